@@ -1,0 +1,58 @@
+//! The one error type of the library. Every message names the file and the place in it, what was found and what
+//! was expected; the hint says what to do.
+
+use std::path::{Path, PathBuf};
+
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A file that does not hold what its format promises.
+    #[error("{}: {place}: {message}", file.display())]
+    Input { file: PathBuf, place: String, message: String, hint: Option<String> },
+
+    /// A file (or a claim in it) larger than the [`Limits`](crate::io::Limits) allow.
+    #[error("{}: {what} is {found}, over the limit of {limit}", file.display())]
+    Limit { file: PathBuf, what: String, found: u64, limit: u64 },
+
+    /// The operating system could not open, read or write a file.
+    #[error("{}: cannot {action}: {source}", file.display())]
+    File { file: PathBuf, action: &'static str, source: std::io::Error },
+
+    /// A value given by the caller that makes no picture (a size of 0, a kernel with no width, …).
+    #[error("{0}")]
+    Argument(String),
+
+    /// The scene holds nothing that could be seen.
+    #[error("nothing to draw: {0}")]
+    NothingToDraw(String),
+
+    /// No adapter, or none of the wanted name.
+    #[error("no usable GPU: {0}")]
+    NoAdapter(String),
+
+    /// The device was lost or ran out of memory.
+    #[error("GPU: {0}")]
+    Gpu(String),
+}
+
+impl Error {
+    /// An [`Error::Input`] without a hint.
+    pub fn input(file: &Path, place: impl Into<String>, message: impl Into<String>) -> Self {
+        Self::Input { file: file.to_owned(), place: place.into(), message: message.into(), hint: None }
+    }
+
+    /// An [`Error::File`].
+    pub fn file(file: &Path, action: &'static str, source: std::io::Error) -> Self {
+        Self::File { file: file.to_owned(), action, source }
+    }
+
+    /// Adds what the user can do about an [`Error::Input`]; other errors pass unchanged.
+    #[must_use]
+    pub fn hint(mut self, text: impl Into<String>) -> Self {
+        if let Self::Input { hint, .. } = &mut self {
+            *hint = Some(text.into());
+        }
+        self
+    }
+}

@@ -1,0 +1,12 @@
+//! splatkit draws volumes and surfaces as elliptic splats, by one engine on wgpu.
+//!
+//! The way of the data: a file → [`io`] (what it says) → [`volume`] / [`surface`] (what it means) → splats
+//! ([`splat`]) → [`engine`] (one pass, one Rust file, one shader) → a [`Frame`](picture::Frame).
+
+pub mod error;
+pub mod io;
+pub mod splat;
+pub mod surface;
+pub mod volume;
+
+pub use error::{Error, Result};

@@ -1,0 +1,72 @@
+//! The one primitive: an ellipsoidal Gaussian kernel with a payload.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec3};
+
+/// An ellipsoidal Gaussian splat as it lies in memory and on the GPU (48 bytes).
+///
+/// The covariance is Σ = B·Bᵀ with B lower triangular; in the whitened space x′ = B⁻¹(x − center) the kernel is the unit
+/// Gaussian exp(−|x′|²/2).
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Splat {
+    /// World position, relative to the set's origin.
+    pub center: [f32; 3],
+    /// Radiance payload: the optical depth through the centre. Scalar payload: the sample's value.
+    pub strength: f32,
+    /// B row by row: b00, b10, b11, b20, b21, b22, in world units.
+    pub factor: [f32; 6],
+    /// Red, green, blue, opacity of 8 bits each, red lowest. Not read for scalars.
+    pub color: u32,
+    /// Unit normal, octahedral, two signed 16-bit parts ([`encode_normal`]); [`NO_NORMAL`] for none (drawn unshaded).
+    pub normal: u32,
+}
+
+/// The [`Splat::normal`] of a splat that has none.
+pub const NO_NORMAL: u32 = 0x8000_8000;
+
+/// What the splats of a set carry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Payload {
+    /// Colour, optical depth and normal; classified before.
+    Radiance,
+    /// A sample value; classified after interpolation, by the scene's transfer function.
+    Scalar,
+}
+
+/// Splats of one payload around a common origin.
+#[derive(Debug, Clone)]
+pub struct SplatSet {
+    /// World position that the centres are relative to.
+    pub origin: DVec3,
+    pub payload: Payload,
+    pub splats: Vec<Splat>,
+    /// Footprints end this many standard deviations from the centre.
+    pub extent: f32,
+}
+
+/// Packs a unit vector in 32 bits (octahedral, Meyer et al. 2010).
+pub fn encode_normal(n: Vec3) -> u32 {
+    let sum = n.x.abs() + n.y.abs() + n.z.abs();
+    if !(sum > 0.0) || !sum.is_finite() {
+        return NO_NORMAL;
+    }
+    let (mut x, mut y) = (n.x / sum, n.y / sum);
+    if n.z < 0.0 {
+        (x, y) = ((1.0 - y.abs()) * x.signum(), (1.0 - x.abs()) * y.signum());
+    }
+    let pack = |v: f32| u32::from((v.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16);
+    pack(x) | pack(y) << 16
+}
+
+/// The unit vector behind [`encode_normal`]; `None` for [`NO_NORMAL`].
+pub fn decode_normal(packed: u32) -> Option<Vec3> {
+    if packed == NO_NORMAL {
+        return None;
+    }
+    let part = |v: u32| f32::from(v as u16 as i16) / 32767.0;
+    let (x, y) = (part(packed), part(packed >> 16));
+    let z = 1.0 - x.abs() - y.abs();
+    let fold = (-z).max(0.0);
+    Some(Vec3::new(x - fold * x.signum(), y - fold * y.signum(), z).normalize())
+}

@@ -1,0 +1,41 @@
+//! What a mesh or cloud file says, whatever its format.
+
+use glam::{DVec3, Vec2, Vec3};
+use std::sync::Arc;
+
+/// A triangle mesh, or a point cloud when it has no triangles.
+///
+/// Positions are in the file's own unit, relative to `origin` (so that geo-referenced doubles keep their precision in
+/// 32 bits). Optional attributes are either empty or as long as `positions`.
+#[derive(Debug, Clone, Default)]
+pub struct Mesh {
+    pub origin: DVec3,
+    pub positions: Vec<Vec3>,
+    /// Unit normals as the file gives them; empty where it gives none.
+    pub normals: Vec<Vec3>,
+    /// Linear copies of the file's display colours, 8 bits a channel: red, green, blue, opacity.
+    pub colors: Vec<[u8; 4]>,
+    pub uvs: Vec<Vec2>,
+    /// Vertex indices, counter-clockwise from outside; polygons are already cut into triangles.
+    pub triangles: Vec<[u32; 3]>,
+    /// The material of each triangle, an index into `materials`; empty where there are none.
+    pub triangle_materials: Vec<u32>,
+    pub materials: Vec<Material>,
+}
+
+/// A base colour, and a texture that it multiplies.
+#[derive(Debug, Clone)]
+pub struct Material {
+    pub name: String,
+    /// Red, green, blue, opacity in 0 … 1, as displayed (not linear light).
+    pub color: [f32; 4],
+    pub texture: Option<Arc<Texture>>,
+}
+
+/// A decoded picture, rows from the top; `uv` (0, 0) is its top left corner.
+#[derive(Debug, Clone)]
+pub struct Texture {
+    pub width: u32,
+    pub height: u32,
+    pub texels: Vec<[u8; 4]>,
+}
