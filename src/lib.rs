@@ -1,10 +1,13 @@
 //! splatkit draws volumes and surfaces as elliptic splats, by one engine on wgpu.
 //!
 //! The way of the data: a file → [`io`] (what it says) → [`volume`] / [`surface`] (what it means) → splats
-//! ([`splat`]) → [`engine`] (one pass, one Rust file, one shader) → a [`Frame`](picture::Frame).
+//! ([`splat`]) → [`engine`] (one pass, one Rust file, one shader) → a [`Picture`](picture::Picture).
 
 pub mod error;
 pub mod io;
+pub mod math;
+pub mod picture;
+pub mod scene;
 pub mod splat;
 pub mod surface;
 pub mod volume;

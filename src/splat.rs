@@ -1,7 +1,9 @@
 //! The one primitive: an ellipsoidal Gaussian kernel with a payload.
 
+use crate::math::Bounds;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 /// An ellipsoidal Gaussian splat as it lies in memory and on the GPU (48 bytes).
 ///
@@ -69,4 +71,25 @@ pub fn decode_normal(packed: u32) -> Option<Vec3> {
     let z = 1.0 - x.abs() - y.abs();
     let fold = (-z).max(0.0);
     Some(Vec3::new(x - fold * x.signum(), y - fold * y.signum(), z).normalize())
+}
+
+impl SplatSet {
+    /// The widest footprint that the engine takes, in standard deviations.
+    pub const MAX_EXTENT: f32 = 8.0;
+
+    /// The box around all footprints, in world coordinates.
+    pub fn bounds(&self) -> Bounds {
+        let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let grow = |(low, high): (Vec3, Vec3), splat: &Splat| {
+            let [b00, b10, b11, b20, b21, b22] = splat.factor;
+            // The half extents of an ellipsoid along the axes are the lengths of the rows of its factor.
+            let reach = self.extent
+                * Vec3::new(b00.abs(), (b10 * b10 + b11 * b11).sqrt(), (b20 * b20 + b21 * b21 + b22 * b22).sqrt());
+            let center = Vec3::from(splat.center);
+            (low.min(center - reach), high.max(center + reach))
+        };
+        let both = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
+        let (low, high) = self.splats.par_iter().fold(|| none, grow).reduce(|| none, both);
+        Bounds { min: self.origin + low.as_dvec3(), max: self.origin + high.as_dvec3() }
+    }
 }

@@ -1,0 +1,258 @@
+//! Cameras and the view frame.
+//!
+//! World frame: right-handed, any unit. View frame: x to the right of the picture, y **down**, z away from the viewer, with
+//! the origin at the camera's position; so a view-space point projects to pixel (cx + f·x/z, cy + f·y/z), rows counted
+//! from the top and pixel centres at half-integers.
+
+use crate::{Error, Result};
+use glam::{DMat3, DVec2, DVec3};
+
+/// A box along the world's axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    pub min: DVec3,
+    pub max: DVec3,
+}
+
+impl Bounds {
+    /// The box of no points; growing it by a point gives that point.
+    pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+
+    pub fn is_empty(&self) -> bool {
+        !(self.min.cmple(self.max)).all()
+    }
+
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    pub fn center(&self) -> DVec3 {
+        0.5 * (self.min + self.max)
+    }
+
+    /// Length of the diagonal.
+    pub fn diagonal(&self) -> f64 {
+        (self.max - self.min).length()
+    }
+
+    pub fn corners(&self) -> [DVec3; 8] {
+        std::array::from_fn(|i| {
+            DVec3::new(
+                if i & 1 == 0 { self.min.x } else { self.max.x },
+                if i & 2 == 0 { self.min.y } else { self.max.y },
+                if i & 4 == 0 { self.min.z } else { self.max.z },
+            )
+        })
+    }
+
+    /// Distances from `point` to the nearest and the farthest point of the box.
+    pub fn distances(&self, point: DVec3) -> [f64; 2] {
+        let nearest = point.clamp(self.min, self.max);
+        let farthest = (point - self.min).abs().max((point - self.max).abs());
+        [(point - nearest).length(), farthest.length()]
+    }
+}
+
+/// How the picture plane is reached.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Projection {
+    /// Full vertical view angle in degrees.
+    Perspective { view_angle: f64 },
+    /// World height that the picture's height shows.
+    Orthographic { height: f64 },
+}
+
+/// Where the picture is taken from. World units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    pub position: DVec3,
+    pub focal_point: DVec3,
+    pub view_up: DVec3,
+    pub projection: Projection,
+}
+
+impl Camera {
+    /// VTK's default, so that the same scene fits the same picture in both.
+    pub const DEFAULT_VIEW_ANGLE: f64 = 30.0;
+
+    /// Looks along `direction` at the whole of `bounds`: its bounding sphere fits the shorter side of the picture.
+    pub fn framing(bounds: &Bounds, direction: DVec3, view_up: DVec3, aspect: f64) -> Self {
+        let radius = (0.5 * bounds.diagonal()).max(f64::MIN_POSITIVE.sqrt());
+        let half = (0.5 * Self::DEFAULT_VIEW_ANGLE).to_radians();
+        // The horizontal half angle is the narrower one in a portrait picture.
+        let narrow = (half.tan() * aspect.min(1.0)).atan();
+        let distance = radius / narrow.sin();
+        Self {
+            position: bounds.center() - distance * direction.normalize(),
+            focal_point: bounds.center(),
+            view_up,
+            projection: Projection::Perspective { view_angle: Self::DEFAULT_VIEW_ANGLE },
+        }
+    }
+
+    /// Turns the camera about the focal point around the view-up axis, in degrees (VTK's Azimuth).
+    pub fn azimuth(&mut self, degrees: f64) {
+        let turn = glam::DQuat::from_axis_angle(self.view_up.normalize(), degrees.to_radians());
+        self.position = self.focal_point + turn * (self.position - self.focal_point);
+    }
+
+    /// Turns the camera about the focal point around the picture's horizontal axis, in degrees (VTK's Elevation).
+    pub fn elevation(&mut self, degrees: f64) {
+        let forward = (self.focal_point - self.position).normalize();
+        let right = forward.cross(self.view_up).normalize();
+        let turn = glam::DQuat::from_axis_angle(right, -degrees.to_radians());
+        self.position = self.focal_point + turn * (self.position - self.focal_point);
+        // Past a pole the old up would point along the view; the turned one never does.
+        self.view_up = turn * self.view_up;
+    }
+
+    /// Narrows the view by a factor (VTK's Zoom).
+    pub fn zoom(&mut self, factor: f64) {
+        match &mut self.projection {
+            Projection::Perspective { view_angle } => *view_angle /= factor,
+            Projection::Orthographic { height } => *height /= factor,
+        }
+    }
+
+    /// The same view without perspective: what lies in the focal plane keeps its size.
+    pub fn make_orthographic(&mut self) {
+        if let Projection::Perspective { view_angle } = self.projection {
+            let distance = (self.focal_point - self.position).length();
+            self.projection =
+                Projection::Orthographic { height: 2.0 * distance * (0.5 * view_angle).to_radians().tan() };
+        }
+    }
+
+    /// Resolves the camera for a picture of `size` pixels (width, height).
+    pub fn view(&self, size: [u32; 2]) -> Result<View> {
+        let bad = |what: &str| Err(Error::Argument(format!("the camera {what}")));
+        if size[0] == 0 || size[1] == 0 {
+            return Err(Error::Argument(format!("a picture of {}x{} has no pixels", size[0], size[1])));
+        }
+        if !(self.position.is_finite() && self.focal_point.is_finite() && self.view_up.is_finite()) {
+            return bad("has a coordinate that is not a finite number");
+        }
+        let forward = match (self.focal_point - self.position).try_normalize() {
+            Some(forward) => forward,
+            None => return bad("stands in its own focal point"),
+        };
+        // A view-up along the view direction has no meaning; any perpendicular one serves better than an error.
+        let right = (forward.cross(self.view_up).try_normalize()).unwrap_or_else(|| forward.any_orthonormal_vector());
+        let down = forward.cross(right);
+        let height = f64::from(size[1]);
+        let (perspective, scale) = match self.projection {
+            Projection::Perspective { view_angle } if view_angle > 0.0 && view_angle < 180.0 => {
+                (true, 0.5 * height / (0.5 * view_angle).to_radians().tan())
+            }
+            Projection::Orthographic { height: world } if world > 0.0 && world.is_finite() => (false, height / world),
+            Projection::Perspective { .. } => return bad("needs a view angle between 0 and 180 degrees"),
+            Projection::Orthographic { .. } => return bad("needs a height above 0"),
+        };
+        Ok(View {
+            position: self.position,
+            rotation: DMat3::from_cols(right, down, forward).transpose(),
+            perspective,
+            scale,
+            center: 0.5 * DVec2::new(f64::from(size[0]), height),
+            size,
+        })
+    }
+}
+
+/// A camera resolved for a picture's size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    /// World position of the view frame's origin.
+    pub position: DVec3,
+    /// View-space direction of a world direction.
+    pub rotation: DMat3,
+    pub perspective: bool,
+    /// Perspective: focal length in pixels. Orthographic: pixels per world unit.
+    pub scale: f64,
+    /// Pixel coordinates of the optical axis.
+    pub center: DVec2,
+    pub size: [u32; 2],
+}
+
+impl View {
+    /// View-space position of a world point.
+    pub fn to_view(&self, world: DVec3) -> DVec3 {
+        self.rotation * (world - self.position)
+    }
+
+    /// The ray of a point of the picture: view-space origin and unit direction. Distances along rays are counted from
+    /// this origin: from the eye in perspective, from the plane z = 0 in orthographic views.
+    pub fn ray(&self, pixel: DVec2) -> (DVec3, DVec3) {
+        let p = (pixel - self.center) / self.scale;
+        if self.perspective { (DVec3::ZERO, p.extend(1.0).normalize()) } else { (p.extend(0.0), DVec3::Z) }
+    }
+
+    /// Smallest and largest distance from the view's origin (perspective) or from its plane (orthographic) in a box.
+    pub fn distances(&self, bounds: &Bounds) -> [f64; 2] {
+        if self.perspective {
+            return bounds.distances(self.position);
+        }
+        bounds.corners().iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[near, far], &corner| {
+            let z = self.to_view(corner).z;
+            [near.min(z), far.max(z)]
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera() -> Camera {
+        let bounds = Bounds { min: DVec3::splat(-1.0), max: DVec3::new(3.0, 2.0, 5.0) };
+        Camera::framing(&bounds, DVec3::new(1.0, 2.0, -0.5), DVec3::Z, 4.0 / 3.0)
+    }
+
+    #[test]
+    fn the_framing_camera_shows_every_corner() {
+        let bounds = Bounds { min: DVec3::splat(-1.0), max: DVec3::new(3.0, 2.0, 5.0) };
+        for size in [[640, 480], [480, 640]] {
+            let aspect = f64::from(size[0]) / f64::from(size[1]);
+            let camera = Camera::framing(&bounds, DVec3::new(1.0, 2.0, -0.5), DVec3::Z, aspect);
+            let view = camera.view(size).unwrap();
+            for corner in bounds.corners() {
+                let p = view.to_view(corner);
+                let pixel = view.center + view.scale * p.truncate() / p.z;
+                assert!(pixel.x >= 0.0 && pixel.x <= f64::from(size[0]), "{pixel}");
+                assert!(pixel.y >= 0.0 && pixel.y <= f64::from(size[1]), "{pixel}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_view_frame_is_right_down_forward() {
+        let view = camera().view([64, 64]).unwrap();
+        let rows = view.rotation.transpose();
+        assert!((view.rotation.determinant() - 1.0).abs() < 1e-12);
+        assert!(rows.y_axis.dot(DVec3::Z) < 0.0, "down points against view-up");
+        let center = view.to_view(camera().focal_point);
+        assert!(center.truncate().length() < 1e-9 && center.z > 0.0);
+    }
+
+    #[test]
+    fn an_orthographic_copy_keeps_the_focal_plane() {
+        let mut flat = camera();
+        let sharp = camera().view([200, 100]).unwrap();
+        flat.make_orthographic();
+        let flat = flat.view([200, 100]).unwrap();
+        let distance = (camera().focal_point - camera().position).length();
+        assert!((flat.scale - sharp.scale / distance).abs() < 1e-9 * flat.scale);
+    }
+
+    #[test]
+    fn cameras_without_a_picture_are_refused() {
+        let mut c = camera();
+        assert!(c.view([0, 5]).is_err());
+        c.focal_point = c.position;
+        assert!(c.view([5, 5]).is_err());
+        c = camera();
+        c.projection = Projection::Perspective { view_angle: 180.0 };
+        assert!(c.view([5, 5]).is_err());
+    }
+}
