@@ -121,8 +121,8 @@ impl Item {
                 let axes = volume.lattice.axes;
                 let reach =
                     kernel.extent * glam::DVec3::new(axes.row(0).length(), axes.row(1).length(), axes.row(2).length());
-                let samples = volume.bounds();
-                Bounds { min: samples.min - reach, max: samples.max + reach }
+                let [min, max] = volume.bounds();
+                Bounds { min: min - reach, max: max + reach }
             }
         }
     }
@@ -168,5 +168,10 @@ impl Settings {
             sheet_pixels: 4.0,
             near: None,
         }
+    }
+
+    /// The light on a volume that `transfer` shows.
+    pub fn shade_of(&self, transfer: &TransferFunction) -> Option<Shade> {
+        self.volume_shade.unwrap_or(transfer.shade)
     }
 }

@@ -1,0 +1,153 @@
+//! The device: adapters, their limits, and the errors of both.
+
+use crate::{Error, Result};
+use std::sync::Arc;
+
+/// A wgpu device and queue, with the adapter's description.
+#[derive(Debug, Clone)]
+pub struct Gpu {
+    pub device: wgpu::Device,
+    pub queue: wgpu::Queue,
+    pub info: Arc<wgpu::AdapterInfo>,
+}
+
+/// Which adapter to take.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum AdapterChoice {
+    /// The environment's `WGPU_ADAPTER_NAME` if set, else the fastest: discrete, integrated, virtual, then software.
+    #[default]
+    Automatic,
+    /// By its place in [`Gpu::adapters`].
+    Index(usize),
+    /// By a part of its name, in any case.
+    Name(String),
+    /// A software adapter.
+    Software,
+}
+
+impl std::str::FromStr for AdapterChoice {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Ok(match text.parse() {
+            Ok(index) => Self::Index(index),
+            Err(_) if text.eq_ignore_ascii_case("software") => Self::Software,
+            Err(_) => Self::Name(text.to_owned()),
+        })
+    }
+}
+
+/// What the user can do where no adapter is found.
+const NO_ADAPTER_HELP: &str = "install a Vulkan driver; without a GPU, Mesa's software driver serves \
+    (Debian and Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1)";
+
+fn instance() -> wgpu::Instance {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+    // The debug layers that wgpu turns on in debug builds are a developer's choice, not a default.
+    descriptor.flags = wgpu::InstanceFlags::from_env_or_default();
+    wgpu::Instance::new(descriptor)
+}
+
+/// Fastest first; software last.
+fn rank(info: &wgpu::AdapterInfo) -> u8 {
+    match info.device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    }
+}
+
+fn usable_adapters() -> Vec<wgpu::Adapter> {
+    let mut adapters = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::all()));
+    // One that lacks compute shaders, or storage buffers in them, cannot run the engine.
+    adapters.retain(|a| {
+        let flags = a.get_downlevel_capabilities().flags;
+        flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS) && a.limits().max_storage_buffers_per_shader_stage >= 8
+    });
+    adapters.sort_by_key(|a| rank(&a.get_info()));
+    adapters
+}
+
+impl Gpu {
+    /// The adapters that can run the engine, fastest first, with their limits.
+    pub fn adapters() -> Vec<(wgpu::AdapterInfo, wgpu::Limits)> {
+        usable_adapters().iter().map(|a| (a.get_info(), a.limits())).collect()
+    }
+
+    /// Opens a device without a window.
+    ///
+    /// # Errors
+    /// [`Error::NoAdapter`] where there is none (or none of that name), with what to install.
+    pub fn headless(choice: &AdapterChoice) -> Result<Self> {
+        let mut adapters = usable_adapters();
+        let names = || adapters.iter().map(|a| a.get_info().name).collect::<Vec<_>>().join(", ");
+        let by_name = |part: &str| {
+            let part = part.to_lowercase();
+            adapters.iter().position(|a| a.get_info().name.to_lowercase().contains(&part))
+        };
+        if adapters.is_empty() {
+            return Err(Error::NoAdapter(format!("no adapter was found; {NO_ADAPTER_HELP}")));
+        }
+        let wanted = match choice {
+            AdapterChoice::Automatic => match std::env::var("WGPU_ADAPTER_NAME") {
+                Ok(name) if !name.is_empty() => (by_name(&name), format!("named “{name}” (WGPU_ADAPTER_NAME)")),
+                _ => (Some(0), String::new()),
+            },
+            AdapterChoice::Index(index) => (Some(*index).filter(|&i| i < adapters.len()), format!("number {index}")),
+            AdapterChoice::Name(name) => (by_name(name), format!("named “{name}”")),
+            AdapterChoice::Software => {
+                let found = adapters.iter().position(|a| a.get_info().device_type == wgpu::DeviceType::Cpu);
+                (found, format!("in software; {NO_ADAPTER_HELP}"))
+            }
+        };
+        let Some(index) = wanted.0 else {
+            return Err(Error::NoAdapter(format!("there is no adapter {}; found: {}", wanted.1, names())));
+        };
+        Self::open(&adapters.swap_remove(index))
+    }
+
+    fn open(adapter: &wgpu::Adapter) -> Result<Self> {
+        // WebGPU's defaults are what the engine is built for; larger bindings only save passes.
+        let limits = wgpu::Limits {
+            max_storage_buffer_binding_size: adapter.limits().max_storage_buffer_binding_size,
+            max_buffer_size: adapter.limits().max_buffer_size,
+            ..wgpu::Limits::default()
+        };
+        let features = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("splatkit"),
+            required_features: features,
+            required_limits: limits,
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|e| Error::NoAdapter(format!("{} cannot be opened: {e}", adapter.get_info().name)))?;
+        Ok(Self { device, queue, info: Arc::new(adapter.get_info()) })
+    }
+
+    /// Takes the device of a host application. It must keep WebGPU's default limits.
+    pub fn from_wgpu(device: wgpu::Device, queue: wgpu::Queue, info: wgpu::AdapterInfo) -> Self {
+        Self { device, queue, info: Arc::new(info) }
+    }
+
+    /// Whether the adapter runs on the processor. Tiles are then walked by fewer, wider invocations.
+    pub fn is_software(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// The most bytes that one storage binding holds, as a multiple of 256.
+    pub fn binding_size(&self) -> u64 {
+        let limits = self.device.limits();
+        (limits.max_storage_buffer_binding_size).min(limits.max_buffer_size) / 256 * 256
+    }
+
+    /// Waits until the device has done all that was submitted.
+    pub fn wait(&self) -> Result<()> {
+        match self.device.poll(wgpu::PollType::wait_indefinitely()) {
+            Ok(_) => Ok(()),
+            Err(e) => Err(Error::Gpu(format!("{} stopped answering: {e}", self.info.name))),
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! One compute pipeline with its bindings. Shaders are put together from whole files: shared declarations first, then the
+//! pass's own file, so that each shader says what it uses and nothing is generated.
+
+use super::Gpu;
+
+/// What a binding holds, in the order of the shader's binding numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Binding {
+    Uniform,
+    Read,
+    Write,
+}
+
+/// A compute pipeline and the layouts of its bind groups.
+#[derive(Debug)]
+pub struct Stage {
+    label: &'static str,
+    pipeline: wgpu::ComputePipeline,
+    layouts: Vec<wgpu::BindGroupLayout>,
+}
+
+impl Stage {
+    /// Compiles `entry` of the joined `sources`; `groups` lists the bindings of each bind group.
+    pub fn new(gpu: &Gpu, label: &'static str, sources: &[&str], entry: &str, groups: &[&[Binding]]) -> Self {
+        let device = &gpu.device;
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(label),
+            source: wgpu::ShaderSource::Wgsl(sources.concat().into()),
+        });
+        let layouts: Vec<_> = groups.iter().map(|bindings| layout(device, label, bindings)).collect();
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(label),
+            bind_group_layouts: &layouts.iter().map(Some).collect::<Vec<_>>(),
+            immediate_size: 0,
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(label),
+            layout: Some(&pipeline_layout),
+            module: &module,
+            entry_point: Some(entry),
+            // Nothing reads workgroup memory before it is written.
+            compilation_options: wgpu::PipelineCompilationOptions {
+                zero_initialize_workgroup_memory: false,
+                ..Default::default()
+            },
+            cache: None,
+        });
+        Self { label, pipeline, layouts }
+    }
+
+    /// Binds buffers (whole, or parts) to group `group`, in the order of their binding numbers.
+    pub fn bind(&self, gpu: &Gpu, group: usize, buffers: &[wgpu::BufferBinding<'_>]) -> wgpu::BindGroup {
+        let entries: Vec<_> = (0..)
+            .zip(buffers)
+            .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                binding,
+                resource: wgpu::BindingResource::Buffer(buffer.clone()),
+            })
+            .collect();
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(self.label),
+            layout: &self.layouts[group],
+            entries: &entries,
+        })
+    }
+
+    /// Encodes a dispatch of a fixed number of workgroups.
+    pub fn dispatch(&self, encoder: &mut wgpu::CommandEncoder, groups: &[&wgpu::BindGroup], workgroups: u32) {
+        if workgroups > 0 {
+            self.begin(encoder, groups).dispatch_workgroups(workgroups, 1, 1);
+        }
+    }
+
+    /// Encodes a dispatch whose number of workgroups lies in `arguments` at a byte offset.
+    pub fn dispatch_indirect(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        groups: &[&wgpu::BindGroup],
+        (arguments, offset): (&wgpu::Buffer, u64),
+    ) {
+        self.begin(encoder, groups).dispatch_workgroups_indirect(arguments, offset);
+    }
+
+    fn begin<'a>(
+        &self,
+        encoder: &'a mut wgpu::CommandEncoder,
+        groups: &[&wgpu::BindGroup],
+    ) -> wgpu::ComputePass<'a> {
+        let mut pass = encoder
+            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(self.label), timestamp_writes: None });
+        pass.set_pipeline(&self.pipeline);
+        for (index, group) in (0..).zip(groups) {
+            pass.set_bind_group(index, *group, &[]);
+        }
+        pass
+    }
+}
+
+fn layout(device: &wgpu::Device, label: &str, bindings: &[Binding]) -> wgpu::BindGroupLayout {
+    let entries: Vec<_> = (0..)
+        .zip(bindings)
+        .map(|(binding, kind)| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer {
+                ty: match kind {
+                    Binding::Uniform => wgpu::BufferBindingType::Uniform,
+                    Binding::Read => wgpu::BufferBindingType::Storage { read_only: true },
+                    Binding::Write => wgpu::BufferBindingType::Storage { read_only: false },
+                },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        })
+        .collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+}
