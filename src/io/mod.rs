@@ -3,7 +3,41 @@
 //! [`load`] looks at the name and the first bytes and gives a [`Loaded`]: a mesh (or cloud) or a volume.
 
 mod limits;
+pub mod nrrd;
+pub mod raw;
+mod sample_type;
 mod source;
+#[cfg(test)]
+mod testing;
+pub mod vti;
+mod vtk_array;
 
 pub use limits::Limits;
+pub use raw::RawLayout;
+pub use sample_type::{Endian, SampleType};
 pub use source::Source;
+
+use crate::{Result, volume::Volume};
+use std::path::Path;
+
+/// Reads a volume: VTI and NRRD by their extensions (`.vti`, `.nrrd`, `.nhdr`), any other file as raw where `raw` gives
+/// its layout, and by its first bytes otherwise. World units are those of the file.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) for what is no such file, [`Error::Limit`](crate::Error::Limit) and
+/// [`Error::File`](crate::Error::File) as for every input.
+pub fn load_volume(path: &Path, limits: &Limits, raw: Option<&RawLayout>) -> Result<Volume> {
+    let source = Source::open(path, limits)?;
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let beginning = &source.bytes()[..source.bytes().len().min(1024)];
+    match (extension.as_deref(), raw) {
+        (Some("vti"), _) => vti::read(&source),
+        (Some("nrrd" | "nhdr"), _) => nrrd::read(&source),
+        (_, Some(layout)) => raw::read(&source, layout),
+        _ if beginning.starts_with(b"NRRD") => nrrd::read(&source),
+        _ if beginning.windows(8).any(|w| w == b"<VTKFile") => vti::read(&source),
+        _ => Err(source
+            .error("file", "is not a volume that can be read: neither VTI nor NRRD")
+            .hint("a raw file needs its dimensions and its sample type")),
+    }
+}

@@ -1,7 +1,9 @@
 //! Volumes: samples on a lattice, and the transfer functions that show them.
 
 mod lattice;
+pub mod phantoms;
 mod presets;
+pub mod reach;
 mod samples;
 mod transfer;
 

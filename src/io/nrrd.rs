@@ -1,0 +1,421 @@
+//! NRRD volumes (Teem's format, versions 1 to 5), attached and detached, after its definition at
+//! <https://teem.sourceforge.net/nrrd/format.html>.
+
+use super::{Endian, SampleType, Source};
+use crate::{
+    Result,
+    volume::{Lattice, Volume},
+};
+use flate2::read::MultiGzDecoder;
+use glam::{DMat3, DVec3};
+use std::{borrow::Cow, collections::HashMap};
+
+/// Reads a volume of three axes with one scalar each. Positions are in the file's own space (RAS, LPS, …: nothing is
+/// turned round); without `space directions` the axes are x, y, z at the `spacings`, 1 where those are missing or NaN.
+///
+/// Encodings: raw, gzip, ascii and hex. `data file` may name one file inside the header's folder.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) with the field that is missing or wrong, for data that are cut off and for
+/// samples that are not finite; [`Error::Limit`](crate::Error::Limit) for sizes over the limits.
+pub fn read(source: &Source) -> Result<Volume> {
+    let (header, body) = Header::read(source)?;
+    let dims = header.dims()?;
+    let lattice = header.lattice(dims)?;
+    let kind = header.sample_type()?;
+    let size = source.check_bytes("the size of the samples in bytes", kind.bytes_of(dims).unwrap_or(u64::MAX))?;
+    let Some(name) = header.get(&["data file", "datafile"]) else {
+        return header.samples(source, &source.bytes()[body..], kind, size, lattice);
+    };
+    if name == "LIST" || name.starts_with("LIST ") || name.contains('%') {
+        return Err(source
+            .error("data file", format!("“{name}” names several files, which is not supported"))
+            .hint("join them to one file"));
+    }
+    let path = source.neighbour("data file", name)?;
+    let data = Source::open(&path, source.limits)?;
+    header.samples(&data, data.bytes(), kind, size, lattice)
+}
+
+/// The fields of a header, names in lower case.
+struct Header<'a> {
+    source: &'a Source<'a>,
+    fields: HashMap<String, String>,
+}
+
+impl<'a> Header<'a> {
+    /// Reads up to the empty line or the end of the file; also gives where the data begin.
+    fn read(source: &'a Source<'a>) -> Result<(Self, usize)> {
+        let bytes = source.bytes();
+        if !(bytes.starts_with(b"NRRD000") && matches!(bytes.get(7), Some(b'1'..=b'5'))) {
+            return Err(source.error("line 1", "does not begin with NRRD0001 … NRRD0005"));
+        }
+        let mut fields = HashMap::new();
+        let mut at = 0;
+        for (number, line) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
+            at += line.len();
+            // Comments may be in any encoding.
+            let text = String::from_utf8_lossy(line);
+            let text = text.trim_end_matches(['\n', '\r']);
+            if text.is_empty() {
+                break;
+            }
+            // “key:=value” pairs carry nothing that a picture needs.
+            let field = text.split_once(':').filter(|(_, value)| !value.starts_with('='));
+            match field {
+                _ if number == 0 || text.starts_with('#') => {}
+                Some((name, value)) => {
+                    fields.insert(name.trim().to_ascii_lowercase(), value.trim().to_owned());
+                }
+                None if text.contains(":=") => {}
+                None => {
+                    let message = "is neither a field, a key and value, a comment, nor the empty line before the data";
+                    return Err(source.error(format!("line {}", number + 1), message));
+                }
+            }
+        }
+        Ok((Self { source, fields }, at))
+    }
+
+    /// A field by its spellings.
+    fn get(&self, names: &[&str]) -> Option<&str> {
+        names.iter().find_map(|&name| self.fields.get(name)).map(String::as_str)
+    }
+
+    fn need(&self, name: &str) -> Result<&str> {
+        self.get(&[name]).ok_or_else(|| self.source.error("header", format!("has no field “{name}”")))
+    }
+
+    /// The numbers of a field, exactly `N`.
+    fn numbers<const N: usize, T: std::str::FromStr>(&self, name: &str, text: &str) -> Result<[T; N]> {
+        let numbers: Option<Vec<T>> = text.split_ascii_whitespace().map(|word| word.parse().ok()).collect();
+        let wrong = |_| self.source.error(name, format!("“{text}” is not a list of {N} numbers"));
+        numbers.unwrap_or_default().try_into().map_err(wrong)
+    }
+
+    fn dims(&self) -> Result<[usize; 3]> {
+        let [dimension]: [u32; 1] = self.numbers("dimension", self.need("dimension")?)?;
+        if dimension != 3 {
+            return Err(self.source.error(
+                "dimension",
+                format!("is {dimension}, but a volume has 3 axes with one scalar for each sample"),
+            ));
+        }
+        self.numbers("sizes", self.need("sizes")?)
+    }
+
+    fn lattice(&self, dims: [usize; 3]) -> Result<Lattice> {
+        let axes = match self.get(&["space directions"]) {
+            Some(text) => {
+                let [x, y, z] = self.vectors("space directions", text)?;
+                DMat3::from_cols(x, y, z)
+            }
+            None => {
+                let [x, y, z]: [f64; 3] = match self.get(&["spacings"]) {
+                    Some(text) => self.numbers("spacings", text)?,
+                    None => [1.0; 3],
+                };
+                // NaN stands for a spacing that is not known.
+                DMat3::from_diagonal(DVec3::new(x, y, z).map(|s| if s.is_nan() { 1.0 } else { s }))
+            }
+        };
+        let origin = match self.get(&["space origin"]) {
+            Some(text) => self.vectors::<1>("space origin", text)?[0],
+            None => DVec3::ZERO,
+        };
+        let lattice = Lattice { dims, origin, axes };
+        lattice.validate().map_err(|message| self.source.error("header", message))?;
+        Ok(lattice)
+    }
+
+    /// Vectors written as (x,y,z), exactly `N`.
+    fn vectors<const N: usize>(&self, name: &str, text: &str) -> Result<[DVec3; N]> {
+        let wrong = || self.source.error(name, format!("“{text}” is not {N} × (x,y,z)"));
+        let vector = |part: &str| {
+            let numbers: Option<Vec<f64>> =
+                part.trim().strip_prefix('(')?.split(',').map(|word| word.trim().parse().ok()).collect();
+            <[f64; 3]>::try_from(numbers?).ok().map(DVec3::from_array)
+        };
+        let (inside, rest) = text.rsplit_once(')').ok_or_else(wrong)?;
+        let vectors: Option<Vec<DVec3>> = inside.split(')').map(vector).collect();
+        let vectors = vectors.filter(|_| rest.trim().is_empty()).ok_or_else(wrong)?;
+        vectors.try_into().map_err(|_| wrong())
+    }
+
+    fn sample_type(&self) -> Result<SampleType> {
+        let name = self.need("type")?.to_ascii_lowercase();
+        Ok(match name.as_str() {
+            "signed char" | "int8" | "int8_t" => SampleType::I8,
+            "uchar" | "unsigned char" | "uint8" | "uint8_t" => SampleType::U8,
+            "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => SampleType::I16,
+            "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => SampleType::U16,
+            "int" | "signed int" | "int32" | "int32_t" => SampleType::I32,
+            "uint" | "unsigned int" | "uint32" | "uint32_t" => SampleType::U32,
+            "longlong"
+            | "long long"
+            | "long long int"
+            | "signed long long"
+            | "signed long long int"
+            | "int64"
+            | "int64_t" => SampleType::I64,
+            "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => SampleType::U64,
+            "float" => SampleType::F32,
+            "double" => SampleType::F64,
+            _ => return Err(self.source.error("type", format!("“{name}” is not a type of scalars"))),
+        })
+    }
+
+    fn endian(&self, kind: SampleType) -> Result<Endian> {
+        match self.get(&["endian"]).map(str::to_ascii_lowercase).as_deref() {
+            Some("little") => Ok(Endian::Little),
+            Some("big") => Ok(Endian::Big),
+            None if kind.bytes() == 1 => Ok(Endian::Little),
+            None => Err(self.source.error("header", "has no field “endian”, which samples of several bytes need")),
+            Some(other) => Err(self.source.error("endian", format!("“{other}” is neither little nor big"))),
+        }
+    }
+
+    /// Decodes `size` bytes of samples from the data, which may be in a file of their own.
+    fn samples(&self, file: &Source, data: &[u8], kind: SampleType, size: usize, lattice: Lattice) -> Result<Volume> {
+        let place = "data";
+        let skip = |names: &[&str]| match self.get(names) {
+            Some(text) => self.numbers::<1, i64>(names[0], text).map(|[n]| n),
+            None => Ok(0),
+        };
+        let lines = skip(&["line skip", "lineskip"])?;
+        let skipped: usize = data.split_inclusive(|&b| b == b'\n').take(lines.max(0) as usize).map(<[u8]>::len).sum();
+        let data = &data[skipped..];
+        let skip = skip(&["byte skip", "byteskip"])?;
+        if lines < 0 || skip < -1 {
+            return Err(self.source.error("header", "skips a negative number of lines or bytes"));
+        }
+        let encoding = self.need("encoding")?.to_ascii_lowercase();
+        let from_end = skip == -1;
+        if from_end && encoding != "raw" {
+            return Err(self.source.error("byte skip", "-1 counts from the end, which only raw data can"));
+        }
+        let skip = skip.max(0) as usize;
+        let after_skip =
+            || data.get(skip..).ok_or_else(|| file.error(place, format!("end before the {skip} bytes to skip do")));
+        let text = || {
+            let bytes = after_skip()?;
+            std::str::from_utf8(bytes).map_err(|e| file.error(place, format!("byte {} is not text", e.valid_up_to())))
+        };
+        let (bytes, endian): (Cow<[u8]>, Endian) = match encoding.as_str() {
+            "raw" => {
+                let start = if from_end { data.len().checked_sub(size) } else { Some(skip) };
+                let found = start.and_then(|start| data.get(start..)).and_then(|rest| rest.get(..size));
+                let found = found.ok_or_else(|| {
+                    let there = data.len().saturating_sub(skip);
+                    file.error(place, format!("there are {there} bytes where {size} were expected"))
+                })?;
+                (found.into(), self.endian(kind)?)
+            }
+            // Skipped lines stand before the packed stream, skipped bytes inside it.
+            "gzip" | "gz" => {
+                let mut unpacked = file.unpack(place, MultiGzDecoder::new(data), skip.saturating_add(size))?;
+                unpacked.drain(..skip);
+                (unpacked.into(), self.endian(kind)?)
+            }
+            "ascii" | "txt" | "text" => {
+                let bytes = kind.parse(text()?, size / kind.bytes()).map_err(|message| file.error(place, message))?;
+                (bytes.into(), Endian::Little)
+            }
+            "hex" => {
+                let bytes = from_hex(text()?, size).map_err(|message| file.error(place, message))?;
+                (bytes.into(), self.endian(kind)?)
+            }
+            _ => {
+                return Err(self
+                    .source
+                    .error("encoding", format!("“{encoding}” is not supported"))
+                    .hint("write the file with raw or gzip encoding"));
+            }
+        };
+        Volume::new(lattice, kind.decode(bytes, endian)).map_err(|message| file.error("samples", message))
+    }
+}
+
+/// Bytes of two hexadecimal digits each; white space does not count.
+fn from_hex(text: &str, size: usize) -> Result<Vec<u8>, String> {
+    let mut digits = Vec::new();
+    for c in text.chars().filter(|c| !c.is_ascii_whitespace()) {
+        digits.push(c.to_digit(16).ok_or_else(|| format!("“{c}” is no hexadecimal digit"))? as u8);
+    }
+    if digits.len() % 2 != 0 || digits.len() / 2 != size {
+        return Err(format!("there are {} hexadecimal digits where {} were expected", digits.len(), 2 * size as u64));
+    }
+    Ok(digits.chunks_exact(2).map(|pair| pair[0] << 4 | pair[1]).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Error, io::testing::*, volume::Samples};
+    use flate2::{Compression, write::GzEncoder};
+    use std::io::Write;
+
+    const VALUES: [i16; 12] = [0, 1, -2, 300, -4000, 5, 6, 7, 8, 9, 10, 32767];
+
+    fn gzip(bytes: &[u8]) -> Vec<u8> {
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
+        encoder.write_all(bytes).unwrap();
+        encoder.finish().unwrap()
+    }
+
+    fn file(fields: &str, data: &[u8]) -> Vec<u8> {
+        let mut bytes = format!("NRRD0005\n# a comment\ndimension: 3\n{fields}\n\n").into_bytes();
+        bytes.extend_from_slice(data);
+        bytes
+    }
+
+    fn bytes_of(endian: Endian) -> Vec<u8> {
+        VALUES.iter().flat_map(|v| if endian == Endian::Little { v.to_le_bytes() } else { v.to_be_bytes() }).collect()
+    }
+
+    #[test]
+    fn every_encoding_in_both_orders() {
+        let folder = Folder::new("nrrd-encodings");
+        let ascii = VALUES.map(|v| v.to_string()).join("\n");
+        for (endian, name) in [(Endian::Little, "little"), (Endian::Big, "big")] {
+            let raw = bytes_of(endian);
+            let hex: String = raw.iter().map(|b| format!("{b:02x} ")).collect();
+            for (encoding, data) in [
+                ("raw", raw.clone()),
+                ("gzip", gzip(&raw)),
+                ("gz", gzip(&raw)),
+                ("ascii", ascii.clone().into_bytes()),
+                ("txt", ascii.clone().into_bytes()),
+                ("hex", hex.into_bytes()),
+            ] {
+                for (header, line_end) in [(0, "\n"), (1, "\r\n")] {
+                    let fields = format!("type: short\nsizes: 3 2 2\nencoding: {encoding}\nendian: {name}");
+                    let text = format!("NRRD000{}\nkey:=value\ndimension: 3\n{fields}\n\n", header + 4);
+                    let mut content = text.replace('\n', line_end).into_bytes();
+                    content.extend_from_slice(&data);
+                    let volume = read_with(&folder.write("volume.nrrd", &content), read).unwrap();
+                    assert_eq!(volume.samples, Samples::I16(VALUES.to_vec()), "{encoding} {name}");
+                    assert_eq!(volume.lattice, Lattice::with_spacing([3, 2, 2], DVec3::ONE));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lattices() {
+        let folder = Folder::new("nrrd-lattices");
+        let lattice = |fields: &str| {
+            let content = file(&format!("type: uint8\nsizes: 2 1 1\nencoding: raw\n{fields}"), &[1, 2]);
+            read_with(&folder.write("volume.nrrd", &content), read).map(|volume| volume.lattice)
+        };
+        let turned =
+            lattice("space: RAS\nspace directions: (0, 0.5,0) (-2,0,0)(0,0,3)\nspace origin: (10,20,-30.5)").unwrap();
+        assert_eq!(turned.origin, DVec3::new(10.0, 20.0, -30.5));
+        assert_eq!(turned.position(DVec3::new(1.0, 1.0, 1.0)), DVec3::new(8.0, 20.5, -27.5));
+        assert_eq!(lattice("spacings: 1 2.5 NaN").unwrap().spacing(), DVec3::new(1.0, 2.5, 1.0));
+        for (fields, word) in [
+            ("space directions: none (1,0,0) (0,1,0)", "space directions"),
+            ("space directions: (1,0) (0,1)", "space directions"),
+            ("space directions: (1,0,0) (0,1,0) (1,1,0)", "one plane"),
+            ("space origin: (1,0,0", "space origin"),
+            ("spacings: 1 0 1", "spacing"),
+            ("spacings: 1 1", "spacings"),
+            ("spacings: 1 1 inf", "finite"),
+        ] {
+            let message = lattice(fields).unwrap_err().to_string();
+            assert!(message.contains(word), "{message}");
+        }
+    }
+
+    #[test]
+    fn skips_and_detached_files() {
+        let folder = Folder::new("nrrd-detached");
+        folder.write("plain.raw", &[9, 9, 1, 2, 3, 4]);
+        folder.write("lines.raw", b"one\ntwo\n\x05\x01\x02\x03\x04");
+        folder.write("packed.raw.gz", &[b"line\n".to_vec(), gzip(&[7, 1, 2, 3, 4])].concat());
+        let detached = |fields: &str| {
+            let text = format!("NRRD0001\ntype: uchar\ndimension: 3\nsizes: 2 2 1\n{fields}\n");
+            read_with(&folder.write("volume.nhdr", text.as_bytes()), read)
+        };
+        for fields in [
+            "encoding: raw\nbyte skip: 2\ndata file: plain.raw",
+            "encoding: raw\nbyte skip: -1\ndatafile: ./plain.raw",
+            "encoding: raw\nline skip: 2\nbyte skip: 1\ndata file: lines.raw",
+            "encoding: gzip\nlineskip: 1\nbyteskip: 1\ndata file: packed.raw.gz",
+        ] {
+            assert_eq!(detached(fields).unwrap().samples, Samples::U8(vec![1, 2, 3, 4]), "{fields}");
+        }
+        for (fields, word) in [
+            ("encoding: raw\ndata file: missing.raw", "missing.raw"),
+            ("encoding: raw\ndata file: ../plain.raw", "own folder"),
+            ("encoding: raw\ndata file: LIST", "several files"),
+            ("encoding: raw\ndata file: slice%03d.raw 1 9 1", "several files"),
+            ("encoding: raw\nbyte skip: 99\ndata file: plain.raw", "0 bytes where 4"),
+            ("encoding: raw\nbyte skip: -2\ndata file: plain.raw", "negative"),
+            ("encoding: raw\nbyte skip: 9223372036854775807\ndata file: plain.raw", "0 bytes where 4"),
+            ("encoding: gzip\nbyte skip: 9223372036854775807\ndata file: packed.raw.gz", "limit"),
+            ("encoding: gzip\nbyte skip: -1\ndata file: packed.raw.gz", "-1"),
+            ("encoding: bzip2\ndata file: plain.raw", "bzip2"),
+            ("encoding: hex\ndata file: plain.raw", "hexadecimal"),
+            ("data file: plain.raw", "encoding"),
+        ] {
+            let message = detached(fields).unwrap_err().to_string();
+            assert!(message.contains(word), "{message}");
+        }
+    }
+
+    #[test]
+    fn every_type() {
+        let folder = Folder::new("nrrd-types");
+        for (name, samples) in [
+            ("signed char", Samples::I16(vec![1, 2])),
+            ("unsigned char", Samples::U8(vec![1, 2])),
+            ("short int", Samples::I16(vec![1, 2])),
+            ("unsigned short int", Samples::U16(vec![1, 2])),
+            ("int", Samples::I32(vec![1, 2])),
+            ("uint32_t", Samples::I32(vec![1, 2])),
+            ("long long int", Samples::I32(vec![1, 2])),
+            ("unsigned long long", Samples::I32(vec![1, 2])),
+            ("float", Samples::F32(vec![1.0, 2.0])),
+            ("double", Samples::F32(vec![1.0, 2.0])),
+        ] {
+            let content = file(&format!("type: {name}\nsizes: 1 1 2\nencoding: ascii"), b"1 2");
+            let volume = read_with(&folder.write("volume.nrrd", &content), read).unwrap();
+            assert_eq!(volume.samples, samples, "{name}");
+        }
+    }
+
+    #[test]
+    fn cuts_and_lies_are_errors() {
+        let folder = Folder::new("nrrd-broken");
+        let fields = "type: short\nsizes: 3 2 2\nencoding";
+        for (encoding, data) in [("raw", bytes_of(Endian::Little)), ("gzip", gzip(&bytes_of(Endian::Little)))] {
+            let content = file(&format!("{fields}: {encoding}\nendian: little"), &data);
+            every_cut(&folder, "volume.nrrd", &content, read);
+        }
+        let error =
+            |fields: &str, data: &[u8]| read_with(&folder.write("volume.nrrd", &file(fields, data)), read).unwrap_err();
+        let sizes =
+            |sizes: &str| error(&format!("type: uint8\nsizes: {sizes}\nencoding: gzip"), &gzip(&vec![0; 1 << 20]));
+        assert!(matches!(sizes("1099511627776 1 1"), Error::Limit { .. }));
+        assert!(matches!(sizes("4294967296 4294967296 2"), Error::Input { .. }), "more than memory indexes");
+        assert!(sizes("99999999999999999999 1 1").to_string().contains("sizes"));
+        assert!(sizes("2147483648 4 1").to_string().contains("unpacks to 1048576 bytes"));
+        assert!(sizes("2 2 2").to_string().contains("more bytes"));
+        assert!(sizes("0 2 2").to_string().contains("holds none"));
+        assert!(sizes("2 2").to_string().contains("3 numbers"));
+        for (fields, data, word) in [
+            ("dimension: 2\ntype: uint8\nsizes: 2 2\nencoding: raw", &[0; 4][..], "3 axes"),
+            ("type: block\nsizes: 1 1 1\nencoding: raw", &[0], "block"),
+            ("type: short\nsizes: 1 1 1\nencoding: raw", &[0; 2], "endian"),
+            ("type: short\nsizes: 1 1 1\nencoding: raw\nendian: middle", &[0; 2], "middle"),
+            ("type: uchar\nsizes: 1 1 1\nencoding: ascii", b"256", "256"),
+            ("type: uchar\nsizes: 1 1 1\nencoding: ascii", b"\xff", "not text"),
+            ("type: float\nsizes: 1 1 2\nencoding: ascii", b"1 nan", "not finite"),
+            ("nonsense\ntype: float", b"", "line 4"),
+        ] {
+            let message = error(fields, data).to_string();
+            assert!(message.contains(word), "{message}");
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! What the tests of the readers share: files in a folder of their own, and every cut of a file.
+
+use super::{Limits, Source};
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// A folder for one test, removed at its end.
+pub struct Folder(PathBuf);
+
+impl Folder {
+    pub fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("splatkit-{}-{name}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    pub fn write(&self, name: &str, bytes: &[u8]) -> PathBuf {
+        let path = self.0.join(name);
+        // Some file systems wait for the disk when a file is cut and written again, but not for a new one.
+        std::fs::remove_file(&path).ok();
+        std::fs::write(&path, bytes).unwrap();
+        path
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        std::fs::remove_dir_all(&self.0).ok();
+    }
+}
+
+/// Opens a file with the default limits and reads it.
+pub fn read_with<T>(path: &Path, read: impl Fn(&Source) -> Result<T>) -> Result<T> {
+    let limits = Limits::default();
+    read(&Source::open(path, &limits)?)
+}
+
+/// Reads the file cut off after every byte but the last: each must be an input error that names file and place.
+pub fn every_cut<T>(folder: &Folder, name: &str, bytes: &[u8], read: impl Fn(&Source) -> Result<T>) {
+    for end in 0..bytes.len() {
+        let path = folder.write(name, &bytes[..end]);
+        match read_with(&path, &read) {
+            Err(Error::Input { file, place, message, .. }) => {
+                assert_eq!(file, path, "cut at {end}");
+                assert!(!place.is_empty() && !message.is_empty(), "cut at {end}");
+            }
+            Err(other) => panic!("cut at {end}: {other}"),
+            Ok(_) => panic!("cut at {end}: was read"),
+        }
+    }
+    let path = folder.write(name, bytes);
+    read_with(&path, &read).unwrap_or_else(|e| panic!("the whole file: {e}"));
+}

@@ -1,0 +1,139 @@
+//! Volumes that need no file, for tests, the demo and the documentation. Each is a function of position with values in
+//! 0 … 1, sampled over the cube from −1 to 1.
+
+use super::{Lattice, Samples, Volume};
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// A function of position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Phantom {
+    /// The test signal of Marschner and Lobb (“An Evaluation of Reconstruction Filters for Volume Rendering”, 1994), with
+    /// their f_M = 6 and α = 0.25: rings that 41³ samples hold just so.
+    MarschnerLobb,
+    /// A ball that fades from 1 at its centre to 0 at radius 0.9: (1 − (r/0.9)²)².
+    Ball,
+    /// What a CT scanner would see of an invented fruit: air around (0), a rind (0.35), soft flesh (0.15), in it a hard
+    /// lattice along a gyroid (0.7 … 0.8) and a dense stone (1). A wedge is cut out to show the inside.
+    Specimen,
+    /// One value everywhere.
+    Constant(f64),
+}
+
+impl Phantom {
+    /// The value at a position in the cube from −1 to 1, in 0 … 1 (for [`Constant`](Self::Constant): its value).
+    pub fn value(self, p: DVec3) -> f64 {
+        match self {
+            Self::MarschnerLobb => marschner_lobb(p),
+            Self::Ball => (1.0 - p.length_squared() / 0.81).max(0.0).powi(2),
+            Self::Specimen => specimen(p),
+            Self::Constant(value) => value,
+        }
+    }
+
+    /// 32-bit samples at evenly spaced positions, the first and the last of each axis at −1 and 1 of world space (an axis
+    /// of one sample: at 0).
+    ///
+    /// # Errors
+    /// In words, for dimensions of 0 or more samples than memory can hold.
+    pub fn sample(self, dims: [usize; 3]) -> Result<Volume, String> {
+        let lattice = lattice(dims)?;
+        let values = self.fill(&lattice, |value| value as f32);
+        Volume::new(lattice, Samples::F32(values))
+    }
+
+    /// As [`sample`](Self::sample), with 8-bit samples: 0 … 1 become 0 … 255, rounded.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn sample_bytes(self, dims: [usize; 3]) -> Result<Volume, String> {
+        let lattice = lattice(dims)?;
+        let values = self.fill(&lattice, |value| (value * 255.0).round() as u8);
+        Volume::new(lattice, Samples::U8(values))
+    }
+
+    fn fill<T: Send>(self, lattice: &Lattice, turn: impl Fn(f64) -> T + Sync) -> Vec<T> {
+        let [nx, ny, _] = lattice.dims;
+        let at = |index: usize| DVec3::new((index % nx) as f64, (index / nx % ny) as f64, (index / nx / ny) as f64);
+        (0..lattice.len()).into_par_iter().map(|index| turn(self.value(lattice.position(at(index))))).collect()
+    }
+}
+
+fn lattice(dims: [usize; 3]) -> Result<Lattice, String> {
+    let step = dims.map(|n| if n > 1 { 2.0 / (n - 1) as f64 } else { 2.0 });
+    let origin = dims.map(|n| if n > 1 { -1.0 } else { 0.0 });
+    let axes = DMat3::from_diagonal(DVec3::from_array(step));
+    let lattice = Lattice { dims, origin: DVec3::from_array(origin), axes };
+    lattice.validate()?;
+    Ok(lattice)
+}
+
+fn marschner_lobb(p: DVec3) -> f64 {
+    let (frequency, alpha) = (6.0, 0.25);
+    let rings = (2.0 * PI * frequency * (PI * p.truncate().length() / 2.0).cos()).cos();
+    (1.0 - (PI * p.z / 2.0).sin() + alpha * (1.0 + rings)) / (2.0 * (1.0 + alpha))
+}
+
+fn specimen(p: DVec3) -> f64 {
+    let r = p.length();
+    // Edges are some hundredths wide, as a scanner blurs them.
+    let inside = |distance: f64| smooth((distance / 0.03 + 1.0) / 2.0);
+    let waves = p * 9.0;
+    let gyroid = waves.x.sin() * waves.y.cos() + waves.y.sin() * waves.z.cos() + waves.z.sin() * waves.x.cos();
+    let mut value = 0.15 * inside(0.9 - r);
+    value = over(value, 0.35, inside(r - 0.83) * inside(0.9 - r));
+    // The lattice's value rises outwards; its walls are as thick as the gyroid is slow.
+    let walls = inside((0.45 - gyroid.abs()) / 12.0) * inside(0.74 - r) * inside(r - 0.36);
+    value = over(value, 0.7 + 0.1 * r / 0.74, walls);
+    value = over(value, 1.0, inside(0.26 - r));
+    // The wedge leaves the stone whole.
+    let wedge = inside(p.x) * inside(-p.y) * inside(p.z) * inside(r - 0.32);
+    over(value, 0.0, wedge)
+}
+
+fn over(below: f64, above: f64, share: f64) -> f64 {
+    below + (above - below) * share
+}
+
+/// 0 below 0, 1 above 1, a cubic between.
+fn smooth(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volume::TransferFunction;
+
+    #[test]
+    fn values_by_hand() {
+        // At the centre: (1 + 0.25·(1 + cos 12π)) / 2.5; on top the sine takes the 1 away.
+        assert!((Phantom::MarschnerLobb.value(DVec3::ZERO) - 0.6).abs() < 1e-12);
+        assert!((Phantom::MarschnerLobb.value(DVec3::Z) - 0.2).abs() < 1e-12);
+        assert_eq!((Phantom::Ball.value(DVec3::ZERO), Phantom::Ball.value(DVec3::X)), (1.0, 0.0));
+        assert_eq!((Phantom::Specimen.value(DVec3::ZERO), Phantom::Specimen.value(DVec3::ONE)), (1.0, 0.0));
+        assert!((Phantom::Specimen.value(DVec3::NEG_X * 0.865) - 0.35).abs() < 1e-9);
+    }
+
+    #[test]
+    fn samples_lie_where_they_should() {
+        let volume = Phantom::Ball.sample([5, 3, 1]).unwrap();
+        assert_eq!(volume.bounds(), [DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, 1.0, 0.0)]);
+        assert_eq!((volume.value(7), volume.range), (1.0, [0.0, 1.0]));
+        assert_eq!(Phantom::Constant(0.5).sample_bytes([2, 2, 2]).unwrap().range, [128.0, 128.0]);
+        assert!(Phantom::Ball.sample([0, 2, 2]).is_err());
+    }
+
+    #[test]
+    fn the_specimen_has_its_parts_and_clear_air() {
+        let volume = Phantom::Specimen.sample_bytes([48; 3]).unwrap();
+        assert_eq!(volume.range, [0.0, 255.0]);
+        let counts = volume.histogram(10);
+        assert!(counts[0] > 40_000 && [1, 3, 7].iter().all(|&bin| counts[bin] > 1000), "{counts:?}");
+        let transfer = TransferFunction::automatic(&volume);
+        assert_eq!(transfer.opacity(0.0), 0.0);
+        assert!(transfer.opacity(0.75 * 255.0) > 0.1);
+    }
+}

@@ -1,0 +1,233 @@
+//! What a splat's neighbourhood can show: the range of the samples around each sample. A kernel mixes the samples that it
+//! reaches, so where the transfer function is clear over their whole range, the splats between them cannot be seen, and
+//! the engine leaves them out.
+
+use super::{Samples, TransferFunction, Volume};
+use rayon::prelude::*;
+
+/// For each sample the smallest and the largest value in the box of ±`radius` samples around it (cut at the volume's
+/// border), in memory order. Both are steps of 1/255 of the volume's range, the smallest rounded down and the largest
+/// rounded up. [`first_visible`] tells which of them show something.
+///
+/// The extremes of a box are those along each axis after another. Smallest values and 255 minus the largest ones lie
+/// beside each other, so that one minimum of bytes serves both, and rounding goes before it because it keeps the order.
+/// Besides the result, a thread holds 2·`radius` + 3 slices.
+pub fn neighbourhood_ranges(volume: &Volume, radius: usize) -> Vec<[u8; 2]> {
+    let [nx, ny, nz] = volume.lattice.dims;
+    let steps = Steps::new(volume);
+    let slice = nx * ny;
+    let reach = |n: usize| radius.min(n.saturating_sub(1));
+    let (rx, ry, rz) = (reach(nx), reach(ny), reach(nz));
+    // Slabs repeat the slices that reach into them, so they are thick compared to the radius.
+    let slab = nz.div_ceil(4 * rayon::current_num_threads()).max(8 * rz).max(1);
+    let mut ranges = vec![[0u8; 2]; slice * nz];
+    ranges.par_chunks_mut((slab * slice).max(1)).enumerate().for_each(|(index, slab_ranges)| {
+        let mut scratch = vec![[0u8; 2]; slice];
+        let mut row = vec![[0u8; 2]; nx];
+        // Slices that are done along x and y, slice k in place k modulo their number.
+        let mut ring = vec![vec![[0u8; 2]; slice]; 2 * rz + 1];
+        let first = index * slab;
+        let mut next = first.saturating_sub(rz);
+        for (k, out) in (first..).zip(slab_ranges.chunks_mut(slice)) {
+            let around = k.saturating_sub(rz)..(k + rz + 1).min(nz);
+            while next < around.end {
+                for (j, out) in scratch.chunks_mut(nx).enumerate() {
+                    steps.write((next * ny + j) * nx, &mut row);
+                    out.copy_from_slice(&row);
+                    for shift in 1..=rx {
+                        smaller(&mut out[..nx - shift], &row[shift..]);
+                        smaller(&mut out[shift..], &row[..nx - shift]);
+                    }
+                }
+                let place = next % ring.len();
+                for (j, out) in ring[place].chunks_mut(nx).enumerate() {
+                    out.copy_from_slice(&scratch[j * nx..(j + 1) * nx]);
+                    for other in j.saturating_sub(ry)..(j + ry + 1).min(ny) {
+                        smaller(out, &scratch[other * nx..(other + 1) * nx]);
+                    }
+                }
+                next += 1;
+            }
+            out.copy_from_slice(&ring[k % ring.len()]);
+            for other in around {
+                smaller(out, &ring[other % ring.len()]);
+            }
+            for [_, highest] in out {
+                *highest = 255 - *highest;
+            }
+        }
+    });
+    ranges
+}
+
+/// For each smallest step the least largest step with which something shows; 256 where nothing does. A sample of the
+/// neighbourhood `[low, high]` may be left out where `high < first_visible[low]`.
+pub fn first_visible(transfer: &TransferFunction, range: [f64; 2]) -> [u16; 256] {
+    let step = (range[1] - range[0]) / 255.0;
+    let value = |steps: u16| range[0] + f64::from(steps) * step;
+    // A step's value may miss the sample's by a rounding error. That matters where opacity jumps, not where it rises.
+    let slack = step * 1e-7;
+    let jumps = |value: f64| transfer.opacity(value) > 1e-5;
+    std::array::from_fn(|low| {
+        let from = value(low as u16);
+        let shows = |high: &u16| {
+            let to = value(*high);
+            transfer.visible([from, to]) || jumps(from - slack) || jumps(to + slack)
+        };
+        (low as u16..256).find(shows).unwrap_or(256)
+    })
+}
+
+fn smaller(into: &mut [[u8; 2]], other: &[[u8; 2]]) {
+    for (a, b) in into.as_flattened_mut().iter_mut().zip(other.as_flattened()) {
+        *a = (*a).min(*b);
+    }
+}
+
+/// The rounded steps of samples: how many fit below a value, and 255 minus how many cover it. Types of few values look
+/// them up.
+enum Steps<'a> {
+    Bytes(&'a [u8], Vec<[u8; 2]>),
+    Unsigned(&'a [u16], Vec<[u8; 2]>),
+    Signed(&'a [i16], Vec<[u8; 2]>),
+    Wide(&'a [i32], Scale),
+    Floats(&'a [f32], Scale),
+}
+
+#[derive(Clone, Copy)]
+struct Scale {
+    low: f64,
+    steps: f64,
+}
+
+impl Scale {
+    fn step(self, value: f64) -> [u8; 2] {
+        let step = (value - self.low) * self.steps;
+        // Casts cut to 0 … 255.
+        let below = step as u8;
+        let above = below.saturating_add(u8::from(f64::from(below) < step));
+        [below, 255 - above]
+    }
+}
+
+impl<'a> Steps<'a> {
+    fn new(volume: &'a Volume) -> Self {
+        let [low, high] = volume.range;
+        let scale = Scale { low, steps: if high > low { 255.0 / (high - low) } else { 0.0 } };
+        let table = |from: i32, to: i32| (from..=to).map(|value| scale.step(f64::from(value))).collect();
+        match &volume.samples {
+            Samples::U8(values) => Self::Bytes(values, table(0, 255)),
+            Samples::U16(values) => Self::Unsigned(values, table(0, 65_535)),
+            Samples::I16(values) => Self::Signed(values, table(-32_768, 32_767)),
+            Samples::I32(values) => Self::Wide(values, scale),
+            Samples::F32(values) => Self::Floats(values, scale),
+        }
+    }
+
+    /// The steps of a row of samples.
+    fn write(&self, start: usize, row: &mut [[u8; 2]]) {
+        fn each<T: Copy>(values: &[T], row: &mut [[u8; 2]], step: impl Fn(T) -> [u8; 2]) {
+            row.iter_mut().zip(values).for_each(|(out, &value)| *out = step(value));
+        }
+        match self {
+            Self::Bytes(values, table) => each(&values[start..], row, |v| table[usize::from(v)]),
+            Self::Unsigned(values, table) => each(&values[start..], row, |v| table[usize::from(v)]),
+            Self::Signed(values, table) => {
+                each(&values[start..], row, |v| table[(i32::from(v) + 32_768) as usize]);
+            }
+            Self::Wide(values, scale) => each(&values[start..], row, |v| scale.step(f64::from(v))),
+            Self::Floats(values, scale) => each(&values[start..], row, |v| scale.step(f64::from(v))),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volume::Lattice;
+    use glam::DVec3;
+
+    /// A small generator of random bits (Marsaglia's xorshift, 2003).
+    struct Random(u64);
+
+    impl Random {
+        fn next(&mut self, below: u64) -> u64 {
+            self.0 ^= self.0 << 13;
+            self.0 ^= self.0 >> 7;
+            self.0 ^= self.0 << 17;
+            (self.0 >> 11) % below
+        }
+    }
+
+    fn random_volume(random: &mut Random) -> Volume {
+        let dims = [0; 3].map(|_| 1 + random.next(9) as usize);
+        let count = dims.iter().product::<usize>();
+        // Mostly one value, so that boxes differ.
+        let mut bits = || if random.next(10) == 0 { random.next(1 << 32) } else { 1 << 30 };
+        let bits: Vec<u64> = (0..count).map(|_| bits()).collect();
+        let samples = match random.next(5) {
+            0 => Samples::U8(bits.iter().map(|&b| b as u8 / 3).collect()),
+            1 => Samples::U16(bits.iter().map(|&b| b as u16).collect()),
+            2 => Samples::I16(bits.iter().map(|&b| b as i16).collect()),
+            3 => Samples::I32(bits.iter().map(|&b| b as i32).collect()),
+            _ => Samples::F32(bits.iter().map(|&b| (b as f32).sin()).collect()),
+        };
+        Volume::new(Lattice::with_spacing(dims, DVec3::ONE), samples).unwrap()
+    }
+
+    #[test]
+    fn agrees_with_brute_force() {
+        let mut random = Random(7);
+        for _ in 0..300 {
+            let volume = random_volume(&mut random);
+            let radius = random.next(5) as usize;
+            let [nx, ny, nz] = volume.lattice.dims;
+            let [lowest, highest] = volume.range;
+            let scale = if highest > lowest { 255.0 / (highest - lowest) } else { 0.0 };
+            let around = |i: usize, n: usize| i.saturating_sub(radius)..(i + radius + 1).min(n);
+            let ranges = neighbourhood_ranges(&volume, radius);
+            assert_eq!(ranges.len(), volume.len());
+            for (index, range) in ranges.into_iter().enumerate() {
+                let (i, j, k) = (index % nx, index / nx % ny, index / nx / ny);
+                let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+                for c in around(k, nz) {
+                    for b in around(j, ny) {
+                        for a in around(i, nx) {
+                            let value = volume.value((c * ny + b) * nx + a);
+                            (low, high) = (low.min(value), high.max(value));
+                        }
+                    }
+                }
+                let expected = [((low - lowest) * scale).floor(), ((high - lowest) * scale).ceil().min(255.0)];
+                assert_eq!(
+                    range.map(f64::from),
+                    expected,
+                    "sample {index} of {:?}, radius {radius}",
+                    volume.lattice.dims
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn visible_steps_keep_what_shows() {
+        let json = r#"{"color": [[0, 1, 1, 1]], "opacity": [[30, 0], [40, 0.5], [50, 0], [200, 0], [210, 1]]}"#;
+        let transfer = TransferFunction::from_json(json).unwrap();
+        let first = first_visible(&transfer, [0.0, 255.0]);
+        // From 0 on, 31 is the first value that shows; from 50 on it is 201; above, all do.
+        assert_eq!((first[0], first[30], first[35], first[50], first[200]), (31, 31, 35, 201, 201));
+        // A label's step, at values that 255 steps of the range miss by rounding.
+        let label = TransferFunction::from_json(r#"{"color": [[0, 1, 1, 1]], "opacity": [[2, 0], [2, 1]]}"#).unwrap();
+        for range in [[0.0, 3.0], [1.0, 7.0], [-0.1, 2.0]] {
+            let volume = Volume::new(
+                Lattice::with_spacing([3, 1, 1], DVec3::ONE),
+                Samples::F32(vec![range[0] as f32, 2.0, range[1] as f32]),
+            );
+            let volume = volume.unwrap();
+            let [low, high] = neighbourhood_ranges(&volume, 0)[1];
+            assert!(u16::from(high) >= first_visible(&label, volume.range)[usize::from(low)], "{range:?}");
+        }
+        assert_eq!(first_visible(&transfer, [0.0, 20.0]), [256; 256]);
+        assert_eq!(first_visible(&transfer, [40.0, 40.0])[0], 0);
+    }
+}
