@@ -175,4 +175,22 @@ mod tests {
         let error = read_with(&path, |source| read(source, &layout([2, 1, 1], SampleType::F32))).unwrap_err();
         assert!(error.to_string().contains("1 of 2 samples are not finite, the first is sample 0"));
     }
+
+    #[test]
+    fn volumes_are_known_by_name_then_layout_then_content() {
+        let folder = Folder::new("load-volume");
+        let nrrd = b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 1 1\nencoding: raw\n\n\x01\x02";
+        let layout = layout([nrrd.len(), 1, 1], SampleType::U8);
+        let load =
+            |name: &str, raw| crate::io::load_volume(&folder.write(name, nrrd), &crate::io::Limits::default(), raw);
+        assert_eq!(load("a.nrrd", Some(&layout)).unwrap().len(), 2);
+        assert_eq!(load("a.data", Some(&layout)).unwrap().len(), nrrd.len());
+        assert_eq!(load("a.data", None).unwrap().len(), 2);
+        assert!(load("a.VTI", None).is_err());
+        let path = folder.write("b.raw", &[1, 2, 3]);
+        assert!(
+            hint(crate::io::load_volume(&path, &crate::io::Limits::default(), None).unwrap_err())
+                .contains("dimensions")
+        );
+    }
 }

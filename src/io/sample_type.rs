@@ -142,7 +142,6 @@ fn integers<const N: usize, T: TryInto<i32>>(
     read: impl Fn([u8; N]) -> T + Sync + Copy,
     round: impl Fn(T) -> f32 + Sync,
 ) -> Samples {
-    // No sample is lost when all fit, so the count tells.
     let (numbers, _) = bytes.as_chunks::<N>();
     let fits = |&number: &[u8; N]| {
         let mut number = number;

@@ -77,15 +77,20 @@ fn marschner_lobb(p: DVec3) -> f64 {
 
 fn specimen(p: DVec3) -> f64 {
     let r = p.length();
+    if r > 0.93 {
+        return 0.0;
+    }
     // Edges are some hundredths wide, as a scanner blurs them.
     let inside = |distance: f64| smooth((distance / 0.03 + 1.0) / 2.0);
-    let waves = p * 9.0;
-    let gyroid = waves.x.sin() * waves.y.cos() + waves.y.sin() * waves.z.cos() + waves.z.sin() * waves.x.cos();
     let mut value = 0.15 * inside(0.9 - r);
     value = over(value, 0.35, inside(r - 0.83) * inside(0.9 - r));
-    // The lattice's value rises outwards; its walls are as thick as the gyroid is slow.
-    let walls = inside((0.45 - gyroid.abs()) / 12.0) * inside(0.74 - r) * inside(r - 0.36);
-    value = over(value, 0.7 + 0.1 * r / 0.74, walls);
+    let shell = inside(0.74 - r) * inside(r - 0.36);
+    if shell > 0.0 {
+        // The lattice's value rises outwards; its walls are as thick as the gyroid is slow.
+        let (sin, cos) = (p.map(|x| (9.0 * x).sin()), p.map(|x| (9.0 * x).cos()));
+        let gyroid = sin.x * cos.y + sin.y * cos.z + sin.z * cos.x;
+        value = over(value, 0.7 + 0.1 * r / 0.74, shell * inside((0.45 - gyroid.abs()) / 12.0));
+    }
     value = over(value, 1.0, inside(0.26 - r));
     // The wedge leaves the stone whole.
     let wedge = inside(p.x) * inside(-p.y) * inside(p.z) * inside(r - 0.32);

@@ -89,9 +89,9 @@ impl TransferFunction {
     /// A transfer function for any volume, from its histogram. The values split in two by Otsu's threshold (1979, "A
     /// threshold selection method from gray-level histograms"); the side that nearly all of the volume's border is on
     /// is background, the low side where the border is mixed. Opacity begins three standard deviations from the
-    /// background's mode and rises over the quantiles of the rest. It is measured in hundredths of the volume's
-    /// diagonal, so that thin things show and thick ones are no fog, whatever the sampling. A constant volume is
-    /// shown as a faint haze.
+    /// background's mode and rises over the threshold and the quantiles above it. It is measured in hundredths of the
+    /// volume's diagonal, so that thin things show and thick ones are no fog, whatever the sampling. A constant volume
+    /// is shown as a faint haze.
     pub fn automatic(volume: &Volume) -> Self {
         let [first, last] = volume.bounds();
         let diagonal = (last - first).length();
@@ -185,8 +185,8 @@ fn ramp(counts: &[u64]) -> [(f64, f64); 4] {
         });
         (threshold + 1 + at.unwrap_or(0)) as f64 + 0.5
     };
-    let (quarter, half, top) = (quantile(0.25), quantile(0.6), quantile(0.99));
-    [(start, 0.0), (quarter, 0.15), (half.max(quarter), 0.45), (top.max(half), 0.85)]
+    let (half, top) = (quantile(0.5), quantile(0.99));
+    [(start, 0.0), (threshold as f64 + 1.0, 0.08), (half, 0.4), (top, 0.85)]
 }
 
 #[cfg(test)]
