@@ -1,0 +1,47 @@
+// The bins of a pass: one per tile and group of sheets, tile by tile. Used by project (to count) and scatter (to fill),
+// so that both walk the same windows and tiles.
+
+// The tiles and sheets of a record: first and last tile (column, then row from bit 16), then first and last sheet. The top
+// bit of the first tile marks an isotropic record.
+const BOX_ISOTROPIC: u32 = 0x80000000u;
+
+struct Box {
+    first_tile: u32,
+    last_tile: u32,
+    sheets: u32,
+}
+
+struct Walk {
+    first_column: u32,
+    last_column: u32,
+    first_row: u32,
+    end_row: u32,
+    // Windows of four sheets each, every third sheet.
+    first_window: u32,
+    windows: u32,
+}
+
+// The part of a box that lies in a pass. What reaches in from sheets before the pass gets a window that starts one sheet
+// early: that sheet takes the splat's mass up to the pass and is not drawn.
+fn walk_of(box: Box, stage: Pass) -> Walk {
+    let first = max(box.sheets & 0xffffu, stage.first_collected - 1u);
+    let last = min(box.sheets >> 16u, stage.end_collected);
+    return Walk(
+        box.first_tile & 0xffffu,
+        box.last_tile & 0xffffu,
+        max((box.first_tile & ~BOX_ISOTROPIC) >> 16u, stage.first_row),
+        min((box.last_tile >> 16u) + 1u, stage.end_row),
+        first,
+        window_count(first, last),
+    );
+}
+
+fn bin_of(column: u32, row: u32, window: u32, stage: Pass) -> u32 {
+    let tile = (row - stage.first_row) * frame.tiles.x + column;
+    return tile * stage.groups + ((window - (stage.first_collected - 1u)) >> frame.group_shift);
+}
+
+// Windows of four sheets, each starting three after the one before (see march.wgsl), from a first sheet to a last one.
+fn window_count(first: u32, last: u32) -> u32 {
+    return max((last - min(first, last) + 2u) / 3u, 1u);
+}

@@ -1,0 +1,132 @@
+// The footprint of an ellipsoidal Gaussian: where it lies in the picture and in the sheets. Used by measure and project.
+
+// A symmetric 3×3 matrix.
+struct Symmetric {
+    xx: f32,
+    xy: f32,
+    xz: f32,
+    yy: f32,
+    yz: f32,
+    zz: f32,
+}
+
+// A splat in view space, ready to be projected.
+struct Candidate {
+    center: vec3<f32>,
+    covariance: Symmetric,
+    extent: f32,
+    // Value (scalar) or optical depth at the centre (radiance).
+    strength: f32,
+    color: u32,
+    normal: u32,
+}
+
+// The tiles (inclusive) and sheets (inclusive) that a footprint meets.
+struct Span {
+    visible: bool,
+    first_tile: vec2<u32>,
+    last_tile: vec2<u32>,
+    first_sheet: u32,
+    last_sheet: u32,
+}
+
+fn quadratic_form(m: Symmetric, v: vec3<f32>) -> f32 {
+    return m.xx * v.x * v.x + m.yy * v.y * v.y + m.zz * v.z * v.z
+        + 2.0 * (m.xy * v.x * v.y + m.xz * v.x * v.z + m.yz * v.y * v.z);
+}
+
+// The sheet that a distance lies in; 0 before the first plane.
+fn sheet_of(distance: f32) -> u32 {
+    let near = planes[1];
+    if distance < near {
+        return 0u;
+    }
+    let turn = planes[1u + frame.geometric_sheets];
+    var estimate: f32;
+    if distance < turn {
+        estimate = 1.0 + floor(log2(distance / near) * frame.ratio_log2_inverse);
+    } else {
+        estimate = 1.0 + f32(frame.geometric_sheets) + floor((distance - turn) * frame.step_inverse);
+    }
+    var sheet = u32(clamp(estimate, 1.0, f32(frame.sheet_count)));
+    // The closed form is off by at most one where rounding meets a plane; the list decides.
+    if distance < planes[sheet] {
+        sheet = sheet - 1u;
+    } else if distance >= planes[sheet + 1u] && sheet < frame.sheet_count {
+        sheet = sheet + 1u;
+    }
+    return sheet;
+}
+
+// Bounds of x/z over an ellipsoid in front of the eye: tangents of its outline (dual conic), exact in perspective.
+// The expanded discriminant has no cancellation for small, distant splats.
+fn tangent_bounds(x: f32, z: f32, xx: f32, xz: f32, zz: f32) -> vec2<f32> {
+    let denominator = 1.0 / (z * z - zz);
+    let middle = (x * z - xz) * denominator;
+    let square = xx * z * z - 2.0 * xz * x * z + zz * x * x - (xx * zz - xz * xz);
+    let half_width = sqrt(max(square, 0.0)) * abs(denominator);
+    return vec2(middle - half_width, middle + half_width);
+}
+
+// Conservative bounds of x/z over the part of a box beyond the nearest visible z.
+fn box_bounds(x: f32, reach: f32, z_low: f32, z_high: f32) -> vec2<f32> {
+    let low = x - reach;
+    let high = x + reach;
+    return vec2(low / select(z_high, z_low, low < 0.0), high / select(z_low, z_high, high < 0.0));
+}
+
+fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
+    var span: Span;
+    span.visible = false;
+    let e2 = extent * extent;
+    let reach_z = extent * sqrt(covariance.zz);
+    var distance = c.z;
+    var reach = reach_z;
+    var far = c.z + reach_z;
+    var bounds_x: vec2<f32>;
+    var bounds_y: vec2<f32>;
+    if frame.perspective != 0u {
+        if c.z + reach_z <= frame.z_near {
+            return span;
+        }
+        distance = length(c);
+        let toward = c / max(distance, 1e-30);
+        reach = extent * sqrt(quadratic_form(covariance, toward));
+        let across = e2 * (covariance.xx + covariance.yy + covariance.zz);
+        far = sqrt((distance + reach) * (distance + reach) + across);
+        if c.z - reach_z > frame.z_near {
+            bounds_x = tangent_bounds(c.x, c.z, e2 * covariance.xx, e2 * covariance.xz, e2 * covariance.zz);
+            bounds_y = tangent_bounds(c.y, c.z, e2 * covariance.yy, e2 * covariance.yz, e2 * covariance.zz);
+        } else {
+            bounds_x = box_bounds(c.x, extent * sqrt(covariance.xx), frame.z_near, c.z + reach_z);
+            bounds_y = box_bounds(c.y, extent * sqrt(covariance.yy), frame.z_near, c.z + reach_z);
+        }
+    } else {
+        let reach_x = extent * sqrt(covariance.xx);
+        let reach_y = extent * sqrt(covariance.yy);
+        bounds_x = vec2(c.x - reach_x, c.x + reach_x);
+        bounds_y = vec2(c.y - reach_y, c.y + reach_y);
+    }
+    let last_plane = planes[frame.sheet_count + 1u];
+    let near = distance - reach;
+    // Written so that NaN fails.
+    if !(far > planes[1]) || !(near < last_plane) {
+        return span;
+    }
+    // Pixels whose centres lie in the box, with a margin for rounding; clamped as floats, so that no infinity is cast.
+    let limit = vec2<f32>(frame.size) + f32(APRON);
+    let low = frame.center + frame.scale * vec2(bounds_x.x, bounds_y.x) - 0.51;
+    let high = frame.center + frame.scale * vec2(bounds_x.y, bounds_y.y) - 0.49;
+    let first = vec2<i32>(ceil(clamp(low, vec2(-f32(APRON)), limit)));
+    let last = vec2<i32>(floor(clamp(high, vec2(-f32(APRON) - 1.0), limit - 1.0)));
+    if !(first.x <= last.x) || !(first.y <= last.y) {
+        return span;
+    }
+    let top = vec2<i32>(frame.tiles) - 1;
+    span.first_tile = vec2<u32>(clamp((first - APRON + TILE_STEP) / TILE_STEP - 1, vec2(0), top));
+    span.last_tile = vec2<u32>(clamp((last + APRON) / TILE_STEP, vec2(0), top));
+    span.first_sheet = sheet_of(near);
+    span.last_sheet = max(sheet_of(far), 1u);
+    span.visible = true;
+    return span;
+}

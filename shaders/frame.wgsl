@@ -1,0 +1,89 @@
+// What every pass knows of the picture: the view, the sheets, the light. Mirrors engine/uniforms.rs.
+
+struct Frame {
+    // Picture in pixels, and in tiles.
+    size: vec2<u32>,
+    tiles: vec2<u32>,
+    // Pixel coordinates of the optical axis; focal length in pixels (perspective) or pixels per world unit.
+    center: vec2<f32>,
+    scale: f32,
+    perspective: u32,
+    // Sheets are numbered from 1; sheet 0 is everything before the first plane and is never drawn.
+    sheet_count: u32,
+    geometric_sheets: u32,
+    ratio_log2_inverse: f32,
+    step_inverse: f32,
+    // Smallest view-space z that any pixel sees (perspective).
+    z_near: f32,
+    // Bins: tiles times groups of 2^group_shift sheets.
+    group_shift: u32,
+    // Capacities of the records (in vec4) and entries of a pass.
+    record_capacity: u32,
+    entry_capacity: u32,
+    // View space to lattice index: index = field_origin + field_axes * position; samples fill 0 … field_last.
+    field_axis_x: vec4<f32>,
+    field_axis_y: vec4<f32>,
+    field_axis_z: vec4<f32>,
+    field_origin: vec4<f32>,
+    field_low: vec4<f32>,
+    field_high: vec4<f32>,
+    // Ambient, diffuse, specular, power.
+    volume_shade: vec4<f32>,
+    surface_shade: vec4<f32>,
+    // Standard deviation of the isotropic lattice kernel (world units), its inverse, its squared extent in sigmas; the
+    // smallest weight that counts as a value, as a fraction of the sheet.
+    isotropic: vec4<f32>,
+    // First value, table entries per value, last table index, unused.
+    transfer: vec4<f32>,
+}
+
+// One depth pass: sheets and rows of tiles. Written by plan.wgsl.
+struct Pass {
+    // Sheets that are composited: first … end-1.
+    first_sheet: u32,
+    end_sheet: u32,
+    // Sheets that are collected, one more on either side where gradients need the neighbours.
+    first_collected: u32,
+    end_collected: u32,
+    // Rows of tiles: first … end-1.
+    first_row: u32,
+    end_row: u32,
+    // Groups of sheets per tile; 0 when there is no such pass.
+    groups: u32,
+    unused: u32,
+}
+
+// One item's place in the view. Mirrors engine/uniforms.rs.
+struct Source {
+    // Columns of the matrix from the item's local frame (explicit splats) or lattice index to view space.
+    axis_x: vec4<f32>,
+    axis_y: vec4<f32>,
+    axis_z: vec4<f32>,
+    origin: vec4<f32>,
+    // Lattices: the kernel's covariance in view space (xx, xy, xz, yy), (yz, zz), and the samples' size.
+    covariance_a: vec4<f32>,
+    covariance_b: vec4<f32>,
+    // Samples along x and y, first z of this chunk, type of the samples (see sample_value).
+    lattice: vec4<u32>,
+    // Radius of the footprint in standard deviations.
+    extent: f32,
+    // Number of candidates (splats; voxels before selection).
+    count: u32,
+    // First run of this chunk in the frame's list of runs.
+    first_run: u32,
+    // Bit 0: radiance payload. Bit 1: isotropic lattice records.
+    flags: u32,
+}
+
+const RADIANCE: u32 = 1u;
+const ISOTROPIC: u32 = 2u;
+
+// Candidates that one invocation handles in order, so that lists come out in the same order each time.
+const RUN: u32 = 16u;
+const NO_SPAN: u32 = 0xffffffffu;
+
+// An entry: sheet within its group (7 bits), window after the splat's first (1), isotropic record (1), record (23).
+const ENTRY_SHEET_SHIFT: u32 = 25u;
+const ENTRY_CONTINUED: u32 = 0x1000000u;
+const ENTRY_ISOTROPIC: u32 = 0x800000u;
+const ENTRY_RECORD: u32 = 0x7fffffu;

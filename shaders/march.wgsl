@@ -1,0 +1,487 @@
+// March: one workgroup per tile walks the tile's entries front to back. Four sheets are open at once, one in each lane of
+// a vec4; an entry adds its splat's sections to all four. When the walk passes a sheet, the sheet is closed: its density
+// is classified and shaded, its optical depth composited, and its lane shifted out. Nothing is sorted by depth.
+//
+// A window of four sheets from sheet k sees the planes k+1, k+2 and k+3 inside it, and gives what lies behind the last of
+// them to the fourth lane. A splat that is longer gets its next window three sheets on: there, the first lane takes back
+// what the window before gave it too much. So each entry evaluates three planes, however long its splat is.
+//
+// An invocation holds ROWS pixels, one below the other, so that they share the loads of an entry.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> planes: array<f32>;
+@group(0) @binding(2) var<uniform> stage: Pass;
+@group(0) @binding(3) var<storage, read> records: array<vec4<f32>>;
+@group(0) @binding(4) var<storage, read> bins: array<u32>;
+@group(0) @binding(5) var<storage, read> entries: array<u32>;
+// Colour and extinction per value.
+@group(0) @binding(6) var<storage, read> transfer: array<vec4<f32>>;
+// Premultiplied colour and opacity; view-space depth. Both carry over from pass to pass.
+@group(0) @binding(7) var<storage, read_write> colors: array<vec4<f32>>;
+@group(0) @binding(8) var<storage, read_write> depths: array<f32>;
+
+// A pixel that lets less light through than this is finished.
+const OPAQUE: f32 = 0.0005;
+const SQRT_TAU: f32 = 2.5066283;
+
+// Everything that one pixel keeps while its tile is walked.
+struct Pixel {
+    // Whole sums of the four open sheets: weights, weighted values, and their derivatives to the right and down.
+    weight: vec4<f32>,
+    value: vec4<f32>,
+    weight_x: vec4<f32>,
+    weight_y: vec4<f32>,
+    value_x: vec4<f32>,
+    value_y: vec4<f32>,
+    // Optical depth, and colour and normal weighted by it.
+    depth: vec4<f32>,
+    red: vec4<f32>,
+    green: vec4<f32>,
+    blue: vec4<f32>,
+    normal_x: vec4<f32>,
+    normal_y: vec4<f32>,
+    normal_z: vec4<f32>,
+    // The sheet closed last, which waits for the value behind it before it is shaded, and the value before it.
+    waiting: Sheet,
+    value_before: f32,
+    has_before: bool,
+    // The picture so far.
+    color: vec3<f32>,
+    transmittance: f32,
+    hit: f32,
+    // The ray: image-plane position, cosine to the optical axis, and the part of it inside the sampled box.
+    ray: vec2<f32>,
+    cosine: f32,
+    inside: vec2<f32>,
+}
+
+// One sheet at one pixel.
+struct Sheet {
+    has_value: bool,
+    value: f32,
+    // Weight, for sets of scattered samples: how much of the sheet is filled.
+    weight: f32,
+    // Derivative of the value per pixel to the right and down.
+    slope: vec2<f32>,
+    // Radiance payload: colour times optical depth, and optical depth.
+    radiance: vec4<f32>,
+}
+
+// An invocation's pixels, one below the other.
+var<private> pixels: array<Pixel, ROWS>;
+
+// Values of the sheet that is being closed, for differences between neighbouring pixels.
+var<workgroup> neighbours: array<f32, 64>;
+const NO_VALUE: f32 = 3e38;
+
+// Normal distribution function, for |t| up to 3.3 and within 1e-4 (minimax fit); beyond, its end values.
+fn normal_cdf(t: vec3<f32>) -> vec3<f32> {
+    let x = clamp(t * (1.0 / 3.3), vec3(-1.0), vec3(1.0));
+    let y = x * x;
+    return 0.5 + x * (1.3152320 + y * (-2.3494747 + y * (3.5386943 + y * (-3.5700652 + y * (2.0969673 + y * -0.5319302)))));
+}
+
+// The four sections of a window, from the distribution function at its three inner planes.
+fn sections(t: vec3<f32>, base: f32) -> vec4<f32> {
+    let f = normal_cdf(t);
+    return vec4(f.x - base, f.y - f.x, f.z - f.y, 1.0 - f.z);
+}
+
+fn table(value: f32) -> vec4<f32> {
+    let at = clamp((value - frame.transfer.x) * frame.transfer.y, 0.0, frame.transfer.z);
+    let low = u32(at);
+    return mix(transfer[low], transfer[low + 1u], at - f32(low));
+}
+
+fn lit(color: vec3<f32>, normal: vec3<f32>, direction: vec3<f32>, shade: vec4<f32>) -> vec3<f32> {
+    let size = length(normal);
+    if !(size > 1e-20) {
+        return color * (shade.x + shade.y);
+    }
+    let facing = min(abs(dot(normal, direction)) / size, 1.0);
+    return min(color * (shade.x + shade.y * facing) + shade.z * pow(facing, shade.w), vec3(1.0));
+}
+
+fn direction_of(r: u32) -> vec3<f32> {
+    if PERSPECTIVE {
+        return vec3(pixels[r].ray, 1.0) * pixels[r].cosine;
+    }
+    return vec3(0.0, 0.0, 1.0);
+}
+
+// Gradient in view space from the slope across the picture and the derivative along the ray, at a distance.
+fn gradient(r: u32, slope: vec2<f32>, along: f32, distance: f32) -> vec3<f32> {
+    if PERSPECTIVE {
+        let d = direction_of(r);
+        let g = slope * frame.scale / (pixels[r].cosine * distance) + along * d.xy;
+        return vec3(g, (along - dot(g, d.xy)) / d.z);
+    }
+    return vec3(slope * frame.scale, along);
+}
+
+fn middle(sheet: u32) -> f32 {
+    return 0.5 * (planes[sheet] + planes[sheet + 1u]);
+}
+
+// Adds a sheet to the picture. `has_after` and `after`: the value of the sheet behind it.
+fn composite(r: u32, sheet: u32, own: Sheet, has_after: bool, after: f32) {
+    if sheet < stage.first_sheet || sheet >= stage.end_sheet {
+        return;
+    }
+    var premultiplied = own.radiance.xyz;
+    var depth = own.radiance.w;
+    if SCALAR && own.has_value {
+        let shown = table(own.value);
+        var length = max(min(planes[sheet + 1u], pixels[r].inside.y) - max(planes[sheet], pixels[r].inside.x), 0.0);
+        if !LATTICE {
+            length = min(planes[sheet + 1u] - planes[sheet], own.weight);
+        }
+        var color = shown.xyz;
+        if VOLUME_SHADED {
+            // One-sided where a neighbouring sheet has no value.
+            let value_before = select(own.value, pixels[r].value_before, pixels[r].has_before);
+            let value_after = select(own.value, after, has_after);
+            let start = middle(sheet - u32(pixels[r].has_before));
+            let stop = middle(sheet + u32(has_after));
+            let along = select(0.0, (value_after - value_before) / (stop - start), stop > start);
+            let normal = gradient(r, own.slope, along, middle(sheet));
+            color = lit(color, normal, direction_of(r), frame.volume_shade);
+        }
+        let own_depth = shown.w * length;
+        premultiplied += own_depth * color;
+        depth += own_depth;
+    }
+    if depth > 0.0 {
+        let through = pixels[r].transmittance;
+        let left = through * exp(-depth);
+        pixels[r].color += (through - left) / depth * premultiplied;
+        if through > 0.5 && left <= 0.5 {
+            let part = log(2.0 * through) / depth;
+            pixels[r].hit = mix(planes[sheet], planes[sheet + 1u], part);
+        }
+        pixels[r].transmittance = left;
+    }
+}
+
+fn shift(sums: vec4<f32>) -> vec4<f32> {
+    return vec4(sums.yzw, 0.0);
+}
+
+// Resolves the front lane to a sheet and shifts it out.
+fn resolve(r: u32, sheet: u32) -> Sheet {
+    var own: Sheet;
+    if SCALAR {
+        let weight = pixels[r].weight.x;
+        own.has_value = weight > 1e-6 * (planes[sheet + 1u] - planes[sheet]);
+        let inverse = 1.0 / max(weight, 1e-37);
+        own.value = pixels[r].value.x * inverse;
+        own.weight = weight;
+        if VOLUME_SHADED && !CENTRAL {
+            let weight_slope = vec2(pixels[r].weight_x.x, pixels[r].weight_y.x);
+            let value_slope = vec2(pixels[r].value_x.x, pixels[r].value_y.x);
+            own.slope = (own.value * weight_slope - value_slope) * inverse;
+            pixels[r].weight_x = shift(pixels[r].weight_x);
+            pixels[r].weight_y = shift(pixels[r].weight_y);
+            pixels[r].value_x = shift(pixels[r].value_x);
+            pixels[r].value_y = shift(pixels[r].value_y);
+        }
+        pixels[r].weight = shift(pixels[r].weight);
+        pixels[r].value = shift(pixels[r].value);
+    }
+    if RADIANCE_PAYLOAD {
+        let depth = pixels[r].depth.x;
+        var color = vec3(pixels[r].red.x, pixels[r].green.x, pixels[r].blue.x);
+        if SURFACE_SHADED {
+            let normal = vec3(pixels[r].normal_x.x, pixels[r].normal_y.x, pixels[r].normal_z.x);
+            // Colours of splats without a normal stay as they are.
+            if dot(normal, normal) > 0.0 {
+                color = depth * lit(color / max(depth, 1e-37), normal, direction_of(r), frame.surface_shade);
+            }
+            pixels[r].normal_x = shift(pixels[r].normal_x);
+            pixels[r].normal_y = shift(pixels[r].normal_y);
+            pixels[r].normal_z = shift(pixels[r].normal_z);
+        }
+        own.radiance = vec4(color, depth);
+        pixels[r].depth = shift(pixels[r].depth);
+        pixels[r].red = shift(pixels[r].red);
+        pixels[r].green = shift(pixels[r].green);
+        pixels[r].blue = shift(pixels[r].blue);
+    }
+    return own;
+}
+
+// Adds the sections of a splat to a pixel. `slope`: half the derivative of ρ² per pixel.
+fn add(r: u32, w: vec4<f32>, slope: vec2<f32>, strength: f32) {
+    let v = w * strength;
+    pixels[r].weight += w;
+    pixels[r].value += v;
+    if VOLUME_SHADED && !CENTRAL {
+        pixels[r].weight_x += w * slope.x;
+        pixels[r].weight_y += w * slope.y;
+        pixels[r].value_x += v * slope.x;
+        pixels[r].value_y += v * slope.y;
+    }
+}
+
+@compute @workgroup_size(8, LANE_ROWS)
+fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) lane: vec3<u32>) {
+    let column = group.x % frame.tiles.x;
+    let row = stage.first_row + group.x / frame.tiles.x;
+    if stage.groups == 0u || row >= stage.end_row {
+        return;
+    }
+    let corner = vec2<i32>(vec2(column, row)) * TILE_STEP - APRON;
+    let first_pixel = corner + vec2<i32>(i32(lane.x), i32(lane.y * ROWS));
+    for (var r = 0u; r < ROWS; r++) {
+        let at = first_pixel + vec2(0, i32(r));
+        if all(at >= vec2(0)) && all(at < vec2<i32>(frame.size)) {
+            let stored = colors[u32(at.y) * frame.size.x + u32(at.x)];
+            pixels[r].color = stored.xyz;
+            pixels[r].transmittance = 1.0 - stored.w;
+            pixels[r].hit = depths[u32(at.y) * frame.size.x + u32(at.x)];
+        } else {
+            pixels[r].transmittance = select(0.0, 1.0, CENTRAL);
+        }
+        pixels[r].ray = (vec2<f32>(at) + 0.5 - frame.center) / frame.scale;
+        pixels[r].cosine = 1.0;
+        if PERSPECTIVE {
+            pixels[r].cosine = inverseSqrt(1.0 + dot(pixels[r].ray, pixels[r].ray));
+        }
+        if SCALAR && LATTICE {
+            pixels[r].inside = inside_field(r);
+        }
+    }
+
+    let tile_bins = ((row - stage.first_row) * frame.tiles.x + column) * stage.groups;
+    var group_end = bin_end(tile_bins);
+    var bin = tile_bins;
+    let last_bin = tile_bins + stage.groups - 1u;
+    var at = 0u;
+    if tile_bins > 0u {
+        at = bin_end(tile_bins - 1u);
+    }
+    let end = bin_end(last_bin);
+    var front = stage.first_collected - 1u;
+    // Sheets from `front` on that may hold something, the one that waits to be shaded included.
+    var open = 0u;
+    loop {
+        if at >= end {
+            break;
+        }
+        while group_end <= at {
+            bin++;
+            group_end = bin_end(bin);
+        }
+        let entry_sheet = entries[at] >> ENTRY_SHEET_SHIFT;
+        let sheet = ((bin - tile_bins) << frame.group_shift) + entry_sheet + stage.first_collected - 1u;
+        if open > 0u {
+            close(front, min(sheet - front, open), lane.xy);
+            open -= min(sheet - front, open);
+        }
+        front = sheet;
+        // With differences between pixels, all lanes must reach every barrier.
+        if !CENTRAL {
+            var light = 0.0;
+            for (var r = 0u; r < ROWS; r++) {
+                light = max(light, pixels[r].transmittance);
+            }
+            if light < OPAQUE {
+                break;
+            }
+        }
+        loop {
+            let entry = entries[at];
+            if ISOTROPIC_RECORDS && (!GENERAL_RECORDS || (entry & ENTRY_ISOTROPIC) != 0u) {
+                add_isotropic(entry, front, first_pixel);
+            } else if GENERAL_RECORDS {
+                add_general(entry, front, first_pixel);
+            }
+            at++;
+            if at >= group_end || (entries[at] >> ENTRY_SHEET_SHIFT) != entry_sheet {
+                break;
+            }
+        }
+        open = 4u + WAITING;
+    }
+    close(front, open, lane.xy);
+
+    for (var r = 0u; r < ROWS; r++) {
+        let own = vec2<i32>(lane.xy) + vec2(0, i32(lane.y * (ROWS - 1u) + r));
+        let pixel = first_pixel + vec2(0, i32(r));
+        if all(own >= vec2(APRON)) && all(own < vec2(8 - APRON)) && all(pixel < vec2<i32>(frame.size)) {
+            let index = u32(pixel.y) * frame.size.x + u32(pixel.x);
+            colors[index] = vec4(pixels[r].color, 1.0 - pixels[r].transmittance);
+            depths[index] = pixels[r].hit;
+        }
+    }
+}
+
+fn bin_end(bin: u32) -> u32 {
+    return min(bins[bin], frame.entry_capacity);
+}
+
+// The distances between which a pixel's ray is inside the sampled box.
+fn inside_field(r: u32) -> vec2<f32> {
+    var origin = frame.field_origin.xyz;
+    var direction = direction_of(r);
+    direction = vec3(
+        dot(frame.field_axis_x.xyz, direction),
+        dot(frame.field_axis_y.xyz, direction),
+        dot(frame.field_axis_z.xyz, direction),
+    );
+    if !PERSPECTIVE {
+        let start = vec3(pixels[r].ray, 0.0);
+        origin += vec3(
+            dot(frame.field_axis_x.xyz, start),
+            dot(frame.field_axis_y.xyz, start),
+            dot(frame.field_axis_z.xyz, start),
+        );
+    }
+    // A ray along a face would divide 0 by 0; this direction misses no box that the exact one meets visibly.
+    direction = select(direction, vec3(1e-20), abs(direction) < vec3(1e-20));
+    let a = (frame.field_low.xyz - origin) / direction;
+    let b = (frame.field_high.xyz - origin) / direction;
+    let enter = min(a, b);
+    let leave = max(a, b);
+    return vec2(max(enter.x, max(enter.y, enter.z)), min(leave.x, min(leave.y, leave.z)));
+}
+
+// Closes `count` sheets from `front` on.
+fn close(front: u32, count: u32, lane: vec2<u32>) {
+    for (var sheet = front; sheet < front + count; sheet++) {
+        for (var r = 0u; r < ROWS; r++) {
+            let own = resolve(r, sheet);
+            if WAITING > 0u {
+                composite(r, sheet - 1u, pixels[r].waiting, own.has_value, own.value);
+                pixels[r].value_before = pixels[r].waiting.value;
+                pixels[r].has_before = pixels[r].waiting.has_value;
+                pixels[r].waiting = own;
+            } else {
+                composite(r, sheet, own, false, 0.0);
+            }
+        }
+        if CENTRAL {
+            take_differences(lane);
+        }
+    }
+}
+
+// Slopes of the sheet that waits, from its values at the neighbouring pixels of the tile.
+fn take_differences(lane: vec2<u32>) {
+    for (var r = 0u; r < ROWS; r++) {
+        let at = (lane.y * ROWS + r) * 8u + lane.x;
+        neighbours[at] = select(NO_VALUE, pixels[r].waiting.value, pixels[r].waiting.has_value);
+    }
+    workgroupBarrier();
+    for (var r = 0u; r < ROWS; r++) {
+        let y = lane.y * ROWS + r;
+        let own = pixels[r].waiting.value;
+        let left = neighbours[y * 8u + max(lane.x, 1u) - 1u];
+        let right = neighbours[y * 8u + min(lane.x + 1u, 7u)];
+        let above = neighbours[(max(y, 1u) - 1u) * 8u + lane.x];
+        let below = neighbours[min(y + 1u, 7u) * 8u + lane.x];
+        pixels[r].waiting.slope = vec2(difference(left, own, right), difference(above, own, below));
+    }
+    workgroupBarrier();
+}
+
+// Central difference, one-sided where a neighbour has no value.
+fn difference(before: f32, own: f32, after: f32) -> f32 {
+    let has_before = before < NO_VALUE;
+    let has_after = after < NO_VALUE;
+    let span = f32(u32(has_before) + u32(has_after));
+    return (select(own, after, has_after) - select(own, before, has_before)) / max(span, 1.0);
+}
+
+// An isotropic lattice sample: view-space centre and value. Far from the eye the shells of the sheets are flat across its
+// footprint, so its sections are four numbers for all pixels.
+fn add_isotropic(entry: u32, front: u32, first_pixel: vec2<i32>) {
+    let record = records[entry & ENTRY_RECORD];
+    let c = record.xyz;
+    let inverse_sigma = frame.isotropic.y;
+    var distance = c.z;
+    var at = frame.center + frame.scale * c.xy;
+    let per_pixel = inverse_sigma / frame.scale;
+    var q = vec3(1.0, 0.0, 1.0) * (per_pixel * per_pixel);
+    if PERSPECTIVE {
+        distance = length(c);
+        let p = c.xy / c.z;
+        at = frame.center + frame.scale * p;
+        let k = c.z * per_pixel;
+        q = vec3(1.0 + p.y * p.y, -p.x * p.y, 1.0 + p.x * p.x) * (k * k);
+    }
+    let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
+    let base = select(0.0, 1.0, (entry & ENTRY_CONTINUED) != 0u);
+    let s = sections((near - distance) * inverse_sigma, base) * (SQRT_TAU * frame.isotropic.x);
+    let extent2 = frame.isotropic.z;
+    let dx = f32(first_pixel.x) + 0.5 - at.x;
+    let nx = q.x * dx * dx;
+    let mixed = 2.0 * q.y * dx;
+    for (var r = 0u; r < ROWS; r++) {
+        let dy = f32(first_pixel.y) + (f32(r) + 0.5 - at.y);
+        let flat2 = nx + dy * (mixed + dy * q.z);
+        let cosine2 = pixels[r].cosine * pixels[r].cosine;
+        let rho2 = flat2 * cosine2;
+        let e = select(0.0, exp(-0.5 * rho2), rho2 <= extent2);
+        let slope = vec2(q.x * dx + q.y * dy, q.y * dx + q.z * dy) * cosine2;
+        add(r, s * e, slope, record.w);
+    }
+}
+
+// Any ellipsoid: ρ² = N/D and the sections t = (D·z − L)/√D, all polynomials in the distance from the projected centre;
+// see docs/engine.md.
+fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
+    let index = entry & ENTRY_RECORD;
+    let a = records[index];
+    let b = records[index + 1u];
+    let c = records[index + 2u];
+    let d = records[index + 3u];
+    let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
+    let base = select(0.0, 1.0, (entry & ENTRY_CONTINUED) != 0u);
+    let dx = f32(first_pixel.x) + 0.5 - a.x;
+    var color: vec4<f32>;
+    var normal: vec3<f32>;
+    // The sign of the squared extent tells the payloads apart.
+    let is_radiance = RADIANCE_PAYLOAD && (!SCALAR || d.w > 0.0);
+    if RADIANCE_PAYLOAD {
+        color = unpack4x8unorm(bitcast<u32>(d.y));
+        let packed = bitcast<u32>(d.z);
+        if SURFACE_SHADED && packed != NO_NORMAL {
+            normal = decode_normal(packed);
+        }
+    }
+    for (var r = 0u; r < ROWS; r++) {
+        let dy = f32(first_pixel.y) + (f32(r) + 0.5 - a.y);
+        let n = dx * (a.z * dx + a.w * dy) + b.x * dy * dy;
+        var linear = b.z * dx + b.w * dy;
+        var big_d = b.y;
+        var l = c.w * b.y + linear;
+        if PERSPECTIVE {
+            big_d = b.y + linear + dx * (c.x * dx + c.y * dy) + c.z * dy * dy;
+            l = c.w * (b.y + 0.5 * linear);
+        }
+        let inverse = inverseSqrt(max(big_d, 1e-37));
+        let rho2 = n * inverse * inverse;
+        let e = select(0.0, exp(-0.5 * rho2), rho2 <= abs(d.w));
+        let t = (big_d * (near * pixels[r].cosine) - l) * inverse;
+        let s = sections(t, base) * e;
+        if is_radiance {
+            let w = s * d.x;
+            pixels[r].depth += w;
+            pixels[r].red += w * color.x;
+            pixels[r].green += w * color.y;
+            pixels[r].blue += w * color.z;
+            if SURFACE_SHADED {
+                pixels[r].normal_x += w * normal.x;
+                pixels[r].normal_y += w * normal.y;
+                pixels[r].normal_z += w * normal.z;
+            }
+        } else if SCALAR {
+            var change = vec2(a.z * dx + 0.5 * a.w * dy, 0.5 * a.w * dx + b.x * dy);
+            if PERSPECTIVE {
+                change -= 0.5 * rho2 * vec2(b.z + 2.0 * c.x * dx + c.y * dy, b.w + c.y * dx + 2.0 * c.z * dy);
+            }
+            add(r, s * (SQRT_TAU * inverse / pixels[r].cosine), change * (inverse * inverse), d.x);
+        }
+    }
+}

@@ -1,0 +1,108 @@
+// Order: sorts each bin's entries, by sheet and then by record. Scatter fills bins in whatever order its invocations run;
+// with sorted bins the same input adds up in the same order, and draws the same bytes, each time.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> stage: Pass;
+@group(0) @binding(2) var<storage, read> bins: array<u32>;
+@group(0) @binding(3) var<storage, read_write> entries: array<u32>;
+// Bins too long for one invocation.
+@group(0) @binding(4) var<storage, read_write> long_bins: array<u32>;
+// Their number.
+@group(0) @binding(5) var<storage, read_write> long_count: atomic<u32>;
+// The workgroups of `order_long`.
+@group(1) @binding(0) var<storage, read_write> long_arguments: array<u32, 3>;
+
+const SHORT: u32 = 256u;
+
+var<workgroup> shared_number: u32;
+
+fn bin_start(bin: u32) -> u32 {
+    if bin == 0u {
+        return 0u;
+    }
+    return min(bins[bin - 1u], frame.entry_capacity);
+}
+
+fn bin_end(bin: u32) -> u32 {
+    return min(bins[bin], frame.entry_capacity);
+}
+
+@compute @workgroup_size(64)
+fn order(@builtin(global_invocation_id) id: vec3<u32>) {
+    let bin = id.x;
+    if bin >= (stage.end_row - stage.first_row) * frame.tiles.x * stage.groups {
+        return;
+    }
+    let start = bin_start(bin);
+    let end = bin_end(bin);
+    if end - start > SHORT {
+        long_bins[atomicAdd(&long_count, 1u)] = bin;
+        return;
+    }
+    // Insertion: the entries are nearly in order already.
+    for (var i = start + 1u; i < end; i++) {
+        let own = entries[i];
+        var at = i;
+        while at > start && entries[at - 1u] > own {
+            entries[at] = entries[at - 1u];
+            at--;
+        }
+        entries[at] = own;
+    }
+}
+
+// Workgroups that share the long bins at most.
+const LONG_WORKGROUPS: u32 = 4096u;
+
+@compute @workgroup_size(1)
+fn count_long() {
+    long_arguments[0] = min(atomicLoad(&long_count), LONG_WORKGROUPS);
+    long_arguments[1] = 1u;
+    long_arguments[2] = 1u;
+}
+
+// A bitonic network in its form with a flipped first step, in which every comparison puts the smaller entry first, so that
+// missing entries behind the last one count as largest and need no room (Batcher 1968).
+@compute @workgroup_size(64)
+fn order_long(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    if lane == 0u {
+        shared_number = atomicLoad(&long_count);
+    }
+    let long = workgroupUniformLoad(&shared_number);
+    for (var i = group.x; i < long; i += groups.x) {
+        if lane == 0u {
+            shared_number = long_bins[i];
+        }
+        let bin = workgroupUniformLoad(&shared_number);
+        sort_bin(bin_start(bin), bin_end(bin), lane);
+    }
+}
+
+fn sort_bin(start: u32, end: u32, lane: u32) {
+    let count = end - start;
+    for (var block = 2u; block < 2u * count; block *= 2u) {
+        for (var half = block / 2u; half > 0u; half /= 2u) {
+            for (var pair = lane; pair < count; pair += 64u) {
+                let within = pair % half;
+                let low = (pair / half) * 2u * half + within;
+                var high = low + half;
+                if half == block / 2u {
+                    high = low + block - 1u - 2u * within;
+                }
+                if high < count {
+                    let a = entries[start + low];
+                    let b = entries[start + high];
+                    if a > b {
+                        entries[start + low] = b;
+                        entries[start + high] = a;
+                    }
+                }
+            }
+            storageBarrier();
+        }
+    }
+}

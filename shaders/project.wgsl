@@ -1,0 +1,134 @@
+// Project: writes the records of a pass's splats, all that march needs of them, and counts their entries into bins.
+//
+// `count` and `write` stand around a prefix sum over the runs, so that records come out in the same order each time.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> planes: array<f32>;
+@group(0) @binding(2) var<storage, read> spans: array<u32>;
+@group(0) @binding(3) var<uniform> stage: Pass;
+// Record words before each run of candidates.
+@group(0) @binding(4) var<storage, read_write> runs: array<u32>;
+@group(0) @binding(5) var<storage, read_write> records: array<vec4<f32>>;
+// Where each record lies, for scatter.
+@group(0) @binding(6) var<storage, read_write> boxes: array<Box>;
+@group(0) @binding(7) var<storage, read_write> bins: array<atomic<u32>>;
+
+fn in_pass(span: u32) -> bool {
+    return span != NO_SPAN && (span & 0xffffu) < stage.end_collected && (span >> 16u) >= stage.first_collected;
+}
+
+fn record_words() -> u32 {
+    return select(4u, 1u, (source.flags & ISOTROPIC) != 0u);
+}
+
+@compute @workgroup_size(64)
+fn count(@builtin(global_invocation_id) id: vec3<u32>) {
+    let start = id.x * RUN;
+    let candidates = candidate_count();
+    if stage.groups == 0u || start >= candidates {
+        return;
+    }
+    var words = 0u;
+    for (var i = start; i < min(start + RUN, candidates); i++) {
+        words += u32(in_pass(spans[i])) * record_words();
+    }
+    runs[source.first_run + id.x] = words;
+}
+
+fn box_of(span: Span) -> Box {
+    return Box(
+        span.first_tile.x | (span.first_tile.y << 16u),
+        span.last_tile.x | (span.last_tile.y << 16u),
+        span.first_sheet | (span.last_sheet << 16u),
+    );
+}
+
+// Four vec4 of a general record; see general_record in march.wgsl for how they are read.
+fn write_general(at: u32, splat: Candidate) {
+    // Whitening M = L⁻¹ of the covariance L·Lᵀ. The floors keep discs far thinner than wide invertible in 32 bits.
+    let s = splat.covariance;
+    let floor_of = 1e-7 * max(s.xx, max(s.yy, s.zz)) + 1e-37;
+    let l00 = sqrt(max(s.xx, floor_of));
+    let l10 = s.xy / l00;
+    let l20 = s.xz / l00;
+    let l11 = sqrt(max(s.yy - l10 * l10, floor_of));
+    let l21 = (s.yz - l10 * l20) / l11;
+    let l22 = sqrt(max(s.zz - l20 * l20 - l21 * l21, floor_of));
+    let i00 = 1.0 / l00;
+    let i11 = 1.0 / l11;
+    let i22 = 1.0 / l22;
+    let i10 = -l10 * i00 * i11;
+    let i21 = -l21 * i11 * i22;
+    let i20 = -(l20 * i00 + l21 * i10) * i22;
+    let pixel = 1.0 / frame.scale;
+    // Change of the whitened ray direction per pixel to the right and per pixel down.
+    let m0 = vec3(i00, i10, i20) * pixel;
+    let m1 = vec3(0.0, i11, i21) * pixel;
+    let m2 = vec3(0.0, 0.0, i22);
+    let c = splat.center;
+    if frame.perspective != 0u {
+        // A centre beside the eye projects to infinity; moving it by a thousandth of its distance cannot be seen.
+        let least = 1e-3 * length(c);
+        let z = select(c.z, select(-least, least, c.z >= 0.0), abs(c.z) < least);
+        let x = c.x / z;
+        let y = c.y / z;
+        let toward = m0 * (x * frame.scale) + m1 * (y * frame.scale) + m2;
+        let a0 = cross(toward, m0) * z;
+        let a1 = cross(toward, m1) * z;
+        let at_center = frame.center + frame.scale * vec2(x, y);
+        records[at] = vec4(at_center, dot(a0, a0), 2.0 * dot(a0, a1));
+        records[at + 1u] = vec4(dot(a1, a1), dot(toward, toward), 2.0 * dot(toward, m0), 2.0 * dot(toward, m1));
+        records[at + 2u] = vec4(dot(m0, m0), 2.0 * dot(m0, m1), dot(m1, m1), z);
+    } else {
+        let a0 = cross(m0, m2);
+        let a1 = cross(m1, m2);
+        let at_center = frame.center + frame.scale * c.xy;
+        records[at] = vec4(at_center, dot(a0, a0), 2.0 * dot(a0, a1));
+        records[at + 1u] = vec4(dot(a1, a1), dot(m2, m2), -dot(m0, m2), -dot(m1, m2));
+        records[at + 2u] = vec4(0.0, 0.0, 0.0, c.z);
+    }
+    // The sign of the squared extent tells march the payload.
+    let extent2 = splat.extent * splat.extent * select(-1.0, 1.0, (source.flags & RADIANCE) != 0u);
+    records[at + 3u] = vec4(splat.strength, bitcast<f32>(splat.color), bitcast<f32>(splat.normal), extent2);
+}
+
+@compute @workgroup_size(64)
+fn write(@builtin(global_invocation_id) id: vec3<u32>) {
+    let start = id.x * RUN;
+    let candidates = candidate_count();
+    if stage.groups == 0u || start >= candidates {
+        return;
+    }
+    var at = runs[source.first_run + id.x];
+    let words = record_words();
+    for (var i = start; i < min(start + RUN, candidates); i++) {
+        if !in_pass(spans[i]) {
+            continue;
+        }
+        // plan.wgsl leaves room for all; this only keeps a wrong plan from writing elsewhere.
+        if at + words > frame.record_capacity {
+            return;
+        }
+        let splat = candidate(i);
+        if words == 1u {
+            records[at] = vec4(splat.center, splat.strength);
+        } else {
+            write_general(at, splat);
+        }
+        var box = box_of(locate(splat.center, splat.covariance, splat.extent));
+        box.first_tile |= select(0u, BOX_ISOTROPIC, words == 1u);
+        boxes[at] = box;
+        for (var word = 1u; word < words; word++) {
+            boxes[at + word].sheets = NO_SPAN;
+        }
+        let walk = walk_of(box, stage);
+        for (var window = 0u; window < walk.windows; window++) {
+            for (var row = walk.first_row; row < walk.end_row; row++) {
+                for (var column = walk.first_column; column <= walk.last_column; column++) {
+                    atomicAdd(&bins[bin_of(column, row, walk.first_window + 3u * window, stage)], 1u);
+                }
+            }
+        }
+        at += words;
+    }
+}

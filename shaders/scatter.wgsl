@@ -1,0 +1,41 @@
+// Scatter: writes an entry for every tile and window of every record into its bin. After it, `bins` holds where each bin
+// ends, which is where the next one starts.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> stage: Pass;
+@group(0) @binding(2) var<storage, read> boxes: array<Box>;
+// Record words before each run; the last element is the number of record words of the pass.
+@group(0) @binding(3) var<storage, read> runs: array<u32>;
+@group(0) @binding(4) var<storage, read_write> bins: array<atomic<u32>>;
+@group(0) @binding(5) var<storage, read_write> entries: array<u32>;
+@group(0) @binding(6) var<uniform> run_count: vec4<u32>;
+
+@compute @workgroup_size(64)
+fn scatter(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    if stage.groups == 0u {
+        return;
+    }
+    let words = min(runs[run_count.x], frame.record_capacity);
+    let group_mask = (1u << frame.group_shift) - 1u;
+    for (var at = id.x; at < words; at += groups.x * 64u) {
+        let box = boxes[at];
+        if box.sheets == NO_SPAN {
+            continue;
+        }
+        let isotropic = select(0u, ENTRY_ISOTROPIC, (box.first_tile & BOX_ISOTROPIC) != 0u);
+        let walk = walk_of(box, stage);
+        for (var window = 0u; window < walk.windows; window++) {
+            let sheet = walk.first_window + 3u * window;
+            let in_group = (sheet - (stage.first_collected - 1u)) & group_mask;
+            let entry = (in_group << ENTRY_SHEET_SHIFT) | select(0u, ENTRY_CONTINUED, window > 0u) | isotropic | at;
+            for (var row = walk.first_row; row < walk.end_row; row++) {
+                for (var column = walk.first_column; column <= walk.last_column; column++) {
+                    let slot = atomicAdd(&bins[bin_of(column, row, sheet, stage)], 1u);
+                    if slot < frame.entry_capacity {
+                        entries[slot] = entry;
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,53 @@
+// Candidates from explicit splats (48 bytes each, see splat.rs).
+
+@group(1) @binding(0) var<uniform> source: Source;
+@group(1) @binding(1) var<storage, read> splats: array<vec4<f32>>;
+
+// The picture is sampled at pixel centres: a blur of this many pixels keeps small splats from falling between them.
+const FOOTPRINT_BLUR: f32 = 0.35;
+
+fn candidate_count() -> u32 {
+    return source.count;
+}
+
+fn candidate(index: u32) -> Candidate {
+    let a = splats[3u * index];
+    let b = splats[3u * index + 1u];
+    let d = splats[3u * index + 2u];
+    let to_view = mat3x3<f32>(source.axis_x.xyz, source.axis_y.xyz, source.axis_z.xyz);
+    var splat: Candidate;
+    splat.center = to_view * a.xyz + source.origin.xyz;
+    // Columns of B turned into view space; B = (b00 0 0, b10 b11 0, b20 b21 b22) row by row.
+    let c0 = to_view * vec3(b.x, b.y, b.w);
+    let c1 = to_view * vec3(0.0, b.z, d.x);
+    let c2 = to_view * vec3(0.0, 0.0, d.y);
+    var pixel = 1.0 / frame.scale;
+    if frame.perspective != 0u {
+        pixel = pixel * length(splat.center);
+    }
+    let blur = FOOTPRINT_BLUR * pixel;
+    let blur2 = blur * blur;
+    splat.covariance.xx = c0.x * c0.x + c1.x * c1.x + c2.x * c2.x + blur2;
+    splat.covariance.xy = c0.x * c0.y + c1.x * c1.y + c2.x * c2.y;
+    splat.covariance.xz = c0.x * c0.z + c1.x * c1.z + c2.x * c2.z;
+    splat.covariance.yy = c0.y * c0.y + c1.y * c1.y + c2.y * c2.y + blur2;
+    splat.covariance.yz = c0.y * c0.z + c1.y * c1.z + c2.y * c2.z;
+    splat.covariance.zz = c0.z * c0.z + c1.z * c1.z + c2.z * c2.z + blur2;
+    splat.extent = source.extent;
+    splat.strength = a.w;
+    splat.color = bitcast<u32>(d.z);
+    splat.normal = bitcast<u32>(d.w);
+    if (source.flags & RADIANCE) != 0u {
+        splat.strength = splat.strength * f32(splat.color >> 24u) / 255.0;
+        splat.normal = turn_normal(splat.normal, to_view);
+    }
+    return splat;
+}
+
+// Turns an octahedral normal (splat.rs) into view space.
+fn turn_normal(packed: u32, to_view: mat3x3<f32>) -> u32 {
+    if packed == NO_NORMAL {
+        return packed;
+    }
+    return encode_normal(to_view * decode_normal(packed));
+}

@@ -1,0 +1,47 @@
+//! The engine: draws a scene of splats by sheets, on the GPU.
+//!
+//! A frame runs through these passes, each one Rust file here and one shader of the same name in shaders/:
+//!
+//! | pass | does |
+//! |---|---|
+//! | [`select`] | which samples of a volume the transfer function can show (only when it changes) |
+//! | [`measure`] | which sheets each splat meets, and how much room it will need |
+//! | [`plan`] | cuts the frame into depth passes that fit the buffers |
+//! | [`project`] | per depth pass: the records of its splats, counted into bins |
+//! | [`scan`], [`scatter`] | entries (splat, tile, window of four sheets) into the bins |
+//! | [`order`] | sorts each bin, for the same bytes each time |
+//! | [`march`] | per tile: adds up sections, closes sheets, composites front to back |
+//!
+//! docs/engine.md tells the mathematics.
+
+mod frame;
+mod gpu;
+mod march;
+mod measure;
+mod order;
+mod plan;
+mod project;
+mod renderer;
+mod scan;
+mod scatter;
+mod select;
+mod shaders;
+mod source;
+mod stage;
+mod uniforms;
+mod upload;
+
+pub use frame::Budget;
+pub use gpu::{AdapterChoice, Gpu};
+pub use renderer::{FrameStats, Renderer};
+pub use upload::PreparedScene;
+
+/// An empty buffer; its size is rounded up to what every binding takes.
+fn buffer(gpu: &Gpu, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size: bytes.max(16).next_multiple_of(16),
+        usage: usage | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}

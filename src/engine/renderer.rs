@@ -1,0 +1,217 @@
+//! The renderer: pipelines and buffers kept from frame to frame.
+
+use super::{
+    Budget, Gpu, PreparedScene,
+    frame::{self, Pipelines, Pool, Step, Targets},
+    scan::Scan,
+    select::Select,
+    shaders::Variant,
+    uniforms::Report,
+    upload::Origin,
+};
+use crate::{
+    Error, Result,
+    math::{Camera, View},
+    picture::Picture,
+    scene::{Scene, Settings},
+};
+use std::{collections::HashMap, time::Instant};
+
+/// Draws prepared scenes. One renderer serves any number of scenes, cameras and sizes.
+#[derive(Debug)]
+pub struct Renderer {
+    gpu: Gpu,
+    budget: Budget,
+    select: Select,
+    scan: Scan,
+    pipelines: HashMap<Variant, Pipelines>,
+    pool: Pool,
+}
+
+/// What a frame took.
+#[derive(Debug, Clone, Default)]
+pub struct FrameStats {
+    /// Splats that meet the picture.
+    pub splats: u64,
+    /// (splat, tile, window) triples.
+    pub entries: u64,
+    /// Depth passes.
+    pub passes: u32,
+    /// GPU memory held by the scene and by the frame.
+    pub gpu_bytes: u64,
+    /// Milliseconds of each step, in order; only from [`Renderer::profile`].
+    pub steps: Vec<(&'static str, f64)>,
+}
+
+impl Renderer {
+    pub fn new(gpu: &Gpu) -> Self {
+        Self::with_budget(gpu, Budget::default())
+    }
+
+    /// A renderer whose passes have a given room.
+    pub fn with_budget(gpu: &Gpu, budget: Budget) -> Self {
+        Self {
+            gpu: gpu.clone(),
+            budget,
+            select: Select::new(gpu),
+            scan: Scan::new(gpu),
+            pipelines: HashMap::new(),
+            pool: Pool::default(),
+        }
+    }
+
+    /// Uploads a scene.
+    ///
+    /// # Errors
+    /// A scene that [`Scene::validate`] refuses, or one that does not fit the device.
+    pub fn prepare(&self, scene: &Scene) -> Result<PreparedScene> {
+        PreparedScene::new(&self.gpu, scene)
+    }
+
+    /// Draws a picture and reads it back.
+    pub fn render(
+        &mut self,
+        prepared: &mut PreparedScene,
+        camera: &Camera,
+        settings: &Settings,
+    ) -> Result<(Picture, FrameStats)> {
+        let view = camera.view(settings.size)?;
+        let (targets, stats) = self.draw_frame(prepared, &view, settings, false)?;
+        Ok((self.read(&targets, &view)?, stats))
+    }
+
+    /// Draws a picture and leaves it on the GPU: a frame's time without the way back.
+    pub fn draw(&mut self, prepared: &mut PreparedScene, camera: &Camera, settings: &Settings) -> Result<FrameStats> {
+        Ok(self.draw_frame(prepared, &camera.view(settings.size)?, settings, false)?.1)
+    }
+
+    /// As [`Self::draw`], but waits for each step and tells its time.
+    pub fn profile(
+        &mut self,
+        prepared: &mut PreparedScene,
+        camera: &Camera,
+        settings: &Settings,
+    ) -> Result<FrameStats> {
+        Ok(self.draw_frame(prepared, &camera.view(settings.size)?, settings, true)?.1)
+    }
+
+    fn draw_frame(
+        &mut self,
+        prepared: &mut PreparedScene,
+        view: &View,
+        settings: &Settings,
+        profile: bool,
+    ) -> Result<(Targets, FrameStats)> {
+        let gpu = &self.gpu;
+        let _span = tracing::debug_span!("frame", width = view.size[0], height = view.size[1]).entered();
+        let variant = frame::variant(gpu, prepared, view, settings);
+        let sheets = prepared.scene.sheets(view, settings);
+        let targets = frame::targets(gpu, &mut self.pool, prepared, &variant, view, &sheets, settings, self.budget)?;
+        let pipelines = self.pipelines.entry(variant).or_insert_with(|| Pipelines::new(gpu, &variant));
+        for chunk in &prepared.chunks {
+            let lattice = matches!(chunk.origin, Origin::Lattice { .. });
+            let source = chunk.source(view, variant.isotropic && lattice);
+            gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
+        }
+        let mut times = Vec::new();
+        let steps = frame::opening(gpu, &self.select, &self.scan, pipelines, &targets, prepared);
+        let first = frame::depth_pass(gpu, &self.scan, pipelines, &targets, prepared, 0);
+        submit(gpu, steps.into_iter().chain(first), profile.then_some(&mut times))?;
+        let report: Report = bytemuck::pod_read_unaligned(&read_buffer(gpu, &targets.report, 16)?);
+        if report.overflow != 0 {
+            return Err(Error::Gpu(format!(
+                "the scene needs more room in one sheet of the picture than the budget of {} entries gives; \
+                 raise the budget",
+                self.budget.entries
+            )));
+        }
+        // One pass in flight at a time keeps the number of bind groups, and the time to the next answer, small.
+        for pass in 1..report.passes {
+            let steps = frame::depth_pass(gpu, &self.scan, pipelines, &targets, prepared, pass);
+            submit(gpu, steps, profile.then_some(&mut times))?;
+        }
+        if report.passes > 1 {
+            gpu.wait()?;
+        }
+        for chunk in &mut prepared.chunks {
+            if let Origin::Lattice { selection, .. } = &mut chunk.origin {
+                selection.outdated = false;
+            }
+        }
+        let words = if variant.isotropic && !variant.radiance { 1 } else { 4 };
+        let stats = FrameStats {
+            splats: u64::from(report.words / words),
+            entries: u64::from(report.entries),
+            passes: report.passes,
+            gpu_bytes: prepared.bytes + targets.bytes(),
+            steps: times,
+        };
+        Ok((targets, stats))
+    }
+
+    fn read(&self, targets: &Targets, view: &View) -> Result<Picture> {
+        let pixels = view.size[0] as usize * view.size[1] as usize;
+        let color: Vec<[f32; 4]> =
+            bytemuck::pod_collect_to_vec(&read_buffer(&self.gpu, &targets.colors, 16 * pixels as u64)?);
+        let hits: Vec<f32> = bytemuck::pod_collect_to_vec(&read_buffer(&self.gpu, &targets.depths, 4 * pixels as u64)?);
+        let width = view.size[0] as usize;
+        let depth = (0..pixels)
+            .map(|i| {
+                if color[i][3] < 0.5 {
+                    return f32::INFINITY;
+                }
+                let at = glam::DVec2::new((i % width) as f64 + 0.5, (i / width) as f64 + 0.5);
+                hits[i] * view.ray(at).1.z as f32
+            })
+            .collect();
+        Ok(Picture { width: view.size[0], height: view.size[1], color, depth })
+    }
+}
+
+/// Runs steps, all in one submission, or each on its own with its time.
+fn submit<'a>(
+    gpu: &Gpu,
+    steps: impl IntoIterator<Item = Step<'a>>,
+    mut times: Option<&mut Vec<(&'static str, f64)>>,
+) -> Result<()> {
+    let new = || gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
+    let mut encoder = new();
+    for (label, encode) in steps {
+        encode(&mut encoder);
+        if let Some(times) = &mut times {
+            let start = Instant::now();
+            gpu.queue.submit([std::mem::replace(&mut encoder, new()).finish()]);
+            gpu.wait()?;
+            let own = start.elapsed().as_secs_f64() * 1e3;
+            match times.iter_mut().find(|(name, _)| *name == label) {
+                Some((_, sum)) => *sum += own,
+                None => times.push((label, own)),
+            }
+        }
+    }
+    gpu.queue.submit([encoder.finish()]);
+    Ok(())
+}
+
+/// Reads the first `bytes` of a buffer back.
+fn read_buffer(gpu: &Gpu, buffer: &wgpu::Buffer, bytes: u64) -> Result<Vec<u8>> {
+    let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("read back"),
+        size: bytes,
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, bytes);
+    gpu.queue.submit([encoder.finish()]);
+    let (sender, receiver) = std::sync::mpsc::channel();
+    // The receiver outlives the callback: it is waited for below.
+    staging.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
+    gpu.wait()?;
+    match receiver.recv() {
+        Ok(Ok(())) => {}
+        _ => return Err(Error::Gpu(format!("a picture could not be read back from {}", gpu.info.name))),
+    }
+    let view = staging.get_mapped_range(..).map_err(|e| Error::Gpu(e.to_string()))?;
+    Ok(view.to_vec())
+}

@@ -1,0 +1,56 @@
+//! Scan: exclusive prefix sums in place (shaders/scan.wgsl).
+
+use super::{
+    Gpu, shaders,
+    stage::{Binding, Stage},
+};
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
+
+/// The most numbers that one scan takes.
+pub const SCAN_CAPACITY: u32 = 1 << 24;
+/// Numbers per invocation (`SEGMENT` in scan.wgsl).
+const SEGMENT: u32 = 64;
+
+/// The pass, with room for the sums of its segments.
+#[derive(Debug)]
+pub struct Scan {
+    sum: Stage,
+    spine: Stage,
+    spread: Stage,
+    segments: wgpu::Buffer,
+}
+
+impl Scan {
+    pub fn new(gpu: &Gpu) -> Self {
+        let stage = |label, entry| {
+            let bindings = [Binding::Uniform, Binding::Write, Binding::Write];
+            Stage::new(gpu, label, &[shaders::SCAN], entry, &[&bindings])
+        };
+        Self {
+            sum: stage("scan: sum", "sum"),
+            spine: stage("scan: spine", "spine"),
+            spread: stage("scan: spread", "spread"),
+            segments: super::buffer(
+                gpu,
+                "scan segments",
+                4 * u64::from(SCAN_CAPACITY / SEGMENT),
+                wgpu::BufferUsages::STORAGE,
+            ),
+        }
+    }
+
+    /// Replaces each of the first `count` numbers by the sum of those before it.
+    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, numbers: &wgpu::Buffer, count: u32) {
+        debug_assert!(count <= SCAN_CAPACITY);
+        let size = gpu.device.create_buffer_init(&BufferInitDescriptor {
+            label: Some("scan size"),
+            contents: bytemuck::bytes_of(&[count, 0, 0, 0]),
+            usage: wgpu::BufferUsages::UNIFORM,
+        });
+        let buffers = [&size, numbers, &self.segments].map(|b| b.as_entire_buffer_binding());
+        let groups = count.div_ceil(SEGMENT * 64);
+        self.sum.dispatch(encoder, &[&self.sum.bind(gpu, 0, &buffers)], groups);
+        self.spine.dispatch(encoder, &[&self.spine.bind(gpu, 0, &buffers)], 1);
+        self.spread.dispatch(encoder, &[&self.spread.bind(gpu, 0, &buffers)], groups);
+    }
+}

@@ -1,0 +1,49 @@
+//! Passes that read candidates come in two kinds, one per source of candidates: explicit splats
+//! (shaders/source_splats.wgsl) and lattices (shaders/source_lattice.wgsl).
+
+use super::{
+    Gpu, shaders,
+    stage::{Binding, Stage},
+    upload::{Chunk, Origin, WORKGROUP_CANDIDATES},
+};
+
+/// One thing per kind of source.
+#[derive(Debug)]
+pub struct Sources<T> {
+    splats: T,
+    lattice: T,
+}
+
+/// Makes both kinds of a stage from the source's shader and the bindings of its group.
+pub fn per_source(make: impl Fn(&str, &[Binding]) -> Stage) -> Sources<Stage> {
+    use Binding::{Read, Uniform};
+    let lattice = [shaders::SAMPLE, shaders::SOURCE_LATTICE].concat();
+    Sources { splats: make(shaders::SOURCE_SPLATS, &[Uniform, Read]), lattice: make(&lattice, &[Uniform, Read, Read]) }
+}
+
+impl Sources<Stage> {
+    /// Encodes the stage over the candidates of a chunk; `buffers` is its first bind group.
+    pub fn dispatch(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        chunk: &Chunk,
+        buffers: &[wgpu::BufferBinding<'_>],
+    ) {
+        match &chunk.origin {
+            Origin::Splats { .. } => {
+                let own = [&chunk.uniform, &chunk.data].map(|b| b.as_entire_buffer_binding());
+                let groups = [self.splats.bind(gpu, 0, buffers), self.splats.bind(gpu, 1, &own)];
+                let workgroups = chunk.count.div_ceil(WORKGROUP_CANDIDATES);
+                self.splats.dispatch(encoder, &[&groups[0], &groups[1]], workgroups);
+            }
+            Origin::Lattice { selection, .. } => {
+                let own = [&chunk.uniform, &chunk.data, &selection.selected];
+                let own = own.map(|b| b.as_entire_buffer_binding());
+                let groups = [self.lattice.bind(gpu, 0, buffers), self.lattice.bind(gpu, 1, &own)];
+                // The number of selected samples is known on the GPU alone.
+                self.lattice.dispatch_indirect(encoder, &[&groups[0], &groups[1]], (&selection.arguments, 0));
+            }
+        }
+    }
+}
