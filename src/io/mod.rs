@@ -10,6 +10,8 @@ mod limits;
 mod load_mesh;
 mod positions;
 mod source;
+#[cfg(test)]
+mod test_files;
 mod texture;
 
 pub use limits::Limits;

@@ -45,10 +45,14 @@ pub(super) fn read_reference(source: &Source, place: &str, reference: &str) -> R
 /// The path of a file that may be missing: `None`, with a warning, where a proper reference leads to no file.
 pub(super) fn find(source: &Source, place: &str, reference: &str) -> Result<Option<PathBuf>> {
     let reference = reference.replace('\\', "/");
-    let plain = Path::new(&reference).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+    let inside = Path::new(&reference).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
     match source.neighbour(place, &reference) {
         Ok(path) => Ok(Some(path)),
-        Err(_) if plain && source.path.parent().is_some_and(|folder| !folder.join(&reference).exists()) => {
+        Err(_)
+            if inside
+                && !reference.contains("://")
+                && source.path.parent().is_some_and(|folder| !folder.join(&reference).exists()) =>
+        {
             tracing::warn!("{}: {place}: “{reference}” does not exist; drawn without it", source.path.display());
             Ok(None)
         }

@@ -1,8 +1,8 @@
 //! Cutting large triangles, so that surfels at the corners stay small.
 //!
-//! Edges over the wanted length are halved, and the triangles beside them cut in two, three or four, until none is
-//! left: triangles of one size everywhere, deterministic, with no gaps between neighbours because an edge is judged
-//! alone. A sliver is cut along its length only.
+//! In each round the longest edges of every triangle that has edges over the wanted length are halved, and the triangles
+//! beside them cut in two, three or four. Both neighbours of an edge see it halved, so no gap opens between them. A
+//! sliver is cut along its length only.
 
 use super::Mesh;
 use glam::{Vec2, Vec3};
@@ -89,8 +89,10 @@ fn marked_edges(mesh: &Mesh, wanted: &Wanted, settled: usize) -> Vec<(u32, u32)>
         .enumerate()
         .flat_map_iter(|(index, &t)| {
             let edges = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
-            let long = edges.map(|(a, b)| a != b && wanted.excess(mesh, settled + index, a, b) > 1.0);
-            edges.into_iter().zip(long).filter_map(|(edge, long)| long.then_some(sorted(edge)))
+            let excess = edges.map(|(a, b)| wanted.excess(mesh, settled + index, a, b));
+            // Only the longest, and those about as long: a flat triangle is cut along its length first.
+            let least = (excess.iter().fold(0.0, |a: f32, &b| a.max(b)) * 0.7).max(1.0);
+            edges.into_iter().zip(excess).filter_map(move |(edge, excess)| (excess > least).then_some(sorted(edge)))
         })
         .collect()
 }

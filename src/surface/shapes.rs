@@ -98,8 +98,8 @@ impl Mesh {
             for j in 0..around {
                 let index = |i: u32, j: u32| (i % along) * around + j % around;
                 let (a, b, c, d) = (index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1));
-                mesh.triangles.push([a, c, b]);
-                mesh.triangles.push([a, d, c]);
+                mesh.triangles.push([a, b, c]);
+                mesh.triangles.push([a, c, d]);
             }
         }
         mesh
