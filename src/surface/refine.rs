@@ -1,8 +1,8 @@
 //! Cutting large triangles, so that surfels at the corners stay small.
 //!
 //! In each round the longest edges of every triangle that has edges over the wanted length are halved, and the triangles
-//! beside them cut in two, three or four. Both neighbours of an edge see it halved, so no gap opens between them. A
-//! sliver is cut along its length only.
+//! beside them cut in two, three or four. Both neighbours of an edge see it halved, so no gap opens between them.
+//! Halving would also multiply needles (two long edges and a short one) across, so these are cut in slabs.
 
 use super::Mesh;
 use glam::{Vec2, Vec3};
@@ -41,6 +41,7 @@ pub(super) fn refine(mesh: &Mesh, length: f32, most: usize) -> Cow<'_, Mesh> {
     // Triangles before `settled` have no long edge.
     let mut settled = 0;
     loop {
+        slice_needles(&mut fine, &wanted, settled);
         let mut marked = marked_edges(&fine, &wanted, settled);
         if marked.is_empty() || fine.positions.len() + marked.len() > u32::MAX as usize {
             return fine;
@@ -82,6 +83,84 @@ impl Wanted<'_> {
     }
 }
 
+/// A needle's corners from its tip on, and into how many parts its long edges are to be cut.
+struct Needle {
+    triangle: usize,
+    corners: [u32; 3],
+    parts: u32,
+}
+
+/// Cuts the triangles with two long edges and a short one in slabs across, each as long as it may be.
+fn slice_needles(fine: &mut Cow<Mesh>, wanted: &Wanted, settled: usize) {
+    let needle = |(index, &t): (usize, &[u32; 3])| {
+        let triangle = settled + index;
+        let excess = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| wanted.excess(fine, triangle, t[i], t[j]));
+        let short = (0..3).min_by(|&i, &j| excess[i].total_cmp(&excess[j]))?;
+        let longest = excess[(short + 1) % 3].max(excess[(short + 2) % 3]);
+        let least = excess[(short + 1) % 3].min(excess[(short + 2) % 3]);
+        // A slab's diagonal may be as long as an edge.
+        let step = (1.0 - excess[short] * excess[short]).max(0.0).sqrt();
+        let is_needle = excess[short] < 0.8 && least > 1.0 && longest > 2.0;
+        let corners = [t[(short + 2) % 3], t[short], t[(short + 1) % 3]];
+        is_needle.then(|| Needle { triangle, corners, parts: (longest / step).ceil().min(1e6) as u32 })
+    };
+    let needles: Vec<Needle> = fine.triangles[settled..].par_iter().enumerate().filter_map(needle).collect();
+    if needles.is_empty() {
+        return;
+    }
+    // The long edges with the parts that the more demanding neighbour asks for, and where each one's new vertices begin.
+    let mut edges: Vec<((u32, u32), u32)> =
+        needles.iter().flat_map(|n| [1, 2].map(|i| (sorted((n.corners[0], n.corners[i])), n.parts))).collect();
+    edges.par_sort_unstable_by_key(|&(edge, parts)| (edge, std::cmp::Reverse(parts)));
+    edges.dedup_by_key(|&mut (edge, _)| edge);
+    let mut next = fine.positions.len() as u64;
+    let mut starts = Vec::with_capacity(edges.len());
+    let mut new = Vec::new();
+    for &((a, b), parts) in &edges {
+        starts.push(next as u32);
+        next += u64::from(parts) - 1;
+        new.extend((1..parts).map(|i| (a, b, i as f32 / parts as f32)));
+    }
+    if next > u64::from(u32::MAX) {
+        return;
+    }
+    let mesh = fine.to_mut();
+    add_vertices(mesh, &new);
+    // Vertex `i` of `parts` from `from` to `to`, and `parts`.
+    let chain = |from: u32, to: u32| {
+        let edge = sorted((from, to));
+        let rank = edges.binary_search_by_key(&edge, |&(edge, _)| edge).unwrap_or(0);
+        let (parts, start) = (edges[rank].1, starts[rank]);
+        let vertex = move |i: u32| match i {
+            0 => from,
+            _ if i == parts => to,
+            _ if edge.0 == from => start + i - 1,
+            _ => start + parts - i - 1,
+        };
+        (parts, vertex)
+    };
+    for needle in &needles {
+        let [tip, a, b] = needle.corners;
+        let ((left, left_at), (right, right_at)) = (chain(tip, a), chain(tip, b));
+        let material = mesh.triangle_materials.get(needle.triangle).copied();
+        mesh.triangles[needle.triangle] = [tip, left_at(1), right_at(1)];
+        let (mut i, mut j) = (1, 1);
+        while i < left || j < right {
+            let on_left =
+                j == right || (i < left && u64::from(i + 1) * u64::from(right) <= u64::from(j + 1) * u64::from(left));
+            let (l, r) = (left_at(i), right_at(j));
+            if on_left {
+                i += 1;
+                mesh.triangles.push([l, left_at(i), r]);
+            } else {
+                j += 1;
+                mesh.triangles.push([l, right_at(j), r]);
+            }
+            mesh.triangle_materials.extend(material);
+        }
+    }
+}
+
 /// Every edge (smaller index first) that is too long for one of its triangles, possibly twice.
 fn marked_edges(mesh: &Mesh, wanted: &Wanted, settled: usize) -> Vec<(u32, u32)> {
     mesh.triangles[settled..]
@@ -109,7 +188,8 @@ fn cut(mesh: &mut Mesh, marked: &[(u32, u32)], settled: usize) -> usize {
         [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]
             .map(|edge| marked.binary_search(&sorted(edge)).ok().map(|rank| base + rank as u32))
     };
-    add_midpoints(mesh, marked);
+    let middles: Vec<_> = marked.iter().map(|&(a, b)| (a, b, 0.5)).collect();
+    add_vertices(mesh, &middles);
     let positions = &mesh.positions;
     let with_materials = !mesh.triangle_materials.is_empty();
     let open: Vec<([u32; 3], u32)> = mesh.triangles[settled..]
@@ -137,18 +217,25 @@ fn cut(mesh: &mut Mesh, marked: &[(u32, u32)], settled: usize) -> usize {
     now_settled
 }
 
-fn add_midpoints(mesh: &mut Mesh, marked: &[(u32, u32)]) {
-    fn extend<T: Copy + Send + Sync>(values: &mut Vec<T>, marked: &[(u32, u32)], mix: impl Fn(T, T) -> T + Sync) {
+/// Appends vertices between pairs of others, each at a part of the way.
+fn add_vertices(mesh: &mut Mesh, new: &[(u32, u32, f32)]) {
+    fn extend<T: Copy + Send + Sync>(
+        values: &mut Vec<T>,
+        new: &[(u32, u32, f32)],
+        mix: impl Fn(T, T, f32) -> T + Sync,
+    ) {
         if !values.is_empty() {
-            let middle = |&(a, b): &(u32, u32)| mix(values[a as usize], values[b as usize]);
-            let new: Vec<T> = marked.par_iter().map(middle).collect();
-            values.extend(new);
+            let between = |&(a, b, part): &(u32, u32, f32)| mix(values[a as usize], values[b as usize], part);
+            let more: Vec<T> = new.par_iter().map(between).collect();
+            values.extend(more);
         }
     }
-    extend(&mut mesh.positions, marked, |a: Vec3, b| a * 0.5 + b * 0.5);
-    extend(&mut mesh.normals, marked, |a: Vec3, b| (a + b).normalize_or_zero());
-    extend(&mut mesh.uvs, marked, |a: Vec2, b| (a + b) * 0.5);
-    extend(&mut mesh.colors, marked, |a: [u8; 4], b| std::array::from_fn(|i| a[i].midpoint(b[i])));
+    extend(&mut mesh.positions, new, |a: Vec3, b, part| a.lerp(b, part));
+    extend(&mut mesh.normals, new, |a: Vec3, b, part| a.lerp(b, part).normalize_or_zero());
+    extend(&mut mesh.uvs, new, |a: Vec2, b, part| a.lerp(b, part));
+    extend(&mut mesh.colors, new, |a: [u8; 4], b, part| {
+        std::array::from_fn(|i| (f32::from(a[i]) * (1.0 - part) + f32::from(b[i]) * part).round() as u8)
+    });
 }
 
 /// The pieces of a triangle whose edges (0–1, 1–2, 2–0) have these midpoints.
@@ -199,7 +286,7 @@ mod tests {
             let fine = refine(&mesh, 0.1, 1 << 20);
             for t in &fine.triangles {
                 for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-                    assert!(fine.positions[t[i] as usize].distance(fine.positions[t[j] as usize]) <= 0.1);
+                    assert!(fine.positions[t[i] as usize].distance(fine.positions[t[j] as usize]) <= 0.1001);
                 }
             }
             assert!((area(&fine) / area(&mesh) - 1.0).abs() < 1e-4);
