@@ -210,6 +210,8 @@ impl Builder<'_> {
             (None, None) => return Err(self.source.error(place, "has neither a URI nor a buffer view")),
         };
         self.pictures.insert(image, decoded.clone());
+        let total = self.pictures.values().map(|picture| picture.texels.len() as u64 * 4).sum();
+        self.source.check_bytes("the size of all pictures in bytes", total)?;
         Ok(decoded)
     }
 

@@ -1,6 +1,6 @@
 //! Wavefront OBJ with its MTL materials and pictures.
 //!
-//! tobj reads the statements. A survey of our own goes first ([`survey`]): it gives errors their line, and its feed
+//! tobj reads the statements. A survey of our own goes first (`survey`): it gives errors their line, and its feed
 //! keeps from tobj what tobj would read wrongly. OBJ has no counts and no end mark, so a file that is cut at the end of
 //! a line, or within its last number, reads as a smaller one.
 

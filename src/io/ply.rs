@@ -1,6 +1,6 @@
 //! PLY, in text and binary of either byte order: meshes and clouds, with normals, colours and texture coordinates.
 //!
-//! The header gives every element's columns ([`header`]); the rows are found without decoding ([`rows`]); then the
+//! The header gives every element's columns (`header`); the rows are found without decoding (`rows`); then the
 //! columns that mean something here are decoded in parallel. Other elements and columns are passed over. A text file
 //! that ends within its very last number cannot be told from a whole one and reads as that shorter number.
 

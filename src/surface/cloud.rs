@@ -5,6 +5,7 @@ use super::{
     ellipse::{Tensor, factor, lower},
     neighbours::Neighbours,
     paint::{pack, point_color},
+    weld::first_of_equals,
 };
 use crate::splat::{NO_NORMAL, Splat, encode_normal};
 use glam::{DMat3, DVec3, Vec3};
@@ -28,7 +29,8 @@ struct Surroundings {
 }
 
 pub(super) fn surfels(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
-    let kept = distinct(&mesh.positions);
+    let first = first_of_equals(&mesh.positions);
+    let kept: Vec<u32> = (0..).zip(first).filter(|&(index, first)| index == first).map(|(index, _)| index).collect();
     let points: Vec<Vec3> = kept.par_iter().map(|&index| mesh.positions[index as usize]).collect();
     let tree = Neighbours::new(&points);
     let around: Vec<Surroundings> =
@@ -116,18 +118,4 @@ fn eigen(matrix: DMat3) -> ([f64; 3], [DVec3; 3]) {
     let mut order = [0, 1, 2];
     order.sort_by(|&i, &j| a[j][j].total_cmp(&a[i][i]));
     (order.map(|i| a[i][i].max(0.0)), order.map(|i| DVec3::from_array(v[i])))
-}
-
-/// The first of every group of coincident points, in ascending order.
-fn distinct(positions: &[Vec3]) -> Vec<u32> {
-    let key = |index: u32| {
-        // Adding zero makes the two zeros one.
-        let p = positions[index as usize] + Vec3::ZERO;
-        (p.x.to_bits(), p.y.to_bits(), p.z.to_bits())
-    };
-    let mut order: Vec<u32> = (0..positions.len() as u32).collect();
-    order.par_sort_unstable_by_key(|&index| (key(index), index));
-    order.dedup_by_key(|index| key(*index));
-    order.par_sort_unstable();
-    order
 }

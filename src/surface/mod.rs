@@ -9,6 +9,7 @@ mod paint;
 mod refine;
 mod shapes;
 mod surfels;
+mod weld;
 
 pub use mesh::{Material, Mesh, Texture};
 pub use surfels::SurfelOptions;

@@ -7,6 +7,25 @@ use glam::Vec2;
 const NEUTRAL: [f32; 4] = [0.8, 0.8, 0.8, 1.0];
 
 impl Texture {
+    /// The mean colour over the parallelogram from `uv` along `a` and `b`; its samples are about two texels apart, but at
+    /// most 8 in each direction.
+    fn mean(&self, uv: Vec2, a: Vec2, b: Vec2) -> [f32; 4] {
+        let size = Vec2::new(self.width as f32, self.height as f32);
+        let steps = |edge: Vec2| (((edge * size).length() / 2.0) as u32).clamp(1, 8);
+        let (rows, columns) = (steps(a), steps(b));
+        if rows == 1 && columns == 1 {
+            return self.sample(uv);
+        }
+        let mut sum = [0.0; 4];
+        for i in 0..rows {
+            for j in 0..columns {
+                let at = uv + a * ((i as f32 + 0.5) / rows as f32) + b * ((j as f32 + 0.5) / columns as f32);
+                sum.iter_mut().zip(self.sample(at)).for_each(|(sum, part)| *sum += part);
+            }
+        }
+        sum.map(|sum| sum / (rows * columns) as f32)
+    }
+
     /// The colour at `uv`, between the four nearest texels, repeated in both directions; channels in 0 … 1.
     pub fn sample(&self, uv: Vec2) -> [f32; 4] {
         let axis = |part: f32, size: u32| {
@@ -28,8 +47,9 @@ impl Texture {
     }
 }
 
-/// The colour that triangle `triangle` shows at `vertex`, one of its corners; channels in 0 … 1.
-pub(super) fn corner_color(mesh: &Mesh, triangle: usize, vertex: usize) -> [f32; 4] {
+/// The colour that a triangle shows around one of its corners; channels in 0 … 1.
+pub(super) fn corner_color(mesh: &Mesh, triangle: usize, corner: usize) -> [f32; 4] {
+    let [vertex, next, last] = [0, 1, 2].map(|i| mesh.triangles[triangle][(corner + i) % 3] as usize);
     let material = mesh.triangle_materials.get(triangle).map(|&index| &mesh.materials[index as usize]);
     let mut color = match material {
         Some(material) => material.color,
@@ -40,9 +60,9 @@ pub(super) fn corner_color(mesh: &Mesh, triangle: usize, vertex: usize) -> [f32;
     if let Some(own) = mesh.colors.get(vertex) {
         multiply(own.map(|part| f32::from(part) / 255.0));
     }
-    if let (Some(texture), Some(&uv)) = (material.and_then(|material| material.texture.as_ref()), mesh.uvs.get(vertex))
-    {
-        multiply(texture.sample(uv));
+    let texture = material.and_then(|material| material.texture.as_ref());
+    if let (Some(texture), Some(&uv)) = (texture, mesh.uvs.get(vertex)) {
+        multiply(texture.mean(uv, (mesh.uvs[next] - uv) * 0.5, (mesh.uvs[last] - uv) * 0.5));
     }
     color
 }

@@ -230,7 +230,8 @@ fn add_vertices(mesh: &mut Mesh, new: &[(u32, u32, f32)]) {
             values.extend(more);
         }
     }
-    extend(&mut mesh.positions, new, |a: Vec3, b, part| a.lerp(b, part));
+    // Written so that the middle is the same from either end: vertices that coincide go on doing so.
+    extend(&mut mesh.positions, new, |a: Vec3, b, part| a * (1.0 - part) + b * part);
     extend(&mut mesh.normals, new, |a: Vec3, b, part| a.lerp(b, part).normalize_or_zero());
     extend(&mut mesh.uvs, new, |a: Vec2, b, part| a.lerp(b, part));
     extend(&mut mesh.colors, new, |a: [u8; 4], b, part| {

@@ -12,6 +12,7 @@ use super::{
     ellipse::{Tensor, factor},
     paint::{corner_color, pack},
     refine::refine,
+    weld::first_of_equals,
 };
 use crate::{
     Error, Result,
@@ -130,10 +131,21 @@ impl Mesh {
 fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
     let Some([low, high]) = mesh.bounds() else { return Vec::new() };
     let diagonal = (high - low).length() as f32;
+    // Files split vertices at seams of texture and material, or give every triangle its own. A seam must not show, so
+    // vertices at one place are one; but not where the file has normals, which may be split to be seen.
+    let may_be_split =
+        !mesh.uvs.is_empty() || mesh.materials.len() > 1 || mesh.positions.len() > mesh.triangles.len() / 4 * 3;
+    let is_split = mesh.normals.is_empty() && may_be_split;
     let fine = refine(mesh, diagonal * options.largest_spacing, options.most_triangles);
     let mesh = fine.as_ref();
     let keep: Vec<bool> = mesh.triangles.par_iter().map(|&triangle| has_area(mesh, triangle)).collect();
-    let adjacency = Adjacency::new(&mesh.triangles, mesh.positions.len(), &keep);
+    let adjacency = if is_split {
+        let first = first_of_equals(&mesh.positions);
+        let triangles: Vec<[u32; 3]> = mesh.triangles.par_iter().map(|t| t.map(|i| first[i as usize])).collect();
+        Adjacency::new(&triangles, mesh.positions.len(), &keep)
+    } else {
+        Adjacency::new(&mesh.triangles, mesh.positions.len(), &keep)
+    };
     let maker = Maker {
         mesh,
         adjacency: &adjacency,
@@ -169,6 +181,8 @@ fn has_area(mesh: &Mesh, [a, b, c]: [u32; 3]) -> bool {
 /// A triangle as one of its vertices sees it.
 struct Around {
     triangle: usize,
+    /// Which of its corners the vertex is.
+    corner: usize,
     /// Unit normal.
     normal: DVec3,
     area: f64,
@@ -221,6 +235,7 @@ impl Maker<'_> {
         let double_area = cross.length();
         Around {
             triangle,
+            corner: at as usize % 3,
             normal: cross / double_area,
             area: double_area * 0.5,
             angle: double_area.atan2(edges[0].dot(-edges[2])),
@@ -249,7 +264,7 @@ impl Maker<'_> {
             });
             let asked = Tensor::of_triangle(edges);
             tensor = Some(tensor.map_or(asked, |tensor| tensor.join(asked)));
-            let own = corner_color(self.mesh, triangle.triangle, vertex);
+            let own = corner_color(self.mesh, triangle.triangle, triangle.corner);
             color.iter_mut().zip(own).for_each(|(sum, own)| *sum += own * triangle.area as f32);
             area += triangle.area as f32;
         }

@@ -6,24 +6,31 @@ use crate::{
     Result,
     surface::{Material, Texture},
 };
-use std::{collections::HashMap, sync::Arc};
+use std::{
+    collections::{HashMap, HashSet},
+    sync::Arc,
+};
 
 /// The materials of one OBJ file, and the pictures already decoded for them.
 pub(super) struct Library<'a, 'b> {
     source: &'a Source<'b>,
     pictures: HashMap<String, Option<Arc<Texture>>>,
+    /// Bytes of the pictures so far.
+    picture_bytes: u64,
+    /// Libraries already read; naming one again adds nothing.
+    names: HashSet<String>,
 }
 
 impl<'a, 'b> Library<'a, 'b> {
     pub fn new(source: &'a Source<'b>) -> Self {
-        Self { source, pictures: HashMap::new() }
+        Self { source, pictures: HashMap::new(), picture_bytes: 0, names: HashSet::new() }
     }
 
     /// Reads the library that a `mtllib` names; a missing one is a warning and holds nothing.
     pub fn load(&mut self, name: &str) -> Result<(Vec<tobj::Material>, HashMap<String, usize>)> {
         let mut materials: Vec<tobj::Material> = Vec::new();
         let mut index_of = HashMap::new();
-        if name.is_empty() {
+        if name.is_empty() || !self.names.insert(name.to_owned()) {
             return Ok((materials, index_of));
         }
         let Some(path) = texture::find(self.source, "mtllib", name)? else { return Ok((materials, index_of)) };
@@ -65,6 +72,8 @@ impl<'a, 'b> Library<'a, 'b> {
                 None => {
                     let place = format!("material “{}”", material.name);
                     let texture = texture::read_reference(self.source, &place, name)?;
+                    self.picture_bytes += texture.as_ref().map_or(0, |texture| texture.texels.len() as u64 * 4);
+                    self.source.check_bytes("the size of all pictures in bytes", self.picture_bytes)?;
                     self.pictures.insert(name.clone(), texture.clone());
                     texture
                 }

@@ -210,6 +210,37 @@ fn clouds_of_all_sorts() {
 }
 
 #[test]
+fn a_split_mesh_is_as_a_whole_one() {
+    let mesh = Mesh::sphere(3);
+    let positions = mesh.triangles.iter().flatten().map(|&index| mesh.positions[index as usize]).collect();
+    let triangles = (0..mesh.triangles.len() as u32).map(|i| [i * 3, i * 3 + 1, i * 3 + 2]).collect();
+    let soup = Mesh { positions, triangles, ..Mesh::default() };
+    let (whole, soup) = (surfels(&mesh), surfels(&soup));
+    assert_eq!(whole.splats.len(), soup.splats.len());
+    assert!(least_depth(&mesh, &soup) >= 5.9);
+    for splat in &soup.splats {
+        let normal = decode_normal(splat.normal).expect("a normal");
+        assert!(normal.dot(Vec3::from_array(splat.center).normalize()) > 0.99);
+    }
+}
+
+#[test]
+fn a_fine_texture_on_coarse_triangles_is_averaged() {
+    let texels =
+        (0..1024 * 1024).map(|i: u32| if (i ^ (i / 1024)) & 1 == 0 { [255; 4] } else { [0, 0, 0, 255] }).collect();
+    let texture = Some(Arc::new(Texture { width: 1024, height: 1024, texels }));
+    let mut mesh = Mesh::sphere(2);
+    mesh.uvs = mesh.positions.iter().map(|p| p.truncate() * 0.437).collect();
+    mesh.triangle_materials = vec![0; mesh.triangles.len()];
+    mesh.materials = vec![Material { name: String::new(), color: [1.0; 4], texture }];
+    let coarse = SurfelOptions { largest_spacing: 10.0, most_triangles: 300, ..SurfelOptions::default() };
+    for splat in mesh.surfels(&coarse).expect("surfels").splats {
+        let red = splat.color & 255;
+        assert!((70..186).contains(&red), "{red}");
+    }
+}
+
+#[test]
 fn bounds_are_in_the_world() {
     let mut mesh = Mesh::cube(2.0);
     mesh.origin = DVec3::X * 100.0;
