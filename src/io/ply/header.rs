@@ -41,6 +41,14 @@ impl Element {
         self.columns.iter().map(|column| column.width()).sum()
     }
 
+    /// Bytes that a binary row has at least: lists may be empty.
+    pub fn least_bytes(&self) -> usize {
+        let least = |column: &Column| match &column.kind {
+            PropertyType::Scalar(kind) | PropertyType::List(kind, _) => width(kind),
+        };
+        self.columns.iter().map(least).sum()
+    }
+
     pub fn column(&self, names: &[&str]) -> Option<usize> {
         names.iter().find_map(|name| self.columns.iter().position(|column| column.name == *name))
     }

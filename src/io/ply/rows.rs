@@ -76,7 +76,7 @@ impl<'a> Rows<'a> {
                 return Ok(Rows::Fixed { data: &rest[..size], stride, big });
             }
         }
-        let mut starts = Vec::with_capacity(element.count.min(rest.len()));
+        let mut starts = Vec::with_capacity(element.count.min(rest.len() / element.least_bytes()));
         let mut next = 0;
         for row in 0..element.count {
             starts.push(next);
@@ -96,7 +96,7 @@ impl<'a> Rows<'a> {
 
     fn find_lines(source: &'a Source, element: &Element, at: &mut usize) -> Result<Self> {
         let bytes = source.bytes();
-        let mut lines = Vec::with_capacity(element.count.min((bytes.len() - *at) / 2));
+        let mut lines = Vec::with_capacity(element.count.min((bytes.len() - *at) / (2 * element.columns.len())));
         while lines.len() < element.count {
             if *at >= bytes.len() {
                 return Err(cut(source, element, lines.len()));
