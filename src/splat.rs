@@ -50,7 +50,7 @@ pub struct SplatSet {
 /// Packs a unit vector in 32 bits (octahedral, Meyer et al. 2010).
 pub fn encode_normal(n: Vec3) -> u32 {
     let sum = n.x.abs() + n.y.abs() + n.z.abs();
-    if !(sum > 0.0) || !sum.is_finite() {
+    if sum == 0.0 || !sum.is_finite() {
         return NO_NORMAL;
     }
     let (mut x, mut y) = (n.x / sum, n.y / sum);

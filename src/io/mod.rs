@@ -1,18 +1,27 @@
 //! Reading files: one module per format, all behind the same guarded opening ([`Source`]) and [`Limits`].
 //!
-//! [`load`] looks at the name and the first bytes and gives a [`Loaded`]: a mesh (or cloud) or a volume.
+//! [`load_mesh`] and [`load_volume`] look at the name and the first bytes, and give a mesh (or cloud) or a volume.
 
+pub mod gltf;
 mod limits;
+mod load_mesh;
 pub mod nrrd;
+pub mod obj;
+pub mod ply;
+mod positions;
 pub mod raw;
 mod sample_type;
 mod source;
 #[cfg(test)]
+mod test_files;
+#[cfg(test)]
 mod testing;
+mod texture;
 pub mod vti;
 mod vtk_array;
 
 pub use limits::Limits;
+pub use load_mesh::load_mesh;
 pub use raw::RawLayout;
 pub use sample_type::{Endian, SampleType};
 pub use source::Source;

@@ -1,0 +1,257 @@
+//! glTF 2.0 and GLB: the meshes of the default scene, with base colours and pictures.
+//!
+//! The JSON is read into the types of the gltf crate, unvalidated: its validation panics on some broken files and lets
+//! others pass (cycles, counts without bytes). Every index is looked up and every range checked where it is used.
+
+mod accessor;
+mod buffers;
+mod nodes;
+#[cfg(test)]
+mod tests;
+
+use super::{Source, positions, texture};
+use crate::{
+    Result,
+    surface::{Material, Mesh, Texture},
+};
+use ::gltf::json::{self, mesh::Mode, mesh::Semantic, validation::Checked};
+use buffers::Buffers;
+use glam::{DMat3, DMat4, DVec3, Mat2, Vec2, Vec3};
+use std::{collections::HashMap, sync::Arc};
+
+/// Extensions that a file may require: those that are read, and those that change only the looks of a material in ways
+/// that splats do not show.
+const KNOWN: [&str; 4] = ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "KHR_materials_"];
+
+/// Reads a glTF or GLB file: the triangles of the default scene in its world frame (or its points, where it has no
+/// triangles), vertex colours, base colours and textures. Skins, morph targets and animations are not applied.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) for malformed JSON, indices and ranges outside their target, cyclic nodes,
+/// references outside the file's folder, positions that are not finite, and required extensions that are not read
+/// (Draco and meshopt compression among them); [`Error::Limit`](crate::Error::Limit) for counts over the limits.
+pub fn read(source: &Source) -> Result<Mesh> {
+    let (text, binary) = buffers::split(source)?;
+    let root: json::Root =
+        json::deserialize::from_slice(text).map_err(|error| source.error("JSON", error.to_string()))?;
+    for extension in &root.extensions_required {
+        if !KNOWN.iter().any(|known| extension.starts_with(known)) {
+            return Err(source
+                .error("extensionsRequired", format!("the extension {extension} is not supported"))
+                .hint("convert the file without compression, for example with gltf-transform or gltfpack"));
+        }
+    }
+    let buffers = Buffers::open(source, &root, binary)?;
+    let mut builder = Builder {
+        source,
+        root: &root,
+        buffers: &buffers,
+        positions: Vec::new(),
+        mesh: Mesh::default(),
+        material_of: HashMap::new(),
+        pictures: HashMap::new(),
+    };
+    for (transform, mesh) in nodes::meshes(source, &root)? {
+        builder.add_mesh(transform, mesh)?;
+    }
+    builder.finish()
+}
+
+/// The mesh as it grows.
+struct Builder<'a> {
+    source: &'a Source<'a>,
+    root: &'a json::Root,
+    buffers: &'a Buffers<'a>,
+    positions: Vec<DVec3>,
+    mesh: Mesh,
+    /// Index in the mesh's materials of a file's material (`None`: the default one).
+    material_of: HashMap<Option<usize>, u32>,
+    pictures: HashMap<usize, Arc<Texture>>,
+}
+
+impl Builder<'_> {
+    fn add_mesh(&mut self, transform: DMat4, index: usize) -> Result<()> {
+        let root = self.root;
+        let Some(mesh) = root.meshes.get(index) else {
+            return Err(self.source.error(format!("mesh {index}"), format!("there are {} meshes", root.meshes.len())));
+        };
+        for (number, primitive) in mesh.primitives.iter().enumerate() {
+            self.add_primitive(transform, primitive, &format!("mesh {index}, primitive {number}"))?;
+        }
+        Ok(())
+    }
+
+    fn add_primitive(&mut self, transform: DMat4, primitive: &json::mesh::Primitive, place: &str) -> Result<()> {
+        let Checked::Valid(mode) = primitive.mode else {
+            return Err(self.source.error(place, "has an unknown mode"));
+        };
+        if matches!(mode, Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
+            tracing::warn!("{}: {place}: lines are not drawn", self.source.path.display());
+            return Ok(());
+        }
+        let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(|index| index.value());
+        let Some(position) = attribute(Semantic::Positions) else { return Ok(()) };
+        let points: Vec<[f32; 3]> = self.buffers.floats(position, place, false)?;
+        let base = self.positions.len();
+        let total = self.source.check_points("the number of vertices", (base + points.len()) as u64)?;
+        if u32::try_from(total).is_err() {
+            return Err(self.source.error(place, "more vertices than 32-bit indices can name"));
+        }
+        self.positions.extend(points.iter().map(|p| transform.transform_point3(Vec3::from_array(*p).as_dvec3())));
+        let count = points.len();
+        drop(points);
+        let check = |what: &str, found: usize| {
+            if found == count {
+                return Ok(());
+            }
+            Err(self.source.error(place, format!("has {count} positions but {found} {what}")))
+        };
+
+        if let Some(accessor) = attribute(Semantic::Normals) {
+            let normals: Vec<[f32; 3]> = self.buffers.floats(accessor, place, false)?;
+            check("normals", normals.len())?;
+            // The cofactors turn normals as the inverse transpose does, and exist for a flat transform too.
+            let [x, y, z] = DMat3::from_mat4(transform).to_cols_array_2d().map(DVec3::from_array);
+            let turn = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
+            let turned = normals.iter().map(|n| positions::unit((turn * Vec3::from_array(*n).as_dvec3()).as_vec3()));
+            self.mesh.normals.resize(base, Vec3::ZERO);
+            self.mesh.normals.extend(turned);
+        }
+        if let Some(accessor) = attribute(Semantic::Colors(0)) {
+            let colors = self.buffers.colors(accessor, place)?;
+            check("colours", colors.len())?;
+            self.mesh.colors.resize(base, [255; 4]);
+            self.mesh.colors.extend(colors.iter().map(|&color| displayed(color).map(|v| (v * 255.0).round() as u8)));
+        }
+        let material = primitive.material.map(|index| index.value());
+        let info = match material {
+            None => None,
+            Some(index) => match self.root.materials.get(index) {
+                Some(material) => material.pbr_metallic_roughness.base_color_texture.as_ref(),
+                None => {
+                    return Err(self.source.error(place, format!("refers to material {index}, which is not there")));
+                }
+            },
+        };
+        if let Some(info) = info {
+            let shift = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
+            let set = shift.and_then(|shift| shift.tex_coord).unwrap_or(info.tex_coord);
+            if let Some(accessor) = attribute(Semantic::TexCoords(set)) {
+                let mut uvs: Vec<[f32; 2]> = self.buffers.floats(accessor, place, false)?;
+                check("texture coordinates", uvs.len())?;
+                if let Some(shift) = shift {
+                    let turn = Mat2::from_angle(-shift.rotation.0);
+                    for uv in &mut uvs {
+                        let scaled = Vec2::from_array(*uv) * Vec2::from_array(shift.scale.0);
+                        *uv = (turn * scaled + Vec2::from_array(shift.offset.0)).to_array();
+                    }
+                }
+                self.mesh.uvs.resize(base, Vec2::ZERO);
+                self.mesh.uvs.extend(uvs.iter().map(|&uv| Vec2::from_array(uv)));
+            }
+        }
+        if mode != Mode::Points {
+            let corners = match primitive.indices {
+                Some(index) => self.buffers.indices(index.value(), place, count)?,
+                None => (0..count as u32).collect(),
+            };
+            let material = self.material(material)?;
+            let flip = transform.determinant() < 0.0;
+            let mesh = &mut self.mesh;
+            triangles(mode, &corners, |[a, b, c]| {
+                let [a, b, c] = [a, b, c].map(|corner| corner + base as u32);
+                mesh.triangles.push(if flip { [a, c, b] } else { [a, b, c] });
+            });
+            self.source.check_points("the number of triangles", self.mesh.triangles.len() as u64)?;
+            self.mesh.triangle_materials.resize(self.mesh.triangles.len(), material);
+        }
+        Ok(())
+    }
+
+    /// The index of a material in the mesh, which gets it at its first use.
+    fn material(&mut self, index: Option<usize>) -> Result<u32> {
+        if let Some(&known) = self.material_of.get(&index) {
+            return Ok(known);
+        }
+        let mut made = Material { name: "default".into(), color: [1.0; 4], texture: None };
+        if let Some(material) = index.and_then(|index| self.root.materials.get(index)) {
+            let base = &material.pbr_metallic_roughness;
+            made.name = material.name.clone().unwrap_or_default();
+            made.color = displayed(base.base_color_factor.0);
+            if matches!(material.alpha_mode, Checked::Valid(json::material::AlphaMode::Opaque)) {
+                made.color[3] = 1.0;
+            }
+            if let Some(info) = &base.base_color_texture {
+                made.texture = Some(self.picture(info.index.value())?);
+            }
+        }
+        let id = self.mesh.materials.len() as u32;
+        self.mesh.materials.push(made);
+        self.material_of.insert(index, id);
+        Ok(id)
+    }
+
+    fn picture(&mut self, index: usize) -> Result<Arc<Texture>> {
+        let place = format!("texture {index}");
+        let Some(entry) = self.root.textures.get(index) else {
+            return Err(self.source.error(place, format!("there are {} textures", self.root.textures.len())));
+        };
+        let image = entry.source.value();
+        if let Some(known) = self.pictures.get(&image) {
+            return Ok(known.clone());
+        }
+        let place = format!("image {image}");
+        let Some(entry) = self.root.images.get(image) else {
+            return Err(self.source.error(place, format!("there are {} images", self.root.images.len())));
+        };
+        let decoded = match (&entry.uri, entry.buffer_view) {
+            (Some(uri), _) => texture::decode(self.source, &place, &buffers::resolve(self.source, &place, uri)?)?,
+            (None, Some(view)) => texture::decode(self.source, &place, self.buffers.view(view.value(), &place)?.0)?,
+            (None, None) => return Err(self.source.error(place, "has neither a URI nor a buffer view")),
+        };
+        self.pictures.insert(image, decoded.clone());
+        let total = self.pictures.values().map(|picture| picture.texels.len() as u64 * 4).sum();
+        self.source.check_bytes("the size of all pictures in bytes", total)?;
+        Ok(decoded)
+    }
+
+    fn finish(mut self) -> Result<Mesh> {
+        let count = self.positions.len();
+        if count == 0 {
+            return Err(self.source.error("scene", "holds no meshes with positions"));
+        }
+        let positions = &self.positions;
+        (self.mesh.origin, self.mesh.positions) =
+            positions::settle(self.source, count, |i| positions[i], |i| format!("vertex {i} of the scene"))?;
+        if !self.mesh.normals.is_empty() {
+            self.mesh.normals.resize(count, Vec3::ZERO);
+        }
+        if !self.mesh.colors.is_empty() {
+            self.mesh.colors.resize(count, [255; 4]);
+        }
+        if !self.mesh.uvs.is_empty() {
+            self.mesh.uvs.resize(count, Vec2::ZERO);
+        }
+        Ok(self.mesh)
+    }
+}
+
+/// A colour as displayed (sRGB) from linear light; the opacity is unchanged.
+fn displayed([r, g, b, a]: [f32; 4]) -> [f32; 4] {
+    let encode = |v: f32| if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+    [encode(r), encode(g), encode(b), a].map(|v| if v.is_nan() { 1.0 } else { v.clamp(0.0, 1.0) })
+}
+
+/// Gives the triangles of a list, strip or fan of corners.
+fn triangles(mode: Mode, corners: &[u32], mut give: impl FnMut([u32; 3])) {
+    match mode {
+        Mode::Triangles => corners.chunks_exact(3).for_each(|t| give([t[0], t[1], t[2]])),
+        Mode::TriangleStrip => corners.windows(3).enumerate().for_each(|(i, t)| {
+            give(if i % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] });
+        }),
+        Mode::TriangleFan => {
+            corners.get(1..).unwrap_or(&[]).windows(2).for_each(|t| give([corners[0], t[0], t[1]]));
+        }
+        _ => {}
+    }
+}

@@ -1,0 +1,186 @@
+//! The look over an OBJ file before tobj reads it.
+
+use super::super::Source;
+use crate::Result;
+use std::io::{BufRead, Read};
+
+/// What holds for the whole file. tobj mistakes lines (`l`) for faces, shifts colours and normals where only some
+/// vertices have them, and does arithmetic on indices unchecked; the survey finds these cases.
+#[derive(Debug, Default)]
+pub(super) struct Survey {
+    vertices: u64,
+    pub faces: u64,
+    /// All vertices have a colour.
+    pub colors: bool,
+    /// All corners of all faces have a normal.
+    normals: bool,
+}
+
+impl Survey {
+    pub fn of(source: &Source, text: &str) -> Result<Self> {
+        let mut survey = Self { colors: true, normals: true, ..Self::default() };
+        // Positions, texture coordinates and normals so far, and the largest index used of each with its line.
+        let mut counts = [0i64; 3];
+        let mut largest = [(0i64, 0usize); 3];
+        for (line, number) in text.lines().zip(1..) {
+            let place = || format!("line {number}");
+            let mut words = line.split_whitespace();
+            match words.next() {
+                Some("v") => {
+                    counts[0] += 1;
+                    let mut values = 0;
+                    for word in words {
+                        values += 1;
+                        let first = word.trim_start_matches(['-', '+']).bytes().next().unwrap_or(b'?');
+                        if values <= 3 && matches!(first, b'n' | b'N' | b'i' | b'I') {
+                            return Err(source.error(place(), format!("the position “{word}” is not finite")));
+                        }
+                    }
+                    survey.colors &= values >= 6;
+                }
+                Some("vt") => counts[1] += 1,
+                Some("vn") => counts[2] += 1,
+                Some("f") => {
+                    survey.faces += 1;
+                    for word in words {
+                        let mut has_normal = false;
+                        for (kind, part) in word.split('/').enumerate() {
+                            if kind > 2 || (part.is_empty() && kind == 0) {
+                                return Err(source.error(place(), format!("“{word}” is no corner of a face")));
+                            }
+                            if part.is_empty() {
+                                continue;
+                            }
+                            has_normal |= kind == 2;
+                            let index: i64 = part
+                                .parse::<i32>()
+                                .map_err(|_| source.error(place(), format!("“{word}” is no corner of a face")))?
+                                .into();
+                            if index == 0 || -index > counts[kind] {
+                                return Err(source.error(place(), wrong(index, kind, counts[kind])));
+                            }
+                            if index > largest[kind].0 {
+                                largest[kind] = (index, number);
+                            }
+                        }
+                        survey.normals &= has_normal;
+                    }
+                }
+                _ => {}
+            }
+        }
+        for kind in 0..3 {
+            let (index, line) = largest[kind];
+            if index > counts[kind] {
+                return Err(source.error(format!("line {line}"), wrong(index, kind, counts[kind])));
+            }
+        }
+        survey.vertices = counts[0] as u64;
+        survey.colors &= counts[0] > 0;
+        source.check_points("the number of vertices", survey.vertices)?;
+        source.check_points("the number of faces", survey.faces)?;
+        Ok(survey)
+    }
+
+    /// The file's lines for tobj.
+    pub fn feed<'a>(&self, text: &'a str) -> Feed<'a> {
+        Feed { rest: text, line: 0, current: &[], colors: self.colors, normals: self.normals }
+    }
+}
+
+fn wrong(index: i64, kind: usize, count: i64) -> String {
+    let what = ["vertex", "texture coordinate", "normal"][kind];
+    format!("a face refers to {what} {index}, but there are {count} (1 … {count}, or −1 … −{count})")
+}
+
+/// Serves the statements that matter, one at a time, and counts lines.
+pub(super) struct Feed<'a> {
+    rest: &'a str,
+    line: usize,
+    current: &'a [u8],
+    colors: bool,
+    normals: bool,
+}
+
+impl<'a> Feed<'a> {
+    /// The line that was served last, from 1.
+    pub fn line(&self) -> usize {
+        self.line
+    }
+
+    /// The part of a line that tobj is given: without values that not all vertices have. Groups (`g`, `o`) are left
+    /// out because tobj would split vertices between them.
+    fn useful(&self, line: &'a str) -> &'a str {
+        let keep = |words: usize| first_words(line, words + 1);
+        match line.split_whitespace().next() {
+            Some("v") if self.colors => keep(6),
+            Some("v") if line.split_whitespace().count() == 5 => keep(4),
+            Some("v") => keep(3),
+            Some("vt" | "f" | "usemtl" | "mtllib") => line,
+            Some("vn") if self.normals => line,
+            _ => "",
+        }
+    }
+}
+
+/// The start of a line, up to the end of its `count`-th word.
+fn first_words(line: &str, count: usize) -> &str {
+    let mut inside = false;
+    let mut seen = 0;
+    for (at, letter) in line.char_indices() {
+        match (inside, letter.is_whitespace()) {
+            (false, false) => {
+                inside = true;
+                seen += 1;
+            }
+            (true, true) => {
+                inside = false;
+                if seen == count {
+                    return &line[..at];
+                }
+            }
+            _ => {}
+        }
+    }
+    line
+}
+
+impl BufRead for Feed<'_> {
+    fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
+        while self.current.is_empty() {
+            if self.rest.is_empty() {
+                return Ok(&[]);
+            }
+            let end = self.rest.find('\n').map_or(self.rest.len(), |end| end + 1);
+            let (line, rest) = self.rest.split_at(end);
+            (self.rest, self.line) = (rest, self.line + 1);
+            self.current = self.useful(line.trim()).as_bytes();
+            if !self.current.is_empty() {
+                break;
+            }
+        }
+        Ok(self.current)
+    }
+
+    fn consume(&mut self, amount: usize) {
+        self.current = self.current.get(amount..).unwrap_or(&[]);
+    }
+
+    // The served lines have lost their line ends, so each is one whole line here.
+    fn read_line(&mut self, out: &mut String) -> std::io::Result<usize> {
+        let line = std::str::from_utf8(self.fill_buf()?).unwrap_or("");
+        let length = line.len();
+        out.push_str(line);
+        self.consume(length);
+        Ok(length)
+    }
+}
+
+impl Read for Feed<'_> {
+    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+        let mut available = self.fill_buf()?;
+        let length = available.read(out)?;
+        self.consume(length);
+        Ok(length)
+    }
+}

@@ -1,0 +1,135 @@
+use super::*;
+use crate::io::{
+    Limits, load_mesh,
+    test_files::{Folder, png},
+};
+
+fn load(text: impl AsRef<[u8]>) -> Result<Mesh> {
+    let folder = Folder::new();
+    load_mesh(&folder.write("a.obj", text), &Limits::default())
+}
+
+const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+
+#[test]
+fn polygons_negative_indices_and_line_ends() {
+    for text in [
+        SQUARE.to_owned(),
+        SQUARE.replace('\n', "\r\n"),
+        SQUARE.replace("f 1 2 3 4", "f -4 -3 -2 -1"),
+        SQUARE.replace("f 1 2 3 4", "g a\nl 1 2 3\np 1\nf 1 2 \\\n3 4"),
+        SQUARE.trim_end().to_owned(),
+    ] {
+        let mesh = load(&text).expect(&text);
+        assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y]);
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+    }
+    assert_eq!(load([b"# caf\xe9\n", SQUARE.as_bytes()].concat()).expect("Latin-1").triangles.len(), 2);
+}
+
+#[test]
+fn colors_and_clouds() {
+    let cloud = "v 0 0 0 1 0.5 0\nv 1 0 0 0 0 1\n";
+    let mesh = load(cloud).expect("loads");
+    assert_eq!(mesh.colors, [[255, 128, 0, 255], [0, 0, 255, 255]]);
+    assert!(mesh.triangles.is_empty());
+    let mesh = load(format!("{cloud}v 0 1 0 0 255 0\nf 1 2 3\n")).expect("loads");
+    assert_eq!(mesh.colors[2], [0, 255, 0, 255]);
+    // Colours of some vertices only are left out, not shifted to others.
+    let mesh = load("v 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("loads");
+    assert!(mesh.colors.is_empty());
+}
+
+#[test]
+fn normals_split_vertices_and_partial_ones_are_left_out() {
+    let head = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvn 0 0 2\nvn 1 0 0\n";
+    let mesh = load(format!("{head}f 1//1 2//1 3//1\nf 1//2 3//2 4//2\n")).expect("loads");
+    assert_eq!(mesh.positions.len(), 6);
+    assert_eq!(mesh.normals[0], Vec3::Z);
+    assert_eq!(mesh.normals[5], Vec3::X);
+    let mesh = load(format!("{head}f 1//1 2//1 3//1\nf 1 3 4\n")).expect("loads");
+    assert_eq!((mesh.positions.len(), mesh.normals.len()), (4, 0));
+}
+
+#[test]
+fn materials_and_pictures() {
+    let folder = Folder::new();
+    folder.write("t.png", png(2, 1, &[[255, 0, 0, 255], [0, 255, 0, 255]]));
+    folder
+        .write("a b.mtl", "newmtl red\nKd 1 0 0\nd 0.5\n\nnewmtl tex\n\tKd 1 1 1\n\tmap_Kd -s 1 1 1 -clamp on t.png\n");
+    let obj = "mtllib a b.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n\
+        usemtl red\nf 1 2 3\nusemtl tex\nf 1/1 3/3 4/2\nusemtl unknown\nf 1 2 4\n";
+    let mesh = load_mesh(&folder.write("a.obj", obj), &Limits::default()).expect("loads");
+    let names: Vec<&str> = mesh.triangle_materials.iter().map(|&m| mesh.materials[m as usize].name.as_str()).collect();
+    assert_eq!(names, ["red", "tex", "none"]);
+    let material = &mesh.materials[mesh.triangle_materials[1] as usize];
+    assert_eq!(material.texture.as_ref().expect("a picture").texels, [[255, 0, 0, 255], [0, 255, 0, 255]]);
+    assert_eq!(mesh.materials[mesh.triangle_materials[0] as usize].color, [1.0, 0.0, 0.0, 0.5]);
+    assert_eq!(mesh.uvs[mesh.triangles[1][1] as usize], Vec2::new(1.0, 0.0));
+    assert_eq!(mesh.uvs.len(), mesh.positions.len());
+    let limits = Limits { texels: 1, ..Limits::default() };
+    assert!(matches!(load_mesh(&folder.path().join("a.obj"), &limits), Err(Error::Limit { found: 2, .. })));
+}
+
+#[test]
+fn missing_files_are_warnings_and_traversal_is_refused() {
+    assert_eq!(load(format!("mtllib no.mtl\nusemtl a\n{SQUARE}")).expect("loads").triangles.len(), 2);
+    for path in ["../up.mtl", "/etc/hostname", "a/../../up.mtl", "..\\up.mtl", "file:///etc/hostname"] {
+        let error = load(format!("mtllib {path}\n{SQUARE}")).expect_err(path).to_string();
+        assert!(error.contains("not a path inside"), "{error}");
+    }
+    let folder = Folder::new();
+    for (mtl, reason) in [
+        ("newmtl a\nmap_Kd ../up.png\n", "not a path inside"),
+        ("newmtl a\nKd 1\n", ""),
+        ("newmtl a\nKd 1 2\n", "not a colour"),
+        ("newmtl a\nKd x y z\n", "not a colour"),
+        ("newmtl a\nKd nan 1 1\nmap_Kd\nmap_Kd no.png\nmap_Kd -s\n", ""),
+    ] {
+        folder.write("m.mtl", mtl);
+        let loaded = load_mesh(&folder.write("a.obj", format!("mtllib m.mtl\n{SQUARE}")), &Limits::default());
+        match loaded {
+            Ok(_) => assert!(reason.is_empty(), "{mtl}"),
+            Err(error) => assert!(!reason.is_empty() && error.to_string().contains(reason), "{mtl}: {error}"),
+        }
+    }
+}
+
+#[test]
+fn broken_statements_are_errors_with_their_line() {
+    for (text, reason) in [
+        (SQUARE.replace("v 1 0 0", "v 1 nan 0"), "line 2: the position “nan” is not finite"),
+        (SQUARE.replace("v 1 0 0", "v 1 -inf 0"), "line 2"),
+        (SQUARE.replace("v 1 0 0", "v 1 1e999 0"), "not finite"),
+        (SQUARE.replace("v 1 0 0", "v 1 0"), "line 2: position parse error"),
+        (SQUARE.replace("v 1 0 0", "v 1,0 0 0"), "line 2"),
+        (SQUARE.replace("3 4", "3 5"), "line 5: a face refers to vertex 5"),
+        (SQUARE.replace("3 4", "3 0"), "line 5"),
+        (SQUARE.replace("3 4", "3 -5"), "line 5"),
+        (SQUARE.replace("3 4", "3 9223372036854775807"), "line 5"),
+        (SQUARE.replace("3 4", "3 4/1"), "texture coordinate 1"),
+        (SQUARE.replace("3 4", "3 4//1"), "normal 1"),
+        (SQUARE.replace("3 4", "3 4/a"), "no corner"),
+        (SQUARE.replace("3 4", "3 4/1/1/1"), "line 5"),
+        (String::new(), "no vertices"),
+        ("{}".into(), "no vertices"),
+    ] {
+        let error = load(&text).expect_err(&text).to_string();
+        assert!(error.contains(reason), "{text}: {error}");
+    }
+}
+
+#[test]
+fn a_cut_file_never_panics() {
+    let text = format!("mtllib no.mtl\no name\nvt 0 0\nvn 0 0 1\n{SQUARE}usemtl x\nf 1/1/1 2/1/1 3/1/1\n");
+    for length in 0..text.len() {
+        let _ = load(&text[..length]);
+    }
+}
+
+#[test]
+fn large_coordinates_keep_their_precision() {
+    let mesh = load("v 4500000.125 5600000.25 1\nv 4500001.125 5600000.25 1\nv 4500000.125 5600001.5 1\nf 1 2 3\n");
+    let mesh = mesh.expect("loads");
+    assert_eq!(mesh.origin + mesh.positions[2].as_dvec3(), DVec3::new(4_500_000.125, 5_600_001.5, 1.0));
+}

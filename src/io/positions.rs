@@ -1,0 +1,44 @@
+//! From the doubles of a file to 32-bit positions around an origin.
+
+use super::Source;
+use crate::Result;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Positions this far from the origin still have squares that fit in 32 bits.
+const LARGEST: f64 = 1e18;
+
+/// Chooses an origin and gives the positions relative to it. The origin is zero where the coordinates are not large
+/// beside the extent of the whole, else the whole number nearest to the centre. `place` names a row in an error.
+pub(super) fn settle(
+    source: &Source,
+    count: usize,
+    position: impl Fn(usize) -> DVec3 + Sync,
+    place: impl Fn(usize) -> String,
+) -> Result<(DVec3, Vec<Vec3>)> {
+    let bad = (0..count).into_par_iter().find_first(|&row| !position(row).is_finite());
+    if let Some(row) = bad {
+        return Err(source
+            .error(place(row), format!("the position {} is not finite", position(row)))
+            .hint("remove the point, or write the file again without undefined coordinates"));
+    }
+    if count == 0 {
+        return Ok((DVec3::ZERO, Vec::new()));
+    }
+    let start = position(0);
+    let (low, high) = (0..count)
+        .into_par_iter()
+        .map(|row| (position(row), position(row)))
+        .reduce(|| (start, start), |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let (center, extent) = (low * 0.5 + high * 0.5, (high * 0.5 - low * 0.5).max_element());
+    let origin = if center.abs().max_element() > 16.0 * extent { center.round() } else { DVec3::ZERO };
+    if (low - origin).abs().max((high - origin).abs()).max_element() > LARGEST {
+        return Err(source.error("positions", format!("spread from {low} to {high}, more than 32 bits can hold")));
+    }
+    Ok((origin, (0..count).into_par_iter().map(|row| (position(row) - origin).as_vec3()).collect()))
+}
+
+/// A normal of unit length, or zero where the file's is unusable.
+pub(super) fn unit(normal: Vec3) -> Vec3 {
+    normal.as_dvec3().normalize_or_zero().as_vec3()
+}

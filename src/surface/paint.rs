@@ -1,0 +1,78 @@
+//! The colour of a mesh at a corner: vertex colour × material colour × texture.
+
+use super::{Mesh, Texture};
+use glam::Vec2;
+
+/// Drawn where a mesh says nothing of its colour.
+const NEUTRAL: [f32; 4] = [0.8, 0.8, 0.8, 1.0];
+
+impl Texture {
+    /// The mean colour over the parallelogram from `uv` along `a` and `b`; its samples are about two texels apart, but at
+    /// most 8 in each direction.
+    fn mean(&self, uv: Vec2, a: Vec2, b: Vec2) -> [f32; 4] {
+        let size = Vec2::new(self.width as f32, self.height as f32);
+        let steps = |edge: Vec2| (((edge * size).length() / 2.0) as u32).clamp(1, 8);
+        let (rows, columns) = (steps(a), steps(b));
+        if rows == 1 && columns == 1 {
+            return self.sample(uv);
+        }
+        let mut sum = [0.0; 4];
+        for i in 0..rows {
+            for j in 0..columns {
+                let at = uv + a * ((i as f32 + 0.5) / rows as f32) + b * ((j as f32 + 0.5) / columns as f32);
+                sum.iter_mut().zip(self.sample(at)).for_each(|(sum, part)| *sum += part);
+            }
+        }
+        sum.map(|sum| sum / (rows * columns) as f32)
+    }
+
+    /// The colour at `uv`, between the four nearest texels, repeated in both directions; channels in 0 … 1.
+    pub fn sample(&self, uv: Vec2) -> [f32; 4] {
+        let axis = |part: f32, size: u32| {
+            let part = if part.is_finite() { part - part.floor() } else { 0.0 };
+            let at = part * size as f32 - 0.5;
+            let first = at.floor();
+            let wrap = |i: f32| (i as i64).rem_euclid(i64::from(size)) as usize;
+            (wrap(first), wrap(first + 1.0), at - first)
+        };
+        let (x0, x1, fx) = axis(uv.x, self.width);
+        let (y0, y1, fy) = axis(uv.y, self.height);
+        let texel = |x: usize, y: usize| self.texels[y * self.width as usize + x].map(f32::from);
+        let (a, b, c, d) = (texel(x0, y0), texel(x1, y0), texel(x0, y1), texel(x1, y1));
+        std::array::from_fn(|i| {
+            let top = a[i] + (b[i] - a[i]) * fx;
+            let bottom = c[i] + (d[i] - c[i]) * fx;
+            (top + (bottom - top) * fy) / 255.0
+        })
+    }
+}
+
+/// The colour that a triangle shows around one of its corners; channels in 0 … 1.
+pub(super) fn corner_color(mesh: &Mesh, triangle: usize, corner: usize) -> [f32; 4] {
+    let [vertex, next, last] = [0, 1, 2].map(|i| mesh.triangles[triangle][(corner + i) % 3] as usize);
+    let material = mesh.triangle_materials.get(triangle).map(|&index| &mesh.materials[index as usize]);
+    let mut color = match material {
+        Some(material) => material.color,
+        None if mesh.colors.is_empty() => NEUTRAL,
+        None => [1.0; 4],
+    };
+    let mut multiply = |by: [f32; 4]| color.iter_mut().zip(by).for_each(|(part, by)| *part *= by);
+    if let Some(own) = mesh.colors.get(vertex) {
+        multiply(own.map(|part| f32::from(part) / 255.0));
+    }
+    let texture = material.and_then(|material| material.texture.as_ref());
+    if let (Some(texture), Some(&uv)) = (texture, mesh.uvs.get(vertex)) {
+        multiply(texture.mean(uv, (mesh.uvs[next] - uv) * 0.5, (mesh.uvs[last] - uv) * 0.5));
+    }
+    color
+}
+
+/// The colour of a point that belongs to no triangle.
+pub(super) fn point_color(mesh: &Mesh, vertex: usize) -> [f32; 4] {
+    mesh.colors.get(vertex).map_or(NEUTRAL, |color| color.map(|part| f32::from(part) / 255.0))
+}
+
+/// A colour in 32 bits, red lowest.
+pub(super) fn pack(color: [f32; 4]) -> u32 {
+    u32::from_le_bytes(color.map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8))
+}

@@ -1,0 +1,314 @@
+//! Cutting large triangles, so that surfels at the corners stay small.
+//!
+//! In each round the longest edges of every triangle that has edges over the wanted length are halved, and the triangles
+//! beside them cut in two, three or four. Both neighbours of an edge see it halved, so no gap opens between them.
+//! Halving would also multiply needles (two long edges and a short one) across, so these are cut in slabs.
+
+use super::Mesh;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use std::borrow::Cow;
+
+/// A texture is sampled about this many texels apart …
+const TEXELS: f32 = 1.5;
+/// … but no closer than this part of the longest edge that is allowed.
+const FINEST: f32 = 1.0 / 8.0;
+
+/// What edges may stay.
+struct Wanted<'a> {
+    mesh: &'a Mesh,
+    length: f32,
+    /// Factor on [`TEXELS`] and [`FINEST`] that keeps to the budget.
+    coarser: f32,
+}
+
+/// The mesh with no edge longer than `length` (in its unit), and textured triangles cut to about the size of the texels.
+/// Lengths grow where there would be more than about `most` triangles.
+pub(super) fn refine(mesh: &Mesh, length: f32, most: usize) -> Cow<'_, Mesh> {
+    let mut wanted = Wanted { mesh, length, coarser: 1.0 };
+    let budget = most.max(mesh.triangles.len()) as f64;
+    for _ in 0..8 {
+        let expected = wanted.expected();
+        if expected <= budget * 1.1 {
+            break;
+        }
+        // Slivers need fewer by the first power only; the next round corrects for them.
+        let factor = (expected / budget).sqrt() as f32;
+        wanted.coarser *= factor;
+        wanted.length = length * (wanted.coarser * FINEST).max(1.0);
+    }
+    let mut fine = Cow::Borrowed(mesh);
+    // Triangles before `settled` have no long edge.
+    let mut settled = 0;
+    loop {
+        slice_needles(&mut fine, &wanted, settled);
+        let mut marked = marked_edges(&fine, &wanted, settled);
+        if marked.is_empty() || fine.positions.len() + marked.len() > u32::MAX as usize {
+            return fine;
+        }
+        marked.par_sort_unstable();
+        marked.dedup();
+        settled = cut(fine.to_mut(), &marked, settled);
+    }
+}
+
+impl Wanted<'_> {
+    /// The size of a texel along an edge, in texels: how long it is in its triangle's texture; 0 without one.
+    fn texels(&self, mesh: &Mesh, triangle: usize, a: u32, b: u32) -> f32 {
+        let material = mesh.triangle_materials.get(triangle).map(|&index| &self.mesh.materials[index as usize]);
+        let Some(texture) = material.and_then(|material| material.texture.as_ref()) else { return 0.0 };
+        let (Some(&a), Some(&b)) = (mesh.uvs.get(a as usize), mesh.uvs.get(b as usize)) else { return 0.0 };
+        ((a - b) * Vec2::new(texture.width as f32, texture.height as f32)).length()
+    }
+
+    /// How many times too long an edge is; up to 1 it may stay.
+    fn excess(&self, mesh: &Mesh, triangle: usize, a: u32, b: u32) -> f32 {
+        let length = (mesh.positions[a as usize] - mesh.positions[b as usize]).length();
+        let texels = self.texels(mesh, triangle, a, b) / (TEXELS * self.coarser);
+        let finest = length / (self.length * FINEST * self.coarser).min(self.length);
+        (length / self.length).max(texels.min(finest))
+    }
+
+    /// About how many triangles there will be.
+    fn expected(&self) -> f64 {
+        let mesh = self.mesh;
+        let parts = |(index, t): (usize, &[u32; 3])| {
+            let [p, q, r] = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| f64::from(self.excess(mesh, index, t[i], t[j])));
+            // The triangle measured in the lengths that are wanted, by Heron; a cut leaves edges of about 0.7.
+            let s = (p + q + r) * 0.5;
+            let area = (s * (s - p) * (s - q) * (s - r)).max(0.0).sqrt();
+            (area / 0.21).max(p.max(q).max(r)).max(1.0)
+        };
+        mesh.triangles.par_iter().enumerate().map(parts).sum()
+    }
+}
+
+/// A needle's corners from its tip on, and into how many parts its long edges are to be cut.
+struct Needle {
+    triangle: usize,
+    corners: [u32; 3],
+    parts: u32,
+}
+
+/// Cuts the triangles with two long edges and a short one in slabs across, each as long as it may be.
+fn slice_needles(fine: &mut Cow<Mesh>, wanted: &Wanted, settled: usize) {
+    let needle = |(index, &t): (usize, &[u32; 3])| {
+        let triangle = settled + index;
+        let excess = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| wanted.excess(fine, triangle, t[i], t[j]));
+        let short = (0..3).min_by(|&i, &j| excess[i].total_cmp(&excess[j]))?;
+        let longest = excess[(short + 1) % 3].max(excess[(short + 2) % 3]);
+        let least = excess[(short + 1) % 3].min(excess[(short + 2) % 3]);
+        // A slab's diagonal may be as long as an edge.
+        let step = (1.0 - excess[short] * excess[short]).max(0.0).sqrt();
+        let is_needle = excess[short] < 0.8 && least > 1.0 && longest > 2.0;
+        let corners = [t[(short + 2) % 3], t[short], t[(short + 1) % 3]];
+        is_needle.then(|| Needle { triangle, corners, parts: (longest / step).ceil().min(1e6) as u32 })
+    };
+    let needles: Vec<Needle> = fine.triangles[settled..].par_iter().enumerate().filter_map(needle).collect();
+    if needles.is_empty() {
+        return;
+    }
+    // The long edges with the parts that the more demanding neighbour asks for, and where each one's new vertices begin.
+    let mut edges: Vec<((u32, u32), u32)> =
+        needles.iter().flat_map(|n| [1, 2].map(|i| (sorted((n.corners[0], n.corners[i])), n.parts))).collect();
+    edges.par_sort_unstable_by_key(|&(edge, parts)| (edge, std::cmp::Reverse(parts)));
+    edges.dedup_by_key(|&mut (edge, _)| edge);
+    let mut next = fine.positions.len() as u64;
+    let mut starts = Vec::with_capacity(edges.len());
+    let mut new = Vec::new();
+    for &((a, b), parts) in &edges {
+        starts.push(next as u32);
+        next += u64::from(parts) - 1;
+        new.extend((1..parts).map(|i| (a, b, i as f32 / parts as f32)));
+    }
+    if next > u64::from(u32::MAX) {
+        return;
+    }
+    let mesh = fine.to_mut();
+    add_vertices(mesh, &new);
+    // Vertex `i` of `parts` from `from` to `to`, and `parts`.
+    let chain = |from: u32, to: u32| {
+        let edge = sorted((from, to));
+        let rank = edges.binary_search_by_key(&edge, |&(edge, _)| edge).unwrap_or(0);
+        let (parts, start) = (edges[rank].1, starts[rank]);
+        let vertex = move |i: u32| match i {
+            0 => from,
+            _ if i == parts => to,
+            _ if edge.0 == from => start + i - 1,
+            _ => start + parts - i - 1,
+        };
+        (parts, vertex)
+    };
+    for needle in &needles {
+        let [tip, a, b] = needle.corners;
+        let ((left, left_at), (right, right_at)) = (chain(tip, a), chain(tip, b));
+        let material = mesh.triangle_materials.get(needle.triangle).copied();
+        mesh.triangles[needle.triangle] = [tip, left_at(1), right_at(1)];
+        let (mut i, mut j) = (1, 1);
+        while i < left || j < right {
+            let on_left =
+                j == right || (i < left && u64::from(i + 1) * u64::from(right) <= u64::from(j + 1) * u64::from(left));
+            let (l, r) = (left_at(i), right_at(j));
+            if on_left {
+                i += 1;
+                mesh.triangles.push([l, left_at(i), r]);
+            } else {
+                j += 1;
+                mesh.triangles.push([l, right_at(j), r]);
+            }
+            mesh.triangle_materials.extend(material);
+        }
+    }
+}
+
+/// Every edge (smaller index first) that is too long for one of its triangles, possibly twice.
+fn marked_edges(mesh: &Mesh, wanted: &Wanted, settled: usize) -> Vec<(u32, u32)> {
+    mesh.triangles[settled..]
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(index, &t)| {
+            let edges = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
+            let excess = edges.map(|(a, b)| wanted.excess(mesh, settled + index, a, b));
+            // Only the longest, and those about as long: a flat triangle is cut along its length first.
+            let least = (excess.iter().fold(0.0, |a: f32, &b| a.max(b)) * 0.7).max(1.0);
+            edges.into_iter().zip(excess).filter_map(move |(edge, excess)| (excess > least).then_some(sorted(edge)))
+        })
+        .collect()
+}
+
+fn sorted((a, b): (u32, u32)) -> (u32, u32) {
+    (a.min(b), a.max(b))
+}
+
+/// Halves the marked edges of the triangles from `settled` on. The triangles without any come first afterwards; gives
+/// the number of all that are settled.
+fn cut(mesh: &mut Mesh, marked: &[(u32, u32)], settled: usize) -> usize {
+    let base = mesh.positions.len() as u32;
+    let halves = |t: [u32; 3]| {
+        [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]
+            .map(|edge| marked.binary_search(&sorted(edge)).ok().map(|rank| base + rank as u32))
+    };
+    let middles: Vec<_> = marked.iter().map(|&(a, b)| (a, b, 0.5)).collect();
+    add_vertices(mesh, &middles);
+    let positions = &mesh.positions;
+    let with_materials = !mesh.triangle_materials.is_empty();
+    let open: Vec<([u32; 3], u32)> = mesh.triangles[settled..]
+        .iter()
+        .enumerate()
+        .map(|(i, &t)| (t, if with_materials { mesh.triangle_materials[settled + i] } else { 0 }))
+        .collect();
+    let parts: Vec<_> = open.par_iter().map(|&(t, material)| (split(t, halves(t), positions), material)).collect();
+    mesh.triangles.truncate(settled);
+    mesh.triangle_materials.truncate(settled);
+    let mut now_settled = settled;
+    for whole in [true, false] {
+        for ((pieces, count), material) in &parts {
+            if (*count == 1) == whole {
+                mesh.triangles.extend_from_slice(&pieces[..*count]);
+                if with_materials {
+                    mesh.triangle_materials.extend(std::iter::repeat_n(*material, *count));
+                }
+            }
+        }
+        if whole {
+            now_settled = mesh.triangles.len();
+        }
+    }
+    now_settled
+}
+
+/// Appends vertices between pairs of others, each at a part of the way.
+fn add_vertices(mesh: &mut Mesh, new: &[(u32, u32, f32)]) {
+    fn extend<T: Copy + Send + Sync>(
+        values: &mut Vec<T>,
+        new: &[(u32, u32, f32)],
+        mix: impl Fn(T, T, f32) -> T + Sync,
+    ) {
+        if !values.is_empty() {
+            let between = |&(a, b, part): &(u32, u32, f32)| mix(values[a as usize], values[b as usize], part);
+            let more: Vec<T> = new.par_iter().map(between).collect();
+            values.extend(more);
+        }
+    }
+    // Written so that the middle is the same from either end: vertices that coincide go on doing so.
+    extend(&mut mesh.positions, new, |a: Vec3, b, part| a * (1.0 - part) + b * part);
+    extend(&mut mesh.normals, new, |a: Vec3, b, part| a.lerp(b, part).normalize_or_zero());
+    extend(&mut mesh.uvs, new, |a: Vec2, b, part| a.lerp(b, part));
+    extend(&mut mesh.colors, new, |a: [u8; 4], b, part| {
+        std::array::from_fn(|i| (f32::from(a[i]) * (1.0 - part) + f32::from(b[i]) * part).round() as u8)
+    });
+}
+
+/// The pieces of a triangle whose edges (0–1, 1–2, 2–0) have these midpoints.
+fn split(t: [u32; 3], halves: [Option<u32>; 3], positions: &[Vec3]) -> ([[u32; 3]; 4], usize) {
+    let none = [0; 3];
+    let turn = |by: usize| [t[by % 3], t[(by + 1) % 3], t[(by + 2) % 3]];
+    match halves {
+        [None, None, None] => ([t, none, none, none], 1),
+        [Some(x), Some(y), Some(z)] => ([[t[0], x, z], [x, t[1], y], [z, y, t[2]], [x, y, z]], 4),
+        _ => {
+            let count = halves.iter().flatten().count();
+            // Turned so that with one midpoint it is on the first edge, and with two the last edge has none.
+            let by = (0..3).find(|&by| {
+                let has = |i: usize| halves[(by + i) % 3].is_some();
+                has(0) && !has(2) && (count == 1 || has(1))
+            });
+            let by = by.unwrap_or(0);
+            let [a, b, c] = turn(by);
+            let (Some(x), second) = (halves[by], halves[(by + 1) % 3]) else { return ([t, none, none, none], 1) };
+            let Some(y) = second else { return ([[a, x, c], [x, b, c], none, none], 2) };
+            let length = |i: u32, j: u32| positions[i as usize].distance_squared(positions[j as usize]);
+            if length(a, y) <= length(x, c) {
+                ([[x, b, y], [a, x, y], [a, y, c], none], 3)
+            } else {
+                ([[x, b, y], [a, x, c], [x, y, c], none], 3)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn area(mesh: &Mesh) -> f32 {
+        let corner = |i: u32| mesh.positions[i as usize];
+        mesh.triangles.iter().map(|t| (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).z * 0.5).sum()
+    }
+
+    fn one(c: Vec3) -> Mesh {
+        Mesh { positions: vec![Vec3::ZERO, Vec3::X, c], triangles: vec![[0, 1, 2]], ..Mesh::default() }
+    }
+
+    #[test]
+    fn no_edge_stays_long_and_the_area_is_kept() {
+        for apex in [Vec3::new(0.3, 0.8, 0.0), Vec3::new(0.5, 1e-3, 0.0), Vec3::new(0.0, 3.0, 0.0)] {
+            let mesh = one(apex);
+            let fine = refine(&mesh, 0.1, 1 << 20);
+            for t in &fine.triangles {
+                for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+                    assert!(fine.positions[t[i] as usize].distance(fine.positions[t[j] as usize]) <= 0.1001);
+                }
+            }
+            assert!((area(&fine) / area(&mesh) - 1.0).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn a_sliver_is_cut_along_its_length_only() {
+        let mesh = one(Vec3::new(0.5, 1e-3, 0.0));
+        assert!(refine(&mesh, 0.01, 1 << 20).triangles.len() < 400);
+    }
+
+    #[test]
+    fn the_budget_holds() {
+        let mesh = one(Vec3::new(0.3, 0.8, 0.0));
+        let count = refine(&mesh, 1e-4, 10_000).triangles.len();
+        assert!((2_000..40_000).contains(&count), "{count}");
+    }
+
+    #[test]
+    fn small_triangles_are_borrowed() {
+        assert!(matches!(refine(&one(Vec3::Y), 2.0, 100), Cow::Borrowed(_)));
+    }
+}

@@ -1,0 +1,249 @@
+use super::*;
+use crate::{
+    splat::decode_normal,
+    surface::{Material, Texture},
+};
+use glam::{Vec2, Vec3};
+use std::sync::Arc;
+
+/// The optical depth of a ray, by brute force: strength · exp(−ρ²/2), ρ its whitened distance from the centre.
+fn depth(set: &SplatSet, point: DVec3, direction: DVec3) -> f64 {
+    set.splats
+        .iter()
+        .map(|splat| {
+            let whiten = |v: DVec3| {
+                let b = splat.factor.map(f64::from);
+                let x = v.x / b[0];
+                let y = (v.y - b[1] * x) / b[2];
+                DVec3::new(x, y, (v.z - b[3] * x - b[4] * y) / b[5])
+            };
+            let offset = whiten(point - Vec3::from_array(splat.center).as_dvec3());
+            let square = offset.reject_from(whiten(direction)).length_squared();
+            let extent = f64::from(set.extent);
+            if square > extent * extent { 0.0 } else { f64::from(splat.strength) * (-square / 2.0).exp() }
+        })
+        .sum()
+}
+
+/// The least optical depth seen along the triangles' normals, over points on up to 60 of the triangles.
+fn least_depth(mesh: &Mesh, set: &SplatSet) -> f64 {
+    let step = (mesh.triangles.len() / 60).max(1);
+    let points =
+        |n: usize| (0..=n).flat_map(move |i| (0..=n - i).map(move |j| (i as f64 / n as f64, j as f64 / n as f64)));
+    (mesh.triangles.par_iter().step_by(step))
+        .map(|&t| {
+            let [a, b, c] = t.map(|index| corner(mesh, index));
+            let normal = (b - a).cross(c - a).normalize();
+            let n = if mesh.triangles.len() < 100 { 60 } else { 8 };
+            points(n).map(|(u, v)| depth(set, a + (b - a) * u + (c - a) * v, normal)).fold(f64::INFINITY, f64::min)
+        })
+        .reduce(|| f64::INFINITY, f64::min)
+}
+
+fn surfels(mesh: &Mesh) -> SplatSet {
+    mesh.surfels(&SurfelOptions::default()).expect("surfels")
+}
+
+/// Long thin triangles: a fan, and strips with steps between them.
+fn needles() -> Mesh {
+    let mut mesh = Mesh { positions: vec![Vec3::ZERO], ..Mesh::default() };
+    for i in 0..=40u32 {
+        let angle = i as f32 * 0.02;
+        mesh.positions.push(Vec3::new(angle.cos(), angle.sin(), 0.02 * (i % 3) as f32) * (1.0 + 0.3 * (i % 5) as f32));
+        if i > 0 {
+            mesh.triangles.push([0, i, i + 1]);
+        }
+    }
+    mesh
+}
+
+#[test]
+fn surfaces_have_no_holes() {
+    let coarse = SurfelOptions { largest_spacing: 10.0, ..SurfelOptions::default() };
+    for (name, mesh) in [
+        ("sphere 1", Mesh::sphere(1)),
+        ("sphere 3", Mesh::sphere(3)),
+        ("cube", Mesh::cube(2.0)),
+        ("needles", needles()),
+        ("knot", Mesh::knot(120, 16)),
+        ("knot of long quads", Mesh::knot(60, 48)),
+    ] {
+        let least = least_depth(&mesh, &mesh.surfels(&coarse).expect("surfels"));
+        assert!(least >= 5.9, "{name}, not cut: {least}");
+    }
+    for (name, mesh) in [("cube", Mesh::cube(2.0)), ("needles", needles()), ("sphere 0", Mesh::sphere(0))] {
+        let fine = SurfelOptions { largest_spacing: 0.05, ..SurfelOptions::default() };
+        let least = least_depth(&mesh, &mesh.surfels(&fine).expect("surfels"));
+        assert!(least >= 5.9, "{name}: {least}");
+    }
+}
+
+#[test]
+fn normals_point_outward() {
+    let mesh = Mesh::sphere(4);
+    for splat in surfels(&mesh).splats {
+        let normal = decode_normal(splat.normal).expect("a normal");
+        assert!(normal.dot(Vec3::from_array(splat.center).normalize()) > 0.999);
+    }
+    let mut knot = Mesh::knot(300, 40);
+    let given = surfels(&knot);
+    knot.normals.clear();
+    let computed = surfels(&knot);
+    let options = SurfelOptions { largest_spacing: 10.0, ..SurfelOptions::default() };
+    assert_eq!(given.splats.len(), computed.splats.len());
+    let own = knot.surfels(&options).expect("surfels");
+    assert_eq!(own.splats.len(), knot.positions.len());
+    for (a, b) in given.splats.iter().zip(&computed.splats) {
+        let (a, b) = (decode_normal(a.normal).expect("a normal"), decode_normal(b.normal).expect("a normal"));
+        assert!(a.dot(b) > 0.95, "{a} {b}");
+    }
+}
+
+#[test]
+fn a_cube_keeps_its_creases() {
+    let set = surfels(&Mesh::cube(2.0));
+    for splat in &set.splats {
+        let normal = decode_normal(splat.normal).expect("a normal");
+        assert!(normal.abs().max_element() > 0.9999, "{normal}");
+        assert!((normal.dot(Vec3::from_array(splat.center)) - 1.0).abs() < 1e-3);
+    }
+    let whole = SurfelOptions { largest_spacing: 10.0, ..SurfelOptions::default() };
+    assert_eq!(Mesh::cube(2.0).surfels(&whole).expect("surfels").splats.len(), 24);
+}
+
+#[test]
+fn ellipses_stay_close_to_the_surface() {
+    // Beyond the rim of a square cut to 1/128 of its diagonal nothing is left at two spacings.
+    let mesh = Mesh {
+        positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    };
+    let set = surfels(&mesh);
+    let spacing = 2f64.sqrt() / 128.0;
+    assert!(depth(&set, DVec3::new(0.5, -spacing * 1.5, 0.0), DVec3::Z) < 0.2);
+    assert!(depth(&set, DVec3::new(0.5, 0.5, spacing), DVec3::X) < 1e-3);
+}
+
+#[test]
+fn useless_parts_are_left_out() {
+    let mut mesh = Mesh::sphere(2);
+    let whole = surfels(&mesh).splats;
+    mesh.positions.push(Vec3::ONE * 0.1);
+    mesh.triangles.extend([[0, 0, 1], [3, 3, 3], [0, 1, 0]]);
+    assert_eq!(surfels(&mesh).splats, whole);
+    let flat =
+        Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::X * 2.0], triangles: vec![[0, 1, 2]], ..Mesh::default() };
+    assert!(matches!(flat.surfels(&SurfelOptions::default()), Err(Error::NothingToDraw(_))));
+    assert!(matches!(Mesh::default().surfels(&SurfelOptions::default()), Err(Error::NothingToDraw(_))));
+}
+
+#[test]
+fn a_mesh_that_contradicts_itself_is_an_argument_error() {
+    let check = |change: fn(&mut Mesh)| {
+        let mut mesh = Mesh::cube(1.0);
+        change(&mut mesh);
+        assert!(matches!(mesh.surfels(&SurfelOptions::default()), Err(Error::Argument(_))));
+    };
+    check(|mesh| mesh.triangles[3][1] = 8);
+    check(|mesh| mesh.colors.push([0; 4]));
+    check(|mesh| mesh.triangle_materials = vec![0; 12]);
+    check(|mesh| mesh.positions[2].y = f32::NAN);
+    let options = SurfelOptions { radius_scale: f32::NAN, ..SurfelOptions::default() };
+    assert!(matches!(Mesh::cube(1.0).surfels(&options), Err(Error::Argument(_))));
+}
+
+#[test]
+fn textures_are_shown() {
+    let texels =
+        (0..64 * 64).map(|i| if (i / 8 + i / 512) % 2 == 0 { [255, 0, 0, 255] } else { [0, 0, 255, 255] }).collect();
+    let texture = Some(Arc::new(Texture { width: 64, height: 64, texels }));
+    let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
+    let mesh = Mesh {
+        positions: corners.map(|uv| uv.extend(0.0)).to_vec(),
+        uvs: corners.to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        triangle_materials: vec![0, 0],
+        materials: vec![Material { name: String::new(), color: [1.0, 1.0, 0.5, 1.0], texture }],
+        ..Mesh::default()
+    };
+    let set = surfels(&mesh);
+    let inside = |x: f32| (x * 8.0).fract() > 0.2 && (x * 8.0).fract() < 0.8;
+    let mut seen = [0, 0];
+    for splat in set.splats.iter().filter(|s| inside(s.center[0]) && inside(s.center[1])) {
+        let odd = ((splat.center[0] * 8.0) as u32 + (splat.center[1] * 8.0) as u32) % 2;
+        assert_eq!(splat.color, if odd == 0 { 0xff00_00ff } else { 0xff80_0000 }, "{:?}", splat.center);
+        seen[odd as usize] += 1;
+    }
+    assert!(seen.iter().all(|&count| count > 500), "{seen:?}");
+}
+
+#[test]
+fn clouds_of_all_sorts() {
+    // A square grid of points is covered and faces up.
+    let grid = |i: u32| Vec3::new((i % 30) as f32, (i / 30) as f32, 0.0);
+    let mut cloud = Mesh { positions: (0..900).map(grid).collect(), ..Mesh::default() };
+    let set = surfels(&cloud);
+    for i in 0..400 {
+        let at = DVec3::new(5.0 + f64::from(i % 20) * 0.63, 5.0 + f64::from(i / 20) * 0.63, 0.0);
+        assert!(depth(&set, at, DVec3::Z) >= 5.9);
+    }
+    for splat in &set.splats {
+        assert!(decode_normal(splat.normal).expect("a normal").z.abs() > 0.99);
+    }
+    // Doubles change nothing; a far point stays of moderate size; the file's normals are kept.
+    cloud.positions.extend((0..900).map(grid));
+    assert_eq!(surfels(&cloud).splats, set.splats);
+    cloud.positions.push(Vec3::new(1e6, 0.0, 0.0));
+    assert!(surfels(&cloud).splats.iter().all(|splat| splat.factor.iter().all(|b| b.abs() < 5.0)));
+    cloud.normals = vec![Vec3::NEG_Z; cloud.positions.len()];
+    assert!(surfels(&cloud).splats.iter().all(|splat| decode_normal(splat.normal).expect("a normal").z < -0.99));
+    for positions in
+        [vec![Vec3::ONE; 5000], vec![Vec3::ZERO], vec![Vec3::X, Vec3::Y], (0..50).map(|i| Vec3::X * i as f32).collect()]
+    {
+        let set = surfels(&Mesh { positions, ..Mesh::default() });
+        for splat in set.splats {
+            let [xx, _, yy, _, _, zz] = splat.factor;
+            assert!(xx > 0.0 && yy > 0.0 && zz > 0.0, "{splat:?}");
+        }
+    }
+}
+
+#[test]
+fn a_split_mesh_is_as_a_whole_one() {
+    let mesh = Mesh::sphere(3);
+    let positions = mesh.triangles.iter().flatten().map(|&index| mesh.positions[index as usize]).collect();
+    let triangles = (0..mesh.triangles.len() as u32).map(|i| [i * 3, i * 3 + 1, i * 3 + 2]).collect();
+    let soup = Mesh { positions, triangles, ..Mesh::default() };
+    let (whole, soup) = (surfels(&mesh), surfels(&soup));
+    assert_eq!(whole.splats.len(), soup.splats.len());
+    assert!(least_depth(&mesh, &soup) >= 5.9);
+    for splat in &soup.splats {
+        let normal = decode_normal(splat.normal).expect("a normal");
+        assert!(normal.dot(Vec3::from_array(splat.center).normalize()) > 0.99);
+    }
+}
+
+#[test]
+fn a_fine_texture_on_coarse_triangles_is_averaged() {
+    let texels =
+        (0..1024 * 1024).map(|i: u32| if (i ^ (i / 1024)) & 1 == 0 { [255; 4] } else { [0, 0, 0, 255] }).collect();
+    let texture = Some(Arc::new(Texture { width: 1024, height: 1024, texels }));
+    let mut mesh = Mesh::sphere(2);
+    mesh.uvs = mesh.positions.iter().map(|p| p.truncate() * 0.437).collect();
+    mesh.triangle_materials = vec![0; mesh.triangles.len()];
+    mesh.materials = vec![Material { name: String::new(), color: [1.0; 4], texture }];
+    let coarse = SurfelOptions { largest_spacing: 10.0, most_triangles: 300, ..SurfelOptions::default() };
+    for splat in mesh.surfels(&coarse).expect("surfels").splats {
+        let red = splat.color & 255;
+        assert!((70..186).contains(&red), "{red}");
+    }
+}
+
+#[test]
+fn bounds_are_in_the_world() {
+    let mut mesh = Mesh::cube(2.0);
+    mesh.origin = DVec3::X * 100.0;
+    assert_eq!(mesh.bounds(), Some([DVec3::new(99.0, -1.0, -1.0), DVec3::new(101.0, 1.0, 1.0)]));
+    assert_eq!(Mesh::default().bounds(), None);
+}

@@ -1,0 +1,33 @@
+//! Vertices at the same place.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// For each position the index of the first one that is equal to it (often itself).
+pub(super) fn first_of_equals(positions: &[Vec3]) -> Vec<u32> {
+    let key = |index: u32| {
+        // Adding zero makes the two zeros one.
+        let p = positions[index as usize] + Vec3::ZERO;
+        (p.x.to_bits(), p.y.to_bits(), p.z.to_bits())
+    };
+    let mut order: Vec<u32> = (0..positions.len() as u32).collect();
+    order.par_sort_unstable_by_key(|&index| (key(index), index));
+    let mut first = vec![0; positions.len()];
+    for equals in order.chunk_by(|&a, &b| key(a) == key(b)) {
+        for &index in equals {
+            first[index as usize] = equals[0];
+        }
+    }
+    first
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_of_each_place() {
+        let positions = [Vec3::X, Vec3::Y, Vec3::X, Vec3::ZERO, -Vec3::ZERO, Vec3::Y];
+        assert_eq!(first_of_equals(&positions), [0, 1, 0, 3, 3, 1]);
+    }
+}
