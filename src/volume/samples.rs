@@ -1,0 +1,210 @@
+//! The values of a volume, in the type of their file.
+
+use super::Lattice;
+use rayon::prelude::*;
+
+/// The samples in the type of their file, first axis fastest.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Samples {
+    U8(Vec<u8>),
+    U16(Vec<u16>),
+    I16(Vec<i16>),
+    I32(Vec<i32>),
+    F32(Vec<f32>),
+}
+
+/// Runs one expression on the vector inside, whatever its type.
+macro_rules! each_type {
+    ($samples:expr, $values:ident => $body:expr) => {
+        match $samples {
+            $crate::volume::Samples::U8($values) => $body,
+            $crate::volume::Samples::U16($values) => $body,
+            $crate::volume::Samples::I16($values) => $body,
+            $crate::volume::Samples::I32($values) => $body,
+            $crate::volume::Samples::F32($values) => $body,
+        }
+    };
+}
+pub(crate) use each_type;
+
+/// Samples that one task of a parallel pass looks at: some 10 µs of work.
+const CHUNK: usize = 1 << 16;
+
+impl Samples {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        each_type!(self, values => values.len())
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The value of a sample; exact for every type.
+    ///
+    /// # Panics
+    /// Where `index` is not below [`len`](Self::len).
+    pub fn value(&self, index: usize) -> f64 {
+        each_type!(self, values => f64::from(values[index]))
+    }
+
+    /// The name of the type, as the command spells it.
+    pub fn type_name(&self) -> &'static str {
+        match self {
+            Self::U8(_) => "u8",
+            Self::U16(_) => "u16",
+            Self::I16(_) => "i16",
+            Self::I32(_) => "i32",
+            Self::F32(_) => "f32",
+        }
+    }
+
+    /// Bytes that one sample takes.
+    pub fn sample_bytes(&self) -> usize {
+        fn size<T>(_: &[T]) -> usize {
+            size_of::<T>()
+        }
+        each_type!(self, values => size(values))
+    }
+
+    /// Smallest and largest value, or why there is none: no samples, or some that are not finite.
+    fn range(&self) -> Result<[f64; 2], String> {
+        fn extremes<T: Copy + PartialOrd + Send + Sync + Into<f64>>(values: &[T], first: T) -> [f64; 2] {
+            let wider = |[low, high]: [T; 2], v: T| [if v < low { v } else { low }, if v > high { v } else { high }];
+            let ends = values
+                .par_chunks(CHUNK)
+                .map(|chunk| chunk.iter().copied().fold([first, first], wider))
+                .reduce(|| [first, first], |a, b| wider(wider(a, b[0]), b[1]));
+            ends.map(Into::into)
+        }
+        if let Self::F32(values) = self {
+            let bad = |v: &f32| !v.is_finite();
+            let count: usize = values.par_chunks(CHUNK).map(|chunk| chunk.iter().filter(|v| bad(v)).count()).sum();
+            if let Some(first) = values.iter().position(bad).filter(|_| count > 0) {
+                return Err(format!(
+                    "{count} of {} samples are not finite, the first is sample {first} ({})",
+                    values.len(),
+                    values[first]
+                ));
+            }
+        }
+        each_type!(self, values => match values.first() {
+            Some(&first) => Ok(extremes(values, first)),
+            None => Err("there are no samples".into()),
+        })
+    }
+}
+
+/// A volume: a lattice and one scalar per sample. Values are finite; `range` holds their smallest and largest.
+#[derive(Debug, Clone)]
+pub struct Volume {
+    pub lattice: Lattice,
+    pub samples: Samples,
+    pub range: [f64; 2],
+}
+
+impl Volume {
+    /// Puts samples on a lattice and measures their range (in parallel).
+    ///
+    /// # Errors
+    /// In words, for the caller to say where: a lattice that is none ([`Lattice::validate`]), another number of samples
+    /// than the lattice has, or NaN and infinite samples (how many, and the first).
+    pub fn new(lattice: Lattice, samples: Samples) -> Result<Self, String> {
+        lattice.validate()?;
+        if samples.len() != lattice.len() {
+            let [nx, ny, nz] = lattice.dims;
+            return Err(format!("{} samples do not fill a volume of {nx} × {ny} × {nz}", samples.len()));
+        }
+        let range = samples.range()?;
+        Ok(Self { lattice, samples, range })
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.samples.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.samples.is_empty()
+    }
+
+    /// The value of the sample at an index in memory order (first axis fastest).
+    ///
+    /// # Panics
+    /// Where `index` is not below [`len`](Self::len).
+    pub fn value(&self, index: usize) -> f64 {
+        self.samples.value(index)
+    }
+
+    /// Smallest and largest world coordinates of the sample positions.
+    pub fn bounds(&self) -> [glam::DVec3; 2] {
+        self.lattice.bounds()
+    }
+
+    /// How many samples fall into each of `bins` equal parts of the range; a value on a border counts above it, the
+    /// largest in the last bin. A constant volume fills the first bin.
+    pub fn histogram(&self, bins: usize) -> Vec<u64> {
+        if bins == 0 {
+            return Vec::new();
+        }
+        let count = |range: std::ops::Range<usize>| {
+            let mut counts = vec![0u64; bins];
+            each_type!(&self.samples, values => for &v in &values[range] {
+                counts[self.bin(f64::from(v), bins)] += 1;
+            });
+            counts
+        };
+        let add = |mut a: Vec<u64>, b: Vec<u64>| {
+            a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+            a
+        };
+        let chunk = self.len().div_ceil(4 * rayon::current_num_threads()).max(CHUNK);
+        (0..self.len().div_ceil(chunk))
+            .into_par_iter()
+            .map(|c| count(c * chunk..self.len().min((c + 1) * chunk)))
+            .reduce(|| vec![0; bins], add)
+    }
+
+    /// The bin of [`histogram`](Self::histogram) that a value falls into.
+    pub fn bin(&self, value: f64, bins: usize) -> usize {
+        let [low, high] = self.range;
+        let scale = if high > low { bins as f64 / (high - low) } else { 0.0 };
+        // Casts saturate, so values outside the range land in the outer bins.
+        (((value - low) * scale) as usize).min(bins.saturating_sub(1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    fn volume(dims: [usize; 3], samples: Samples) -> Result<Volume, String> {
+        Volume::new(Lattice::with_spacing(dims, DVec3::ONE), samples)
+    }
+
+    #[test]
+    fn range_and_histogram() {
+        let v = volume([2, 3, 1], Samples::I16(vec![-4, 0, 4, 4, 1, 2])).unwrap();
+        assert_eq!(v.range, [-4.0, 4.0]);
+        assert_eq!(v.histogram(4), [1, 0, 2, 3]);
+        assert_eq!(v.value(4), 1.0);
+        assert_eq!((v.samples.type_name(), v.samples.sample_bytes()), ("i16", 2));
+        let large = volume([300, 300, 3], Samples::F32((0..270_000).map(|i| i as f32).collect())).unwrap();
+        assert_eq!(large.range, [0.0, 269_999.0]);
+        assert_eq!(large.histogram(3).iter().sum::<u64>(), 270_000);
+    }
+
+    #[test]
+    fn constant_volumes_are_fine() {
+        let v = volume([1, 1, 2], Samples::U8(vec![7, 7])).unwrap();
+        assert_eq!((v.range, v.histogram(3)), ([7.0, 7.0], vec![2, 0, 0]));
+    }
+
+    #[test]
+    fn bad_samples_are_told() {
+        assert!(volume([2, 2, 2], Samples::U8(vec![0; 7])).unwrap_err().contains("7 samples"));
+        let message = volume([2, 2, 1], Samples::F32(vec![0.0, f32::NAN, 1.0, f32::NEG_INFINITY])).unwrap_err();
+        assert_eq!(message, "2 of 4 samples are not finite, the first is sample 1 (NaN)");
+    }
+}

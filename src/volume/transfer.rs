@@ -1,0 +1,308 @@
+//! Transfer functions: the colour and the opacity that a value is shown with.
+
+use crate::{
+    Error, Result,
+    io::{Limits, Source},
+};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Colour and opacity as piecewise linear functions of the value, in the data's unit. Before the first point and after
+/// the last one the function keeps their value; two points at one value make a step.
+///
+/// Opacity is what `unit` of world length of that value covers, so a picture does not depend on the sampling. Colours are
+/// those displayed: they are mixed and composited as they stand, with no gamma in between.
+///
+/// As JSON: `{"color": [[value, red, green, blue], …], "opacity": [[value, opacity], …], "unit": 1.0, "shade":
+/// {"ambient": 0.2, "diffuse": 0.7, "specular": 0.3, "power": 10}}`; `unit` is 1 and `shade` is none where they are
+/// not given.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TransferFunction {
+    /// Value, and red, green, blue in 0 … 1; values ascend.
+    pub color: Vec<(f64, [f64; 3])>,
+    /// Value, and opacity in 0 … 1 per `unit`; values ascend.
+    pub opacity: Vec<(f64, f64)>,
+    /// The world length that the opacities hold for.
+    pub unit: f64,
+    /// How gradients are lit; none for colours as they are.
+    pub shade: Option<Shade>,
+}
+
+/// Phong's coefficients: ambient + diffuse·cos + specular·cosᵖᵒʷᵉʳ.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shade {
+    pub ambient: f64,
+    pub diffuse: f64,
+    pub specular: f64,
+    pub power: f64,
+}
+
+impl Default for Shade {
+    fn default() -> Self {
+        Self { ambient: 0.2, diffuse: 0.7, specular: 0.3, power: 10.0 }
+    }
+}
+
+/// The largest opacity that still has a finite extinction worth computing with: opacity 1 would need an infinite one.
+/// The missing 1/10,000 is far below the 1/255 steps of a displayed picture.
+const OPAQUE: f64 = 0.9999;
+
+/// A transfer file of a megabyte is no transfer file.
+const FILE_LIMIT: u64 = 1 << 20;
+
+/// The form of the JSON.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    color: Vec<[f64; 4]>,
+    opacity: Vec<[f64; 2]>,
+    #[serde(default = "one")]
+    unit: f64,
+    #[serde(default)]
+    shade: Option<Shade>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl TransferFunction {
+    /// Reads the JSON form.
+    ///
+    /// # Errors
+    /// In words: what is no such JSON (with line and column), or what [`validate`](Self::validate) finds.
+    pub fn from_json(text: &str) -> Result<Self, String> {
+        let document: Document = serde_json::from_str(text).map_err(|e| e.to_string())?;
+        let transfer = Self {
+            color: document.color.iter().map(|&[value, r, g, b]| (value, [r, g, b])).collect(),
+            opacity: document.opacity.iter().map(|&[value, opacity]| (value, opacity)).collect(),
+            unit: document.unit,
+            shade: document.shade,
+        };
+        transfer.validate()?;
+        Ok(transfer)
+    }
+
+    /// The JSON form; [`from_json`](Self::from_json) reads it back.
+    pub fn to_json(&self) -> String {
+        let document = Document {
+            color: self.color.iter().map(|&(value, [r, g, b])| [value, r, g, b]).collect(),
+            opacity: self.opacity.iter().map(|&(value, opacity)| [value, opacity]).collect(),
+            unit: self.unit,
+            shade: self.shade,
+        };
+        serde_json::json!(document).to_string()
+    }
+
+    /// Reads a JSON file.
+    ///
+    /// # Errors
+    /// [`Error::File`] and [`Error::Limit`] as for every input; [`Error::Input`] for what is no transfer function.
+    pub fn read(path: &Path) -> Result<Self> {
+        let limits = Limits { bytes: FILE_LIMIT, ..Limits::default() };
+        let source = Source::open(path, &limits)?;
+        let text = std::str::from_utf8(source.bytes())
+            .map_err(|e| source.error(format!("byte {}", e.valid_up_to()), "is not UTF-8 text"))?;
+        Self::from_json(text).map_err(|message| {
+            Error::input(path, "transfer function", message)
+                .hint("the form is {\"color\": [[value, r, g, b], …], \"opacity\": [[value, opacity], …]}, all but values in 0 … 1")
+        })
+    }
+
+    /// Checks what the other functions rely on: at least one point each, values that are finite and ascend, colours and
+    /// opacities in 0 … 1, some opacity over 0, a unit over 0 and a finite, not negative shade.
+    ///
+    /// # Errors
+    /// In words, with the first point that is wrong.
+    pub fn validate(&self) -> Result<(), String> {
+        check_values("color", self.color.iter().map(|p| p.0))?;
+        check_values("opacity", self.opacity.iter().map(|p| p.0))?;
+        let inside = |v: &f64| (0.0..=1.0).contains(v);
+        if let Some(i) = self.color.iter().position(|(_, rgb)| !rgb.iter().all(inside)) {
+            return Err(format!("color point {i} is {:?}, but channels lie in 0 … 1", self.color[i].1));
+        }
+        if let Some(i) = self.opacity.iter().position(|(_, opacity)| !inside(opacity)) {
+            return Err(format!("opacity point {i} is {}, but opacities lie in 0 … 1", self.opacity[i].1));
+        }
+        if self.opacity.iter().all(|p| p.1 == 0.0) {
+            return Err("a transfer function without opacity shows nothing: every opacity is 0".into());
+        }
+        if !(self.unit.is_finite() && self.unit > 0.0) {
+            return Err(format!("the unit is {}, but it is a length over 0", self.unit));
+        }
+        if let Some(Shade { ambient, diffuse, specular, power }) = self.shade
+            && ![ambient, diffuse, specular, power].iter().all(|v| v.is_finite() && *v >= 0.0)
+        {
+            return Err("the coefficients of the shade must be finite and not negative".into());
+        }
+        Ok(())
+    }
+
+    /// Red, green, blue of a value, 0 … 1.
+    pub fn color(&self, value: f64) -> [f64; 3] {
+        let (below, above, t) = segment(&self.color, value);
+        std::array::from_fn(|channel| mix(below[channel], above[channel], t))
+    }
+
+    /// The share of light that `unit` of world length of this value holds back, 0 … 1.
+    pub fn opacity(&self, value: f64) -> f64 {
+        let (below, above, t) = segment(&self.opacity, value);
+        mix(below, above, t)
+    }
+
+    /// Extinction per world length: −ln(1 − opacity) / unit, so that a length s of one value lets e^(−extinction·s)
+    /// through. Opacities over 0.9999 count as 0.9999, because 1 has no finite extinction.
+    pub fn extinction(&self, value: f64) -> f64 {
+        -(1.0 - self.opacity(value).min(OPAQUE)).ln() / self.unit
+    }
+
+    /// Red, green, blue and extinction per world length at `entries` values evenly spaced over `range`, both ends
+    /// included; for interpolating linearly in between. What is narrower than an entry's distance blurs.
+    pub fn table(&self, range: [f64; 2], entries: usize) -> Vec<[f32; 4]> {
+        let last = entries.saturating_sub(1).max(1) as f64;
+        let entry = |i: usize| {
+            let value = mix(range[0], range[1], i as f64 / last);
+            let [r, g, b] = self.color(value);
+            [r, g, b, self.extinction(value)].map(|v| v as f32)
+        };
+        (0..entries).map(entry).collect()
+    }
+
+    /// Whether any value in the closed interval `range` has opacity. Exact, but that both sides of a step belong to its
+    /// value.
+    pub fn visible(&self, range: [f64; 2]) -> bool {
+        // Between its points the function is linear, so its maximum is at a point or at an end of the interval.
+        let [low, high] = range;
+        self.opacity(low) > 0.0
+            || self.opacity(high) > 0.0
+            || self.opacity.iter().any(|&(value, opacity)| opacity > 0.0 && low <= value && value <= high)
+    }
+}
+
+fn check_values(what: &str, values: impl Iterator<Item = f64>) -> Result<(), String> {
+    let mut previous = None;
+    for (i, value) in values.enumerate() {
+        if !value.is_finite() {
+            return Err(format!("the value of {what} point {i} is {value}"));
+        }
+        if let Some(previous) = previous.filter(|p| value < *p) {
+            return Err(format!("{what} point {i} is at {value}, before the previous one at {previous}"));
+        }
+        previous = Some(value);
+    }
+    previous.map(|_| ()).ok_or_else(|| format!("there are no {what} points"))
+}
+
+/// What stands at the points around a value, and how far between them it lies (0 … 1). At a step, its upper side.
+/// Defaults where there are no points.
+fn segment<T: Copy + Default>(points: &[(f64, T)], value: f64) -> (T, T, f64) {
+    let above = points.partition_point(|p| p.0 <= value);
+    match (above.checked_sub(1).map(|below| points[below]), points.get(above)) {
+        (Some((v0, p0)), Some(&(v1, p1))) => (p0, p1, (value - v0) / (v1 - v0)),
+        (Some((_, only)), None) | (None, Some(&(_, only))) => (only, only, 0.0),
+        (None, None) => (T::default(), T::default(), 0.0),
+    }
+}
+
+fn mix(a: f64, b: f64, t: f64) -> f64 {
+    a + (b - a) * t
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EXAMPLE: &str = r#"{"color": [[0, 0, 0, 0], [60, 0.8, 0.4, 0.2], [255, 1, 1, 1]],
+        "opacity": [[0, 0], [40, 0], [80, 0.05], [160, 0.4], [255, 0.8]], "unit": 2.0,
+        "shade": {"ambient": 0.2, "diffuse": 0.7, "specular": 0.3, "power": 10}}"#;
+
+    fn close(a: f64, b: f64) {
+        assert!((a - b).abs() < 1e-12, "{a} is not {b}");
+    }
+
+    #[test]
+    fn values_by_hand() {
+        let t = TransferFunction::from_json(EXAMPLE).unwrap();
+        assert_eq!(t.color(30.0), [0.4, 0.2, 0.1]);
+        assert_eq!((t.color(-1.0), t.color(300.0)), ([0.0; 3], [1.0; 3]));
+        close(t.opacity(60.0), 0.025);
+        close(t.opacity(120.0), 0.225);
+        close(t.opacity(1e9), 0.8);
+        // −ln(1 − 0.8) / 2
+        close(t.extinction(255.0), 0.804_718_956_217_050_1);
+        assert_eq!(t.shade, Some(Shade::default()));
+        assert_eq!(TransferFunction::from_json(&t.to_json()).unwrap(), t);
+    }
+
+    #[test]
+    fn defaults_steps_and_the_cap() {
+        let t = TransferFunction::from_json(
+            r#"{"color": [[5, 1, 0, 0]], "opacity": [[1, 0], [2, 0], [2, 1]], "shade": null}"#,
+        )
+        .unwrap();
+        assert_eq!((t.unit, t.shade, t.color(-3.0)), (1.0, None, [1.0, 0.0, 0.0]));
+        assert_eq!((t.opacity(1.999), t.opacity(2.0)), (0.0, 1.0));
+        close(t.extinction(2.0), -(1e-4f64.ln()));
+    }
+
+    #[test]
+    fn tables_include_both_ends() {
+        let t = TransferFunction::from_json(EXAMPLE).unwrap();
+        let table = t.table([0.0, 255.0], 18);
+        assert_eq!(table.len(), 18);
+        for (i, entry) in table.iter().enumerate() {
+            let value = i as f64 * 15.0;
+            assert!((f64::from(entry[3]) - t.extinction(value)).abs() < 1e-6);
+            assert!((f64::from(entry[1]) - t.color(value)[1]).abs() < 1e-6);
+        }
+        assert!(t.table([3.0, 3.0], 0).is_empty());
+        assert_eq!(t.table([255.0, 255.0], 1)[0][0], 1.0);
+    }
+
+    #[test]
+    fn visibility_agrees_with_sampling() {
+        let json = r#"{"color": [[0, 0, 0, 0]], "opacity": [[10, 0], [20, 0], [30, 0.5], [40, 0], [60, 0], [60, 0.1], [61, 0]]}"#;
+        let t = TransferFunction::from_json(json).unwrap();
+        for low in 0..80 {
+            for high in low..80 {
+                let interval = [f64::from(low), f64::from(high)];
+                let sampled = (low * 8..=high * 8).any(|v| t.opacity(f64::from(v) / 8.0) > 0.0);
+                assert_eq!(t.visible(interval), sampled, "{interval:?}");
+            }
+        }
+        assert!(!t.visible([0.0, 20.0]) && t.visible([0.0, 20.001]) && t.visible([29.0, 29.0]));
+    }
+
+    #[test]
+    fn what_is_wrong_is_told() {
+        let with = |color: &str, opacity: &str, rest: &str| {
+            TransferFunction::from_json(&format!("{{\"color\": {color}, \"opacity\": {opacity}{rest}}}")).unwrap_err()
+        };
+        let (color, opacity) = ("[[0,1,1,1]]", "[[0,1]]");
+        for (message, word) in [
+            (with("[]", opacity, ""), "no color points"),
+            (with(color, "[]", ""), "no opacity points"),
+            (with("[[1,0,0,0],[0,0,0,0]]", opacity, ""), "color point 1 is at 0, before"),
+            (with("[[1,0,0,128]]", opacity, ""), "0 … 1"),
+            (with(color, "[[0,0.5],[1,1.5]]", ""), "opacity point 1 is 1.5"),
+            (with(color, "[[0,-0.5]]", ""), "opacity point 0"),
+            (with(color, "[[0,0],[1,0]]", ""), "without opacity"),
+            (with(color, "[[1e999,1]]", ""), "out of range"),
+            (with(color, "[[NaN,1]]", ""), "line 1"),
+            (with(color, opacity, ", \"unit\": 0"), "unit is 0"),
+            (with(color, opacity, ", \"units\": 1"), "unknown field"),
+            (
+                with(color, opacity, ", \"shade\": {\"ambient\": -1, \"diffuse\": 0, \"specular\": 0, \"power\": 1}"),
+                "shade",
+            ),
+        ] {
+            assert!(message.contains(word), "{message}");
+        }
+        let mut t = TransferFunction::from_json(EXAMPLE).unwrap();
+        t.opacity[2].0 = f64::NAN;
+        assert!(t.validate().unwrap_err().contains("opacity point 2 is NaN"));
+        t.color.clear();
+        assert_eq!(t.color(1.0), [0.0; 3]);
+    }
+}
