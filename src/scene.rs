@@ -121,8 +121,8 @@ impl Item {
                 let axes = volume.lattice.axes;
                 let reach =
                     kernel.extent * glam::DVec3::new(axes.row(0).length(), axes.row(1).length(), axes.row(2).length());
-                let samples = volume.bounds();
-                Bounds { min: samples.min - reach, max: samples.max + reach }
+                let [low, high] = volume.bounds();
+                Bounds { min: low - reach, max: high + reach }
             }
         }
     }
