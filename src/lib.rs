@@ -3,6 +3,7 @@
 //! The way of the data: a file → [`io`] (what it says) → [`volume`] / [`surface`] (what it means) → splats
 //! ([`splat`]) → [`engine`] (one pass, one Rust file, one shader) → a [`Picture`](picture::Picture).
 
+pub mod compare;
 pub mod error;
 pub mod io;
 pub mod math;
