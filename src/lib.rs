@@ -8,6 +8,7 @@ pub mod error;
 pub mod io;
 pub mod math;
 pub mod picture;
+pub mod reference;
 pub mod scene;
 pub mod splat;
 pub mod surface;
