@@ -33,8 +33,9 @@ struct Pixel {
     weight_y: vec4<f32>,
     value_x: vec4<f32>,
     value_y: vec4<f32>,
-    // Optical depth, and colour and normal weighted by it.
+    // Optical depth; and colour and normal, weighted by how much of it faces the eye, with that weight.
     depth: vec4<f32>,
+    facing: vec4<f32>,
     red: vec4<f32>,
     green: vec4<f32>,
     blue: vec4<f32>,
@@ -190,18 +191,20 @@ fn resolve(r: u32, sheet: u32) -> Sheet {
     }
     if RADIANCE_PAYLOAD {
         let depth = pixels[r].depth.x;
-        var color = vec3(pixels[r].red.x, pixels[r].green.x, pixels[r].blue.x);
+        let sum = vec3(pixels[r].red.x, pixels[r].green.x, pixels[r].blue.x);
+        var color = sum / max(pixels[r].facing.x, 1e-37);
         if SURFACE_SHADED {
             let normal = vec3(pixels[r].normal_x.x, pixels[r].normal_y.x, pixels[r].normal_z.x);
             // Colours of splats without a normal stay as they are.
             if dot(normal, normal) > 0.0 {
-                color = depth * lit(color / max(depth, 1e-37), normal, direction_of(r), frame.surface_shade);
+                color = lit(color, normal, direction_of(r), frame.surface_shade);
             }
             pixels[r].normal_x = shift(pixels[r].normal_x);
             pixels[r].normal_y = shift(pixels[r].normal_y);
             pixels[r].normal_z = shift(pixels[r].normal_z);
         }
-        own.radiance = vec4(color, depth);
+        own.radiance = vec4(depth * color, depth);
+        pixels[r].facing = shift(pixels[r].facing);
         pixels[r].depth = shift(pixels[r].depth);
         pixels[r].red = shift(pixels[r].red);
         pixels[r].green = shift(pixels[r].green);
@@ -467,14 +470,17 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
         let s = sections(t, base) * e;
         if is_radiance {
             let w = s * d.x;
+            // The colour's fourth byte is how much the splat faces the eye.
+            let v = w * color.w;
             pixels[r].depth += w;
-            pixels[r].red += w * color.x;
-            pixels[r].green += w * color.y;
-            pixels[r].blue += w * color.z;
+            pixels[r].facing += v;
+            pixels[r].red += v * color.x;
+            pixels[r].green += v * color.y;
+            pixels[r].blue += v * color.z;
             if SURFACE_SHADED {
-                pixels[r].normal_x += w * normal.x;
-                pixels[r].normal_y += w * normal.y;
-                pixels[r].normal_z += w * normal.z;
+                pixels[r].normal_x += v * normal.x;
+                pixels[r].normal_y += v * normal.y;
+                pixels[r].normal_z += v * normal.z;
             }
         } else if SCALAR {
             var change = vec2(a.z * dx + 0.5 * a.w * dy, 0.5 * a.w * dx + b.x * dy);

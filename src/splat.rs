@@ -27,6 +27,10 @@ pub struct Splat {
 /// The [`Splat::normal`] of a splat that has none.
 pub const NO_NORMAL: u32 = 0x8000_8000;
 
+/// Standard deviation, in pixels, by which every splat is widened in the picture, so that none falls between the pixels.
+/// Lattice samples are not: their kernels overlap.
+pub const FOOTPRINT_BLUR: f64 = 0.35;
+
 /// What the splats of a set carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Payload {

@@ -41,7 +41,7 @@ impl Default for SurfelOptions {
         Self {
             radius_scale: 1.0,
             optical_depth: 8.0,
-            crease_angle_degrees: 40.0,
+            crease_angle_degrees: 75.0,
             largest_spacing: 1.0 / 128.0,
             most_triangles: 1 << 23,
         }
