@@ -75,6 +75,11 @@ fn box_bounds(x: f32, reach: f32, z_low: f32, z_high: f32) -> vec2<f32> {
     return vec2(low / select(z_high, z_low, low < 0.0), high / select(z_low, z_high, high < 0.0));
 }
 
+// How far beyond the ellipsoid the windows of a splat reach. What lies farther is added to its first or last sheet. With
+// 1.25 the pictures of tests/engine_equals_reference.rs agree to 61 dB or better, with 1 to 49; bunny's entries grow by 5 %.
+// An isotropic lattice kernel, wide against its sheets, does not need it.
+const SECTION_OVERREACH: f32 = 1.25;
+
 fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
     var span: Span;
     span.visible = false;
@@ -107,8 +112,11 @@ fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
         bounds_x = vec2(c.x - reach_x, c.x + reach_x);
         bounds_y = vec2(c.y - reach_y, c.y + reach_y);
     }
+    // A ray keeps a kernel whole, so near the rim of its footprint the sections reach beyond the ellipsoid.
+    let overreach = select(SECTION_OVERREACH, 1.0, (source.flags & ISOTROPIC) != 0u);
+    far = distance + overreach * (far - distance);
+    let near = distance - overreach * reach;
     let last_plane = planes[frame.sheet_count + 1u];
-    let near = distance - reach;
     // Written so that NaN fails.
     if !(far > planes[1]) || !(near < last_plane) {
         return span;
@@ -125,7 +133,8 @@ fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
     let top = vec2<i32>(frame.tiles) - 1;
     span.first_tile = vec2<u32>(clamp((first - APRON + TILE_STEP) / TILE_STEP - 1, vec2(0), top));
     span.last_tile = vec2<u32>(clamp((last + APRON) / TILE_STEP, vec2(0), top));
-    span.first_sheet = sheet_of(near);
+    // Beside the eye, rays leave the kernel's middle behind them: the part in front of the first plane must be cut off.
+    span.first_sheet = select(sheet_of(near), 0u, frame.perspective != 0u && distance < 2.0 * reach);
     span.last_sheet = max(sheet_of(far), 1u);
     span.visible = true;
     return span;

@@ -22,6 +22,10 @@
 
 // A pixel that lets less light through than this is finished.
 const OPAQUE: f32 = 0.0005;
+// A sheet that is filled less than this has no value, one with less optical depth no colour: such small sums may be what
+// rounding left of the sections that windows of one splat give each other.
+const LEAST_FILLING: f32 = 1e-4;
+const LEAST_DEPTH: f32 = 1e-5;
 const SQRT_TAU: f32 = 2.5066283;
 
 // Everything that one pixel keeps while its tile is walked.
@@ -75,11 +79,17 @@ var<private> pixels: array<Pixel, ROWS>;
 var<workgroup> neighbours: array<f32, 64>;
 const NO_VALUE: f32 = 3e38;
 
-// Normal distribution function, for |t| up to 3.3 and within 1e-4 (minimax fit); beyond, its end values.
+// Normal distribution function, within 2e-7 (Abramowitz & Stegun 1964, 7.1.28). Its tails must be right: what they get
+// wrong is multiplied by the strength of an opaque splat and lies in front of it.
 fn normal_cdf(t: vec3<f32>) -> vec3<f32> {
-    let x = clamp(t * (1.0 / 3.3), vec3(-1.0), vec3(1.0));
-    let y = x * x;
-    return 0.5 + x * (1.3152320 + y * (-2.3494747 + y * (3.5386943 + y * (-3.5700652 + y * (2.0969673 + y * -0.5319302)))));
+    let x = min(abs(t), vec3(8.0));
+    var p = 1.0 + x * (0.049867347 + x * (0.0211410061 + x * (0.00327762632 + x * (3.8003575e-05 + x * (4.88906356e-05 + x * (5.382975e-06))))));
+    p *= p;
+    p *= p;
+    p *= p;
+    p *= p;
+    let tail = 0.5 / p;
+    return select(tail, 1.0 - tail, t >= vec3(0.0));
 }
 
 // The four sections of a window, from the distribution function at its three inner planes.
@@ -173,7 +183,7 @@ fn resolve(r: u32, sheet: u32) -> Sheet {
     var own: Sheet;
     if SCALAR {
         let weight = pixels[r].weight.x;
-        own.has_value = weight > 1e-6 * (planes[sheet + 1u] - planes[sheet]);
+        own.has_value = weight > LEAST_FILLING * (planes[sheet + 1u] - planes[sheet]);
         let inverse = 1.0 / max(weight, 1e-37);
         own.value = pixels[r].value.x * inverse;
         own.weight = weight;
@@ -192,7 +202,8 @@ fn resolve(r: u32, sheet: u32) -> Sheet {
     if RADIANCE_PAYLOAD {
         let depth = pixels[r].depth.x;
         let sum = vec3(pixels[r].red.x, pixels[r].green.x, pixels[r].blue.x);
-        var color = sum / max(pixels[r].facing.x, 1e-37);
+        // Where next to nothing faces the eye, rounding may have left a weight of any sign; its colour must stay a colour.
+        var color = clamp(sum / max(pixels[r].facing.x, 1e-12), vec3(0.0), vec3(1.0));
         if SURFACE_SHADED {
             let normal = vec3(pixels[r].normal_x.x, pixels[r].normal_y.x, pixels[r].normal_z.x);
             // Colours of splats without a normal stay as they are.
@@ -203,7 +214,7 @@ fn resolve(r: u32, sheet: u32) -> Sheet {
             pixels[r].normal_y = shift(pixels[r].normal_y);
             pixels[r].normal_z = shift(pixels[r].normal_z);
         }
-        own.radiance = vec4(depth * color, depth);
+        own.radiance = select(vec4(0.0), vec4(depth * color, depth), depth >= LEAST_DEPTH);
         pixels[r].facing = shift(pixels[r].facing);
         pixels[r].depth = shift(pixels[r].depth);
         pixels[r].red = shift(pixels[r].red);
@@ -431,8 +442,19 @@ fn add_isotropic(entry: u32, front: u32, first_pixel: vec2<i32>) {
     }
 }
 
-// Any ellipsoid: ρ² = N/D and the sections t = (D·z − L)/√D, all polynomials in the distance from the projected centre;
-// see docs/engine.md.
+// Within a sheet, what faces the eye hides what faces away: where a part is thinner than a sheet, its far side must not
+// mix into the colour and light of its near side. Far sides alone keep a little weight, so that they still have a colour.
+fn facing_weight(normal: vec3<f32>, center: vec3<f32>) -> f32 {
+    var away = normal.z;
+    if PERSPECTIVE {
+        away = dot(normal, center) / max(length(center), 1e-30);
+    }
+    return clamp(0.5 - 4.0 * away, 1.0 / 255.0, 1.0);
+}
+
+// Any ellipsoid, with centre c and whitening M. Along a pixel's ray direction b: β = M·b; v = M·c × β, which is zero at the
+// projected centre and grows evenly from there; ρ² = |v|²/|β|²; the closest approach is where |β|²·z = L. All are exact in
+// perspective, and taken from vectors, not from expanded polynomials, which cancel beside the eye. See docs/engine.md.
 fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
     let index = entry & ENTRY_RECORD;
     let a = records[index];
@@ -441,53 +463,75 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
     let d = records[index + 3u];
     let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
     let base = select(0.0, 1.0, (entry & ENTRY_CONTINUED) != 0u);
-    let dx = f32(first_pixel.x) + 0.5 - a.x;
-    var color: vec4<f32>;
+    var color: vec3<f32>;
     var normal: vec3<f32>;
+    var facing = 1.0;
     // The sign of the squared extent tells the payloads apart.
-    let is_radiance = RADIANCE_PAYLOAD && (!SCALAR || d.w > 0.0);
+    let is_radiance = RADIANCE_PAYLOAD && (!SCALAR || c.z > 0.0);
     if RADIANCE_PAYLOAD {
-        color = unpack4x8unorm(bitcast<u32>(d.y));
-        let packed = bitcast<u32>(d.z);
-        if SURFACE_SHADED && packed != NO_NORMAL {
+        color = unpack4x8unorm(bitcast<u32>(d.x)).xyz;
+        let packed = bitcast<u32>(d.y);
+        if packed != NO_NORMAL {
             normal = decode_normal(packed);
+            facing = facing_weight(normal, a.xyz);
         }
     }
+    // Change of the whitened ray per pixel to the right and down, and its constant part.
+    let m0 = b.xyz / frame.scale;
+    let m1 = vec3(0.0, b.w, c.x) / frame.scale;
+    let m2 = vec3(0.0, 0.0, c.y);
+    var at = frame.center + frame.scale * a.xy;
+    var whitened = m2 * a.z;
+    var v0 = cross(m0, m2);
+    var v1 = cross(m1, m2);
+    if PERSPECTIVE {
+        // A centre beside the eye projects to infinity; moving it by a thousandth of its distance cannot be seen.
+        let least = 1e-3 * length(a.xyz);
+        let z = select(a.z, select(-least, least, a.z >= 0.0), abs(a.z) < least);
+        at = frame.center + frame.scale * a.xy / z;
+        whitened = (m0 * a.x + m1 * a.y) * frame.scale + m2 * z;
+        v0 = cross(whitened, m0);
+        v1 = cross(whitened, m1);
+    }
+    let dx = f32(first_pixel.x) + 0.5 - at.x;
+    let v_column = v0 * dx;
+    let beta_column = m2 + m0 * (f32(first_pixel.x) + 0.5 - frame.center.x);
     for (var r = 0u; r < ROWS; r++) {
-        let dy = f32(first_pixel.y) + (f32(r) + 0.5 - a.y);
-        let n = dx * (a.z * dx + a.w * dy) + b.x * dy * dy;
-        var linear = b.z * dx + b.w * dy;
-        var big_d = b.y;
-        var l = c.w * b.y + linear;
+        let y = f32(first_pixel.y) + (f32(r) + 0.5);
+        let v = v_column + v1 * (y - at.y);
+        var beta = m2;
+        var l = 0.0;
         if PERSPECTIVE {
-            big_d = b.y + linear + dx * (c.x * dx + c.y * dy) + c.z * dy * dy;
-            l = c.w * (b.y + 0.5 * linear);
+            beta = beta_column + m1 * (y - frame.center.y);
+            l = dot(whitened, beta);
+        } else {
+            l = dot(whitened - m0 * dx - m1 * (y - at.y), beta);
         }
-        let inverse = inverseSqrt(max(big_d, 1e-37));
-        let rho2 = n * inverse * inverse;
-        let e = select(0.0, exp(-0.5 * rho2), rho2 <= abs(d.w));
-        let t = (big_d * (near * pixels[r].cosine) - l) * inverse;
+        let size2 = dot(beta, beta);
+        let inverse = inverseSqrt(max(size2, 1e-37));
+        let rho2 = dot(v, v) * inverse * inverse;
+        let e = select(0.0, exp(-0.5 * rho2), rho2 <= abs(c.z));
+        let t = (size2 * (near * pixels[r].cosine) - l) * inverse;
         let s = sections(t, base) * e;
         if is_radiance {
-            let w = s * d.x;
-            // The colour's fourth byte is how much the splat faces the eye.
-            let v = w * color.w;
+            let w = s * a.w;
+            let w_facing = w * facing;
             pixels[r].depth += w;
-            pixels[r].facing += v;
-            pixels[r].red += v * color.x;
-            pixels[r].green += v * color.y;
-            pixels[r].blue += v * color.z;
+            pixels[r].facing += w_facing;
+            pixels[r].red += w_facing * color.x;
+            pixels[r].green += w_facing * color.y;
+            pixels[r].blue += w_facing * color.z;
             if SURFACE_SHADED {
-                pixels[r].normal_x += v * normal.x;
-                pixels[r].normal_y += v * normal.y;
-                pixels[r].normal_z += v * normal.z;
+                pixels[r].normal_x += w_facing * normal.x;
+                pixels[r].normal_y += w_facing * normal.y;
+                pixels[r].normal_z += w_facing * normal.z;
             }
         } else if SCALAR {
-            var change = vec2(a.z * dx + 0.5 * a.w * dy, 0.5 * a.w * dx + b.x * dy);
+            var change = vec2(dot(v, v0), dot(v, v1));
             if PERSPECTIVE {
-                change -= 0.5 * rho2 * vec2(b.z + 2.0 * c.x * dx + c.y * dy, b.w + c.y * dx + 2.0 * c.z * dy);
+                change -= rho2 * vec2(dot(beta, m0), dot(beta, m1));
             }
-            add(r, s * (SQRT_TAU * inverse / pixels[r].cosine), change * (inverse * inverse), d.x);
+            add(r, s * (SQRT_TAU * inverse / pixels[r].cosine), change * (inverse * inverse), a.w);
         }
     }
 }

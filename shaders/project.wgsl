@@ -43,53 +43,29 @@ fn box_of(span: Span) -> Box {
     );
 }
 
-// Four vec4 of a general record; see general_record in march.wgsl for how they are read.
+// Four vec4 of a general record; add_general in march.wgsl reads them.
 fn write_general(at: u32, splat: Candidate) {
     // Whitening M = L⁻¹ of the covariance L·Lᵀ. The floors keep discs far thinner than wide invertible in 32 bits.
     let s = splat.covariance;
-    let floor_of = 1e-7 * max(s.xx, max(s.yy, s.zz)) + 1e-37;
-    let l00 = sqrt(max(s.xx, floor_of));
+    let least = 1e-7 * max(s.xx, max(s.yy, s.zz)) + 1e-37;
+    let l00 = sqrt(max(s.xx, least));
     let l10 = s.xy / l00;
     let l20 = s.xz / l00;
-    let l11 = sqrt(max(s.yy - l10 * l10, floor_of));
+    let l11 = sqrt(max(s.yy - l10 * l10, least));
     let l21 = (s.yz - l10 * l20) / l11;
-    let l22 = sqrt(max(s.zz - l20 * l20 - l21 * l21, floor_of));
+    let l22 = sqrt(max(s.zz - l20 * l20 - l21 * l21, least));
     let i00 = 1.0 / l00;
     let i11 = 1.0 / l11;
     let i22 = 1.0 / l22;
     let i10 = -l10 * i00 * i11;
     let i21 = -l21 * i11 * i22;
     let i20 = -(l20 * i00 + l21 * i10) * i22;
-    let pixel = 1.0 / frame.scale;
-    // Change of the whitened ray direction per pixel to the right and per pixel down.
-    let m0 = vec3(i00, i10, i20) * pixel;
-    let m1 = vec3(0.0, i11, i21) * pixel;
-    let m2 = vec3(0.0, 0.0, i22);
-    let c = splat.center;
-    if frame.perspective != 0u {
-        // A centre beside the eye projects to infinity; moving it by a thousandth of its distance cannot be seen.
-        let least = 1e-3 * length(c);
-        let z = select(c.z, select(-least, least, c.z >= 0.0), abs(c.z) < least);
-        let x = c.x / z;
-        let y = c.y / z;
-        let toward = m0 * (x * frame.scale) + m1 * (y * frame.scale) + m2;
-        let a0 = cross(toward, m0) * z;
-        let a1 = cross(toward, m1) * z;
-        let at_center = frame.center + frame.scale * vec2(x, y);
-        records[at] = vec4(at_center, dot(a0, a0), 2.0 * dot(a0, a1));
-        records[at + 1u] = vec4(dot(a1, a1), dot(toward, toward), 2.0 * dot(toward, m0), 2.0 * dot(toward, m1));
-        records[at + 2u] = vec4(dot(m0, m0), 2.0 * dot(m0, m1), dot(m1, m1), z);
-    } else {
-        let a0 = cross(m0, m2);
-        let a1 = cross(m1, m2);
-        let at_center = frame.center + frame.scale * c.xy;
-        records[at] = vec4(at_center, dot(a0, a0), 2.0 * dot(a0, a1));
-        records[at + 1u] = vec4(dot(a1, a1), dot(m2, m2), -dot(m0, m2), -dot(m1, m2));
-        records[at + 2u] = vec4(0.0, 0.0, 0.0, c.z);
-    }
     // The sign of the squared extent tells march the payload.
     let extent2 = splat.extent * splat.extent * select(-1.0, 1.0, (source.flags & RADIANCE) != 0u);
-    records[at + 3u] = vec4(splat.strength, bitcast<f32>(splat.color), bitcast<f32>(splat.normal), extent2);
+    records[at] = vec4(splat.center, splat.strength);
+    records[at + 1u] = vec4(i00, i10, i20, i11);
+    records[at + 2u] = vec4(i21, i22, extent2, 0.0);
+    records[at + 3u] = vec4(bitcast<f32>(splat.color), bitcast<f32>(splat.normal), 0.0, 0.0);
 }
 
 @compute @workgroup_size(64)

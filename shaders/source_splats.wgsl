@@ -39,23 +39,9 @@ fn candidate(index: u32) -> Candidate {
     splat.normal = bitcast<u32>(d.w);
     if (source.flags & RADIANCE) != 0u {
         splat.strength = splat.strength * f32(splat.color >> 24u) / 255.0;
-        var facing = 1.0;
         if splat.normal != NO_NORMAL {
-            let normal = to_view * decode_normal(splat.normal);
-            splat.normal = encode_normal(normal);
-            facing = facing_weight(normal, splat.center);
+            splat.normal = encode_normal(to_view * decode_normal(splat.normal));
         }
-        splat.color = (splat.color & 0xffffffu) | (u32(255.0 * facing + 0.5) << 24u);
     }
     return splat;
-}
-
-// Within a sheet, what faces the eye hides what faces away: where a part is thinner than a sheet, its far side must not
-// mix into the colour and light of its near side. Far sides alone keep a little weight, so that they still have a colour.
-fn facing_weight(normal: vec3<f32>, center: vec3<f32>) -> f32 {
-    var toward = -1.0 * normal.z;
-    if frame.perspective != 0u {
-        toward = -dot(normal, center) / max(length(center), 1e-30);
-    }
-    return clamp(0.5 + 4.0 * toward, 1.0 / 255.0, 1.0);
 }

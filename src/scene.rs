@@ -180,7 +180,7 @@ impl Settings {
             volume_shade: None,
             surface_shade: Some(Shade { ambient: 0.2, diffuse: 0.75, specular: 0.15, power: 24.0 }),
             sheet_thickness: None,
-            sheet_pixels: 4.0,
+            sheet_pixels: 8.0,
             near: None,
         }
     }

@@ -11,8 +11,8 @@ use glam::{DMat3, DVec2, DVec3};
 /// What a kernel carries.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Load {
-    /// Optical depth through the centre, colour, and view-space normal.
-    Radiance { strength: f64, color: DVec3, normal: Option<DVec3> },
+    /// Optical depth through the centre, colour, view-space normal, and how much of it faces the eye.
+    Radiance { strength: f64, color: DVec3, normal: Option<DVec3>, facing: f64 },
     /// The value of a sample.
     Scalar(f64),
 }
@@ -41,6 +41,13 @@ pub(super) struct Crossing {
     pub density: f64,
     /// ½∂(ρ²) per pixel to the right and per pixel downward.
     pub across: DVec2,
+}
+
+/// How much the colour and normal of a splat count within a sheet: what faces the eye hides what faces away. The change
+/// from one to the other is spread over a quarter of the cosine, and far sides keep enough to have a colour when alone.
+fn facing(normal: DVec3, center: DVec3, view: &View) -> f64 {
+    let ray = if view.perspective { center.normalize_or_zero() } else { DVec3::Z };
+    (0.5 - 4.0 * normal.dot(ray)).clamp(1.0 / 255.0, 1.0)
 }
 
 impl Kernel {
@@ -87,6 +94,7 @@ impl Kernel {
                     strength: f64::from(splat.strength) * opacity,
                     color: DVec3::new(red, green, blue),
                     normal,
+                    facing: normal.map_or(1.0, |normal| facing(normal, center, view)),
                 }
             }
         };

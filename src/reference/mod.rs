@@ -108,6 +108,9 @@ impl Field<'_> {
     }
 }
 
+/// Optical depths below this are left out: they cannot be seen, and 32-bit sums of sections leave such remainders.
+const LEAST_DEPTH: f64 = 1e-5;
+
 /// A picture being drawn.
 struct Frame<'a> {
     view: View,
@@ -234,10 +237,10 @@ impl<'a> Frame<'a> {
 
     /// The radiance splats of a sheet.
     fn surface(&self, sheet: &Sheet, ray: &Ray) -> Medium {
-        if sheet.depth == 0.0 {
+        if sheet.depth < LEAST_DEPTH {
             return Medium::default();
         }
-        let color = sheet.color / sheet.depth;
+        let color = sheet.color / sheet.facing;
         match &self.surface_shade {
             Some(shade) if sheet.has_normal => {
                 Medium { depth: sheet.depth, color: shade::lit(color, sheet.normal, ray.direction, shade) }

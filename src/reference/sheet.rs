@@ -10,8 +10,9 @@ use std::f64::consts::PI;
 /// The sums over all kernels in one sheet of one ray.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Sheet {
-    /// Radiance: optical depth, and colour and normal weighted by it.
+    /// Radiance: optical depth; the part of it that faces the eye, and colour and normal weighted by that part.
     pub depth: f64,
+    pub facing: f64,
     pub color: DVec3,
     pub normal: DVec3,
     /// Whether some splat in the sheet has a normal.
@@ -25,17 +26,21 @@ pub(super) struct Sheet {
     value_across: DVec2,
 }
 
+/// A sheet that is filled less than this has no value: what reaches into it are the kernels' tails alone.
+const LEAST_FILLING: f64 = 1e-4;
+
 impl Sheet {
     /// Adds the part of a kernel that lies between the distances `from` and `to` along the ray.
     pub fn add(&mut self, load: &Load, crossing: &Crossing, [from, to]: [f64; 2]) {
         let Crossing { weight, closest, density, across } = *crossing;
         let share = weight * section(density * (from - closest), density * (to - closest));
         match *load {
-            Load::Radiance { strength, color, normal } => {
+            Load::Radiance { strength, color, normal, facing } => {
                 let depth = strength * share;
                 self.depth += depth;
-                self.color += depth * color;
-                self.normal += normal.map_or(DVec3::ZERO, |normal| depth * normal);
+                self.facing += depth * facing;
+                self.color += depth * facing * color;
+                self.normal += normal.map_or(DVec3::ZERO, |normal| depth * facing * normal);
                 self.has_normal |= normal.is_some();
             }
             Load::Scalar(value) => {
@@ -50,7 +55,7 @@ impl Sheet {
 
     /// The field's value f̄; none where next to no kernel reaches into the sheet.
     pub fn value(&self, thickness: f64) -> Option<f64> {
-        (self.length > 1e-6 * thickness).then(|| self.value / self.length)
+        (self.length > LEAST_FILLING * thickness).then(|| self.value / self.length)
     }
 
     /// The derivatives of the value f̄ per pixel to the right and per pixel downward: from the footprints, with the sections
@@ -98,10 +103,10 @@ mod tests {
             sheet
         };
         let color = DVec3::new(0.1, 0.2, 0.3);
-        let surface = sum(Load::Radiance { strength: 5.0, color, normal: Some(DVec3::Z) });
+        let surface = sum(Load::Radiance { strength: 5.0, color, normal: Some(DVec3::Z), facing: 0.5 });
         assert!((surface.depth - 2.0).abs() < 1e-12);
-        assert!((surface.color / surface.depth - color).length() < 1e-12);
-        assert!(surface.has_normal && (surface.normal.z - 2.0).abs() < 1e-12);
+        assert!((surface.color / surface.facing - color).length() < 1e-12);
+        assert!(surface.has_normal && (surface.normal.z - 1.0).abs() < 1e-12);
         // ∫ exp(−(2s)²/2) ds = √(2π)/2.
         let field = sum(Load::Scalar(7.0));
         assert!((field.length - 0.4 * (2.0 * PI).sqrt() / 2.0).abs() < 1e-12);
