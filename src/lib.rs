@@ -3,11 +3,13 @@
 //! The way of the data: a file → [`io`] (what it says) → [`volume`] / [`surface`] (what it means) → splats
 //! ([`splat`]) → [`engine`] (one pass, one Rust file, one shader) → a [`Picture`](picture::Picture).
 
+pub mod compare;
 pub mod engine;
 pub mod error;
 pub mod io;
 pub mod math;
 pub mod picture;
+pub mod reference;
 pub mod scene;
 pub mod splat;
 pub mod surface;

@@ -3,7 +3,7 @@
 use crate::{
     Error, Result,
     math::{Bounds, Kernel, Sheets, View},
-    splat::{Payload, SplatSet},
+    splat::{FOOTPRINT_BLUR, Payload, SplatSet},
     volume::{Shade, TransferFunction, Volume},
 };
 use std::sync::Arc;
@@ -87,13 +87,28 @@ impl Scene {
         Ok(())
     }
 
+    /// The largest extent of the scene's splat sets, in standard deviations; 0 without any.
+    fn widest_extent(&self) -> f64 {
+        let extents = self.items.iter().map(|item| match item {
+            Item::Radiance(set) | Item::Scalar(set, _) => f64::from(set.extent),
+            Item::Volume(..) => 0.0,
+        });
+        extents.fold(0.0, f64::max)
+    }
+
     /// The sheets of a picture of this scene: as thick as two thirds of a kernel's radius for volumes (a kernel meets at
     /// most four), a few pixels for surfaces, the finer of both where the scene holds both.
     pub fn sheets(&self, view: &View, settings: &Settings) -> Sheets {
         let bounds = self.bounds();
-        let [mut near, far] = view.distances(&bounds);
+        let [mut near, mut far] = view.distances(&bounds);
+        // Widened footprints reach beyond the bounds: a flat surface seen from the front would lie in sheets far thinner
+        // than itself.
+        let reach = FOOTPRINT_BLUR * self.widest_extent() / view.scale;
         if view.perspective {
+            (near, far) = (near * (1.0 - reach), far * (1.0 + reach));
             near = near.max(settings.near.unwrap_or(1e-3 * bounds.diagonal()));
+        } else {
+            (near, far) = (near - reach, far + reach);
         }
         let mut thickness = settings.sheet_thickness;
         let mut pixels = None;
@@ -121,8 +136,8 @@ impl Item {
                 let axes = volume.lattice.axes;
                 let reach =
                     kernel.extent * glam::DVec3::new(axes.row(0).length(), axes.row(1).length(), axes.row(2).length());
-                let [min, max] = volume.bounds();
-                Bounds { min: min - reach, max: max + reach }
+                let [low, high] = volume.bounds();
+                Bounds { min: low - reach, max: high + reach }
             }
         }
     }

@@ -27,6 +27,10 @@ pub struct Splat {
 /// The [`Splat::normal`] of a splat that has none.
 pub const NO_NORMAL: u32 = 0x8000_8000;
 
+/// Standard deviation, in pixels, by which every splat is widened in the picture, so that none falls between the pixels.
+/// Lattice samples are not: their kernels overlap.
+pub const FOOTPRINT_BLUR: f64 = 0.35;
+
 /// What the splats of a set carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Payload {
@@ -50,7 +54,7 @@ pub struct SplatSet {
 /// Packs a unit vector in 32 bits (octahedral, Meyer et al. 2010).
 pub fn encode_normal(n: Vec3) -> u32 {
     let sum = n.x.abs() + n.y.abs() + n.z.abs();
-    if sum == 0.0 || !sum.is_finite() {
+    if sum <= 0.0 || !sum.is_finite() {
         return NO_NORMAL;
     }
     let (mut x, mut y) = (n.x / sum, n.y / sum);

@@ -1,0 +1,284 @@
+//! How much two pictures differ.
+//!
+//! Colours are compared multiplied by their opacity, so what cannot be seen does not count; opacity itself is compared as
+//! a fourth channel unless both pictures are opaque everywhere. A value that is not a number is infinitely wrong.
+
+use crate::{
+    Error, Result,
+    io::{Limits, Source},
+    picture::Picture,
+};
+use std::{io::Cursor, path::Path};
+
+/// What [`compare`] and its like find.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Comparison {
+    /// Peak signal-to-noise ratio in decibels, 10·log₁₀(1 / mean squared difference) for channels of 0 … 1; none where the
+    /// pictures are identical.
+    pub psnr: Option<f64>,
+    /// Structural similarity of the pictures' brightness, at most 1 (Wang, Bovik, Sheikh & Simoncelli 2004): the mean over
+    /// all Gaussian windows of 11 × 11 pixels with σ = 1.5 that lie inside the picture, K₁ = 0.01 and K₂ = 0.03. Brightness
+    /// is 0.299 red + 0.587 green + 0.114 blue, over black.
+    pub ssim: f64,
+    /// The largest difference of any channel, where the channels' range is 0 … 1.
+    pub max_difference: f64,
+    /// Pixels of which some channel differs by more than half a step of 8 bits.
+    pub different_pixels: u64,
+}
+
+/// Compares two pictures of `size` pixels (width, height): rows from the top, red, green, blue and opacity of 8 bits, not
+/// premultiplied.
+///
+/// # Errors
+/// [`Error::Argument`] where a picture has another number of bytes than its size asks for, or no pixels.
+pub fn compare(a: &[u8], b: &[u8], size: [u32; 2]) -> Result<Comparison> {
+    let premultiplied = |bytes: &[u8]| {
+        let pixels = bytes.chunks_exact(4).map(|pixel| {
+            let [r, g, b, a] = [0, 1, 2, 3].map(|channel| f64::from(pixel[channel]) / 255.0);
+            [r * a, g * a, b * a, a]
+        });
+        pixels.collect::<Vec<_>>()
+    };
+    let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
+    for (name, found) in [("first", a.len()), ("second", b.len())] {
+        if found as u64 != bytes {
+            let [width, height] = size;
+            return Err(Error::Argument(format!(
+                "the {name} picture has {found} bytes where {width}x{height} pixels take {bytes}"
+            )));
+        }
+    }
+    compare_pixels(&premultiplied(a), &premultiplied(b), size)
+}
+
+/// Compares the colours and opacities of two pictures; their depths are not compared.
+///
+/// # Errors
+/// [`Error::Argument`] where the sizes differ.
+pub fn compare_pictures(a: &Picture, b: &Picture) -> Result<Comparison> {
+    let size = same_size([a.width, a.height], [b.width, b.height])?;
+    let pixels = |picture: &Picture| picture.color.iter().map(|pixel| pixel.map(f64::from)).collect::<Vec<_>>();
+    compare_pixels(&pixels(a), &pixels(b), size)
+}
+
+/// Compares two PNG or JPEG files (told apart by their content) at 8 bits a channel.
+///
+/// # Errors
+/// [`Error::File`], [`Error::Input`] and [`Error::Limit`] for files that are no such pictures; [`Error::Argument`] where
+/// the sizes differ.
+pub fn compare_files(a: &Path, b: &Path, limits: &Limits) -> Result<Comparison> {
+    let [a, b] = [load(a, limits)?, load(b, limits)?];
+    let size = same_size(a.dimensions().into(), b.dimensions().into())?;
+    compare(a.as_raw(), b.as_raw(), size)
+}
+
+fn load(path: &Path, limits: &Limits) -> Result<image::RgbaImage> {
+    let source = Source::open(path, limits)?;
+    let broken = |e: image::ImageError| source.error("picture", e.to_string()).hint("pictures are PNG or JPEG files");
+    let reader = || {
+        let reader = image::ImageReader::new(Cursor::new(source.bytes())).with_guessed_format();
+        reader.map_err(|e| Error::file(path, "read", e))
+    };
+    let (width, height) = reader()?.into_dimensions().map_err(broken)?;
+    let texels = u64::from(width) * u64::from(height);
+    if texels > limits.texels {
+        let what = "the picture's number of pixels".into();
+        return Err(Error::Limit { file: path.to_owned(), what, found: texels, limit: limits.texels });
+    }
+    let mut decoder = reader()?;
+    let mut bounds = image::Limits::default();
+    bounds.max_alloc = Some(limits.bytes);
+    decoder.limits(bounds);
+    Ok(decoder.decode().map_err(broken)?.to_rgba8())
+}
+
+fn same_size(a: [u32; 2], b: [u32; 2]) -> Result<[u32; 2]> {
+    if a == b {
+        return Ok(a);
+    }
+    let [[aw, ah], [bw, bh]] = [a, b];
+    Err(Error::Argument(format!("pictures of {aw}x{ah} and {bw}x{bh} pixels cannot be compared")))
+}
+
+fn compare_pixels(a: &[[f64; 4]], b: &[[f64; 4]], size: [u32; 2]) -> Result<Comparison> {
+    let [width, height] = size.map(|side| side as usize);
+    let count = width.saturating_mul(height);
+    if count == 0 || a.len() != count || b.len() != count {
+        let found = [a.len(), b.len()];
+        return Err(Error::Argument(format!("pictures of {width}x{height} pixels cannot have {found:?} pixels")));
+    }
+    let opaque = |pixels: &[[f64; 4]]| pixels.iter().all(|pixel| pixel[3] == 1.0);
+    let channels = if opaque(a) && opaque(b) { 3 } else { 4 };
+    let mut comparison = Comparison { psnr: None, ssim: 0.0, max_difference: 0.0, different_pixels: 0 };
+    let mut squares = 0.0;
+    for (a, b) in a.iter().zip(b) {
+        let mut largest: f64 = 0.0;
+        for channel in 0..channels {
+            let difference = (a[channel] - b[channel]).abs();
+            let difference = if difference.is_nan() { f64::INFINITY } else { difference };
+            squares += difference * difference;
+            largest = largest.max(difference);
+        }
+        comparison.max_difference = comparison.max_difference.max(largest);
+        comparison.different_pixels += u64::from(largest > 0.5 / 255.0);
+    }
+    let mean = squares / (count * channels) as f64;
+    comparison.psnr = (mean > 0.0).then(|| -10.0 * mean.log10());
+    let brightness = |pixels: &[[f64; 4]]| -> Vec<f64> {
+        pixels.iter().map(|[r, g, b, _]| 0.299 * r + 0.587 * g + 0.114 * b).collect()
+    };
+    comparison.ssim = structural_similarity(&brightness(a), &brightness(b), [width, height]);
+    Ok(comparison)
+}
+
+/// The mean structural similarity of two pictures of one channel of 0 … 1.
+fn structural_similarity(a: &[f64], b: &[f64], size: [usize; 2]) -> f64 {
+    let product = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
+    let [mean_a, mean_b] = [a, b].map(|picture| windowed(picture, size));
+    let [square_a, square_b, mixed] = [(a, a), (b, b), (a, b)].map(|(a, b)| windowed(&product(a, b), size));
+    let (c1, c2) = (0.01 * 0.01, 0.03 * 0.03);
+    let similarity = |i: usize| {
+        let (a, b) = (mean_a[i], mean_b[i]);
+        let (variance_a, variance_b, covariance) = (square_a[i] - a * a, square_b[i] - b * b, mixed[i] - a * b);
+        (2.0 * a * b + c1) * (2.0 * covariance + c2) / ((a * a + b * b + c1) * (variance_a + variance_b + c2))
+    };
+    (0..mean_a.len()).map(similarity).sum::<f64>() / mean_a.len() as f64
+}
+
+/// The Gaussian averages of a picture over every window that lies inside it.
+fn windowed(picture: &[f64], [width, height]: [usize; 2]) -> Vec<f64> {
+    // A Gaussian over x and y is one over x after one over y.
+    let [across, down] = [window(width), window(height)];
+    let columns = width + 1 - across.len();
+    let rows = height + 1 - down.len();
+    let average = |window: &[f64], at: &dyn Fn(usize) -> f64| -> f64 {
+        window.iter().enumerate().map(|(i, weight)| weight * at(i)).sum()
+    };
+    let mut lines = Vec::with_capacity(columns * height);
+    for y in 0..height {
+        lines.extend((0..columns).map(|x| average(&across, &|i| picture[y * width + x + i])));
+    }
+    let mut out = Vec::with_capacity(columns * rows);
+    for y in 0..rows {
+        out.extend((0..columns).map(|x| average(&down, &|i| lines[(y + i) * columns + x])));
+    }
+    out
+}
+
+/// The weights of a window along an axis of `length` pixels, of sum 1: 11 of them, or as many as the axis has.
+fn window(length: usize) -> Vec<f64> {
+    let taps = length.min(11);
+    let weight = |i: usize| {
+        let distance = i as f64 - 0.5 * (taps as f64 - 1.0);
+        (-0.5 * (distance / 1.5).powi(2)).exp()
+    };
+    let sum: f64 = (0..taps).map(weight).sum();
+    (0..taps).map(|i| weight(i) / sum).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Grey pictures of a made-up texture, all opaque.
+    fn texture(size: [usize; 2], value: impl Fn(usize, usize) -> u8) -> Vec<u8> {
+        let pixels = (0..size[0] * size[1]).map(|i| value(i % size[0], i / size[0]));
+        pixels.flat_map(|v| [v, v, v, 255]).collect()
+    }
+
+    fn close(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-9, "{found} is not {expected}");
+    }
+
+    #[test]
+    fn the_same_picture_is_the_same() {
+        let a = texture([20, 15], |x, y| (x * 31 + y * 17) as u8);
+        let found = compare(&a, &a, [20, 15]).unwrap();
+        assert_eq!((found.psnr, found.max_difference, found.different_pixels), (None, 0.0, 0));
+        close(found.ssim, 1.0);
+    }
+
+    #[test]
+    fn constant_pictures_by_hand() {
+        let [a, b] = [100u8, 110].map(|v| texture([16, 16], |_, _| v));
+        let found = compare(&a, &b, [16, 16]).unwrap();
+        close(found.psnr.unwrap(), 20.0 * 25.5_f64.log10());
+        close(found.max_difference, 10.0 / 255.0);
+        assert_eq!(found.different_pixels, 256);
+        // Without variance, SSIM is its first factor.
+        let (a, b) = (100.0 / 255.0, 110.0 / 255.0);
+        close(found.ssim, (2.0 * a * b + 1e-4) / (a * a + b * b + 1e-4));
+    }
+
+    #[test]
+    fn one_wrong_channel_by_hand() {
+        let a = texture([4, 5], |_, _| 50);
+        let mut b = a.clone();
+        b[4 * 7 + 1] = 101;
+        let found = compare(&a, &b, [4, 5]).unwrap();
+        assert_eq!(found.different_pixels, 1);
+        close(found.max_difference, 0.2);
+        // 0.2² in one of 60 channels: opacity does not count where all is opaque.
+        close(found.psnr.unwrap(), 10.0 * (60.0 / 0.04_f64).log10());
+    }
+
+    #[test]
+    fn similarity_agrees_with_an_independent_implementation() {
+        // The expected values come from a direct evaluation of Wang et al.'s formula with NumPy (2D windows, no
+        // separation), rounded to 10 digits.
+        let size = [24usize, 17];
+        let a = texture(size, |x, y| ((x * x * 7 + y * 29 + x * y * 3) % 251) as u8);
+        let b = texture(size, |x, y| ((x * x * 7 + y * 29 + x * y * 3) % 251 / 2 + (x * 5 + y * 3) % 60) as u8);
+        let found = compare(&a, &b, [24, 17]).unwrap();
+        close(found.ssim, 0.745_384_820_6);
+        close(found.psnr.unwrap(), 14.008_331_670_7);
+        assert!(found.ssim < 0.999);
+    }
+
+    #[test]
+    fn unseen_colours_do_not_count() {
+        let clear = |v: u8| [v, v, v, 0].repeat(4);
+        assert_eq!(compare(&clear(3), &clear(200), [2, 2]).unwrap().psnr, None);
+        let half = [10, 10, 10, 128].repeat(4);
+        close(compare(&clear(3), &half, [2, 2]).unwrap().max_difference, 128.0 / 255.0);
+    }
+
+    #[test]
+    fn pictures_of_numbers_and_of_none() {
+        let picture = |v: f32| Picture { width: 3, height: 1, color: vec![[v, 0.0, 0.0, 1.0]; 3], depth: vec![1.0; 3] };
+        let found = compare_pictures(&picture(0.25), &picture(0.25 + 0.001)).unwrap();
+        assert_eq!(found.different_pixels, 0);
+        assert!((found.psnr.unwrap() - (60.0 + 10.0 * 3.0_f64.log10())).abs() < 1e-3);
+        let broken = compare_pictures(&picture(0.25), &picture(f32::NAN)).unwrap();
+        assert_eq!((broken.psnr, broken.max_difference), (Some(f64::NEG_INFINITY), f64::INFINITY));
+    }
+
+    #[test]
+    fn what_cannot_be_compared_is_told() {
+        assert!(matches!(compare(&[0; 16], &[0; 12], [2, 2]), Err(Error::Argument(_))));
+        assert!(matches!(compare(&[], &[], [0, 2]), Err(Error::Argument(_))));
+        let picture =
+            |width: u32| Picture { width, height: 1, color: vec![[0.0; 4]; width as usize], depth: Vec::new() };
+        assert!(matches!(compare_pictures(&picture(2), &picture(3)), Err(Error::Argument(_))));
+    }
+
+    #[test]
+    fn files_are_read_within_limits() {
+        let folder = std::env::temp_dir().join(format!("splatkit-compare-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let [png, jpeg, text] = ["a.png", "a.jpg", "a.txt"].map(|name| folder.join(name));
+        let color = (0..64 * 48).map(|i| [i as f32 / 3072.0, 0.5, 0.25, 1.0]).collect();
+        let picture = Picture { width: 64, height: 48, color, depth: Vec::new() };
+        picture.save(&png, None).unwrap();
+        picture.save(&jpeg, None).unwrap();
+        std::fs::write(&text, "no picture").unwrap();
+        let limits = Limits::default();
+        assert_eq!(compare_files(&png, &png, &limits).unwrap().psnr, None);
+        assert!(compare_files(&png, &jpeg, &limits).unwrap().psnr.unwrap() > 30.0);
+        assert!(matches!(compare_files(&png, &text, &limits), Err(Error::Input { .. })));
+        assert!(matches!(compare_files(&folder.join("none.png"), &png, &limits), Err(Error::File { .. })));
+        let small = Limits { texels: 64 * 47, ..Limits::default() };
+        assert!(matches!(compare_files(&png, &png, &small), Err(Error::Limit { .. })));
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+}

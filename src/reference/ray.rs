@@ -1,0 +1,153 @@
+//! The ray of a pixel, and how it moves from pixel to pixel.
+
+use crate::{math::View, volume::Lattice};
+use glam::{DMat3, DVec2, DVec3};
+
+/// A ray in view space: the points `origin + s·direction`, and what one pixel to the right and one downward add to it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ray {
+    pub origin: DVec3,
+    /// Unit vector.
+    pub direction: DVec3,
+    /// Derivative of the origin per pixel to the right and per pixel downward.
+    origin_across: [DVec3; 2],
+    /// Derivative of the direction, likewise.
+    direction_across: [DVec3; 2],
+}
+
+impl Ray {
+    /// The ray through a point of the picture, in pixels.
+    pub fn new(view: &View, pixel: DVec2) -> Self {
+        let (origin, direction) = view.ray(pixel);
+        let steps = [DVec3::X, DVec3::Y].map(|axis| axis / view.scale);
+        if !view.perspective {
+            return Self { origin, direction, origin_across: steps, direction_across: [DVec3::ZERO; 2] };
+        }
+        // The direction is b/|b| with b = (x, y, 1): its derivative is what is across it in the derivative of b.
+        let inverse_length = direction.z;
+        let direction_across = steps.map(|step| inverse_length * (step - direction * direction.dot(step)));
+        Self { origin, direction, origin_across: [DVec3::ZERO; 2], direction_across }
+    }
+
+    pub fn point(&self, s: f64) -> DVec3 {
+        self.origin + s * self.direction
+    }
+
+    /// Derivative of the point at distance s, in world units per pixel to the right and per pixel downward.
+    pub fn across(&self, s: f64) -> [DVec3; 2] {
+        [0, 1].map(|i| self.origin_across[i] + s * self.direction_across[i])
+    }
+
+    /// The gradient (view space, per world unit) of which the derivatives per pixel to the right, per pixel downward and
+    /// per world unit along the ray are known at distance s.
+    pub fn gradient(&self, s: f64, across: DVec2, along: f64) -> Option<DVec3> {
+        let [right, down] = self.across(s);
+        let slopes = across.extend(along);
+        // A derivative is the gradient's product with its step; three of them are a system of equations.
+        let steps = DMat3::from_cols(right, down, self.direction).transpose();
+        Some(steps.inverse() * slopes).filter(|gradient| gradient.is_finite())
+    }
+
+    /// Where the ray enters and leaves the box of a lattice's samples; `None` where it misses it. An axis with a single
+    /// sample counts half a spacing to either side.
+    pub fn within(&self, view: &View, lattice: &Lattice) -> Option<[f64; 2]> {
+        let to_index = lattice.axes.inverse();
+        let to_world = view.rotation.transpose();
+        let start = to_index * (to_world * self.origin + view.position - lattice.origin);
+        let slope = to_index * (to_world * self.direction);
+        let mut interval = [f64::NEG_INFINITY, f64::INFINITY];
+        for axis in 0..3 {
+            let [low, high] = match lattice.dims[axis] {
+                1 => [-0.5, 0.5],
+                n => [0.0, n as f64 - 1.0],
+            };
+            if slope[axis] == 0.0 {
+                if !(low..=high).contains(&start[axis]) {
+                    return None;
+                }
+                continue;
+            }
+            let [a, b] = [low, high].map(|bound| (bound - start[axis]) / slope[axis]);
+            interval = [interval[0].max(a.min(b)), interval[1].min(a.max(b))];
+        }
+        (interval[0] < interval[1]).then_some(interval)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Camera, Projection};
+
+    fn views() -> [View; 2] {
+        let projections = [Projection::Perspective { view_angle: 70.0 }, Projection::Orthographic { height: 3.0 }];
+        projections.map(|projection| {
+            let camera = Camera {
+                position: DVec3::new(3.0, -2.0, 1.0),
+                focal_point: DVec3::new(0.5, 0.5, 0.5),
+                view_up: DVec3::Z,
+                projection,
+            };
+            camera.view([40, 30]).unwrap()
+        })
+    }
+
+    #[test]
+    fn points_move_across_the_picture_as_the_derivative_says() {
+        for view in views() {
+            let pixel = DVec2::new(33.5, 4.5);
+            let ray = Ray::new(&view, pixel);
+            let step = 1e-5;
+            for (axis, moved) in [DVec2::X, DVec2::Y].into_iter().zip(ray.across(2.5)) {
+                let [before, after] = [-step, step].map(|d| Ray::new(&view, pixel + d * axis).point(2.5));
+                assert!(((after - before) / (2.0 * step) - moved).length() < 1e-8);
+            }
+        }
+    }
+
+    #[test]
+    fn gradients_come_back_from_their_derivatives() {
+        let gradient = DVec3::new(0.3, -2.0, 1.5);
+        for view in views() {
+            let ray = Ray::new(&view, DVec2::new(2.5, 25.5));
+            let s = 4.0;
+            let across = DVec2::from(ray.across(s).map(|step| gradient.dot(step)));
+            let along = gradient.dot(ray.direction);
+            let found = ray.gradient(s, across, along).unwrap();
+            assert!((found - gradient).length() < 1e-9, "{found}");
+            if view.perspective {
+                // The same, solved by hand: r = |b| = 1/b̂_z.
+                let b = ray.direction;
+                let k = view.scale / (b.z * s);
+                let (x, y) = (across[0] * k + along * b.x, across[1] * k + along * b.y);
+                let by_hand = DVec3::new(x, y, (along - x * b.x - y * b.y) / b.z);
+                assert!((found - by_hand).length() < 1e-9, "{by_hand}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_ray_crosses_a_skewed_box_where_its_faces_are() {
+        let lattice = Lattice {
+            dims: [5, 4, 1],
+            origin: DVec3::new(0.1, 0.2, 0.3),
+            axes: DMat3::from_cols(DVec3::new(0.3, 0.1, 0.0), DVec3::new(0.0, 0.2, 0.1), DVec3::new(0.05, 0.0, 0.4)),
+        };
+        for view in views() {
+            let center = view.to_view(lattice.position(DVec3::new(2.0, 1.5, 0.0)));
+            let flat = if view.perspective { center.truncate() / center.z } else { center.truncate() };
+            let ray = Ray::new(&view, view.center + view.scale * flat);
+            let interval = ray.within(&view, &lattice).unwrap();
+            for s in interval {
+                let world = view.rotation.transpose() * ray.point(s) + view.position;
+                let index = lattice.axes.inverse() * (world - lattice.origin);
+                let faces = [index.x, index.x - 4.0, index.y, index.y - 3.0, index.z - 0.5, index.z + 0.5];
+                assert!(faces.iter().any(|f| f.abs() < 1e-9), "{index}");
+            }
+            let middle = ray.point(0.5 * (interval[0] + interval[1]));
+            let along = (center - middle).length();
+            assert!(along < interval[1] - interval[0]);
+            assert!(Ray::new(&view, DVec2::new(-900.0, 900.0)).within(&view, &lattice).is_none());
+        }
+    }
+}
