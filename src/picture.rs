@@ -55,16 +55,103 @@ impl Picture {
     }
 
     /// Writes a PNG or JPEG, chosen by the extension. JPEG has no opacity: without a background it gets black.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for another extension, [`Error::File`] where the file cannot be written.
     pub fn save(&self, path: &Path, background: Option<[f32; 3]>) -> Result<()> {
-        let format = image::ImageFormat::from_path(path)
-            .map_err(|_| Error::Argument(format!("{}: unknown picture format, use .png or .jpg", path.display())))?;
-        let failed = |e: image::ImageError| Error::file(path, "write", std::io::Error::other(e));
-        let rgba = |back| image::RgbaImage::from_raw(self.width, self.height, self.to_rgba8(back));
-        let too_large = || Error::Argument("the picture is too large to be stored".into());
-        if format == image::ImageFormat::Jpeg {
-            let picture = rgba(background.or(Some([0.0; 3]))).ok_or_else(too_large)?;
-            return image::DynamicImage::from(picture).to_rgb8().save_with_format(path, format).map_err(failed);
+        let bytes = self.encode(PictureFormat::of(path)?, background)?;
+        std::fs::write(path, bytes).map_err(|e| Error::file(path, "write", e))
+    }
+
+    /// The bytes of a picture file. JPEG has no opacity: without a background it gets black.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a picture that the format cannot hold.
+    pub fn encode(&self, format: PictureFormat, background: Option<[f32; 3]>) -> Result<Vec<u8>> {
+        let rgba = |back| {
+            let picture = image::RgbaImage::from_raw(self.width, self.height, self.to_rgba8(back));
+            picture.map(image::DynamicImage::from).ok_or_else(too_large)
+        };
+        match format {
+            PictureFormat::Png => encode(&rgba(background)?, image::ImageFormat::Png),
+            PictureFormat::Jpeg => {
+                let opaque = rgba(background.or(Some([0.0; 3])))?.to_rgb8();
+                encode(&opaque.into(), image::ImageFormat::Jpeg)
+            }
         }
-        rgba(background).ok_or_else(too_large)?.save_with_format(path, format).map_err(failed)
+    }
+
+    /// The depths as a grey PNG of 16 bits: 65535 at the nearest depth of the picture, falling evenly to 1 at the farthest;
+    /// 0 where there is none.
+    ///
+    /// # Errors
+    /// As [`encode`](Self::encode).
+    pub fn encode_depth(&self) -> Result<Vec<u8>> {
+        let finite = self.depth.iter().copied().filter(|d| d.is_finite());
+        let [near, far] = finite.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], d| [low.min(d), high.max(d)]);
+        let grey = |&depth: &f32| match (far - depth) / (far - near) {
+            _ if !depth.is_finite() => 0,
+            share if share.is_finite() => 1 + (65534.0 * share).round() as u16,
+            // All depths are the same.
+            _ => u16::MAX,
+        };
+        let pixels: Vec<u16> = self.depth.iter().map(grey).collect();
+        let picture = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(self.width, self.height, pixels);
+        encode(&picture.ok_or_else(too_large)?.into(), image::ImageFormat::Png)
+    }
+}
+
+/// A kind of picture file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PictureFormat {
+    Png,
+    Jpeg,
+}
+
+impl PictureFormat {
+    /// The format that a file's extension names.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where it names none of these.
+    pub fn of(path: &Path) -> Result<Self> {
+        match image::ImageFormat::from_path(path) {
+            Ok(image::ImageFormat::Png) => Ok(Self::Png),
+            Ok(image::ImageFormat::Jpeg) => Ok(Self::Jpeg),
+            _ => Err(Error::Argument(format!("{}: unknown picture format, use .png or .jpg", path.display()))),
+        }
+    }
+}
+
+fn too_large() -> Error {
+    Error::Argument("the picture is too large to be stored".into())
+}
+
+fn encode(picture: &image::DynamicImage, format: image::ImageFormat) -> Result<Vec<u8>> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, format).map_err(|e| Error::Argument(format!("the picture cannot be stored: {e}")))?;
+    Ok(bytes.into_inner())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depths_span_sixteen_bits() {
+        let depth = vec![2.0, 4.0, f32::INFINITY, 3.0];
+        let picture = Picture { width: 4, height: 1, color: vec![[0.0; 4]; 4], depth };
+        let read = image::load_from_memory(&picture.encode_depth().unwrap()).unwrap().to_luma16();
+        assert_eq!(read.into_raw(), [65535, 1, 0, 32768]);
+        let flat = Picture { width: 2, height: 1, color: vec![[0.0; 4]; 2], depth: vec![1.0, f32::INFINITY] };
+        let read = image::load_from_memory(&flat.encode_depth().unwrap()).unwrap().to_luma16();
+        assert_eq!(read.into_raw(), [65535, 0]);
+    }
+
+    #[test]
+    fn formats_are_known_by_extension() {
+        assert_eq!(PictureFormat::of(Path::new("a.PNG")).unwrap(), PictureFormat::Png);
+        assert_eq!(PictureFormat::of(Path::new("a.jpeg")).unwrap(), PictureFormat::Jpeg);
+        assert!(PictureFormat::of(Path::new("a.gif")).is_err());
+        assert!(PictureFormat::of(Path::new("a")).is_err());
     }
 }

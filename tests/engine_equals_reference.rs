@@ -176,3 +176,82 @@ fn surface_in_a_volume() {
 fn surface_in_a_volume_orthographic() {
     assert_matches(scenes::surface_in_a_volume_orthographic(), 50.0);
 }
+
+/// A frame that does not fit in one pass is drawn in several, and is the same picture: only the sums at the seams of
+/// passes are rounded otherwise.
+#[test]
+fn small_budgets_draw_the_same_picture() {
+    let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
+    for make in [scenes::ellipsoids_in_perspective, scenes::blobs_analytic, scenes::surface_in_a_volume] {
+        let case = make();
+        let whole = drawn(&case, Budget::default());
+        for (entries, record_words) in [(3000, 1 << 22), (1 << 24, 1500), (900, 600)] {
+            let mut renderer = Renderer::with_budget(&gpu, Budget { entries, record_words });
+            let mut prepared = renderer.prepare(&case.scene).expect(case.name);
+            let (parts, stats) = renderer.render(&mut prepared, &case.camera, &case.settings).expect(case.name);
+            assert!(stats.passes > 1, "{}: {entries} entries fit in one pass", case.name);
+            let agreement = psnr(&parts, &whole);
+            println!("{}: {} passes, {agreement:.1} dB", case.name, stats.passes);
+            assert!(agreement > 90.0, "{}: {agreement:.1} dB in {} passes", case.name, stats.passes);
+        }
+    }
+}
+
+/// More splats in one sheet of one band than the budget holds: an error that says so, not a picture without them.
+#[test]
+fn a_budget_too_small_for_a_single_sheet_is_an_error() {
+    let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
+    let case = scenes::blobs_analytic();
+    let mut renderer = Renderer::with_budget(&gpu, Budget { entries: 8, record_words: 8 });
+    let mut prepared = renderer.prepare(&case.scene).expect(case.name);
+    let found = renderer.render(&mut prepared, &case.camera, &case.settings);
+    assert!(found.is_err_and(|e| e.to_string().contains("budget")));
+}
+
+#[test]
+fn the_same_input_draws_the_same_bytes() {
+    for make in [scenes::huge_among_small, scenes::blobs_analytic, scenes::surface_in_a_volume] {
+        let case = make();
+        let first = drawn(&case, Budget::default());
+        for _ in 0..3 {
+            let again = drawn(&case, Budget::default());
+            assert_eq!(bits(&first), bits(&again), "{}", case.name);
+        }
+    }
+}
+
+fn bits(picture: &Picture) -> Vec<u32> {
+    picture.color.iter().flatten().chain(&picture.depth).map(|v| v.to_bits()).collect()
+}
+
+/// Bins too long for one invocation go through the bitonic network.
+#[test]
+fn thousands_of_splats_in_one_bin() {
+    let case = scenes::ellipsoids_orthographic();
+    let splatkit::scene::Item::Radiance(set) = &case.scene.items[0] else { panic!("radiance") };
+    let mut set = (**set).clone();
+    for splat in &mut set.splats {
+        splat.center = splat.center.map(|v| 0.02 * v);
+        splat.strength *= 0.002;
+    }
+    set.splats = set.splats.repeat(9);
+    let scene = splatkit::scene::Scene::new().with_splats(set);
+    assert_matches(Case { name: "thousands_in_one_bin", scene, ..case }, 50.0);
+}
+
+#[test]
+fn a_new_transfer_function_needs_no_new_upload() {
+    let case = scenes::blobs_analytic();
+    let splatkit::scene::Item::Volume(volume, kernel, transfer) = &case.scene.items[0] else { panic!("a volume") };
+    let mut other = transfer.clone();
+    other.opacity = vec![(0.5, 0.0), (0.6, 0.9), (0.7, 0.0)];
+    let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
+    let mut renderer = Renderer::new(&gpu);
+    let mut prepared = renderer.prepare(&case.scene).expect(case.name);
+    renderer.render(&mut prepared, &case.camera, &case.settings).expect(case.name);
+    prepared.set_transfer(&other);
+    let (found, _) = renderer.render(&mut prepared, &case.camera, &case.settings).expect(case.name);
+    let scene = splatkit::scene::Scene::new().with_volume(volume.clone(), *kernel, other);
+    let expected = reference::render(&scene, &case.camera, &case.settings).expect(case.name);
+    assert!(psnr(&found, &expected) > 50.0, "{:.1} dB", psnr(&found, &expected));
+}

@@ -1,6 +1,8 @@
 //! NRRD volumes (Teem's format, versions 1 to 5), attached and detached, after its definition at
 //! <https://teem.sourceforge.net/nrrd/format.html>.
 
+mod write;
+
 use super::{Endian, SampleType, Source};
 use crate::{
     Result,
@@ -9,6 +11,7 @@ use crate::{
 use flate2::read::MultiGzDecoder;
 use glam::{DMat3, DVec3};
 use std::{borrow::Cow, collections::HashMap};
+pub use write::write;
 
 /// Reads a volume of three axes with one scalar each. Positions are in the file's own space (RAS, LPS, …: nothing is
 /// turned round); without `space directions` the axes are x, y, z at the `spacings`, 1 where those are missing or NaN.

@@ -8,6 +8,7 @@ mod header;
 mod rows;
 #[cfg(test)]
 mod tests;
+mod write;
 
 use super::{Source, positions, texture};
 use crate::{
@@ -19,6 +20,7 @@ use header::{Element, width};
 use ply_rs::ply::{PropertyType, ScalarType};
 use rayon::prelude::*;
 use rows::{List, Rows, number};
+pub use write::write;
 
 /// Rows of one parallel task.
 const CHUNK: usize = 1 << 14;

@@ -78,8 +78,13 @@ impl Camera {
 
     /// Looks along `direction` at the whole of `bounds`: its bounding sphere fits the shorter side of the picture.
     pub fn framing(bounds: &Bounds, direction: DVec3, view_up: DVec3, aspect: f64) -> Self {
+        Self::framing_with(bounds, direction, view_up, aspect, Self::DEFAULT_VIEW_ANGLE)
+    }
+
+    /// As [`framing`](Self::framing), with a vertical view angle in degrees, between 0 and 180.
+    pub fn framing_with(bounds: &Bounds, direction: DVec3, view_up: DVec3, aspect: f64, view_angle: f64) -> Self {
         let radius = (0.5 * bounds.diagonal()).max(f64::MIN_POSITIVE.sqrt());
-        let half = (0.5 * Self::DEFAULT_VIEW_ANGLE).to_radians();
+        let half = (0.5 * view_angle).to_radians();
         // The horizontal half angle is the narrower one in a portrait picture.
         let narrow = (half.tan() * aspect.min(1.0)).atan();
         let distance = radius / narrow.sin();
@@ -87,8 +92,38 @@ impl Camera {
             position: bounds.center() - distance * direction.normalize(),
             focal_point: bounds.center(),
             view_up,
-            projection: Projection::Perspective { view_angle: Self::DEFAULT_VIEW_ANGLE },
+            projection: Projection::Perspective { view_angle },
         }
+    }
+
+    /// Narrows or widens the view until the corners of `bounds` just fit a picture of `size` pixels, with a margin of this
+    /// share of its sides. Does nothing where a corner is not in front of the camera.
+    ///
+    /// # Errors
+    /// As [`view`](Self::view).
+    pub fn fit(&mut self, bounds: &Bounds, size: [u32; 2], margin: f64) -> Result<()> {
+        let view = self.view(size)?;
+        let mut widest: f64 = 0.0;
+        for corner in bounds.corners() {
+            let p = view.to_view(corner);
+            if view.perspective && p.z <= 0.0 {
+                return Ok(());
+            }
+            let depth = if view.perspective { p.z } else { 1.0 };
+            widest = widest.max((view.scale * p.truncate() / depth / view.center).abs().max_element());
+        }
+        let factor = (1.0 - 2.0 * margin) / widest;
+        if factor.is_finite() && factor > 0.0 {
+            match &mut self.projection {
+                // The picture's size follows the tangent of half the angle.
+                Projection::Perspective { view_angle } => {
+                    let half = (0.5 * *view_angle).to_radians().tan() / factor;
+                    *view_angle = 2.0 * half.atan().to_degrees();
+                }
+                Projection::Orthographic { height } => *height /= factor,
+            }
+        }
+        Ok(())
     }
 
     /// Turns the camera about the focal point around the view-up axis, in degrees (VTK's Azimuth).
@@ -222,6 +257,25 @@ mod tests {
                 assert!(pixel.x >= 0.0 && pixel.x <= f64::from(size[0]), "{pixel}");
                 assert!(pixel.y >= 0.0 && pixel.y <= f64::from(size[1]), "{pixel}");
             }
+        }
+    }
+
+    #[test]
+    fn a_fitted_camera_touches_the_margin() {
+        let bounds = Bounds { min: DVec3::splat(-1.0), max: DVec3::new(3.0, 2.0, 5.0) };
+        for orthographic in [false, true] {
+            let mut camera = camera();
+            if orthographic {
+                camera.make_orthographic();
+            }
+            camera.fit(&bounds, [640, 480], 0.05).unwrap();
+            let view = camera.view([640, 480]).unwrap();
+            let reach = bounds.corners().map(|corner| {
+                let p = view.to_view(corner);
+                (view.scale * p.truncate() / if orthographic { 1.0 } else { p.z } / view.center).abs().max_element()
+            });
+            let widest = reach.into_iter().fold(0.0, f64::max);
+            assert!((widest - 0.9).abs() < 1e-9, "{widest}");
         }
     }
 

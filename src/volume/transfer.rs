@@ -139,6 +139,31 @@ impl TransferFunction {
         Ok(())
     }
 
+    /// The same function stretched so that its points reach from one end of `range` to the other. One whose points all
+    /// lie at one value is only moved.
+    #[must_use]
+    pub fn spread_over(mut self, range: [f64; 2]) -> Self {
+        let values = self.color.iter().map(|p| p.0).chain(self.opacity.iter().map(|p| p.0));
+        let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
+        let turn = |value: f64| {
+            let share = if high > low { (value - low) / (high - low) } else { 0.0 };
+            mix(range[0], range[1], share)
+        };
+        self.color.iter_mut().for_each(|p| p.0 = turn(p.0));
+        self.opacity.iter_mut().for_each(|p| p.0 = turn(p.0));
+        self
+    }
+
+    /// The values that have opacity: the ends of the smallest interval that holds them, infinite where the function keeps
+    /// its opacity beyond its points; `None` for a function without opacity.
+    pub fn shown_range(&self) -> Option<[f64; 2]> {
+        let first = self.opacity.iter().position(|p| p.1 > 0.0)?;
+        let last = self.opacity.iter().rposition(|p| p.1 > 0.0)?;
+        let low = first.checked_sub(1).map_or(f64::NEG_INFINITY, |before| self.opacity[before].0);
+        let high = self.opacity.get(last + 1).map_or(f64::INFINITY, |after| after.0);
+        Some([low, high])
+    }
+
     /// Red, green, blue of a value, 0 … 1.
     pub fn color(&self, value: f64) -> [f64; 3] {
         let (below, above, t) = segment(&self.color, value);
@@ -219,6 +244,22 @@ mod tests {
 
     fn close(a: f64, b: f64) {
         assert!((a - b).abs() < 1e-12, "{a} is not {b}");
+    }
+
+    #[test]
+    fn stretching_moves_the_points_and_nothing_else() {
+        let transfer = TransferFunction {
+            color: vec![(10.0, [0.0; 3]), (30.0, [1.0; 3])],
+            opacity: vec![(20.0, 0.0), (30.0, 0.5)],
+            unit: 2.0,
+            shade: None,
+        };
+        assert_eq!(transfer.shown_range(), Some([20.0, f64::INFINITY]));
+        let stretched = transfer.clone().spread_over([-1.0, 1.0]);
+        assert_eq!(stretched.color, [(-1.0, [0.0; 3]), (1.0, [1.0; 3])]);
+        assert_eq!(stretched.opacity, [(0.0, 0.0), (1.0, 0.5)]);
+        assert_eq!((stretched.unit, stretched.opacity(0.5)), (2.0, 0.25));
+        assert_eq!(transfer.spread_over([3.0, 3.0]).opacity(3.0), 0.5);
     }
 
     #[test]

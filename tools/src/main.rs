@@ -1,1 +1,95 @@
-fn main() {}
+//! The `splatkit` command: one file per subcommand, the flags that they share in modules of their own. All drawing is the
+//! library's.
+
+mod bench;
+mod camera;
+mod compare;
+mod demo;
+mod engine;
+mod failure;
+mod gpus;
+mod info;
+mod load;
+mod output;
+mod parse;
+mod progress;
+mod render;
+mod scene;
+
+use clap::{Parser, Subcommand};
+use progress::Progress;
+use std::{io::IsTerminal, process::ExitCode};
+
+/// Draws volumes and surfaces as elliptic splats.
+///
+/// Exit codes: 0 done, 1 runtime or output, 2 usage, 3 bad input or nothing to draw, 4 no adapter or out of memory,
+/// 5 comparison failed.
+#[derive(Parser)]
+#[command(name = "splatkit", version, max_term_width = 110)]
+struct Command {
+    #[command(subcommand)]
+    task: Task,
+
+    /// Tells more on stderr; twice for every frame.
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    verbose: u8,
+
+    /// Tells nothing but errors.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Draws meshes, clouds and volumes in one picture.
+    Render(Box<render::Render>),
+    /// Tells what is in a file.
+    Info(info::Info),
+    /// Compares two pictures.
+    Compare(compare::Compare),
+    /// Measures frame times: the camera turns by 5 degrees between frames.
+    Bench(Box<bench::Bench>),
+    /// Makes a mesh and a volume and draws them: pictures and timings with no download.
+    Demo(demo::Demo),
+    /// Lists the adapters that can draw, and their limits.
+    Gpus(gpus::Gpus),
+}
+
+fn main() -> ExitCode {
+    let command = Command::parse();
+    start_log(&command);
+    let progress = Progress::new(!command.quiet);
+    let result = match command.task {
+        Task::Render(task) => task.run(&progress),
+        Task::Info(task) => task.run(&progress),
+        Task::Compare(task) => task.run(),
+        Task::Bench(task) => task.run(&progress),
+        Task::Demo(task) => task.run(&progress),
+        Task::Gpus(task) => task.run(),
+    };
+    progress.clear();
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    }
+}
+
+/// Sends the library's events to stderr; `RUST_LOG` decides where it is set.
+fn start_log(command: &Command) {
+    let default = match (command.quiet, command.verbose) {
+        (true, _) => "off",
+        (_, 0) => "error,splatkit=warn",
+        (_, 1) => "error,splatkit=info",
+        (_, _) => "warn,splatkit=trace",
+    };
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| default.into());
+    let colored = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(colored)
+        .with_target(false)
+        // A span that closes tells its time.
+        .with_span_events(tracing_subscriber::fmt::format::FmtSpan::CLOSE)
+        .init();
+}

@@ -1,0 +1,72 @@
+//! Writing NRRD: samples in their own type, packed by gzip, in the header's own file.
+
+use crate::{
+    Error, Result,
+    volume::{Samples, Volume},
+};
+use flate2::{Compression, write::GzEncoder};
+use glam::DVec3;
+use std::{io::Write, path::Path};
+
+/// Writes a volume with its position in space.
+///
+/// # Errors
+/// [`Error::File`] where the file cannot be written.
+pub fn write(volume: &Volume, path: &Path) -> Result<()> {
+    let file = std::fs::File::create(path).map_err(|e| Error::file(path, "create", e))?;
+    let mut out = std::io::BufWriter::new(file);
+    write_to(volume, &mut out).and_then(|()| out.flush()).map_err(|e| Error::file(path, "write", e))
+}
+
+fn write_to(volume: &Volume, out: &mut impl Write) -> std::io::Result<()> {
+    let lattice = &volume.lattice;
+    let [nx, ny, nz] = lattice.dims;
+    let [i, j, k] = [lattice.axes.x_axis, lattice.axes.y_axis, lattice.axes.z_axis].map(vector);
+    let (kind, bytes): (_, &[u8]) = match &volume.samples {
+        Samples::U8(values) => ("uint8", values),
+        Samples::U16(values) => ("uint16", bytemuck::cast_slice(values)),
+        Samples::I16(values) => ("int16", bytemuck::cast_slice(values)),
+        Samples::I32(values) => ("int32", bytemuck::cast_slice(values)),
+        Samples::F32(values) => ("float", bytemuck::cast_slice(values)),
+    };
+    let endian = if cfg!(target_endian = "little") { "little" } else { "big" };
+    writeln!(out, "NRRD0004\ntype: {kind}\ndimension: 3\nspace dimension: 3\nsizes: {nx} {ny} {nz}")?;
+    writeln!(out, "space directions: {i} {j} {k}\nspace origin: {}", vector(lattice.origin))?;
+    writeln!(out, "endian: {endian}\nencoding: gzip\n")?;
+    let mut packed = GzEncoder::new(out, Compression::default());
+    packed.write_all(bytes)?;
+    packed.finish().map(drop)
+}
+
+fn vector(v: DVec3) -> String {
+    format!("({},{},{})", v.x, v.y, v.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        io::{nrrd, testing::*},
+        volume::Lattice,
+    };
+
+    #[test]
+    fn what_is_written_reads_back() {
+        let folder = Folder::new("nrrd-write");
+        let axes = glam::DMat3::from_cols(DVec3::new(0.5, 0.1, 0.0), DVec3::new(0.0, 2.0, 0.0), DVec3::Z);
+        let lattice = Lattice { dims: [2, 3, 1], origin: DVec3::new(-1.5, 0.0, 1e9), axes };
+        let samples = [
+            Samples::U8(vec![0, 1, 2, 3, 4, 255]),
+            Samples::U16(vec![0, 1, 2, 3, 4, 65535]),
+            Samples::I16(vec![0, 1, 2, 3, 4, -32768]),
+            Samples::I32(vec![0, 1, 2, 3, 4, i32::MIN]),
+            Samples::F32(vec![0.0, 1e-30, -2.5, 3.0, 4.0, 1e30]),
+        ];
+        for samples in samples {
+            let path = folder.write("volume.nrrd", b"");
+            write(&Volume::new(lattice.clone(), samples.clone()).unwrap(), &path).unwrap();
+            let read = read_with(&path, nrrd::read).unwrap();
+            assert_eq!((read.samples, read.lattice), (samples, lattice.clone()));
+        }
+    }
+}

@@ -1,0 +1,40 @@
+# What ./tools/demo and ./tools/test need beside the Rust toolchain: a linker and a Vulkan driver. Sourced, not run.
+
+say() { printf '\n== %s\n' "$*"; }
+fail() { printf 'error: %s\n' "$*" >&2; exit 1; }
+
+# Installs Debian packages, or says which are missing.
+install_packages() {
+    local as_root=()
+    if [ "$(id -u)" -ne 0 ]; then as_root=(sudo -n); fi
+    if ! command -v apt-get >/dev/null || { [ "$(id -u)" -ne 0 ] && ! sudo -n true 2>/dev/null; }; then
+        fail "please install: $* (Debian and Ubuntu: apt-get install $*)"
+    fi
+    say "Installing $*"
+    local apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -y --no-install-recommends)
+    # A bare machine has no package lists, an old one outdated lists.
+    "${apt[@]}" install "$@" </dev/null || { "${apt[@]}" update </dev/null && "${apt[@]}" install "$@" </dev/null; } ||
+        fail "apt-get could not install $*"
+}
+
+# Whether the Vulkan loader and a driver are there. macOS has Metal, Windows has Direct3D.
+has_vulkan() {
+    [ "$(uname -s)" = Linux ] || return 0
+    local libraries
+    libraries=$(PATH="$PATH:/sbin:/usr/sbin" ldconfig -p 2>/dev/null || true)
+    [[ $libraries == *libvulkan.so.1* ]] || return 1
+    [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ] || return 0
+    local file
+    for file in {/usr/share,/usr/local/share,/etc,"${XDG_DATA_HOME:-$HOME/.local/share}"}/vulkan/icd.d/*.json; do
+        [ -e "$file" ] && return 0
+    done
+    return 1
+}
+
+command -v cargo >/dev/null || PATH="$PATH:$HOME/.cargo/bin"
+command -v cargo >/dev/null || fail "there is no cargo: install Rust as https://rustup.rs tells"
+command -v cc >/dev/null || install_packages gcc libc6-dev
+has_vulkan || install_packages mesa-vulkan-drivers libvulkan1
+
+# Mesa asks for it and complains where there is none.
+export XDG_RUNTIME_DIR="${XDG_RUNTIME_DIR:-${TMPDIR:-/tmp}}"

@@ -1,0 +1,105 @@
+//! `splatkit bench`.
+
+use crate::{
+    camera::CameraFlags, engine::EngineFlags, failure::Failure, output, progress::Progress, render::milliseconds,
+    scene::SceneFlags,
+};
+use clap::Args;
+use splatkit::Error;
+use std::time::Instant;
+
+/// Degrees between frames, as VTK's benchmark in the same view has.
+const STEP: f64 = 5.0;
+
+#[derive(Args, Debug)]
+pub struct Bench {
+    #[command(flatten)]
+    scene: SceneFlags,
+    /// Frames that are measured, after a first one that is not.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    frames: u32,
+    #[command(flatten)]
+    camera: CameraFlags,
+    #[command(flatten)]
+    engine: EngineFlags,
+    /// Writes JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Bench {
+    pub fn run(self, progress: &Progress) -> Result<(), Failure> {
+        let loaded = self.scene.load(progress)?;
+        progress.stage("Opening the GPU");
+        let gpu = self.engine.gpu()?;
+        progress.stage("Uploading");
+        let start = Instant::now();
+        let mut renderer = self.engine.renderer(&gpu);
+        let mut prepared = renderer.prepare(&loaded.scene)?;
+        gpu.wait()?;
+        let upload_ms = milliseconds(start);
+        let settings = self.engine.settings(&loaded, 1);
+        let camera = |frame: u32| self.camera.turned(&loaded.subject, settings.size, STEP * f64::from(frame));
+
+        let mut frame = |number: u32| {
+            progress.stage(format!("Frame {number} of {}", self.frames));
+            let start = Instant::now();
+            let stats = renderer.draw(&mut prepared, &camera(number), &settings)?;
+            Ok::<_, Error>((milliseconds(start), stats))
+        };
+        let (first_ms, stats) = frame(0)?;
+        if stats.splats == 0 {
+            return Err(Error::NothingToDraw("the camera sees no splat that has opacity".into()).into());
+        }
+        let mut times = Vec::new();
+        for number in 1..=self.frames {
+            times.push(frame(number)?.0);
+        }
+        progress.stage("Measuring the passes");
+        let profile = renderer.profile(&mut prepared, &camera(0), &settings)?;
+        progress.clear();
+
+        times.sort_by(f64::total_cmp);
+        let middle = times.len() / 2;
+        let median = if times.len() % 2 == 1 { times[middle] } else { 0.5 * (times[middle - 1] + times[middle]) };
+        let [min, max] = [times[0], times[times.len() - 1]];
+        let [width, height] = self.engine.size;
+        let culled = loaded.count.saturating_sub(stats.splats);
+        if self.json {
+            let passes = profile.steps.iter().map(|(name, ms)| serde_json::json!({ "name": name, "ms": ms }));
+            return output::line(serde_json::json!({
+                "scene": self.scene.name(),
+                "adapter": gpu.info.name,
+                "width": width,
+                "height": height,
+                "frames": self.frames,
+                "frame_ms": { "min": min, "median": median, "max": max },
+                "first_ms": first_ms,
+                "load_ms": loaded.load_ms,
+                "upload_ms": upload_ms,
+                "passes": serde_json::Value::from_iter(passes),
+                "depth_passes": stats.passes,
+                "splats": stats.splats,
+                "entries": stats.entries,
+                "culled": culled,
+                "gpu_bytes": stats.gpu_bytes,
+                "camera": crate::camera::to_json(&camera(0)),
+            }));
+        }
+        output::line(format_args!("{} at {width}x{height} on {}", self.scene.name(), gpu.info.name))?;
+        output::line(format_args!("load      {:10.1} ms", loaded.load_ms))?;
+        output::line(format_args!("upload    {upload_ms:10.1} ms"))?;
+        output::line(format_args!("first     {first_ms:10.1} ms"))?;
+        output::line(format_args!("frame     {median:10.1} ms  ({min:.1} to {max:.1}, {} frames)", self.frames))?;
+        for (name, ms) in &profile.steps {
+            output::line(format_args!("  {name:<8}{ms:10.1} ms"))?;
+        }
+        output::line(format_args!(
+            "{} splats drawn, {culled} culled, {} entries in {} passes, {} MiB on the GPU",
+            stats.splats,
+            stats.entries,
+            stats.passes,
+            stats.gpu_bytes >> 20
+        ))
+    }
+}

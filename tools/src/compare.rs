@@ -1,0 +1,50 @@
+//! `splatkit compare`.
+
+use crate::{failure::Failure, output, parse};
+use clap::Args;
+use splatkit::{Error, compare::compare_files, io::Limits};
+use std::path::PathBuf;
+
+#[derive(Args, Debug)]
+pub struct Compare {
+    /// A PNG or JPEG.
+    a: PathBuf,
+    /// Another of the same size.
+    b: PathBuf,
+    /// Fails with exit code 5 where the PSNR, in dB, is lower.
+    #[arg(long, value_name = "DECIBELS", value_parser = parse::finite, allow_hyphen_values = true)]
+    threshold: Option<f64>,
+    /// Writes JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Compare {
+    pub fn run(self) -> Result<(), Failure> {
+        let found = compare_files(&self.a, &self.b, &Limits::default()).map_err(|error| match error {
+            // Of all that can be wrong with arguments, here it can only be the sizes: the pictures differ.
+            Error::Argument(message) => Failure::Comparison(message),
+            other => other.into(),
+        })?;
+        if self.json {
+            output::line(serde_json::json!({
+                "psnr": found.psnr,
+                "ssim": found.ssim,
+                "max_difference": found.max_difference,
+                "different_pixels": found.different_pixels,
+            }))?;
+        } else {
+            let psnr = found.psnr.map_or("identical".to_owned(), |psnr| format!("{psnr:.2} dB"));
+            output::line(format_args!("PSNR              {psnr}"))?;
+            output::line(format_args!("SSIM              {:.6}", found.ssim))?;
+            output::line(format_args!("largest difference {:.6}", found.max_difference))?;
+            output::line(format_args!("different pixels  {}", found.different_pixels))?;
+        }
+        match (found.psnr, self.threshold) {
+            (Some(psnr), Some(threshold)) if psnr < threshold => {
+                Err(Failure::Comparison(format!("the pictures' PSNR is {psnr:.2} dB, below {threshold} dB")))
+            }
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! `splatkit demo`: pictures with no download. The inputs are made, written, and read again as any other file.
+
+use crate::{
+    camera::CameraFlags,
+    engine::{EngineFlags, require_content},
+    failure::Failure,
+    output,
+    progress::Progress,
+    render::{Drawer, milliseconds},
+    scene::SceneFlags,
+};
+use clap::{Args, Parser};
+use splatkit::{Error, io, picture::PictureFormat, surface::Mesh, volume::phantoms::Phantom};
+use std::{ffi::OsString, path::PathBuf, time::Instant};
+
+#[derive(Args, Debug)]
+pub struct Demo {
+    /// The folder for inputs and pictures; it is made if need be.
+    #[arg(default_value = "out")]
+    folder: PathBuf,
+    /// Replaces files that are there already.
+    #[arg(long)]
+    overwrite: bool,
+    /// The adapter, as for render.
+    #[arg(long, value_name = "N|NAME|software")]
+    gpu: Option<String>,
+}
+
+const MESH: &str = "knot.ply";
+const VOLUME: &str = "specimen.nrrd";
+const TRANSFER: &str = "specimen.json";
+/// The knot reaches 3.4 from its centre; the specimen's radius is 0.9.
+const KNOT_SCALE: f32 = 0.42;
+/// #10141c.
+const BACKGROUND: Option<[f32; 3]> = Some([16.0 / 255.0, 20.0 / 255.0, 28.0 / 255.0]);
+
+/// The specimen's parts: the rind and the flesh faint, the lattice golden, the stone pale.
+const SHOWN: &str = r#"{
+  "color": [[20, 0.55, 0.20, 0.10], [60, 0.75, 0.30, 0.16], [105, 0.85, 0.42, 0.18], [165, 0.95, 0.62, 0.25],
+            [205, 0.98, 0.78, 0.42], [235, 0.55, 0.78, 0.95], [255, 0.85, 0.94, 1.0]],
+  "opacity": [[20, 0], [45, 0.004], [60, 0.012], [90, 0.03], [120, 0.03], [150, 0.45], [200, 0.75], [255, 0.95]],
+  "unit": 0.02,
+  "shade": {"ambient": 0.25, "diffuse": 0.75, "specular": 0.35, "power": 24}
+}
+"#;
+
+/// A picture: its name, its inputs, and the further arguments of the command that draws it.
+struct Shot {
+    name: &'static str,
+    inputs: &'static [&'static str],
+    arguments: &'static str,
+}
+
+const SHOTS: [Shot; 3] = [
+    Shot { name: "mesh.png", inputs: &[MESH], arguments: "--size 1024x768 --azimuth 20 --elevation 25" },
+    Shot { name: "volume.png", inputs: &[VOLUME], arguments: "--size 1024x768 --up +Z" },
+    Shot { name: "mixed.png", inputs: &[MESH, VOLUME], arguments: "--size 1024x768 --azimuth 20 --elevation 25" },
+];
+
+/// The flags of `render` that decide what a picture shows.
+#[derive(Parser)]
+struct Flags {
+    #[command(flatten)]
+    scene: SceneFlags,
+    #[command(flatten)]
+    camera: CameraFlags,
+    #[command(flatten)]
+    engine: EngineFlags,
+}
+
+impl Demo {
+    pub fn run(self, progress: &Progress) -> Result<(), Failure> {
+        self.make_inputs(progress)?;
+        for (number, shot) in SHOTS.iter().enumerate() {
+            self.draw(shot, number == 0, progress)?;
+        }
+        Ok(())
+    }
+
+    fn make_inputs(&self, progress: &Progress) -> Result<(), Failure> {
+        std::fs::create_dir_all(&self.folder).map_err(|e| Failure::output(&self.folder, e))?;
+        for name in [MESH, VOLUME, TRANSFER].into_iter().chain(SHOTS.iter().map(|shot| shot.name)) {
+            output::check(&self.folder.join(name), self.overwrite)?;
+        }
+        progress.stage("Making a mesh and a volume");
+        let mut mesh = Mesh::knot(1200, 72);
+        // So large that the knot winds through the specimen.
+        mesh.positions.iter_mut().for_each(|p| *p *= KNOT_SCALE);
+        let specimen = Phantom::Specimen.sample_bytes([160; 3]).map_err(Error::Argument)?;
+        output::write_by(&self.folder.join(MESH), |path| io::ply::write(&mesh, path))?;
+        output::write_by(&self.folder.join(VOLUME), |path| io::nrrd::write(&specimen, path))?;
+        output::write(&self.folder.join(TRANSFER), SHOWN.as_bytes())
+    }
+
+    /// Draws a picture twice, the second time with everything warm.
+    fn draw(&self, shot: &Shot, first: bool, progress: &Progress) -> Result<(), Failure> {
+        let mut arguments: Vec<OsString> = vec!["render".into()];
+        arguments.extend(shot.inputs.iter().map(|name| self.folder.join(name).into()));
+        if shot.inputs.contains(&VOLUME) {
+            arguments.extend(["--transfer".into(), self.folder.join(TRANSFER).into()]);
+        }
+        arguments.extend(shot.arguments.split_whitespace().map(OsString::from));
+        if let Some(gpu) = &self.gpu {
+            arguments.extend(["--gpu".into(), gpu.into()]);
+        }
+        let flags = Flags::try_parse_from(&arguments).map_err(|e| Failure::Usage(e.to_string()))?;
+        let loaded = flags.scene.load(progress)?;
+        let mut drawer = Drawer::engine(&flags.engine, &loaded, progress)?;
+        let settings = flags.engine.settings(&loaded, 1);
+        let camera = flags.camera.camera(&loaded.subject, settings.size)?;
+        progress.stage(format!("Drawing {}", shot.name));
+        let mut draw = || {
+            let start = Instant::now();
+            let (picture, stats) = drawer.draw(&loaded, &camera, &settings)?;
+            Ok::<_, Error>((milliseconds(start), picture, stats))
+        };
+        let (first_ms, ..) = draw()?;
+        let (later_ms, picture, stats) = draw()?;
+        require_content(&picture)?;
+        let path = self.folder.join(shot.name);
+        output::write(&path, &picture.encode(PictureFormat::Png, BACKGROUND)?)?;
+        progress.clear();
+        if first {
+            output::line(format_args!("Drawn on {}", drawer.adapter()))?;
+        }
+        output::line(format_args!(
+            "{}: {} splats, load {:.0} ms, first frame {first_ms:.0} ms, later frames {later_ms:.0} ms",
+            path.display(),
+            stats.splats,
+            loaded.load_ms
+        ))?;
+        let arguments: Vec<_> = arguments.iter().map(|argument| argument.to_string_lossy()).collect();
+        output::line(format_args!("  splatkit {} -o {} --background '#10141c'", arguments.join(" "), shot.name))
+    }
+}

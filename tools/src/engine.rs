@@ -1,0 +1,92 @@
+//! The engine's flags: the adapter, and the settings of a picture.
+
+use crate::{failure::Failure, parse, scene::Loaded};
+use clap::{Args, ValueEnum};
+use splatkit::{
+    Error,
+    engine::{AdapterChoice, Budget, Gpu, Renderer},
+    picture::Picture,
+    scene::{self, Item, Settings},
+};
+
+/// How pictures are drawn.
+#[derive(Args, Debug, Clone)]
+#[command(next_help_heading = "Engine")]
+pub struct EngineFlags {
+    /// Width and height in pixels.
+    #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "1280x720")]
+    pub size: [u32; 2],
+    /// The adapter: its number in `splatkit gpus`, a part of its name, or `software`. By default the fastest.
+    #[arg(long, value_name = "N|NAME|software")]
+    gpu: Option<String>,
+    /// How a volume's gradient across the picture is found.
+    #[arg(long, value_enum, default_value_t = Gradient::Analytic)]
+    gradient: Gradient,
+    /// Lights volumes, also where the transfer function has no light.
+    #[arg(long, overrides_with = "no_shade")]
+    shade: bool,
+    /// Draws volumes and surfaces in their own colours, without light.
+    #[arg(long, overrides_with = "shade")]
+    no_shade: bool,
+    /// Largest thickness of a sheet, in world units; by default two thirds of a kernel's radius for volumes.
+    #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
+    sheet_thickness: Option<f64>,
+    /// Room of a depth pass: pairs of a splat and a tile. Pictures that need more take more passes.
+    #[arg(long, value_name = "ENTRIES", value_parser = clap::value_parser!(u32).range(1..))]
+    budget: Option<u32>,
+}
+
+/// [`scene::Gradient`] as a flag.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Gradient {
+    Analytic,
+    Central,
+}
+
+impl EngineFlags {
+    /// Opens the adapter.
+    pub fn gpu(&self) -> splatkit::Result<Gpu> {
+        // Any text is a choice: the conversion cannot fail.
+        let choice = self.gpu.as_deref().map_or(AdapterChoice::Automatic, |text| text.parse().unwrap_or_default());
+        Gpu::headless(&choice)
+    }
+
+    pub fn renderer(&self, gpu: &Gpu) -> Renderer {
+        let mut budget = Budget::default();
+        if let Some(entries) = self.budget {
+            budget.entries = entries;
+        }
+        Renderer::with_budget(gpu, budget)
+    }
+
+    /// The settings of a picture, each side `factor` times as long.
+    pub fn settings(&self, loaded: &Loaded, factor: u32) -> Settings {
+        let mut settings = Settings::new(self.size.map(|side| side.saturating_mul(factor)));
+        settings.sheet_thickness = self.sheet_thickness;
+        settings.gradient = match self.gradient {
+            Gradient::Analytic => scene::Gradient::Analytic,
+            Gradient::Central => scene::Gradient::Central,
+        };
+        if self.no_shade {
+            settings.volume_shade = Some(None);
+            settings.surface_shade = None;
+        }
+        if self.shade {
+            let own = loaded.scene.items.iter().find_map(|item| match item {
+                Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) => transfer.shade,
+                Item::Radiance(_) => None,
+            });
+            settings.volume_shade = Some(Some(own.unwrap_or_default()));
+        }
+        settings
+    }
+}
+
+/// Turns a picture that shows nothing into an error.
+pub fn require_content(picture: &Picture) -> Result<(), Failure> {
+    // What would round to nothing in a file of 8 bits is nothing.
+    if picture.color.iter().any(|pixel| pixel[3] >= 0.5 / 255.0) {
+        return Ok(());
+    }
+    Err(Error::NothingToDraw("the picture is empty: the camera sees no splat that has opacity".into()).into())
+}

@@ -1,0 +1,90 @@
+//! What can go wrong, the exit code of each, and how it is told.
+
+use splatkit::Error;
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+/// Why the command ends without success.
+#[derive(Debug)]
+pub enum Failure {
+    /// What the library found.
+    Library(Error),
+    /// Arguments that do not go together.
+    Usage(String),
+    /// A result that could not be written.
+    Output { file: PathBuf, message: String, hint: Option<&'static str> },
+    /// Pictures that differ by more than the user allows.
+    Comparison(String),
+}
+
+impl Failure {
+    /// A result that the operating system would not take.
+    pub fn output(file: &Path, error: impl fmt::Display) -> Self {
+        Self::Output { file: file.to_owned(), message: format!("cannot be written: {error}"), hint: None }
+    }
+
+    fn code(&self) -> u8 {
+        match self {
+            Self::Output { .. } => 1,
+            Self::Usage(_) | Self::Library(Error::Argument(_)) => 2,
+            Self::Library(Error::NoAdapter(_) | Error::Gpu(_)) => 4,
+            Self::Library(Error::Input { .. } | Error::Limit { .. } | Error::File { .. } | Error::NothingToDraw(_)) => {
+                3
+            }
+            Self::Comparison(_) => 5,
+        }
+    }
+
+    fn hint(&self) -> Option<&str> {
+        match self {
+            Self::Library(Error::Input { hint, .. }) => hint.as_deref(),
+            Self::Library(Error::Limit { .. }) => {
+                Some("raise --limit-points or --limit-bytes if the file can be trusted")
+            }
+            Self::Library(Error::NoAdapter(_)) => {
+                Some("`splatkit gpus` lists what there is; `--reference` needs no GPU")
+            }
+            Self::Library(Error::Gpu(_)) => Some("try a smaller --size, or another --gpu (`software` is one)"),
+            Self::Library(Error::NothingToDraw(_)) => {
+                Some("`splatkit info` tells what a file holds; --transfer, --range and the camera decide what is seen")
+            }
+            Self::Library(Error::Argument(_)) | Self::Usage(_) => Some("`splatkit help` lists the options"),
+            Self::Library(Error::File { .. }) | Self::Comparison(_) => None,
+            Self::Output { hint, .. } => *hint,
+        }
+    }
+
+    /// Tells the failure on stderr.
+    pub fn report(self) -> ExitCode {
+        let code = self.code();
+        eprintln!("{:?}", miette::Report::new(self));
+        ExitCode::from(code)
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Self::Library(error)
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Library(error) => error.fmt(out),
+            Self::Usage(message) | Self::Comparison(message) => out.write_str(message),
+            Self::Output { file, message, .. } => write!(out, "{}: {message}", file.display()),
+        }
+    }
+}
+
+impl std::error::Error for Failure {}
+
+impl miette::Diagnostic for Failure {
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.hint().map(|hint| Box::new(hint) as Box<dyn fmt::Display>)
+    }
+}

@@ -1,0 +1,119 @@
+//! `splatkit info`.
+
+use crate::{
+    failure::Failure,
+    load::{Input, LoadFlags},
+    output,
+    progress::Progress,
+};
+use clap::Args;
+use serde_json::{Map, Value, json};
+use splatkit::{Error, surface::Mesh, volume::Volume};
+use std::path::PathBuf;
+
+#[derive(Args, Debug)]
+pub struct Info {
+    /// A mesh, cloud or volume.
+    file: PathBuf,
+    #[command(flatten)]
+    load: LoadFlags,
+    /// Writes JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Info {
+    pub fn run(self, progress: &Progress) -> Result<(), Failure> {
+        progress.stage(format!("Reading {}", self.file.display()));
+        let input = self.load.open(&self.file)?;
+        progress.clear();
+        let bytes = self.file.metadata().map_err(|e| Error::file(&self.file, "read", e))?.len();
+        let (count, mut facts) = match &input {
+            Input::Mesh(mesh) => (mesh.positions.len(), of_mesh(mesh)),
+            Input::Volume(volume) => (volume.len(), of_volume(volume)),
+        };
+        facts.insert("file".into(), json!(self.file));
+        facts.insert("count".into(), json!(count));
+        facts.insert("bytes".into(), json!(bytes));
+        facts.insert("bytes_per_point".into(), json!(bytes as f64 / count.max(1) as f64));
+        // Only hierarchies have more.
+        facts.insert("levels".into(), json!(1));
+        if self.json {
+            return output::line(Value::Object(facts));
+        }
+        let order = [
+            "file",
+            "kind",
+            "count",
+            "triangles",
+            "dims",
+            "spacing",
+            "type",
+            "range",
+            "bounds",
+            "attributes",
+            "materials",
+            "textures",
+            "bytes",
+            "bytes_per_point",
+        ];
+        for name in order {
+            if let Some(value) = facts.get(name) {
+                output::line(format_args!("{:<16}{}", name.replace('_', " "), plain(value)))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn of_mesh(mesh: &Mesh) -> Map<String, Value> {
+    let attributes: Vec<&str> = [
+        ("position", true),
+        ("normal", !mesh.normals.is_empty()),
+        ("color", !mesh.colors.is_empty()),
+        ("uv", !mesh.uvs.is_empty()),
+    ]
+    .into_iter()
+    .filter_map(|(name, present)| present.then_some(name))
+    .collect();
+    let mut facts = Map::new();
+    facts.insert("kind".into(), json!(if mesh.triangles.is_empty() { "cloud" } else { "mesh" }));
+    facts.insert("triangles".into(), json!(mesh.triangles.len()));
+    facts.insert("attributes".into(), json!(attributes));
+    facts.insert("materials".into(), json!(mesh.materials.len()));
+    facts.insert("textures".into(), json!(mesh.materials.iter().filter(|m| m.texture.is_some()).count()));
+    facts.insert("bounds".into(), bounds(mesh.bounds()));
+    facts
+}
+
+fn of_volume(volume: &Volume) -> Map<String, Value> {
+    let mut facts = Map::new();
+    facts.insert("kind".into(), json!("volume"));
+    facts.insert("dims".into(), json!(volume.lattice.dims));
+    facts.insert("spacing".into(), json!(volume.lattice.spacing().to_array()));
+    facts.insert("type".into(), json!(volume.samples.type_name()));
+    facts.insert("range".into(), json!(volume.range));
+    facts.insert("attributes".into(), json!(["value"]));
+    facts.insert("bounds".into(), bounds(Some(volume.bounds())));
+    facts
+}
+
+fn bounds(bounds: Option<[glam::DVec3; 2]>) -> Value {
+    bounds.map_or(Value::Null, |[min, max]| json!({ "min": min.to_array(), "max": max.to_array() }))
+}
+
+/// A value for people.
+fn plain(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Array(values) => values.iter().map(plain).collect::<Vec<_>>().join(", "),
+        Value::Object(map) => {
+            map.iter().map(|(name, value)| format!("{name} {}", plain(value))).collect::<Vec<_>>().join("; ")
+        }
+        Value::Number(number) => match number.as_f64().filter(|_| number.is_f64()) {
+            Some(float) => format!("{}", (float * 1e6).round() / 1e6),
+            None => number.to_string(),
+        },
+        other => other.to_string(),
+    }
+}

@@ -1,0 +1,107 @@
+//! Where results go: files that appear whole or not at all, and stdout.
+
+use crate::failure::Failure;
+use splatkit::{Error, picture::PictureFormat};
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+/// Where a picture goes.
+#[derive(Debug, Clone)]
+pub enum Target {
+    /// A PNG on stdout.
+    Stdout,
+    File(PathBuf, PictureFormat),
+}
+
+impl Target {
+    /// The target that `-o` names; a file that is there already must be allowed to go.
+    pub fn new(path: &Path, overwrite: bool) -> Result<Self, Failure> {
+        if path.as_os_str() == "-" {
+            return Ok(Self::Stdout);
+        }
+        let format = PictureFormat::of(path)?;
+        check(path, overwrite)?;
+        Ok(Self::File(path.to_owned(), format))
+    }
+
+    /// The format and the name of the target.
+    pub fn format(&self) -> PictureFormat {
+        match self {
+            Self::Stdout => PictureFormat::Png,
+            Self::File(_, format) => *format,
+        }
+    }
+
+    pub fn name(&self) -> String {
+        match self {
+            Self::Stdout => "-".into(),
+            Self::File(path, _) => path.display().to_string(),
+        }
+    }
+
+    pub fn write(&self, bytes: &[u8]) -> Result<(), Failure> {
+        match self {
+            Self::Stdout => stdout(bytes),
+            Self::File(path, _) => write(path, bytes),
+        }
+    }
+}
+
+/// Refuses a file that is there already, and a folder that is not, before the work is done.
+pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
+    let refuse =
+        |message: &str, hint| Err(Failure::Output { file: path.to_owned(), message: message.into(), hint: Some(hint) });
+    if path.is_dir() {
+        return refuse("is a folder", "give the name of a file");
+    }
+    if !overwrite && path.symlink_metadata().is_ok() {
+        return refuse("exists already", "give --overwrite, or another name");
+    }
+    if !folder(path).is_dir() {
+        return refuse("cannot be written: its folder does not exist", "make the folder first");
+    }
+    Ok(())
+}
+
+fn folder(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Writes a file as a whole: what reads it sees the old one or the new one.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    write_by(path, |part| std::fs::write(part, bytes).map_err(|e| Error::file(path, "write", e)))
+}
+
+/// Has a function write a file beside `path`, and renames it.
+pub fn write_by(path: &Path, write: impl FnOnce(&Path) -> splatkit::Result<()>) -> Result<(), Failure> {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(format!(".{}.part", std::process::id()));
+    let part = folder(path).join(name);
+    let written = write(&part).map_err(|error| match error {
+        Error::File { source, .. } => Failure::output(path, source),
+        other => other.into(),
+    });
+    let written = written.and_then(|()| std::fs::rename(&part, path).map_err(|e| Failure::output(path, e)));
+    if written.is_err() {
+        // The first error is the one to tell.
+        std::fs::remove_file(&part).ok();
+    }
+    written
+}
+
+/// Writes to stdout. A reader that has seen enough and closed it is no error.
+pub fn stdout(bytes: &[u8]) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::output(Path::new("stdout"), e)),
+        _ => Ok(()),
+    }
+}
+
+/// Writes a line to stdout.
+pub fn line(text: impl std::fmt::Display) -> Result<(), Failure> {
+    stdout(format!("{text}\n").as_bytes())
+}

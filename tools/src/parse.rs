@@ -1,0 +1,147 @@
+//! Values of flags that are more than a word or a number.
+
+use glam::DVec3;
+use splatkit::io::{Endian, SampleType};
+use std::str::FromStr;
+
+/// Numbers with a separator, exactly as many as asked for.
+fn numbers<T: FromStr, const N: usize>(text: &str, separator: char, form: &str) -> Result<[T; N], String> {
+    let parts: Option<Vec<T>> = text.split(separator).map(|part| part.trim().parse().ok()).collect();
+    parts.and_then(|parts| parts.try_into().ok()).ok_or_else(|| format!("the form is {form}"))
+}
+
+/// `1280x720`.
+pub fn size(text: &str) -> Result<[u32; 2], String> {
+    let size = numbers(text, 'x', "WIDTHxHEIGHT, such as 1280x720")?;
+    if size.contains(&0) { Err("a picture needs a width and a height above 0".into()) } else { Ok(size) }
+}
+
+/// `256x256x128`, or with commas.
+pub fn dims(text: &str) -> Result<[usize; 3], String> {
+    numbers(&text.replace(',', "x"), 'x', "XxYxZ, such as 256x256x128")
+}
+
+/// `1,2.5,-3`.
+pub fn vector(text: &str) -> Result<DVec3, String> {
+    let vector = DVec3::from_array(numbers(text, ',', "X,Y,Z, such as 1,2.5,-3")?);
+    if vector.is_finite() { Ok(vector) } else { Err("the numbers must be finite".into()) }
+}
+
+/// A length above 0 per axis, or one for all.
+pub fn spacing(text: &str) -> Result<DVec3, String> {
+    let spacing = match text.parse::<f64>() {
+        Ok(all) => DVec3::splat(all),
+        Err(_) => vector(text)?,
+    };
+    let fine = spacing.is_finite() && spacing.min_element() > 0.0;
+    if fine { Ok(spacing) } else { Err("a spacing is a length above 0".into()) }
+}
+
+/// `LOW,HIGH`.
+pub fn range(text: &str) -> Result<[f64; 2], String> {
+    let [low, high]: [f64; 2] = numbers(text, ',', "LOW,HIGH, such as 0,255")?;
+    let fine = low.is_finite() && high.is_finite() && low <= high;
+    if fine { Ok([low, high]) } else { Err("a range is LOW,HIGH with LOW not above HIGH".into()) }
+}
+
+/// `#rrggbb`, with or without `#`; `none` keeps the picture's opacity.
+pub fn background(text: &str) -> Result<Background, String> {
+    if text.eq_ignore_ascii_case("none") {
+        return Ok(Background(None));
+    }
+    let digits = text.strip_prefix('#').unwrap_or(text);
+    let bytes = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6 && !digits.starts_with('+'));
+    let [_, red, green, blue] = bytes.ok_or("the form is '#rrggbb' or none")?.to_be_bytes();
+    Ok(Background(Some([red, green, blue].map(|channel| f32::from(channel) / 255.0))))
+}
+
+/// What stands behind the picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Background(pub Option<[f32; 3]>);
+
+/// `+X`, `-y`, `Z`, …
+pub fn axis(text: &str) -> Result<DVec3, String> {
+    let (sign, name) = match text.strip_prefix('-') {
+        Some(name) => (-1.0, name),
+        None => (1.0, text.strip_prefix('+').unwrap_or(text)),
+    };
+    let axis = match name {
+        "x" | "X" => DVec3::X,
+        "y" | "Y" => DVec3::Y,
+        "z" | "Z" => DVec3::Z,
+        _ => return Err("an axis is one of +X, -X, +Y, -Y, +Z, -Z".into()),
+    };
+    Ok(sign * axis)
+}
+
+/// Pixels drawn for one of the picture; gives how many along each side.
+pub fn samples(text: &str) -> Result<u32, String> {
+    match text {
+        "1" => Ok(1),
+        "4" => Ok(2),
+        "9" => Ok(3),
+        "16" => Ok(4),
+        _ => Err("use 1, 4, 9 or 16".into()),
+    }
+}
+
+/// A number above 0.
+pub fn positive(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "a number above 0 is needed".into())
+}
+
+/// A number.
+pub fn finite(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| "a number is needed".into())
+}
+
+/// Degrees between 0 and 180.
+pub fn view_angle(text: &str) -> Result<f64, String> {
+    positive(text)
+        .ok()
+        .filter(|angle| *angle < 180.0)
+        .ok_or_else(|| "an angle between 0 and 180 degrees is needed".into())
+}
+
+/// `u8`, `i16`, `f32`, …
+pub fn sample_type(text: &str) -> Result<SampleType, String> {
+    SampleType::from_name(text).ok_or_else(|| "use u8, i8, u16, i16, u32, i32, u64, i64, f32 or f64".into())
+}
+
+/// `little` or `big`.
+pub fn endian(text: &str) -> Result<Endian, String> {
+    match text {
+        "little" => Ok(Endian::Little),
+        "big" => Ok(Endian::Big),
+        _ => Err("use little or big".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_dims_and_vectors() {
+        assert_eq!(size("1280x720"), Ok([1280, 720]));
+        assert_eq!(dims("64,64,93"), dims("64x64x93"));
+        assert_eq!(vector("1, -2.5,3e2"), Ok(DVec3::new(1.0, -2.5, 300.0)));
+        assert_eq!(spacing("0.5"), Ok(DVec3::splat(0.5)));
+        for bad in ["", "12", "1x2x3", "0x4", "-1x4", "99999999999x1"] {
+            assert!(size(bad).is_err(), "{bad}");
+        }
+        for bad in ["1,2", "1,2,3,4", "1,2,nan", "a,b,c"] {
+            assert!(vector(bad).is_err(), "{bad}");
+        }
+        assert!(spacing("0,1,1").is_err() && range("2,1").is_err() && range("1,1").is_ok());
+    }
+
+    #[test]
+    fn colours_and_axes() {
+        assert_eq!(background("#ff0080"), Ok(Background(Some([1.0, 0.0, 128.0 / 255.0]))));
+        assert_eq!(background("NONE"), Ok(Background(None)));
+        assert!(background("#ff00").is_err() && background("+ff008").is_err() && background("#gg0000").is_err());
+        assert_eq!((axis("+Z"), axis("-x"), axis("Y")), (Ok(DVec3::Z), Ok(DVec3::NEG_X), Ok(DVec3::Y)));
+        assert!(axis("+W").is_err() && axis("").is_err());
+    }
+}

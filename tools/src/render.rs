@@ -1,0 +1,218 @@
+//! `splatkit render`.
+
+use crate::{
+    camera::CameraFlags,
+    engine::{EngineFlags, require_content},
+    failure::Failure,
+    output::{self, Target},
+    parse::{self, Background},
+    progress::Progress,
+    scene::{Loaded, SceneFlags},
+};
+use clap::Args;
+use splatkit::{
+    engine::{FrameStats, PreparedScene, Renderer},
+    math::Camera,
+    picture::Picture,
+    reference,
+    scene::Settings,
+};
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+#[derive(Args, Debug)]
+pub struct Render {
+    #[command(flatten)]
+    scene: SceneFlags,
+    /// The picture, .png or .jpg; `-` writes a PNG to stdout. Frames of a turntable are numbered: out.png gives
+    /// out_0000.png, and {frame} or {frame:04} in the name is replaced.
+    #[arg(short, long, value_name = "FILE", allow_hyphen_values = true)]
+    output: PathBuf,
+    /// Also writes depths: a grey PNG of 16 bits, the nearest white, nothing black.
+    #[arg(long, value_name = "FILE.png", conflicts_with = "turntable")]
+    depth: Option<PathBuf>,
+    /// Replaces files that are there already.
+    #[arg(long)]
+    overwrite: bool,
+    /// '#rrggbb', or none for a transparent PNG.
+    #[arg(long, value_name = "COLOR", value_parser = parse::background, default_value = "#000000")]
+    background: Background,
+    /// Pixels drawn for one of the picture: 1, 4, 9 or 16.
+    #[arg(long, value_name = "N", value_parser = parse::samples, default_value = "1")]
+    samples: u32,
+    /// Draws this many frames around the up axis.
+    #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    turntable: Option<u32>,
+    #[command(flatten)]
+    camera: CameraFlags,
+    #[command(flatten)]
+    engine: EngineFlags,
+    /// Draws by the reference on the CPU: exact, and slow beyond small scenes.
+    #[arg(long, help_heading = "Engine", conflicts_with_all = ["gpu", "budget"])]
+    reference: bool,
+    /// Writes what was done to stdout, as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What draws.
+pub enum Drawer {
+    Engine { renderer: Box<Renderer>, prepared: Box<PreparedScene>, adapter: String },
+    Reference,
+}
+
+impl Drawer {
+    /// The engine with a scene uploaded.
+    pub fn engine(flags: &EngineFlags, loaded: &Loaded, progress: &Progress) -> Result<Self, Failure> {
+        progress.stage("Opening the GPU");
+        let gpu = flags.gpu()?;
+        progress.stage("Uploading");
+        let renderer = Box::new(flags.renderer(&gpu));
+        let prepared = Box::new(renderer.prepare(&loaded.scene)?);
+        Ok(Self::Engine { renderer, prepared, adapter: gpu.info.name.clone() })
+    }
+
+    pub fn adapter(&self) -> &str {
+        match self {
+            Self::Engine { adapter, .. } => adapter,
+            Self::Reference => "reference",
+        }
+    }
+
+    /// Draws a picture; the reference has no statistics.
+    pub fn draw(
+        &mut self,
+        loaded: &Loaded,
+        camera: &Camera,
+        settings: &Settings,
+    ) -> splatkit::Result<(Picture, FrameStats)> {
+        match self {
+            Self::Engine { renderer, prepared, .. } => renderer.render(prepared, camera, settings),
+            Self::Reference => Ok((reference::render(&loaded.scene, camera, settings)?, FrameStats::default())),
+        }
+    }
+}
+
+impl Render {
+    pub fn run(self, progress: &Progress) -> Result<(), Failure> {
+        let frames = self.turntable.unwrap_or(1);
+        let targets = self.targets(frames)?;
+        let loaded = self.scene.load(progress)?;
+        let start = Instant::now();
+        let mut drawer = match self.reference {
+            true => Drawer::Reference,
+            false => Drawer::engine(&self.engine, &loaded, progress)?,
+        };
+        let upload_ms = milliseconds(start);
+        let settings = self.engine.settings(&loaded, self.samples);
+        let mut times = Vec::new();
+        let mut last = (FrameStats::default(), self.camera.camera(&loaded.subject, settings.size)?);
+        for (frame, target) in (0..frames).zip(&targets) {
+            progress.stage(format!("Drawing {}", target.name()));
+            let camera = match self.turntable {
+                Some(_) => {
+                    let turn = 360.0 * f64::from(frame) / f64::from(frames);
+                    self.camera.turned(&loaded.subject, settings.size, turn)
+                }
+                None => last.1,
+            };
+            let start = Instant::now();
+            let (picture, stats) = drawer.draw(&loaded, &camera, &settings)?;
+            times.push(milliseconds(start));
+            require_content(&picture)?;
+            let picture = if self.samples > 1 { picture.reduced(self.samples) } else { picture };
+            progress.stage(format!("Writing {}", target.name()));
+            target.write(&picture.encode(target.format(), self.background.0)?)?;
+            if let Some(depth) = &self.depth {
+                output::write(depth, &picture.encode_depth()?)?;
+            }
+            last = (stats, camera);
+        }
+        progress.clear();
+        let (stats, camera) = last;
+        times.sort_by(f64::total_cmp);
+        let frame_ms = times[times.len() / 2];
+        tracing::info!(splats = stats.splats, entries = stats.entries, passes = stats.passes, "drawn");
+        if self.json {
+            output::line(serde_json::json!({
+                "output": self.output,
+                "width": self.engine.size[0],
+                "height": self.engine.size[1],
+                "frames": frames,
+                "adapter": drawer.adapter(),
+                "splats": stats.splats,
+                "entries": stats.entries,
+                "passes": stats.passes,
+                "gpu_bytes": stats.gpu_bytes,
+                "frame_ms": frame_ms,
+                "load_ms": loaded.load_ms,
+                "upload_ms": upload_ms,
+                "camera": crate::camera::to_json(&camera),
+            }))?;
+        }
+        Ok(())
+    }
+
+    /// One target a frame; none of them may be in the way.
+    fn targets(&self, frames: u32) -> Result<Vec<Target>, Failure> {
+        let stdout = self.output.as_os_str() == "-";
+        if stdout && self.json {
+            return Err(Failure::Usage("--json and a picture cannot both go to stdout".into()));
+        }
+        if stdout && self.turntable.is_some() {
+            return Err(Failure::Usage("the frames of a turntable cannot go to stdout".into()));
+        }
+        if let Some(depth) = &self.depth {
+            if splatkit::picture::PictureFormat::of(depth)? != splatkit::picture::PictureFormat::Png {
+                return Err(Failure::Usage(format!("{}: depths are written as .png", depth.display())));
+            }
+            output::check(depth, self.overwrite)?;
+        }
+        match self.turntable {
+            None => Ok(vec![Target::new(&self.output, self.overwrite)?]),
+            Some(_) => (0..frames).map(|frame| Target::new(&numbered(&self.output, frame)?, self.overwrite)).collect(),
+        }
+    }
+}
+
+/// Milliseconds since an instant.
+pub fn milliseconds(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}
+
+/// The name of a turntable's frame.
+fn numbered(path: &Path, frame: u32) -> Result<PathBuf, Failure> {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let Some(start) = name.find("{frame") else {
+        let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+        return Ok(path.with_file_name(format!("{stem}_{frame:04}.{extension}")));
+    };
+    let (before, rest) = name.split_at(start);
+    let parts = rest.strip_prefix("{frame").and_then(|rest| rest.split_once('}'));
+    let width = parts.and_then(|(format, _)| match format.strip_prefix(':') {
+        None => format.is_empty().then_some(0),
+        Some(digits) => digits.parse().ok().filter(|width| *width <= 20),
+    });
+    match (parts, width) {
+        (Some((_, after)), Some(width)) => Ok(path.with_file_name(format!("{before}{frame:0width$}{after}"))),
+        _ => Err(Failure::Usage(format!("{}: write {{frame}} or {{frame:04}}", path.display()))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_numbered() {
+        let name = |text: &str| numbered(Path::new(text), 7).map(|path| path.display().to_string()).ok();
+        assert_eq!(name("a/out.png").as_deref(), Some("a/out_0007.png"));
+        assert_eq!(name("a/{frame}.png").as_deref(), Some("a/7.png"));
+        assert_eq!(name("a/x{frame:03}y.jpg").as_deref(), Some("a/x007y.jpg"));
+        assert!(name("{frame:x}.png").is_none() && name("{frames}.png").is_none() && name("{frame.png").is_none());
+        assert!(name("{frame:99999}.png").is_none());
+    }
+}
