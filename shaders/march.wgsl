@@ -120,10 +120,27 @@ fn direction_of(r: u32) -> vec3<f32> {
     return vec3(0.0, 0.0, 1.0);
 }
 
+// A view-space direction in steps of the lattice, in which its kernels are round.
+fn in_steps(v: vec3<f32>) -> vec3<f32> {
+    return vec3(dot(frame.field_axis_x.xyz, v), dot(frame.field_axis_y.xyz, v), dot(frame.field_axis_z.xyz, v));
+}
+
 // Gradient in view space from the slope across the picture and the derivative along the ray, at a distance.
-fn gradient(r: u32, slope: vec2<f32>, along: f32, distance: f32) -> vec3<f32> {
+fn gradient(r: u32, own_slope: vec2<f32>, along: f32, distance: f32) -> vec3<f32> {
+    var slope = own_slope;
+    let d = direction_of(r);
+    if LATTICE && !ISOTROPIC_RECORDS && !CENTRAL {
+        // The footprints' derivatives hold the sections fixed, so where steps are unequal or not at right angles they are
+        // taken along a line that leans towards the ray; what that leaning picks up of the derivative along it goes back.
+        var steps = mat2x3<f32>(vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0)) * (1.0 / frame.scale);
+        if PERSPECTIVE {
+            let size = distance * pixels[r].cosine;
+            steps = mat2x3<f32>(size * (steps[0] - d * dot(d, steps[0])), size * (steps[1] - d * dot(d, steps[1])));
+        }
+        let ray = in_steps(d);
+        slope += along / dot(ray, ray) * vec2(dot(in_steps(steps[0]), ray), dot(in_steps(steps[1]), ray));
+    }
     if PERSPECTIVE {
-        let d = direction_of(r);
         let g = slope * frame.scale / (pixels[r].cosine * distance) + along * d.xy;
         return vec3(g, (along - dot(g, d.xy)) / d.z);
     }
@@ -338,18 +355,10 @@ fn bin_end(bin: u32) -> u32 {
 fn inside_field(r: u32) -> vec2<f32> {
     var origin = frame.field_origin.xyz;
     var direction = direction_of(r);
-    direction = vec3(
-        dot(frame.field_axis_x.xyz, direction),
-        dot(frame.field_axis_y.xyz, direction),
-        dot(frame.field_axis_z.xyz, direction),
-    );
+    direction = in_steps(direction);
     if !PERSPECTIVE {
         let start = vec3(pixels[r].ray, 0.0);
-        origin += vec3(
-            dot(frame.field_axis_x.xyz, start),
-            dot(frame.field_axis_y.xyz, start),
-            dot(frame.field_axis_z.xyz, start),
-        );
+        origin += in_steps(start);
     }
     // A ray along a face would divide 0 by 0; this direction misses no box that the exact one meets visibly.
     direction = select(direction, vec3(1e-20), abs(direction) < vec3(1e-20));

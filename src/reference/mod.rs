@@ -260,6 +260,19 @@ impl<'a> Frame<'a> {
         }
     }
 
+    /// How far, per pixel to the right and per pixel downward, the derivative with sections held fixed is taken along the
+    /// ray instead of across it. A section stays fixed on the line on which the kernel's closest approach moves, which is
+    /// across the ray in the lattice's own steps, and so in space only where those are equal and at right angles.
+    /// Scattered samples have no common shape, and are left as they are.
+    fn lean(&self, ray: &Ray, distance: f64) -> DVec2 {
+        let lattice = self.field.as_ref().and_then(|field| field.lattice);
+        let Some(lattice) = lattice.filter(|_| self.gradient == Gradient::Analytic) else { return DVec2::ZERO };
+        let in_steps = (self.view.rotation * lattice.axes).inverse();
+        let direction = in_steps * ray.direction;
+        let [right, down] = ray.across(distance).map(|step| (in_steps * step).dot(direction));
+        DVec2::new(right, down) / direction.length_squared()
+    }
+
     /// The field's view-space gradient in a sheet that has a value, given its derivatives across the picture; zero where
     /// it cannot be told.
     fn gradient(&self, ray: &Ray, values: &[Option<f64>], k: usize, across: DVec2) -> DVec3 {
@@ -269,6 +282,7 @@ impl<'a> Frame<'a> {
         let [(first, before), (last, after)] = [before, after].map(|neighbour| neighbour.unwrap_or_default());
         let middle = self.middle(k);
         let along = slope([first, middle, last], [before, values[k], after]);
+        let across = across + along * self.lean(ray, middle);
         ray.gradient(middle, across, along).unwrap_or(DVec3::ZERO)
     }
 }

@@ -79,9 +79,10 @@ fn one_round_splat_is_its_projection() {
             // The distance of the centre from the ray.
             let distance = (center - origin).cross(direction).length();
             let opacity = 1.0 - (-f64::from(strength) * (-0.5 * distance * distance / variance).exp()).exp();
-            close(color[3], opacity, 2e-6);
-            close(color[0], opacity * f64::from(0xc0) / 255.0, 2e-6);
-            close(color[2], opacity * f64::from(0x40) / 255.0, 2e-6);
+            // Sheets with an optical depth below 1e-5 are left out.
+            close(color[3], opacity, 1.1e-5);
+            close(color[0], opacity * f64::from(0xc0) / 255.0, 1.1e-5);
+            close(color[2], opacity * f64::from(0x40) / 255.0, 1.1e-5);
             brightest = brightest.max(color[3]);
         }
         assert!(brightest > 0.8);
@@ -169,7 +170,8 @@ fn scattered_samples_fill_at_most_their_sheets() {
         (100.0 * length * section::section(from, to)).min(plane[1] - plane[0])
     });
     let found = render(&scene, &camera, &settings).unwrap().color[0][3];
-    close(found, 1.0 - (-0.1 * lengths.sum::<f64>()).exp(), 1e-6);
+    // Sheets filled to less than a ten-thousandth, the tails, have no value.
+    close(found, 1.0 - (-0.1 * lengths.sum::<f64>()).exp(), 5e-6);
 }
 
 /// The gradients of a linear field of given slope in the middle of a picture, in world space.
@@ -207,8 +209,10 @@ fn gradients_of(slope: DVec3, axes: DMat3, projection: Projection, gradient: Gra
 
 #[test]
 fn the_gradient_of_a_linear_field_is_its_slope() {
-    let axes = DMat3::from_diagonal(DVec3::splat(0.25));
-    for projection in PROJECTIONS {
+    let sheared =
+        DMat3::from_cols(DVec3::new(0.25, 0.05, 0.0), DVec3::new(-0.05, 0.2, 0.08), DVec3::new(0.0, 0.1, 0.3));
+    let shapes = [DVec3::splat(0.25), DVec3::new(0.15, 0.15, 0.375)].map(DMat3::from_diagonal);
+    for (axes, projection) in shapes.into_iter().chain([sheared]).flat_map(|a| PROJECTIONS.map(|p| (a, p))) {
         for gradient in [Gradient::Analytic, Gradient::Central] {
             for slope in [DVec3::X, DVec3::new(0.5, -1.0, 2.0), DVec3::new(4.0, -3.0, 2.0), DVec3::new(3.0, 4.0, 0.0)] {
                 let found = gradients_of(slope, axes, projection, gradient);
