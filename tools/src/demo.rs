@@ -56,7 +56,7 @@ const SHOTS: [Shot; 3] = [
     Shot {
         name: "volume.png",
         inputs: &[VOLUME],
-        arguments: "--size 960x720 --up +Z --zoom 1.75 --azimuth 40 --elevation 30",
+        arguments: "--size 960x720 --up +Z --zoom 1.75 --azimuth 40 --elevation 30 --sheet-thickness 0.01",
     },
     Shot {
         name: "mixed.png",

@@ -33,7 +33,7 @@ fn info_tells_what_a_file_holds() {
             assert!(!volume[name].is_null(), "{arguments}: {name}");
         }
     }
-    let text = folder.run("info a.vti").ok().0.stdout;
+    let text = folder.run("info a.vti").ok().stdout;
     assert!(String::from_utf8_lossy(&text).contains("16, 16, 16"));
 }
 

@@ -42,11 +42,11 @@ fn every_format_gives_a_picture() {
 #[test]
 fn stdout_takes_a_picture_and_nothing_else() {
     let folder = folder("stdout");
-    let output = folder.run(&format!("render a.ply -o - -vv {SMALL}")).ok().0;
+    let output = folder.run(&format!("render a.ply -o - -vv {SMALL}")).ok();
     assert!(is_png(&output.stdout, 64, 48));
     assert!(!output.stderr.is_empty());
     folder.run("render a.ply -o - --json").fails(2, &["stdout"]);
-    let quiet = folder.run(&format!("render a.ply -o quiet.png -q {SMALL}")).ok().0;
+    let quiet = folder.run(&format!("render a.ply -o quiet.png -q {SMALL}")).ok();
     assert!(quiet.stdout.is_empty());
 }
 
@@ -153,7 +153,7 @@ fn adapters_are_listed_and_chosen() {
     let folder = folder("adapters");
     let list = folder.json("gpus --json");
     assert!(list[0]["name"].is_string() && list[0]["max_binding_bytes"].is_u64());
-    let output = folder.run("gpus").ok().0;
+    let output = folder.run("gpus").ok();
     assert!(String::from_utf8_lossy(&output.stdout).contains(list[0]["name"].as_str().unwrap()));
     folder.run("render a.ply -o a.png --gpu nonexistent").fails(4, &["nonexistent", "splatkit gpus"]);
     folder.run("render a.ply -o a.png --gpu 99").fails(4, &["99"]);
@@ -163,7 +163,7 @@ fn adapters_are_listed_and_chosen() {
 #[test]
 fn the_demo_draws_its_pictures() {
     let folder = Folder::new("demo");
-    let output = folder.run("demo out").ok().0;
+    let output = folder.run("demo out").ok();
     let text = String::from_utf8_lossy(&output.stdout);
     for name in ["mesh.png", "volume.png", "mixed.png"] {
         assert!(text.contains(name) && folder.path("out").join(name).is_file(), "{text}");

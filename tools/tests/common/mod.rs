@@ -40,7 +40,7 @@ impl Folder {
 
     /// Runs a command that must succeed, with a JSON result.
     pub fn json(&self, arguments: &str) -> serde_json::Value {
-        serde_json::from_slice(&self.run(arguments).ok().0.stdout).unwrap()
+        serde_json::from_slice(&self.run(arguments).ok().stdout).unwrap()
     }
 }
 
@@ -50,11 +50,8 @@ impl Drop for Folder {
     }
 }
 
-/// What a run left on its outputs.
-pub struct Pair(pub Output);
-
-/// A finished run.
-pub struct Run(String, pub Output);
+/// A finished run: its arguments, and what it left.
+pub struct Run(String, Output);
 
 impl Run {
     pub fn stderr(&self) -> String {
@@ -64,9 +61,9 @@ impl Run {
     }
 
     /// The run must have succeeded.
-    pub fn ok(self) -> Pair {
+    pub fn ok(self) -> Output {
         assert!(self.1.status.success(), "splatkit {}: {}", self.0, self.stderr());
-        Pair(self.1)
+        self.1
     }
 
     /// The run must have failed with this exit code and a message that holds every one of these words.
