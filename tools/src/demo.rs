@@ -52,16 +52,16 @@ struct Shot {
 }
 
 const SHOTS: [Shot; 3] = [
-    Shot { name: "mesh.png", inputs: &[MESH], arguments: "--size 960x720 --azimuth 0 --elevation 20 --zoom 1.3" },
+    Shot { name: "mesh.png", inputs: &[MESH], arguments: "--size 800x600 --azimuth 0 --elevation 20 --zoom 1.3" },
     Shot {
         name: "volume.png",
         inputs: &[VOLUME],
-        arguments: "--size 960x720 --up +Z --zoom 1.75 --azimuth 40 --elevation 30 --sheet-thickness 0.01",
+        arguments: "--size 800x600 --up +Z --zoom 1.75 --azimuth 40 --elevation 30 --sheet-thickness 0.013",
     },
     Shot {
         name: "mixed.png",
         inputs: &[MESH, VOLUME],
-        arguments: "--size 960x720 --azimuth 0 --elevation 20 --zoom 1.3",
+        arguments: "--size 800x600 --azimuth 0 --elevation 20 --zoom 1.3",
     },
 ];
 
@@ -94,7 +94,7 @@ impl Demo {
         let mut mesh = Mesh::knot(1200, 72);
         // So large that the knot winds through the specimen.
         mesh.positions.iter_mut().for_each(|p| *p *= KNOT_SCALE);
-        let specimen = Phantom::Specimen.sample([160; 3]).map_err(Error::Argument)?;
+        let specimen = Phantom::Specimen.sample([128; 3]).map_err(Error::Argument)?;
         output::write_by(&self.folder.join(MESH), |path| io::ply::write(&mesh, path))?;
         output::write_by(&self.folder.join(VOLUME), |path| io::nrrd::write(&specimen, path))?;
         output::write(&self.folder.join(TRANSFER), SHOWN.as_bytes())
