@@ -4,6 +4,8 @@
 // The tiles and sheets of a record: first and last tile (column, then row from bit 16), then first and last sheet. The top
 // bit of the first tile marks an isotropic record.
 const BOX_ISOTROPIC: u32 = 0x80000000u;
+// The sheets of a word that begins no record.
+const NO_BOX: u32 = 0xffffffffu;
 
 struct Box {
     first_tile: u32,

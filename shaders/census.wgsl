@@ -1,6 +1,5 @@
 // What survey counts and plan reads: per sheet and band of tile rows.
 
-const BANDS: u32 = 16u;
 const CENSUS_KINDS: u32 = 5u;
 // Entries of windows that start in the sheet.
 const WINDOW_TILES: u32 = 0u;
@@ -18,12 +17,4 @@ struct Totals {
 
 fn fits(totals: Totals) -> bool {
     return totals.entries <= frame.entry_capacity && totals.words <= frame.record_capacity;
-}
-
-fn band_start(band: u32) -> u32 {
-    return band * frame.tiles.y / BANDS;
-}
-
-fn band_of(row: u32) -> u32 {
-    return ((row + 1u) * BANDS - 1u) / frame.tiles.y;
 }

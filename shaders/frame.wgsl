@@ -48,9 +48,12 @@ struct Pass {
     // Rows of tiles: first … end-1.
     first_row: u32,
     end_row: u32,
+    // The same rows as bands of the picture.
+    first_band: u32,
+    end_band: u32,
     // Groups of sheets per tile; 0 when there is no such pass.
     groups: u32,
-    unused: u32,
+    unused: vec3<u32>,
 }
 
 // One item's place in the view. Mirrors engine/uniforms.rs.
@@ -80,7 +83,6 @@ const ISOTROPIC: u32 = 2u;
 
 // Candidates that one invocation handles in order, so that lists come out in the same order each time.
 const RUN: u32 = 16u;
-const NO_SPAN: u32 = 0xffffffffu;
 
 // An entry: sheet within its group (7 bits), window after the splat's first (1), isotropic record (1), record (23).
 const ENTRY_SHEET_SHIFT: u32 = 25u;

@@ -2,7 +2,7 @@
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> planes: array<f32>;
-// First and last sheet, 16 bits each, per candidate of this chunk.
+// What each candidate of this chunk meets, see pack_span.
 @group(0) @binding(2) var<storage, read_write> spans: array<u32>;
 // Entries and record words per run.
 @group(0) @binding(3) var<storage, read_write> needs: array<vec2<u32>>;
@@ -21,7 +21,7 @@ fn measure(@builtin(global_invocation_id) id: vec3<u32>) {
         let span = locate(splat.center, splat.covariance, splat.extent);
         var packed = NO_SPAN;
         if span.visible {
-            packed = span.first_sheet | (span.last_sheet << 16u);
+            packed = pack_span(span.first_sheet, span.last_sheet, span.first_tile.y, span.last_tile.y);
             let across = span.last_tile - span.first_tile + 1u;
             need += vec2(across.x * across.y * window_count(span.first_sheet, span.last_sheet), words);
         }

@@ -13,7 +13,7 @@
 
 struct PaddedPass {
     stage: Pass,
-    padding: array<vec4<u32>, 14>,
+    padding: array<vec4<u32>, 12>,
 }
 
 struct Report {
@@ -78,14 +78,17 @@ fn collected(first: u32, end: u32) -> vec2<u32> {
     return vec2(max(first, 1u + MARGIN) - MARGIN, min(end + MARGIN, frame.sheet_count + 1u));
 }
 
-fn emit(first: u32, end: u32, first_row: u32, end_row: u32) {
+fn emit(first: u32, end: u32, first_band: u32, end_band: u32) {
     if report.passes >= MAX_PASSES {
         report.overflow = 1u;
         return;
     }
     let range = collected(first, end);
     let groups = ((range.y - range.x + 1u) >> frame.group_shift) + 1u;
-    passes[report.passes].stage = Pass(first, end, range.x, range.y, first_row, end_row, groups, 0u);
+    let first_row = band_start(first_band);
+    let end_row = band_start(end_band);
+    passes[report.passes].stage =
+        Pass(first, end, range.x, range.y, first_row, end_row, first_band, end_band, groups, vec3(0u));
     report.passes += 1u;
 }
 
@@ -100,7 +103,7 @@ fn plan() {
     }
     let end = frame.sheet_count + 1u;
     if fits(totals) {
-        emit(1u, end, 0u, frame.tiles.y);
+        emit(1u, end, 0u, BANDS);
         return;
     }
     var first = 1u;
@@ -118,7 +121,7 @@ fn plan() {
             }
         }
         if fitting > first {
-            emit(first, fitting, 0u, frame.tiles.y);
+            emit(first, fitting, 0u, BANDS);
             first = fitting;
             continue;
         }
@@ -133,7 +136,7 @@ fn plan() {
                 report.overflow = 1u;
             }
             if band_start(band) < band_start(last) {
-                emit(first, first + 1u, band_start(band), band_start(last));
+                emit(first, first + 1u, band, last);
             }
             band = last;
         }

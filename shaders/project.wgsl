@@ -13,10 +13,6 @@
 @group(0) @binding(6) var<storage, read_write> boxes: array<Box>;
 @group(0) @binding(7) var<storage, read_write> bins: array<atomic<u32>>;
 
-fn in_pass(span: u32) -> bool {
-    return span != NO_SPAN && (span & 0xffffu) < stage.end_collected && (span >> 16u) >= stage.first_collected;
-}
-
 fn record_words() -> u32 {
     return select(4u, 1u, (source.flags & ISOTROPIC) != 0u);
 }
@@ -30,7 +26,7 @@ fn count(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     var words = 0u;
     for (var i = start; i < min(start + RUN, candidates); i++) {
-        words += u32(in_pass(spans[i])) * record_words();
+        words += u32(in_pass(spans[i], stage)) * record_words();
     }
     runs[source.first_run + id.x] = words;
 }
@@ -78,7 +74,7 @@ fn write(@builtin(global_invocation_id) id: vec3<u32>) {
     var at = runs[source.first_run + id.x];
     let words = record_words();
     for (var i = start; i < min(start + RUN, candidates); i++) {
-        if !in_pass(spans[i]) {
+        if !in_pass(spans[i], stage) {
             continue;
         }
         // plan.wgsl leaves room for all; this only keeps a wrong plan from writing elsewhere.
@@ -95,7 +91,7 @@ fn write(@builtin(global_invocation_id) id: vec3<u32>) {
         box.first_tile |= select(0u, BOX_ISOTROPIC, words == 1u);
         boxes[at] = box;
         for (var word = 1u; word < words; word++) {
-            boxes[at + word].sheets = NO_SPAN;
+            boxes[at + word].sheets = NO_BOX;
         }
         let walk = walk_of(box, stage);
         for (var window = 0u; window < walk.windows; window++) {

@@ -10,16 +10,25 @@
 @group(0) @binding(5) var<storage, read_write> entries: array<u32>;
 @group(0) @binding(6) var<uniform> run_count: vec4<u32>;
 
+// The workgroups of `scatter`.
+@group(1) @binding(0) var<storage, read_write> workgroups: array<u32, 3>;
+
+@compute @workgroup_size(1)
+fn count() {
+    let words = select(0u, min(runs[run_count.x], frame.record_capacity), stage.groups > 0u);
+    workgroups[0] = min((words + 63u) / 64u, 65535u);
+    workgroups[1] = 1u;
+    workgroups[2] = 1u;
+}
+
+// Neighbouring invocations take neighbouring records, so that bins fill nearly in the order that `order` wants.
 @compute @workgroup_size(64)
 fn scatter(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    if stage.groups == 0u {
-        return;
-    }
     let words = min(runs[run_count.x], frame.record_capacity);
     let group_mask = (1u << frame.group_shift) - 1u;
     for (var at = id.x; at < words; at += groups.x * 64u) {
         let box = boxes[at];
-        if box.sheets == NO_SPAN {
+        if box.sheets == NO_BOX {
             continue;
         }
         let isotropic = select(0u, ENTRY_ISOTROPIC, (box.first_tile & BOX_ISOTROPIC) != 0u);

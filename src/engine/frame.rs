@@ -11,7 +11,7 @@ use super::{
     scatter::Scatter,
     select::Select,
     shaders::Variant,
-    uniforms::{Frame, PASS_STRIDE, Report},
+    uniforms::{Frame, PASS_BYTES, PASS_STRIDE, Report},
     upload::{Origin, PreparedScene, upload},
 };
 use crate::{
@@ -151,6 +151,7 @@ pub struct Targets {
     pub boxes: wgpu::Buffer,
     pub bins: wgpu::Buffer,
     pub entries: wgpu::Buffer,
+    pub scatter_arguments: wgpu::Buffer,
     pub long_bins: wgpu::Buffer,
     pub long_count: wgpu::Buffer,
     pub long_arguments: wgpu::Buffer,
@@ -166,7 +167,7 @@ impl Targets {
         wgpu::BufferBinding {
             buffer: &self.passes,
             offset: u64::from(pass) * PASS_STRIDE,
-            size: wgpu::BufferSize::new(size_of::<[u32; 8]>() as u64),
+            size: wgpu::BufferSize::new(PASS_BYTES),
         }
     }
 
@@ -283,6 +284,7 @@ pub fn targets(
         boxes: pool.take(gpu, "boxes", 12 * words),
         bins: pool.take(gpu, "bins", 4 * u64::from(bin_count)),
         entries: pool.take(gpu, "entries", 4 * u64::from(budget.entries)),
+        scatter_arguments: pool.take(gpu, "scatter arguments", 12),
         long_bins: pool.take(gpu, "long bins", 4 * u64::from(bin_count)),
         long_count: pool.take(gpu, "long count", 4),
         long_arguments: pool.take(gpu, "long arguments", 12),

@@ -24,6 +24,7 @@ impl Measure {
                 shaders::NORMAL,
                 shaders::FOOTPRINT,
                 source,
+                shaders::SPANS,
                 shaders::BINS,
                 shaders::MEASURE,
             ];

@@ -28,7 +28,7 @@ impl Plan {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
         use Binding::{Read, Uniform, Write};
         let constants = variant.constants();
-        let sources = [&constants, shaders::FRAME, shaders::CENSUS, shaders::PLAN];
+        let sources = [&constants, shaders::FRAME, shaders::SPANS, shaders::CENSUS, shaders::PLAN];
         let bindings: &[&[Binding]] = &[&[Uniform, Read, Write, Read, Write, Write, Uniform]];
         let survey = per_source(|source, bindings| {
             let sources = [
@@ -37,6 +37,7 @@ impl Plan {
                 shaders::NORMAL,
                 shaders::FOOTPRINT,
                 source,
+                shaders::SPANS,
                 shaders::CENSUS,
                 shaders::BINS,
                 shaders::SURVEY,

@@ -29,6 +29,7 @@ impl Project {
                     shaders::NORMAL,
                     shaders::FOOTPRINT,
                     source,
+                    shaders::SPANS,
                     shaders::BINS,
                     shaders::PROJECT,
                 ];

@@ -7,19 +7,26 @@ use super::{
     stage::{Binding, Stage},
 };
 
-/// Workgroups that share the records of a pass.
-const WORKGROUPS: u32 = 2048;
-
-/// The pass.
+/// The pass: as many workgroups as it has records, which only the GPU knows.
 #[derive(Debug)]
-pub struct Scatter(Stage);
+pub struct Scatter {
+    count: Stage,
+    scatter: Stage,
+}
 
 impl Scatter {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
         use Binding::{Read, Uniform, Write};
-        let sources = [&variant.constants(), shaders::FRAME, shaders::BINS, shaders::SCATTER];
-        let bindings = [Uniform, Uniform, Read, Read, Write, Write, Uniform];
-        Self(Stage::new(gpu, "scatter", &sources, "scatter", &[&bindings]))
+        let constants = variant.constants();
+        let bindings: &[Binding] = &[Uniform, Uniform, Read, Read, Write, Write, Uniform];
+        let stage = |label, entry, groups: &[&[Binding]]| {
+            let sources = [&constants, shaders::FRAME, shaders::BINS, shaders::SCATTER];
+            Stage::new(gpu, label, &sources, entry, groups)
+        };
+        Self {
+            count: stage("scatter: count", "count", &[bindings, &[Write]]),
+            scatter: stage("scatter", "scatter", &[bindings]),
+        }
     }
 
     pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets, pass: u32) {
@@ -32,6 +39,9 @@ impl Scatter {
             targets.entries.as_entire_buffer_binding(),
             targets.run_count.as_entire_buffer_binding(),
         ];
-        self.0.dispatch(encoder, &[&self.0.bind(gpu, 0, &buffers)], WORKGROUPS);
+        let arguments = self.count.bind(gpu, 1, &[targets.scatter_arguments.as_entire_buffer_binding()]);
+        self.count.dispatch(encoder, &[&self.count.bind(gpu, 0, &buffers), &arguments], 1);
+        let group = self.scatter.bind(gpu, 0, &buffers);
+        self.scatter.dispatch_indirect(encoder, &[&group], (&targets.scatter_arguments, 0));
     }
 }

@@ -6,6 +6,7 @@ pub const SAMPLE: &str = include_str!("../../shaders/sample.wgsl");
 pub const FOOTPRINT: &str = include_str!("../../shaders/footprint.wgsl");
 pub const SOURCE_SPLATS: &str = include_str!("../../shaders/source_splats.wgsl");
 pub const SOURCE_LATTICE: &str = include_str!("../../shaders/source_lattice.wgsl");
+pub const SPANS: &str = include_str!("../../shaders/spans.wgsl");
 pub const CENSUS: &str = include_str!("../../shaders/census.wgsl");
 pub const BINS: &str = include_str!("../../shaders/bins.wgsl");
 pub const SELECT: &str = include_str!("../../shaders/select.wgsl");

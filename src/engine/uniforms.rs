@@ -54,6 +54,8 @@ const _: () = assert!(size_of::<Source>() == 8 * 16);
 
 /// Bytes between the passes that plan.wgsl writes: the alignment of uniform bindings.
 pub const PASS_STRIDE: u64 = 256;
+/// Bytes of `Pass` in frame.wgsl.
+pub const PASS_BYTES: u64 = 64;
 
 /// `Report` in plan.wgsl.
 #[repr(C)]

@@ -24,7 +24,7 @@ pub struct Sheets {
 
 impl Sheets {
     /// More sheets than this are not opened; the list gets thicker sheets instead.
-    pub const MAX: usize = 8192;
+    pub const MAX: usize = 4093;
 
     /// Sheets from `near` to `far` (world units), at most `thickness` thick, and at most `pixels` pixels thick
     /// (`None`: no such bound). At least one of the two must bind.
