@@ -11,9 +11,10 @@ install_packages() {
         fail "please install: $* (Debian and Ubuntu: apt-get install $*)"
     fi
     say "Installing $*"
-    local apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -y --no-install-recommends)
+    local apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get)
+    local get=("${apt[@]}" install -y --no-install-recommends "$@")
     # A bare machine has no package lists, an old one outdated lists.
-    "${apt[@]}" install "$@" </dev/null || { "${apt[@]}" update </dev/null && "${apt[@]}" install "$@" </dev/null; } ||
+    "${get[@]}" </dev/null || { "${apt[@]}" update </dev/null && "${get[@]}" </dev/null; } ||
         fail "apt-get could not install $*"
 }
 

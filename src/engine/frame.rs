@@ -207,6 +207,7 @@ impl Pool {
 }
 
 /// Makes (or takes from the pool) everything a frame needs.
+#[allow(clippy::too_many_arguments, reason = "each is a different thing that the renderer holds apart")]
 pub fn targets(
     gpu: &Gpu,
     pool: &mut Pool,

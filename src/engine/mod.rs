@@ -4,13 +4,13 @@
 //!
 //! | pass | does |
 //! |---|---|
-//! | [`select`] | which samples of a volume the transfer function can show (only when it changes) |
-//! | [`measure`] | which sheets each splat meets, and how much room it will need |
-//! | [`plan`] | cuts the frame into depth passes that fit the buffers |
-//! | [`project`] | per depth pass: the records of its splats, counted into bins |
-//! | [`scan`], [`scatter`] | entries (splat, tile, window of four sheets) into the bins |
-//! | [`order`] | sorts each bin, for the same bytes each time |
-//! | [`march`] | per tile: adds up sections, closes sheets, composites front to back |
+//! | `select` | which samples of a volume the transfer function can show (only when it changes) |
+//! | `measure` | which sheets each splat meets, and how much room it will need |
+//! | `plan` | cuts the frame into depth passes that fit the buffers |
+//! | `project` | per depth pass: the records of its splats, counted into bins |
+//! | `scan`, `scatter` | entries (splat, tile, window of four sheets) into the bins |
+//! | `order` | sorts each bin, for the same bytes each time |
+//! | `march` | per tile: adds up sections, closes sheets, composites front to back |
 //!
 //! docs/engine.md tells the mathematics.
 

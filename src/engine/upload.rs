@@ -160,7 +160,7 @@ impl Chunk {
 /// A read-only storage buffer of some bytes, padded to whole words.
 pub fn upload(gpu: &Gpu, label: &str, bytes: &[u8]) -> wgpu::Buffer {
     let usage = wgpu::BufferUsages::STORAGE;
-    if bytes.len() % 4 == 0 && !bytes.is_empty() {
+    if bytes.len().is_multiple_of(4) && !bytes.is_empty() {
         return gpu.device.create_buffer_init(&BufferInitDescriptor { label: Some(label), contents: bytes, usage });
     }
     let mut padded = bytes.to_vec();

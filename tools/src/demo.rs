@@ -36,11 +36,11 @@ const BACKGROUND: Option<[f32; 3]> = Some([16.0 / 255.0, 20.0 / 255.0, 28.0 / 25
 
 /// The specimen's parts: the rind and the flesh faint, the lattice golden, the stone pale.
 const SHOWN: &str = r#"{
-  "color": [[20, 0.55, 0.20, 0.10], [60, 0.75, 0.30, 0.16], [105, 0.85, 0.42, 0.18], [165, 0.95, 0.62, 0.25],
-            [205, 0.98, 0.78, 0.42], [235, 0.55, 0.78, 0.95], [255, 0.85, 0.94, 1.0]],
-  "opacity": [[20, 0], [45, 0.004], [60, 0.012], [90, 0.03], [120, 0.03], [150, 0.45], [200, 0.75], [255, 0.95]],
+  "color": [[0.08, 0.55, 0.20, 0.10], [0.24, 0.75, 0.30, 0.16], [0.41, 0.80, 0.36, 0.16], [0.62, 0.90, 0.50, 0.18],
+            [0.75, 0.96, 0.72, 0.36], [0.88, 0.80, 0.86, 0.92], [1.0, 0.90, 0.95, 1.0]],
+  "opacity": [[0.08, 0], [0.15, 0.004], [0.24, 0.010], [0.36, 0.03], [0.45, 0.03], [0.65, 0.35], [0.8, 0.6], [1.0, 0.8]],
   "unit": 0.02,
-  "shade": {"ambient": 0.25, "diffuse": 0.75, "specular": 0.35, "power": 24}
+  "shade": {"ambient": 0.3, "diffuse": 0.7, "specular": 0.3, "power": 24}
 }
 "#;
 
@@ -52,9 +52,17 @@ struct Shot {
 }
 
 const SHOTS: [Shot; 3] = [
-    Shot { name: "mesh.png", inputs: &[MESH], arguments: "--size 1024x768 --azimuth 20 --elevation 25" },
-    Shot { name: "volume.png", inputs: &[VOLUME], arguments: "--size 1024x768 --up +Z" },
-    Shot { name: "mixed.png", inputs: &[MESH, VOLUME], arguments: "--size 1024x768 --azimuth 20 --elevation 25" },
+    Shot { name: "mesh.png", inputs: &[MESH], arguments: "--size 800x600 --azimuth 0 --elevation 20 --zoom 1.3" },
+    Shot {
+        name: "volume.png",
+        inputs: &[VOLUME],
+        arguments: "--size 800x600 --up +Z --zoom 1.75 --azimuth 40 --elevation 30 --sheet-thickness 0.013",
+    },
+    Shot {
+        name: "mixed.png",
+        inputs: &[MESH, VOLUME],
+        arguments: "--size 800x600 --azimuth 0 --elevation 20 --zoom 1.3",
+    },
 ];
 
 /// The flags of `render` that decide what a picture shows.
@@ -86,7 +94,7 @@ impl Demo {
         let mut mesh = Mesh::knot(1200, 72);
         // So large that the knot winds through the specimen.
         mesh.positions.iter_mut().for_each(|p| *p *= KNOT_SCALE);
-        let specimen = Phantom::Specimen.sample_bytes([160; 3]).map_err(Error::Argument)?;
+        let specimen = Phantom::Specimen.sample([128; 3]).map_err(Error::Argument)?;
         output::write_by(&self.folder.join(MESH), |path| io::ply::write(&mesh, path))?;
         output::write_by(&self.folder.join(VOLUME), |path| io::nrrd::write(&specimen, path))?;
         output::write(&self.folder.join(TRANSFER), SHOWN.as_bytes())

@@ -1,0 +1,133 @@
+//! The commands and errors that need no adapter.
+
+mod common;
+
+use common::*;
+
+#[test]
+fn info_tells_what_a_file_holds() {
+    let folder = Folder::new("info");
+    let mesh = folder.json(&format!("info {} --json", folder.put("a.ply", PLY)));
+    assert_eq!(
+        (mesh["kind"].as_str(), mesh["count"].as_u64(), mesh["triangles"].as_u64()),
+        (Some("mesh"), Some(4), Some(4))
+    );
+    assert_eq!(mesh["bounds"]["max"], serde_json::json!([7.0, 7.0, 7.0]));
+    assert_eq!(mesh["attributes"], serde_json::json!(["position", "color"]));
+    assert_eq!(mesh["bytes"].as_u64(), Some(PLY.len() as u64));
+    let cloud = PLY.replace("face 4", "face 0").split_inclusive("255 255 255\n").next().unwrap().to_owned();
+    assert_eq!(folder.json(&format!("info {} --json", folder.put("cloud.ply", cloud)))["kind"], "cloud");
+    let textured = folder.json(&format!("info {} --json", folder.put("a.glb", glb())));
+    assert_eq!(textured["textures"].as_u64(), Some(1));
+    folder.put("a.raw", ball());
+    for arguments in [
+        folder.put("a.vti", vti()),
+        folder.put("a.nrrd", nrrd("uint8", &ball())),
+        "a.raw --dims 16,16,16 --type u8 --endian little --header 0",
+    ] {
+        let volume = folder.json(&format!("info {arguments} --json"));
+        assert_eq!(volume["kind"], "volume");
+        assert_eq!(volume["dims"], serde_json::json!([16, 16, 16]));
+        assert_eq!((volume["count"].as_u64(), volume["type"].as_str()), (Some(4096), Some("u8")));
+        for name in ["file", "bounds", "attributes", "bytes", "bytes_per_point", "levels", "range", "spacing"] {
+            assert!(!volume[name].is_null(), "{arguments}: {name}");
+        }
+    }
+    let text = folder.run("info a.vti").ok().stdout;
+    assert!(String::from_utf8_lossy(&text).contains("16, 16, 16"));
+}
+
+#[test]
+fn bad_inputs_are_named() {
+    let folder = Folder::new("bad");
+    let cut = |bytes: &[u8]| bytes[..bytes.len() * 3 / 4].to_vec();
+    let nan: Vec<u8> = (0..4096).flat_map(|i| (if i == 7 { f32::NAN } else { 1.0 }).to_le_bytes()).collect();
+    let files: Vec<(&str, Vec<u8>)> = vec![
+        ("cut.ply", cut(PLY.as_bytes())),
+        ("cut.obj", b"v 0 0 0\nv 1 0 0\nf 1 2 3\n".to_vec()),
+        ("cut.glb", cut(&glb())),
+        ("cut.nrrd", cut(&nrrd("uint8", &ball()))),
+        ("cut.vti", cut(vti().as_bytes())),
+        ("nan.ply", PLY.replace("7 0 0 0", "nan 0 0 0").into_bytes()),
+        ("nan.obj", OBJ.replace("v 1 0 0", "v nan 0 0").into_bytes()),
+        ("nan.nrrd", nrrd("float", &nan)),
+        ("nan.vti", vti().replace("UInt8", "Float32").replacen(">0 0 ", ">nan 0 ", 1).into_bytes()),
+        ("empty.ply", Vec::new()),
+        ("empty.obj", Vec::new()),
+        ("empty.glb", Vec::new()),
+        ("empty.gltf", Vec::new()),
+        ("empty.nrrd", Vec::new()),
+        ("empty.vti", Vec::new()),
+        (
+            "flat.ply",
+            PLY.replace("0 7 0 0", "0 0 0 0").replace("0 0 7", "0 0 0").replace("7 0 0 0", "0 0 0 0").into_bytes(),
+        ),
+    ];
+    for (name, bytes) in files {
+        folder.put(name, bytes);
+        folder.run(&format!("render {name} -o out.png")).fails(3, &[name]);
+    }
+    folder.run("render none.ply -o out.png").fails(3, &["none.ply"]);
+    folder.run("info none.ply").fails(3, &["none.ply"]);
+    folder.run("render . -o out.png").fails(3, &["regular file"]);
+    folder.put("text.txt", "hello");
+    folder.run("info text.txt").fails(3, &["text.txt", ".ply", ".nrrd", "--dims"]);
+    folder.put("a.raw", &ball()[..4000]);
+    folder.run("info a.raw --dims 16x16x16 --type u8").fails(3, &["a.raw", "4000"]);
+    folder.put("nan.raw", nan);
+    folder.run("info nan.raw --dims 16x16x16 --type f32").fails(3, &["nan.raw", "sample 7"]);
+    folder.put("a.vti", vti());
+    folder.run("info a.vti --limit-bytes 100").fails(3, &["a.vti", "limit"]);
+    assert!(!folder.path("out.png").exists());
+}
+
+#[test]
+fn pictures_are_compared() {
+    let folder = Folder::new("compare");
+    let picture = |name: &str, size: u32, value: f32| {
+        let color = vec![[value, value, value, 1.0]; (size * size) as usize];
+        let picture = splatkit::picture::Picture { width: size, height: size, color, depth: Vec::new() };
+        picture.save(&folder.path(name), None).unwrap();
+    };
+    picture("a.png", 16, 0.5);
+    picture("b.png", 16, 0.6);
+    picture("c.png", 8, 0.5);
+    let same = folder.json("compare a.png a.png --json --threshold 99");
+    assert_eq!((&same["psnr"], same["different_pixels"].as_u64()), (&serde_json::Value::Null, Some(0)));
+    let found = folder.json("compare a.png b.png --json");
+    assert!((found["psnr"].as_f64().unwrap() - 20.0).abs() < 0.5, "{found}");
+    assert_eq!(found["different_pixels"].as_u64(), Some(256));
+    assert!(found["ssim"].is_f64() && found["max_difference"].is_f64());
+    folder.run("compare a.png b.png --threshold 10").ok();
+    folder.run("compare a.png b.png --threshold 30").fails(5, &["30"]);
+    folder.run("compare a.png c.png").fails(5, &["16x16", "8x8"]);
+    folder.put("text.png", "no picture");
+    folder.run("compare a.png text.png").fails(3, &["text.png"]);
+    folder.run("compare a.png none.png").fails(3, &["none.png"]);
+}
+
+#[test]
+fn wrong_usage_is_told() {
+    let folder = Folder::new("usage");
+    for arguments in [
+        "",
+        "paint",
+        "render",
+        "render a.ply",
+        "render a.ply -o a.png --size 10",
+        "render a.ply -o a.png --samples 3",
+        "render a.ply -o a.png --background red",
+        "render a.ply -o a.png --view-angle 180",
+        "render a.ply -o a.png --dims 2x2x2",
+        "render a.ply -o a.png --sigma -1",
+        "render a.ply -o a.png -v -q",
+        "render a.ply -o a.png --gradient sideways",
+        "bench a.ply --frames 0",
+        "compare a.png",
+    ] {
+        folder.run(arguments).fails(2, &[]);
+    }
+    folder.run("--help").ok();
+    folder.run("render --help").ok();
+    folder.run("--version").ok();
+}
