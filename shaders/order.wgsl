@@ -12,7 +12,7 @@
 // The workgroups of `order_long`.
 @group(1) @binding(0) var<storage, read_write> long_arguments: array<u32, 3>;
 
-const SHORT: u32 = 512u;
+const SHORT: u32 = 256u;
 
 var<workgroup> shared_number: u32;
 

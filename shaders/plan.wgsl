@@ -1,11 +1,11 @@
 // Plan: cuts the frame into depth passes, front to back, so that no pass needs more entries or records than there is room.
-// `total` adds up what measure found; `plan` writes one pass if all fits, else cuts by the survey: as many sheets as fit,
-// and where a single sheet is too much, bands of it.
+// `total` adds up what measure found; `plan` writes one pass if all fits, else cuts by the survey, which `accumulate` has
+// prepared: as many sheets as fit, and where a single sheet is too much, bands of it.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> needs: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read_write> totals: Totals;
-@group(0) @binding(3) var<storage, read> census: array<u32>;
+@group(0) @binding(3) var<storage, read_write> census: array<u32>;
 // Each pass has 256 bytes, so that it can be bound on its own.
 @group(0) @binding(4) var<storage, read_write> passes: array<PaddedPass>;
 @group(0) @binding(5) var<storage, read_write> report: Report;
@@ -46,28 +46,49 @@ fn total(@builtin(local_invocation_index) lane: u32) {
     }
 }
 
-fn counted(sheet: u32, band: u32, what: u32) -> u32 {
-    return census[(sheet * BANDS + band) * CENSUS_KINDS + what];
-}
-
-// What a pass over the sheets first … end-1 and some bands needs: the windows that start there, and one window and one
-// record for each splat that reaches in from before.
-fn needed(first: u32, end: u32, first_band: u32, end_band: u32) -> vec2<u32> {
-    var sum = vec2(0u);
-    for (var band = first_band; band < end_band; band++) {
-        var open = vec2(0u);
-        for (var sheet = 0u; sheet < end; sheet++) {
-            let starting = vec2(counted(sheet, band, FIRST_TILES), counted(sheet, band, FIRST_WORDS));
-            let ending = vec2(counted(sheet, band, LAST_TILES), counted(sheet, band, LAST_WORDS));
-            if sheet < first {
+// Turns the census into what passes are cut by. In every band: the tiles and record words of splats that reach into a sheet
+// from before it take the place of those that start in it. Behind the bands: the sums over them.
+@compute @workgroup_size(64)
+fn accumulate(@builtin(local_invocation_index) lane: u32) {
+    if !fits(totals) {
+        if lane < BANDS {
+            var open = vec2(0u);
+            for (var sheet = 0u; sheet <= frame.sheet_count; sheet++) {
+                let at = census_index(sheet, lane);
+                let starting = vec2(census[at + FIRST_TILES], census[at + FIRST_WORDS]);
+                let ending = vec2(census[at + LAST_TILES], census[at + LAST_WORDS]);
+                census[at + OPEN_TILES] = open.x;
+                census[at + OPEN_WORDS] = open.y;
                 open = open + starting - ending;
-            } else {
-                sum = saturating_add(sum, vec2(counted(sheet, band, WINDOW_TILES), starting.y));
             }
         }
-        sum = saturating_add(sum, open);
+        storageBarrier();
+        for (var sheet = lane; sheet <= frame.sheet_count; sheet += 64u) {
+            var starting = vec2(0u);
+            var open = vec2(0u);
+            for (var band = 0u; band < BANDS; band++) {
+                starting = saturating_add(starting, starting_in(sheet, band));
+                open = saturating_add(open, open_at(sheet, band));
+            }
+            let at = census_index(sheet, BANDS);
+            census[at + WINDOW_TILES] = starting.x;
+            census[at + FIRST_WORDS] = starting.y;
+            census[at + OPEN_TILES] = open.x;
+            census[at + OPEN_WORDS] = open.y;
+        }
     }
-    return sum;
+}
+
+// Entries and record words of the windows and splats that start in a sheet.
+fn starting_in(sheet: u32, band: u32) -> vec2<u32> {
+    let at = census_index(sheet, band);
+    return vec2(census[at + WINDOW_TILES], census[at + FIRST_WORDS]);
+}
+
+// Those of the splats that reach into it from before: each has one window there.
+fn open_at(sheet: u32, band: u32) -> vec2<u32> {
+    let at = census_index(sheet, band);
+    return vec2(census[at + OPEN_TILES], census[at + OPEN_WORDS]);
 }
 
 fn is_room(need: vec2<u32>) -> bool {
@@ -106,40 +127,66 @@ fn plan() {
         emit(1u, end, 0u, BANDS);
         return;
     }
+    // One walk over the sheets: the driver of a software adapter ends long loops (see docs/engine.md).
     var first = 1u;
     while first < end {
-        // The most sheets that fit, by bisection: what a pass needs grows with its end.
-        var fitting = first;
-        var too_many = end + 1u;
-        while too_many - fitting > 1u {
-            let middle = (fitting + too_many) / 2u;
-            let range = collected(first, middle);
-            if is_room(needed(range.x, range.y, 0u, BANDS)) {
-                fitting = middle;
-            } else {
-                too_many = middle;
-            }
+        let first_collected = collected(first, end).x;
+        var need = open_at(first_collected, BANDS);
+        for (var sheet = first_collected; sheet < first + MARGIN; sheet++) {
+            need = saturating_add(need, starting_in(sheet, BANDS));
         }
-        if fitting > first {
-            emit(first, fitting, 0u, BANDS);
-            first = fitting;
+        var last = first;
+        while last < end {
+            // Collecting up to the margin behind `last`, which the last sheets lack.
+            var more = need;
+            if last + MARGIN < end {
+                more = saturating_add(need, starting_in(last + MARGIN, BANDS));
+            }
+            if !is_room(more) {
+                break;
+            }
+            need = more;
+            last++;
+        }
+        if last > first {
+            emit(first, last, 0u, BANDS);
+            first = last;
             continue;
         }
-        let range = collected(first, first + 1u);
-        var band = 0u;
-        while band < BANDS {
-            var last = band + 1u;
-            while last < BANDS && is_room(needed(range.x, range.y, band, last + 1u)) {
-                last++;
-            }
-            if !is_room(needed(range.x, range.y, band, last)) {
-                report.overflow = 1u;
-            }
-            if band_start(band) < band_start(last) {
-                emit(first, first + 1u, band, last);
-            }
-            band = last;
-        }
+        emit_in_bands(first);
         first++;
+    }
+}
+
+// What one band of a single sheet needs.
+fn needed_in_band(sheet: u32, band: u32) -> vec2<u32> {
+    let range = collected(sheet, sheet + 1u);
+    var need = open_at(range.x, band);
+    for (var own = range.x; own < range.y; own++) {
+        need = saturating_add(need, starting_in(own, band));
+    }
+    return need;
+}
+
+// A sheet that is too much for one pass, in as many bands together as fit.
+fn emit_in_bands(sheet: u32) {
+    var band = 0u;
+    while band < BANDS {
+        var need = needed_in_band(sheet, band);
+        if !is_room(need) {
+            report.overflow = 1u;
+        }
+        var last = band + 1u;
+        while last < BANDS {
+            need = saturating_add(need, needed_in_band(sheet, last));
+            if !is_room(need) {
+                break;
+            }
+            last++;
+        }
+        if band_start(band) < band_start(last) {
+            emit(sheet, sheet + 1u, band, last);
+        }
+        band = last;
     }
 }

@@ -8,7 +8,7 @@
 @group(0) @binding(4) var<storage, read_write> census: array<atomic<u32>>;
 
 fn add(sheet: u32, band: u32, what: u32, amount: u32) {
-    atomicAdd(&census[(sheet * BANDS + band) * CENSUS_KINDS + what], amount);
+    atomicAdd(&census[census_index(sheet, band) + what], amount);
 }
 
 @compute @workgroup_size(64)

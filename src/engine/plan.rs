@@ -11,9 +11,10 @@ use super::{
 
 /// The most passes of a frame.
 pub const MAX_PASSES: u32 = 256;
-/// Bytes of the census for a number of sheets: 16 bands of 5 counts for each, and for the sheet before the first.
+/// Bytes of the census for a number of sheets: 7 counts for each of 16 bands and for their sum, also for the sheet before
+/// the first and the one behind the last.
 pub fn census_bytes(sheets: usize) -> u64 {
-    (sheets as u64 + 2) * 16 * 5 * 4
+    (sheets as u64 + 2) * 17 * 7 * 4
 }
 
 /// The passes.
@@ -21,6 +22,7 @@ pub fn census_bytes(sheets: usize) -> u64 {
 pub struct Plan {
     total: Stage,
     survey: Sources<Stage>,
+    accumulate: Stage,
     plan: Stage,
 }
 
@@ -29,7 +31,7 @@ impl Plan {
         use Binding::{Read, Uniform, Write};
         let constants = variant.constants();
         let sources = [&constants, shaders::FRAME, shaders::SPANS, shaders::CENSUS, shaders::PLAN];
-        let bindings: &[&[Binding]] = &[&[Uniform, Read, Write, Read, Write, Write, Uniform]];
+        let bindings: &[&[Binding]] = &[&[Uniform, Read, Write, Write, Write, Write, Uniform]];
         let survey = per_source(|source, bindings| {
             let sources = [
                 &constants,
@@ -47,6 +49,7 @@ impl Plan {
         Self {
             total: Stage::new(gpu, "plan: total", &sources, "total", bindings),
             survey,
+            accumulate: Stage::new(gpu, "plan: accumulate", &sources, "accumulate", bindings),
             plan: Stage::new(gpu, "plan", &sources, "plan", bindings),
         }
     }
@@ -68,6 +71,7 @@ impl Plan {
             let buffers = [&targets.frame, &targets.planes, &chunk.spans, &targets.totals, &targets.census];
             self.survey.dispatch(gpu, encoder, chunk, &buffers.map(|b| b.as_entire_buffer_binding()));
         }
+        self.accumulate.dispatch(encoder, &[&self.accumulate.bind(gpu, 0, &buffers)], 1);
         self.plan.dispatch(encoder, &[&self.plan.bind(gpu, 0, &buffers)], 1);
     }
 }

@@ -79,10 +79,10 @@ fn one_round_splat_is_its_projection() {
             // The distance of the centre from the ray.
             let distance = (center - origin).cross(direction).length();
             let opacity = 1.0 - (-f64::from(strength) * (-0.5 * distance * distance / variance).exp()).exp();
-            // Sheets with an optical depth below 1e-5 are left out.
-            close(color[3], opacity, 1.1e-5);
-            close(color[0], opacity * f64::from(0xc0) / 255.0, 1.1e-5);
-            close(color[2], opacity * f64::from(0x40) / 255.0, 1.1e-5);
+            // Sheets with an optical depth below 1e-5 are left out, up to three of them here.
+            close(color[3], opacity, 3e-5);
+            close(color[0], opacity * f64::from(0xc0) / 255.0, 3e-5);
+            close(color[2], opacity * f64::from(0x40) / 255.0, 3e-5);
             brightest = brightest.max(color[3]);
         }
         assert!(brightest > 0.8);
