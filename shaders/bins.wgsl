@@ -47,3 +47,28 @@ fn bin_of(column: u32, row: u32, window: u32, stage: Pass) -> u32 {
 fn window_count(first: u32, last: u32) -> u32 {
     return max((last - min(first, last) + 2u) / 3u, 1u);
 }
+
+// Bins that a splat meets.
+fn bin_count(walk: Walk) -> u32 {
+    if walk.first_row >= walk.end_row {
+        return 0u;
+    }
+    return (walk.last_column - walk.first_column + 1u) * (walk.end_row - walk.first_row) * walk.windows;
+}
+
+// Splats that meet more bins than this are left to large.wgsl. Besides the balance of work, that keeps every invocation's
+// loops short, which some drivers end without a word (see docs/engine.md).
+const LARGE: u32 = 512u;
+
+fn is_large(walk: Walk) -> bool {
+    return bin_count(walk) > LARGE;
+}
+
+// The entry of a record's window.
+fn entry_of(box: Box, record: u32, walk: Walk, window: u32, stage: Pass) -> u32 {
+    let sheet = walk.first_window + 3u * window - (stage.first_collected - 1u);
+    let in_group = sheet & ((1u << frame.group_shift) - 1u);
+    let continued = select(0u, ENTRY_CONTINUED, window > 0u);
+    let isotropic = select(0u, ENTRY_ISOTROPIC, (box.first_tile & BOX_ISOTROPIC) != 0u);
+    return (in_group << ENTRY_SHEET_SHIFT) | continued | isotropic | record;
+}

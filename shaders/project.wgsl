@@ -93,7 +93,11 @@ fn write(@builtin(global_invocation_id) id: vec3<u32>) {
         for (var word = 1u; word < words; word++) {
             boxes[at + word].sheets = NO_BOX;
         }
+        at += words;
         let walk = walk_of(box, stage);
+        if is_large(walk) {
+            continue;
+        }
         for (var window = 0u; window < walk.windows; window++) {
             for (var row = walk.first_row; row < walk.end_row; row++) {
                 for (var column = walk.first_column; column <= walk.last_column; column++) {
@@ -101,6 +105,5 @@ fn write(@builtin(global_invocation_id) id: vec3<u32>) {
                 }
             }
         }
-        at += words;
     }
 }

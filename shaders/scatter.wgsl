@@ -25,18 +25,18 @@ fn count() {
 @compute @workgroup_size(64)
 fn scatter(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let words = min(runs[run_count.x], frame.record_capacity);
-    let group_mask = (1u << frame.group_shift) - 1u;
     for (var at = id.x; at < words; at += groups.x * 64u) {
         let box = boxes[at];
         if box.sheets == NO_BOX {
             continue;
         }
-        let isotropic = select(0u, ENTRY_ISOTROPIC, (box.first_tile & BOX_ISOTROPIC) != 0u);
         let walk = walk_of(box, stage);
+        if is_large(walk) {
+            continue;
+        }
         for (var window = 0u; window < walk.windows; window++) {
+            let entry = entry_of(box, at, walk, window, stage);
             let sheet = walk.first_window + 3u * window;
-            let in_group = (sheet - (stage.first_collected - 1u)) & group_mask;
-            let entry = (in_group << ENTRY_SHEET_SHIFT) | select(0u, ENTRY_CONTINUED, window > 0u) | isotropic | at;
             for (var row = walk.first_row; row < walk.end_row; row++) {
                 for (var column = walk.first_column; column <= walk.last_column; column++) {
                     let slot = atomicAdd(&bins[bin_of(column, row, sheet, stage)], 1u);

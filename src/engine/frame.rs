@@ -2,6 +2,7 @@
 
 use super::{
     Gpu,
+    large::Large,
     march::March,
     measure::Measure,
     order::Order,
@@ -117,6 +118,7 @@ pub struct Pipelines {
     plan: Plan,
     project: Project,
     scatter: Scatter,
+    large: Large,
     order: Order,
     march: March,
 }
@@ -128,6 +130,7 @@ impl Pipelines {
             plan: Plan::new(gpu, variant),
             project: Project::new(gpu, variant),
             scatter: Scatter::new(gpu, variant),
+            large: Large::new(gpu, variant),
             order: Order::new(gpu, variant),
             march: March::new(gpu, variant),
         }
@@ -152,6 +155,9 @@ pub struct Targets {
     pub bins: wgpu::Buffer,
     pub entries: wgpu::Buffer,
     pub scatter_arguments: wgpu::Buffer,
+    pub large: wgpu::Buffer,
+    pub large_count: wgpu::Buffer,
+    pub large_arguments: wgpu::Buffer,
     pub long_bins: wgpu::Buffer,
     pub long_count: wgpu::Buffer,
     pub long_arguments: wgpu::Buffer,
@@ -285,6 +291,9 @@ pub fn targets(
         bins: pool.take(gpu, "bins", 4 * u64::from(bin_count)),
         entries: pool.take(gpu, "entries", 4 * u64::from(budget.entries)),
         scatter_arguments: pool.take(gpu, "scatter arguments", 12),
+        large: pool.take(gpu, "large", 4 * words),
+        large_count: pool.take(gpu, "large count", 4),
+        large_arguments: pool.take(gpu, "large arguments", 12),
         long_bins: pool.take(gpu, "long bins", 4 * u64::from(bin_count)),
         long_count: pool.take(gpu, "long count", 4),
         long_arguments: pool.take(gpu, "long arguments", 12),
@@ -382,8 +391,11 @@ pub fn depth_pass<'a>(
         (
             "bin",
             Box::new(move |encoder| {
+                pipelines.scatter.encode_count(gpu, encoder, targets, pass);
+                pipelines.large.encode_count(gpu, encoder, targets, pass);
                 scan.encode(gpu, encoder, &targets.bins, targets.bin_count);
                 pipelines.scatter.encode(gpu, encoder, targets, pass);
+                pipelines.large.encode_fill(gpu, encoder, targets, pass);
             }),
         ),
         ("order", Box::new(move |encoder| pipelines.order.encode(gpu, encoder, targets, pass))),

@@ -9,6 +9,7 @@
 //! | `plan` | cuts the frame into depth passes that fit the buffers |
 //! | `project` | per depth pass: the records of its splats, counted into bins |
 //! | `scan`, `scatter` | entries (splat, tile, window of four sheets) into the bins |
+//! | `large` | the same for splats that meet many bins, each spread over a workgroup |
 //! | `order` | sorts each bin, for the same bytes each time |
 //! | `march` | per tile: adds up sections, closes sheets, composites front to back |
 //!
@@ -16,6 +17,7 @@
 
 mod frame;
 mod gpu;
+mod large;
 mod march;
 mod measure;
 mod order;

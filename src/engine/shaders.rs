@@ -16,6 +16,7 @@ pub const PLAN: &str = include_str!("../../shaders/plan.wgsl");
 pub const PROJECT: &str = include_str!("../../shaders/project.wgsl");
 pub const SCAN: &str = include_str!("../../shaders/scan.wgsl");
 pub const SCATTER: &str = include_str!("../../shaders/scatter.wgsl");
+pub const LARGE: &str = include_str!("../../shaders/large.wgsl");
 pub const ORDER: &str = include_str!("../../shaders/order.wgsl");
 pub const MARCH: &str = include_str!("../../shaders/march.wgsl");
 
