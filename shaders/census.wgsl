@@ -21,6 +21,7 @@ fn census_index(sheet: u32, band: u32) -> u32 {
 struct Totals {
     entries: u32,
     words: u32,
+    splats: u32,
 }
 
 fn fits(totals: Totals) -> bool {

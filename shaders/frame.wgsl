@@ -83,6 +83,8 @@ const ISOTROPIC: u32 = 2u;
 
 // Candidates that one invocation handles in order, so that lists come out in the same order each time.
 const RUN: u32 = 16u;
+// One splat, in the upper half of what a run needs.
+const ONE_SPLAT: u32 = 0x10000u;
 
 // An entry: sheet within its group (7 bits), window after the splat's first (1), isotropic record (1), record (23).
 const ENTRY_SHEET_SHIFT: u32 = 25u;

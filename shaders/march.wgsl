@@ -6,6 +6,9 @@
 // them to the fourth lane. A splat that is longer gets its next window three sheets on: there, the first lane takes back
 // what the window before gave it too much. So each entry evaluates three planes, however long its splat is.
 //
+// A tile with very many entries stops between two sheets and goes on in another dispatch, because some drivers end long
+// loops without a word (see docs/engine.md). It then collects again what reaches into the sheets to come from before.
+//
 // An invocation holds ROWS pixels, one below the other, so that they share the loads of an entry.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -19,6 +22,8 @@
 // Premultiplied colour and opacity; view-space depth. Both carry over from pass to pass.
 @group(0) @binding(7) var<storage, read_write> colors: array<vec4<f32>>;
 @group(0) @binding(8) var<storage, read_write> depths: array<f32>;
+// For each tile the sheet that it goes on from; behind the tiles: whether any is unfinished, whether one can't be finished.
+@group(0) @binding(9) var<storage, read_write> progress: array<atomic<u32>>;
 
 // A pixel that lets less light through than this is finished.
 const OPAQUE: f32 = 0.0005;
@@ -26,6 +31,8 @@ const OPAQUE: f32 = 0.0005;
 // rounding left of the sections that windows of one splat give each other.
 const LEAST_FILLING: f32 = 1e-4;
 const LEAST_DEPTH: f32 = 1e-5;
+// The progress of a tile that needs no more work.
+const FINISHED: u32 = 0xffffffffu;
 const SQRT_TAU: f32 = 2.5066283;
 
 // Everything that one pixel keeps while its tile is walked.
@@ -59,6 +66,9 @@ struct Pixel {
     cosine: f32,
     inside: vec2<f32>,
 }
+
+// First sheet that this invocation composites: the pass's own, or where its tile stopped.
+var<private> first_composited: u32;
 
 // One sheet at one pixel.
 struct Sheet {
@@ -153,7 +163,7 @@ fn middle(sheet: u32) -> f32 {
 
 // Adds a sheet to the picture. `has_after` and `after`: the value of the sheet behind it.
 fn composite(r: u32, sheet: u32, own: Sheet, has_after: bool, after: f32) {
-    if sheet < stage.first_sheet || sheet >= stage.end_sheet {
+    if sheet < first_composited || sheet >= stage.end_sheet {
         return;
     }
     var premultiplied = own.radiance.xyz;
@@ -261,6 +271,12 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     if stage.groups == 0u || row >= stage.end_row {
         return;
     }
+    let tile = row * frame.tiles.x + column;
+    let resumed = atomicLoad(&progress[tile]);
+    if resumed == FINISHED {
+        return;
+    }
+    first_composited = max(resumed, stage.first_sheet);
     let corner = vec2<i32>(vec2(column, row)) * TILE_STEP - APRON;
     let first_pixel = corner + vec2<i32>(i32(lane.x), i32(lane.y * ROWS));
     for (var r = 0u; r < ROWS; r++) {
@@ -287,12 +303,19 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     var group_end = bin_end(tile_bins);
     var bin = tile_bins;
     let last_bin = tile_bins + stage.groups - 1u;
+    // The first window that reaches into the sheets to come, or into the one before them, which gradients need.
+    let origin = stage.first_collected - 1u;
+    let first_window = first_composited - min(first_composited, 3u + WAITING);
+    bin += (max(first_window, origin) - origin) >> frame.group_shift;
     var at = 0u;
-    if tile_bins > 0u {
-        at = bin_end(tile_bins - 1u);
+    if bin > 0u {
+        at = bin_end(bin - 1u);
     }
+    group_end = bin_end(bin);
     let end = bin_end(last_bin);
-    var front = stage.first_collected - 1u;
+    var entries_left = MOST_ENTRIES;
+    var stopped = 0u;
+    var front = origin;
     // Sheets from `front` on that may hold something, the one that waits to be shaded included.
     var open = 0u;
     loop {
@@ -304,12 +327,18 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
             group_end = bin_end(bin);
         }
         let entry_sheet = entries[at] >> ENTRY_SHEET_SHIFT;
-        let sheet = ((bin - tile_bins) << frame.group_shift) + entry_sheet + stage.first_collected - 1u;
+        let sheet = origin + ((bin - tile_bins) << frame.group_shift) + entry_sheet;
         if open > 0u {
             close(front, min(sheet - front, open), lane.xy);
             open -= min(sheet - front, open);
         }
         front = sheet;
+        // All sheets before this one are closed, and composited but for the one that waits. A tile stops only when it has
+        // got further than where it started.
+        if entries_left == 0u && front > first_composited + WAITING + 1u {
+            stopped = front - WAITING;
+            break;
+        }
         // With differences between pixels, all lanes must reach every barrier.
         if !CENTRAL {
             var light = 0.0;
@@ -320,6 +349,7 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
                 break;
             }
         }
+        let run_end = at + min(LONGEST_RUN, end - at);
         loop {
             let entry = entries[at];
             if ISOTROPIC_RECORDS && (!GENERAL_RECORDS || (entry & ENTRY_ISOTROPIC) != 0u) {
@@ -328,13 +358,27 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
                 add_general(entry, front, first_pixel);
             }
             at++;
+            entries_left -= min(entries_left, 1u);
             if at >= group_end || (entries[at] >> ENTRY_SHEET_SHIFT) != entry_sheet {
+                break;
+            }
+            if at >= run_end {
+                atomicStore(&progress[frame.tiles.x * frame.tiles.y + 1u], 1u);
                 break;
             }
         }
         open = 4u + WAITING;
     }
-    close(front, open, lane.xy);
+    if stopped == 0u {
+        close(front, open, lane.xy);
+    }
+    if all(lane.xy == vec2(0u)) {
+        atomicStore(&progress[tile], FINISHED);
+    }
+    if stopped > 0u {
+        atomicStore(&progress[tile], stopped);
+        atomicStore(&progress[frame.tiles.x * frame.tiles.y], 1u);
+    }
 
     for (var r = 0u; r < ROWS; r++) {
         let own = vec2<i32>(lane.xy) + vec2(0, i32(lane.y * (ROWS - 1u) + r));

@@ -4,7 +4,7 @@
 @group(0) @binding(1) var<storage, read> planes: array<f32>;
 // What each candidate of this chunk meets, see pack_span.
 @group(0) @binding(2) var<storage, read_write> spans: array<u32>;
-// Entries and record words per run.
+// Entries per run; record words and splats, 16 bits each.
 @group(0) @binding(3) var<storage, read_write> needs: array<vec2<u32>>;
 
 @compute @workgroup_size(64)
@@ -23,7 +23,8 @@ fn measure(@builtin(global_invocation_id) id: vec3<u32>) {
         if span.visible {
             packed = pack_span(span.first_sheet, span.last_sheet, span.first_tile.y, span.last_tile.y);
             let across = span.last_tile - span.first_tile + 1u;
-            need += vec2(across.x * across.y * window_count(span.first_sheet, span.last_sheet), words);
+            let windows = window_count(span.first_sheet, span.last_sheet);
+            need += vec2(across.x * across.y * windows, words | ONE_SPLAT);
         }
         spans[i] = packed;
     }

@@ -21,10 +21,10 @@ struct Report {
     // Set when even one band of one sheet is more than there is room for, or there are more passes than can be listed.
     overflow: u32,
     entries: u32,
-    words: u32,
+    splats: u32,
 }
 
-var<workgroup> sums: array<vec2<u32>, 256>;
+var<workgroup> sums: array<vec3<u32>, 256>;
 
 fn saturating_add(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
     return a + min(b, vec2(0xffffffffu) - a);
@@ -32,17 +32,18 @@ fn saturating_add(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
 
 @compute @workgroup_size(256)
 fn total(@builtin(local_invocation_index) lane: u32) {
-    var sum = vec2(0u);
+    var sum = vec3(0u);
     for (var i = lane; i < runs.x; i += 256u) {
-        sum = saturating_add(sum, needs[i]);
+        let own = vec3(needs[i].x, needs[i].y & (ONE_SPLAT - 1u), needs[i].y / ONE_SPLAT);
+        sum += min(own, vec3(0xffffffffu) - sum);
     }
     sums[lane] = sum;
     workgroupBarrier();
     if lane == 0u {
         for (var i = 1u; i < 256u; i++) {
-            sum = saturating_add(sum, sums[i]);
+            sum += min(sums[i], vec3(0xffffffffu) - sum);
         }
-        totals = Totals(sum.x, sum.y);
+        totals = Totals(sum.x, sum.y, sum.z);
     }
 }
 
@@ -118,7 +119,7 @@ fn plan() {
     report.passes = 0u;
     report.overflow = 0u;
     report.entries = totals.entries;
-    report.words = totals.words;
+    report.splats = totals.splats;
     for (var i = 0u; i < MAX_PASSES; i++) {
         passes[i].stage.groups = 0u;
     }

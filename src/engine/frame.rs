@@ -72,6 +72,7 @@ pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Sett
         central: false,
         // A software adapter runs eight invocations at once: eight columns of eight pixels fill a tile.
         rows: if gpu.is_software() { 8 } else { 1 },
+        most_entries: if gpu.is_software() { SOFTWARE_ENTRIES } else { u32::MAX },
     };
     for item in &prepared.scene.items {
         match item {
@@ -98,6 +99,10 @@ pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Sett
     variant.central = variant.volume_shaded && settings.gradient == Gradient::Central;
     variant
 }
+
+/// Mesa's software driver ends all loops of an invocation after 65,535 iterations together. In march an entry takes up to
+/// six: its own, and those that find its sheet and close the sheets before it.
+const SOFTWARE_ENTRIES: u32 = 10_000;
 
 /// Beyond this many footprint radii the sections of an isotropic kernel count as the same for all pixels. The error is at
 /// most a two-hundredth of the radius, at the footprint's rim; tests/engine_equals_reference.rs bounds the picture's.
@@ -161,6 +166,7 @@ pub struct Targets {
     pub long_bins: wgpu::Buffer,
     pub long_count: wgpu::Buffer,
     pub long_arguments: wgpu::Buffer,
+    pub progress: wgpu::Buffer,
     pub colors: wgpu::Buffer,
     pub depths: wgpu::Buffer,
     pub run_total: u32,
@@ -175,6 +181,11 @@ impl Targets {
             offset: u64::from(pass) * PASS_STRIDE,
             size: wgpu::BufferSize::new(PASS_BYTES),
         }
+    }
+
+    /// Where in `progress` it stands whether any tile is unfinished, and whether one cannot be finished: a byte offset.
+    pub fn unfinished(&self) -> u64 {
+        4 * u64::from(self.tile_count)
     }
 
     /// Bytes of GPU memory.
@@ -281,7 +292,7 @@ pub fn targets(
         transfer: upload(gpu, "transfer", bytemuck::cast_slice(&table)),
         run_count: uniform("run count", bytemuck::bytes_of(&[prepared.runs, 0, 0, 0])),
         needs: pool.take(gpu, "needs", 8 * runs),
-        totals: pool.take(gpu, "totals", 8),
+        totals: pool.take(gpu, "totals", 12),
         census: pool.take(gpu, "census", plan::census_bytes(sheets.count())),
         passes: pool.take(gpu, "passes", PASS_STRIDE * u64::from(MAX_PASSES)),
         report: pool.take(gpu, "report", size_of::<Report>() as u64),
@@ -297,6 +308,7 @@ pub fn targets(
         long_bins: pool.take(gpu, "long bins", 4 * u64::from(bin_count)),
         long_count: pool.take(gpu, "long count", 4),
         long_arguments: pool.take(gpu, "long arguments", 12),
+        progress: pool.take(gpu, "progress", 4 * (u64::from(tile_count) + 2)),
         colors: pool.take(gpu, "colors", 16 * pixels),
         depths: pool.take(gpu, "depths", 4 * pixels),
         run_total: prepared.runs,
@@ -399,6 +411,21 @@ pub fn depth_pass<'a>(
             }),
         ),
         ("order", Box::new(move |encoder| pipelines.order.encode(gpu, encoder, targets, pass))),
-        ("march", Box::new(move |encoder| pipelines.march.encode(gpu, encoder, targets, pass))),
+        (
+            "march",
+            Box::new(move |encoder| {
+                encoder.clear_buffer(&targets.progress, 0, None);
+                pipelines.march.encode(gpu, encoder, targets, pass);
+            }),
+        ),
     ]
+}
+
+/// The step that goes on with the tiles of a pass that march has stopped.
+pub fn march_on<'a>(gpu: &'a Gpu, pipelines: &'a Pipelines, targets: &'a Targets, pass: u32) -> Step<'a> {
+    let encode = move |encoder: &mut wgpu::CommandEncoder| {
+        encoder.clear_buffer(&targets.progress, targets.unfinished(), Some(8));
+        pipelines.march.encode(gpu, encoder, targets, pass);
+    };
+    ("march", Box::new(encode))
 }

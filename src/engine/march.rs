@@ -15,7 +15,7 @@ impl March {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
         use Binding::{Read, Uniform, Write};
         let sources = [&variant.constants(), shaders::FRAME, shaders::NORMAL, shaders::MARCH];
-        let bindings = [Uniform, Read, Uniform, Read, Read, Read, Read, Write, Write];
+        let bindings = [Uniform, Read, Uniform, Read, Read, Read, Read, Write, Write, Write];
         Self(Stage::new(gpu, "march", &sources, "march", &[&bindings]))
     }
 
@@ -30,6 +30,7 @@ impl March {
             targets.transfer.as_entire_buffer_binding(),
             targets.colors.as_entire_buffer_binding(),
             targets.depths.as_entire_buffer_binding(),
+            targets.progress.as_entire_buffer_binding(),
         ];
         self.0.dispatch(encoder, &[&self.0.bind(gpu, 0, &buffers)], targets.tile_count);
     }

@@ -117,7 +117,8 @@ impl Renderer {
         let steps = frame::opening(gpu, &self.select, &self.scan, pipelines, &targets, prepared);
         let first = frame::depth_pass(gpu, &self.scan, pipelines, &targets, prepared, 0);
         submit(gpu, steps.into_iter().chain(first), profile.then_some(&mut times))?;
-        let report: Report = bytemuck::pod_read_unaligned(&read_buffer(gpu, &targets.report, 16)?);
+        finish_tiles(gpu, pipelines, &targets, 0, profile.then_some(&mut times))?;
+        let report: Report = bytemuck::pod_read_unaligned(&read_buffer(gpu, &targets.report, 0, 16)?);
         if report.overflow != 0 {
             return Err(Error::Gpu(format!(
                 "the scene needs more room in one sheet of the picture than the budget of {} entries gives; \
@@ -129,18 +130,16 @@ impl Renderer {
         for pass in 1..report.passes {
             let steps = frame::depth_pass(gpu, &self.scan, pipelines, &targets, prepared, pass);
             submit(gpu, steps, profile.then_some(&mut times))?;
+            finish_tiles(gpu, pipelines, &targets, pass, profile.then_some(&mut times))?;
         }
-        if report.passes > 1 {
-            gpu.wait()?;
-        }
+        gpu.wait()?;
         for chunk in &mut prepared.chunks {
             if let Origin::Lattice { selection, .. } = &mut chunk.origin {
                 selection.outdated = false;
             }
         }
-        let words = if variant.isotropic && !variant.radiance { 1 } else { 4 };
         let stats = FrameStats {
-            splats: u64::from(report.words / words),
+            splats: u64::from(report.splats),
             entries: u64::from(report.entries),
             passes: report.passes,
             gpu_bytes: prepared.bytes + targets.bytes(),
@@ -152,8 +151,8 @@ impl Renderer {
     fn read(&self, targets: &Targets, view: &View) -> Result<Picture> {
         let pixels = view.size[0] as usize * view.size[1] as usize;
         let color: Vec<[f32; 4]> =
-            bytemuck::pod_collect_to_vec(&read_buffer(&self.gpu, &targets.colors, 16 * pixels as u64)?);
-        let hits: Vec<f32> = bytemuck::pod_collect_to_vec(&read_buffer(&self.gpu, &targets.depths, 4 * pixels as u64)?);
+            bytemuck::pod_collect_to_vec(&read_buffer(&self.gpu, &targets.colors, 0, 16 * pixels as u64)?);
+        let hits: Vec<f32> = bytemuck::pod_collect_to_vec(&read_buffer(&self.gpu, &targets.depths, 0, 4 * pixels as u64)?);
         let width = view.size[0] as usize;
         let depth = (0..pixels)
             .map(|i| {
@@ -193,8 +192,33 @@ fn submit<'a>(
     Ok(())
 }
 
-/// Reads the first `bytes` of a buffer back.
-fn read_buffer(gpu: &Gpu, buffer: &wgpu::Buffer, bytes: u64) -> Result<Vec<u8>> {
+/// Goes on with the tiles of a pass until all are finished.
+fn finish_tiles(
+    gpu: &Gpu,
+    pipelines: &Pipelines,
+    targets: &Targets,
+    pass: u32,
+    mut times: Option<&mut Vec<(&'static str, f64)>>,
+) -> Result<()> {
+    loop {
+        let [unfinished, impossible]: [u32; 2] =
+            bytemuck::pod_read_unaligned(&read_buffer(gpu, &targets.progress, targets.unfinished(), 8)?);
+        if impossible != 0 {
+            return Err(Error::Gpu(format!(
+                "more splats meet in one sheet of one tile of the picture than the driver of {} can add up; \
+                 draw the scene nearer, or on a GPU",
+                gpu.info.name
+            )));
+        }
+        if unfinished == 0 {
+            return Ok(());
+        }
+        submit(gpu, [frame::march_on(gpu, pipelines, targets, pass)], times.as_deref_mut())?;
+    }
+}
+
+/// Reads a part of a buffer back.
+fn read_buffer(gpu: &Gpu, buffer: &wgpu::Buffer, offset: u64, bytes: u64) -> Result<Vec<u8>> {
     let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("read back"),
         size: bytes,
@@ -202,7 +226,7 @@ fn read_buffer(gpu: &Gpu, buffer: &wgpu::Buffer, bytes: u64) -> Result<Vec<u8>> 
         mapped_at_creation: false,
     });
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, bytes);
+    encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, bytes);
     gpu.queue.submit([encoder.finish()]);
     let (sender, receiver) = std::sync::mpsc::channel();
     // The receiver outlives the callback: it is waited for below.

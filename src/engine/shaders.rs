@@ -37,6 +37,8 @@ pub struct Variant {
     pub central: bool,
     /// Pixels per invocation of march, one below the other: 1, 2, 4 or 8.
     pub rows: u32,
+    /// Entries after which march stops a tile, to go on in another dispatch.
+    pub most_entries: u32,
 }
 
 impl Variant {
@@ -52,7 +54,7 @@ impl Variant {
 
     /// The constants, as WGSL.
     pub fn constants(&self) -> String {
-        let Self { perspective, scalar, lattice, radiance, isotropic, volume_shaded, surface_shaded, central, rows } =
+        let Self { perspective, scalar, lattice, radiance, isotropic, volume_shaded, surface_shaded, central, rows, most_entries } =
             *self;
         let general = radiance || !isotropic;
         let waiting = u32::from(self.waits());
@@ -64,10 +66,12 @@ impl Variant {
              const CENTRAL: bool = {central};\nconst APRON: i32 = {apron};\nconst TILE_STEP: i32 = {step};\n\
              const WAITING: u32 = {waiting}u;\nconst MARGIN: u32 = {waiting}u;\n\
              const MAX_PASSES: u32 = {passes}u;\n\
+             const MOST_ENTRIES: u32 = {most_entries}u;\nconst LONGEST_RUN: u32 = {longest_run}u;\n\
              const ROWS: u32 = {rows}u;\nconst LANE_ROWS: u32 = {lanes}u;\n",
             apron = i32::from(central),
             step = self.tile_step(),
             lanes = 8 / rows,
+            longest_run = most_entries.saturating_mul(4),
             passes = super::plan::MAX_PASSES,
         )
     }

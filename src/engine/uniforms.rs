@@ -64,7 +64,7 @@ pub struct Report {
     pub passes: u32,
     pub overflow: u32,
     pub entries: u32,
-    pub words: u32,
+    pub splats: u32,
 }
 
 /// `Source::flags`.
