@@ -21,6 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut camera = Camera::framing(&scene.bounds(), DVec3::Y, DVec3::Z, 640.0 / 480.0);
     camera.azimuth(40.0);
     camera.elevation(30.0);
+    camera.zoom(1.9);
     let (picture, stats) = renderer.render(&mut prepared, &camera, &settings)?;
     picture.save("specimen.png".as_ref(), Some([0.0, 0.0, 0.0]))?;
     println!("{} splats in {} passes on {}", stats.splats, stats.passes, gpu.info.name);
