@@ -1,0 +1,29 @@
+//! Draws a volume that the library makes itself: cargo run --release --example volume
+
+use glam::DVec3;
+use splatkit::{
+    engine::{AdapterChoice, Gpu, Renderer},
+    math::{Camera, Kernel},
+    scene::{Scene, Settings},
+    volume::{TransferFunction, phantoms::Phantom},
+};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let volume = Phantom::Specimen.sample_bytes([96; 3])?;
+    let transfer = TransferFunction::automatic(&volume);
+    let scene = Scene::new().with_volume(volume, Kernel::default(), transfer);
+
+    let gpu = Gpu::headless(&AdapterChoice::Automatic)?;
+    let mut renderer = Renderer::new(&gpu);
+    let mut prepared = renderer.prepare(&scene)?;
+
+    let settings = Settings::new([640, 480]);
+    let mut camera = Camera::framing(&scene.bounds(), DVec3::Y, DVec3::Z, 640.0 / 480.0);
+    camera.azimuth(40.0);
+    camera.elevation(30.0);
+    camera.zoom(1.9);
+    let (picture, stats) = renderer.render(&mut prepared, &camera, &settings)?;
+    picture.save("specimen.png".as_ref(), Some([0.0, 0.0, 0.0]))?;
+    println!("{} splats in {} passes on {}", stats.splats, stats.passes, gpu.info.name);
+    Ok(())
+}
