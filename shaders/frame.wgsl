@@ -30,8 +30,7 @@ struct Frame {
     // Ambient, diffuse, specular, power.
     volume_shade: vec4<f32>,
     surface_shade: vec4<f32>,
-    // Standard deviation of the isotropic lattice kernel (world units), its inverse, its squared extent in sigmas; the
-    // smallest weight that counts as a value, as a fraction of the sheet.
+    // Standard deviation of the isotropic lattice kernel (world units), its inverse, its squared extent in sigmas.
     isotropic: vec4<f32>,
     // First value, table entries per value, last table index, unused.
     transfer: vec4<f32>,

@@ -89,7 +89,7 @@ var<private> pixels: array<Pixel, ROWS>;
 var<workgroup> neighbours: array<f32, 64>;
 const NO_VALUE: f32 = 3e38;
 
-// Normal distribution function, within 2e-7 (Abramowitz & Stegun 1964, 7.1.28). Its tails must be right: what they get
+// Normal distribution function, within 2e-7 (Abramowitz & Stegun 1964, 26.2.19). Its tails must be right: what they get
 // wrong is multiplied by the strength of an opaque splat and lies in front of it.
 fn normal_cdf(t: vec3<f32>) -> vec3<f32> {
     let x = min(abs(t), vec3(8.0));
@@ -266,8 +266,9 @@ fn add(r: u32, w: vec4<f32>, slope: vec2<f32>, strength: f32) {
 
 @compute @workgroup_size(8, LANE_ROWS)
 fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) lane: vec3<u32>) {
-    let column = group.x % frame.tiles.x;
-    let row = stage.first_row + group.x / frame.tiles.x;
+    let number = group.x + group.y * 65535u;
+    let column = number % frame.tiles.x;
+    let row = stage.first_row + number / frame.tiles.x;
     if stage.groups == 0u || row >= stage.end_row {
         return;
     }

@@ -274,34 +274,3 @@ fn a_new_transfer_function_needs_no_new_upload() {
     let expected = reference::render(&scene, &case.camera, &case.settings).expect(case.name);
     assert!(psnr(&found, &expected) > 50.0, "{:.1} dB", psnr(&found, &expected));
 }
-
-/// So many samples behind each pixel that tiles stop and go on: software drivers end long loops without a word.
-#[test]
-fn crowded_tiles() {
-    for make in [scenes::blobs_analytic, scenes::surface_in_a_volume] {
-        let mut case = make();
-        for item in &mut case.scene.items {
-            if let splatkit::scene::Item::Volume(volume, _, transfer) = item {
-                let fine = 80;
-                let coarse = volume.lattice.dims;
-                let mut lattice = volume.lattice.clone();
-                lattice.dims = [fine; 3];
-                lattice.axes *= (coarse[0] - 1) as f64 / (fine - 1) as f64;
-                let near = |i: usize, axis: usize| i * (coarse[axis] - 1) / (fine - 1);
-                let value = |i: usize| {
-                    let (x, y, z) = (near(i % fine, 0), near(i / fine % fine, 1), near(i / fine / fine, 2));
-                    volume.value(x + coarse[0] * (y + coarse[1] * z)) as f32
-                };
-                let samples = splatkit::volume::Samples::F32((0..fine.pow(3)).map(value).collect());
-                // Thin enough that tiles do not end early.
-                transfer.opacity.iter_mut().for_each(|point| point.1 *= 0.3);
-                *volume = splatkit::volume::Volume::new(lattice, samples).expect("a volume").into();
-            }
-        }
-        case.settings.size = [18, 14];
-        let expected = reference::render(&case.scene, &case.camera, &case.settings).expect(case.name);
-        let agreement = psnr(&drawn(&case, Budget::default()), &expected);
-        println!("{} in crowded tiles: {agreement:.1} dB", case.name);
-        assert!(agreement > 50.0, "{agreement:.1} dB");
-    }
-}

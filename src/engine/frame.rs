@@ -105,7 +105,7 @@ pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Sett
 const SOFTWARE_ENTRIES: u32 = 10_000;
 
 /// Beyond this many footprint radii the sections of an isotropic kernel count as the same for all pixels. The error is at
-/// most a two-hundredth of the radius, at the footprint's rim; tests/engine_equals_reference.rs bounds the picture's.
+/// most a hundredth of the radius, at the footprint's rim; tests/engine_equals_reference.rs bounds the picture's.
 const ISOTROPIC_DISTANCE: f64 = 50.0;
 
 /// Steps of equal length at right angles.

@@ -3,6 +3,9 @@
 
 use super::Gpu;
 
+/// Workgroups along one dimension of a dispatch, by WebGPU's default limits.
+const MOST_WORKGROUPS: u32 = 65_535;
+
 /// What a binding holds, in the order of the shader's binding numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Binding {
@@ -75,10 +78,12 @@ impl Stage {
         })
     }
 
-    /// Encodes a dispatch of a fixed number of workgroups.
+    /// Encodes a dispatch of a fixed number of workgroups. More than fit one dimension go on in the second, so that
+    /// workgroup (x, y) is number x + 65,535·y, and a few of the last row may be too many.
     pub fn dispatch(&self, encoder: &mut wgpu::CommandEncoder, groups: &[&wgpu::BindGroup], workgroups: u32) {
-        if workgroups > 0 {
-            self.begin(encoder, groups).dispatch_workgroups(workgroups, 1, 1);
+        let columns = workgroups.min(MOST_WORKGROUPS);
+        if columns > 0 {
+            self.begin(encoder, groups).dispatch_workgroups(columns, workgroups.div_ceil(columns), 1);
         }
     }
 

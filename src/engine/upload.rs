@@ -36,7 +36,7 @@ pub struct Chunk {
     /// Splats (48 bytes each) or samples in their own type.
     pub data: wgpu::Buffer,
     pub uniform: wgpu::Buffer,
-    /// The sheets and bands that every candidate meets (`pack_span` in frame.wgsl).
+    /// The sheets and bands that every candidate meets (`pack_span` in spans.wgsl).
     pub spans: wgpu::Buffer,
     /// Splats, or voxels before selection.
     pub count: u32,

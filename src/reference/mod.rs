@@ -23,7 +23,7 @@
 //! add, colours and normals are averaged by them, and the average is lit once where some splat has a normal.
 //!
 //! **Fields.** A sample adds the section s = √(2π)·exp(−ρ²/2)·share/|β|, a length. A sheet's value is f̄ = Σ f·s / Σ s;
-//! it has none where Σ s is under a millionth of its thickness. The value is classified after this interpolation:
+//! it has none where Σ s is under a ten-thousandth of its thickness. The value is classified after this interpolation:
 //! optical depth = extinction(f̄) · ℓ, with ℓ the length of the ray inside both the sheet and the box of the samples
 //! (for a lattice; an axis of one sample counts ± ½ of its step), or Σ s but at most the sheet's thickness (for scattered
 //! samples).
