@@ -152,7 +152,8 @@ impl Renderer {
         let pixels = view.size[0] as usize * view.size[1] as usize;
         let color: Vec<[f32; 4]> =
             bytemuck::pod_collect_to_vec(&read_buffer(&self.gpu, &targets.colors, 0, 16 * pixels as u64)?);
-        let hits: Vec<f32> = bytemuck::pod_collect_to_vec(&read_buffer(&self.gpu, &targets.depths, 0, 4 * pixels as u64)?);
+        let hits: Vec<f32> =
+            bytemuck::pod_collect_to_vec(&read_buffer(&self.gpu, &targets.depths, 0, 4 * pixels as u64)?);
         let width = view.size[0] as usize;
         let depth = (0..pixels)
             .map(|i| {

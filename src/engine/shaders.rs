@@ -54,8 +54,18 @@ impl Variant {
 
     /// The constants, as WGSL.
     pub fn constants(&self) -> String {
-        let Self { perspective, scalar, lattice, radiance, isotropic, volume_shaded, surface_shaded, central, rows, most_entries } =
-            *self;
+        let Self {
+            perspective,
+            scalar,
+            lattice,
+            radiance,
+            isotropic,
+            volume_shaded,
+            surface_shaded,
+            central,
+            rows,
+            most_entries,
+        } = *self;
         let general = radiance || !isotropic;
         let waiting = u32::from(self.waits());
         format!(
