@@ -201,7 +201,7 @@ fn small_budgets_draw_the_same_picture() {
     for (case, few_entries, few_words) in cases {
         let whole = drawn(&case, Budget::default());
         for (entries, record_words) in [(few_entries, 1 << 22), (1 << 24, few_words), (few_entries, few_words)] {
-            let mut renderer = Renderer::with_budget(&gpu, Budget { entries, record_words });
+            let mut renderer = Renderer::with_budget(&gpu, Budget { entries, record_words, ..Budget::default() });
             let mut prepared = renderer.prepare(&case.scene).expect(case.name);
             let (parts, stats) = renderer.render(&mut prepared, &case.camera, &case.settings).expect(case.name);
             assert!(stats.passes > 1, "{}: {entries} entries fit in one pass", case.name);
@@ -212,12 +212,24 @@ fn small_budgets_draw_the_same_picture() {
     }
 }
 
+/// A tile that stops after some hundred entries and goes on in another dispatch draws the same picture.
+#[test]
+fn tiles_that_stop_go_on() {
+    for make in [scenes::blobs_analytic, scenes::blobs_central, scenes::surface_in_a_volume, scenes::huge_among_small] {
+        let case = make();
+        let budget = Budget { tile_entries: Some(300), ..Budget::default() };
+        let agreement = psnr(&drawn(&case, budget), &drawn(&case, Budget::default()));
+        println!("{} in stops: {agreement:.1} dB", case.name);
+        assert!(agreement > 80.0, "{}: {agreement:.1} dB", case.name);
+    }
+}
+
 /// More splats in one sheet of one band than the budget holds: an error that says so, not a picture without them.
 #[test]
 fn a_budget_too_small_for_a_single_sheet_is_an_error() {
     let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
     let case = scenes::blobs_analytic();
-    let mut renderer = Renderer::with_budget(&gpu, Budget { entries: 8, record_words: 8 });
+    let mut renderer = Renderer::with_budget(&gpu, Budget { entries: 8, record_words: 8, ..Budget::default() });
     let mut prepared = renderer.prepare(&case.scene).expect(case.name);
     let found = renderer.render(&mut prepared, &case.camera, &case.settings);
     assert!(found.is_err_and(|e| e.to_string().contains("budget")));

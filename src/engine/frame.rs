@@ -30,11 +30,14 @@ pub struct Budget {
     pub entries: u32,
     /// Record words of a pass: an isotropic lattice sample takes one, any other splat four; 28 bytes each.
     pub record_words: u32,
+    /// Entries of a tile that one dispatch of march adds up; a tile with more goes on in another. `None`: as many as the
+    /// adapter's driver bears.
+    pub tile_entries: Option<u32>,
 }
 
 impl Default for Budget {
     fn default() -> Self {
-        Self { entries: 1 << 24, record_words: 1 << 22 }
+        Self { entries: 1 << 24, record_words: 1 << 22, tile_entries: None }
     }
 }
 
@@ -48,6 +51,7 @@ impl Budget {
         Self {
             entries: self.entries.clamp(1, room.saturating_mul(4)),
             record_words: self.record_words.clamp(4, room.min(Self::MOST_WORDS)),
+            ..self
         }
     }
 }
@@ -60,7 +64,7 @@ const MOST_GROUP_SHIFT: u32 = 7;
 const TABLE: usize = 4096;
 
 /// Which light and which sources a picture has decides what is compiled.
-pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Settings) -> Variant {
+pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Settings, budget: Budget) -> Variant {
     let mut variant = Variant {
         perspective: view.perspective,
         scalar: false,
@@ -72,7 +76,7 @@ pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Sett
         central: false,
         // A software adapter runs eight invocations at once: eight columns of eight pixels fill a tile.
         rows: if gpu.is_software() { 8 } else { 1 },
-        most_entries: if gpu.is_software() { SOFTWARE_ENTRIES } else { u32::MAX },
+        most_entries: budget.tile_entries.unwrap_or(if gpu.is_software() { SOFTWARE_ENTRIES } else { u32::MAX }),
     };
     for item in &prepared.scene.items {
         match item {

@@ -1,7 +1,7 @@
 //! The device: adapters, their limits, and the errors of both.
 
 use crate::{Error, Result};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// A wgpu device and queue, with the adapter's description.
 #[derive(Debug, Clone)]
@@ -9,6 +9,8 @@ pub struct Gpu {
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
     pub info: Arc<wgpu::AdapterInfo>,
+    /// The first error that the device reported outside of a call, memory that ran out above all.
+    fault: Arc<Mutex<Option<String>>>,
 }
 
 /// Which adapter to take.
@@ -124,12 +126,19 @@ impl Gpu {
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|e| Error::NoAdapter(format!("{} cannot be opened: {e}", adapter.get_info().name)))?;
-        Ok(Self { device, queue, info: Arc::new(adapter.get_info()) })
+        let gpu = Self::from_wgpu(device, queue, adapter.get_info());
+        let fault = gpu.fault.clone();
+        // Without a handler wgpu ends the program where memory runs out.
+        gpu.device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| error.to_string());
+        }));
+        Ok(gpu)
     }
 
-    /// Takes the device of a host application. It must keep WebGPU's default limits.
+    /// Takes the device of a host application. It must keep WebGPU's default limits, and its errors go to the host's own
+    /// handler.
     pub fn from_wgpu(device: wgpu::Device, queue: wgpu::Queue, info: wgpu::AdapterInfo) -> Self {
-        Self { device, queue, info: Arc::new(info) }
+        Self { device, queue, info: Arc::new(info), fault: Arc::default() }
     }
 
     /// Whether the adapter runs on the processor. Tiles are then walked by fewer, wider invocations.
@@ -144,10 +153,17 @@ impl Gpu {
     }
 
     /// Waits until the device has done all that was submitted.
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] where the device is lost, or reported an error since the last time.
     pub fn wait(&self) -> Result<()> {
-        match self.device.poll(wgpu::PollType::wait_indefinitely()) {
-            Ok(_) => Ok(()),
-            Err(e) => Err(Error::Gpu(format!("{} stopped answering: {e}", self.info.name))),
+        let name = &self.info.name;
+        if let Err(error) = self.device.poll(wgpu::PollType::wait_indefinitely()) {
+            return Err(Error::Gpu(format!("{name} stopped answering: {error}")));
+        }
+        match self.fault.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            None => Ok(()),
+            Some(fault) => Err(Error::Gpu(format!("{name}: {fault}"))),
         }
     }
 }

@@ -104,7 +104,7 @@ impl Renderer {
     ) -> Result<(Targets, FrameStats)> {
         let gpu = &self.gpu;
         let _span = tracing::debug_span!("frame", width = view.size[0], height = view.size[1]).entered();
-        let variant = frame::variant(gpu, prepared, view, settings);
+        let variant = frame::variant(gpu, prepared, view, settings, self.budget);
         let sheets = prepared.scene.sheets(view, settings);
         let targets = frame::targets(gpu, &mut self.pool, prepared, &variant, view, &sheets, settings, self.budget)?;
         let pipelines = self.pipelines.entry(variant).or_insert_with(|| Pipelines::new(gpu, &variant));
