@@ -13,8 +13,6 @@ pub mod raw;
 mod sample_type;
 mod source;
 #[cfg(test)]
-mod test_files;
-#[cfg(test)]
 mod testing;
 mod texture;
 pub mod vti;

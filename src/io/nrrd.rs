@@ -278,7 +278,7 @@ mod tests {
 
     #[test]
     fn every_encoding_in_both_orders() {
-        let folder = Folder::new("nrrd-encodings");
+        let folder = Folder::new();
         let ascii = VALUES.map(|v| v.to_string()).join("\n");
         for (endian, name) in [(Endian::Little, "little"), (Endian::Big, "big")] {
             let raw = bytes_of(endian);
@@ -306,7 +306,7 @@ mod tests {
 
     #[test]
     fn lattices() {
-        let folder = Folder::new("nrrd-lattices");
+        let folder = Folder::new();
         let lattice = |fields: &str| {
             let content = file(&format!("type: uint8\nsizes: 2 1 1\nencoding: raw\n{fields}"), &[1, 2]);
             read_with(&folder.write("volume.nrrd", &content), read).map(|volume| volume.lattice)
@@ -332,10 +332,10 @@ mod tests {
 
     #[test]
     fn skips_and_detached_files() {
-        let folder = Folder::new("nrrd-detached");
-        folder.write("plain.raw", &[9, 9, 1, 2, 3, 4]);
+        let folder = Folder::new();
+        folder.write("plain.raw", [9, 9, 1, 2, 3, 4]);
         folder.write("lines.raw", b"one\ntwo\n\x05\x01\x02\x03\x04");
-        folder.write("packed.raw.gz", &[b"line\n".to_vec(), gzip(&[7, 1, 2, 3, 4])].concat());
+        folder.write("packed.raw.gz", [b"line\n".to_vec(), gzip(&[7, 1, 2, 3, 4])].concat());
         let detached = |fields: &str| {
             let text = format!("NRRD0001\ntype: uchar\ndimension: 3\nsizes: 2 2 1\n{fields}\n");
             read_with(&folder.write("volume.nhdr", text.as_bytes()), read)
@@ -369,7 +369,7 @@ mod tests {
 
     #[test]
     fn every_type() {
-        let folder = Folder::new("nrrd-types");
+        let folder = Folder::new();
         for (name, samples) in [
             ("signed char", Samples::I16(vec![1, 2])),
             ("unsigned char", Samples::U8(vec![1, 2])),
@@ -390,14 +390,14 @@ mod tests {
 
     #[test]
     fn cuts_and_lies_are_errors() {
-        let folder = Folder::new("nrrd-broken");
+        let folder = Folder::new();
         let fields = "type: short\nsizes: 3 2 2\nencoding";
         for (encoding, data) in [("raw", bytes_of(Endian::Little)), ("gzip", gzip(&bytes_of(Endian::Little)))] {
             let content = file(&format!("{fields}: {encoding}\nendian: little"), &data);
             every_cut(&folder, "volume.nrrd", &content, read);
         }
         let error =
-            |fields: &str, data: &[u8]| read_with(&folder.write("volume.nrrd", &file(fields, data)), read).unwrap_err();
+            |fields: &str, data: &[u8]| read_with(&folder.write("volume.nrrd", file(fields, data)), read).unwrap_err();
         let sizes =
             |sizes: &str| error(&format!("type: uint8\nsizes: {sizes}\nencoding: gzip"), &gzip(&vec![0; 1 << 20]));
         assert!(matches!(sizes("1099511627776 1 1"), Error::Limit { .. }));

@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn plain_packed_with_header_and_in_both_orders() {
-        let folder = Folder::new("raw-variants");
+        let folder = Folder::new();
         let values: Vec<i16> = (0..24).map(|i| i * 1000 - 9000).collect();
         for endian in [Endian::Little, Endian::Big] {
             for header in [0, 5] {
@@ -140,8 +140,8 @@ mod tests {
 
     #[test]
     fn a_size_that_does_not_fit_gives_a_guess() {
-        let folder = Folder::new("raw-size");
-        let path = folder.write("volume.raw", &[7; 128]);
+        let folder = Folder::new();
+        let path = folder.write("volume.raw", [7; 128]);
         let error = |layout: RawLayout| read_with(&path, |source| read(source, &layout)).unwrap_err();
         let message = error(layout([4, 4, 4], SampleType::U8)).to_string();
         assert!(
@@ -152,33 +152,33 @@ mod tests {
         assert!(hint(error(layout([4, 4, 5], SampleType::U8))).contains("4 × 4 × 8"));
         assert!(hint(error(layout([3, 5, 5], SampleType::I16))).contains("4 × 4 × 4"));
         assert!(hint(error(layout([5, 5, 5], SampleType::U8))).contains("header of 3 bytes"));
-        let packed = folder.write("volume.raw.gz", &gzip(&[7; 128]));
+        let packed = folder.write("volume.raw.gz", gzip(&[7; 128]));
         let error = read_with(&packed, |source| read(source, &layout([4, 4, 4], SampleType::U8))).unwrap_err();
         assert!(hint(error).contains("2 bytes"));
     }
 
     #[test]
     fn broken_files_and_layouts_are_errors() {
-        let folder = Folder::new("raw-broken");
+        let folder = Folder::new();
         let whole = gzip(&(0..64).collect::<Vec<u8>>());
         for (name, content) in [("volume.raw.gz", &whole[..]), ("volume.raw", &[9; 64])] {
             every_cut(&folder, name, content, |source| read(source, &layout([4, 4, 4], SampleType::U8)));
         }
-        let path = folder.write("bomb.raw.gz", &gzip(&vec![0; 1 << 20]));
+        let path = folder.write("bomb.raw.gz", gzip(&vec![0; 1 << 20]));
         let small = |layout: RawLayout| read_with(&path, |source| read(source, &layout)).unwrap_err();
         assert!(small(layout([2, 2, 2], SampleType::U8)).to_string().contains("more bytes"));
         assert!(matches!(small(layout([1 << 40, 1, 1], SampleType::U8)), Error::Limit { .. }));
         assert!(matches!(small(layout([1 << 31, 1 << 31, 1], SampleType::F64)), Error::Limit { .. }));
         assert!(matches!(small(RawLayout { header: u64::MAX, ..layout([2; 3], SampleType::U8) }), Error::Limit { .. }));
         assert!(matches!(small(layout([2, 0, 2], SampleType::U8)), Error::Argument(_)));
-        let path = folder.write("nan.raw", &[0, 0, 192, 127, 0, 0, 128, 63]);
+        let path = folder.write("nan.raw", [0, 0, 192, 127, 0, 0, 128, 63]);
         let error = read_with(&path, |source| read(source, &layout([2, 1, 1], SampleType::F32))).unwrap_err();
         assert!(error.to_string().contains("1 of 2 samples are not finite, the first is sample 0"));
     }
 
     #[test]
     fn volumes_are_known_by_name_then_layout_then_content() {
-        let folder = Folder::new("load-volume");
+        let folder = Folder::new();
         let nrrd = b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 1 1\nencoding: raw\n\n\x01\x02";
         let layout = layout([nrrd.len(), 1, 1], SampleType::U8);
         let load =
@@ -187,7 +187,7 @@ mod tests {
         assert_eq!(load("a.data", Some(&layout)).unwrap().len(), nrrd.len());
         assert_eq!(load("a.data", None).unwrap().len(), 2);
         assert!(load("a.VTI", None).is_err());
-        let path = folder.write("b.raw", &[1, 2, 3]);
+        let path = folder.write("b.raw", [1, 2, 3]);
         assert!(
             hint(crate::io::load_volume(&path, &crate::io::Limits::default(), None).unwrap_err())
                 .contains("dimensions")

@@ -2,24 +2,34 @@
 
 use super::{Limits, Source};
 use crate::{Error, Result};
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::atomic::{AtomicU32, Ordering},
+};
 
 /// A folder for one test, removed at its end.
 pub struct Folder(PathBuf);
 
 impl Folder {
-    pub fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("splatkit-{}-{name}", std::process::id()));
+    pub fn new() -> Self {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let number = COUNT.fetch_add(1, Ordering::Relaxed);
+        let path = std::env::temp_dir().join(format!("splatkit-test-{}-{number}", std::process::id()));
         std::fs::create_dir_all(&path).unwrap();
         Self(path)
     }
 
-    pub fn write(&self, name: &str, bytes: &[u8]) -> PathBuf {
+    /// Writes a file and gives its path.
+    pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
         let path = self.0.join(name);
         // Some file systems wait for the disk when a file is cut and written again, but not for a new one.
         std::fs::remove_file(&path).ok();
         std::fs::write(&path, bytes).unwrap();
         path
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.0
     }
 }
 
@@ -50,4 +60,12 @@ pub fn every_cut<T>(folder: &Folder, name: &str, bytes: &[u8], read: impl Fn(&So
     }
     let path = folder.write(name, bytes);
     read_with(&path, &read).unwrap_or_else(|e| panic!("the whole file: {e}"));
+}
+
+/// A PNG of these texels.
+pub fn png(width: u32, height: u32, texels: &[[u8; 4]]) -> Vec<u8> {
+    let mut out = std::io::Cursor::new(Vec::new());
+    let picture = image::RgbaImage::from_raw(width, height, texels.concat()).expect("as many texels as the size says");
+    picture.write_to(&mut out, image::ImageFormat::Png).expect("encodes");
+    out.into_inner()
 }

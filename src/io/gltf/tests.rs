@@ -1,7 +1,7 @@
 use super::*;
 use crate::io::{
     Limits, load_mesh,
-    test_files::{Folder, png},
+    testing::{Folder, png},
 };
 use base64::{Engine, engine::general_purpose::STANDARD};
 use serde_json::{Value, json};

@@ -1,7 +1,7 @@
 use super::*;
 use crate::io::{
     Limits, load_mesh,
-    test_files::{Folder, png},
+    testing::{Folder, png},
 };
 
 fn load(text: impl AsRef<[u8]>) -> Result<Mesh> {

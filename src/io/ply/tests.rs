@@ -1,7 +1,7 @@
 use super::*;
 use crate::{
     Error,
-    io::{Limits, test_files::Folder},
+    io::{Limits, testing::Folder},
 };
 
 fn load(bytes: impl AsRef<[u8]>) -> Result<Mesh> {

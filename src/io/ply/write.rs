@@ -60,7 +60,7 @@ mod tests {
 
     #[test]
     fn what_is_written_reads_back() {
-        let folder = Folder::new("ply-write");
+        let folder = Folder::new();
         for mesh in [Mesh::knot(20, 5), Mesh::cube(2.0), Mesh { triangles: Vec::new(), ..Mesh::sphere(1) }] {
             let path = folder.write("mesh.ply", b"");
             write(&mesh, &path).unwrap();

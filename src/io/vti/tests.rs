@@ -130,10 +130,10 @@ fn styles() -> Vec<Style> {
 
 #[test]
 fn every_style() {
-    let folder = Folder::new("vti-styles");
+    let folder = Folder::new();
     for style in styles() {
         let volume =
-            read_with(&folder.write("volume.vti", &style.file()), read).unwrap_or_else(|e| panic!("{style:?}: {e}"));
+            read_with(&folder.write("volume.vti", style.file()), read).unwrap_or_else(|e| panic!("{style:?}: {e}"));
         assert_eq!(volume.samples, Samples::I16(VALUES.to_vec()), "{style:?}");
         assert_eq!(volume.lattice.dims, [3, 2, 2]);
         // The first axis points along y, the second one along −x; the first index along it is 1.
@@ -143,7 +143,7 @@ fn every_style() {
 
 #[test]
 fn every_cut_is_an_error() {
-    let folder = Folder::new("vti-cuts");
+    let folder = Folder::new();
     for style in styles().into_iter().filter(|style| style.wide) {
         every_cut(&folder, "volume.vti", &style.file(), read);
     }
@@ -152,7 +152,7 @@ fn every_cut_is_an_error() {
 /// Cut or changed data inside files that end as they should.
 #[test]
 fn no_damage_panics_or_passes_for_long() {
-    let folder = Folder::new("vti-damage");
+    let folder = Folder::new();
     for style in [PLAIN, Style { packed: true, ..PLAIN }, Style { packed: true, format: "binary", ..PLAIN }] {
         let file = style.file();
         for at in 0..file.len() {
@@ -178,7 +178,7 @@ fn ascii(head: &str, image: &str, points: &str) -> Vec<u8> {
 
 #[test]
 fn types_and_the_choice_of_the_array() {
-    let folder = Folder::new("vti-types");
+    let folder = Folder::new();
     let load = |points: &str| {
         let content = ascii("type=\"ImageData\"", "WholeExtent=\"0 1 0 0 0 1\"", points);
         read_with(&folder.write("volume.vti", &content), read)
@@ -221,10 +221,10 @@ fn types_and_the_choice_of_the_array() {
 
 #[test]
 fn wrong_heads_are_told() {
-    let folder = Folder::new("vti-heads");
+    let folder = Folder::new();
     let error = |head: &str, image: &str| {
         let points = "<PointData><DataArray type='UInt8' format='ascii'>1 2 3 4</DataArray></PointData>";
-        read_with(&folder.write("volume.vti", &ascii(head, image, points)), read).unwrap_err()
+        read_with(&folder.write("volume.vti", ascii(head, image, points)), read).unwrap_err()
     };
     let (head, image) = ("type='ImageData'", "WholeExtent='0 1 0 0 0 1'");
     for (head, image, word) in [
@@ -254,7 +254,7 @@ fn wrong_heads_are_told() {
 
 #[test]
 fn lying_counts_allocate_nothing() {
-    let folder = Folder::new("vti-lies");
+    let folder = Folder::new();
     let error = |extent: &str, wide: bool, section: &[u8]| {
         let style = Style { packed: true, wide, ..PLAIN };
         let mut file = format!(
@@ -293,7 +293,7 @@ fn lying_counts_allocate_nothing() {
 
 #[test]
 fn pieces_are_put_together() {
-    let folder = Folder::new("vti-pieces");
+    let folder = Folder::new();
     let load = |pieces: &[(&str, &str)]| {
         let pieces: String = pieces
             .iter()
