@@ -68,21 +68,27 @@ impl Renderer {
         PreparedScene::new(&self.gpu, scene)
     }
 
-    /// Draws a picture and reads it back.
+    /// Draws a picture and reads it back. Pictures larger than a binding holds are drawn in strips, one below the other.
     pub fn render(
         &mut self,
         prepared: &mut PreparedScene,
         camera: &Camera,
         settings: &Settings,
     ) -> Result<(Picture, FrameStats)> {
-        let view = camera.view(settings.size)?;
-        let (targets, stats) = self.draw_frame(prepared, &view, settings, false)?;
-        Ok((self.read(&targets, &view)?, stats))
+        let [width, height] = settings.size;
+        let mut picture = Picture { width, height, color: Vec::new(), depth: Vec::new() };
+        let mut stats = FrameStats::default();
+        for strip in self.strips(&camera.view(settings.size)?) {
+            let (targets, own) = self.draw_frame(prepared, &strip, settings, false)?;
+            self.read(&targets, &strip, &mut picture)?;
+            stats.add(own);
+        }
+        Ok((picture, stats))
     }
 
     /// Draws a picture and leaves it on the GPU: a frame's time without the way back.
     pub fn draw(&mut self, prepared: &mut PreparedScene, camera: &Camera, settings: &Settings) -> Result<FrameStats> {
-        Ok(self.draw_frame(prepared, &camera.view(settings.size)?, settings, false)?.1)
+        self.draw_strips(prepared, camera, settings, false)
     }
 
     /// As [`Self::draw`], but waits for each step and tells its time.
@@ -92,7 +98,35 @@ impl Renderer {
         camera: &Camera,
         settings: &Settings,
     ) -> Result<FrameStats> {
-        Ok(self.draw_frame(prepared, &camera.view(settings.size)?, settings, true)?.1)
+        self.draw_strips(prepared, camera, settings, true)
+    }
+
+    fn draw_strips(
+        &mut self,
+        prepared: &mut PreparedScene,
+        camera: &Camera,
+        settings: &Settings,
+        profile: bool,
+    ) -> Result<FrameStats> {
+        let mut stats = FrameStats::default();
+        for strip in self.strips(&camera.view(settings.size)?) {
+            stats.add(self.draw_frame(prepared, &strip, settings, profile)?.1);
+        }
+        Ok(stats)
+    }
+
+    /// The view cut in strips of whole rows whose colours (16 bytes a pixel) fit a binding.
+    fn strips(&self, view: &View) -> Vec<View> {
+        let [width, height] = view.size;
+        let most = self.gpu.binding_size() / (16 * u64::from(width));
+        let rows = u32::try_from(most).unwrap_or(u32::MAX).clamp(1, height);
+        let strip = |first: u32| {
+            let mut strip = view.clone();
+            strip.size[1] = rows.min(height - first);
+            strip.center.y -= f64::from(first);
+            strip
+        };
+        (0..height).step_by(rows as usize).map(strip).collect()
     }
 
     fn draw_frame(
@@ -148,23 +182,39 @@ impl Renderer {
         Ok((targets, stats))
     }
 
-    fn read(&self, targets: &Targets, view: &View) -> Result<Picture> {
+    /// Appends the rows of a strip to a picture.
+    fn read(&self, targets: &Targets, view: &View, picture: &mut Picture) -> Result<()> {
         let pixels = view.size[0] as usize * view.size[1] as usize;
         let color: Vec<[f32; 4]> =
             bytemuck::pod_collect_to_vec(&read_buffer(&self.gpu, &targets.colors, 0, 16 * pixels as u64)?);
         let hits: Vec<f32> =
             bytemuck::pod_collect_to_vec(&read_buffer(&self.gpu, &targets.depths, 0, 4 * pixels as u64)?);
         let width = view.size[0] as usize;
-        let depth = (0..pixels)
-            .map(|i| {
-                if color[i][3] < 0.5 {
-                    return f32::INFINITY;
-                }
-                let at = glam::DVec2::new((i % width) as f64 + 0.5, (i / width) as f64 + 0.5);
-                hits[i] * view.ray(at).1.z as f32
-            })
-            .collect();
-        Ok(Picture { width: view.size[0], height: view.size[1], color, depth })
+        picture.depth.extend((0..pixels).map(|i| {
+            if color[i][3] < 0.5 {
+                return f32::INFINITY;
+            }
+            let at = glam::DVec2::new((i % width) as f64 + 0.5, (i / width) as f64 + 0.5);
+            hits[i] * view.ray(at).1.z as f32
+        }));
+        picture.color.extend(color);
+        Ok(())
+    }
+}
+
+impl FrameStats {
+    /// Adds what another strip of the same picture took.
+    fn add(&mut self, other: Self) {
+        self.splats = self.splats.max(other.splats);
+        self.entries += other.entries;
+        self.passes += other.passes;
+        self.gpu_bytes = self.gpu_bytes.max(other.gpu_bytes);
+        for (name, time) in other.steps {
+            match self.steps.iter_mut().find(|step| step.0 == name) {
+                Some(step) => step.1 += time,
+                None => self.steps.push((name, time)),
+            }
+        }
     }
 }
 

@@ -63,6 +63,8 @@ impl EngineFlags {
     pub fn settings(&self, loaded: &Loaded, factor: u32) -> Settings {
         let mut settings = Settings::new(self.size.map(|side| side.saturating_mul(factor)));
         settings.sheet_thickness = self.sheet_thickness;
+        // Sheets stay as thick as they are without the extra pixels: thinner ones would part what overlaps on a surface.
+        settings.sheet_pixels *= f64::from(factor);
         settings.gradient = match self.gradient {
             Gradient::Analytic => scene::Gradient::Analytic,
             Gradient::Central => scene::Gradient::Central,
