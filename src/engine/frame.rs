@@ -187,6 +187,19 @@ impl Targets {
         }
     }
 
+    /// What scatter and large bind alike to fill the bins of a pass.
+    pub fn bin_bindings(&self, pass: u32) -> [wgpu::BufferBinding<'_>; 7] {
+        [
+            self.frame.as_entire_buffer_binding(),
+            self.pass(pass),
+            self.boxes.as_entire_buffer_binding(),
+            self.runs.as_entire_buffer_binding(),
+            self.bins.as_entire_buffer_binding(),
+            self.entries.as_entire_buffer_binding(),
+            self.run_count.as_entire_buffer_binding(),
+        ]
+    }
+
     /// Where in `progress` it stands whether any tile is unfinished, and whether one cannot be finished: a byte offset.
     pub fn unfinished(&self) -> u64 {
         4 * u64::from(self.tile_count)

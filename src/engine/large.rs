@@ -32,18 +32,9 @@ impl Large {
         }
     }
 
-    fn buffers(targets: &Targets, pass: u32) -> [wgpu::BufferBinding<'_>; 9] {
-        [
-            targets.frame.as_entire_buffer_binding(),
-            targets.pass(pass),
-            targets.boxes.as_entire_buffer_binding(),
-            targets.runs.as_entire_buffer_binding(),
-            targets.bins.as_entire_buffer_binding(),
-            targets.entries.as_entire_buffer_binding(),
-            targets.run_count.as_entire_buffer_binding(),
-            targets.large.as_entire_buffer_binding(),
-            targets.large_count.as_entire_buffer_binding(),
-        ]
+    fn buffers(targets: &Targets, pass: u32) -> Vec<wgpu::BufferBinding<'_>> {
+        let own = [&targets.large, &targets.large_count].map(|b| b.as_entire_buffer_binding());
+        targets.bin_bindings(pass).into_iter().chain(own).collect()
     }
 
     /// Lists the large splats and counts their entries. Needs the workgroups that scatter has found.

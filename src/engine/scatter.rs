@@ -29,28 +29,16 @@ impl Scatter {
         }
     }
 
-    fn buffers(targets: &Targets, pass: u32) -> [wgpu::BufferBinding<'_>; 7] {
-        [
-            targets.frame.as_entire_buffer_binding(),
-            targets.pass(pass),
-            targets.boxes.as_entire_buffer_binding(),
-            targets.runs.as_entire_buffer_binding(),
-            targets.bins.as_entire_buffer_binding(),
-            targets.entries.as_entire_buffer_binding(),
-            targets.run_count.as_entire_buffer_binding(),
-        ]
-    }
-
     /// Finds the workgroups that a pass's records need.
     pub fn encode_count(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets, pass: u32) {
-        let buffers = Self::buffers(targets, pass);
+        let buffers = targets.bin_bindings(pass);
         let arguments = self.count.bind(gpu, 1, &[targets.scatter_arguments.as_entire_buffer_binding()]);
         self.count.dispatch(encoder, &[&self.count.bind(gpu, 0, &buffers), &arguments], 1);
     }
 
     /// Fills the bins.
     pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets, pass: u32) {
-        let buffers = Self::buffers(targets, pass);
+        let buffers = targets.bin_bindings(pass);
         let group = self.scatter.bind(gpu, 0, &buffers);
         self.scatter.dispatch_indirect(encoder, &[&group], (&targets.scatter_arguments, 0));
     }

@@ -183,6 +183,12 @@ fn read_cloud(source: &Source, text: &str, survey: &Survey) -> Result<Mesh> {
     if points.is_empty() {
         return Err(source.error("file", "has no vertices (no line that begins with “v ”)"));
     }
+    // Vertices come before faces: a mesh that is cut in its vertices looks like a cloud, but for its last line.
+    if !source.bytes().ends_with(b"\n") {
+        return Err(source
+            .error(format!("byte {}", source.bytes().len()), "the file ends within a line, before any face: it is cut")
+            .hint("if this is a whole point cloud, end its last line with a line break"));
+    }
     (mesh.origin, mesh.positions) =
         positions::settle(source, points.len(), |i| points[i].0, |i| format!("line {}", points[i].1))?;
     if colors.len() == points.len() {

@@ -31,6 +31,8 @@ fn polygons_negative_indices_and_line_ends() {
 fn colors_and_clouds() {
     let cloud = "v 0 0 0 1 0.5 0\nv 1 0 0 0 0 1\n";
     let mesh = load(cloud).expect("loads");
+    let cut = load(&cloud[..cloud.len() - 3]).expect_err("vertices that end within a line are a cut mesh");
+    assert!(cut.to_string().contains("byte"), "{cut}");
     assert_eq!(mesh.colors, [[255, 128, 0, 255], [0, 0, 255, 255]]);
     assert!(mesh.triangles.is_empty());
     let mesh = load(format!("{cloud}v 0 1 0 0 255 0\nf 1 2 3\n")).expect("loads");
