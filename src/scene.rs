@@ -6,6 +6,7 @@ use crate::{
     splat::{FOOTPRINT_BLUR, Payload, SplatSet},
     volume::{Shade, TransferFunction, Volume},
 };
+use glam::DVec3;
 use std::sync::Arc;
 
 /// One thing in a scene.
@@ -54,6 +55,72 @@ impl Scene {
     /// The box around everything that can be seen, footprints included.
     pub fn bounds(&self) -> Bounds {
         self.items.iter().fold(Bounds::EMPTY, |all, item| all.union(item.bounds()))
+    }
+
+    /// Checks that the scene can be drawn with the settings, beyond [`validate`](Self::validate): clips that are some, and
+    /// combinations that mean something.
+    pub fn validate_settings(&self, settings: &Settings) -> Result<()> {
+        let wrong = |message: String| Err(Error::Argument(message));
+        if settings.clips.len() > Settings::MAX_CLIPS {
+            return wrong(format!("{} clips are more than {}", settings.clips.len(), Settings::MAX_CLIPS));
+        }
+        for clip in &settings.clips {
+            match clip.shape {
+                ClipShape::HalfSpace { normal, offset } => {
+                    if !(normal.is_finite() && normal.length_squared() > 0.0 && offset.is_finite()) {
+                        return wrong(format!(
+                            "a clip plane needs a direction and an offset, found {normal} and {offset}"
+                        ));
+                    }
+                }
+                ClipShape::Box(bounds) => {
+                    if !(bounds.min.is_finite() && bounds.max.is_finite() && bounds.min.cmplt(bounds.max).all()) {
+                        let Bounds { min, max } = bounds;
+                        return wrong(format!("a clip box from {min} to {max} holds nothing"));
+                    }
+                }
+            }
+        }
+        let before = settings.mode != Mode::Sheets || settings.classification == Classification::Pre;
+        for item in &self.items {
+            match item {
+                Item::Radiance(_) if settings.optics == Optics::Maximum => {
+                    return wrong(
+                        "a maximum intensity picture takes a volume or samples alone, without surfaces".into(),
+                    );
+                }
+                Item::Radiance(_) => {}
+                Item::Volume(volume, kernel, _) => {
+                    if let Some(coefficients) = &volume.coefficients {
+                        if before {
+                            return wrong(
+                                "a sharp volume is classified after interpolation, in image-aligned sheets".into(),
+                            );
+                        }
+                        if coefficients.kernel != *kernel {
+                            return wrong("the volume was made sharp for another kernel".into());
+                        }
+                    }
+                }
+                Item::Scalar(..) => {}
+            }
+            if let Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) = item
+                && before
+            {
+                if settings.optics == Optics::Maximum {
+                    return wrong(
+                        "the maximum of a field needs image-aligned sheets, classified after interpolation".into(),
+                    );
+                }
+                if !(transfer.isosurfaces.is_empty() && transfer.gradient.is_empty()) {
+                    return wrong(
+                        "isosurfaces and gradient opacity need image-aligned sheets, classified after interpolation"
+                            .into(),
+                    );
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Checks that the engine can draw the scene: payloads that fit their items, and one scalar field at most (the
@@ -115,8 +182,7 @@ impl Scene {
         for item in &self.items {
             match item {
                 Item::Volume(volume, kernel, _) if settings.sheet_thickness.is_none() => {
-                    let spacing = volume.lattice.axes.determinant().abs().cbrt();
-                    let step = 2.0 / 3.0 * kernel.extent * spacing;
+                    let step = 2.0 / 3.0 * kernel.extent * volume.lattice.kernel_spacing();
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
                 }
                 Item::Volume(..) => {}
@@ -134,8 +200,10 @@ impl Item {
             Self::Radiance(set) | Self::Scalar(set, _) => set.bounds(),
             Self::Volume(volume, kernel, _) => {
                 let axes = volume.lattice.axes;
+                let unit = volume.lattice.largest_unit();
+                let axes = axes * glam::DMat3::from_diagonal(unit);
                 let reach =
-                    kernel.extent * glam::DVec3::new(axes.row(0).length(), axes.row(1).length(), axes.row(2).length());
+                    kernel.extent * DVec3::new(axes.row(0).length(), axes.row(1).length(), axes.row(2).length());
                 let [low, high] = volume.bounds();
                 Bounds { min: low - reach, max: high + reach }
             }
@@ -143,10 +211,76 @@ impl Item {
     }
 }
 
-/// How the gradient across the picture is found; along the ray it is always the difference of neighbouring sheets.
+/// What is composited.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Mode {
+    /// Image-aligned sheets (Mueller & Crawfis 1998): sheets parallel to the picture cut every kernel into sections.
+    #[default]
+    Sheets,
+    /// Axis-aligned sheets (Westover 1990): whole kernels are added in the slice of the data that their centre lies in, of
+    /// the data's axis nearest to the view. Samples are classified before they are added.
+    AxisSheets,
+    /// Every splat on its own (Westover 1989), whole, in the order of the distances of their centres. Samples are
+    /// classified before.
+    Splats(Order),
+}
+
+/// The order in which single splats are composited; the picture is the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Order {
+    #[default]
+    FrontToBack,
+    BackToFront,
+}
+
+/// When a field's values become colour and opacity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Classification {
+    /// Everywhere along the ray inside a sheet: the values at its two faces and its mean make a parabola, and the transfer
+    /// function is integrated over it. Thin shells keep their look in thick sheets.
+    #[default]
+    PreIntegrated,
+    /// Once per sheet, its mean (Mueller, Möller & Crawfis 1999).
+    Post,
+    /// Once per sample, before interpolation (Westover 1990). Blurs edges; for comparison.
+    Pre,
+}
+
+/// What a ray makes of a field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Optics {
+    /// Emission and absorption (Max 1995).
+    #[default]
+    EmissionAbsorption,
+    /// The colour and opacity of the largest value on the ray.
+    Maximum,
+    /// The light that the field absorbs, in white: opacity alone, without light or colour.
+    XRay,
+}
+
+/// A part of space that a scene is cut to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clip {
+    pub shape: ClipShape,
+    /// Keeps what is inside the shape; else what is outside.
+    pub inside: bool,
+}
+
+/// The shape of a [`Clip`], in world coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ClipShape {
+    /// The points x with normal·x ≤ offset are inside.
+    HalfSpace {
+        normal: DVec3,
+        offset: f64,
+    },
+    Box(Bounds),
+}
+
+/// How the gradient across the picture is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Gradient {
-    /// Derivative of the footprints.
+    /// Derivative of the kernels.
     #[default]
     Analytic,
     /// Differences of neighbouring pixels of a sheet (Mueller, Möller & Crawfis 1999, and the GPU sheet buffers after it).
@@ -158,6 +292,11 @@ pub enum Gradient {
 pub struct Settings {
     /// Width and height in pixels.
     pub size: [u32; 2],
+    pub mode: Mode,
+    pub classification: Classification,
+    pub optics: Optics,
+    /// All of them cut, at most [`Settings::MAX_CLIPS`].
+    pub clips: Vec<Clip>,
     pub gradient: Gradient,
     /// Light on volumes, instead of the transfer function's own; `Some(None)` for none.
     pub volume_shade: Option<Option<Shade>>,
@@ -172,10 +311,17 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// The most clips of one picture.
+    pub const MAX_CLIPS: usize = 8;
+
     /// The defaults for a picture of `size` pixels (width, height).
     pub fn new(size: [u32; 2]) -> Self {
         Self {
             size,
+            mode: Mode::default(),
+            classification: Classification::default(),
+            optics: Optics::default(),
+            clips: Vec::new(),
             gradient: Gradient::default(),
             volume_shade: None,
             surface_shade: Some(Shade { ambient: 0.2, diffuse: 0.75, specular: 0.15, power: 24.0 }),

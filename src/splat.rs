@@ -3,6 +3,7 @@
 use crate::math::Bounds;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
+use half::f16;
 use rayon::prelude::*;
 
 /// An ellipsoidal Gaussian splat as it lies in memory and on the GPU (48 bytes).
@@ -18,10 +19,37 @@ pub struct Splat {
     pub strength: f32,
     /// B row by row: b00, b10, b11, b20, b21, b22, in world units.
     pub factor: [f32; 6],
-    /// Red, green, blue, opacity of 8 bits each, red lowest. Not read for scalars.
+    /// Radiance: red, green, blue, opacity of 8 bits each, red lowest. Scalar: the weight and the first part of the slope,
+    /// 16-bit floats ([`Splat::sample`]).
     pub color: u32,
-    /// Unit normal, octahedral, two signed 16-bit parts ([`encode_normal`]); [`NO_NORMAL`] for none (drawn unshaded).
+    /// Radiance: unit normal, octahedral, two signed 16-bit parts ([`encode_normal`]); [`NO_NORMAL`] for none (drawn
+    /// unshaded). Scalar: the other parts of the slope.
     pub normal: u32,
+}
+
+impl Splat {
+    /// A scattered sample at `center` with a `value`. Its kernel, of the given `factor`, counts `weight` times in the
+    /// weighted mean that is the field, and carries not the value alone but value + slope·x′, x′ the place in whitened space:
+    /// with the right slopes a linear field comes out linear (Franke & Nielson 1980).
+    pub fn sample(center: Vec3, value: f32, factor: [f32; 6], weight: f32, slope: Vec3) -> Self {
+        let pack = |low: f32, high: f32| {
+            u32::from(f16::from_f32(low).to_bits()) | u32::from(f16::from_f32(high).to_bits()) << 16
+        };
+        Self {
+            center: center.to_array(),
+            strength: value,
+            factor,
+            color: pack(weight, slope.x),
+            normal: pack(slope.y, slope.z),
+        }
+    }
+
+    /// The weight and the slope of a [`sample`](Self::sample).
+    pub fn weight_and_slope(&self) -> (f32, Vec3) {
+        let [weight, x, y, z] = [self.color, self.color >> 16, self.normal, self.normal >> 16]
+            .map(|bits| f16::from_bits(bits as u16).to_f32());
+        (weight, Vec3::new(x, y, z))
+    }
 }
 
 /// The [`Splat::normal`] of a splat that has none.
@@ -49,6 +77,9 @@ pub struct SplatSet {
     pub splats: Vec<Splat>,
     /// Footprints end this many standard deviations from the centre.
     pub extent: f32,
+    /// Scalars: what the weighted kernels add up to inside the set, on average; read where samples are classified before
+    /// they are added. 1 for radiance.
+    pub overlap: f32,
 }
 
 /// Packs a unit vector in 32 bits (octahedral, Meyer et al. 2010).

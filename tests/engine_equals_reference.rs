@@ -282,7 +282,7 @@ fn a_new_transfer_function_needs_no_new_upload() {
     renderer.render(&mut prepared, &case.camera, &case.settings).expect(case.name);
     prepared.set_transfer(&other);
     let (found, _) = renderer.render(&mut prepared, &case.camera, &case.settings).expect(case.name);
-    let scene = splatkit::scene::Scene::new().with_volume(volume.clone(), *kernel, other);
+    let scene = splatkit::scene::Scene::new().with_volume(volume.clone(), kernel.clone(), other);
     let expected = reference::render(&scene, &case.camera, &case.settings).expect(case.name);
     assert!(psnr(&found, &expected) > 50.0, "{:.1} dB", psnr(&found, &expected));
 }

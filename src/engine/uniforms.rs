@@ -146,8 +146,8 @@ impl Frame {
                 Item::Volume(volume, kernel, transfer) => {
                     frame.volume_shade = shade(settings.shade_of(transfer));
                     frame.set_field(view, &volume.lattice);
-                    let sigma = kernel.sigma * volume.lattice.axes.x_axis.length();
-                    let extent = kernel.extent_in_sigmas();
+                    let sigma = kernel.unit() * volume.lattice.axes.x_axis.length();
+                    let extent = kernel.radius();
                     frame.isotropic = [sigma as f32, (1.0 / sigma) as f32, (extent * extent) as f32, 0.0];
                 }
             }

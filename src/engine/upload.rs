@@ -10,7 +10,7 @@ use crate::{
     math::{Kernel, View},
     scene::{Item, Scene},
     splat::{Splat, SplatSet},
-    volume::{Samples, TransferFunction, Volume, reach::neighbourhood_ranges},
+    volume::{Samples, TransferFunction, Volume},
 };
 use std::sync::Arc;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
@@ -63,7 +63,7 @@ impl PreparedScene {
             match item {
                 Item::Radiance(set) => prepared.add_splats(gpu, set, true),
                 Item::Scalar(set, _) => prepared.add_splats(gpu, set, false),
-                Item::Volume(volume, kernel, _) => prepared.add_volume(gpu, volume, *kernel)?,
+                Item::Volume(volume, kernel, _) => prepared.add_volume(gpu, volume, kernel.clone())?,
             }
         }
         Ok(prepared)
@@ -103,12 +103,17 @@ impl PreparedScene {
                 gpu.info.name
             )));
         }
-        let ranges = neighbourhood_ranges(volume, kernel.extent.ceil() as usize);
+        let ranges = volume.drawn_ranges(&kernel);
         for first in (0..depth).step_by(slices) {
             let part = first * slice as usize..(first + slices).min(depth) * slice as usize;
             let selection = Selection::new(gpu, &ranges[part.clone()]);
             self.bytes += selection.bytes();
-            let origin = Origin::Lattice { volume: volume.clone(), kernel, first_slice: first as u32, selection };
+            let origin = Origin::Lattice {
+                volume: volume.clone(),
+                kernel: kernel.clone(),
+                first_slice: first as u32,
+                selection,
+            };
             let count = part.len() as u32;
             let bytes = match &volume.samples {
                 Samples::U8(v) => bytemuck::cast_slice(&v[part]),
@@ -148,7 +153,7 @@ impl Chunk {
                 };
                 Source {
                     lattice: [width, height, *first_slice, kind],
-                    ..Source::of_lattice(view, &volume.lattice, kernel.sigma, kernel.extent, isotropic)
+                    ..Source::of_lattice(view, &volume.lattice, kernel.unit(), kernel.extent, isotropic)
                 }
             }
         };

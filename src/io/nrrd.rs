@@ -126,7 +126,7 @@ impl<'a> Header<'a> {
             Some(text) => self.vectors::<1>("space origin", text)?[0],
             None => DVec3::ZERO,
         };
-        let lattice = Lattice { dims, origin, axes };
+        let lattice = Lattice::cartesian(dims, origin, axes);
         lattice.validate().map_err(|message| self.source.error("header", message))?;
         Ok(lattice)
     }

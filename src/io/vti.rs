@@ -207,7 +207,7 @@ impl<'a> Image<'a> {
         let directions = DMat3::from_cols_array(&self.direction).transpose();
         let axes = directions * DMat3::from_diagonal(self.spacing);
         let first = DVec3::from_array(self.extent.map(|[first, _]| first as f64));
-        let lattice = Lattice { dims: dims(source, &self.extent)?, origin: self.origin + axes * first, axes };
+        let lattice = Lattice::cartesian(dims(source, &self.extent)?, self.origin + axes * first, axes);
         lattice.validate().map_err(|message| source.error("ImageData", message))?;
         Ok(lattice)
     }

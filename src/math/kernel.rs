@@ -1,34 +1,81 @@
-//! The reconstruction kernel of lattice samples.
+//! The reconstruction kernel of lattice samples: a radial function, in units of the sample spacing.
 
 use crate::{Error, Result};
+use std::{f64::consts::PI, sync::Arc};
 
-/// A truncated Gaussian exp(−r²/2σ²), r in units of the sample spacing along each axis, whose footprint ends at `extent`.
-///
-/// σ = 0.6 with extent 2 keeps the ripple of the kernels' sum at 1.3 % on a Cartesian lattice; dividing by that sum
-/// removes it from the picture.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The shape of a kernel over the distance r from its sample, in sample spacings.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Profile {
+    /// exp(−r²/2σ²) with this σ. Its footprint ends at the extent; along the ray it is whole.
+    Gaussian(f64),
+    /// The cubic B-spline, stretched so that it ends at the extent (2 is its own).
+    BSpline,
+    /// sin(πr)/πr under a Hann window that ends at the extent: cos²(πr / 2·extent).
+    Hann,
+    /// Values at evenly spaced radii from 0 to the extent, linear in between.
+    Table(Arc<[f64]>),
+}
+
+/// A radial kernel that ends at `extent`.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Kernel {
-    /// Standard deviation, in sample spacings.
-    pub sigma: f64,
+    pub profile: Profile,
     /// Radius of the footprint, in sample spacings.
     pub extent: f64,
 }
 
 impl Default for Kernel {
+    /// A Gaussian of σ = 0.6 with extent 2: its sum over a Cartesian lattice ripples by 1.3 %; dividing by that sum
+    /// removes it from the picture.
     fn default() -> Self {
-        Self { sigma: 0.6, extent: 2.0 }
+        Self { profile: Profile::Gaussian(0.6), extent: 2.0 }
     }
 }
 
 impl Kernel {
     /// The widest footprint that the engine takes, in sample spacings.
     pub const MAX_EXTENT: f64 = 16.0;
+    /// The most values of a [`Profile::Table`].
+    pub const MAX_TABLE: usize = 65_536;
 
     /// A Gaussian of standard deviation `sigma` cut at radius `extent`, both in sample spacings.
     pub fn gaussian(sigma: f64, extent: f64) -> Result<Self> {
         if !(sigma > 0.0 && sigma.is_finite()) {
             return Err(Error::Argument(format!("a kernel needs a sigma above 0, found {sigma}")));
         }
+        let kernel = Self::with_extent(Profile::Gaussian(sigma), extent)?;
+        if kernel.radius() < 1.0 {
+            return Err(Error::Argument(format!(
+                "a Gaussian of sigma {sigma} cut at {extent} samples is a block; cut it at {sigma} or more"
+            )));
+        }
+        Ok(kernel)
+    }
+
+    /// A cubic B-spline that ends at `extent`.
+    pub fn b_spline(extent: f64) -> Result<Self> {
+        Self::with_extent(Profile::BSpline, extent)
+    }
+
+    /// A Hann-windowed sinc that ends at `extent`.
+    pub fn hann(extent: f64) -> Result<Self> {
+        Self::with_extent(Profile::Hann, extent)
+    }
+
+    /// A kernel of the caller's own: its values at evenly spaced radii from 0 to `extent`.
+    pub fn table(values: Vec<f64>, extent: f64) -> Result<Self> {
+        let (count, most) = (values.len(), Self::MAX_TABLE);
+        if !(2..=most).contains(&count) || !values.iter().all(|value| value.is_finite()) {
+            return Err(Error::Argument(format!("a kernel's table has 2 to {most} finite values, found {count}")));
+        }
+        let kernel = Self::with_extent(Profile::Table(values.into()), extent)?;
+        if kernel.integral() <= 0.0 {
+            return Err(Error::Argument("a kernel's values must add up to more than 0".into()));
+        }
+        Ok(kernel)
+    }
+
+    fn with_extent(profile: Profile, extent: f64) -> Result<Self> {
         // Below 0.71 samples (half the diagonal of a face) a ray can pass between the samples of a lattice.
         if !(0.71..=Self::MAX_EXTENT).contains(&extent) {
             let most = Self::MAX_EXTENT;
@@ -36,11 +83,93 @@ impl Kernel {
                 "a kernel's extent must lie in 0.71 … {most} samples, found {extent}"
             )));
         }
-        Ok(Self { sigma, extent })
+        Ok(Self { profile, extent })
     }
 
-    /// Radius of the footprint in standard deviations.
-    pub fn extent_in_sigmas(&self) -> f64 {
-        self.extent / self.sigma
+    /// The length, in sample spacings, that kernel space counts in: σ of a Gaussian, one spacing of any other.
+    pub fn unit(&self) -> f64 {
+        match self.profile {
+            Profile::Gaussian(sigma) => sigma,
+            _ => 1.0,
+        }
+    }
+
+    /// Radius of the footprint in kernel space.
+    pub fn radius(&self) -> f64 {
+        self.extent / self.unit()
+    }
+
+    /// The value at distance `r`, in sample spacings; 0 beyond the extent, 1 at the sample unless a table says otherwise.
+    pub fn value(&self, r: f64) -> f64 {
+        if r > self.extent {
+            return 0.0;
+        }
+        match &self.profile {
+            Profile::Gaussian(sigma) => (-0.5 * (r / sigma).powi(2)).exp(),
+            Profile::BSpline => {
+                let t = 2.0 * r / self.extent;
+                if t < 1.0 { 1.0 - 1.5 * t * t + 0.75 * t * t * t } else { 0.25 * (2.0 - t).powi(3) }
+            }
+            Profile::Hann => {
+                let sinc = if r < 1e-6 { 1.0 } else { (PI * r).sin() / (PI * r) };
+                sinc * (0.5 * PI * r / self.extent).cos().powi(2)
+            }
+            Profile::Table(values) => {
+                let at = r / self.extent * (values.len() - 1) as f64;
+                let low = (at as usize).min(values.len() - 2);
+                values[low] + (values[low + 1] - values[low]) * (at - low as f64)
+            }
+        }
+    }
+
+    /// ∫ of the kernel over space, in cubed sample spacings: what its copies at every sample of a Cartesian lattice sum to
+    /// on average. A Gaussian is cut by its footprint's cylinder alone.
+    pub fn integral(&self) -> f64 {
+        if let Profile::Gaussian(sigma) = self.profile {
+            return (2.0 * PI).powf(1.5) * sigma.powi(3) * -(-0.5 * self.radius().powi(2)).exp_m1();
+        }
+        // Simpson's rule over the radius.
+        let parts = 4096;
+        let step = self.extent / f64::from(parts);
+        let shell = |i: u32| {
+            let r = f64::from(i) * step;
+            4.0 * PI * r * r * self.value(r)
+        };
+        let weight = |i: u32| if i == 0 || i == parts { 1.0 } else { f64::from(2 + 2 * (i % 2)) };
+        (0..=parts).map(|i| weight(i) * shell(i)).sum::<f64>() * step / 3.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_by_hand() {
+        let gaussian = Kernel::gaussian(0.5, 2.0).unwrap();
+        assert!((gaussian.value(0.5) - (-0.5f64).exp()).abs() < 1e-15 && gaussian.radius() == 4.0);
+        let spline = Kernel::b_spline(2.0).unwrap();
+        // ⅔, ⅙ and 0 over ⅔.
+        assert_eq!([0.0, 1.0, 2.0].map(|r| spline.value(r)), [1.0, 0.25, 0.0]);
+        let hann = Kernel::hann(3.0).unwrap();
+        assert!(hann.value(1.0).abs() < 1e-15 && hann.value(0.5) > 0.0 && hann.value(1.5) < 0.0);
+        let table = Kernel::table(vec![1.0, 0.5, 0.0], 4.0).unwrap();
+        assert_eq!([0.0, 1.0, 2.0, 3.0, 4.0, 4.1].map(|r| table.value(r)), [1.0, 0.75, 0.5, 0.25, 0.0, 0.0]);
+        // A cone of height 1 and radius 4: its integral over a ball is π·4³/3.
+        assert!((table.integral() / (PI * 64.0 / 3.0) - 1.0).abs() < 1e-6);
+        // 4π (⅓ − 3/10 + ⅛ + 11/120)
+        assert!((spline.integral() / PI - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn impossible_kernels_are_told() {
+        let message = |kernel: Result<Kernel>| kernel.unwrap_err().to_string();
+        assert!(message(Kernel::gaussian(0.0, 2.0)).contains("sigma above 0"));
+        assert!(message(Kernel::gaussian(f64::NAN, 2.0)).contains("sigma above 0"));
+        assert!(message(Kernel::gaussian(0.6, 1000.0)).contains("0.71 … 16"));
+        assert!(message(Kernel::gaussian(3.0, 1.0)).contains("block"));
+        assert!(message(Kernel::table(vec![1.0], 2.0)).contains("2 to"));
+        assert!(message(Kernel::table(vec![-1.0, 0.0], 2.0)).contains("more than 0"));
+        assert!(message(Kernel::table(vec![f64::NAN, 0.0], 2.0)).contains("finite"));
     }
 }

@@ -5,5 +5,5 @@ mod kernel;
 mod sheets;
 
 pub use camera::{Bounds, Camera, Projection, View};
-pub use kernel::Kernel;
+pub use kernel::{Kernel, Profile};
 pub use sheets::Sheets;

@@ -61,9 +61,9 @@ impl Kernel {
                 }
                 Item::Volume(volume, shape, _) => {
                     let lattice = &volume.lattice;
-                    let factor = view.rotation * lattice.axes * shape.sigma;
+                    let factor = view.rotation * lattice.axes * shape.unit();
                     let whitening = factor.inverse();
-                    let extent = shape.extent_in_sigmas();
+                    let extent = shape.radius();
                     let [nx, ny, _] = lattice.dims;
                     kernels.extend((0..lattice.len()).map(|at| {
                         let index = [at % nx, at / nx % ny, at / nx / ny].map(|i| i as f64);
@@ -155,7 +155,13 @@ mod tests {
             color: u32::MAX,
             normal: NO_NORMAL,
         };
-        SplatSet { origin: DVec3::new(0.1, 0.2, 0.3), payload: Payload::Radiance, splats: vec![splat], extent: 8.0 }
+        SplatSet {
+            origin: DVec3::new(0.1, 0.2, 0.3),
+            payload: Payload::Radiance,
+            splats: vec![splat],
+            extent: 8.0,
+            overlap: 1.0,
+        }
     }
 
     fn views() -> [View; 2] {

@@ -128,11 +128,8 @@ mod tests {
 
     #[test]
     fn a_ray_crosses_a_skewed_box_where_its_faces_are() {
-        let lattice = Lattice {
-            dims: [5, 4, 1],
-            origin: DVec3::new(0.1, 0.2, 0.3),
-            axes: DMat3::from_cols(DVec3::new(0.3, 0.1, 0.0), DVec3::new(0.0, 0.2, 0.1), DVec3::new(0.05, 0.0, 0.4)),
-        };
+        let axes = DMat3::from_cols(DVec3::new(0.3, 0.1, 0.0), DVec3::new(0.0, 0.2, 0.1), DVec3::new(0.05, 0.0, 0.4));
+        let lattice = Lattice::cartesian([5, 4, 1], DVec3::new(0.1, 0.2, 0.3), axes);
         for view in views() {
             let center = view.to_view(lattice.position(DVec3::new(2.0, 1.5, 0.0)));
             let flat = if view.perspective { center.truncate() / center.z } else { center.truncate() };

@@ -25,20 +25,23 @@ fn unshaded(size: [u32; 2]) -> Settings {
 /// One colour and one extinction for all values.
 fn uniform(color: [f64; 3], extinction: f64) -> TransferFunction {
     let opacity = -(-extinction).exp_m1();
-    TransferFunction { color: vec![(0.0, color)], opacity: vec![(0.0, opacity)], unit: 1.0, shade: None }
+    TransferFunction {
+        color: vec![(0.0, color)],
+        opacity: vec![(0.0, opacity)],
+        unit: 1.0,
+        ..TransferFunction::default()
+    }
 }
 
 fn volume(lattice: Lattice, value: impl Fn(DVec3) -> f64) -> Arc<Volume> {
-    let [nx, ny, _] = lattice.dims;
-    let position = |i: usize| lattice.position(DVec3::from([i % nx, i / nx % ny, i / nx / ny].map(|i| i as f64)));
-    let samples = (0..lattice.len()).map(|i| value(position(i)) as f32).collect();
+    let samples = (0..lattice.len()).map(|i| value(lattice.sample_position(i)) as f32).collect();
     Arc::new(Volume::new(lattice, Samples::F32(samples)).unwrap())
 }
 
 /// A lattice about the world's origin with given steps between its samples.
 fn centered(dims: [usize; 3], axes: DMat3) -> Lattice {
     let last = DVec3::from(dims.map(|n| n as f64 - 1.0));
-    Lattice { dims, origin: -0.5 * (axes * last), axes }
+    Lattice::cartesian(dims, -0.5 * (axes * last), axes)
 }
 
 fn skewed_axes() -> DMat3 {
@@ -51,7 +54,7 @@ fn round(center: Vec3, strength: f32, deviation: f32) -> Splat {
 }
 
 fn set(payload: Payload, splats: Vec<Splat>) -> SplatSet {
-    SplatSet { origin: DVec3::ZERO, payload, splats, extent: 8.0 }
+    SplatSet { origin: DVec3::ZERO, payload, splats, extent: 8.0, overlap: 1.0 }
 }
 
 fn close(found: impl Into<f64>, expected: f64, tolerance: f64) {

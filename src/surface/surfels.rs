@@ -74,7 +74,7 @@ impl Mesh {
             let what = if self.positions.is_empty() { "there are no points" } else { "no triangle has an area" };
             return Err(Error::NothingToDraw(what.into()));
         }
-        Ok(SplatSet { origin: self.origin, payload: Payload::Radiance, splats, extent: EXTENT })
+        Ok(SplatSet { origin: self.origin, payload: Payload::Radiance, splats, extent: EXTENT, overlap: 1.0 })
     }
 
     /// The smallest and the largest world coordinates of the positions; `None` where there are none.

@@ -7,7 +7,7 @@ pub mod reach;
 mod samples;
 mod transfer;
 
-pub use lattice::Lattice;
+pub use lattice::{Arrangement, Lattice};
 pub(crate) use samples::each_type;
-pub use samples::{Samples, Volume};
-pub use transfer::{Shade, TransferFunction};
+pub use samples::{Coefficients, Samples, Volume};
+pub use transfer::{Isosurface, Shade, TransferFunction};

@@ -54,9 +54,8 @@ impl Phantom {
     }
 
     fn fill<T: Send>(self, lattice: &Lattice, turn: impl Fn(f64) -> T + Sync) -> Vec<T> {
-        let [nx, ny, _] = lattice.dims;
-        let at = |index: usize| DVec3::new((index % nx) as f64, (index / nx % ny) as f64, (index / nx / ny) as f64);
-        (0..lattice.len()).into_par_iter().map(|index| turn(self.value(lattice.position(at(index))))).collect()
+        let value = |index: usize| turn(self.value(lattice.sample_position(index)));
+        (0..lattice.len()).into_par_iter().map(value).collect()
     }
 }
 
@@ -64,7 +63,7 @@ fn lattice(dims: [usize; 3]) -> Result<Lattice, String> {
     let step = dims.map(|n| if n > 1 { 2.0 / (n - 1) as f64 } else { 2.0 });
     let origin = dims.map(|n| if n > 1 { -1.0 } else { 0.0 });
     let axes = DMat3::from_diagonal(DVec3::from_array(step));
-    let lattice = Lattice { dims, origin: DVec3::from_array(origin), axes };
+    let lattice = Lattice::cartesian(dims, DVec3::from_array(origin), axes);
     lattice.validate()?;
     Ok(lattice)
 }

@@ -83,6 +83,7 @@ impl TransferFunction {
             opacity: points.iter().map(|&[v, .., opacity]| (low + v * width, opacity)).collect(),
             unit: 1.0,
             shade: Some(Shade::default()),
+            ..Self::default()
         })
     }
 
@@ -99,7 +100,13 @@ impl TransferFunction {
         let shade = Some(Shade::default());
         let [low, high] = volume.range;
         if low >= high {
-            return Self { color: vec![(low, [0.9, 0.8, 0.7])], opacity: vec![(low, 0.05)], unit, shade };
+            return Self {
+                color: vec![(low, [0.9, 0.8, 0.7])],
+                opacity: vec![(low, 0.05)],
+                unit,
+                shade,
+                ..Self::default()
+            };
         }
         let mut counts = volume.histogram(BINS);
         // A bright background is a dark one seen from the other end of the range.
@@ -120,7 +127,7 @@ impl TransferFunction {
             points.reverse();
             color.reverse();
         }
-        Self { color, opacity: points, unit, shade }
+        Self { color, opacity: points, unit, shade, ..Self::default() }
     }
 }
 

@@ -5,19 +5,19 @@
 use super::{Samples, TransferFunction, Volume};
 use rayon::prelude::*;
 
-/// For each sample the smallest and the largest value in the box of ±`radius` samples around it (cut at the volume's
-/// border), in memory order. Both are steps of 1/255 of the volume's range, the smallest rounded down and the largest
+/// For each sample the smallest and the largest value in the box of ±`radius` samples along each axis around it (cut at the
+/// volume's border), in memory order. Both are steps of 1/255 of the volume's range, the smallest rounded down and the largest
 /// rounded up. [`first_visible`] tells which of them show something.
 ///
 /// The extremes of a box are those along each axis after another. Smallest values and 255 minus the largest ones lie
 /// beside each other, so that one minimum of bytes serves both, and rounding goes before it because it keeps the order.
-/// Besides the result, a thread holds 2·`radius` + 3 slices.
-pub fn neighbourhood_ranges(volume: &Volume, radius: usize) -> Vec<[u8; 2]> {
+/// Besides the result, a thread holds 2·`radius[2]` + 3 slices.
+pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]> {
     let [nx, ny, nz] = volume.lattice.dims;
     let steps = Steps::new(volume);
     let slice = nx * ny;
-    let reach = |n: usize| radius.min(n.saturating_sub(1));
-    let (rx, ry, rz) = (reach(nx), reach(ny), reach(nz));
+    let reach = |axis: usize| radius[axis].min(volume.lattice.dims[axis].saturating_sub(1));
+    let (rx, ry, rz) = (reach(0), reach(1), reach(2));
     // Slabs repeat the slices that reach into them, so they are thick compared to the radius.
     let slab = nz.div_ceil(4 * rayon::current_num_threads()).max(8 * rz).max(1);
     let mut ranges = vec![[0u8; 2]; slice * nz];
@@ -180,19 +180,22 @@ mod tests {
         let mut random = Random(7);
         for _ in 0..300 {
             let volume = random_volume(&mut random);
-            let radius = random.next(5) as usize;
-            let [nx, ny, nz] = volume.lattice.dims;
+            let radius: [usize; 3] = std::array::from_fn(|_| random.next(5) as usize);
+            let [nx, ny, _] = volume.lattice.dims;
             let [lowest, highest] = volume.range;
             let scale = if highest > lowest { 255.0 / (highest - lowest) } else { 0.0 };
-            let around = |i: usize, n: usize| i.saturating_sub(radius)..(i + radius + 1).min(n);
+            let around = |i: usize, axis: usize| {
+                let (radius, n) = (radius[axis], volume.lattice.dims[axis]);
+                i.saturating_sub(radius)..(i + radius + 1).min(n)
+            };
             let ranges = neighbourhood_ranges(&volume, radius);
             assert_eq!(ranges.len(), volume.len());
             for (index, range) in ranges.into_iter().enumerate() {
                 let (i, j, k) = (index % nx, index / nx % ny, index / nx / ny);
                 let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-                for c in around(k, nz) {
-                    for b in around(j, ny) {
-                        for a in around(i, nx) {
+                for c in around(k, 2) {
+                    for b in around(j, 1) {
+                        for a in around(i, 0) {
                             let value = volume.value((c * ny + b) * nx + a);
                             (low, high) = (low.min(value), high.max(value));
                         }
@@ -202,7 +205,7 @@ mod tests {
                 assert_eq!(
                     range.map(f64::from),
                     expected,
-                    "sample {index} of {:?}, radius {radius}",
+                    "sample {index} of {:?}, radius {radius:?}",
                     volume.lattice.dims
                 );
             }
@@ -224,7 +227,7 @@ mod tests {
                 Samples::F32(vec![range[0] as f32, 2.0, range[1] as f32]),
             );
             let volume = volume.unwrap();
-            let [low, high] = neighbourhood_ranges(&volume, 0)[1];
+            let [low, high] = neighbourhood_ranges(&volume, [0; 3])[1];
             assert!(u16::from(high) >= first_visible(&label, volume.range)[usize::from(low)], "{range:?}");
         }
         assert_eq!(first_visible(&transfer, [0.0, 20.0]), [256; 256]);

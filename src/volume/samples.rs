@@ -1,7 +1,9 @@
 //! The values of a volume, in the type of their file.
 
-use super::Lattice;
+use super::{Lattice, reach::neighbourhood_ranges};
+use crate::math::Kernel;
 use rayon::prelude::*;
+use std::{borrow::Cow, sync::Arc};
 
 /// The samples in the type of their file, first axis fastest.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,6 +103,22 @@ pub struct Volume {
     pub lattice: Lattice,
     pub samples: Samples,
     pub range: [f64; 2],
+    /// What kernels carry instead of the samples, so that they pass through them ([`Volume::sharpened`]).
+    pub coefficients: Option<Arc<Coefficients>>,
+}
+
+/// Values for kernels on a lattice, such that their normalised sum passes through a volume's samples.
+#[derive(Debug, Clone)]
+pub struct Coefficients {
+    /// The volume's lattice, continued on all sides as far as the kernel reaches.
+    pub lattice: Lattice,
+    /// A value per sample of that lattice; of either sign, and beyond the range of the samples.
+    pub values: Vec<f32>,
+    /// For each of them the smallest and the largest value that their sum takes around it, in steps of 1/255 of the
+    /// volume's range (as [`neighbourhood_ranges`] has them).
+    pub ranges: Vec<[u8; 2]>,
+    /// The kernel that they hold for.
+    pub kernel: Kernel,
 }
 
 impl Volume {
@@ -116,7 +134,7 @@ impl Volume {
             return Err(format!("{} samples do not fill a volume of {nx} × {ny} × {nz}", samples.len()));
         }
         let range = samples.range()?;
-        Ok(Self { lattice, samples, range })
+        Ok(Self { lattice, samples, range, coefficients: None })
     }
 
     /// Number of samples.
@@ -134,6 +152,28 @@ impl Volume {
     /// Where `index` is not below [`len`](Self::len).
     pub fn value(&self, index: usize) -> f64 {
         self.samples.value(index)
+    }
+
+    /// The lattice whose samples kernels are drawn at: the volume's, or its coefficients'.
+    pub fn drawn_lattice(&self) -> &Lattice {
+        self.coefficients.as_ref().map_or(&self.lattice, |coefficients| &coefficients.lattice)
+    }
+
+    /// What the kernel at a sample of [`drawn_lattice`](Self::drawn_lattice) carries.
+    ///
+    /// # Panics
+    /// Where `index` is not below that lattice's number of samples.
+    pub fn drawn_value(&self, index: usize) -> f64 {
+        self.coefficients.as_ref().map_or_else(|| self.value(index), |drawn| f64::from(drawn.values[index]))
+    }
+
+    /// For each sample of [`drawn_lattice`](Self::drawn_lattice) the range of the values around it
+    /// ([`neighbourhood_ranges`]), as far as the kernel reaches.
+    pub fn drawn_ranges(&self, kernel: &Kernel) -> Cow<'_, [[u8; 2]]> {
+        match &self.coefficients {
+            Some(coefficients) => Cow::Borrowed(&coefficients.ranges),
+            None => Cow::Owned(neighbourhood_ranges(self, self.lattice.reach(kernel.extent))),
+        }
     }
 
     /// Smallest and largest world coordinates of the sample positions.

@@ -15,7 +15,8 @@ use std::path::Path;
 ///
 /// As JSON: `{"color": [[value, red, green, blue], …], "opacity": [[value, opacity], …], "unit": 1.0, "shade":
 /// {"ambient": 0.2, "diffuse": 0.7, "specular": 0.3, "power": 10}}`; `unit` is 1 and `shade` is none where they are
-/// not given.
+/// not given. Optional: `"gradient": [[magnitude, factor], …]` and `"isosurfaces": [{"value": 80, "color": [1, 1, 1],
+/// "opacity": 1}, …]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransferFunction {
     /// Value, and red, green, blue in 0 … 1; values ascend.
@@ -26,6 +27,36 @@ pub struct TransferFunction {
     pub unit: f64,
     /// How gradients are lit; none for colours as they are.
     pub shade: Option<Shade>,
+    /// Gradient magnitude (value per world length) and a factor of 0 … 1 on the extinction there (Levoy 1988); magnitudes
+    /// ascend. Empty for no such factor.
+    pub gradient: Vec<(f64, f64)>,
+    /// Surfaces of one value, drawn beside what the opacity shows.
+    pub isosurfaces: Vec<Isosurface>,
+}
+
+/// A surface of one value.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Isosurface {
+    pub value: f64,
+    /// Red, green, blue, 0 … 1.
+    pub color: [f64; 3],
+    /// The share of light that the surface holds back, over 0 and up to 1.
+    pub opacity: f64,
+}
+
+impl Default for TransferFunction {
+    /// Shows nothing.
+    fn default() -> Self {
+        Self {
+            color: vec![(0.0, [1.0; 3])],
+            opacity: vec![(0.0, 0.0)],
+            unit: 1.0,
+            shade: None,
+            gradient: Vec::new(),
+            isosurfaces: Vec::new(),
+        }
+    }
 }
 
 /// Phong's coefficients: ambient + diffuse·cos + specular·cosᵖᵒʷᵉʳ.
@@ -61,6 +92,10 @@ struct Document {
     unit: f64,
     #[serde(default)]
     shade: Option<Shade>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    gradient: Vec<[f64; 2]>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    isosurfaces: Vec<Isosurface>,
 }
 
 fn one() -> f64 {
@@ -68,6 +103,9 @@ fn one() -> f64 {
 }
 
 impl TransferFunction {
+    /// The most isosurfaces of one picture.
+    pub const MAX_ISOSURFACES: usize = 8;
+
     /// Reads the JSON form.
     ///
     /// # Errors
@@ -79,6 +117,8 @@ impl TransferFunction {
             opacity: document.opacity.iter().map(|&[value, opacity]| (value, opacity)).collect(),
             unit: document.unit,
             shade: document.shade,
+            gradient: document.gradient.iter().map(|&[magnitude, factor]| (magnitude, factor)).collect(),
+            isosurfaces: document.isosurfaces,
         };
         transfer.validate()?;
         Ok(transfer)
@@ -91,6 +131,8 @@ impl TransferFunction {
             opacity: self.opacity.iter().map(|&(value, opacity)| [value, opacity]).collect(),
             unit: self.unit,
             shade: self.shade,
+            gradient: self.gradient.iter().map(|&(magnitude, factor)| [magnitude, factor]).collect(),
+            isosurfaces: self.isosurfaces.clone(),
         };
         serde_json::json!(document).to_string()
     }
@@ -125,8 +167,29 @@ impl TransferFunction {
         if let Some(i) = self.opacity.iter().position(|(_, opacity)| !inside(opacity)) {
             return Err(format!("opacity point {i} is {}, but opacities lie in 0 … 1", self.opacity[i].1));
         }
-        if self.opacity.iter().all(|p| p.1 == 0.0) {
+        if self.opacity.iter().all(|p| p.1 == 0.0) && self.isosurfaces.is_empty() {
             return Err("a transfer function without opacity shows nothing: every opacity is 0".into());
+        }
+        if !self.gradient.is_empty() {
+            check_values("gradient", self.gradient.iter().map(|p| p.0))?;
+        }
+        if let Some(i) = self.gradient.iter().position(|(magnitude, factor)| *magnitude < 0.0 || !inside(factor)) {
+            let (magnitude, factor) = self.gradient[i];
+            return Err(format!(
+                "gradient point {i} is {factor} at {magnitude}, but magnitudes are 0 or more and factors lie in 0 … 1"
+            ));
+        }
+        let most = Self::MAX_ISOSURFACES;
+        if self.isosurfaces.len() > most {
+            return Err(format!("there are {} isosurfaces, more than {most}", self.isosurfaces.len()));
+        }
+        for (i, Isosurface { value, color, opacity }) in self.isosurfaces.iter().enumerate() {
+            if !(value.is_finite() && color.iter().all(inside) && *opacity > 0.0 && *opacity <= 1.0) {
+                return Err(format!(
+                    "isosurface {i} has value {value}, colour {color:?} and opacity {opacity}, but colours lie in 0 … 1 \
+                     and opacities above 0 and up to 1"
+                ));
+            }
         }
         if !(self.unit.is_finite() && self.unit > 0.0) {
             return Err(format!("the unit is {}, but it is a length over 0", self.unit));
@@ -151,17 +214,22 @@ impl TransferFunction {
         };
         self.color.iter_mut().for_each(|p| p.0 = turn(p.0));
         self.opacity.iter_mut().for_each(|p| p.0 = turn(p.0));
+        self.isosurfaces.iter_mut().for_each(|surface| surface.value = turn(surface.value));
         self
     }
 
-    /// The values that have opacity: the ends of the smallest interval that holds them, infinite where the function keeps
-    /// its opacity beyond its points; `None` for a function without opacity.
+    /// The values that have opacity or an isosurface: the ends of the smallest interval that holds them, infinite where the
+    /// function keeps its opacity beyond its points; `None` for a function that shows nothing.
     pub fn shown_range(&self) -> Option<[f64; 2]> {
-        let first = self.opacity.iter().position(|p| p.1 > 0.0)?;
-        let last = self.opacity.iter().rposition(|p| p.1 > 0.0)?;
-        let low = first.checked_sub(1).map_or(f64::NEG_INFINITY, |before| self.opacity[before].0);
-        let high = self.opacity.get(last + 1).map_or(f64::INFINITY, |after| after.0);
-        Some([low, high])
+        let first = self.opacity.iter().position(|p| p.1 > 0.0);
+        let last = self.opacity.iter().rposition(|p| p.1 > 0.0);
+        let seen = first.zip(last).map(|(first, last)| {
+            let low = first.checked_sub(1).map_or(f64::NEG_INFINITY, |before| self.opacity[before].0);
+            let high = self.opacity.get(last + 1).map_or(f64::INFINITY, |after| after.0);
+            [low, high]
+        });
+        let surfaces = self.isosurfaces.iter().map(|surface| [surface.value; 2]);
+        seen.into_iter().chain(surfaces).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
     }
 
     /// Red, green, blue of a value, 0 … 1.
@@ -173,6 +241,15 @@ impl TransferFunction {
     /// The share of light that `unit` of world length of this value holds back, 0 … 1.
     pub fn opacity(&self, value: f64) -> f64 {
         let (below, above, t) = segment(&self.opacity, value);
+        mix(below, above, t)
+    }
+
+    /// The factor on the extinction where the gradient has a magnitude (value per world length).
+    pub fn gradient_factor(&self, magnitude: f64) -> f64 {
+        if self.gradient.is_empty() {
+            return 1.0;
+        }
+        let (below, above, t) = segment(&self.gradient, magnitude);
         mix(below, above, t)
     }
 
@@ -194,12 +271,13 @@ impl TransferFunction {
         (0..entries).map(entry).collect()
     }
 
-    /// Whether any value in the closed interval `range` has opacity. Exact, but that both sides of a step belong to its
-    /// value.
+    /// Whether any value in the closed interval `range` has opacity or an isosurface. Exact, but that both sides of a step
+    /// belong to its value.
     pub fn visible(&self, range: [f64; 2]) -> bool {
         // Between its points the function is linear, so its maximum is at a point or at an end of the interval.
         let [low, high] = range;
-        self.opacity(low) > 0.0
+        self.isosurfaces.iter().any(|surface| low <= surface.value && surface.value <= high)
+            || self.opacity(low) > 0.0
             || self.opacity(high) > 0.0
             || self.opacity.iter().any(|&(value, opacity)| opacity > 0.0 && low <= value && value <= high)
     }
@@ -252,7 +330,7 @@ mod tests {
             color: vec![(10.0, [0.0; 3]), (30.0, [1.0; 3])],
             opacity: vec![(20.0, 0.0), (30.0, 0.5)],
             unit: 2.0,
-            shade: None,
+            ..TransferFunction::default()
         };
         assert_eq!(transfer.shown_range(), Some([20.0, f64::INFINITY]));
         let stretched = transfer.clone().spread_over([-1.0, 1.0]);

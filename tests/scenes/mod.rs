@@ -58,7 +58,7 @@ impl Random {
 
 /// Splats about a place away from the world's origin, which their own coordinates are relative to.
 fn set(payload: Payload, extent: f32, splats: Vec<Splat>) -> SplatSet {
-    SplatSet { origin: ORIGIN, payload, splats, extent }
+    SplatSet { origin: ORIGIN, payload, splats, extent, overlap: 1.0 }
 }
 
 const ORIGIN: DVec3 = DVec3::new(10.0, -20.0, 30.0);
@@ -184,6 +184,7 @@ fn transfer(scale: f64, shade: Option<Shade>) -> TransferFunction {
         opacity: vec![(0.1 * scale, 0.0), (0.6 * scale, 0.7), (scale, 0.95)],
         unit: 0.3,
         shade,
+        ..TransferFunction::default()
     }
 }
 
@@ -202,7 +203,7 @@ fn scattered() -> SplatSet {
     let splats = (0..600).map(|_| {
         let center = random.point(0.8);
         let splat = random.ellipsoid(center, 0.12);
-        Splat { strength: blobs(center.as_dvec3()) as f32, ..splat }
+        Splat::sample(center, blobs(center.as_dvec3()) as f32, splat.factor, 1.0, Vec3::ZERO)
     });
     set(Payload::Scalar, 3.0, splats.collect())
 }
@@ -223,7 +224,7 @@ fn sampled<T>(dims: [usize; 3], axes: DMat3, value: impl Fn(DVec3) -> T) -> (Lat
     let index =
         |i: usize| DVec3::new((i % dims[0]) as f64, (i / dims[0] % dims[1]) as f64, (i / dims[0] / dims[1]) as f64);
     let values = (0..dims.iter().product()).map(|i| value(start + axes * index(i))).collect();
-    (Lattice { dims, origin: ORIGIN + start, axes }, values)
+    (Lattice::cartesian(dims, ORIGIN + start, axes), values)
 }
 
 /// Blobs as bytes on a cubic lattice of 20³ samples, lit.

@@ -121,9 +121,9 @@ impl Loaded {
 impl ShowFlags {
     fn kernel(&self) -> splatkit::Result<Kernel> {
         let default = Kernel::default();
-        let sigma = self.sigma.unwrap_or(default.sigma);
+        let sigma = self.sigma.unwrap_or(default.unit());
         // A wider kernel keeps its shape unless the user cuts it.
-        let extent = self.extent.unwrap_or(default.extent.max(default.extent_in_sigmas() * sigma));
+        let extent = self.extent.unwrap_or(default.extent.max(default.radius() * sigma));
         Kernel::gaussian(sigma, extent)
     }
 

@@ -54,7 +54,7 @@ mod tests {
     fn what_is_written_reads_back() {
         let folder = Folder::new();
         let axes = glam::DMat3::from_cols(DVec3::new(0.5, 0.1, 0.0), DVec3::new(0.0, 2.0, 0.0), DVec3::Z);
-        let lattice = Lattice { dims: [2, 3, 1], origin: DVec3::new(-1.5, 0.0, 1e9), axes };
+        let lattice = Lattice::cartesian([2, 3, 1], DVec3::new(-1.5, 0.0, 1e9), axes);
         let samples = [
             Samples::U8(vec![0, 1, 2, 3, 4, 255]),
             Samples::U16(vec![0, 1, 2, 3, 4, 65535]),
