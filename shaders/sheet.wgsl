@@ -124,19 +124,14 @@ struct Medium {
     back: vec3<f32>,
     // The largest value.
     peak: f32,
+    // An isosurface took the half of the light.
+    has_hit: bool,
 }
 
 const NO_VALUE: f32 = -3e38;
 
 fn gradient_at(medium: Medium, place: f32) -> vec3<f32> {
     return mix(medium.front, medium.back, place);
-}
-
-// Where on the way from `from` to `to` the pixel has lost half of its light, if there.
-fn note_half(r: u32, before: f32, depth: f32, begin: f32, end: f32) {
-    if before > 0.5 && before * exp(-depth) <= 0.5 {
-        pixels[r].hit = mix(begin, end, log(2.0 * before) / depth);
-    }
 }
 
 // The part of a sheet between two distances, in which the field is a parabola with the values of the faces at the ends and
@@ -173,12 +168,12 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
                 let level = surface.value.x;
                 if (value < level) != (next < level) {
                     let share = (level - value) / (next - value);
-                    pass_part(r, own, depth * (share - done), color, middle, near + step * done, near + step * share, medium);
+                    pass_part(depth * (share - done), color, middle, medium);
                     done = share;
-                    pass_surface(r, own, surface, mix(place, next_place, share), near + step * share, medium);
+                    pass_surface(r, surface, mix(place, next_place, share), near + step * share, medium);
                 }
             }
-            pass_part(r, own, depth * (1.0 - done), color, middle, near + step * done, near + step, medium);
+            pass_part(depth * (1.0 - done), color, middle, medium);
         }
         place = next_place;
         value = next;
@@ -192,13 +187,8 @@ fn parabola(curve: vec3<f32>, u: f32) -> f32 {
     return curve.x * (1.0 - u) * (1.0 - 2.0 * u) + 4.0 * curve.y * u * (1.0 - u) + curve.z * u * (2.0 * u - 1.0);
 }
 
-fn pass_part(
-    r: u32, own: Sheet, depth: f32, color: vec3<f32>, place: f32, begin: f32, end: f32, medium: ptr<function, Medium>,
-) {
+fn pass_part(depth: f32, color: vec3<f32>, place: f32, medium: ptr<function, Medium>) {
     let share = (*medium).through * (1.0 - exp(-depth));
-    if own.radiance.w == 0.0 {
-        note_half(r, pixels[r].transmittance * (*medium).through, depth, begin, end);
-    }
     (*medium).color += share * color;
     (*medium).opacity += share;
     (*medium).place += share * place;
@@ -206,15 +196,14 @@ fn pass_part(
     (*medium).depth += depth;
 }
 
-fn pass_surface(
-    r: u32, own: Sheet, surface: Isosurface, place: f32, distance: f32, medium: ptr<function, Medium>,
-) {
+fn pass_surface(r: u32, surface: Isosurface, place: f32, distance: f32, medium: ptr<function, Medium>) {
     let share = (*medium).through * surface.value.y;
     let before = pixels[r].transmittance * (*medium).through;
     (*medium).through -= share;
     (*medium).depth += surface.value.z;
-    if own.radiance.w == 0.0 && before > 0.5 && pixels[r].transmittance * (*medium).through <= 0.5 {
+    if before > 0.5 && pixels[r].transmittance * (*medium).through <= 0.5 {
         pixels[r].hit = distance;
+        (*medium).has_hit = true;
     }
     var color = surface.color.xyz;
     if VOLUME_SHADED {
@@ -271,6 +260,7 @@ fn composite(r: u32, sheet: u32, own: Sheet) {
     var premultiplied = own.radiance.xyz;
     var depth = own.radiance.w;
     let before = pixels[r].transmittance;
+    var has_hit = false;
     if SCALAR && own.has_value {
         var medium = pass_field(r, sheet, own);
         if MAXIMUM {
@@ -287,6 +277,7 @@ fn composite(r: u32, sheet: u32, own: Sheet) {
         let ratio = select(field_depth / (1.0 - exp(-field_depth)), 1.0 + 0.5 * field_depth, field_depth < 1e-2);
         premultiplied += ratio * (color + medium.surfaces);
         depth += field_depth;
+        has_hit = medium.has_hit;
     }
     if XRAY {
         premultiplied = vec3(depth);
@@ -294,8 +285,9 @@ fn composite(r: u32, sheet: u32, own: Sheet) {
     if depth > 0.0 {
         let left = before * exp(-depth);
         pixels[r].color += (before - left) / depth * premultiplied;
-        if own.radiance.w > 0.0 {
-            note_half(r, before, depth, planes[sheet], planes[sheet + 1u]);
+        // Inside the sheet, optical depth counts as evenly spread; an isosurface is where it is.
+        if !has_hit && before > 0.5 && left <= 0.5 {
+            pixels[r].hit = mix(planes[sheet], planes[sheet + 1u], log(2.0 * before) / depth);
         }
         pixels[r].transmittance = left;
     }
