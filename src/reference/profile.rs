@@ -91,6 +91,11 @@ impl<'a> Profile<'a> {
         let kinks = kinks(kernel).into_iter().filter(|kink| *kink > rho).map(|kink| (kink * kink - rho * rho).sqrt());
         let inner = kinks.flat_map(|t| [-t, t]).chain([0.0]).filter(|t| from < *t && *t < to);
         cuts.extend(inner);
+        if let math::Profile::Table(_) = kernel.profile {
+            // Tables may have a peak, near which r turns within ρ.
+            let around = std::iter::successors(Some(rho.max(1e-3)), |t| Some(4.0 * t)).take_while(|t| *t < reach);
+            cuts.extend(around.flat_map(|t| [-t, t]).filter(|t| from < *t && *t < to));
+        }
         cuts.extend((from.floor() as i64 + 1..to.ceil() as i64).map(|t| t as f64));
         cuts.sort_by(f64::total_cmp);
         let mut sums = [0.0; 2];

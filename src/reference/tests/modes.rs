@@ -106,6 +106,24 @@ fn samples_classified_before_are_lit_by_their_field() {
 }
 
 #[test]
+fn the_near_side_of_a_wall_hides_its_far_side() {
+    // Layers of values 0, 0.6, 1, 0.4, 0 from below: the one of 0.4 is the wall's upper side. All lie in one sheet.
+    let lattice = centered([9, 9, 5], DMat3::from_diagonal(DVec3::splat(0.25)));
+    let layers = [0.0, 0.6, 1.0, 0.4, 0.0];
+    let field = volume(lattice, |p| layers[(4.0 * p.z + 2.0).round() as usize]);
+    let transfer = TransferFunction {
+        color: vec![(0.4, [1.0, 0.0, 0.0]), (0.6, [0.0, 0.0, 1.0])],
+        opacity: vec![(0.3, 0.0), (0.3, 0.5), (0.7, 0.5), (0.7, 0.0)],
+        shade: Some(Shade { ambient: 1.0, diffuse: 0.0, specular: 0.0, power: 1.0 }),
+        ..TransferFunction::default()
+    };
+    let scene = Scene::new().with_volume(field, Shape::default(), transfer);
+    let settings = Settings { volume_shade: None, sheet_thickness: Some(50.0), ..before(Mode::Sheets) };
+    let [red, _, blue, opacity] = render(&scene, &from_above(5.0, 0.01), &settings).unwrap().color[0];
+    assert!(opacity > 0.1 && red > 0.99 * opacity && blue < 0.01 * opacity, "{red} {blue} {opacity}");
+}
+
+#[test]
 fn axis_sheets_follow_the_data() {
     let view = camera(PROJECTIONS[0]).view([8, 8]).unwrap();
     // The camera looks most along −x.

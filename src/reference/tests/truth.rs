@@ -6,15 +6,19 @@ use crate::{
     volume::{Arrangement, Isosurface, phantoms::Phantom},
 };
 
-/// Shells of the Marschner–Lobb signal, lit or not.
-fn shells(lattice_size: usize, kernel: Shape, shade: Option<Shade>) -> Scene {
-    let transfer = TransferFunction {
+/// Extinction that changes fast, with a step.
+fn steep() -> TransferFunction {
+    TransferFunction {
         color: vec![(0.0, [0.1, 0.2, 0.9]), (0.5, [0.9, 0.8, 0.2]), (1.0, [0.9, 0.1, 0.1])],
         opacity: vec![(0.45, 0.0), (0.5, 0.9), (0.55, 0.1), (0.7, 0.1), (0.7, 0.6)],
         unit: 0.1,
-        shade,
         ..TransferFunction::default()
-    };
+    }
+}
+
+/// Shells of the Marschner–Lobb signal.
+fn shells(lattice_size: usize, kernel: Shape, shade: Option<Shade>) -> Scene {
+    let transfer = TransferFunction { shade, ..steep() };
     Scene::new().with_volume(Phantom::MarschnerLobb.sample([lattice_size; 3]).unwrap(), kernel, transfer)
 }
 
@@ -49,7 +53,7 @@ fn thinner_sheets_change_little() {
     let scene = shells(24, Shape::default(), None);
     let camera = camera(PROJECTIONS[0]);
     let usual = scene.sheets(&camera.view([24, 20]).unwrap(), &small(Classification::Post, None)).step;
-    for (classification, least) in [(Classification::PreIntegrated, 30.0), (Classification::Post, 15.0)] {
+    for (classification, least) in [(Classification::PreIntegrated, 50.0), (Classification::Post, 35.0)] {
         let [thick, thin] = [usual, 0.5 * usual]
             .map(|thickness| render(&scene, &camera, &small(classification, Some(thickness))).unwrap());
         let found = decibels(&thick, &thin);
@@ -58,22 +62,30 @@ fn thinner_sheets_change_little() {
     }
 }
 
+/// Three balls that touch.
+fn blobs(kernel: Shape, shade: Option<Shade>) -> Scene {
+    let lattice = centered([24; 3], DMat3::from_diagonal(DVec3::splat(2.0 / 23.0)));
+    let centers = [DVec3::new(0.4, 0.1, 0.0), DVec3::new(-0.4, 0.2, 0.3), DVec3::new(0.0, -0.4, -0.3)];
+    let field = volume(lattice, |p| centers.iter().map(|c| (-8.0 * (p - *c).length_squared()).exp()).sum());
+    Scene::new().with_volume(field, kernel, TransferFunction { shade, ..steep() })
+}
+
 #[test]
 fn sheets_converge_to_the_rays() {
     let lit = Some(Shade::default());
-    for (name, kernel, shade) in [
-        ("unlit", Shape::default(), None),
-        ("lit", Shape::default(), lit),
-        ("spline", Shape::b_spline(2.0).unwrap(), lit),
+    let spline = Shape::b_spline(2.0).unwrap();
+    for (name, scene, better) in [
+        ("shells", shells(24, Shape::default(), None), 10.0),
+        ("blobs", blobs(Shape::default(), None), 10.0),
+        ("spline", blobs(spline, None), 10.0),
+        // A sheet is lit once, so in the finest of shells its light is the smaller part of the error.
+        ("shells, lit", shells(24, Shape::default(), lit), 0.0),
+        ("blobs, lit", blobs(Shape::default(), lit), 4.0),
     ] {
-        let scene = shells(24, kernel, shade);
         for projection in PROJECTIONS {
             let camera = camera(projection);
             let usual = scene.sheets(&camera.view([24, 20]).unwrap(), &small(Classification::Post, None)).step;
-            let truth = integrate(&scene, &camera, &small(Classification::Post, None), 0.001).unwrap();
-            let finer = integrate(&scene, &camera, &small(Classification::Post, None), 0.0005).unwrap();
-            let coarse = integrate(&scene, &camera, &small(Classification::Post, None), 0.2 / 23.0).unwrap();
-            println!("{name}: steps {:.1} dB, tenths {:.1} dB", decibels(&truth, &finer), decibels(&truth, &coarse));
+            let truth = integrate(&scene, &camera, &small(Classification::Post, None), 0.0005).unwrap();
             let found = |classification, share: f64| {
                 let picture = render(&scene, &camera, &small(classification, Some(usual * share))).unwrap();
                 decibels(&picture, &truth)
@@ -81,8 +93,8 @@ fn sheets_converge_to_the_rays() {
             let [post, post_thin] = [1.0, 0.125].map(|share| found(Classification::Post, share));
             let [inside, inside_thin] = [1.0, 0.125].map(|share| found(Classification::PreIntegrated, share));
             println!("{name}: post {post:.1} → {post_thin:.1} dB, inside {inside:.1} → {inside_thin:.1} dB");
-            assert!(post_thin > post + 10.0 && inside_thin > inside + 10.0);
-            assert!(inside > post + 6.0);
+            assert!(post_thin > post + 15.0 && inside_thin > inside + 15.0);
+            assert!(inside > post + better);
         }
     }
 }
@@ -106,7 +118,7 @@ fn body_centred_samples_and_isosurfaces_converge_too() {
     for projection in PROJECTIONS {
         let camera = camera(projection);
         let truth = integrate(&scene, &camera, &small(Classification::Post, None), 0.002).unwrap();
-        for (share, least) in [(0.1, 30.0), (0.02, 40.0)] {
+        for (share, least) in [(0.1, 55.0), (0.02, 70.0)] {
             let picture = render(&scene, &camera, &small(Classification::PreIntegrated, Some(share))).unwrap();
             let found = decibels(&picture, &truth);
             println!("sheets of {share}: {found:.1} dB");
