@@ -3,18 +3,23 @@
 
 mod bench;
 mod camera;
+mod clip;
 mod compare;
 mod demo;
+mod describe;
 mod engine;
 mod failure;
 mod gpus;
 mod info;
+mod kernel;
 mod load;
+mod method;
 mod output;
 mod parse;
 mod progress;
 mod render;
 mod scene;
+mod show;
 
 use clap::{Parser, Subcommand};
 use progress::Progress;
