@@ -10,7 +10,8 @@ pub enum Profile {
     Gaussian(f64),
     /// The cubic B-spline, stretched so that it ends at the extent (2 is its own).
     BSpline,
-    /// sin(πr)/πr under a Hann window that ends at the extent: cos²(πr / 2·extent).
+    /// The low-pass filter of a ball, 3(sin x − x cos x)/x³ at x = πr, under a Hann window that ends at the extent:
+    /// cos²(πr / 2·extent). (A radial sin(πr)/πr is the filter of no band: over space it sums to less than nothing.)
     Hann,
     /// Values at evenly spaced radii from 0 to the extent, linear in between.
     Table(Arc<[f64]>),
@@ -111,8 +112,10 @@ impl Kernel {
                 if t < 1.0 { 1.0 - 1.5 * t * t + 0.75 * t * t * t } else { 0.25 * (2.0 - t).powi(3) }
             }
             Profile::Hann => {
-                let sinc = if r < 1e-6 { 1.0 } else { (PI * r).sin() / (PI * r) };
-                sinc * (0.5 * PI * r / self.extent).cos().powi(2)
+                let x = PI * r;
+                // Near 0 the difference cancels; the series does not.
+                let filter = if x < 0.02 { 1.0 - 0.1 * x * x } else { 3.0 * (x.sin() - x * x.cos()) / x.powi(3) };
+                filter * (0.5 * PI * r / self.extent).cos().powi(2)
             }
             Profile::Table(values) => {
                 let at = r / self.extent * (values.len() - 1) as f64;
@@ -152,7 +155,11 @@ mod tests {
         // ⅔, ⅙ and 0 over ⅔.
         assert_eq!([0.0, 1.0, 2.0].map(|r| spline.value(r)), [1.0, 0.25, 0.0]);
         let hann = Kernel::hann(3.0).unwrap();
-        assert!(hann.value(1.0).abs() < 1e-15 && hann.value(0.5) > 0.0 && hann.value(1.5) < 0.0);
+        // 3/π² · cos²(π/6); beyond the first zero, at 1.43, it is negative.
+        assert!((hann.value(1.0) - 2.25 / (PI * PI)).abs() < 1e-12 && hann.value(1.4) > 0.0 && hann.value(1.5) < 0.0);
+        assert!((hann.value(0.02 / PI) - hann.value(0.019_999 / PI)).abs() < 1e-6);
+        // 6/π without the window.
+        assert!((hann.integral() - 6.0 / PI).abs() < 0.02);
         let table = Kernel::table(vec![1.0, 0.5, 0.0], 4.0).unwrap();
         assert_eq!([0.0, 1.0, 2.0, 3.0, 4.0, 4.1].map(|r| table.value(r)), [1.0, 0.75, 0.5, 0.25, 0.0, 0.0]);
         // A cone of height 1 and radius 4: its integral over a ball is π·4³/3.

@@ -1,5 +1,6 @@
 //! Volumes: samples on a lattice, and the transfer functions that show them.
 
+mod head;
 mod lattice;
 pub mod phantoms;
 mod presets;

@@ -1,7 +1,7 @@
-//! Volumes that need no file, for tests, the demo and the documentation. Each is a function of position with values in
-//! 0 … 1, sampled over the cube from −1 to 1.
+//! Volumes that need no file, for tests, the demo and the documentation. Each is a function of position, most with values
+//! in 0 … 1, sampled over the cube from −1 to 1.
 
-use super::{Lattice, Samples, Volume};
+use super::{Lattice, Samples, Volume, head::head};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -17,17 +17,34 @@ pub enum Phantom {
     /// What a CT scanner would see of an invented fruit: air around (0), a rind (0.35), soft flesh (0.15), in it a hard
     /// lattice along a gyroid (0.7 … 0.8) and a dense stone (1). A wedge is cut out to show the inside.
     Specimen,
+    /// Two slabs across the z axis, the front one of value 0.5 (0 < z < 0.15), right behind it one of value 1 (down to
+    /// −0.3): what a renderer must hide, and what it must hide behind. Both end at 0.9 from the axis.
+    Slabs,
+    /// A head as a CT scanner would see it, in Hounsfield units, 1 standing for 100 mm: skin and flesh, skull, jaw and neck
+    /// bones, brain, and arteries with contrast agent. The face is towards −y.
+    Head,
     /// One value everywhere.
     Constant(f64),
 }
 
 impl Phantom {
-    /// The value at a position in the cube from −1 to 1, in 0 … 1 (for [`Constant`](Self::Constant): its value).
+    /// The phantoms that [`named`](Self::named) knows.
+    pub const NAMES: [&'static str; 5] = ["marschner-lobb", "ball", "specimen", "slabs", "head"];
+
+    /// A phantom by its name.
+    pub fn named(name: &str) -> Option<Self> {
+        let at = Self::NAMES.iter().position(|known| *known == name)?;
+        [Self::MarschnerLobb, Self::Ball, Self::Specimen, Self::Slabs, Self::Head].get(at).copied()
+    }
+
+    /// The value at a position in the cube from −1 to 1.
     pub fn value(self, p: DVec3) -> f64 {
         match self {
             Self::MarschnerLobb => marschner_lobb(p),
             Self::Ball => (1.0 - p.length_squared() / 0.81).max(0.0).powi(2),
             Self::Specimen => specimen(p),
+            Self::Slabs => slabs(p),
+            Self::Head => head(p),
             Self::Constant(value) => value,
         }
     }
@@ -38,7 +55,15 @@ impl Phantom {
     /// # Errors
     /// In words, for dimensions of 0 or more samples than memory can hold.
     pub fn sample(self, dims: [usize; 3]) -> Result<Volume, String> {
-        let lattice = lattice(dims)?;
+        self.sample_on(lattice(dims)?)
+    }
+
+    /// 32-bit samples at the places of any lattice; those outside the cube have the function's value there too.
+    ///
+    /// # Errors
+    /// In words, for a lattice that is none ([`Lattice::validate`]).
+    pub fn sample_on(self, lattice: Lattice) -> Result<Volume, String> {
+        lattice.validate()?;
         let values = self.fill(&lattice, |value| value as f32);
         Volume::new(lattice, Samples::F32(values))
     }
@@ -96,6 +121,17 @@ fn specimen(p: DVec3) -> f64 {
     over(value, 0.0, wedge)
 }
 
+fn slabs(p: DVec3) -> f64 {
+    if p.truncate().abs().max_element() > 0.9 {
+        return 0.0;
+    }
+    match p.z {
+        z if 0.0 < z && z < 0.15 => 0.5,
+        z if -0.3 < z && z <= 0.0 => 1.0,
+        _ => 0.0,
+    }
+}
+
 fn over(below: f64, above: f64, share: f64) -> f64 {
     below + (above - below) * share
 }
@@ -119,6 +155,14 @@ mod tests {
         assert_eq!((Phantom::Ball.value(DVec3::ZERO), Phantom::Ball.value(DVec3::X)), (1.0, 0.0));
         assert_eq!((Phantom::Specimen.value(DVec3::ZERO), Phantom::Specimen.value(DVec3::ONE)), (1.0, 0.0));
         assert!((Phantom::Specimen.value(DVec3::NEG_X * 0.865) - 0.35).abs() < 1e-9);
+    }
+
+    #[test]
+    fn every_name_has_a_phantom() {
+        assert!(Phantom::NAMES.iter().all(|name| Phantom::named(name).is_some()) && Phantom::named("knot").is_none());
+        assert_eq!(Phantom::named("ball"), Some(Phantom::Ball));
+        let slab = |z: f64| Phantom::Slabs.value(DVec3::new(0.3, -0.3, z));
+        assert_eq!([0.2, 0.1, 0.0, -0.2, -0.4].map(slab), [0.0, 0.5, 1.0, 1.0, 0.0]);
     }
 
     #[test]

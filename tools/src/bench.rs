@@ -1,8 +1,8 @@
 //! `splatkit bench`.
 
 use crate::{
-    camera::CameraFlags, engine::EngineFlags, failure::Failure, output, progress::Progress, render::milliseconds,
-    scene::SceneFlags,
+    camera::CameraFlags, describe, engine::EngineFlags, failure::Failure, output, progress::Progress,
+    render::milliseconds, scene::SceneFlags,
 };
 use clap::Args;
 use splatkit::Error;
@@ -29,7 +29,9 @@ pub struct Bench {
 
 impl Bench {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
+        self.engine.check()?;
         let loaded = self.scene.load(progress)?;
+        let settings = self.engine.settings(&loaded, 1)?;
         progress.stage("Opening the GPU");
         let gpu = self.engine.gpu()?;
         progress.stage("Uploading");
@@ -38,7 +40,6 @@ impl Bench {
         let mut prepared = renderer.prepare(&loaded.scene)?;
         gpu.wait()?;
         let upload_ms = milliseconds(start);
-        let settings = self.engine.settings(&loaded, 1);
         let camera = |frame: u32| self.camera.turned(&loaded.subject, settings.size, STEP * f64::from(frame));
 
         let mut frame = |number: u32| {
@@ -84,6 +85,7 @@ impl Bench {
                 "culled": culled,
                 "gpu_bytes": stats.gpu_bytes,
                 "camera": crate::camera::to_json(&camera(0)),
+                "settings": describe::settings(&loaded.scene, &settings),
             }));
         }
         output::line(format_args!("{} at {width}x{height} on {}", self.scene.name(), gpu.info.name))?;

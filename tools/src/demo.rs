@@ -2,7 +2,7 @@
 
 use crate::{
     camera::CameraFlags,
-    engine::{EngineFlags, require_content},
+    engine::EngineFlags,
     failure::Failure,
     output,
     progress::Progress,
@@ -114,7 +114,7 @@ impl Demo {
         let flags = Flags::try_parse_from(&arguments).map_err(|e| Failure::Usage(e.to_string()))?;
         let loaded = flags.scene.load(progress)?;
         let mut drawer = Drawer::engine(&flags.engine, &loaded, progress)?;
-        let settings = flags.engine.settings(&loaded, 1);
+        let settings = flags.engine.settings(&loaded, 1)?;
         let camera = flags.camera.camera(&loaded.subject, settings.size)?;
         progress.stage(format!("Drawing {}", shot.name));
         let mut draw = || {
@@ -124,7 +124,7 @@ impl Demo {
         };
         let (first_ms, ..) = draw()?;
         let (later_ms, picture, stats) = draw()?;
-        require_content(&picture)?;
+        flags.engine.require_content(&picture)?;
         let path = self.folder.join(shot.name);
         output::write(&path, &picture.encode(PictureFormat::Png, BACKGROUND)?)?;
         progress.clear();

@@ -1,6 +1,6 @@
 //! The engine's flags: the adapter, and the settings of a picture.
 
-use crate::{failure::Failure, parse, scene::Loaded};
+use crate::{clip::ClipFlags, failure::Failure, method::MethodFlags, parse, scene::Loaded};
 use clap::{Args, ValueEnum};
 use splatkit::{
     Error,
@@ -34,6 +34,10 @@ pub struct EngineFlags {
     /// Room of a depth pass: pairs of a splat and a tile. Pictures that need more take more passes.
     #[arg(long, value_name = "ENTRIES", value_parser = clap::value_parser!(u32).range(1..))]
     budget: Option<u32>,
+    #[command(flatten)]
+    method: MethodFlags,
+    #[command(flatten)]
+    clip: ClipFlags,
 }
 
 /// [`scene::Gradient`] as a flag.
@@ -59,8 +63,14 @@ impl EngineFlags {
         Renderer::with_budget(gpu, budget)
     }
 
-    /// The settings of a picture, each side `factor` times as long.
-    pub fn settings(&self, loaded: &Loaded, factor: u32) -> Settings {
+    /// What is wrong whatever the scene.
+    pub fn check(&self) -> Result<(), Failure> {
+        self.method.check()?;
+        self.clip.check()
+    }
+
+    /// The settings of a picture, each side `factor` times as long; those that do not go with the scene are an error.
+    pub fn settings(&self, loaded: &Loaded, factor: u32) -> splatkit::Result<Settings> {
         let mut settings = Settings::new(self.size.map(|side| side.saturating_mul(factor)));
         settings.sheet_thickness = self.sheet_thickness;
         // Sheets stay as thick as they are without the extra pixels: thinner ones would part what overlaps on a surface.
@@ -80,15 +90,20 @@ impl EngineFlags {
             });
             settings.volume_shade = Some(Some(own.unwrap_or_default()));
         }
-        settings
+        self.method.apply(&mut settings);
+        settings.clips = self.clip.clips(&loaded.scene, &loaded.subject.bounds)?;
+        loaded.scene.validate_settings(&settings)?;
+        Ok(settings)
     }
-}
 
-/// Turns a picture that shows nothing into an error.
-pub fn require_content(picture: &Picture) -> Result<(), Failure> {
-    // What would round to nothing in a file of 8 bits is nothing.
-    if picture.color.iter().any(|pixel| pixel[3] >= 0.5 / 255.0) {
-        return Ok(());
+    /// Turns a picture that shows nothing into an error.
+    pub fn require_content(&self, picture: &Picture) -> Result<(), Failure> {
+        // What would round to nothing in a file of 8 bits is nothing.
+        if picture.color.iter().any(|pixel| pixel[3] >= 0.5 / 255.0) {
+            return Ok(());
+        }
+        let left = self.clip.text().map_or(String::new(), |clips| format!(" in what {clips} leaves"));
+        Err(Error::NothingToDraw(format!("the picture is empty: the camera sees no splat that has opacity{left}"))
+            .into())
     }
-    Err(Error::NothingToDraw("the picture is empty: the camera sees no splat that has opacity".into()).into())
 }

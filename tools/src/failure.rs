@@ -48,9 +48,9 @@ impl Failure {
                 Some("`splatkit gpus` lists what there is; `--reference` needs no GPU")
             }
             Self::Library(Error::Gpu(_)) => Some("try a smaller --size, or another --gpu (`software` is one)"),
-            Self::Library(Error::NothingToDraw(_)) => {
-                Some("`splatkit info` tells what a file holds; --transfer, --range and the camera decide what is seen")
-            }
+            Self::Library(Error::NothingToDraw(_)) => Some(
+                "`splatkit info` tells what a file holds; --transfer, --range, --clip and the camera decide what is seen",
+            ),
             Self::Library(Error::Argument(_)) | Self::Usage(_) => Some("`splatkit help` lists the options"),
             Self::Library(Error::File { .. }) | Self::Comparison(_) => None,
             Self::Output { hint, .. } => *hint,

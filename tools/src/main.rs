@@ -3,18 +3,25 @@
 
 mod bench;
 mod camera;
+mod clip;
 mod compare;
 mod demo;
+mod describe;
 mod engine;
 mod failure;
+mod figures;
+mod generate;
 mod gpus;
 mod info;
+mod kernel;
 mod load;
+mod method;
 mod output;
 mod parse;
 mod progress;
 mod render;
 mod scene;
+mod show;
 
 use clap::{Parser, Subcommand};
 use progress::Progress;
@@ -51,6 +58,10 @@ enum Task {
     Bench(Box<bench::Bench>),
     /// Makes a mesh and a volume and draws them: pictures and timings with no download.
     Demo(demo::Demo),
+    /// Writes a phantom: a volume or scattered samples to try the other commands on.
+    Generate(generate::Generate),
+    /// Measures the quality of what is drawn: the tables of docs/volumes.md.
+    Figures(figures::Figures),
     /// Lists the adapters that can draw, and their limits.
     Gpus(gpus::Gpus),
 }
@@ -65,6 +76,8 @@ fn main() -> ExitCode {
         Task::Compare(task) => task.run(),
         Task::Bench(task) => task.run(&progress),
         Task::Demo(task) => task.run(&progress),
+        Task::Generate(task) => task.run(&progress),
+        Task::Figures(task) => task.run(&progress),
         Task::Gpus(task) => task.run(),
     };
     progress.clear();

@@ -5,7 +5,7 @@ use splatkit::io::{Endian, SampleType};
 use std::str::FromStr;
 
 /// Numbers with a separator, exactly as many as asked for.
-fn numbers<T: FromStr, const N: usize>(text: &str, separator: char, form: &str) -> Result<[T; N], String> {
+pub fn numbers<T: FromStr, const N: usize>(text: &str, separator: char, form: &str) -> Result<[T; N], String> {
     let parts: Option<Vec<T>> = text.split(separator).map(|part| part.trim().parse().ok()).collect();
     parts.and_then(|parts| parts.try_into().ok()).ok_or_else(|| format!("the form is {form}"))
 }
@@ -49,10 +49,15 @@ pub fn background(text: &str) -> Result<Background, String> {
     if text.eq_ignore_ascii_case("none") {
         return Ok(Background(None));
     }
+    color(text).map(|color| Background(Some(color))).map_err(|message| message + " or none")
+}
+
+/// `#rrggbb`, with or without `#`.
+pub fn color(text: &str) -> Result<[f32; 3], String> {
     let digits = text.strip_prefix('#').unwrap_or(text);
     let bytes = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6 && !digits.starts_with('+'));
-    let [_, red, green, blue] = bytes.ok_or("the form is '#rrggbb' or none")?.to_be_bytes();
-    Ok(Background(Some([red, green, blue].map(|channel| f32::from(channel) / 255.0))))
+    let [_, red, green, blue] = bytes.ok_or("the form is '#rrggbb'")?.to_be_bytes();
+    Ok([red, green, blue].map(|channel| f32::from(channel) / 255.0))
 }
 
 /// What stands behind the picture.

@@ -2,7 +2,8 @@
 
 use crate::{
     camera::CameraFlags,
-    engine::{EngineFlags, require_content},
+    describe,
+    engine::EngineFlags,
     failure::Failure,
     output::{self, Target},
     parse::{self, Background},
@@ -99,14 +100,15 @@ impl Render {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
         let frames = self.turntable.unwrap_or(1);
         let targets = self.targets(frames)?;
+        self.engine.check()?;
         let loaded = self.scene.load(progress)?;
+        let settings = self.engine.settings(&loaded, self.samples)?;
         let start = Instant::now();
         let mut drawer = match self.reference {
             true => Drawer::Reference,
             false => Drawer::engine(&self.engine, &loaded, progress)?,
         };
         let upload_ms = milliseconds(start);
-        let settings = self.engine.settings(&loaded, self.samples);
         let mut times = Vec::new();
         let mut last = (FrameStats::default(), self.camera.camera(&loaded.subject, settings.size)?);
         for (frame, target) in (0..frames).zip(&targets) {
@@ -121,7 +123,7 @@ impl Render {
             let start = Instant::now();
             let (picture, stats) = drawer.draw(&loaded, &camera, &settings)?;
             times.push(milliseconds(start));
-            require_content(&picture)?;
+            self.engine.require_content(&picture)?;
             let picture = if self.samples > 1 { picture.reduced(self.samples) } else { picture };
             progress.stage(format!("Writing {}", target.name()));
             target.write(&picture.encode(target.format(), self.background.0)?)?;
@@ -150,6 +152,7 @@ impl Render {
                 "load_ms": loaded.load_ms,
                 "upload_ms": upload_ms,
                 "camera": crate::camera::to_json(&camera),
+                "settings": describe::settings(&loaded.scene, &settings),
             }))?;
         }
         Ok(())

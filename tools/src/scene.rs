@@ -3,19 +3,14 @@
 use crate::{
     camera::Subject,
     failure::Failure,
+    kernel,
     load::{Input, LoadFlags},
-    parse,
     progress::Progress,
+    show::ShowFlags,
 };
 use clap::Args;
 use glam::DVec3;
-use splatkit::{
-    Error,
-    math::{Bounds, Kernel},
-    scene::Scene,
-    surface::SurfelOptions,
-    volume::{TransferFunction, Volume},
-};
+use splatkit::{Error, math::Bounds, scene::Scene, surface::SurfelOptions};
 use std::{
     path::{Path, PathBuf},
     time::Instant,
@@ -34,31 +29,6 @@ pub struct SceneFlags {
     show: ShowFlags,
 }
 
-/// How a scene's values and surfaces are shown.
-#[derive(Args, Debug, Clone)]
-#[command(next_help_heading = "Look")]
-struct ShowFlags {
-    /// How a volume's values are shown: ct-bone, ct-soft-tissue, ct-lung, ct-angiography, mri, generic, or a JSON file. By
-    /// default made from the volume's histogram.
-    #[arg(long, value_name = "NAME|FILE.json")]
-    transfer: Option<String>,
-    /// The values that the transfer function spreads over, instead of its own.
-    #[arg(long, value_name = "LOW,HIGH", value_parser = parse::range, allow_hyphen_values = true)]
-    range: Option<[f64; 2]>,
-    /// The world length that the transfer function's opacities hold for.
-    #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
-    opacity_unit: Option<f64>,
-    /// Standard deviation of a sample's kernel, in samples [default: 0.6]
-    #[arg(long, value_name = "SAMPLES", value_parser = parse::positive)]
-    sigma: Option<f64>,
-    /// Radius of a sample's footprint, in samples [default: 2]
-    #[arg(long, value_name = "SAMPLES", value_parser = parse::positive)]
-    extent: Option<f64>,
-    /// Factor on the radii of surfels.
-    #[arg(long, value_name = "FACTOR", value_parser = parse::positive)]
-    radius_scale: Option<f64>,
-}
-
 /// A scene that was read.
 pub struct Loaded {
     pub scene: Scene,
@@ -72,6 +42,7 @@ impl SceneFlags {
     /// Reads the inputs and makes a scene of them.
     pub fn load(&self, progress: &Progress) -> Result<Loaded, Failure> {
         let start = Instant::now();
+        let show = self.show.open()?;
         let mut loaded = Loaded {
             scene: Scene::new(),
             subject: Subject { bounds: Bounds::EMPTY, up: DVec3::Z },
@@ -92,11 +63,16 @@ impl SceneFlags {
                     loaded.subject.up = DVec3::Y;
                 }
                 Input::Volume(volume) => {
-                    let transfer = self.show.transfer(path, &volume)?;
-                    let kernel = self.show.kernel()?;
+                    let transfer = show.transfer(path, &volume)?;
                     let [min, max] = volume.bounds();
                     loaded.add(Bounds { min, max }, volume.len());
-                    loaded.scene = loaded.scene.with_volume(volume, kernel, transfer);
+                    let volume = if show.sharp {
+                        progress.stage(format!("Sharpening {}", path.display()));
+                        kernel::sharpened(volume, &show.kernel)?
+                    } else {
+                        volume
+                    };
+                    loaded.scene = loaded.scene.with_volume(volume, show.kernel.clone(), transfer);
                 }
             }
         }
@@ -115,51 +91,6 @@ impl Loaded {
     fn add(&mut self, bounds: Bounds, count: usize) {
         self.subject.bounds = self.subject.bounds.union(bounds);
         self.count += count as u64;
-    }
-}
-
-impl ShowFlags {
-    fn kernel(&self) -> splatkit::Result<Kernel> {
-        let default = Kernel::default();
-        let sigma = self.sigma.unwrap_or(default.unit());
-        // A wider kernel keeps its shape unless the user cuts it.
-        let extent = self.extent.unwrap_or(default.extent.max(default.radius() * sigma));
-        Kernel::gaussian(sigma, extent)
-    }
-
-    /// The transfer function that shows a volume; one that shows nothing of it is an error.
-    fn transfer(&self, path: &Path, volume: &Volume) -> Result<TransferFunction, Failure> {
-        let transfer = match &self.transfer {
-            None => TransferFunction::automatic(volume),
-            Some(name) if TransferFunction::NAMES.contains(&name.as_str()) => {
-                TransferFunction::named(name, volume.range)?
-            }
-            Some(file) if Path::new(file).extension().is_some() || Path::new(file).exists() => {
-                TransferFunction::read(Path::new(file))?
-            }
-            // Neither: the error lists the names.
-            Some(name) => TransferFunction::named(name, volume.range)?,
-        };
-        let mut transfer = match self.range {
-            Some(range) => transfer.spread_over(range),
-            None => transfer,
-        };
-        if let Some(unit) = self.opacity_unit {
-            transfer.unit = unit;
-        }
-        if !transfer.visible(volume.range) {
-            let [low, high] = volume.range;
-            let shown = match transfer.shown_range() {
-                Some([from, to]) => format!("shows values between {from} and {to}"),
-                None => "shows no value".to_owned(),
-            };
-            return Err(Error::NothingToDraw(format!(
-                "the transfer function {shown}, but those of {} lie between {low} and {high}",
-                path.display()
-            ))
-            .into());
-        }
-        Ok(transfer)
     }
 }
 

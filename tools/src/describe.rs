@@ -1,0 +1,65 @@
+//! What decided a picture, as JSON.
+
+use serde_json::{Value, json};
+use splatkit::{
+    math::{Kernel, Profile},
+    scene::{Classification, Item, Mode, Optics, Order, Scene, Settings},
+    volume::TransferFunction,
+};
+
+/// The settings of a picture and, where the scene has a field, how it is shown.
+pub fn settings(scene: &Scene, settings: &Settings) -> Value {
+    let (mode, order) = match settings.mode {
+        Mode::Sheets => ("sheets", None),
+        Mode::AxisSheets => ("axis-sheets", None),
+        Mode::Splats(Order::FrontToBack) => ("splats", Some("front-to-back")),
+        Mode::Splats(Order::BackToFront) => ("splats", Some("back-to-front")),
+    };
+    let classify = match (settings.mode, settings.classification) {
+        (Mode::Sheets, Classification::PreIntegrated) => "pre-integrated",
+        (Mode::Sheets, Classification::Post) => "post",
+        _ => "pre",
+    };
+    let optics = match settings.optics {
+        Optics::EmissionAbsorption => "light",
+        Optics::Maximum => "maximum",
+        Optics::XRay => "x-ray",
+    };
+    let field = scene.items.iter().find_map(|item| match item {
+        Item::Volume(volume, shape, transfer) => {
+            let mut field = shown(transfer);
+            field["kernel"] = kernel(shape);
+            field["sharp"] = json!(volume.coefficients.is_some());
+            Some(field)
+        }
+        Item::Scalar(_, transfer) => Some(shown(transfer)),
+        Item::Radiance(_) => None,
+    });
+    json!({
+        "mode": mode,
+        "order": order,
+        "classify": classify,
+        "optics": optics,
+        "clips": settings.clips.len(),
+        "sheet_thickness": settings.sheet_thickness,
+        "field": field,
+    })
+}
+
+fn shown(transfer: &TransferFunction) -> Value {
+    json!({
+        "shade": transfer.shade.is_some(),
+        "gradient_opacity": !transfer.gradient.is_empty(),
+        "isosurfaces": transfer.isosurfaces,
+    })
+}
+
+fn kernel(kernel: &Kernel) -> Value {
+    let (name, sigma) = match kernel.profile {
+        Profile::Gaussian(sigma) => ("gaussian", Some(sigma)),
+        Profile::BSpline => ("b-spline", None),
+        Profile::Hann => ("hann", None),
+        Profile::Table(_) => ("table", None),
+    };
+    json!({ "profile": name, "sigma": sigma, "extent": kernel.extent })
+}

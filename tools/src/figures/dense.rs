@@ -1,0 +1,111 @@
+//! Sheets against the integral along the ray that they stand for.
+
+use super::{
+    Stage,
+    report::{Cell, Table},
+};
+use crate::{failure::Failure, generate, kernel, progress::Progress};
+use glam::DVec3;
+use splatkit::{
+    compare::compare_pictures,
+    math::{Bounds, Camera, Kernel},
+    picture::Picture,
+    reference,
+    scene::{Scene, Settings},
+    volume::{TransferFunction, Volume, phantoms::Phantom},
+};
+
+/// The step of the dense integration, in samples.
+const STEP: f64 = 0.02;
+
+/// A volume and how it is shown.
+pub struct Case {
+    name: String,
+    volume: Volume,
+    kernel: Kernel,
+    transfer: TransferFunction,
+}
+
+impl Case {
+    /// As the command shows it by default.
+    pub fn automatic(name: impl Into<String>, volume: Volume) -> Self {
+        let transfer = TransferFunction::automatic(&volume);
+        Self { name: name.into(), volume, kernel: Kernel::default(), transfer }
+    }
+
+    fn scene(&self) -> Scene {
+        Scene::new().with_volume(self.volume.clone(), self.kernel.clone(), self.transfer.clone())
+    }
+}
+
+/// Volumes with and without steep edges, and all ways to reconstruct them.
+pub fn generated() -> Result<Vec<Case>, Failure> {
+    let told = splatkit::Error::Argument;
+    let specimen = Phantom::Specimen.sample_bytes([48; 3]).map_err(told)?;
+    let narrow = Kernel::gaussian(0.7, 3.0)?;
+    // A shell of a tenth of the ball's radius.
+    let shell = TransferFunction {
+        color: vec![(0.0, [0.9, 0.6, 0.3])],
+        opacity: vec![(0.25, 0.0), (0.3, 0.5), (0.35, 0.0)],
+        unit: 0.02,
+        ..TransferFunction::default()
+    };
+    let ball = Phantom::Ball.sample([32; 3]).map_err(told)?;
+    let head = Phantom::Head.sample([48; 3]).map_err(told)?;
+    let bone = TransferFunction { unit: 0.01, ..TransferFunction::named("ct-bone", head.range)? };
+    let sharp = kernel::sharpened(specimen.clone(), &narrow)?;
+    let body_centred = Phantom::Specimen.sample_on(generate::body_centred(48)).map_err(told)?;
+    Ok(vec![
+        Case::automatic("specimen, 48³", specimen),
+        Case { kernel: narrow, ..Case::automatic("specimen, 48³, sharp", sharp) },
+        Case::automatic("specimen, body-centred", body_centred),
+        Case { transfer: shell, ..Case::automatic("thin shell, 32³", ball) },
+        Case { transfer: bone, ..Case::automatic("head, 48³, ct-bone", head) },
+    ])
+}
+
+pub fn table(stage: &mut Stage, cases: &[Case], size: [u32; 2], progress: &Progress) -> Result<Table, Failure> {
+    let mut table = Table::new(
+        "Sheets against dense integration.",
+        format!(
+            "PSNR in dB of unlit pictures of {}×{} pixels, drawn by the engine, against the reference's integral in steps of \
+             {STEP} samples through the same field.",
+            size[0], size[1]
+        ),
+        &["volume", "default thickness", "a quarter of it"],
+    );
+    for case in cases {
+        let scene = case.scene();
+        let [min, max] = case.volume.bounds();
+        let camera = camera(&Bounds { min, max }, size)?;
+        let mut settings = Settings::new(size);
+        settings.volume_shade = Some(None);
+        progress.stage(format!("Integrating {}", case.name));
+        let truth = integrated(&scene, &camera, &settings, STEP * case.volume.lattice.kernel_spacing())?;
+        let mut prepared = stage.prepare(&scene)?;
+        let default = scene.sheets(&camera.view(size)?, &settings).step;
+        let mut cells = Vec::new();
+        for thickness in [default, 0.25 * default] {
+            settings.sheet_thickness = Some(thickness);
+            let picture = stage.draw(&mut prepared, &camera, &settings)?;
+            let psnr = compare_pictures(&picture, &truth)?.psnr;
+            cells.push(psnr.map_or(Cell::None, |psnr| Cell::Number(psnr, 1)));
+        }
+        table.row(&case.name, cells);
+    }
+    Ok(table)
+}
+
+fn camera(bounds: &Bounds, size: [u32; 2]) -> splatkit::Result<Camera> {
+    let mut camera = Camera::framing(bounds, DVec3::Y, DVec3::Z, f64::from(size[0]) / f64::from(size[1]));
+    camera.azimuth(30.0);
+    camera.elevation(20.0);
+    camera.fit(bounds, size, 0.04)?;
+    Ok(camera)
+}
+
+/// The picture that sheets come near to.
+fn integrated(scene: &Scene, camera: &Camera, settings: &Settings, step: f64) -> splatkit::Result<Picture> {
+    let fine = Settings { sheet_thickness: Some(step), ..settings.clone() };
+    reference::render(scene, camera, &fine)
+}

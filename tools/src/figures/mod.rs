@@ -1,0 +1,123 @@
+//! `splatkit figures`: what the documentation says of quality, measured.
+
+mod bleeding;
+mod dense;
+mod marschner_lobb;
+mod popping;
+mod report;
+mod ripple;
+
+use crate::{failure::Failure, load::LoadFlags, output, parse, progress::Progress};
+use clap::Args;
+use report::{Report, Table};
+use splatkit::{
+    Error,
+    engine::{AdapterChoice, Gpu, PreparedScene, Renderer},
+    math::Camera,
+    picture::Picture,
+    scene::{Scene, Settings},
+};
+use std::path::PathBuf;
+
+#[derive(Args, Debug)]
+pub struct Figures {
+    /// Volumes that are drawn in sheets and by dense integration too, beside the generated ones.
+    #[arg(value_name = "VOLUME")]
+    files: Vec<PathBuf>,
+    /// Leaves out all but these.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "PART,…")]
+    only: Vec<Part>,
+    /// Size of the pictures that are integrated densely.
+    #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "96x72")]
+    size: [u32; 2],
+    /// Replaces the marked block of this file by the tables.
+    #[arg(long, value_name = "FILE.md")]
+    write: Option<PathBuf>,
+    /// Writes JSON.
+    #[arg(long)]
+    json: bool,
+    /// The adapter, as for render.
+    #[arg(long, value_name = "N|NAME|software", help_heading = "Engine")]
+    gpu: Option<String>,
+    #[command(flatten)]
+    load: LoadFlags,
+}
+
+/// What is measured.
+#[derive(Debug, Clone, Copy, PartialEq, clap::ValueEnum)]
+enum Part {
+    /// How even the sum of a kernel's copies is.
+    Ripple,
+    /// The error of the field that the engine draws.
+    MarschnerLobb,
+    /// What shows through an opaque slab.
+    Bleeding,
+    /// How much a picture jumps while the camera turns.
+    Popping,
+    /// Sheets against dense integration.
+    Dense,
+}
+
+/// The engine, for one scene after another.
+struct Stage {
+    renderer: Renderer,
+}
+
+impl Stage {
+    fn prepare(&self, scene: &Scene) -> splatkit::Result<PreparedScene> {
+        self.renderer.prepare(scene)
+    }
+
+    fn draw(&mut self, scene: &mut PreparedScene, camera: &Camera, settings: &Settings) -> splatkit::Result<Picture> {
+        Ok(self.renderer.render(scene, camera, settings)?.0)
+    }
+}
+
+impl Figures {
+    pub fn run(self, progress: &Progress) -> Result<(), Failure> {
+        let block = self.write.as_deref().map(report::Block::open).transpose()?;
+        let choice = self.gpu.as_deref().map_or(AdapterChoice::Automatic, |text| text.parse().unwrap_or_default());
+        let gpu = Gpu::headless(&choice)?;
+        let mut stage = Stage { renderer: Renderer::new(&gpu) };
+        let mut report = Report { adapter: gpu.info.name.clone(), tables: Vec::new() };
+        let wanted = |part| self.only.is_empty() || self.only.contains(&part);
+        if wanted(Part::Ripple) {
+            report.tables.push(ripple::table()?);
+        }
+        if wanted(Part::MarschnerLobb) {
+            report.tables.push(marschner_lobb::table(&mut stage, progress)?);
+        }
+        if wanted(Part::Bleeding) {
+            report.tables.push(bleeding::table(&mut stage, progress)?);
+        }
+        if wanted(Part::Popping) {
+            report.tables.push(popping::table(&mut stage, progress)?);
+        }
+        if wanted(Part::Dense) {
+            report.tables.push(self.dense(&mut stage, progress)?);
+        }
+        progress.clear();
+        if let Some(block) = block {
+            block.replace(&report.markdown())?;
+        }
+        if self.json {
+            return output::line(report.json());
+        }
+        output::line(report.markdown().trim_end())
+    }
+
+    fn dense(&self, stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {
+        let mut cases = dense::generated()?;
+        for file in &self.files {
+            progress.stage(format!("Reading {}", file.display()));
+            match self.load.open(file)? {
+                crate::load::Input::Volume(volume) => {
+                    let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+                    cases.push(dense::Case::automatic(name, volume));
+                }
+                _ => return Err(Error::input(file, "file", "is no volume").into()),
+            }
+        }
+        dense::table(stage, &cases, self.size, progress)
+    }
+}

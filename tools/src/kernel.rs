@@ -1,0 +1,97 @@
+//! The flags of the kernel that stands for a sample of a lattice.
+
+use crate::{failure::Failure, parse};
+use clap::Args;
+use splatkit::{
+    Error,
+    io::{Limits, Source},
+    math::Kernel,
+    volume::Volume,
+};
+use std::path::Path;
+
+/// The kernel of a volume's samples. Lengths are counted in samples.
+#[derive(Args, Debug, Clone)]
+#[command(next_help_heading = "Kernel")]
+pub struct KernelFlags {
+    /// gaussian, b-spline, hann, or a file of values at even distances from 0 to --extent: a JSON array, or one number in
+    /// a line [default: gaussian]
+    #[arg(long, value_name = "NAME|FILE")]
+    kernel: Option<String>,
+    /// Standard deviation of the Gaussian [default: 0.6, or 0.7 with --sharp]
+    #[arg(long, value_name = "SAMPLES", value_parser = parse::positive)]
+    sigma: Option<f64>,
+    /// Radius of a footprint [default: 2 for gaussian and b-spline, 3 for hann and for gaussian with --sharp]
+    #[arg(long, value_name = "SAMPLES", value_parser = parse::positive)]
+    extent: Option<f64>,
+    /// Makes kernels pass through the samples, which they smooth otherwise.
+    #[arg(long)]
+    sharp: bool,
+}
+
+const NAMES: [&str; 3] = ["gaussian", "b-spline", "hann"];
+
+/// A table of this many bytes is no kernel.
+const FILE_LIMIT: u64 = 4 << 20;
+
+impl KernelFlags {
+    pub fn kernel(&self) -> Result<Kernel, Failure> {
+        let name = self.kernel.as_deref().unwrap_or("gaussian");
+        if self.sigma.is_some() && name != "gaussian" {
+            return Err(Failure::Usage(format!("--sigma is the Gaussian's; the kernel {name} has none")));
+        }
+        Ok(match name {
+            "gaussian" => self.gaussian()?,
+            "b-spline" => Kernel::b_spline(self.extent.unwrap_or(2.0))?,
+            "hann" => Kernel::hann(self.extent.unwrap_or(3.0))?,
+            file if Path::new(file).extension().is_some() || Path::new(file).exists() => {
+                let extent = self.extent.ok_or_else(|| {
+                    Failure::Usage(format!("{file}: a kernel of one's own needs --extent, where its last value lies"))
+                })?;
+                Kernel::table(read_table(Path::new(file))?, extent)?
+            }
+            _ => {
+                let names = NAMES.join(", ");
+                return Err(Failure::Usage(format!("there is no kernel “{name}”; there are {names}, and files")));
+            }
+        })
+    }
+
+    fn gaussian(&self) -> splatkit::Result<Kernel> {
+        let default = match self.sharp {
+            false => Kernel::default(),
+            true => Kernel::gaussian(0.7, 3.0)?,
+        };
+        let sigma = self.sigma.unwrap_or(default.unit());
+        // A wider kernel keeps its shape unless the user cuts it.
+        let extent = self.extent.unwrap_or(default.extent.max(default.radius() * sigma));
+        Kernel::gaussian(sigma, extent)
+    }
+
+    /// Whether kernels are to pass through the samples.
+    pub fn is_sharp(&self) -> bool {
+        self.sharp
+    }
+}
+
+/// The volume with coefficients in place of its samples, so that the kernels pass through them.
+pub fn sharpened(_volume: Volume, _kernel: &Kernel) -> splatkit::Result<Volume> {
+    Err(Error::Argument("--sharp is not there yet".into()))
+}
+
+/// The numbers of a JSON array, or of lines.
+fn read_table(path: &Path) -> splatkit::Result<Vec<f64>> {
+    let limits = Limits { bytes: FILE_LIMIT, ..Limits::default() };
+    let source = Source::open(path, &limits)?;
+    let text = std::str::from_utf8(source.bytes())
+        .map_err(|e| source.error(format!("byte {}", e.valid_up_to()), "is not UTF-8 text"))?;
+    if text.trim_start().starts_with('[') {
+        return serde_json::from_str(text).map_err(|e| source.error("kernel", e.to_string()));
+    }
+    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+    let number = |(at, line): (usize, &str)| {
+        let error = || source.error(format!("line {}", at + 1), format!("“{}” is no number", line.trim()));
+        parse::finite(line.trim()).map_err(|_| error().hint("the form is a JSON array, or one number in a line"))
+    };
+    lines.map(number).collect()
+}

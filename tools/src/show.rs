@@ -1,0 +1,201 @@
+//! The flags of how values and surfaces are shown.
+
+use crate::{failure::Failure, kernel::KernelFlags, parse};
+use clap::Args;
+use splatkit::{
+    Error,
+    math::Kernel,
+    volume::{Isosurface, TransferFunction, Volume},
+};
+use std::path::Path;
+
+/// How a scene's values and surfaces are shown.
+#[derive(Args, Debug, Clone)]
+#[command(next_help_heading = "Look")]
+pub struct ShowFlags {
+    /// How a volume's values are shown: ct-bone, ct-soft-tissue, ct-lung, ct-angiography, mri, generic, or a JSON file. By
+    /// default made from the volume's histogram.
+    #[arg(long, value_name = "NAME|FILE.json")]
+    transfer: Option<String>,
+    /// The values that the transfer function spreads over, instead of its own.
+    #[arg(long, value_name = "LOW,HIGH", value_parser = parse::range, allow_hyphen_values = true)]
+    range: Option<[f64; 2]>,
+    /// The world length that the transfer function's opacities hold for.
+    #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
+    opacity_unit: Option<f64>,
+    /// Surfaces of one value each, as VALUE, VALUE:#rrggbb, VALUE:OPACITY or VALUE:#rrggbb:OPACITY. Without --transfer they
+    /// are all that is shown. By default opaque, in the transfer function's colour of the value.
+    #[arg(long, value_name = "VALUE,…", value_parser = Surface::parse, value_delimiter = ',', allow_hyphen_values = true)]
+    iso: Vec<Surface>,
+    /// Factors of 0 … 1 on the opacity by the gradient's magnitude (value per world length), linear in between.
+    #[arg(long, value_name = "MAGNITUDE,FACTOR:…", value_parser = Factors::parse)]
+    gradient_opacity: Option<Factors>,
+    /// Factor on the radii of surfels.
+    #[arg(long, value_name = "FACTOR", value_parser = parse::positive)]
+    pub radius_scale: Option<f64>,
+    #[command(flatten)]
+    kernel: KernelFlags,
+}
+
+/// An isosurface whose colour may be left to the transfer function.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Surface {
+    value: f64,
+    color: Option<[f64; 3]>,
+    opacity: f64,
+}
+
+/// [`TransferFunction::gradient`].
+#[derive(Debug, Clone, PartialEq)]
+struct Factors(Vec<(f64, f64)>);
+
+/// [`ShowFlags`] with their files read: what is wrong whatever the scene is known before its files are.
+pub struct Show<'a> {
+    flags: &'a ShowFlags,
+    pub kernel: Kernel,
+    pub sharp: bool,
+    transfer: Transfer<'a>,
+}
+
+enum Transfer<'a> {
+    Automatic,
+    Named(&'a str),
+    Read(TransferFunction),
+}
+
+impl ShowFlags {
+    pub fn open(&self) -> Result<Show<'_>, Failure> {
+        let transfer = match &self.transfer {
+            None => Transfer::Automatic,
+            Some(file) if !TransferFunction::NAMES.contains(&file.as_str()) && is_file(file) => {
+                Transfer::Read(TransferFunction::read(Path::new(file))?)
+            }
+            Some(name) => {
+                // What is no name is told here; the range comes with the volume.
+                TransferFunction::named(name, [0.0, 1.0])?;
+                Transfer::Named(name)
+            }
+        };
+        let more = match &transfer {
+            Transfer::Read(transfer) => transfer.isosurfaces.len(),
+            _ => 0,
+        };
+        let (count, most) = (self.iso.len() + more, TransferFunction::MAX_ISOSURFACES);
+        if count > most {
+            return Err(Failure::Usage(format!("{count} isosurfaces are more than {most}")));
+        }
+        Ok(Show { flags: self, kernel: self.kernel.kernel()?, sharp: self.kernel.is_sharp(), transfer })
+    }
+}
+
+fn is_file(text: &str) -> bool {
+    Path::new(text).extension().is_some() || Path::new(text).exists()
+}
+
+impl Show<'_> {
+    /// The transfer function that shows a volume; one that shows nothing of it is an error.
+    pub fn transfer(&self, path: &Path, volume: &Volume) -> Result<TransferFunction, Failure> {
+        let transfer = match &self.transfer {
+            Transfer::Automatic => TransferFunction::automatic(volume),
+            Transfer::Named(name) => TransferFunction::named(name, volume.range)?,
+            Transfer::Read(transfer) => transfer.clone(),
+        };
+        let mut transfer = match self.flags.range {
+            Some(range) => transfer.spread_over(range),
+            None => transfer,
+        };
+        if let Some(unit) = self.flags.opacity_unit {
+            transfer.unit = unit;
+        }
+        if let Some(Factors(factors)) = &self.flags.gradient_opacity {
+            transfer.gradient.clone_from(factors);
+        }
+        self.add_surfaces(&mut transfer);
+        if !transfer.visible(volume.range) {
+            let [low, high] = volume.range;
+            let shown = match transfer.shown_range() {
+                Some([from, to]) if from == to => format!("shows the value {from} alone"),
+                Some([from, to]) => format!("shows values between {from} and {to}"),
+                None => "shows no value".to_owned(),
+            };
+            return Err(Error::NothingToDraw(format!(
+                "the transfer function {shown}, but those of {} lie between {low} and {high}",
+                path.display()
+            ))
+            .into());
+        }
+        Ok(transfer)
+    }
+
+    fn add_surfaces(&self, transfer: &mut TransferFunction) {
+        if self.flags.iso.is_empty() {
+            return;
+        }
+        for &Surface { value, color, opacity } in &self.flags.iso {
+            let color = color.unwrap_or_else(|| transfer.color(value));
+            transfer.isosurfaces.push(Isosurface { value, color, opacity });
+        }
+        if matches!(self.transfer, Transfer::Automatic) {
+            transfer.opacity = vec![(0.0, 0.0)];
+        }
+    }
+}
+
+impl Surface {
+    /// `80`, `80:#ff8800`, `80:0.5` or `80:#ff8800:0.5`.
+    fn parse(text: &str) -> Result<Self, String> {
+        let form = "the form is VALUE, VALUE:#rrggbb, VALUE:OPACITY or VALUE:#rrggbb:OPACITY";
+        let mut parts = text.split(':').peekable();
+        let value = parse::finite(parts.next().unwrap_or_default().trim()).map_err(|_| form)?;
+        let color = match parts.next_if(|part| part.starts_with('#')) {
+            Some(text) => Some(parse::color(text)?.map(f64::from)),
+            None => None,
+        };
+        let opacity = match parts.next() {
+            Some(text) => parse::finite(text).map_err(|_| form)?,
+            None => 1.0,
+        };
+        if !(opacity > 0.0 && opacity <= 1.0) {
+            return Err("the opacity of a surface lies above 0 and up to 1".into());
+        }
+        if parts.next().is_some() { Err(form.into()) } else { Ok(Self { value, color, opacity }) }
+    }
+}
+
+impl Factors {
+    /// `0,0:50,0.2:200,1`.
+    fn parse(text: &str) -> Result<Self, String> {
+        let form = "MAGNITUDE,FACTOR:MAGNITUDE,FACTOR…, such as 0,0:200,1";
+        let points = text.split(':').map(|point| parse::numbers(point, ',', form).map(|[m, factor]| (m, factor)));
+        let gradient = points.collect::<Result<Vec<(f64, f64)>, String>>()?;
+        // The library knows what a right one is.
+        let whole = TransferFunction { opacity: vec![(0.0, 1.0)], gradient, ..TransferFunction::default() };
+        whole.validate()?;
+        Ok(Self(whole.gradient))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn surfaces_are_read() {
+        let surface = |text| Surface::parse(text);
+        assert_eq!(surface("-500"), Ok(Surface { value: -500.0, color: None, opacity: 1.0 }));
+        assert_eq!(surface("0.5:0.25"), Ok(Surface { value: 0.5, color: None, opacity: 0.25 }));
+        assert_eq!(surface("80:#ff0000"), Ok(Surface { value: 80.0, color: Some([1.0, 0.0, 0.0]), opacity: 1.0 }));
+        assert_eq!(surface("80:#00ff00:0.5"), Ok(Surface { value: 80.0, color: Some([0.0, 1.0, 0.0]), opacity: 0.5 }));
+        for bad in ["", "x", "80:", "80:#ff", "80:0", "80:2", "80:0.5:#ffffff", "80:#ffffff:1:1", "nan"] {
+            assert!(surface(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn factors_are_read() {
+        assert_eq!(Factors::parse("0,0:50,0.2:200,1"), Ok(Factors(vec![(0.0, 0.0), (50.0, 0.2), (200.0, 1.0)])));
+        for (bad, word) in [("1", "the form is"), ("2,0:1,1", "before"), ("0,2", "0 … 1"), ("-1,0", "0 or more")] {
+            assert!(Factors::parse(bad).unwrap_err().contains(word), "{bad}");
+        }
+    }
+}

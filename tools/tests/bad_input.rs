@@ -1,0 +1,135 @@
+//! What makes no picture of a volume is told in words, by its exit code, before a GPU is asked for where that can be.
+
+mod common;
+
+use common::*;
+
+/// 16³ samples of 32 bits.
+fn floats(value: impl Fn(usize) -> f32) -> Vec<u8> {
+    nrrd("float", &(0..4096).flat_map(|i| value(i).to_le_bytes()).collect::<Vec<_>>())
+}
+
+fn folder(name: &str) -> Folder {
+    let folder = Folder::new(name);
+    folder.put("a.nrrd", nrrd("uint8", &ball()));
+    folder.put("flat.nrrd", nrrd("uint8", &[7; 4096]));
+    folder.put("nan.nrrd", floats(|i| if i % 100 == 7 { f32::NAN } else { i as f32 }));
+    folder.put("clear.json", r#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 0], [255, 0]]}"#);
+    folder.put("steep.json", r#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 1]], "gradient": [[5, 1], [2, 0]]}"#);
+    folder.put("cone.csv", "1\n0.5\n0\n");
+    folder.put("cone.json", "[1, 0.5, 0]");
+    folder.put("words.csv", "1\none half\n");
+    folder.put("negative.json", "[-1, 0]");
+    folder
+}
+
+/// Arguments after `render`, the exit code, and the message.
+const WRONG: &[(&str, i32, &str)] = &[
+    // Inputs.
+    (
+        "a.nrrd --transfer clear.json",
+        3,
+        "clear.json: transfer function: a transfer function without opacity shows nothing: every opacity is 0",
+    ),
+    ("a.nrrd --transfer steep.json", 3, "gradient point 1 is at 2, before the previous one at 5"),
+    ("nan.nrrd", 3, "nan.nrrd: samples: 41 of 4096 samples are not finite, the first is sample 7 (NaN)"),
+    (
+        "flat.nrrd --transfer ct-bone",
+        3,
+        "nothing to draw: the transfer function shows values between 150 and inf, but those of flat.nrrd lie between 7 and 7",
+    ),
+    (
+        "flat.nrrd --iso 8",
+        3,
+        "nothing to draw: the transfer function shows the value 8 alone, but those of flat.nrrd lie between 7 and 7",
+    ),
+    // Kernels.
+    ("a.nrrd --sigma 0", 2, "invalid value '0' for '--sigma <SAMPLES>': a number above 0 is needed"),
+    ("a.nrrd --sigma 3 --extent 1", 2, "a Gaussian of sigma 3 cut at 1 samples is a block; cut it at 3 or more"),
+    ("a.nrrd --extent 1000", 2, "a kernel's extent must lie in 0.71 … 16 samples, found 1000"),
+    ("a.nrrd --extent 0.5", 2, "a kernel's extent must lie in 0.71 … 16 samples, found 0.5"),
+    ("a.nrrd --kernel sinc", 2, "there is no kernel “sinc”; there are gaussian, b-spline, hann, and files"),
+    ("a.nrrd --kernel hann --sigma 1", 2, "--sigma is the Gaussian's; the kernel hann has none"),
+    ("a.nrrd --kernel cone.csv", 2, "cone.csv: a kernel of one's own needs --extent, where its last value lies"),
+    ("a.nrrd --kernel none.csv --extent 2", 3, "none.csv: cannot open"),
+    ("a.nrrd --kernel words.csv --extent 2", 3, "words.csv: line 2: “one half” is no number"),
+    ("a.nrrd --kernel negative.json --extent 2", 2, "a kernel's values must add up to more than 0"),
+    // Clips.
+    (
+        "a.nrrd --clip box:20,20,20:30,30,30",
+        3,
+        "nothing to draw: --clip 'box:20,20,20:30,30,30' leaves nothing of the scene, which lies between [0, 0, 0] and [15, 15, 15]",
+    ),
+    ("a.nrrd --clip x<-100%", 3, "nothing to draw: --clip 'x<-100%' leaves nothing of the scene"),
+    ("a.nrrd --cut plane:0,0,1,99", 3, "nothing to draw: --cut 'plane:0,0,1,99' leaves nothing of the scene"),
+    ("a.nrrd --clip box:1,1,1:0,2,2", 2, "the first corner of a box must lie below the second on every axis"),
+    ("a.nrrd --clip box:50%,0,0:1,9,9", 2, "a clip box from [7.5, 0, 0] to [1, 9, 9] holds nothing"),
+    ("a.nrrd --clip plane:0,0,0,1", 2, "a plane needs a direction that is not 0,0,0"),
+    ("a.nrrd --clip w<3", 2, "the forms are plane:NX,NY,NZ,OFFSET, box:X0,Y0,Z0:X1,Y1,Z1 and 'x<AT' or 'x>AT'"),
+    (
+        "a.nrrd --clip x<9 --clip x<9 --clip x<9 --clip x<9 --clip x<9 --cut x<1 --cut x<1 --cut x<1 --cut x<1",
+        2,
+        "9 shapes of --clip and --cut are more than 8",
+    ),
+    // What does not go together.
+    ("a.nrrd --back-to-front", 2, "--back-to-front is an order of single splats: it needs --mode splats"),
+    ("a.nrrd --mip --x-ray", 2, "the argument '--mip' cannot be used with '--x-ray'"),
+    (
+        "a.nrrd --mode splats --iso 50",
+        2,
+        "isosurfaces and gradient opacity need image-aligned sheets, classified after interpolation",
+    ),
+    (
+        "a.nrrd --classify pre --gradient-opacity 0,0:9,1",
+        2,
+        "isosurfaces and gradient opacity need image-aligned sheets, classified after interpolation",
+    ),
+    (
+        "a.nrrd --mode axis-sheets --mip",
+        2,
+        "the maximum of a field needs image-aligned sheets, classified after interpolation",
+    ),
+    ("a.nrrd --iso 1,2,3,4,5,6,7,8,9", 2, "9 isosurfaces are more than 8"),
+    ("a.nrrd --iso 50:2", 2, "the opacity of a surface lies above 0 and up to 1"),
+    ("a.nrrd --gradient-opacity 5,0:2,1", 2, "gradient point 1 is at 2, before the previous one at 5"),
+];
+
+#[test]
+fn each_wrong_input_has_its_message() {
+    let folder = folder("wrong");
+    for (arguments, code, message) in WRONG {
+        folder.run(&format!("render {arguments} -o out.png")).fails(*code, &[message]);
+    }
+    assert!(!folder.path("out.png").exists());
+}
+
+#[test]
+fn what_is_unusual_draws() {
+    let folder = folder("unusual");
+    for arguments in [
+        // A constant volume is a faint haze.
+        "flat.nrrd",
+        "a.nrrd --kernel b-spline",
+        "a.nrrd --kernel cone.csv --extent 2",
+        "a.nrrd --kernel cone.json --extent 1.5",
+        "a.nrrd --iso 50,100:#ff0000:0.5 --iso 150:0.3",
+        "a.nrrd --transfer generic --iso 100 --gradient-opacity 0,0:20,1",
+        "a.nrrd --classify pre",
+        "a.nrrd --mode axis-sheets",
+        "a.nrrd --mode splats --back-to-front",
+        "a.nrrd --mip",
+        "a.nrrd --x-ray",
+        "a.nrrd --clip plane:1,1,0,15 --clip y>20% --cut box:0,0,0:50%,50%,50%",
+    ] {
+        let found = folder.json(&format!("render {arguments} -o out.png --overwrite --json --size 32x24"));
+        let settings = &found["settings"];
+        for name in ["mode", "classify", "optics", "clips"] {
+            assert!(!settings[name].is_null(), "{arguments}: {name}: {found}");
+        }
+        assert!(settings["field"]["kernel"]["extent"].is_f64(), "{found}");
+    }
+    // What several clips leave together is known by the picture.
+    folder
+        .run("render a.nrrd -o none.png --size 32x24 --clip x<30% --clip x>70%")
+        .fails(3, &["the camera sees no splat that has opacity in what --clip 'x<30%' --clip 'x>70%' leaves"]);
+}
