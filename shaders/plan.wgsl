@@ -13,7 +13,7 @@
 
 struct PaddedPass {
     stage: Pass,
-    padding: array<vec4<u32>, 12>,
+    padding: array<vec4<u32>, 14>,
 }
 
 struct Report {

@@ -160,8 +160,9 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
             if GRADIENT_OPACITY {
                 shown *= gradient_factor(length(gradient_at(*medium, middle)));
             }
-            let depth = shown.w * step * select(own.filling, 1.0, LATTICE);
-            let color = shown.xyz / max(shown.w, 1e-20);
+            // Differences of integrals: what rounding leaves of them where nothing is shown must stay a colour.
+            let depth = max(shown.w, 0.0) * step * select(own.filling, 1.0, LATTICE);
+            let color = clamp(shown.xyz / max(shown.w, 1e-20), vec3(0.0), vec3(1.0));
             var done = 0.0;
             for (var i = 0u; i < ISOSURFACES; i++) {
                 let surface = frame.isosurfaces[select(ISOSURFACES - 1u - i, i, next > value)];
