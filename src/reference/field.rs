@@ -216,6 +216,22 @@ mod tests {
         }
     }
 
+    #[test]
+    fn surfaces_are_met_in_order() {
+        let surface = |value: f64, red: f64| Isosurface { value, color: [red, 0.0, 0.0], opacity: 1.0 };
+        let surfaces = [surface(3.0, 0.1), surface(2.0, 0.2), surface(2.0, 0.3), surface(5.0, 0.4)];
+        let transfer = TransferFunction::default();
+        let classifier = Classifier::new(&transfer);
+        let field = Field { classifier, lattice: None, shade: None, surfaces: &surfaces, inside: true };
+        let met = |ends: [f64; 2]| -> Vec<(f64, f64)> {
+            field.met(ends).into_iter().map(|(share, surface)| (share, surface.color[0])).collect()
+        };
+        assert_eq!(met([1.0, 5.0]), [(0.25, 0.2), (0.25, 0.3), (0.5, 0.1), (1.0, 0.4)]);
+        assert_eq!(met([5.0, 1.0]), [(0.0, 0.4), (0.5, 0.1), (0.75, 0.2), (0.75, 0.3)]);
+        // An end that has a surface's value is met by one of the two parts that share it.
+        assert_eq!(met([2.0, 2.5]), []);
+    }
+
     fn layer_like(layer: &Layer) -> Layer {
         Layer { ..*layer }
     }
