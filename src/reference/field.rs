@@ -21,6 +21,7 @@ pub(super) struct Field<'a> {
 }
 
 /// The field in one sheet of a ray. Places in it are counted from 0 at the front to 1 at the back.
+#[derive(Clone, Copy)]
 pub(super) struct Layer {
     /// The distances of its faces.
     pub span: [f64; 2],
@@ -207,16 +208,25 @@ mod tests {
                 steps.iter().filter(|s| s.span[0] == s.span[1] && s.depth > 0.0).map(|s| s.span[0]).collect();
             assert_eq!(places, [3.5, 4.5]);
             // Backwards, and cut to its second half.
-            let (back, _) = Layer { faces: [Some(8.0), Some(0.0)], ..layer_like(&layer) }.shine(
-                &field(inside),
-                DVec3::Z,
-                &[[4.0, 5.0]],
-            );
+            let (back, _) =
+                Layer { faces: [Some(8.0), Some(0.0)], ..layer }.shine(&field(inside), DVec3::Z, &[[4.0, 5.0]]);
             assert!((back.depth - 1.0 - 2.0_f64.ln()).abs() < 1e-12);
         }
     }
 
-    fn layer_like(layer: &Layer) -> Layer {
-        Layer { ..*layer }
+    #[test]
+    fn surfaces_are_met_in_order() {
+        let surface = |value: f64, red: f64| Isosurface { value, color: [red, 0.0, 0.0], opacity: 1.0 };
+        let surfaces = [surface(3.0, 0.1), surface(2.0, 0.2), surface(2.0, 0.3), surface(5.0, 0.4)];
+        let transfer = TransferFunction::default();
+        let classifier = Classifier::new(&transfer);
+        let field = Field { classifier, lattice: None, shade: None, surfaces: &surfaces, inside: true };
+        let met = |ends: [f64; 2]| -> Vec<(f64, f64)> {
+            field.met(ends).into_iter().map(|(share, surface)| (share, surface.color[0])).collect()
+        };
+        assert_eq!(met([1.0, 5.0]), [(0.25, 0.2), (0.25, 0.3), (0.5, 0.1), (1.0, 0.4)]);
+        assert_eq!(met([5.0, 1.0]), [(0.0, 0.4), (0.5, 0.1), (0.75, 0.2), (0.75, 0.3)]);
+        // An end that has a surface's value is met by one of the two parts that share it.
+        assert_eq!(met([2.0, 2.5]), []);
     }
 }

@@ -113,13 +113,11 @@ mod tests;
 
 pub use truth::integrate;
 
-#[cfg(doc)]
-use crate::scene::Classification;
 use crate::{
     Result,
     math::{Camera, View},
     picture::Picture,
-    scene::{self, Clip, Gradient, Item, Mode, Optics, Scene, Settings},
+    scene::{Classification, Clip, Gradient, Item, Mode, Optics, Scene, Settings},
     volume::{Lattice, Shade},
 };
 use classify::Classifier;
@@ -197,14 +195,14 @@ impl<'a> Frame<'a> {
             Item::Volume(volume, _, transfer) => Some((transfer, Some(&volume.lattice))),
         });
         let dark = settings.optics == Optics::XRay;
-        let before = settings.mode != Mode::Sheets || settings.classification == scene::Classification::Pre;
+        let before = settings.mode != Mode::Sheets || settings.classification == Classification::Pre;
         let shade = samples.and_then(|(transfer, _)| settings.shade_of(transfer)).filter(|_| !dark);
         let field = samples.filter(|_| !before).map(|(transfer, lattice)| Field {
             classifier: Classifier::new(transfer),
             lattice,
             shade,
             surfaces: if dark { &[] } else { &transfer.isosurfaces },
-            inside: settings.classification == scene::Classification::PreIntegrated,
+            inside: settings.classification == Classification::PreIntegrated,
         });
         Self {
             mode: settings.mode,

@@ -11,6 +11,7 @@ use super::*;
 use crate::{
     compare::compare_pictures,
     math::{Kernel as Shape, Projection},
+    scene,
     splat::{NO_NORMAL, Payload, Splat, SplatSet},
     volume::{Samples, TransferFunction, Volume},
 };
