@@ -48,7 +48,6 @@ fn add_isotropic(entry: u32, front: u32, first_pixel: vec2<i32>) {
     let t = clamp((near - distance) * inverse_sigma, -FAR, FAR);
     let along = sections(t, base) * (SQRT_TAU * frame.isotropic.x);
     let on_plane = exp(-0.5 * t * t);
-    let on_plane_z = on_plane * t * inverse_sigma;
     let extent2 = frame.isotropic.z;
     let dx = f32(first_pixel.x) + 0.5 - at.x;
     let nx = q.x * dx * dx;
@@ -64,16 +63,12 @@ fn add_isotropic(entry: u32, front: u32, first_pixel: vec2<i32>) {
         pixels[r].value += along * v;
         pixels[r].face_weight += on_plane * e;
         pixels[r].face_value += on_plane * v;
-        if GRADIENTS {
-            if !CENTRAL {
-                let slope = vec2(q.x * dx + q.y * dy, q.y * dx + q.z * dy) * cosine2;
-                pixels[r].weight_x += on_plane * (e * slope.x);
-                pixels[r].weight_y += on_plane * (e * slope.y);
-                pixels[r].value_x += on_plane * (v * slope.x);
-                pixels[r].value_y += on_plane * (v * slope.y);
-            }
-            pixels[r].weight_z += on_plane_z * e;
-            pixels[r].value_z += on_plane_z * v;
+        if GRADIENTS && !CENTRAL {
+            let slope = vec2(q.x * dx + q.y * dy, q.y * dx + q.z * dy) * cosine2;
+            pixels[r].weight_x += on_plane * (e * slope.x);
+            pixels[r].weight_y += on_plane * (e * slope.y);
+            pixels[r].value_x += on_plane * (v * slope.x);
+            pixels[r].value_y += on_plane * (v * slope.y);
         }
     }
 }
@@ -240,8 +235,8 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
             }
             pixels[r].face_weight += on_plane;
             pixels[r].face_value += on_plane * value;
-            if GRADIENTS {
-                // How x′ moves on a plane: per pixel to the right and down, and per world unit along the ray.
+            if GRADIENTS && !CENTRAL {
+                // How x′ moves on a plane per pixel to the right and down.
                 var across = array<vec3<f32>, 2>(m0, m1);
                 var size = vec3(1.0);
                 if PERSPECTIVE {
@@ -250,23 +245,15 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
                     across[1] -= beta * (pixels[r].ray.y * k);
                     size = near * pixels[r].cosine;
                 }
-                if !CENTRAL {
-                    let x = size * (dot(nearest, across[0]) + t * dot(unit, across[0]));
-                    let y = size * (dot(nearest, across[1]) + t * dot(unit, across[1]));
-                    pixels[r].weight_x += steep * x;
-                    pixels[r].weight_y += steep * y;
-                    pixels[r].value_x += steep * x * value;
-                    pixels[r].value_y += steep * y * value;
-                    if SLOPES {
-                        pixels[r].value_x -= on_plane * size * dot(splat.slope, across[0]);
-                        pixels[r].value_y -= on_plane * size * dot(splat.slope, across[1]);
-                    }
-                }
-                let z = t / length_of;
-                pixels[r].weight_z += steep * z;
-                pixels[r].value_z += steep * z * value;
+                let x = size * (dot(nearest, across[0]) + t * dot(unit, across[0]));
+                let y = size * (dot(nearest, across[1]) + t * dot(unit, across[1]));
+                pixels[r].weight_x += steep * x;
+                pixels[r].weight_y += steep * y;
+                pixels[r].value_x += steep * x * value;
+                pixels[r].value_y += steep * y * value;
                 if SLOPES {
-                    pixels[r].value_z -= on_plane * (dot(splat.slope, unit) / length_of);
+                    pixels[r].value_x -= on_plane * size * dot(splat.slope, across[0]);
+                    pixels[r].value_y -= on_plane * size * dot(splat.slope, across[1]);
                 }
             }
         }

@@ -1,10 +1,10 @@
 // What an invocation of march keeps for each of its pixels while it walks a tile, and the pixel's ray.
 
-// A value on the plane between two sheets, and its gradient in view space.
+// A value on the plane between two sheets, and its change across the picture, per world unit.
 struct Face {
     has_value: bool,
     value: f32,
-    gradient: vec3<f32>,
+    slope: vec2<f32>,
 }
 
 // One sheet at one pixel.
@@ -24,15 +24,13 @@ struct Pixel {
     weight: vec4<f32>,
     value: vec4<f32>,
     // Sums at the three planes between them: kernels and values times kernels, and the negated derivatives of both per pixel
-    // to the right and down and per world unit along the ray.
+    // to the right and down.
     face_weight: vec3<f32>,
     face_value: vec3<f32>,
     weight_x: vec3<f32>,
     weight_y: vec3<f32>,
-    weight_z: vec3<f32>,
     value_x: vec3<f32>,
     value_y: vec3<f32>,
-    value_z: vec3<f32>,
     // The plane before the first open sheet.
     front: Face,
     // Optical depth; and colour and normal, weighted by how much of it faces the eye, with that weight.

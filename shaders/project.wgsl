@@ -67,7 +67,8 @@ fn write_general(at: u32, splat: Candidate) {
             let size = length(splat.gradient);
             payload.y = bitcast<f32>(NO_NORMAL);
             if size > 1e-20 {
-                payload.y = bitcast<f32>(encode_normal(splat.gradient / size));
+                // What a value falls towards is outside.
+                payload.y = bitcast<f32>(encode_normal(-splat.gradient / size));
             }
         } else if CLASSIFIED {
             payload.y = bitcast<f32>(NO_NORMAL);

@@ -20,14 +20,16 @@ fn lit(color: vec3<f32>, normal: vec3<f32>, direction: vec3<f32>, shade: vec4<f3
     return min(color * (shade.x + shade.y * facing) + shade.z * pow(facing, shade.w), vec3(1.0));
 }
 
-// Gradient in view space from the slope across the picture (per pixel) and the derivative along the ray, at a distance.
-fn gradient(r: u32, slope: vec2<f32>, along: f32, distance: f32) -> vec3<f32> {
+// Slope across the picture per world unit of the plane at a distance, from that per pixel.
+fn in_world_units(r: u32, slope: vec2<f32>, distance: f32) -> vec2<f32> {
+    return slope * frame.scale / select(1.0, pixels[r].cosine * distance, PERSPECTIVE);
+}
+
+// Gradient in view space from the slope across the picture and the derivative along the ray, per world unit.
+fn gradient(r: u32, slope: vec2<f32>, along: f32) -> vec3<f32> {
     let d = direction_of(r);
-    if PERSPECTIVE {
-        let g = slope * frame.scale / (pixels[r].cosine * distance) + along * d.xy;
-        return vec3(g, (along - dot(g, d.xy)) / d.z);
-    }
-    return vec3(slope * frame.scale, along);
+    let g = slope + along * d.xy;
+    return vec3(g, (along - dot(g, d.xy)) / d.z);
 }
 
 fn shift(sums: vec4<f32>) -> vec4<f32> {
@@ -45,24 +47,14 @@ fn resolve_face(r: u32, sheet: u32) -> Face {
     let inverse = 1.0 / max(weight, 1e-37);
     face.has_value = weight > LEAST_FILLING;
     face.value = pixels[r].face_value.x * inverse;
-    if GRADIENTS {
-        var slope = vec2(0.0);
-        if !CENTRAL {
-            slope = face.value * vec2(pixels[r].weight_x.x, pixels[r].weight_y.x);
-            slope = (slope - vec2(pixels[r].value_x.x, pixels[r].value_y.x)) * inverse;
-            pixels[r].weight_x = shift_faces(pixels[r].weight_x);
-            pixels[r].weight_y = shift_faces(pixels[r].weight_y);
-            pixels[r].value_x = shift_faces(pixels[r].value_x);
-            pixels[r].value_y = shift_faces(pixels[r].value_y);
-        }
-        let along = (face.value * pixels[r].weight_z.x - pixels[r].value_z.x) * inverse;
-        pixels[r].weight_z = shift_faces(pixels[r].weight_z);
-        pixels[r].value_z = shift_faces(pixels[r].value_z);
-        // With differences between pixels, the slope along the ray waits here for those across.
-        face.gradient = vec3(slope, along);
-        if !CENTRAL {
-            face.gradient = gradient(r, slope, along, planes[sheet + 1u]);
-        }
+    if GRADIENTS && !CENTRAL {
+        let slope = face.value * vec2(pixels[r].weight_x.x, pixels[r].weight_y.x)
+            - vec2(pixels[r].value_x.x, pixels[r].value_y.x);
+        face.slope = in_world_units(r, slope * inverse, planes[sheet + 1u]);
+        pixels[r].weight_x = shift_faces(pixels[r].weight_x);
+        pixels[r].weight_y = shift_faces(pixels[r].weight_y);
+        pixels[r].value_x = shift_faces(pixels[r].value_x);
+        pixels[r].value_y = shift_faces(pixels[r].value_y);
     }
     pixels[r].face_weight = shift_faces(pixels[r].face_weight);
     pixels[r].face_value = shift_faces(pixels[r].face_value);
@@ -119,9 +111,12 @@ struct Medium {
     place: f32,
     // Lit colour times opacity of isosurfaces.
     surfaces: vec3<f32>,
-    // The gradients at both faces.
-    front: vec3<f32>,
-    back: vec3<f32>,
+    // The field along the ray: values at the front and the back and the parabola's middle; the sheet's thickness.
+    curve: vec3<f32>,
+    thickness: f32,
+    // Its slopes across the picture at both faces.
+    front: vec2<f32>,
+    back: vec2<f32>,
     // The largest value.
     peak: f32,
     // An isosurface took the half of the light.
@@ -130,21 +125,19 @@ struct Medium {
 
 const NO_VALUE: f32 = -3e38;
 
-fn gradient_at(medium: Medium, place: f32) -> vec3<f32> {
-    return mix(medium.front, medium.back, place);
+// Across the picture from the faces; along the ray the parabola's own derivative, which knows more of the inside.
+fn gradient_at(r: u32, medium: Medium, u: f32) -> vec3<f32> {
+    let curve = medium.curve;
+    let along = curve.x * (4.0 * u - 3.0) + curve.y * (4.0 - 8.0 * u) + curve.z * (4.0 * u - 1.0);
+    return gradient(r, mix(medium.front, medium.back, u), along / medium.thickness);
 }
 
 // The part of a sheet between two distances, in which the field is a parabola with the values of the faces at the ends and
 // the sheet's mean.
 fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<function, Medium>) {
     let start = planes[sheet];
-    let thickness = planes[sheet + 1u] - start;
-    var curve = vec3(own.value);
-    if PARABOLA {
-        let front = select(own.value, own.front.value, own.front.has_value);
-        let back = select(own.value, own.back.value, own.back.has_value);
-        curve = vec3(front, 1.5 * own.value - 0.25 * (front + back), back);
-    }
+    let thickness = (*medium).thickness;
+    let curve = (*medium).curve;
     let step = (end - begin) / f32(PARTS);
     var place = (begin - start) / thickness;
     var value = parabola(curve, place);
@@ -158,7 +151,7 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
             var shown = classify_between(select(value, own.value, POST), select(next, own.value, POST));
             let middle = 0.5 * (place + next_place);
             if GRADIENT_OPACITY {
-                shown *= gradient_factor(length(gradient_at(*medium, middle)));
+                shown *= gradient_factor(length(gradient_at(r, *medium, middle)));
             }
             // Differences of integrals: what rounding leaves of them where nothing is shown must stay a colour.
             let depth = max(shown.w, 0.0) * step * select(own.filling, 1.0, LATTICE);
@@ -183,7 +176,7 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
 
 fn parabola(curve: vec3<f32>, u: f32) -> f32 {
     if !PARABOLA {
-        return curve.y;
+        return (curve.x + 4.0 * curve.y + curve.z) / 6.0;
     }
     return curve.x * (1.0 - u) * (1.0 - 2.0 * u) + 4.0 * curve.y * u * (1.0 - u) + curve.z * u * (2.0 * u - 1.0);
 }
@@ -208,7 +201,7 @@ fn pass_surface(r: u32, surface: Isosurface, place: f32, distance: f32, medium: 
     }
     var color = surface.color.xyz;
     if VOLUME_SHADED {
-        color = lit(color, gradient_at(*medium, place), direction_of(r), frame.volume_shade);
+        color = lit(color, gradient_at(r, *medium, place), direction_of(r), frame.volume_shade);
     }
     (*medium).surfaces += share * color;
 }
@@ -218,13 +211,13 @@ fn pass_field(r: u32, sheet: u32, own: Sheet) -> Medium {
     var medium: Medium;
     medium.through = 1.0;
     medium.peak = NO_VALUE;
-    if GRADIENTS {
-        medium.front = select(own.back.gradient, own.front.gradient, own.front.has_value);
-        medium.back = select(own.front.gradient, own.back.gradient, own.back.has_value);
-        if !own.front.has_value && !own.back.has_value {
-            medium.front = vec3(0.0);
-            medium.back = vec3(0.0);
-        }
+    let front = select(own.value, own.front.value, own.front.has_value);
+    let back = select(own.value, own.back.value, own.back.has_value);
+    medium.curve = vec3(front, 1.5 * own.value - 0.25 * (front + back), back);
+    medium.thickness = planes[sheet + 1u] - planes[sheet];
+    if GRADIENTS && (own.front.has_value || own.back.has_value) {
+        medium.front = select(own.back.slope, own.front.slope, own.front.has_value);
+        medium.back = select(own.front.slope, own.back.slope, own.back.has_value);
     }
     var begin = max(planes[sheet], pixels[r].inside.x);
     let last = min(planes[sheet + 1u], pixels[r].inside.y);
@@ -270,7 +263,7 @@ fn composite(r: u32, sheet: u32, own: Sheet) {
         }
         var color = medium.color;
         if VOLUME_SHADED && medium.opacity > 0.0 {
-            let normal = gradient_at(medium, medium.place / medium.opacity);
+            let normal = gradient_at(r, medium, medium.place / medium.opacity);
             color = medium.opacity * lit(color / medium.opacity, normal, direction_of(r), frame.volume_shade);
         }
         // Optical depth for opacity: τ / (1 − e^−τ), of which little is left where τ is small.

@@ -6,11 +6,12 @@
 
 mod scenes;
 
-use scenes::Case;
+use scenes::{Case, methods};
 use splatkit::{
     engine::{AdapterChoice, Budget, Gpu, Renderer},
     picture::Picture,
     reference,
+    scene::{Classification, Order},
 };
 
 fn drawn(case: &Case, budget: Budget) -> Picture {
@@ -186,6 +187,140 @@ fn surface_in_a_volume() {
 #[test]
 fn surface_in_a_volume_orthographic() {
     assert_matches(scenes::surface_in_a_volume_orthographic(), 50.0);
+}
+
+#[test]
+fn body_centred() {
+    assert_matches(methods::body_centred(), 50.0);
+}
+
+#[test]
+fn body_centred_from_afar() {
+    assert_matches(methods::body_centred_from_afar(), 50.0);
+}
+
+#[test]
+fn rectilinear() {
+    assert_matches(methods::rectilinear(), 50.0);
+}
+
+#[test]
+fn b_spline() {
+    assert_matches(methods::b_spline(), 50.0);
+}
+
+#[test]
+fn table_of_a_gaussian() {
+    assert_matches(methods::table_of_a_gaussian(), 50.0);
+}
+
+#[test]
+fn thin_shells() {
+    assert_matches(methods::thin_shells(), 50.0);
+}
+
+#[test]
+fn post_classified() {
+    assert_matches(methods::post_classified(), 50.0);
+}
+
+#[test]
+fn pre_classified() {
+    assert_matches(methods::pre_classified(), 50.0);
+}
+
+#[test]
+fn axis_sheets() {
+    assert_matches(methods::axis_sheets(), 50.0);
+}
+
+#[test]
+fn axis_sheets_body_centred_orthographic() {
+    assert_matches(methods::axis_sheets_body_centred_orthographic(), 50.0);
+}
+
+#[test]
+fn single_ellipsoids() {
+    assert_matches(methods::single_ellipsoids(), 50.0);
+}
+
+#[test]
+fn gradient_opacity() {
+    assert_matches(methods::gradient_opacity(), 50.0);
+}
+
+#[test]
+fn one_isosurface() {
+    assert_matches(methods::one_isosurface(), 50.0);
+}
+
+#[test]
+fn isosurfaces_in_fog() {
+    assert_matches(methods::isosurfaces_in_fog(), 50.0);
+}
+
+#[test]
+fn maximum() {
+    assert_matches(methods::maximum(), 50.0);
+}
+
+#[test]
+fn x_ray() {
+    assert_matches(methods::x_ray(), 50.0);
+}
+
+#[test]
+fn clipped_volume() {
+    assert_matches(methods::clipped_volume(), 50.0);
+}
+
+#[test]
+fn clipped_surface_in_a_volume() {
+    assert_matches(methods::clipped_surface_in_a_volume(), 50.0);
+}
+
+#[test]
+fn sharp() {
+    assert_matches(methods::sharp(), 50.0);
+}
+
+#[test]
+fn sharp_body_centred() {
+    assert_matches(methods::sharp_body_centred(), 50.0);
+}
+
+#[test]
+fn single_splats_in_both_orders() {
+    let [front, back] = [Order::FrontToBack, Order::BackToFront].map(|order| {
+        let case = methods::single_splats(order);
+        let found = drawn(&case, Budget::default());
+        let expected = reference::render(&case.scene, &case.camera, &case.settings).expect(case.name);
+        let agreement = psnr(&found, &expected);
+        println!("{order:?}: {agreement:.1} dB");
+        assert!(agreement > 50.0, "{order:?}: {agreement:.1} dB");
+        found
+    });
+    // Rays that end early leave up to 5e-4 of the light.
+    let agreement = psnr(&front, &back);
+    println!("one order and the other: {agreement:.1} dB");
+    assert!(agreement > 60.0, "{agreement:.1} dB");
+}
+
+#[test]
+fn samples_with_slopes_and_weights() {
+    for classification in [Classification::PreIntegrated, Classification::Pre] {
+        assert_matches(methods::samples_with_slopes(classification), 50.0);
+    }
+}
+
+/// Westover's table with one more axis against the closed form.
+#[test]
+fn the_section_table_agrees_with_the_closed_form() {
+    let [table, closed] = [methods::table_of_a_gaussian(), methods::closed_form_of_that_gaussian()]
+        .map(|case| drawn(&case, Budget::default()));
+    let agreement = psnr(&table, &closed);
+    println!("table and closed form: {agreement:.1} dB");
+    assert!(agreement > 60.0, "{agreement:.1} dB");
 }
 
 /// A frame that does not fit in one pass is drawn in several, and is the same picture: only the sums at the seams of

@@ -73,12 +73,18 @@ impl Layer {
         front * (1.0 - u) * (1.0 - 2.0 * u) + 4.0 * middle * u * (1.0 - u) + back * u * (2.0 * u - 1.0)
     }
 
-    fn gradient(&self, u: f64) -> DVec3 {
-        match self.gradients {
+    /// The gradient at a place: across the ray between those of the faces, along it the parabola's own.
+    fn gradient(&self, u: f64, direction: DVec3) -> DVec3 {
+        let mixed = match self.gradients {
             [Some(front), Some(back)] => (1.0 - u) * front + u * back,
             [Some(only), None] | [None, Some(only)] => only,
             [None, None] => DVec3::ZERO,
-        }
+        };
+        let [front, back] = self.faces.map(|face| face.unwrap_or(self.mean));
+        let middle = 1.5 * self.mean - 0.25 * (front + back);
+        let slope = front * (4.0 * u - 3.0) + middle * (4.0 - 8.0 * u) + back * (4.0 * u - 1.0);
+        let along = slope / (self.span[1] - self.span[0]);
+        mixed + (along - mixed.dot(direction)) * direction
     }
 
     fn distance(&self, u: f64) -> f64 {
@@ -121,7 +127,7 @@ impl Layer {
             let middle = 0.5 * (start + end);
             let (extinction, medium) =
                 if field.inside { field.classifier.between(a, b) } else { field.classifier.at(self.mean) };
-            let factor = field.classifier.transfer.gradient_factor(self.gradient(middle).length());
+            let factor = field.classifier.transfer.gradient_factor(self.gradient(middle, direction).length());
             let length = self.distance(end) - self.distance(start);
             let depth = extinction * factor * length * self.filling;
             let at = |share: f64| start + share * (end - start);
@@ -136,7 +142,7 @@ impl Layer {
                 light *= 1.0 - alpha;
                 steps.push(Step { depth, span: [before, share].map(|share| self.distance(at(share))) });
                 if let Some(surface) = surface {
-                    let lit = field.lit(DVec3::from(surface.color), self.gradient(at(share)), direction);
+                    let lit = field.lit(DVec3::from(surface.color), self.gradient(at(share), direction), direction);
                     surfaces += light * surface.opacity * lit;
                     light *= 1.0 - surface.opacity;
                     let depth = -(1.0 - surface.opacity).ln();
@@ -146,7 +152,7 @@ impl Layer {
             }
         }
         if opacity > 0.0 {
-            surfaces += opacity * field.lit(color / opacity, self.gradient(place / opacity), direction);
+            surfaces += opacity * field.lit(color / opacity, self.gradient(place / opacity, direction), direction);
         }
         let taken = 1.0 - light;
         if taken <= 0.0 {

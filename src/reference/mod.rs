@@ -39,8 +39,8 @@
 //! where neither has one. A face without a value has no gradient.
 //!
 //! **Values.** u counts from 0 at the front face to 1 at the back. [`Classification::PreIntegrated`]: f(u) is the parabola with
-//! the faces' values and the mean f̄. [`Classification::Post`]: f̄. The gradient g(u) is linear between the faces'; that of
-//! one where the other has none, and 0 where both have none.
+//! the faces' values and the mean f̄. [`Classification::Post`]: f̄. The gradient g(u) across the ray is linear between the
+//! faces' (that of one where the other has none, 0 where both have none); along the ray it is the parabola's derivative.
 //!
 //! **Parts.** Field is in that part of the sheet which lies in the box of the samples (of the volume's lattice, not of the drawn
 //! one; an axis on which all lie at one place counts half a kernel unit to either side; scattered samples have no box) and in what

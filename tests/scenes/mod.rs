@@ -1,6 +1,8 @@
 //! Small scenes, of every kind that a picture can be made of, for holding renderers to each other. All are the same in
 //! every run, and the reference draws each in about a second.
 
+pub mod methods;
+
 use glam::{DMat3, DVec3, Vec3};
 use splatkit::{
     math::{Camera, Kernel, Projection},
