@@ -38,7 +38,15 @@ impl Phantom {
     /// # Errors
     /// In words, for dimensions of 0 or more samples than memory can hold.
     pub fn sample(self, dims: [usize; 3]) -> Result<Volume, String> {
-        let lattice = lattice(dims)?;
+        self.sample_on(lattice(dims)?)
+    }
+
+    /// 32-bit samples at the places of any lattice; those outside the cube have the function's value there too.
+    ///
+    /// # Errors
+    /// In words, for a lattice that is none ([`Lattice::validate`]).
+    pub fn sample_on(self, lattice: Lattice) -> Result<Volume, String> {
+        lattice.validate()?;
         let values = self.fill(&lattice, |value| value as f32);
         Volume::new(lattice, Samples::F32(values))
     }
@@ -128,6 +136,16 @@ mod tests {
         assert_eq!((volume.value(7), volume.range), (1.0, [0.0, 1.0]));
         assert_eq!(Phantom::Constant(0.5).sample_bytes([2, 2, 2]).unwrap().range, [128.0, 128.0]);
         assert!(Phantom::Ball.sample([0, 2, 2]).is_err());
+    }
+
+    #[test]
+    fn any_lattice_can_be_sampled() {
+        let lattice = Lattice::body_centred([2, 2, 3], DVec3::splat(-0.5), DMat3::IDENTITY);
+        let volume = Phantom::Ball.sample_on(lattice).unwrap();
+        // The first sample of the middle layer is displaced by half an edge: to the ball's centre.
+        assert_eq!((volume.value(4), volume.len()), (1.0, 12));
+        assert_eq!(volume.value(0), Phantom::Ball.value(DVec3::splat(-0.5)) as f32 as f64);
+        assert!(Phantom::Ball.sample_on(Lattice::body_centred([0, 1, 1], DVec3::ZERO, DMat3::IDENTITY)).is_err());
     }
 
     #[test]

@@ -1,0 +1,89 @@
+//! Sharp volumes: kernels that carry coefficients in place of the samples, such that their normalised sum passes through
+//! every sample. The coefficients are the samples divided, in frequency space, by the response of the sampled kernel
+//! (Unser, "Splines: a perfect fit for signal and image processing", 1999; Thévenaz, Blu and Unser, "Interpolation
+//! revisited", 2000; on body-centred lattices Condat and Van De Ville, "Three-directional box-splines", 2006, and others
+//! after Theußl, Möller and Gröller, "Optimal regular volume sampling", 2001).
+
+use super::{
+    Coefficients, Lattice, Volume,
+    grid::{Grid, Response},
+    overshoot::Overshoot,
+    reach::neighbourhood_ranges,
+};
+use crate::{
+    Error, Result,
+    math::{Kernel, Profile},
+};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// The least response that a kernel may leave of a wave. Coefficients are up to 1 / response as large as the samples and
+/// rounded to 24 bits; this keeps the sum within 1e-4 of their range.
+const LEAST_RESPONSE: f64 = 6e-4;
+
+impl Volume {
+    /// Makes the volume sharp for a kernel: sets [`coefficients`](Self::coefficients), whose normalised kernel sum passes
+    /// through every sample (within 1e-4 of the range). The field goes on mirrored at the outermost samples, and the
+    /// coefficients with it as far as the kernel reaches, so that sums are whole at the border too. The kernel is radial
+    /// in index space.
+    ///
+    /// Besides the volume and the result this takes 8 bytes a sample, on a body-centred lattice 32.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where the kernel takes some wave of the samples away (a Gaussian's sigma too large), on
+    /// rectilinear lattices, and on body-centred ones of one layer.
+    pub fn sharpened(self, kernel: &Kernel) -> Result<Self> {
+        let grid = Grid::of(&self.lattice)?;
+        let response = Response::new(grid, kernel);
+        let least = response.least();
+        // Not a comparison the other way round: NaN is refused too.
+        if !(least >= LEAST_RESPONSE) {
+            let remedy = match kernel.profile {
+                Profile::Gaussian(_) => "take a smaller sigma",
+                _ => "take a narrower kernel",
+            };
+            return Err(Error::Argument(format!(
+                "the kernel is too wide to be made sharp: it leaves {least:.1e} of the finest detail where {LEAST_RESPONSE} \
+                 are needed; {remedy}"
+            )));
+        }
+        let mut points = grid.fill(&self.samples);
+        response.divide(&mut points);
+        let overshoot = Overshoot::new(grid, kernel);
+        let around = neighbourhood_ranges(&self, self.lattice.reach(kernel.extent + overshoot.radius));
+
+        let (lattice, margin) = continued(&self.lattice, kernel.extent);
+        let [nx, ny, _] = self.lattice.dims;
+        let [width, height, _] = lattice.dims;
+        let mut values = vec![0f32; lattice.len()];
+        let mut ranges = vec![[0u8; 2]; lattice.len()];
+        let rows = values.par_chunks_mut(width).zip(ranges.par_chunks_mut(width)).enumerate();
+        rows.for_each(|(row, (values, ranges))| {
+            for (column, (value, range)) in values.iter_mut().zip(ranges).enumerate() {
+                let index = [column, row % height, row / height];
+                let index = std::array::from_fn(|axis| index[axis] as isize - margin[axis] as isize);
+                // A mirror image has the range of what it mirrors.
+                let point = grid.point(index);
+                let [i, j, k] = grid.index(point);
+                *value = points[grid.offset(point)] as f32;
+                *range = overshoot.widen(around[(k * ny + j) * nx + i]);
+            }
+        });
+        let coefficients = Coefficients { lattice, values, ranges, kernel: kernel.clone() };
+        Ok(Self { coefficients: Some(Arc::new(coefficients)), ..self })
+    }
+}
+
+/// A lattice continued on all sides as far as a kernel of some extent reaches, and by how many samples.
+fn continued(lattice: &Lattice, extent: f64) -> (Lattice, [usize; 3]) {
+    let mut margin = lattice.reach(extent);
+    let mut before = DVec3::from_array(margin.map(|n| n as f64));
+    if lattice.arrangement == super::Arrangement::BodyCentred {
+        // Whole cells, so that the first layer is one without displacement again.
+        margin[2] = margin[2].next_multiple_of(2);
+        before.z = 0.5 * margin[2] as f64;
+    }
+    let dims = std::array::from_fn(|axis| lattice.dims[axis] + 2 * margin[axis]);
+    (Lattice { dims, origin: lattice.position(-before), ..lattice.clone() }, margin)
+}
