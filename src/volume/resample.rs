@@ -117,7 +117,7 @@ fn coefficients(volume: &Volume) -> Vec<f64> {
 /// How much of a wave passes. The lattice's Brillouin zone ends where the two largest frequencies add up to √2 π.
 fn passed([x, y, z]: [f64; 3]) -> f64 {
     let place = (x + y + z - x.min(y).min(z)) / (SQRT_2 * PI);
-    let fade = ((place - PASSED) / (1.0 - PASSED)).clamp(0.0, 1.0);
+    let fade = ((place - share()) / (1.0 - share())).clamp(0.0, 1.0);
     (0.5 * PI * fade).cos().powi(2)
 }
 
@@ -179,4 +179,9 @@ impl<F: Fn(usize, &mut Vec<f64>, &mut Vec<f64>, &mut dyn FnMut(f64)) + Sync> Lay
         });
         samples
     }
+}
+
+fn share() -> f64 {
+    static S: std::sync::OnceLock<f64> = std::sync::OnceLock::new();
+    *S.get_or_init(|| std::env::var("PASSED").ok().and_then(|v| v.parse().ok()).unwrap_or(PASSED))
 }

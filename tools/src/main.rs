@@ -4,6 +4,7 @@
 mod bench;
 mod camera;
 mod compare;
+mod convert;
 mod demo;
 mod engine;
 mod failure;
@@ -45,6 +46,8 @@ enum Task {
     Render(Box<render::Render>),
     /// Tells what is in a file.
     Info(info::Info),
+    /// Writes a volume in another format, or on another lattice.
+    Convert(convert::Convert),
     /// Compares two pictures.
     Compare(compare::Compare),
     /// Measures frame times: the camera turns by 5 degrees between frames.
@@ -62,6 +65,7 @@ fn main() -> ExitCode {
     let result = match command.task {
         Task::Render(task) => task.run(&progress),
         Task::Info(task) => task.run(&progress),
+        Task::Convert(task) => task.run(&progress),
         Task::Compare(task) => task.run(),
         Task::Bench(task) => task.run(&progress),
         Task::Demo(task) => task.run(&progress),
