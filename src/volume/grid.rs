@@ -46,6 +46,11 @@ impl Grid {
         if self.body_centred { std::f64::consts::FRAC_1_SQRT_2 } else { 1.0 }
     }
 
+    /// How many points from a sample the lattice's next planes of mirror symmetry lie.
+    pub fn symmetric_part(self) -> f64 {
+        if self.body_centred { 1.0 } else { 0.5 }
+    }
+
     /// Whether so many points away from a sample there lies another.
     pub fn connects(self, [i, j, k]: [isize; 3]) -> bool {
         !self.body_centred || ((i ^ k) | (j ^ k)) & 1 == 0

@@ -31,8 +31,8 @@ impl Overshoot {
         let mut impulse = vec![0.0; SIDE.pow(3)];
         impulse[grid.offset(centre)] = 1.0;
         Response::new(grid, kernel).divide(&mut impulse);
-        // Mirrors at the planes of points, and the axes in any order, leave the lattice as it is.
-        let quarters = || (0..=4).map(|quarter| f64::from(quarter) / 4.0);
+        // Mirrors, and the axes in any order, leave the lattice as it is.
+        let quarters = || (0..=4).map(|quarter| f64::from(quarter) / 4.0).filter(|&at| at <= grid.symmetric_part());
         let places: Vec<[f64; 3]> = quarters()
             .flat_map(|x| quarters().flat_map(move |y| quarters().map(move |z| [x, y, z])))
             .filter(|[x, y, z]| x <= y && y <= z)
