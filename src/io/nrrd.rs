@@ -16,6 +16,11 @@ pub use write::write;
 /// Reads a volume of three axes with one scalar each. Positions are in the file's own space (RAS, LPS, …: nothing is
 /// turned round); without `space directions` the axes are x, y, z at the `spacings`, 1 where those are missing or NaN.
 ///
+/// A key and value of splatkit's own, `lattice:=bcc`, marks a body-centred cubic lattice: `sizes` counts its layers along the
+/// third axis, those of both Cartesian lattices in turn; the first two directions are the edges of the cubic cell, the third
+/// is the step from layer to layer, half an edge. Odd layers are displaced by half an edge along the first two. Readers that
+/// do not know the key see a stack of slices, each second one half a pixel off. All other keys are skipped.
+///
 /// Encodings: raw, gzip, ascii and hex. `data file` may name one file inside the header's folder.
 ///
 /// # Errors
@@ -40,10 +45,11 @@ pub fn read(source: &Source) -> Result<Volume> {
     header.samples(&data, data.bytes(), kind, size, lattice)
 }
 
-/// The fields of a header, names in lower case.
+/// The fields of a header, names in lower case, and its keys with their values.
 struct Header<'a> {
     source: &'a Source<'a>,
     fields: HashMap<String, String>,
+    keys: HashMap<String, String>,
 }
 
 impl<'a> Header<'a> {
@@ -54,6 +60,7 @@ impl<'a> Header<'a> {
             return Err(source.error("line 1", "does not begin with NRRD0001 … NRRD0005"));
         }
         let mut fields = HashMap::new();
+        let mut keys = HashMap::new();
         let mut at = 0;
         for (number, line) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
             at += line.len();
@@ -63,21 +70,22 @@ impl<'a> Header<'a> {
             if text.is_empty() {
                 break;
             }
-            // “key:=value” pairs carry nothing that a picture needs.
-            let field = text.split_once(':').filter(|(_, value)| !value.starts_with('='));
-            match field {
+            match text.split_once(':') {
                 _ if number == 0 || text.starts_with('#') => {}
+                // “key:=value”
+                Some((key, value)) if value.starts_with('=') => {
+                    keys.insert(key.trim().to_owned(), value[1..].trim().to_owned());
+                }
                 Some((name, value)) => {
                     fields.insert(name.trim().to_ascii_lowercase(), value.trim().to_owned());
                 }
-                None if text.contains(":=") => {}
                 None => {
                     let message = "is neither a field, a key and value, a comment, nor the empty line before the data";
                     return Err(source.error(format!("line {}", number + 1), message));
                 }
             }
         }
-        Ok((Self { source, fields }, at))
+        Ok((Self { source, fields, keys }, at))
     }
 
     /// A field by its spellings.
@@ -126,7 +134,19 @@ impl<'a> Header<'a> {
             Some(text) => self.vectors::<1>("space origin", text)?[0],
             None => DVec3::ZERO,
         };
-        let lattice = Lattice::cartesian(dims, origin, axes);
+        let lattice = match self.keys.get("lattice").map(String::as_str) {
+            None => Lattice::cartesian(dims, origin, axes),
+            // Two layers make an edge.
+            Some("bcc") => {
+                Lattice::body_centred(dims, origin, DMat3::from_cols(axes.x_axis, axes.y_axis, 2.0 * axes.z_axis))
+            }
+            Some(other) => {
+                let error = self.source.error("lattice", format!("“{other}” is not a lattice that is known"));
+                return Err(
+                    error.hint("lattice:=bcc marks body-centred cubic lattices; Cartesian ones have no such key")
+                );
+            }
+        };
         lattice.validate().map_err(|message| self.source.error("header", message))?;
         Ok(lattice)
     }
@@ -316,6 +336,15 @@ mod tests {
         assert_eq!(turned.origin, DVec3::new(10.0, 20.0, -30.5));
         assert_eq!(turned.position(DVec3::new(1.0, 1.0, 1.0)), DVec3::new(8.0, 20.5, -27.5));
         assert_eq!(lattice("spacings: 1 2.5 NaN").unwrap().spacing(), DVec3::new(1.0, 2.5, 1.0));
+        let body_centred = lattice("lattice:=bcc\nspacings: 2 2 1").unwrap();
+        assert_eq!(
+            body_centred,
+            Lattice::body_centred([2, 1, 1], DVec3::ZERO, DMat3::from_diagonal(DVec3::splat(2.0)))
+        );
+        assert_eq!(
+            lattice("units:=mm:=lattice:=bcc\ncontent: lattice:=bcc").unwrap(),
+            Lattice::with_spacing([2, 1, 1], DVec3::ONE)
+        );
         for (fields, word) in [
             ("space directions: none (1,0,0) (0,1,0)", "space directions"),
             ("space directions: (1,0) (0,1)", "space directions"),
@@ -324,6 +353,8 @@ mod tests {
             ("spacings: 1 0 1", "spacing"),
             ("spacings: 1 1", "spacings"),
             ("spacings: 1 1 inf", "finite"),
+            ("lattice:=fcc", "fcc"),
+            ("lattice:=", "lattice"),
         ] {
             let message = lattice(fields).unwrap_err().to_string();
             assert!(message.contains(word), "{message}");

@@ -1,6 +1,7 @@
 //! Pure functions shared by everything downstream: the camera, the sheets and the kernel.
 
 mod camera;
+pub(crate) mod cosine;
 mod kernel;
 mod sheets;
 

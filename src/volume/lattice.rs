@@ -41,6 +41,12 @@ impl Lattice {
         Self { dims, origin, axes, arrangement: Arrangement::Cartesian }
     }
 
+    /// Samples at the corners and the middles of cubic cells: `edges` are the columns of a cell's, `dims[2]` counts layers of
+    /// both kinds ([`Arrangement::BodyCentred`]).
+    pub fn body_centred(dims: [usize; 3], origin: DVec3, edges: DMat3) -> Self {
+        Self { dims, origin, axes: edges, arrangement: Arrangement::BodyCentred }
+    }
+
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.dims.iter().product()

@@ -1,14 +1,21 @@
 //! Volumes: samples on a lattice, and the transfer functions that show them.
 
+mod grid;
 mod head;
 mod lattice;
+mod overshoot;
 pub mod phantoms;
 mod presets;
 pub mod reach;
+mod reconstruct;
+mod resample;
 mod samples;
+mod sharp;
 mod transfer;
 
 pub use lattice::{Arrangement, Lattice};
+pub use reconstruct::Reconstruction;
+pub use resample::body_centred;
 pub(crate) use samples::each_type;
 pub use samples::{Coefficients, Samples, Volume};
 pub use transfer::{Isosurface, Shade, TransferFunction};

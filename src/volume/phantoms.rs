@@ -175,6 +175,16 @@ mod tests {
     }
 
     #[test]
+    fn any_lattice_can_be_sampled() {
+        let lattice = Lattice::body_centred([2, 2, 3], DVec3::splat(-0.5), DMat3::IDENTITY);
+        let volume = Phantom::Ball.sample_on(lattice).unwrap();
+        // The first sample of the middle layer is displaced by half an edge: to the ball's centre.
+        assert_eq!((volume.value(4), volume.len()), (1.0, 12));
+        assert_eq!(volume.value(0), Phantom::Ball.value(DVec3::splat(-0.5)) as f32 as f64);
+        assert!(Phantom::Ball.sample_on(Lattice::body_centred([0, 1, 1], DVec3::ZERO, DMat3::IDENTITY)).is_err());
+    }
+
+    #[test]
     fn the_specimen_has_its_parts_and_clear_air() {
         let volume = Phantom::Specimen.sample_bytes([48; 3]).unwrap();
         assert_eq!(volume.range, [0.0, 255.0]);

@@ -114,8 +114,8 @@ pub struct Coefficients {
     pub lattice: Lattice,
     /// A value per sample of that lattice; of either sign, and beyond the range of the samples.
     pub values: Vec<f32>,
-    /// For each of them the smallest and the largest value that their sum takes around it, in steps of 1/255 of the
-    /// volume's range (as [`neighbourhood_ranges`] has them).
+    /// For each of them the smallest and the largest value that their sum may take as far as its kernel reaches, in steps of
+    /// 1/255 of the volume's range (as [`neighbourhood_ranges`] has them), cut to that range.
     pub ranges: Vec<[u8; 2]>,
     /// The kernel that they hold for.
     pub kernel: Kernel,

@@ -5,6 +5,7 @@ mod bench;
 mod camera;
 mod clip;
 mod compare;
+mod convert;
 mod demo;
 mod describe;
 mod engine;
@@ -52,6 +53,8 @@ enum Task {
     Render(Box<render::Render>),
     /// Tells what is in a file.
     Info(info::Info),
+    /// Writes a volume in another format, or on another lattice.
+    Convert(convert::Convert),
     /// Compares two pictures.
     Compare(compare::Compare),
     /// Measures frame times: the camera turns by 5 degrees between frames.
@@ -73,6 +76,7 @@ fn main() -> ExitCode {
     let result = match command.task {
         Task::Render(task) => task.run(&progress),
         Task::Info(task) => task.run(&progress),
+        Task::Convert(task) => task.run(&progress),
         Task::Compare(task) => task.run(),
         Task::Bench(task) => task.run(&progress),
         Task::Demo(task) => task.run(&progress),

@@ -2,13 +2,13 @@
 
 use crate::{
     Error, Result,
-    volume::{Samples, Volume},
+    volume::{Arrangement, Samples, Volume},
 };
 use flate2::{Compression, write::GzEncoder};
 use glam::DVec3;
 use std::{io::Write, path::Path};
 
-/// Writes a volume with its position in space.
+/// Writes a volume with its position in space; body-centred ones with the key that [`read`](super::read) knows.
 ///
 /// # Errors
 /// [`Error::File`] where the file cannot be written.
@@ -21,7 +21,9 @@ pub fn write(volume: &Volume, path: &Path) -> Result<()> {
 fn write_to(volume: &Volume, out: &mut impl Write) -> std::io::Result<()> {
     let lattice = &volume.lattice;
     let [nx, ny, nz] = lattice.dims;
-    let [i, j, k] = [lattice.axes.x_axis, lattice.axes.y_axis, lattice.axes.z_axis].map(vector);
+    let body_centred = lattice.arrangement == Arrangement::BodyCentred;
+    let layer = if body_centred { 0.5 * lattice.axes.z_axis } else { lattice.axes.z_axis };
+    let [i, j, k] = [lattice.axes.x_axis, lattice.axes.y_axis, layer].map(vector);
     let (kind, bytes): (_, &[u8]) = match &volume.samples {
         Samples::U8(values) => ("uint8", values),
         Samples::U16(values) => ("uint16", bytemuck::cast_slice(values)),
@@ -32,7 +34,8 @@ fn write_to(volume: &Volume, out: &mut impl Write) -> std::io::Result<()> {
     let endian = if cfg!(target_endian = "little") { "little" } else { "big" };
     writeln!(out, "NRRD0004\ntype: {kind}\ndimension: 3\nspace dimension: 3\nsizes: {nx} {ny} {nz}")?;
     writeln!(out, "space directions: {i} {j} {k}\nspace origin: {}", vector(lattice.origin))?;
-    writeln!(out, "endian: {endian}\nencoding: gzip\n")?;
+    writeln!(out, "endian: {endian}\nencoding: gzip")?;
+    out.write_all(if body_centred { b"lattice:=bcc\n\n" } else { b"\n" })?;
     let mut packed = GzEncoder::new(out, Compression::default());
     packed.write_all(bytes)?;
     packed.finish().map(drop)
@@ -62,11 +65,14 @@ mod tests {
             Samples::I32(vec![0, 1, 2, 3, 4, i32::MIN]),
             Samples::F32(vec![0.0, 1e-30, -2.5, 3.0, 4.0, 1e30]),
         ];
+        let body_centred = Lattice { arrangement: Arrangement::BodyCentred, ..lattice.clone() };
         for samples in samples {
-            let path = folder.write("volume.nrrd", b"");
-            write(&Volume::new(lattice.clone(), samples.clone()).unwrap(), &path).unwrap();
-            let read = read_with(&path, nrrd::read).unwrap();
-            assert_eq!((read.samples, read.lattice), (samples, lattice.clone()));
+            for lattice in [&lattice, &body_centred] {
+                let path = folder.write("volume.nrrd", b"");
+                write(&Volume::new(lattice.clone(), samples.clone()).unwrap(), &path).unwrap();
+                let read = read_with(&path, nrrd::read).unwrap();
+                assert_eq!((&read.samples, &read.lattice), (&samples, lattice));
+            }
         }
     }
 }

@@ -1,0 +1,154 @@
+//! Sharp volumes: kernels that carry coefficients in place of the samples, such that their normalised sum passes through
+//! every sample. The coefficients are the samples divided, in frequency space, by the response of the sampled kernel
+//! (Unser, "Splines: a perfect fit for signal and image processing", 1999; Thévenaz, Blu and Unser, "Interpolation
+//! revisited", 2000; on body-centred lattices Condat and Van De Ville, "Three-directional box-splines", 2006, and others
+//! after Theußl, Möller and Gröller, "Optimal regular volume sampling", 2001).
+
+use super::{
+    Coefficients, Lattice, Volume,
+    grid::{Grid, Response},
+    overshoot::Overshoot,
+    reach::neighbourhood_ranges,
+};
+use crate::{
+    Error, Result,
+    math::{Kernel, Profile},
+};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// The least response that a kernel may leave of a wave. Coefficients are up to 1 / response as large as the samples and
+/// rounded to 24 bits; this keeps the sum within 1e-4 of their range.
+const LEAST_RESPONSE: f64 = 6e-4;
+
+impl Volume {
+    /// Makes the volume sharp for a kernel: sets [`coefficients`](Self::coefficients), whose normalised kernel sum passes
+    /// through every sample (within 1e-4 of the range). The field goes on mirrored at the outermost samples, and the
+    /// coefficients with it as far as the kernel reaches, so that sums are whole at the border too. The kernel is radial
+    /// in index space.
+    ///
+    /// Besides the volume and the result this takes some 16 bytes a sample, on a body-centred lattice 40.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where the kernel takes some wave of the samples away (a Gaussian's sigma too large), for values near
+    /// the largest of 32 bits, on
+    /// rectilinear lattices, and on body-centred ones of one layer.
+    pub fn sharpened(self, kernel: &Kernel) -> Result<Self> {
+        let grid = Grid::of(&self.lattice)?;
+        let response = Response::new(grid, kernel);
+        let least = response.least();
+        // A kernel whose values at the samples sum to nothing has no response: infinity stands for it.
+        if !(LEAST_RESPONSE..f64::INFINITY).contains(&least) {
+            let remedy = match kernel.profile {
+                Profile::Gaussian(_) => "take a smaller sigma",
+                _ => "take a narrower kernel",
+            };
+            return Err(Error::Argument(format!(
+                "the kernel is too wide to be made sharp: it leaves {least:.1e} of the finest detail where {LEAST_RESPONSE} \
+                 are needed; {remedy}"
+            )));
+        }
+        let largest = self.range[0].abs().max(self.range[1].abs());
+        if largest / least > f64::from(f32::MAX) {
+            return Err(Error::Argument(format!(
+                "values as large as {largest:.1e} cannot be made sharp: take another unit"
+            )));
+        }
+        let mut points = grid.fill(&self.samples);
+        response.divide(&mut points);
+        let overshoot = Overshoot::new(grid, kernel);
+        let reach = |(further, _): &(f64, f64)| self.lattice.reach(kernel.extent + further);
+        let boxes: Vec<_> = overshoot.tails.iter().map(|tail| neighbourhood_ranges(&self, reach(tail))).collect();
+
+        let (lattice, margin) = continued(&self.lattice, kernel.extent);
+        let [nx, ny, _] = self.lattice.dims;
+        let [width, height, _] = lattice.dims;
+        let mut values = vec![0f32; lattice.len()];
+        let mut ranges = vec![[0u8; 2]; lattice.len()];
+        let rows = values.par_chunks_mut(width).zip(ranges.par_chunks_mut(width)).enumerate();
+        rows.for_each(|(row, (values, ranges))| {
+            for (column, (value, range)) in values.iter_mut().zip(ranges).enumerate() {
+                let index = [column, row % height, row / height];
+                let index = std::array::from_fn(|axis| index[axis] as isize - margin[axis] as isize);
+                // A mirror image has the range of what it mirrors.
+                let point = grid.point(index);
+                let [i, j, k] = grid.index(point);
+                *value = points[grid.offset(point)] as f32;
+                let sample = (k * ny + j) * nx + i;
+                *range = overshoot.widen(boxes.iter().map(|ranges| ranges[sample]));
+            }
+        });
+        let coefficients = Coefficients { lattice, values, ranges, kernel: kernel.clone() };
+        Ok(Self { coefficients: Some(Arc::new(coefficients)), ..self })
+    }
+}
+
+/// A lattice continued on all sides as far as a kernel of some extent reaches, and by how many samples.
+fn continued(lattice: &Lattice, extent: f64) -> (Lattice, [usize; 3]) {
+    let mut margin = lattice.reach(extent);
+    let mut before = DVec3::from_array(margin.map(|n| n as f64));
+    if lattice.arrangement == super::Arrangement::BodyCentred {
+        // Whole cells, so that the first layer is one without displacement again.
+        margin[2] = margin[2].next_multiple_of(2);
+        before.z = 0.5 * margin[2] as f64;
+    }
+    let dims = std::array::from_fn(|axis| lattice.dims[axis] + 2 * margin[axis]);
+    (Lattice { dims, origin: lattice.position(-before), ..lattice.clone() }, margin)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volume::{Arrangement, Samples};
+    use glam::DMat3;
+
+    fn volume(lattice: Lattice) -> Volume {
+        let values = (0..lattice.len()).map(|i| ((i * i) as f32).sin()).collect();
+        Volume::new(lattice, Samples::F32(values)).unwrap()
+    }
+
+    #[test]
+    fn coefficients_go_on_mirrored() {
+        let axes = DMat3::from_diagonal(DVec3::new(1.0, 2.0, 3.0));
+        let kernel = Kernel::default();
+        for (lattice, margin) in [
+            (Lattice::cartesian([5, 6, 7], DVec3::ONE, axes), [2; 3]),
+            (Lattice::body_centred([5, 6, 7], DVec3::ONE, axes), [2, 2, 4]),
+        ] {
+            let sharp = volume(lattice.clone()).sharpened(&kernel).unwrap();
+            let drawn = sharp.drawn_lattice();
+            let at = |index: [usize; 3]| (index[2] * drawn.dims[1] + index[1]) * drawn.dims[0] + index[0];
+            // The volume's first sample lies where it did, and sees the same on both sides.
+            assert!(drawn.sample_position(at(margin)).distance(lattice.origin) < 1e-12);
+            let [x, y, z] = margin;
+            let opposite = |a, b| {
+                assert_eq!(sharp.drawn_value(at(a)), sharp.drawn_value(at(b)), "{a:?} {b:?}");
+                assert_eq!(sharp.drawn_ranges(&kernel)[at(a)], sharp.drawn_ranges(&kernel)[at(b)]);
+            };
+            opposite([x + 1, y + 2, z - 2], [x + 1, y + 2, z + 2]);
+            opposite([x - 1, y + 2, z], [x + 1, y + 2, z]);
+            assert_eq!(sharp.coefficients.as_ref().unwrap().values.len(), drawn.len());
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_made_sharp_is_told() {
+        let cartesian = || Lattice::with_spacing([9; 3], DVec3::ONE);
+        let message = |lattice: Lattice, kernel: Result<Kernel>| {
+            volume(lattice).sharpened(&kernel.unwrap()).unwrap_err().to_string()
+        };
+        volume(cartesian()).sharpened(&Kernel::gaussian(0.79, 4.0).unwrap()).unwrap();
+        assert!(message(cartesian(), Kernel::gaussian(0.9, 4.0)).contains("smaller sigma"));
+        assert!(message(cartesian(), Kernel::b_spline(4.0)).contains("narrower"));
+        assert!(message(cartesian(), Kernel::table(vec![1.0, 0.0, -1.0, 8.0, 0.0], 3.0)).contains("narrower"));
+        let single = Lattice::body_centred([3, 3, 1], DVec3::ZERO, DMat3::IDENTITY);
+        assert!(message(single, Ok(Kernel::default())).contains("two layers"));
+        let places = Arc::new([vec![0.0, 1.0], vec![0.0, 1.0], vec![0.0, 2.0]]);
+        let uneven =
+            Lattice { arrangement: Arrangement::Rectilinear(places), ..Lattice::with_spacing([2; 3], DVec3::ONE) };
+        assert!(message(uneven, Ok(Kernel::default())).contains("rectilinear"));
+        let large = Volume::new(cartesian(), Samples::F32(vec![1e38; 729])).unwrap();
+        assert!(large.sharpened(&Kernel::default()).unwrap_err().to_string().contains("1.0e38"));
+    }
+}
