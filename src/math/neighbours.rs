@@ -7,9 +7,11 @@ use glam::Vec3;
 /// Ranges up to this long are searched through.
 const LEAF: usize = 8;
 
-/// `order` holds point indices; the middle of a range is the point that halves it, along `axes[middle]`.
+/// `order` holds point indices; the middle of a range is the point that halves it, along `axes[middle]`. `sorted` are the
+/// points in that order, so that those near to each other in space are near in memory.
 pub(crate) struct Neighbours<'a> {
     points: &'a [Vec3],
+    sorted: Vec<Vec3>,
     order: Vec<u32>,
     axes: Vec<u8>,
 }
@@ -52,7 +54,13 @@ impl<'a> Neighbours<'a> {
         let mut order: Vec<u32> = (0..points.len() as u32).collect();
         let mut axes = vec![0; points.len()];
         build(points, &mut order, &mut axes);
-        Self { points, order, axes }
+        let sorted = order.iter().map(|&index| points[index as usize]).collect();
+        Self { points, sorted, order, axes }
+    }
+
+    /// The points' indices in an order in which neighbours are near each other: asking in it is several times faster.
+    pub fn order(&self) -> &[u32] {
+        &self.order
     }
 
     /// The `K` points nearest to point `index`, itself left out.
@@ -68,20 +76,19 @@ impl<'a> Neighbours<'a> {
     }
 
     fn search<const K: usize>(&self, from: usize, to: usize, own: u32, at: Vec3, nearest: &mut Nearest<K>) {
-        let mut offer = |index: u32| {
-            if index != own {
-                nearest.offer(self.points[index as usize].distance_squared(at), index);
+        let mut offer = |place: usize| {
+            if self.order[place] != own {
+                nearest.offer(self.sorted[place].distance_squared(at), self.order[place]);
             }
         };
         if to - from <= LEAF {
-            self.order[from..to].iter().for_each(|&index| offer(index));
+            (from..to).for_each(offer);
             return;
         }
         let middle = from.midpoint(to);
-        let split = self.order[middle];
-        offer(split);
+        offer(middle);
         let axis = usize::from(self.axes[middle]);
-        let beyond = at[axis] - self.points[split as usize][axis];
+        let beyond = at[axis] - self.sorted[middle][axis];
         let (near, far) = ((from, middle), (middle + 1, to));
         let (near, far) = if beyond < 0.0 { (near, far) } else { (far, near) };
         self.search(near.0, near.1, own, at, nearest);

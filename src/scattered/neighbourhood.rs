@@ -77,23 +77,23 @@ impl Surroundings<'_> {
         let [low, high] = around.iter().fold([0.0f64; 2], |[low, high], &(_, rise, _)| [low.min(rise), high.max(rise)]);
         // The ball, disc or line to the k-th neighbour holds k samples besides the own one in its middle.
         let k = count as f64;
-        let spacing = match fit.dimensions() {
+        let spacing = match fit.dimensions {
             3 => (4.0 / 3.0 * PI / k).cbrt(),
             2 => (PI / k).sqrt(),
             _ => 2.0 / k,
         };
         // A few samples all lie on the border, and so have less room.
         let spacing = farthest * spacing.min(1.0);
-        Place { samples, spacing, gradient: limited(fit.gradient(), around, [low, high]), width: high - low }
+        Place { samples, spacing, gradient: limited(fit.gradient, around, [low, high]), width: high - low }
     }
 }
 
 /// A linear function through the values around a sample, by weighted least squares.
 struct Fit {
-    variances: [f64; 3],
-    axes: [DVec3; 3],
-    /// Σ w · offset · rise, both from their means.
-    trend: DVec3,
+    /// The number of directions in which the samples spread.
+    dimensions: usize,
+    /// The slope; 0 along the directions that have no extent.
+    gradient: DVec3,
 }
 
 impl Fit {
@@ -116,19 +116,15 @@ impl Fit {
             scatter += DMat3::from_cols(d * d.x, d * d.y, d * d.z) * weight;
             trend += d * (rise - mean_rise) * weight;
         }
+        let trace: f64 = scatter.x_axis.x + scatter.y_axis.y + scatter.z_axis.z;
+        // The product of the variances over the cube of their sum is at most the smallest over the largest.
+        if scatter.determinant() > FLAT * trace.powi(3) {
+            return Self { dimensions: 3, gradient: scatter.inverse() * trend };
+        }
         let (variances, axes) = eigen(scatter);
-        Self { variances, axes, trend }
-    }
-
-    /// The number of directions in which the samples spread.
-    fn dimensions(&self) -> usize {
-        self.variances.iter().filter(|&&variance| variance > FLAT * self.variances[0]).count()
-    }
-
-    /// The slope; 0 along the directions that have no extent.
-    fn gradient(&self) -> DVec3 {
-        let along = |axis: usize| self.axes[axis] * (self.axes[axis].dot(self.trend) / self.variances[axis]);
-        (0..self.dimensions()).map(along).sum()
+        let dimensions = variances.iter().filter(|&&variance| variance > FLAT * variances[0]).count();
+        let along = |axis: usize| axes[axis] * (axes[axis].dot(trend) / variances[axis]);
+        Self { dimensions, gradient: (0..dimensions).map(along).sum() }
     }
 }
 
