@@ -17,6 +17,7 @@ mod testing;
 mod texture;
 pub mod vti;
 mod vtk_array;
+mod vtk_xml;
 
 pub use limits::Limits;
 pub use load_mesh::load_mesh;
