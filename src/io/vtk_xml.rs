@@ -57,6 +57,17 @@ pub struct Part<'a> {
     pub bytes: Cow<'a, [u8]>,
 }
 
+impl Part<'_> {
+    /// How many numbers there are.
+    pub fn len(&self) -> usize {
+        self.bytes.len() / self.kind.bytes()
+    }
+
+    pub fn doubles(&self) -> Vec<f64> {
+        self.kind.doubles(&self.bytes, self.endian)
+    }
+}
+
 impl<'a> Document<'a> {
     /// Reads the XML of a file that holds a data set of one `kind` (`ImageData`, …).
     ///

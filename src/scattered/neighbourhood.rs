@@ -47,8 +47,11 @@ pub(super) fn places(points: &Points, neighbours: usize) -> (Vec<Place>, Vec<u32
     let values: Vec<f64> = sums.iter().map(|(sum, count)| sum / f64::from(*count)).collect();
     let tree = Neighbours::new(&positions);
     let around = Surroundings { tree: &tree, positions: &positions, values: &values, neighbours };
-    let places =
-        sums.par_iter().enumerate().map(|(index, (_, samples))| around.place(index as u32, *samples)).collect();
+    let found: Vec<Place> = tree.order().par_iter().map(|&index| around.place(index, sums[index as usize].1)).collect();
+    let mut places = found.clone();
+    for (&index, place) in tree.order().iter().zip(found) {
+        places[index as usize] = place;
+    }
     (places, place_of)
 }
 
