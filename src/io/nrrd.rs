@@ -6,15 +6,19 @@ mod write;
 use super::{Endian, SampleType, Source};
 use crate::{
     Result,
-    volume::{Lattice, Volume},
+    volume::{Arrangement, Lattice, Volume},
 };
 use flate2::read::MultiGzDecoder;
 use glam::{DMat3, DVec3};
-use std::{borrow::Cow, collections::HashMap};
+use std::{borrow::Cow, collections::HashMap, sync::Arc};
 pub use write::write;
 
 /// Reads a volume of three axes with one scalar each. Positions are in the file's own space (RAS, LPS, …: nothing is
 /// turned round); without `space directions` the axes are x, y, z at the `spacings`, 1 where those are missing or NaN.
+///
+/// A rectilinear lattice has the keys `axis positions 0`, `axis positions 1` and `axis positions 2`, a convention of our own
+/// (`axis positions 0:=0 1 2.5`): ascending positions of the samples along each axis, in lengths of its space direction, from
+/// the space origin.
 ///
 /// Encodings: raw, gzip, ascii and hex. `data file` may name one file inside the header's folder.
 ///
@@ -40,10 +44,11 @@ pub fn read(source: &Source) -> Result<Volume> {
     header.samples(&data, data.bytes(), kind, size, lattice)
 }
 
-/// The fields of a header, names in lower case.
+/// The fields of a header, names in lower case, and its pairs of “key:=value”.
 struct Header<'a> {
     source: &'a Source<'a>,
     fields: HashMap<String, String>,
+    keys: HashMap<String, String>,
 }
 
 impl<'a> Header<'a> {
@@ -53,7 +58,7 @@ impl<'a> Header<'a> {
         if !(bytes.starts_with(b"NRRD000") && matches!(bytes.get(7), Some(b'1'..=b'5'))) {
             return Err(source.error("line 1", "does not begin with NRRD0001 … NRRD0005"));
         }
-        let mut fields = HashMap::new();
+        let (mut fields, mut keys) = (HashMap::new(), HashMap::new());
         let mut at = 0;
         for (number, line) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
             at += line.len();
@@ -63,21 +68,22 @@ impl<'a> Header<'a> {
             if text.is_empty() {
                 break;
             }
-            // “key:=value” pairs carry nothing that a picture needs.
             let field = text.split_once(':').filter(|(_, value)| !value.starts_with('='));
             match field {
                 _ if number == 0 || text.starts_with('#') => {}
                 Some((name, value)) => {
                     fields.insert(name.trim().to_ascii_lowercase(), value.trim().to_owned());
                 }
-                None if text.contains(":=") => {}
+                None if let Some((key, value)) = text.split_once(":=") => {
+                    keys.insert(key.trim().to_owned(), value.trim().to_owned());
+                }
                 None => {
                     let message = "is neither a field, a key and value, a comment, nor the empty line before the data";
                     return Err(source.error(format!("line {}", number + 1), message));
                 }
             }
         }
-        Ok((Self { source, fields }, at))
+        Ok((Self { source, fields, keys }, at))
     }
 
     /// A field by its spellings.
@@ -126,9 +132,25 @@ impl<'a> Header<'a> {
             Some(text) => self.vectors::<1>("space origin", text)?[0],
             None => DVec3::ZERO,
         };
-        let lattice = Lattice::cartesian(dims, origin, axes);
+        let arrangement = self.arrangement()?;
+        let lattice = Lattice { dims, origin, axes, arrangement };
         lattice.validate().map_err(|message| self.source.error("header", message))?;
         Ok(lattice)
+    }
+
+    fn arrangement(&self) -> Result<Arrangement> {
+        let keys = [0, 1, 2].map(|axis| format!("axis positions {axis}"));
+        if !keys.iter().any(|key| self.keys.contains_key(key)) {
+            return Ok(Arrangement::Cartesian);
+        }
+        let mut places = [const { Vec::new() }; 3];
+        for (places, key) in places.iter_mut().zip(&keys) {
+            let text = self.keys.get(key).ok_or_else(|| self.source.error("header", format!("has no key “{key}”")))?;
+            let wrong = || self.source.error(key, "is not a list of numbers");
+            *places =
+                text.split_ascii_whitespace().map(|word| word.parse().map_err(|_| wrong())).collect::<Result<_>>()?;
+        }
+        Ok(Arrangement::Rectilinear(Arc::new(places)))
     }
 
     /// Vectors written as (x,y,z), exactly `N`.
@@ -385,6 +407,29 @@ mod tests {
             let content = file(&format!("type: {name}\nsizes: 1 1 2\nencoding: ascii"), b"1 2");
             let volume = read_with(&folder.write("volume.nrrd", &content), read).unwrap();
             assert_eq!(volume.samples, samples, "{name}");
+        }
+    }
+
+    #[test]
+    fn positions_along_the_axes() {
+        let folder = Folder::new();
+        let load = |keys: &str| {
+            let fields = "space directions: (0,2,0) (1,0,0) (0,0,1)\nspace origin: (10,20,30)";
+            let content =
+                file(&format!("type: uint8\nsizes: 3 2 1\nencoding: raw\n{fields}\n{keys}"), &[0, 1, 2, 3, 4, 5]);
+            read_with(&folder.write("volume.nrrd", &content), read)
+        };
+        let keys = "axis positions 0:=0 1 2.5\naxis positions 1:=-1 3\naxis positions 2:=7";
+        let volume = load(keys).unwrap();
+        assert_eq!(volume.lattice.sample_position(5), DVec3::new(13.0, 25.0, 37.0));
+        for (from, to, word) in [
+            ("axis positions 1:=-1 3\n", "", "no key “axis positions 1”"),
+            ("2.5", "two", "axis positions 0: is not a list of numbers"),
+            ("2.5", "0.5", "must ascend"),
+            (" 2.5", "", "2 coordinates along x for 3 samples"),
+        ] {
+            let message = load(&keys.replace(from, to)).unwrap_err().to_string();
+            assert!(message.contains(word), "{message}");
         }
     }
 

@@ -183,7 +183,7 @@ impl<'a> DataSet<'a> {
                         _ => return Err(wrong(format!("“{keyword}” is not known"))),
                     };
                     if keyword == "SCALARS" {
-                        parser.pass_line("LOOKUP_TABLE");
+                        parser.expect("LOOKUP_TABLE")?;
                     }
                     let part = parser.array(&place, count.saturating_mul(components), kind)?;
                     if components == 1 && keyword == "SCALARS" {

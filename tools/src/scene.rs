@@ -14,7 +14,7 @@ use splatkit::{
     math::{Bounds, Kernel},
     scene::Scene,
     surface::SurfelOptions,
-    volume::{TransferFunction, Volume},
+    volume::TransferFunction,
 };
 use std::{
     path::{Path, PathBuf},
@@ -25,7 +25,7 @@ use std::{
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Scene")]
 pub struct SceneFlags {
-    /// Meshes, clouds and at most one volume; all are drawn in one picture.
+    /// Meshes, clouds and at most one volume or set of scattered samples; all are drawn in one picture.
     #[arg(value_name = "SCENE", required = true)]
     pub inputs: Vec<PathBuf>,
     #[command(flatten)]
@@ -38,8 +38,8 @@ pub struct SceneFlags {
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Look")]
 struct ShowFlags {
-    /// How a volume's values are shown: ct-bone, ct-soft-tissue, ct-lung, ct-angiography, mri, generic, or a JSON file. By
-    /// default made from the volume's histogram.
+    /// How the values of a volume or of samples are shown: ct-bone, ct-soft-tissue, ct-lung, ct-angiography, mri, generic, or a JSON file. By
+    /// default made from their histogram.
     #[arg(long, value_name = "NAME|FILE.json")]
     transfer: Option<String>,
     /// The values that the transfer function spreads over, instead of its own.
@@ -92,11 +92,20 @@ impl SceneFlags {
                     loaded.subject.up = DVec3::Y;
                 }
                 Input::Volume(volume) => {
-                    let transfer = self.show.transfer(path, &volume)?;
+                    let transfer = self.show.transfer(path, volume.range, || TransferFunction::automatic(&volume))?;
                     let kernel = self.show.kernel()?;
                     let [min, max] = volume.bounds();
                     loaded.add(Bounds { min, max }, volume.len());
                     loaded.scene = loaded.scene.with_volume(volume, kernel, transfer);
+                }
+                Input::Samples(points) => {
+                    let automatic = || TransferFunction::automatic_for_points(&points);
+                    let transfer = self.show.transfer(path, points.range(), automatic)?;
+                    progress.stage(format!("Making splats of {}", path.display()));
+                    let splats = points.to_splats(&self.load.sample_options()).map_err(|e| in_file(path, e))?;
+                    let [min, max] = points.bounds();
+                    loaded.add(Bounds { min, max }.union(splats.bounds()), points.len());
+                    loaded.scene = loaded.scene.with_samples(splats, transfer);
                 }
             }
         }
@@ -127,18 +136,21 @@ impl ShowFlags {
         Kernel::gaussian(sigma, extent)
     }
 
-    /// The transfer function that shows a volume; one that shows nothing of it is an error.
-    fn transfer(&self, path: &Path, volume: &Volume) -> Result<TransferFunction, Failure> {
+    /// The transfer function that shows values of a range; one that shows nothing of them is an error.
+    fn transfer(
+        &self,
+        path: &Path,
+        values: [f64; 2],
+        automatic: impl FnOnce() -> TransferFunction,
+    ) -> Result<TransferFunction, Failure> {
         let transfer = match &self.transfer {
-            None => TransferFunction::automatic(volume),
-            Some(name) if TransferFunction::NAMES.contains(&name.as_str()) => {
-                TransferFunction::named(name, volume.range)?
-            }
+            None => automatic(),
+            Some(name) if TransferFunction::NAMES.contains(&name.as_str()) => TransferFunction::named(name, values)?,
             Some(file) if Path::new(file).extension().is_some() || Path::new(file).exists() => {
                 TransferFunction::read(Path::new(file))?
             }
             // Neither: the error lists the names.
-            Some(name) => TransferFunction::named(name, volume.range)?,
+            Some(name) => TransferFunction::named(name, values)?,
         };
         let mut transfer = match self.range {
             Some(range) => transfer.spread_over(range),
@@ -147,8 +159,8 @@ impl ShowFlags {
         if let Some(unit) = self.opacity_unit {
             transfer.unit = unit;
         }
-        if !transfer.visible(volume.range) {
-            let [low, high] = volume.range;
+        if !transfer.visible(values) {
+            let [low, high] = values;
             let shown = match transfer.shown_range() {
                 Some([from, to]) => format!("shows values between {from} and {to}"),
                 None => "shows no value".to_owned(),
@@ -167,7 +179,7 @@ impl ShowFlags {
 fn in_file(path: &Path, error: Error) -> Error {
     match error {
         Error::NothingToDraw(what) => Error::NothingToDraw(format!("{}: {what}", path.display())),
-        Error::Argument(what) => Error::input(path, "mesh", what),
+        Error::Argument(what) => Error::input(path, "content", what),
         other => other,
     }
 }

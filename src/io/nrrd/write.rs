@@ -2,7 +2,7 @@
 
 use crate::{
     Error, Result,
-    volume::{Samples, Volume},
+    volume::{Arrangement, Samples, Volume},
 };
 use flate2::{Compression, write::GzEncoder};
 use glam::DVec3;
@@ -32,7 +32,14 @@ fn write_to(volume: &Volume, out: &mut impl Write) -> std::io::Result<()> {
     let endian = if cfg!(target_endian = "little") { "little" } else { "big" };
     writeln!(out, "NRRD0004\ntype: {kind}\ndimension: 3\nspace dimension: 3\nsizes: {nx} {ny} {nz}")?;
     writeln!(out, "space directions: {i} {j} {k}\nspace origin: {}", vector(lattice.origin))?;
-    writeln!(out, "endian: {endian}\nencoding: gzip\n")?;
+    writeln!(out, "endian: {endian}\nencoding: gzip")?;
+    if let Arrangement::Rectilinear(places) = &lattice.arrangement {
+        for (axis, places) in places.iter().enumerate() {
+            let places: Vec<String> = places.iter().map(f64::to_string).collect();
+            writeln!(out, "axis positions {axis}:={}", places.join(" "))?;
+        }
+    }
+    writeln!(out)?;
     let mut packed = GzEncoder::new(out, Compression::default());
     packed.write_all(bytes)?;
     packed.finish().map(drop)
@@ -55,6 +62,8 @@ mod tests {
         let folder = Folder::new();
         let axes = glam::DMat3::from_cols(DVec3::new(0.5, 0.1, 0.0), DVec3::new(0.0, 2.0, 0.0), DVec3::Z);
         let lattice = Lattice::cartesian([2, 3, 1], DVec3::new(-1.5, 0.0, 1e9), axes);
+        let places = [vec![-0.1, 1.0 / 3.0], vec![1e-300, 2.0, 1e9], vec![7.5]];
+        let rectilinear = Lattice { arrangement: Arrangement::Rectilinear(places.into()), ..lattice.clone() };
         let samples = [
             Samples::U8(vec![0, 1, 2, 3, 4, 255]),
             Samples::U16(vec![0, 1, 2, 3, 4, 65535]),
@@ -63,10 +72,12 @@ mod tests {
             Samples::F32(vec![0.0, 1e-30, -2.5, 3.0, 4.0, 1e30]),
         ];
         for samples in samples {
-            let path = folder.write("volume.nrrd", b"");
-            write(&Volume::new(lattice.clone(), samples.clone()).unwrap(), &path).unwrap();
-            let read = read_with(&path, nrrd::read).unwrap();
-            assert_eq!((read.samples, read.lattice), (samples, lattice.clone()));
+            for lattice in [&lattice, &rectilinear] {
+                let path = folder.write("volume.nrrd", b"");
+                write(&Volume::new(lattice.clone(), samples.clone()).unwrap(), &path).unwrap();
+                let read = read_with(&path, nrrd::read).unwrap();
+                assert_eq!((&read.samples, &read.lattice), (&samples, lattice));
+            }
         }
     }
 }

@@ -5,7 +5,7 @@ use super::{
         Source,
         gather::{Columns, choose, gather},
     },
-    ROLES, Table,
+    ALPHA, COLOR, NORMAL, POSITION, ROLES, Table, UV,
     header::{self, Element},
     rows::Rows,
 };
@@ -52,8 +52,15 @@ fn of_vertices(source: &Source, element: &Element, rows: &Rows, scalar: Option<&
     for (at, names) in position.iter_mut().zip(ROLES) {
         *at = column(names).ok_or_else(|| source.error(place, format!("has no scalar property “{}”", names[0])))?;
     }
-    let known =
-        |name: &str| ROLES.iter().any(|names| names.contains(&name)) || name == RADIUS || COVARIANCE.contains(&name);
+    // Of a whole group: a lone “t” or “v” is no texture coordinate.
+    let groups = [POSITION..NORMAL, NORMAL..COLOR, COLOR..UV, UV..ROLES.len()];
+    let known = |name: &str| {
+        let of_group = groups.iter().cloned().any(|group| {
+            let has = |role: usize| role == ALPHA || element.column(ROLES[role]).is_some();
+            group.clone().all(has) && ROLES[group].iter().any(|names| names.contains(&name))
+        });
+        of_group || name == RADIUS || COVARIANCE.contains(&name)
+    };
     let scalars = element.columns.iter().filter(|column| column.width().is_some()).map(|column| column.name.as_str());
     // Those that mean something else can be asked for too.
     let names: Vec<&str> = scalars.filter(|name| scalar == Some(*name) || !known(name)).collect();
@@ -121,6 +128,9 @@ mod tests {
             assert_eq!((points.values, points.radii), (vec![7.0, 8.0], vec![]));
             assert_eq!(load(&one, Some("nz")).unwrap().values, [1.0, 1.0]);
             assert_eq!(load(&one, Some("x")).unwrap().values, [1.0, 4.0]);
+            let painted = "x y z red green blue v alpha";
+            let painted = file(format, painted, &[&[1., 2., 3., 4., 5., 6., 7., 8.]]);
+            assert_eq!(load(&painted, None).unwrap().values, [7.0]);
             let two = file(format, "x y z p radius", &[&[1., 2., 3., 4., 0.5]]);
             assert_eq!(load(&two, None).unwrap().radii, [0.5]);
             let terms = "x y z p cov_zz cov_xx cov_xy cov_xz cov_yy cov_yz";

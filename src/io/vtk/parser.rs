@@ -87,11 +87,11 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Passes over the next line if it begins with a word.
-    pub fn pass_line(&mut self, word: &str) {
-        let before = self.at;
-        if !matches!(self.line(), Ok(Some((_, line))) if line.starts_with(word)) {
-            self.at = before;
+    /// Passes over the line that must come next, by its first word.
+    pub fn expect(&mut self, word: &str) -> Result<()> {
+        match self.line()? {
+            Some((_, line)) if line.split_ascii_whitespace().next() == Some(word) => Ok(()),
+            _ => Err(self.source.error(self.place(), format!("there is no line “{word}” where it was expected"))),
         }
     }
 
