@@ -1,6 +1,7 @@
 //! splatkit draws volumes and surfaces as elliptic splats, by one engine on wgpu.
 //!
-//! The way of the data: a file → [`io`] (what it says) → [`volume`] / [`surface`] (what it means) → splats
+//! The way of the data: a file → [`io`] (what it says) → [`volume`] / [`scattered`] /
+//! [`surface`] (what it means) → splats
 //! ([`splat`]) → [`engine`] (one pass, one Rust file, one shader) → a [`Picture`](picture::Picture).
 
 pub mod compare;
@@ -10,6 +11,7 @@ pub mod io;
 pub mod math;
 pub mod picture;
 pub mod reference;
+pub mod scattered;
 pub mod scene;
 pub mod splat;
 pub mod surface;

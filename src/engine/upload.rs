@@ -37,7 +37,7 @@ pub enum Origin {
         kernel: Kernel,
         /// First slice of the chunk; first and last slice that its data hold.
         slices: [u32; 3],
-        selection: Selection,
+        selection: Box<Selection>,
         /// Coordinates along the axes (`places` in source_lattice.wgsl).
         places: wgpu::Buffer,
     },
@@ -131,7 +131,7 @@ impl PreparedScene {
                 volume: volume.clone(),
                 kernel: kernel.clone(),
                 slices: [first, held.start, held.end - 1].map(|slice| slice as u32),
-                selection,
+                selection: Box::new(selection),
                 places: places.clone(),
             };
             let part = in_slices(held);

@@ -1,10 +1,16 @@
 //! Reading files: one module per format, all behind the same guarded opening ([`Source`]) and [`Limits`].
 //!
-//! [`load_mesh`] and [`load_volume`] look at the name and the first bytes, and give a mesh (or cloud) or a volume.
+//! [`load_mesh`], [`load_volume`] and [`load_samples`] look at the name and the first bytes, and give a mesh (or cloud), a
+//! volume or scattered samples; [`Kind`] tells which of them a file needs.
 
+pub mod csv;
+mod gather;
 pub mod gltf;
+mod kind;
 mod limits;
 mod load_mesh;
+mod load_samples;
+pub mod npy;
 pub mod nrrd;
 pub mod obj;
 pub mod ply;
@@ -16,10 +22,17 @@ mod source;
 mod testing;
 mod texture;
 pub mod vti;
+pub mod vtk;
 mod vtk_array;
+mod vtk_cells;
+mod vtk_xml;
+pub mod vtr;
+pub mod vtu;
 
+pub use kind::Kind;
 pub use limits::Limits;
 pub use load_mesh::load_mesh;
+pub use load_samples::load_samples;
 pub use raw::RawLayout;
 pub use sample_type::{Endian, SampleType};
 pub use source::Source;
@@ -27,8 +40,8 @@ pub use source::Source;
 use crate::{Result, volume::Volume};
 use std::path::Path;
 
-/// Reads a volume: VTI and NRRD by their extensions (`.vti`, `.nrrd`, `.nhdr`), any other file as raw where `raw` gives
-/// its layout, and by its first bytes otherwise. World units are those of the file.
+/// Reads a volume: VTI, VTR, legacy VTK and NRRD by their extensions (`.vti`, `.vtr`, `.vtk`, `.nrrd`, `.nhdr`), any other
+/// file as raw where `raw` gives its layout, and by its first bytes otherwise. World units are those of the file.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for what is no such file, [`Error::Limit`](crate::Error::Limit) and
@@ -39,12 +52,16 @@ pub fn load_volume(path: &Path, limits: &Limits, raw: Option<&RawLayout>) -> Res
     let beginning = &source.bytes()[..source.bytes().len().min(1024)];
     match (extension.as_deref(), raw) {
         (Some("vti"), _) => vti::read(&source),
+        (Some("vtr"), _) => vtr::read(&source),
+        (Some("vtk"), _) => vtk::read_volume(&source),
         (Some("nrrd" | "nhdr"), _) => nrrd::read(&source),
         (_, Some(layout)) => raw::read(&source, layout),
         _ if beginning.starts_with(b"NRRD") => nrrd::read(&source),
+        _ if beginning.starts_with(b"# vtk DataFile") => vtk::read_volume(&source),
+        _ if beginning.windows(15).any(|w| w == b"RectilinearGrid") => vtr::read(&source),
         _ if beginning.windows(8).any(|w| w == b"<VTKFile") => vti::read(&source),
         _ => Err(source
-            .error("file", "is not a volume that can be read: neither VTI nor NRRD")
+            .error("file", "is not a volume that can be read: neither VTI, VTR, VTK nor NRRD")
             .hint("a raw file needs its dimensions and its sample type")),
     }
 }

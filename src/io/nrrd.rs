@@ -6,11 +6,11 @@ mod write;
 use super::{Endian, SampleType, Source};
 use crate::{
     Result,
-    volume::{Lattice, Volume},
+    volume::{Arrangement, Lattice, Volume},
 };
 use flate2::read::MultiGzDecoder;
 use glam::{DMat3, DVec3};
-use std::{borrow::Cow, collections::HashMap};
+use std::{borrow::Cow, collections::HashMap, sync::Arc};
 pub use write::write;
 
 /// Reads a volume of three axes with one scalar each. Positions are in the file's own space (RAS, LPS, …: nothing is
@@ -20,6 +20,10 @@ pub use write::write;
 /// third axis, those of both Cartesian lattices in turn; the first two directions are the edges of the cubic cell, the third
 /// is the step from layer to layer, half an edge. Odd layers are displaced by half an edge along the first two. Readers that
 /// do not know the key see a stack of slices, each second one half a pixel off. All other keys are skipped.
+///
+/// A rectilinear lattice has the keys `axis positions 0`, `axis positions 1` and `axis positions 2`, a convention of our own
+/// (`axis positions 0:=0 1 2.5`): ascending positions of the samples along each axis, in lengths of its space direction, from
+/// the space origin.
 ///
 /// Encodings: raw, gzip, ascii and hex. `data file` may name one file inside the header's folder.
 ///
@@ -135,7 +139,7 @@ impl<'a> Header<'a> {
             None => DVec3::ZERO,
         };
         let lattice = match self.keys.get("lattice").map(String::as_str) {
-            None => Lattice::cartesian(dims, origin, axes),
+            None => Lattice { dims, origin, axes, arrangement: self.arrangement()? },
             // Two layers make an edge.
             Some("bcc") => {
                 Lattice::body_centred(dims, origin, DMat3::from_cols(axes.x_axis, axes.y_axis, 2.0 * axes.z_axis))
@@ -149,6 +153,21 @@ impl<'a> Header<'a> {
         };
         lattice.validate().map_err(|message| self.source.error("header", message))?;
         Ok(lattice)
+    }
+
+    fn arrangement(&self) -> Result<Arrangement> {
+        let keys = [0, 1, 2].map(|axis| format!("axis positions {axis}"));
+        if !keys.iter().any(|key| self.keys.contains_key(key)) {
+            return Ok(Arrangement::Cartesian);
+        }
+        let mut places = [const { Vec::new() }; 3];
+        for (places, key) in places.iter_mut().zip(&keys) {
+            let text = self.keys.get(key).ok_or_else(|| self.source.error("header", format!("has no key “{key}”")))?;
+            let wrong = || self.source.error(key, "is not a list of numbers");
+            *places =
+                text.split_ascii_whitespace().map(|word| word.parse().map_err(|_| wrong())).collect::<Result<_>>()?;
+        }
+        Ok(Arrangement::Rectilinear(Arc::new(places)))
     }
 
     /// Vectors written as (x,y,z), exactly `N`.
@@ -416,6 +435,29 @@ mod tests {
             let content = file(&format!("type: {name}\nsizes: 1 1 2\nencoding: ascii"), b"1 2");
             let volume = read_with(&folder.write("volume.nrrd", &content), read).unwrap();
             assert_eq!(volume.samples, samples, "{name}");
+        }
+    }
+
+    #[test]
+    fn positions_along_the_axes() {
+        let folder = Folder::new();
+        let load = |keys: &str| {
+            let fields = "space directions: (0,2,0) (1,0,0) (0,0,1)\nspace origin: (10,20,30)";
+            let content =
+                file(&format!("type: uint8\nsizes: 3 2 1\nencoding: raw\n{fields}\n{keys}"), &[0, 1, 2, 3, 4, 5]);
+            read_with(&folder.write("volume.nrrd", &content), read)
+        };
+        let keys = "axis positions 0:=0 1 2.5\naxis positions 1:=-1 3\naxis positions 2:=7";
+        let volume = load(keys).unwrap();
+        assert_eq!(volume.lattice.sample_position(5), DVec3::new(13.0, 25.0, 37.0));
+        for (from, to, word) in [
+            ("axis positions 1:=-1 3\n", "", "no key “axis positions 1”"),
+            ("2.5", "two", "axis positions 0: is not a list of numbers"),
+            ("2.5", "0.5", "must ascend"),
+            (" 2.5", "", "2 coordinates along x for 3 samples"),
+        ] {
+            let message = load(&keys.replace(from, to)).unwrap_err().to_string();
+            assert!(message.contains(word), "{message}");
         }
     }
 

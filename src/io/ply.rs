@@ -6,6 +6,8 @@
 
 mod header;
 mod rows;
+mod samples;
+mod table;
 #[cfg(test)]
 mod tests;
 mod write;
@@ -19,7 +21,9 @@ use glam::{DVec3, Vec2, Vec3};
 use header::{Element, width};
 use ply_rs::ply::{PropertyType, ScalarType};
 use rayon::prelude::*;
-use rows::{List, Rows, number};
+use rows::{List, Rows};
+pub use samples::{has_faces, read_samples};
+use table::Table;
 pub use write::write;
 
 /// Rows of one parallel task.
@@ -91,45 +95,8 @@ fn read_vertices(source: &Source, element: &Element, rows: &Rows, mesh: &mut Mes
         let name = ROLES[missing][0];
         return Err(source.error("header", format!("the element “vertex” has no scalar property “{name}”")));
     }
-    if let Rows::Fixed { data, stride, big } = *rows {
-        let fields = columns.map(|column| {
-            column.and_then(|column| {
-                let offset: Option<usize> = element.columns[..column].iter().map(|before| before.width()).sum();
-                let PropertyType::Scalar(kind) = &element.columns[column].kind else { return None };
-                Some((offset?, kind))
-            })
-        });
-        let value = |row: usize, role: usize| {
-            fields[role].map_or(0.0, |(offset, kind)| number(&data[row * stride + offset..], kind, big))
-        };
-        return fill(source, element, rows, &columns, value, mesh);
-    }
-    // Text and rows with lists are decoded once, into a table of the columns in use.
-    let mut slots = [None; ROLES.len()];
-    let mut slot_of_column = vec![None; element.columns.len()];
-    let mut wanted = vec![false; element.columns.len()];
-    let mut used = 0;
-    for (slot, &column) in slots.iter_mut().zip(&columns) {
-        if let Some(column) = column {
-            *slot = Some(used);
-            slot_of_column[column] = Some(used);
-            wanted[column] = true;
-            used += 1;
-        }
-    }
-    let mut table = vec![0.0; element.count * used];
-    table.par_chunks_mut(CHUNK * used).enumerate().try_for_each(|(chunk, values)| {
-        for (row, values) in values.chunks_exact_mut(used).enumerate() {
-            rows.visit(source, element, chunk * CHUNK + row, &wanted, |column, value, _| {
-                if let Some(slot) = slot_of_column[column] {
-                    values[slot] = value;
-                }
-            })?;
-        }
-        Ok(())
-    })?;
-    let value = |row: usize, role: usize| slots[role].map_or(0.0, |slot| table[row * used + slot]);
-    fill(source, element, rows, &columns, value, mesh)
+    let table = Table::read(source, element, rows, &columns)?;
+    fill(source, element, rows, &columns, |row, role| table.value(row, role), mesh)
 }
 
 /// Fills the mesh from the value of a row and a role.

@@ -96,6 +96,23 @@ impl SampleType {
         }
     }
 
+    /// Numbers from their bytes as doubles: exact but for 64-bit integers beyond 2⁵³. Bytes after the last whole number are
+    /// left out.
+    pub fn doubles(self, bytes: &[u8], endian: Endian) -> Vec<f64> {
+        match self {
+            Self::U8 => bytes.iter().map(|&v| f64::from(v)).collect(),
+            Self::I8 => convert(bytes, endian, i8::from_le_bytes, f64::from),
+            Self::U16 => convert(bytes, endian, u16::from_le_bytes, f64::from),
+            Self::I16 => convert(bytes, endian, i16::from_le_bytes, f64::from),
+            Self::U32 => convert(bytes, endian, u32::from_le_bytes, f64::from),
+            Self::I32 => convert(bytes, endian, i32::from_le_bytes, f64::from),
+            Self::U64 => convert(bytes, endian, u64::from_le_bytes, |v| v as f64),
+            Self::I64 => convert(bytes, endian, i64::from_le_bytes, |v| v as f64),
+            Self::F32 => convert(bytes, endian, f32::from_le_bytes, f64::from),
+            Self::F64 => convert(bytes, endian, f64::from_le_bytes, |v| v),
+        }
+    }
+
     /// The little-endian bytes of at most `count` numbers written as text between white space and commas. Memory grows
     /// with the numbers that are there.
     ///
@@ -206,8 +223,10 @@ mod tests {
             assert_eq!(little.len(), 4 * kind.bytes());
             let big: Vec<u8> = little.chunks(kind.bytes()).flat_map(|n| n.iter().rev().copied()).collect();
             for (bytes, endian) in [(little, Endian::Little), (big, Endian::Big)] {
+                let doubles = kind.doubles(&bytes, endian);
                 let samples = kind.decode(bytes.into(), endian);
                 assert_eq!((0..4).map(|i| samples.value(i)).collect::<Vec<_>>(), [1.0, 2.0, 127.0, 0.0], "{kind:?}");
+                assert_eq!(doubles, [1.0, 2.0, 127.0, 0.0], "{kind:?}");
             }
         }
     }

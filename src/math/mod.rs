@@ -1,10 +1,14 @@
-//! Pure functions shared by everything downstream: the camera, the sheets and the kernel.
+//! Pure functions shared by everything downstream: the camera, the sheets, the kernel, and points in space.
 
 mod camera;
 pub(crate) mod cosine;
+mod eigen;
 mod kernel;
+pub(crate) mod neighbours;
 mod sheets;
+pub(crate) mod weld;
 
 pub use camera::{Bounds, Camera, Projection, View};
+pub(crate) use eigen::eigen;
 pub use kernel::{Kernel, Profile};
 pub use sheets::Sheets;

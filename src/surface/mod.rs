@@ -4,12 +4,10 @@ mod adjacency;
 mod cloud;
 mod ellipse;
 mod mesh;
-mod neighbours;
 mod paint;
 mod refine;
 mod shapes;
 mod surfels;
-mod weld;
 
 pub use mesh::{Material, Mesh, Texture};
 pub use surfels::SurfelOptions;

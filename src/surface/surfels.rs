@@ -12,10 +12,10 @@ use super::{
     ellipse::{Tensor, factor},
     paint::{corner_color, pack},
     refine::refine,
-    weld::first_of_equals,
 };
 use crate::{
     Error, Result,
+    math::weld::first_of_equals,
     splat::{Payload, Splat, SplatSet, encode_normal},
 };
 use glam::{DVec2, DVec3};

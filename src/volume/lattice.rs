@@ -235,14 +235,15 @@ impl Lattice {
         }
         // The determinant of the directions, not of the steps: its size does not depend on the unit of length.
         let spacing = self.spacing();
-        let directions =
-            DMat3::from_cols(self.axes.x_axis / spacing.x, self.axes.y_axis / spacing.y, self.axes.z_axis / spacing.z);
         if spacing.min_element() <= 0.0 {
             return Err(format!(
                 "the spacing is {} × {} × {}, but every step needs a length",
                 spacing.x, spacing.y, spacing.z
             ));
         }
+        let directions = DMat3::from_cols_array_2d(
+            &self.axes.to_cols_array_2d().map(|axis| DVec3::from_array(axis).normalize().to_array()),
+        );
         if directions.determinant().abs() < 1e-6 {
             return Err("the directions of the axes lie in one plane".into());
         }
@@ -267,6 +268,9 @@ mod tests {
     fn impossible_lattices_are_told() {
         let good = Lattice::with_spacing([2, 2, 2], DVec3::splat(1e-9));
         good.validate().unwrap();
+        // Coordinates far apart are no flat axes.
+        let far = std::array::from_fn(|_| vec![0.0, 1e6]);
+        Lattice { arrangement: Arrangement::Rectilinear(Arc::new(far)), ..good.clone() }.validate().unwrap();
         let flat = DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::X + DVec3::Y);
         for (bad, word) in [
             (Lattice { dims: [2, 0, 2], ..good.clone() }, "none"),

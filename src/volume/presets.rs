@@ -1,7 +1,7 @@
 //! Transfer functions that need no file: by name, and from a volume's histogram.
 
 use super::{Shade, TransferFunction, Volume, each_type};
-use crate::{Error, Result};
+use crate::{Error, Result, scattered::Points as ScatteredPoints};
 
 /// The points of a preset: value, red, green, blue, opacity.
 type Points = &'static [[f64; 5]];
@@ -97,8 +97,25 @@ impl TransferFunction {
         let [first, last] = volume.bounds();
         let diagonal = (last - first).length();
         let unit = if diagonal > 0.0 { diagonal / 100.0 } else { volume.lattice.spacing().max_element() };
+        let counts = volume.histogram(BINS);
+        let bright = bright_border(volume, otsu(&counts));
+        Self::of_histogram(counts, volume.range, unit, bright)
+    }
+
+    /// A transfer function for scattered samples, as [`automatic`](Self::automatic) makes one for a volume; the low values
+    /// count as background.
+    pub fn automatic_for_points(points: &ScatteredPoints) -> Self {
+        let [first, last] = points.bounds();
+        let diagonal = (last - first).length();
+        let unit = if diagonal > 0.0 { diagonal / 100.0 } else { 1.0 };
+        Self::of_histogram(points.histogram(BINS), points.range(), unit, false)
+    }
+
+    /// Shows values by how many of them fall into equal parts of their range. The background's values are the low ones, or
+    /// the high ones where it is `bright`.
+    fn of_histogram(mut counts: Vec<u64>, range: [f64; 2], unit: f64, bright: bool) -> Self {
         let shade = Some(Shade::default());
-        let [low, high] = volume.range;
+        let [low, high] = range;
         if low >= high {
             return Self {
                 color: vec![(low, [0.9, 0.8, 0.7])],
@@ -108,9 +125,7 @@ impl TransferFunction {
                 ..Self::default()
             };
         }
-        let mut counts = volume.histogram(BINS);
         // A bright background is a dark one seen from the other end of the range.
-        let bright = bright_border(volume, otsu(&counts));
         if bright {
             counts.reverse();
         }

@@ -8,12 +8,12 @@ use crate::{
 };
 use clap::Args;
 use serde_json::{Map, Value, json};
-use splatkit::{Error, surface::Mesh, volume::Volume};
+use splatkit::{Error, scattered::Points, surface::Mesh, volume::Volume};
 use std::path::PathBuf;
 
 #[derive(Args, Debug)]
 pub struct Info {
-    /// A mesh, cloud or volume.
+    /// A mesh, cloud or volume, or scattered samples.
     file: PathBuf,
     #[command(flatten)]
     load: LoadFlags,
@@ -31,6 +31,7 @@ impl Info {
         let (count, mut facts) = match &input {
             Input::Mesh(mesh) => (mesh.positions.len(), of_mesh(mesh)),
             Input::Volume(volume) => (volume.len(), of_volume(volume)),
+            Input::Samples(points) => (points.len(), of_samples(points)),
         };
         facts.insert("file".into(), json!(self.file));
         facts.insert("count".into(), json!(count));
@@ -95,6 +96,24 @@ fn of_volume(volume: &Volume) -> Map<String, Value> {
     facts.insert("range".into(), json!(volume.range));
     facts.insert("attributes".into(), json!(["value"]));
     facts.insert("bounds".into(), bounds(Some(volume.bounds())));
+    facts
+}
+
+fn of_samples(points: &Points) -> Map<String, Value> {
+    let attributes: Vec<&str> = [
+        ("position", true),
+        ("value", true),
+        ("radius", !points.radii.is_empty()),
+        ("covariance", !points.covariances.is_empty()),
+    ]
+    .into_iter()
+    .filter_map(|(name, present)| present.then_some(name))
+    .collect();
+    let mut facts = Map::new();
+    facts.insert("kind".into(), json!("samples"));
+    facts.insert("range".into(), json!(points.range()));
+    facts.insert("attributes".into(), json!(attributes));
+    facts.insert("bounds".into(), bounds(Some(points.bounds())));
     facts
 }
 

@@ -4,7 +4,9 @@ use crate::{failure::Failure, parse};
 use clap::Args;
 use glam::DVec3;
 use splatkit::{
-    io::{self, Endian, Limits, RawLayout, SampleType, Source},
+    Error,
+    io::{self, Endian, Kind, Limits, RawLayout, SampleType},
+    scattered::{Points, SampleOptions},
     surface::Mesh,
     volume::Volume,
 };
@@ -14,6 +16,7 @@ use std::path::Path;
 pub enum Input {
     Mesh(Mesh),
     Volume(Volume),
+    Samples(Points),
 }
 
 /// How raw files are read, and how much any file may claim.
@@ -35,19 +38,26 @@ pub struct LoadFlags {
     /// Raw volumes: bytes before the first sample.
     #[arg(long, value_name = "BYTES", requires = "dims")]
     header: Option<u64>,
+    /// Scattered samples: the property, column or array that holds the values. A PLY file without faces is read as samples
+    /// with it, as a cloud without.
+    #[arg(long, value_name = "NAME")]
+    scalar: Option<String>,
+    /// Scattered samples: one radius for all, in world units, of two standard deviations [default: the file's, or from the
+    /// neighbours]
+    #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
+    radius: Option<f64>,
+    /// Scattered samples: the nearest neighbours, 4 to 64, that kernels and slopes are made from [default: 16]
+    #[arg(long, value_name = "COUNT", value_parser = parse::neighbours)]
+    neighbours: Option<usize>,
+    /// Scattered samples: mean values alone, without slopes fitted to the neighbours.
+    #[arg(long)]
+    no_slopes: bool,
     /// Vertices, points or faces that a file may claim.
     #[arg(long, value_name = "COUNT")]
     limit_points: Option<u64>,
     /// Bytes that a file may take up, packed and unpacked.
     #[arg(long, value_name = "BYTES")]
     limit_bytes: Option<u64>,
-}
-
-/// The readers there are.
-#[derive(Clone, Copy)]
-enum Kind {
-    Mesh,
-    Volume,
 }
 
 impl LoadFlags {
@@ -70,40 +80,30 @@ impl LoadFlags {
             endian: self.endian.unwrap_or_default(),
             header: self.header.unwrap_or(0),
         });
-        let kind = match by_extension(path) {
-            Some(kind) => kind,
-            None => by_content(path, &limits, layout.is_some())?,
-        };
+        let raw = layout.as_ref().map(|_| Kind::Volume);
+        let kind = Kind::of(path, &limits, self.scalar.is_some())?.or(raw).ok_or_else(|| unknown(path))?;
         Ok(match kind {
             Kind::Mesh => Input::Mesh(io::load_mesh(path, &limits)?),
             Kind::Volume => Input::Volume(io::load_volume(path, &limits, layout.as_ref())?),
+            Kind::Samples => Input::Samples(io::load_samples(path, &limits, self.scalar.as_deref())?),
         })
     }
+
+    /// How scattered samples become splats.
+    pub fn sample_options(&self) -> SampleOptions {
+        let default = SampleOptions::default();
+        SampleOptions {
+            neighbours: self.neighbours.unwrap_or(default.neighbours),
+            radius: self.radius,
+            slopes: !self.no_slopes,
+            ..default
+        }
+    }
 }
 
-fn by_extension(path: &Path) -> Option<Kind> {
-    match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
-        "ply" | "obj" | "gltf" | "glb" => Some(Kind::Mesh),
-        "vti" | "nrrd" | "nhdr" => Some(Kind::Volume),
-        _ => None,
-    }
-}
-
-fn by_content(path: &Path, limits: &Limits, raw: bool) -> Result<Kind, Failure> {
-    let source = Source::open(path, limits)?;
-    let start = &source.bytes()[..source.bytes().len().min(1024)];
-    let text = start.trim_ascii_start();
-    if start.starts_with(b"NRRD") || start.windows(8).any(|w| w == b"<VTKFile") || raw {
-        return Ok(Kind::Volume);
-    }
-    if text.starts_with(b"ply") || text.starts_with(b"glTF") || text.starts_with(b"{") {
-        return Ok(Kind::Mesh);
-    }
-    let error = source.error("file", "is of no kind that can be read");
-    Err(error
-        .hint(
-            "meshes and clouds: .ply, .obj, .gltf, .glb; volumes: .vti, .nrrd, .nhdr, and raw samples (also packed by \
-             gzip) with --dims and --type",
-        )
-        .into())
+fn unknown(path: &Path) -> Error {
+    Error::input(path, "file", "is of no kind that can be read").hint(
+        "meshes and clouds: .ply, .obj, .gltf, .glb; volumes: .vti, .vtr, .vtk, .nrrd, .nhdr, and raw samples (also packed \
+         by gzip) with --dims and --type; scattered samples: .vtu, .vtp, .vtk, .npy, .csv, .txt, .xyzv, and .ply with --scalar",
+    )
 }

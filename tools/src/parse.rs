@@ -95,6 +95,11 @@ pub fn positive(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "a number above 0 is needed".into())
 }
 
+/// Neighbours of a sample.
+pub fn neighbours(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|count| (4..=64).contains(count)).ok_or_else(|| "a number from 4 to 64 is needed".into())
+}
+
 /// A number.
 pub fn finite(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| "a number is needed".into())

@@ -10,7 +10,7 @@ use crate::{
 };
 use clap::Args;
 use glam::DVec3;
-use splatkit::{Error, math::Bounds, scene::Scene, surface::SurfelOptions};
+use splatkit::{Error, math::Bounds, scene::Scene, surface::SurfelOptions, volume::TransferFunction};
 use std::{
     path::{Path, PathBuf},
     time::Instant,
@@ -20,7 +20,7 @@ use std::{
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Scene")]
 pub struct SceneFlags {
-    /// Meshes, clouds and at most one volume; all are drawn in one picture.
+    /// Meshes, clouds and at most one volume or set of scattered samples; all are drawn in one picture.
     #[arg(value_name = "SCENE", required = true)]
     pub inputs: Vec<PathBuf>,
     #[command(flatten)]
@@ -63,7 +63,7 @@ impl SceneFlags {
                     loaded.subject.up = DVec3::Y;
                 }
                 Input::Volume(volume) => {
-                    let transfer = show.transfer(path, &volume)?;
+                    let transfer = show.transfer(path, volume.range, || TransferFunction::automatic(&volume))?;
                     let [min, max] = volume.bounds();
                     loaded.add(Bounds { min, max }, volume.len());
                     let volume = if show.sharp {
@@ -73,6 +73,15 @@ impl SceneFlags {
                         volume
                     };
                     loaded.scene = loaded.scene.with_volume(volume, show.kernel.clone(), transfer);
+                }
+                Input::Samples(points) => {
+                    let automatic = || TransferFunction::automatic_for_points(&points);
+                    let transfer = show.transfer(path, points.range(), automatic)?;
+                    progress.stage(format!("Making splats of {}", path.display()));
+                    let splats = points.to_splats(&self.load.sample_options()).map_err(|e| in_file(path, e))?;
+                    let [min, max] = points.bounds();
+                    loaded.add(Bounds { min, max }.union(splats.bounds()), points.len());
+                    loaded.scene = loaded.scene.with_samples(splats, transfer);
                 }
             }
         }
@@ -98,7 +107,7 @@ impl Loaded {
 fn in_file(path: &Path, error: Error) -> Error {
     match error {
         Error::NothingToDraw(what) => Error::NothingToDraw(format!("{}: {what}", path.display())),
-        Error::Argument(what) => Error::input(path, "mesh", what),
+        Error::Argument(what) => Error::input(path, "content", what),
         other => other,
     }
 }

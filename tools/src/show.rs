@@ -5,7 +5,7 @@ use clap::Args;
 use splatkit::{
     Error,
     math::Kernel,
-    volume::{Isosurface, TransferFunction, Volume},
+    volume::{Isosurface, TransferFunction},
 };
 use std::path::Path;
 
@@ -13,8 +13,8 @@ use std::path::Path;
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Look")]
 pub struct ShowFlags {
-    /// How a volume's values are shown: ct-bone, ct-soft-tissue, ct-lung, ct-angiography, mri, generic, or a JSON file. By
-    /// default made from the volume's histogram.
+    /// How the values of a volume or of samples are shown: ct-bone, ct-soft-tissue, ct-lung, ct-angiography, mri, generic, or a JSON file. By
+    /// default made from their histogram.
     #[arg(long, value_name = "NAME|FILE.json")]
     transfer: Option<String>,
     /// The values that the transfer function spreads over, instead of its own.
@@ -93,11 +93,16 @@ fn is_file(text: &str) -> bool {
 }
 
 impl Show<'_> {
-    /// The transfer function that shows a volume; one that shows nothing of it is an error.
-    pub fn transfer(&self, path: &Path, volume: &Volume) -> Result<TransferFunction, Failure> {
+    /// The transfer function that shows values of a range; one that shows nothing of them is an error.
+    pub fn transfer(
+        &self,
+        path: &Path,
+        values: [f64; 2],
+        automatic: impl FnOnce() -> TransferFunction,
+    ) -> Result<TransferFunction, Failure> {
         let transfer = match &self.transfer {
-            Transfer::Automatic => TransferFunction::automatic(volume),
-            Transfer::Named(name) => TransferFunction::named(name, volume.range)?,
+            Transfer::Automatic => automatic(),
+            Transfer::Named(name) => TransferFunction::named(name, values)?,
             Transfer::Read(transfer) => transfer.clone(),
         };
         let mut transfer = match self.flags.range {
@@ -111,8 +116,8 @@ impl Show<'_> {
             transfer.gradient.clone_from(factors);
         }
         self.add_surfaces(&mut transfer);
-        if !transfer.visible(volume.range) {
-            let [low, high] = volume.range;
+        if !transfer.visible(values) {
+            let [low, high] = values;
             let shown = match transfer.shown_range() {
                 Some([from, to]) if from == to => format!("shows the value {from} alone"),
                 Some([from, to]) => format!("shows values between {from} and {to}"),

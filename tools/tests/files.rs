@@ -38,6 +38,30 @@ fn info_tells_what_a_file_holds() {
 }
 
 #[test]
+fn scattered_samples_are_told_from_clouds_and_volumes() {
+    let folder = Folder::new("samples");
+    let ply = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
+        property float p\nproperty float q\nproperty float radius\nend_header\n0 0 0 1 5 1\n1 0 0 2 6 1\n";
+    folder.put("a.ply", ply);
+    assert_eq!(folder.json("info a.ply --json")["kind"], "cloud");
+    let samples = folder.json("info a.ply --json --scalar q");
+    assert_eq!((samples["kind"].as_str(), samples["count"].as_u64()), (Some("samples"), Some(2)));
+    assert_eq!(samples["range"], serde_json::json!([5.0, 6.0]));
+    assert_eq!(samples["attributes"], serde_json::json!(["position", "value", "radius"]));
+    folder.run("info a.ply --scalar t").fails(3, &["a.ply", "no scalar “t”"]);
+    assert_eq!(folder.json(&format!("info {} --json --scalar q", folder.put("b.ply", PLY)))["kind"], "mesh");
+    assert_eq!(folder.json(&format!("info {} --json", folder.put("a.csv", "1,2,3,4\n5,6,7,8\n")))["kind"], "samples");
+    let header = "# vtk DataFile Version 3.0\n\nASCII\nDATASET";
+    let image =
+        format!("{header} STRUCTURED_POINTS\nDIMENSIONS 2 1 1\nPOINT_DATA 2\nSCALARS s int\nLOOKUP_TABLE d\n1 2\n");
+    assert_eq!(folder.json(&format!("info {} --json", folder.put("image.vtk", image)))["kind"], "volume");
+    let points =
+        format!("{header} POLYDATA\nPOINTS 2 float\n0 0 0 1 1 1\nPOINT_DATA 2\nSCALARS s int\nLOOKUP_TABLE d\n1 2\n");
+    assert_eq!(folder.json(&format!("info {} --json", folder.put("points.vtk", points)))["kind"], "samples");
+    folder.run("info a.csv --neighbours 3").fails(2, &["4 to 64"]);
+}
+
+#[test]
 fn bad_inputs_are_named() {
     let folder = Folder::new("bad");
     let cut = |bytes: &[u8]| bytes[..bytes.len() * 3 / 4].to_vec();
@@ -70,8 +94,10 @@ fn bad_inputs_are_named() {
     folder.run("render none.ply -o out.png").fails(3, &["none.ply"]);
     folder.run("info none.ply").fails(3, &["none.ply"]);
     folder.run("render . -o out.png").fails(3, &["regular file"]);
+    folder.put("text.dat", "hello");
+    folder.run("info text.dat").fails(3, &["text.dat", ".ply", ".nrrd", "--dims", ".csv"]);
     folder.put("text.txt", "hello");
-    folder.run("info text.txt").fails(3, &["text.txt", ".ply", ".nrrd", "--dims"]);
+    folder.run("info text.txt").fails(3, &["text.txt", "line 1", "“x”"]);
     folder.put("a.raw", &ball()[..4000]);
     folder.run("info a.raw --dims 16x16x16 --type u8").fails(3, &["a.raw", "4000"]);
     folder.put("nan.raw", nan);

@@ -35,7 +35,16 @@ fn write_to(volume: &Volume, out: &mut impl Write) -> std::io::Result<()> {
     writeln!(out, "NRRD0004\ntype: {kind}\ndimension: 3\nspace dimension: 3\nsizes: {nx} {ny} {nz}")?;
     writeln!(out, "space directions: {i} {j} {k}\nspace origin: {}", vector(lattice.origin))?;
     writeln!(out, "endian: {endian}\nencoding: gzip")?;
-    out.write_all(if body_centred { b"lattice:=bcc\n\n" } else { b"\n" })?;
+    if body_centred {
+        writeln!(out, "lattice:=bcc")?;
+    }
+    if let Arrangement::Rectilinear(places) = &lattice.arrangement {
+        for (axis, places) in places.iter().enumerate() {
+            let places: Vec<String> = places.iter().map(f64::to_string).collect();
+            writeln!(out, "axis positions {axis}:={}", places.join(" "))?;
+        }
+    }
+    writeln!(out)?;
     let mut packed = GzEncoder::new(out, Compression::default());
     packed.write_all(bytes)?;
     packed.finish().map(drop)
@@ -58,6 +67,8 @@ mod tests {
         let folder = Folder::new();
         let axes = glam::DMat3::from_cols(DVec3::new(0.5, 0.1, 0.0), DVec3::new(0.0, 2.0, 0.0), DVec3::Z);
         let lattice = Lattice::cartesian([2, 3, 1], DVec3::new(-1.5, 0.0, 1e9), axes);
+        let places = [vec![-0.1, 1.0 / 3.0], vec![1e-300, 2.0, 1e9], vec![7.5]];
+        let rectilinear = Lattice { arrangement: Arrangement::Rectilinear(places.into()), ..lattice.clone() };
         let samples = [
             Samples::U8(vec![0, 1, 2, 3, 4, 255]),
             Samples::U16(vec![0, 1, 2, 3, 4, 65535]),
@@ -67,7 +78,7 @@ mod tests {
         ];
         let body_centred = Lattice { arrangement: Arrangement::BodyCentred, ..lattice.clone() };
         for samples in samples {
-            for lattice in [&lattice, &body_centred] {
+            for lattice in [&lattice, &body_centred, &rectilinear] {
                 let path = folder.write("volume.nrrd", b"");
                 write(&Volume::new(lattice.clone(), samples.clone()).unwrap(), &path).unwrap();
                 let read = read_with(&path, nrrd::read).unwrap();

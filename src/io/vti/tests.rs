@@ -1,7 +1,7 @@
 //! Every way to write image data, and ways to write it wrong.
 
 use super::*;
-use crate::{io::testing::*, volume::Samples};
+use crate::{Error, io::testing::*, volume::Samples};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use flate2::{Compression, write::ZlibEncoder};
 use std::io::Write;

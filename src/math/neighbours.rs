@@ -7,17 +7,20 @@ use glam::Vec3;
 /// Ranges up to this long are searched through.
 const LEAF: usize = 8;
 
-/// `order` holds point indices; the middle of a range is the point that halves it, along `axes[middle]`.
-pub(super) struct Neighbours<'a> {
+/// `order` holds point indices; the middle of a range is the point that halves it, along `axes[middle]`. `sorted` are the
+/// points in that order, so that those near to each other in space are near in memory.
+pub(crate) struct Neighbours<'a> {
     points: &'a [Vec3],
+    sorted: Vec<Vec3>,
     order: Vec<u32>,
     axes: Vec<u8>,
 }
 
 /// The `K` nearest found so far, as squared distance and index, nearest first.
-pub(super) struct Nearest<const K: usize> {
+pub(crate) struct Nearest<const K: usize> {
     found: [(f32, u32); K],
     count: usize,
+    limit: usize,
 }
 
 impl<const K: usize> Nearest<K> {
@@ -28,20 +31,20 @@ impl<const K: usize> Nearest<K> {
 
     /// Beyond this squared distance nothing is of interest.
     fn reach(&self) -> f32 {
-        if self.count < K { f32::INFINITY } else { self.found[K - 1].0 }
+        if self.count < self.limit { f32::INFINITY } else { self.found[self.limit - 1].0 }
     }
 
     fn offer(&mut self, squared: f32, index: u32) {
         if squared >= self.reach() {
             return;
         }
-        let mut at = self.count.min(K - 1);
+        let mut at = self.count.min(self.limit - 1);
         while at > 0 && self.found[at - 1].0 > squared {
             self.found[at] = self.found[at - 1];
             at -= 1;
         }
         self.found[at] = (squared, index);
-        self.count = (self.count + 1).min(K);
+        self.count = (self.count + 1).min(self.limit);
     }
 }
 
@@ -51,31 +54,41 @@ impl<'a> Neighbours<'a> {
         let mut order: Vec<u32> = (0..points.len() as u32).collect();
         let mut axes = vec![0; points.len()];
         build(points, &mut order, &mut axes);
-        Self { points, order, axes }
+        let sorted = order.iter().map(|&index| points[index as usize]).collect();
+        Self { points, sorted, order, axes }
+    }
+
+    /// The points' indices in an order in which neighbours are near each other: asking in it is several times faster.
+    pub fn order(&self) -> &[u32] {
+        &self.order
     }
 
     /// The `K` points nearest to point `index`, itself left out.
     pub fn of<const K: usize>(&self, index: u32) -> Nearest<K> {
-        let mut nearest = Nearest { found: [(f32::INFINITY, 0); K], count: 0 };
+        self.first_of(index, K)
+    }
+
+    /// The `limit` points nearest to point `index`, itself left out; `limit` lies in 1 … `K`.
+    pub fn first_of<const K: usize>(&self, index: u32, limit: usize) -> Nearest<K> {
+        let mut nearest = Nearest { found: [(f32::INFINITY, 0); K], count: 0, limit: limit.clamp(1, K) };
         self.search(0, self.order.len(), index, self.points[index as usize], &mut nearest);
         nearest
     }
 
     fn search<const K: usize>(&self, from: usize, to: usize, own: u32, at: Vec3, nearest: &mut Nearest<K>) {
-        let mut offer = |index: u32| {
-            if index != own {
-                nearest.offer(self.points[index as usize].distance_squared(at), index);
+        let mut offer = |place: usize| {
+            if self.order[place] != own {
+                nearest.offer(self.sorted[place].distance_squared(at), self.order[place]);
             }
         };
         if to - from <= LEAF {
-            self.order[from..to].iter().for_each(|&index| offer(index));
+            (from..to).for_each(offer);
             return;
         }
         let middle = from.midpoint(to);
-        let split = self.order[middle];
-        offer(split);
+        offer(middle);
         let axis = usize::from(self.axes[middle]);
-        let beyond = at[axis] - self.points[split as usize][axis];
+        let beyond = at[axis] - self.sorted[middle][axis];
         let (near, far) = ((from, middle), (middle + 1, to));
         let (near, far) = if beyond < 0.0 { (near, far) } else { (far, near) };
         self.search(near.0, near.1, own, at, nearest);
@@ -125,6 +138,8 @@ mod tests {
             all.sort_by(f32::total_cmp);
             let found: Vec<f32> = tree.of::<6>(index as u32).iter().map(|(distance, _)| distance).collect();
             assert_eq!(found, all[1..7]);
+            let fewer: Vec<f32> = tree.first_of::<6>(index as u32, 4).iter().map(|(distance, _)| distance).collect();
+            assert_eq!(fewer, all[1..5]);
         }
     }
 

@@ -1,10 +1,10 @@
-//! Vertices at the same place.
+//! Points at the same place.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
 /// For each position the index of the first one that is equal to it (often itself).
-pub(super) fn first_of_equals(positions: &[Vec3]) -> Vec<u32> {
+pub(crate) fn first_of_equals(positions: &[Vec3]) -> Vec<u32> {
     let key = |index: u32| {
         // Adding zero makes the two zeros one.
         let p = positions[index as usize] + Vec3::ZERO;

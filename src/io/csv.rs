@@ -1,0 +1,235 @@
+//! Tables of numbers as text (`.csv`, `.txt`, `.xyzv`): a sample a line, with a line of names or without.
+//!
+//! Columns are parted by the first of these that the first line has: semicolons, commas, tabs, and else any white space.
+//! (The csv crate takes single bytes only, not runs of spaces.) Lines that are empty or begin with `#` or `//` are passed
+//! over, but for a first one that names the columns. Numbers have points, no decimal commas.
+
+use super::{
+    Source,
+    gather::{Columns, choose, gather},
+};
+use crate::{Result, scattered::Points};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Columns of a covariance.
+const COVARIANCE: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
+
+/// Reads samples. With names: `x`, `y`, `z`, a value (the column `scalar` names, else `value` or `scalar`, else the only
+/// one left), and if there are some `radius` and `xx`, `xy`, `xz`, `yy`, `yz`, `zz` (or `cov_xx`, …). Without: x, y, z and
+/// value, and then nothing, a radius, or the six terms of a covariance.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) with the line, for columns that are not these, lines of another length, what is no
+/// number, and numbers that are not finite; [`Error::Limit`](crate::Error::Limit) for more lines than points are allowed.
+pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
+    let bytes = source.bytes();
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let mut lines: Vec<(usize, &[u8])> = Vec::new();
+    for (number, line) in bytes.split(|&b| b == b'\n').enumerate() {
+        let line = line.trim_ascii();
+        let comment = line.starts_with(b"#") || line.starts_with(b"//");
+        // A comment may name the columns, if it comes first.
+        if !line.is_empty() && (!comment || lines.is_empty() && names_columns(line)) {
+            lines.push((number + 1, line));
+        }
+    }
+    source.check_points("the number of lines", lines.len() as u64)?;
+    let Some(&(_, first)) = lines.first() else { return Err(source.error("file", "holds no lines of numbers")) };
+    let separator = [b';', b',', b'\t'].into_iter().find(|separator| first.contains(separator));
+    let header: Vec<String> = words(first, separator).map(name).collect();
+    let named = !header.iter().all(|word| word.parse::<f64>().is_ok());
+    let rows = if named { &lines[1..] } else { &lines };
+    let layout =
+        if named { Layout::named(source, lines[0].0, &header, scalar)? } else { Layout::plain(source, header.len())? };
+    let width = header.len();
+    let mut table = vec![0.0f64; rows.len() * width];
+    table.par_chunks_mut(width).zip(rows).try_for_each(|(row, &(number, line))| {
+        let place = || format!("line {number}");
+        let mut count = 0;
+        for word in words(line, separator) {
+            if let Some(slot) = row.get_mut(count).filter(|_| layout.uses(count)) {
+                let text = String::from_utf8_lossy(word);
+                let text = text.trim_matches('"');
+                *slot = text.parse().map_err(|_| {
+                    let shown: String = text.chars().take(40).collect();
+                    source.error(place(), format!("“{shown}” is not a number"))
+                })?;
+                if !slot.is_finite() {
+                    return Err(source.error(place(), format!("number {} is {slot}", count + 1)));
+                }
+            }
+            count += 1;
+        }
+        if count != width {
+            return Err(source.error(place(), format!("has {count} columns, but the first line has {width}")));
+        }
+        Ok(())
+    })?;
+    let value = |row: usize, column: usize| table[row * width + column];
+    let column = |column: usize| (0..rows.len()).map(move |row| value(row, column));
+    let columns = Columns {
+        values: column(layout.value).collect(),
+        radii: layout.radius.map_or(Vec::new(), |radius| column(radius).map(|radius| radius as f32).collect()),
+        covariances: layout
+            .covariance
+            .map_or(Vec::new(), |terms| (0..rows.len()).map(|row| terms.map(|term| value(row, term) as f32)).collect()),
+    };
+    let [x, y, z] = layout.position;
+    let position = |row| DVec3::new(value(row, x), value(row, y), value(row, z));
+    gather(source, rows.len(), position, |row| format!("line {}", rows[row].0), columns)
+}
+
+/// Which column means what.
+struct Layout {
+    position: [usize; 3],
+    value: usize,
+    radius: Option<usize>,
+    covariance: Option<[usize; 6]>,
+}
+
+impl Layout {
+    fn plain(source: &Source, count: usize) -> Result<Self> {
+        let plain = Self { position: [0, 1, 2], value: 3, radius: None, covariance: None };
+        match count {
+            4 => Ok(plain),
+            5 => Ok(Self { radius: Some(4), ..plain }),
+            10 => Ok(Self { covariance: Some([4, 5, 6, 7, 8, 9]), ..plain }),
+            _ => Err(source
+                .error("line 1", format!("has {count} columns without names"))
+                .hint("write x, y, z, value and then nothing, a radius, or xx, xy, xz, yy, yz, zz; or name the columns in the first line")),
+        }
+    }
+
+    fn named(source: &Source, line: usize, names: &[String], scalar: Option<&str>) -> Result<Self> {
+        let place = format!("line {line}");
+        let at = |name: &str| names.iter().position(|other| other.eq_ignore_ascii_case(name));
+        let need = |name: &str| at(name).ok_or_else(|| source.error(&place, format!("names no column “{name}”")));
+        let position = [need("x")?, need("y")?, need("z")?];
+        let radius = at("radius");
+        let terms = COVARIANCE.map(|term| at(term).or_else(|| at(&format!("cov_{term}"))));
+        let covariance = terms.iter().all(Option::is_some).then(|| terms.map(Option::unwrap_or_default));
+        let taken =
+            |column: &usize| position.contains(column) || radius == Some(*column) || terms.contains(&Some(*column));
+        let rest: Vec<usize> = (0..names.len()).filter(|column| !taken(column)).collect();
+        let of_rest: Vec<&str> = rest.iter().map(|&column| names[column].as_str()).collect();
+        let usual = || at("value").or_else(|| at("scalar")).filter(|_| scalar.is_none());
+        let value = match usual() {
+            Some(value) => value,
+            None => rest[choose(source, &place, scalar, &of_rest)?],
+        };
+        Ok(Self { position, value, radius, covariance })
+    }
+
+    fn uses(&self, column: usize) -> bool {
+        self.position.contains(&column)
+            || self.value == column
+            || self.radius == Some(column)
+            || self.covariance.is_some_and(|terms| terms.contains(&column))
+    }
+}
+
+/// Whether a comment is a line of names.
+fn names_columns(line: &[u8]) -> bool {
+    let separators = |b: &u8| b.is_ascii_whitespace() || matches!(b, b',' | b';' | b'#');
+    let has = |name: &[u8]| line.split(separators).any(|word| word.eq_ignore_ascii_case(name));
+    has(b"x") && has(b"y") && has(b"z")
+}
+
+/// The words of a line; a comment's sign is none.
+fn words(line: &[u8], separator: Option<u8>) -> impl Iterator<Item = &[u8]> {
+    let line = if line.starts_with(b"#") { line[1..].trim_ascii() } else { line };
+    line.split(move |&b| separator.map_or(b.is_ascii_whitespace(), |separator| b == separator))
+        .map(<[u8]>::trim_ascii)
+        .filter(move |word| separator.is_some() || !word.is_empty())
+}
+
+/// A column's name, out of its quotes.
+fn name(word: &[u8]) -> String {
+    String::from_utf8_lossy(word).trim_matches('"').trim().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        Error,
+        io::{Limits, testing::*},
+    };
+    use glam::Vec3;
+
+    fn load(text: &str, scalar: Option<&str>) -> Result<Points> {
+        let folder = Folder::new();
+        read_with(&folder.write("a.csv", text), |source| read(source, scalar))
+    }
+
+    #[test]
+    fn every_separator_and_every_set_of_columns() {
+        let plain = Points {
+            positions: vec![Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)],
+            values: vec![-0.5, 70.0],
+            ..Points::default()
+        };
+        for text in [
+            "1,2,3,-0.5\n4,5,6,7e1\n",
+            "x,y,z,p\r\n1,2,3,-0.5\r\n4,5,6,70",
+            "\u{feff}\"X\";\"Y\";\"Z\";\"pressure of air\"\n1;2;3;-0.5\n\n4;5;6;70\n",
+            "1\t2\t3\t-0.5\n4\t5\t6\t70",
+            "# made by hand\n  1   2 3 -0.5\n// more\n4 5  6 70 ",
+            "# x y z v\n1 2 3 -0.5\n4 5 6 70",
+            "value z y x\n-0.5 3 2 1\n70 6 5 4",
+            "x,y,z,value,name\n1,2,3,-0.5,first\n4,5,6,70,second",
+        ] {
+            assert_eq!(load(text, None).unwrap(), plain, "{text}");
+        }
+        assert_eq!(load("x,y,z,a,b\n1,2,3,9,-0.5\n4,5,6,9,70", Some("b")).unwrap(), plain);
+        let round = Points { radii: vec![0.5, 2.0], ..plain.clone() };
+        assert_eq!(load("1 2 3 -0.5 0.5\n4 5 6 70 2", None).unwrap(), round);
+        assert_eq!(load("radius x y z v\n0.5 1 2 3 -0.5\n2 4 5 6 70", None).unwrap(), round);
+        let slanted = Points { covariances: vec![[4.0, 1.0, 0.0, 2.0, 0.0, 1.0]; 2], ..plain };
+        assert_eq!(load("1 2 3 -0.5 4 1 0 2 0 1\n4 5 6 70 4 1 0 2 0 1", None).unwrap(), slanted);
+        let names = "cov_xx cov_xy cov_xz cov_yy cov_yz cov_zz x y z v";
+        assert_eq!(load(&format!("{names}\n4 1 0 2 0 1 1 2 3 -0.5\n4 1 0 2 0 1 4 5 6 70"), None).unwrap(), slanted);
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_its_line() {
+        for (text, scalar, word) in [
+            ("", None, "no lines"),
+            ("# nothing\n", None, "no lines"),
+            ("hello", None, "no column “x”"),
+            ("1 2 3", None, "3 columns without names"),
+            ("x,y,z\n1,2,3", None, "line 1: has no scalar"),
+            ("x,y,z,a,b\n1,2,3,4,5", None, "2 scalars to choose from"),
+            ("x,y,z,a,b\n1,2,3,4,5", Some("c"), "no scalar “c”"),
+            ("x,y,z,v\n", None, "no samples"),
+            ("1 2 3 4\n\n5 6 7 nan", None, "line 3: number 4 is NaN"),
+            ("1 2 3 4\n5 inf 7 8", None, "line 2: number 2 is inf"),
+            ("1 2 3 4\n5 6 7", None, "line 2: has 3 columns, but the first line has 4"),
+            ("1 2 3 4\n5 6 7 8 9", None, "line 2: has 5 columns"),
+            ("1 2 3 4\n5 6 seven 8", None, "line 2: “seven” is not a number"),
+            ("1;2;3;4\n5;6;7;8,5", None, "“8,5” is not a number"),
+            ("1 2 3 4 0", None, "radius of sample 0 is 0"),
+            ("1 2 3 1e39", None, "line 1: the value"),
+        ] {
+            let message = load(text, scalar).unwrap_err().to_string();
+            assert!(message.contains(word), "{text}: {message}");
+        }
+        let folder = Folder::new();
+        let path = folder.write("a.csv", "1 2 3 4\n5 6 7 8\n");
+        let limits = Limits { points: 1, ..Limits::default() };
+        assert!(matches!(read(&Source::open(&path, &limits).unwrap(), None), Err(Error::Limit { .. })));
+    }
+
+    /// A cut text is an error, or fewer lines, or one of its numbers shorter.
+    #[test]
+    fn every_cut_is_an_error_or_less() {
+        let whole = "x,y,z,v\n1,2,3,4\n5,6,7,85\n";
+        for end in 0..whole.len() {
+            match load(&whole[..end], None) {
+                Ok(points) => assert!(points.len() <= 2 && points.validate().is_ok()),
+                Err(error) => assert!(matches!(error, Error::Input { .. }), "{error}"),
+            }
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! What a file holds: told by its extension, and where that leaves it open by its content.
+
+use super::{Limits, Source, ply, vtk};
+use crate::Result;
+use std::path::Path;
+
+/// The kinds of inputs, each with its way to read it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// [`load_mesh`](super::load_mesh)
+    Mesh,
+    /// [`load_volume`](super::load_volume)
+    Volume,
+    /// [`load_samples`](super::load_samples)
+    Samples,
+}
+
+impl Kind {
+    /// The kind of a file; none where neither its name nor its first bytes tell. A PLY file with faces is a mesh; one without
+    /// is a cloud, or where a scalar is asked for (`with_scalar`) samples. Legacy VTK files are volumes or samples by the
+    /// data set that they hold.
+    ///
+    /// # Errors
+    /// Those of opening the file; [`Error::Input`](crate::Error::Input) for a PLY file or a legacy VTK file with a malformed
+    /// header.
+    pub fn of(path: &Path, limits: &Limits, with_scalar: bool) -> Result<Option<Self>> {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        let source = Source::open(path, limits)?;
+        let start = &source.bytes()[..source.bytes().len().min(1024)];
+        let has = |word: &[u8]| start.windows(word.len()).any(|w| w == word);
+        let of_ply = || Ok(Some(if with_scalar && !ply::has_faces(&source)? { Self::Samples } else { Self::Mesh }));
+        let of_vtk = || Ok(Some(if vtk::holds_volume(&source)? { Self::Volume } else { Self::Samples }));
+        match extension.as_deref() {
+            Some("ply") => return of_ply(),
+            Some("vtk") => return of_vtk(),
+            Some("obj" | "gltf" | "glb") => return Ok(Some(Self::Mesh)),
+            Some("vti" | "vtr" | "nrrd" | "nhdr") => return Ok(Some(Self::Volume)),
+            Some("vtu" | "vtp" | "csv" | "txt" | "xyzv" | "npy") => return Ok(Some(Self::Samples)),
+            _ => {}
+        }
+        let text = start.trim_ascii_start();
+        if text.starts_with(b"ply") {
+            return of_ply();
+        }
+        if start.starts_with(b"# vtk DataFile") {
+            return of_vtk();
+        }
+        Ok(if has(b"<VTKFile") {
+            Some(if has(b"UnstructuredGrid") || has(b"PolyData") { Self::Samples } else { Self::Volume })
+        } else if start.starts_with(b"NRRD") {
+            Some(Self::Volume)
+        } else if start.starts_with(b"\x93NUMPY") {
+            Some(Self::Samples)
+        } else if text.starts_with(b"glTF") || text.starts_with(b"{") {
+            Some(Self::Mesh)
+        } else {
+            None
+        })
+    }
+}

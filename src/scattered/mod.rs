@@ -1,0 +1,110 @@
+//! Scattered samples: points in space with a scalar, in no order and at any density, and the splats that draw them.
+//!
+//! The field between them is the weighted mean of what their kernels carry (Shepard 1968), each its value and a slope
+//! (Franke & Nielson 1980, "Smooth interpolation of large sets of scattered data").
+
+mod neighbourhood;
+mod splats;
+#[cfg(test)]
+mod tests;
+
+pub use splats::SampleOptions;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Points with a value each, in the file's own unit, relative to `origin` (so that doubles far from zero keep their
+/// precision in 32 bits). `radii` and `covariances` are either empty or as long as `positions`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Points {
+    pub origin: DVec3,
+    pub positions: Vec<Vec3>,
+    pub values: Vec<f32>,
+    /// How far each sample reaches, in world units; two standard deviations of its kernel unless
+    /// [`SampleOptions::deviations`] says otherwise.
+    pub radii: Vec<f32>,
+    /// The covariance of each sample's kernel: xx, xy, xz, yy, yz, zz, in squared world units. It counts before a radius.
+    pub covariances: Vec<[f32; 6]>,
+}
+
+impl Points {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+
+    /// Says in words what makes the points unusable, with the first one that is wrong: lists of different lengths, none or
+    /// more than 2³² points, numbers that are not finite, radii not above 0, covariances that no Gaussian has.
+    pub fn validate(&self) -> Result<(), String> {
+        let count = self.len();
+        if count == 0 {
+            return Err("there are no samples".into());
+        }
+        if u32::try_from(count).is_err() {
+            return Err(format!("{count} samples are more than 32 bits count"));
+        }
+        let given = [("radii", self.radii.len()), ("covariances", self.covariances.len())];
+        let mut lists = vec![("values", self.values.len())];
+        lists.extend(given.iter().filter(|list| list.1 > 0));
+        if let Some((name, found)) = lists.into_iter().find(|list| list.1 != count) {
+            return Err(format!("there are {found} {name} for {count} positions"));
+        }
+        if !self.origin.is_finite() {
+            return Err(format!("the origin {} is not finite", self.origin));
+        }
+        let first = |bad: &(dyn Fn(usize) -> bool + Sync)| (0..count).into_par_iter().find_first(|&index| bad(index));
+        if let Some(index) = first(&|index| !self.positions[index].is_finite()) {
+            return Err(format!("the position {} of sample {index} is not finite", self.positions[index]));
+        }
+        if let Some(index) = first(&|index| !self.values[index].is_finite()) {
+            return Err(format!("the value of sample {index} is {}", self.values[index]));
+        }
+        if let Some(index) = self.radii.par_iter().position_first(|radius| !(radius.is_normal() && *radius > 0.0)) {
+            return Err(format!("the radius of sample {index} is {}, but radii are above 0", self.radii[index]));
+        }
+        if let Some(index) = self.covariances.par_iter().position_first(|terms| splats::factor(terms).is_none()) {
+            let terms = self.covariances[index];
+            return Err(format!("the covariance {terms:?} of sample {index} is not positive definite"));
+        }
+        Ok(())
+    }
+
+    /// Smallest and largest value.
+    pub fn range(&self) -> [f64; 2] {
+        let none = || [f32::INFINITY, f32::NEG_INFINITY];
+        let ends = self
+            .values
+            .par_iter()
+            .fold(none, |[low, high], &value| [low.min(value), high.max(value)])
+            .reduce(none, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        ends.map(f64::from)
+    }
+
+    /// Smallest and largest world coordinates of the positions. Kernels reach further.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        let none = || [Vec3::INFINITY, Vec3::NEG_INFINITY];
+        let ends = self
+            .positions
+            .par_iter()
+            .fold(none, |[low, high], &at| [low.min(at), high.max(at)])
+            .reduce(none, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        ends.map(|end| self.origin + end.as_dvec3())
+    }
+
+    /// How many values fall into each of `bins` equal parts of the range, the largest in the last bin; equal values all
+    /// fill the first bin.
+    pub fn histogram(&self, bins: usize) -> Vec<u64> {
+        let mut counts = vec![0; bins];
+        let [low, high] = self.range();
+        let scale = if high > low { bins as f64 / (high - low) } else { 0.0 };
+        for &value in self.values.iter().filter(|_| bins > 0) {
+            // Casts saturate, so the largest value stays in the last bin.
+            counts[(((f64::from(value) - low) * scale) as usize).min(bins - 1)] += 1;
+        }
+        counts
+    }
+}

@@ -1,0 +1,145 @@
+//! What the nearest neighbours of a sample tell: how much room it has, and how the values change around it.
+
+use super::Points;
+use crate::math::{eigen, neighbours::Neighbours, weld::first_of_equals};
+use glam::{DMat3, DVec3, Vec3};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// The most neighbours that a sample is judged by.
+pub(super) const MOST: usize = 64;
+
+/// A direction in which the variance of the neighbours is below this part of the largest one has no extent that could be
+/// told from rounding: no slope, and no share in the room between samples.
+const FLAT: f64 = 1e-4;
+
+/// A place that holds one sample, or several at exactly the same position.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    /// The samples at it.
+    pub samples: u32,
+    /// The edge of the cube that the place has for its own; 0 where it is the only one.
+    pub spacing: f64,
+    /// Change of the value per world unit; 0 where it cannot be told.
+    pub gradient: DVec3,
+    /// From the smallest to the largest value of the neighbours and itself.
+    pub width: f64,
+}
+
+/// The places of all samples, and for each sample the index of its own. Coincident samples share a place: the tree is
+/// asked about different positions only, so that a distance is never 0 and no number of copies takes up all neighbours.
+pub(super) fn places(points: &Points, neighbours: usize) -> (Vec<Place>, Vec<u32>) {
+    let first = first_of_equals(&points.positions);
+    let mut place_of = vec![0; points.len()];
+    let mut positions = Vec::new();
+    let mut sums: Vec<(f64, u32)> = Vec::new();
+    for (index, &first) in first.iter().enumerate() {
+        if first as usize == index {
+            place_of[index] = positions.len() as u32;
+            positions.push(points.positions[index]);
+            sums.push((0.0, 0));
+        } else {
+            place_of[index] = place_of[first as usize];
+        }
+        let sum = &mut sums[place_of[index] as usize];
+        *sum = (sum.0 + f64::from(points.values[index]), sum.1 + 1);
+    }
+    let values: Vec<f64> = sums.iter().map(|(sum, count)| sum / f64::from(*count)).collect();
+    let tree = Neighbours::new(&positions);
+    let around = Surroundings { tree: &tree, positions: &positions, values: &values, neighbours };
+    let found: Vec<Place> = tree.order().par_iter().map(|&index| around.place(index, sums[index as usize].1)).collect();
+    let mut places = found.clone();
+    for (&index, place) in tree.order().iter().zip(found) {
+        places[index as usize] = place;
+    }
+    (places, place_of)
+}
+
+struct Surroundings<'a> {
+    tree: &'a Neighbours<'a>,
+    positions: &'a [Vec3],
+    values: &'a [f64],
+    neighbours: usize,
+}
+
+impl Surroundings<'_> {
+    fn place(&self, index: u32, samples: u32) -> Place {
+        let mut around: [(DVec3, f64, f64); MOST] = [(DVec3::ZERO, 0.0, 0.0); MOST];
+        let (center, own) = (self.positions[index as usize], self.values[index as usize]);
+        let mut count = 0;
+        for (distance, neighbour) in self.tree.first_of::<MOST>(index, self.neighbours).iter() {
+            let offset = (self.positions[neighbour as usize] - center).as_dvec3();
+            around[count] = (offset, self.values[neighbour as usize] - own, f64::from(distance));
+            count += 1;
+        }
+        let around = &around[..count];
+        let Some(&(.., farthest)) = around.last() else {
+            return Place { samples, spacing: 0.0, gradient: DVec3::ZERO, width: 0.0 };
+        };
+        let fit = Fit::new(around, farthest);
+        let [low, high] = around.iter().fold([0.0f64; 2], |[low, high], &(_, rise, _)| [low.min(rise), high.max(rise)]);
+        // The ball, disc or line to the k-th neighbour holds k samples besides the own one in its middle.
+        let k = count as f64;
+        let spacing = match fit.dimensions {
+            3 => (4.0 / 3.0 * PI / k).cbrt(),
+            2 => (PI / k).sqrt(),
+            _ => 2.0 / k,
+        };
+        // A few samples all lie on the border, and so have less room.
+        let spacing = farthest * spacing.min(1.0);
+        Place { samples, spacing, gradient: limited(fit.gradient, around, [low, high]), width: high - low }
+    }
+}
+
+/// A linear function through the values around a sample, by weighted least squares.
+struct Fit {
+    /// The number of directions in which the samples spread.
+    dimensions: usize,
+    /// The slope; 0 along the directions that have no extent.
+    gradient: DVec3,
+}
+
+impl Fit {
+    /// Offsets, rises of the value and distances of the neighbours, the farthest one's last. Their weights fall off with the
+    /// distance, but not to 0 at the farthest: on a lattice all may be equally far.
+    fn new(around: &[(DVec3, f64, f64)], farthest: f64) -> Self {
+        let weight = |distance: f64| 1.0 - 0.64 * (distance / farthest).powi(2);
+        let own = (DVec3::ZERO, 0.0, 0.0);
+        let all = || around.iter().chain([&own]).map(|&(offset, rise, distance)| (offset, rise, weight(distance)));
+        let (mut sum, mut mean, mut mean_rise) = (0.0, DVec3::ZERO, 0.0);
+        for (offset, rise, weight) in all() {
+            sum += weight;
+            mean += weight * offset;
+            mean_rise += weight * rise;
+        }
+        (mean, mean_rise) = (mean / sum, mean_rise / sum);
+        let (mut scatter, mut trend) = (DMat3::ZERO, DVec3::ZERO);
+        for (offset, rise, weight) in all() {
+            let d = offset - mean;
+            scatter += DMat3::from_cols(d * d.x, d * d.y, d * d.z) * weight;
+            trend += d * (rise - mean_rise) * weight;
+        }
+        let trace: f64 = scatter.x_axis.x + scatter.y_axis.y + scatter.z_axis.z;
+        // The product of the variances over the cube of their sum is at most the smallest over the largest.
+        if scatter.determinant() > FLAT * trace.powi(3) {
+            return Self { dimensions: 3, gradient: scatter.inverse() * trend };
+        }
+        let (variances, axes) = eigen(scatter);
+        let dimensions = variances.iter().filter(|&&variance| variance > FLAT * variances[0]).count();
+        let along = |axis: usize| axes[axis] * (axes[axis].dot(trend) / variances[axis]);
+        Self { dimensions, gradient: (0..dimensions).map(along).sum() }
+    }
+}
+
+/// Shortens a gradient until what it says of the neighbours' places lies inside the range of their values widened by half
+/// its width (Barth & Jespersen 1989, but for the widening). A linear field is never cut, not even at the border of the
+/// samples; a step is, where its gradient would lead far beyond both sides.
+fn limited(gradient: DVec3, around: &[(DVec3, f64, f64)], [low, high]: [f64; 2]) -> DVec3 {
+    let room = 0.5 * (high - low);
+    let share = around.iter().map(|&(offset, ..)| {
+        let rise = gradient.dot(offset);
+        let bound = if rise > 0.0 { high + room } else { room - low };
+        if rise.abs() > bound { bound / rise.abs() } else { 1.0 }
+    });
+    gradient * share.fold(1.0, f64::min)
+}

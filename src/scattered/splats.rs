@@ -1,0 +1,196 @@
+//! From scattered samples to splats: kernels, weights and slopes.
+
+use super::{
+    Points,
+    neighbourhood::{MOST, Place, places},
+};
+use crate::{
+    Error, Result,
+    splat::{Payload, Splat, SplatSet},
+};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// Footprints end this many standard deviations from the sample: 1.1 % of the kernel's height.
+const EXTENT: f32 = 3.0;
+/// Standard deviation of a kernel that is made from the neighbours, in the spacing of the samples. On average 5.4 kernels
+/// are added at a place, and random samples leave no empty ball within the footprints' reach of 2.1 spacings: one of that
+/// size turns up once in e³⁹ of them.
+const SPREAD: f64 = 0.7;
+/// The range of weights, whose median is 1. Samples beyond it count for less or more than they should by their volume, but
+/// 16 bits hold them with all their digits, and nothing beside others of weight 1 could be seen of a smaller one.
+const WEIGHTS: [f64; 2] = [1e-4, 6e4];
+/// Over the whole extent of its kernel a sample's value changes by at most this many widths of the range around it.
+const LARGEST_RISE: f64 = 2.5;
+/// What 16 bits hold of a slope.
+const LARGEST_SLOPE: f64 = 65_504.0;
+
+/// How scattered samples become splats.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SampleOptions {
+    /// The nearest neighbours that a sample's room and slope are taken from; 4 to 64. More make wide kernels even.
+    pub neighbours: usize,
+    /// One radius for all samples, in world units, instead of their own.
+    pub radius: Option<f64>,
+    /// Standard deviations of the kernel in a radius.
+    pub deviations: f64,
+    /// Whether samples carry slopes. Without, values stay inside the samples' range but show steps (Shepard 1968).
+    pub slopes: bool,
+}
+
+impl Default for SampleOptions {
+    fn default() -> Self {
+        Self { neighbours: 16, radius: None, deviations: 2.0, slopes: true }
+    }
+}
+
+/// The shape of a kernel, and what is counted of it.
+struct Shape {
+    /// B of Σ = B·Bᵀ, row by row.
+    factor: [f64; 6],
+    weight: f64,
+}
+
+impl Points {
+    /// The splats that draw the samples, in their order.
+    ///
+    /// **Kernels** have the sample's covariance, or are round: the radius of the options, else the sample's own, is
+    /// [`SampleOptions::deviations`] standard deviations; without any, the standard deviation is 0.7 of the spacing of the
+    /// samples around, the edge of a cube that holds one of them (a single sample: 0.5 world units).
+    ///
+    /// **Weights** keep the density of the samples from showing: kernels from neighbours have 1, given ones the volume of
+    /// the sample's cube over the kernel's, up to a common factor. Samples at the same position share the weight of one; the
+    /// field there is their mean.
+    ///
+    /// **Slopes** are fitted to the neighbours by weighted least squares and limited by the range of their values; they are 0
+    /// where the samples have no extent. Those of 6·10⁻⁵ and less lose digits in 16 bits, those under 6·10⁻⁸ are 0.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for what [`validate`](Self::validate) finds, for options out of their ranges, and for values that
+    /// change by more than 65,504 within a kernel (without slopes they are no trouble).
+    pub fn to_splats(&self, options: &SampleOptions) -> Result<SplatSet> {
+        self.validate().map_err(Error::Argument)?;
+        options.validate()?;
+        let (places, place_of) = places(self, options.neighbours);
+        let place = |index: usize| places[place_of[index] as usize];
+        // 32-bit coordinates cannot tell distances below this: a kernel so narrow would only hide in rounding.
+        let [low, high] = self.bounds();
+        let finest = ((high - low).length() * 1e-7).max(f64::from(f32::MIN_POSITIVE));
+        let mut shapes: Vec<Shape> =
+            (0..self.len()).into_par_iter().map(|index| self.shape(options, index, place(index), finest)).collect();
+        settle_weights(&mut shapes);
+        let slope = |index: usize| slope(&shapes[index].factor, &place(index));
+        let slope = |index: usize| if options.slopes { slope(index) } else { DVec3::ZERO };
+        if let Some(index) =
+            (0..self.len()).into_par_iter().find_first(|&index| slope(index).abs().max_element() > LARGEST_SLOPE)
+        {
+            return Err(Error::Argument(format!(
+                "around sample {index} the values change by {:.3e} within a kernel, but 16 bits hold slopes up to \
+                 {LARGEST_SLOPE}; scale the values down, or leave the slopes out",
+                slope(index).length()
+            )));
+        }
+        let splat = |index: usize| {
+            let Shape { factor, weight } = &shapes[index];
+            let factor = factor.map(|term| term as f32);
+            Splat::sample(self.positions[index], self.values[index], factor, *weight as f32, slope(index).as_vec3())
+        };
+        let splats: Vec<Splat> = (0..self.len()).into_par_iter().map(splat).collect();
+        let overlap = overlap(&splats);
+        Ok(SplatSet { origin: self.origin, payload: Payload::Scalar, splats, extent: EXTENT, overlap })
+    }
+
+    /// The kernel of a sample, with its weight up to a common factor.
+    fn shape(&self, options: &SampleOptions, index: usize, place: Place, finest: f64) -> Shape {
+        let share = 1.0 / f64::from(place.samples);
+        let round = |deviation: f64| {
+            let b = deviation.clamp(finest, f64::from(f32::MAX) / 1e6);
+            [b, 0.0, b, 0.0, 0.0, b]
+        };
+        let radius = options.radius.or_else(|| {
+            let own = || self.radii.get(index).map(|&radius| f64::from(radius));
+            if self.covariances.is_empty() { own() } else { None }
+        });
+        let given = match radius {
+            Some(radius) => Some(round(radius / options.deviations)),
+            None => self.covariances.get(index).and_then(factor),
+        };
+        let Some(factor) = given else {
+            let deviation = if place.spacing > 0.0 { SPREAD * place.spacing } else { 0.5 };
+            return Shape { factor: round(deviation), weight: share };
+        };
+        // A single place has no room of its own, and needs no weight.
+        let room = if place.spacing > 0.0 { place.spacing.max(finest) } else { 1.0 };
+        let [b00, _, b11, _, _, b22] = factor;
+        Shape { factor, weight: share * (room / b00) * (room / b11) * (room / b22) }
+    }
+}
+
+impl SampleOptions {
+    fn validate(&self) -> Result<()> {
+        let wrong = |message: String| Err(Error::Argument(message));
+        if !(4..=MOST).contains(&self.neighbours) {
+            return wrong(format!("samples are judged by 4 to {MOST} neighbours, found {}", self.neighbours));
+        }
+        for (name, value) in [("a radius", self.radius.unwrap_or(1.0)), ("deviations", self.deviations)] {
+            if !(value > 0.0 && value.is_finite()) {
+                return wrong(format!("samples need {name} above 0, found {value}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The lower triangular B of Σ = B·Bᵀ, row by row (Cholesky); none where Σ is not positive definite in 32 bits.
+pub(super) fn factor(covariance: &[f32; 6]) -> Option<[f64; 6]> {
+    let [xx, xy, xz, yy, yz, zz] = covariance.map(f64::from);
+    let root = |left: f64, of: f64| (left > 1e-6 * of && left.is_finite()).then(|| left.sqrt());
+    let b00 = root(xx, 0.0)?;
+    let (b10, b20) = (xy / b00, xz / b00);
+    let b11 = root(yy - b10 * b10, yy)?;
+    let b21 = (yz - b20 * b10) / b11;
+    let b22 = root(zz - b20 * b20 - b21 * b21, zz)?;
+    let factor = [b00, b10, b11, b20, b21, b22];
+    factor.iter().all(|term| term.is_finite()).then_some(factor)
+}
+
+/// Brings the weights' median to 1 and all of them into their range.
+fn settle_weights(shapes: &mut [Shape]) {
+    let mut weights: Vec<f64> = shapes.iter().map(|shape| shape.weight).collect();
+    let middle = weights.len() / 2;
+    let median = *weights.select_nth_unstable_by(middle, f64::total_cmp).1;
+    shapes.par_iter_mut().for_each(|shape| shape.weight = (shape.weight / median).clamp(WEIGHTS[0], WEIGHTS[1]));
+}
+
+/// The slope in the kernel's whitened space, Bᵀ·g.
+fn slope([b00, b10, b11, b20, b21, b22]: &[f64; 6], place: &Place) -> DVec3 {
+    let g = place.gradient;
+    let slope = DVec3::new(b00 * g.x + b10 * g.y + b20 * g.z, b11 * g.y + b21 * g.z, b22 * g.z);
+    slope.clamp_length_max(LARGEST_RISE * place.width / f64::from(EXTENT))
+}
+
+/// What the weighted kernels add up to at the samples, on average over some of them spread through the list. All kernels
+/// are tried at each: those of very different sizes have no common neighbourhood to look in.
+fn overlap(splats: &[Splat]) -> f32 {
+    let tried = ((1 << 26) / splats.len()).clamp(16, 512).min(splats.len());
+    let sums = (0..tried).into_par_iter().map(|sample| {
+        let at = Vec3::from(splats[(sample as u64 * splats.len() as u64 / tried as u64) as usize].center);
+        splats.iter().map(|splat| weighted_kernel(splat, at)).sum::<f64>()
+    });
+    (sums.sum::<f64>() / tried as f64) as f32
+}
+
+/// Weight times kernel of a splat at a place, 0 beyond its extent.
+fn weighted_kernel(splat: &Splat, at: Vec3) -> f64 {
+    let d = at - Vec3::from(splat.center);
+    let [b00, b10, b11, b20, b21, b22] = splat.factor;
+    let x = d.x / b00;
+    // Most kernels are far away along the first axis alone.
+    if x.abs() > EXTENT {
+        return 0.0;
+    }
+    let y = (d.y - b10 * x) / b11;
+    let z = (d.z - b20 * x - b21 * y) / b22;
+    let squared = x * x + y * y + z * z;
+    if squared > EXTENT * EXTENT { 0.0 } else { f64::from(splat.weight_and_slope().0 * (-0.5 * squared).exp()) }
+}
