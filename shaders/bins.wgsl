@@ -26,8 +26,8 @@ struct Walk {
 // The part of a box that lies in a pass. What reaches in from sheets before the pass gets a window that starts one sheet
 // early: that sheet takes the splat's mass up to the pass and is not drawn.
 fn walk_of(box: Box, stage: Pass) -> Walk {
-    let first = max(box.sheets & 0xffffu, stage.first_collected - 1u);
-    let last = min(box.sheets >> 16u, stage.end_collected);
+    let first = max(box.sheets & 0xffffu, stage.first_sheet - 1u);
+    let last = min(box.sheets >> 16u, stage.end_sheet);
     return Walk(
         box.first_tile & 0xffffu,
         box.last_tile & 0xffffu,
@@ -40,7 +40,7 @@ fn walk_of(box: Box, stage: Pass) -> Walk {
 
 fn bin_of(column: u32, row: u32, window: u32, stage: Pass) -> u32 {
     let tile = (row - stage.first_row) * frame.tiles.x + column;
-    return tile * stage.groups + ((window - (stage.first_collected - 1u)) >> frame.group_shift);
+    return tile * stage.groups + ((window - (stage.first_sheet - 1u)) >> frame.group_shift);
 }
 
 // Windows of four sheets, each starting three after the one before (see march.wgsl), from a first sheet to a last one.
@@ -66,7 +66,7 @@ fn is_large(walk: Walk) -> bool {
 
 // The entry of a record's window.
 fn entry_of(box: Box, record: u32, walk: Walk, window: u32, stage: Pass) -> u32 {
-    let sheet = walk.first_window + 3u * window - (stage.first_collected - 1u);
+    let sheet = walk.first_window + 3u * window - (stage.first_sheet - 1u);
     let in_group = sheet & ((1u << frame.group_shift) - 1u);
     let continued = select(0u, ENTRY_CONTINUED, window > 0u);
     let isotropic = select(0u, ENTRY_ISOTROPIC, (box.first_tile & BOX_ISOTROPIC) != 0u);

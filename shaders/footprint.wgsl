@@ -19,6 +19,9 @@ struct Candidate {
     strength: f32,
     color: u32,
     normal: u32,
+    // Scalars: how much it counts, and the change of its value per world unit in view space.
+    weight: f32,
+    gradient: vec3<f32>,
 }
 
 // The tiles (inclusive) and sheets (inclusive) that a footprint meets.
@@ -113,12 +116,14 @@ fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
         bounds_y = vec2(c.y - reach_y, c.y + reach_y);
     }
     // A ray keeps a kernel whole, so near the rim of its footprint the sections reach beyond the ellipsoid.
-    let overreach = select(SECTION_OVERREACH, 1.0, (source.flags & ISOTROPIC) != 0u);
+    // A kernel from a table ends.
+    let ends = (source.flags & (ISOTROPIC | ENDS)) != 0u;
+    let overreach = select(SECTION_OVERREACH, 1.0, ends);
     far = distance + overreach * (far - distance);
     let near = distance - overreach * reach;
     let last_plane = planes[frame.sheet_count + 1u];
     // Written so that NaN fails.
-    if !(far > planes[1]) || !(near < last_plane) {
+    if !WHOLE && (!(far > planes[1]) || !(near < last_plane)) {
         return span;
     }
     // Pixels whose centres lie in the box, with a margin for rounding; clamped as floats, so that no infinity is cast.
@@ -133,9 +138,24 @@ fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
     let top = vec2<i32>(frame.tiles) - 1;
     span.first_tile = vec2<u32>(clamp((first - APRON + TILE_STEP) / TILE_STEP - 1, vec2(0), top));
     span.last_tile = vec2<u32>(clamp((last + APRON) / TILE_STEP, vec2(0), top));
+    span.visible = true;
+    if WHOLE {
+        // All of it belongs to the sheet of its centre.
+        var key = distance;
+        if AXIS_SHEETS {
+            key = dot(frame.sheet_normal.xyz, c);
+            key = select(key, abs(key), frame.perspective != 0u);
+        }
+        span.visible = key >= planes[1] && key < last_plane;
+        span.first_sheet = min(sheet_of(key), frame.sheet_count);
+        if BACK_TO_FRONT {
+            span.first_sheet = frame.sheet_count + 1u - span.first_sheet;
+        }
+        span.last_sheet = span.first_sheet;
+        return span;
+    }
     // Beside the eye, rays leave the kernel's middle behind them: the part in front of the first plane must be cut off.
     span.first_sheet = select(sheet_of(near), 0u, frame.perspective != 0u && distance < 2.0 * reach);
     span.last_sheet = max(sheet_of(far), 1u);
-    span.visible = true;
     return span;
 }

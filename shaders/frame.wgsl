@@ -32,18 +32,39 @@ struct Frame {
     surface_shade: vec4<f32>,
     // Standard deviation of the isotropic lattice kernel (world units), its inverse, its squared extent in sigmas.
     isotropic: vec4<f32>,
-    // First value, table entries per value, last table index, unused.
+    // First value, table entries per value, last table index; entries per gradient magnitude.
     transfer: vec4<f32>,
+    // The field's kernel: radius in kernel space, its inverse; one over what kernels add up to.
+    kernel: vec4<f32>,
+    // Axis-aligned sheets: their normal in view space.
+    sheet_normal: vec4<f32>,
+    // Columns of the turn from view space to the world's axes.
+    world_x: vec4<f32>,
+    world_y: vec4<f32>,
+    world_z: vec4<f32>,
+    // What is kept, and boxes that are cut out; around the eye, along the world's axes.
+    clips: array<Clip, 8>,
+    holes: array<Clip, 8>,
+    isosurfaces: array<Isosurface, 8>,
+}
+
+// A box from `low` to `high` if high.w is over 0, else the points x with low·x ≤ high.x.
+struct Clip {
+    low: vec4<f32>,
+    high: vec4<f32>,
+}
+
+struct Isosurface {
+    // Value, opacity, optical depth.
+    value: vec4<f32>,
+    color: vec4<f32>,
 }
 
 // One depth pass: sheets and rows of tiles. Written by plan.wgsl.
 struct Pass {
-    // Sheets that are composited: first … end-1.
+    // Sheets: first … end-1.
     first_sheet: u32,
     end_sheet: u32,
-    // Sheets that are collected, one more on either side where gradients need the neighbours.
-    first_collected: u32,
-    end_collected: u32,
     // Rows of tiles: first … end-1.
     first_row: u32,
     end_row: u32,
@@ -52,7 +73,7 @@ struct Pass {
     end_band: u32,
     // Groups of sheets per tile; 0 when there is no such pass.
     groups: u32,
-    unused: vec3<u32>,
+    unused: u32,
 }
 
 // One item's place in the view. Mirrors engine/uniforms.rs.
@@ -65,20 +86,24 @@ struct Source {
     // Lattices: the kernel's covariance in view space (xx, xy, xz, yy), (yz, zz), and the samples' size.
     covariance_a: vec4<f32>,
     covariance_b: vec4<f32>,
-    // Samples along x and y, first z of this chunk, type of the samples (see sample_value).
+    // Samples along x, y and z, type of the samples (see sample_value).
     lattice: vec4<u32>,
+    // First slice of this chunk; first and last slice that its data hold, which may be neighbours'; unused.
+    slices: vec4<u32>,
     // Radius of the footprint in standard deviations.
     extent: f32,
     // Number of candidates (splats; voxels before selection).
     count: u32,
     // First run of this chunk in the frame's list of runs.
     first_run: u32,
-    // Bit 0: radiance payload. Bit 1: isotropic lattice records.
+    // RADIANCE, ISOTROPIC, ENDS.
     flags: u32,
 }
 
 const RADIANCE: u32 = 1u;
 const ISOTROPIC: u32 = 2u;
+// The kernel ends at its extent along the ray too.
+const ENDS: u32 = 4u;
 
 // Candidates that one invocation handles in order, so that lists come out in the same order each time.
 const RUN: u32 = 16u;

@@ -1,4 +1,4 @@
-// Order: sorts each bin's entries, by sheet and then by record. Scatter fills bins in whatever order its invocations run;
+// Order: sorts each bin's entries, by sheet and then by record, or single splats by sheet and then by distance. Scatter fills bins in whatever order its invocations run;
 // with sorted bins the same input adds up in the same order, and draws the same bytes, each time.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -11,10 +11,27 @@
 @group(0) @binding(5) var<storage, read_write> long_count: atomic<u32>;
 // The workgroups of `order_long`.
 @group(1) @binding(0) var<storage, read_write> long_arguments: array<u32, 3>;
+@group(0) @binding(6) var<storage, read> records: array<vec4<f32>>;
 
 const SHORT: u32 = 256u;
 
 var<workgroup> shared_number: u32;
+
+fn distance_of(entry: u32) -> f32 {
+    let center = records[entry & ENTRY_RECORD].xyz;
+    let distance = select(center.z, length(center), PERSPECTIVE);
+    return select(distance, -distance, BACK_TO_FRONT);
+}
+
+fn goes_before(a: u32, b: u32) -> bool {
+    if SINGLE_SPLATS && (a >> ENTRY_SHEET_SHIFT) == (b >> ENTRY_SHEET_SHIFT) {
+        let of_a = distance_of(a);
+        let of_b = distance_of(b);
+        // Equally far ones keep the order of the scene, in either direction.
+        return of_a < of_b || (of_a == of_b && (a < b) != BACK_TO_FRONT);
+    }
+    return a < b;
+}
 
 fn bin_start(bin: u32) -> u32 {
     if bin == 0u {
@@ -43,7 +60,7 @@ fn order(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var i = start + 1u; i < end; i++) {
         let own = entries[i];
         var at = i;
-        while at > start && entries[at - 1u] > own {
+        while at > start && goes_before(own, entries[at - 1u]) {
             entries[at] = entries[at - 1u];
             at--;
         }
@@ -96,7 +113,7 @@ fn sort_bin(start: u32, end: u32, lane: u32) {
                 if high < count {
                     let a = entries[start + low];
                     let b = entries[start + high];
-                    if a > b {
+                    if goes_before(b, a) {
                         entries[start + low] = b;
                         entries[start + high] = a;
                     }

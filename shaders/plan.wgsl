@@ -96,21 +96,16 @@ fn is_room(need: vec2<u32>) -> bool {
     return need.x <= frame.entry_capacity && need.y <= frame.record_capacity;
 }
 
-fn collected(first: u32, end: u32) -> vec2<u32> {
-    return vec2(max(first, 1u + MARGIN) - MARGIN, min(end + MARGIN, frame.sheet_count + 1u));
-}
-
 fn emit(first: u32, end: u32, first_band: u32, end_band: u32) {
     if report.passes >= MAX_PASSES {
         report.overflow = 1u;
         return;
     }
-    let range = collected(first, end);
-    let groups = ((range.y - range.x + 1u) >> frame.group_shift) + 1u;
+    let groups = ((end - first + 1u) >> frame.group_shift) + 1u;
     let first_row = band_start(first_band);
     let end_row = band_start(end_band);
     passes[report.passes].stage =
-        Pass(first, end, range.x, range.y, first_row, end_row, first_band, end_band, groups, vec3(0u));
+        Pass(first, end, first_row, end_row, first_band, end_band, groups, 0u);
     report.passes += 1u;
 }
 
@@ -131,18 +126,10 @@ fn plan() {
     // One walk over the sheets: the driver of a software adapter ends long loops (see docs/engine.md).
     var first = 1u;
     while first < end {
-        let first_collected = collected(first, end).x;
-        var need = open_at(first_collected, BANDS);
-        for (var sheet = first_collected; sheet < first + MARGIN; sheet++) {
-            need = saturating_add(need, starting_in(sheet, BANDS));
-        }
+        var need = open_at(first, BANDS);
         var last = first;
         while last < end {
-            // Collecting up to the margin behind `last`, which the last sheets lack.
-            var more = need;
-            if last + MARGIN < end {
-                more = saturating_add(need, starting_in(last + MARGIN, BANDS));
-            }
+            let more = saturating_add(need, starting_in(last, BANDS));
             if !is_room(more) {
                 break;
             }
@@ -161,12 +148,7 @@ fn plan() {
 
 // What one band of a single sheet needs.
 fn needed_in_band(sheet: u32, band: u32) -> vec2<u32> {
-    let range = collected(sheet, sheet + 1u);
-    var need = open_at(range.x, band);
-    for (var own = range.x; own < range.y; own++) {
-        need = saturating_add(need, starting_in(own, band));
-    }
-    return need;
+    return saturating_add(open_at(sheet, band), starting_in(sheet, band));
 }
 
 // A sheet that is too much for one pass, in as many bands together as fit.

@@ -61,7 +61,23 @@ fn write_general(at: u32, splat: Candidate) {
     records[at] = vec4(splat.center, splat.strength);
     records[at + 1u] = vec4(i00, i10, i20, i11);
     records[at + 2u] = vec4(i21, i22, extent2, 0.0);
-    records[at + 3u] = vec4(bitcast<f32>(splat.color), bitcast<f32>(splat.normal), 0.0, 0.0);
+    var payload = vec4(bitcast<f32>(splat.color), bitcast<f32>(splat.normal), 0.0, splat.weight);
+    if (source.flags & RADIANCE) == 0u {
+        if SAMPLE_NORMALS {
+            let size = length(splat.gradient);
+            payload.y = bitcast<f32>(NO_NORMAL);
+            if size > 1e-20 {
+                payload.y = bitcast<f32>(encode_normal(splat.gradient / size));
+            }
+        } else if CLASSIFIED {
+            payload.y = bitcast<f32>(NO_NORMAL);
+        } else if SLOPES {
+            // Lᵀ·g: the slope in whitened space.
+            let g = splat.gradient;
+            payload = vec4(l00 * g.x + l10 * g.y + l20 * g.z, l11 * g.y + l21 * g.z, l22 * g.z, splat.weight);
+        }
+    }
+    records[at + 3u] = payload;
 }
 
 @compute @workgroup_size(64)

@@ -37,6 +37,16 @@ fn candidate(index: u32) -> Candidate {
     splat.strength = a.w;
     splat.color = bitcast<u32>(d.z);
     splat.normal = bitcast<u32>(d.w);
+    if SAMPLES && (source.flags & RADIANCE) == 0u {
+        // The slope is in the splat's own whitened space: B⁻ᵀ takes it to the set's.
+        let low = unpack2x16float(splat.color);
+        let high = unpack2x16float(splat.normal);
+        splat.weight = low.x;
+        let z = high.y / d.y;
+        let y = (high.x - d.x * z) / b.z;
+        let x = (low.y - b.y * y - b.w * z) / b.x;
+        splat.gradient = to_view * vec3(x, y, z);
+    }
     if (source.flags & RADIANCE) != 0u {
         splat.strength = splat.strength * f32(splat.color >> 24u) / 255.0;
         if splat.normal != NO_NORMAL {

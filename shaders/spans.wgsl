@@ -23,6 +23,6 @@ fn in_pass(span: u32, stage: Pass) -> bool {
     let last_sheet = (span >> 12u) & 0xfffu;
     let first_band = (span >> 24u) & 0xfu;
     let last_band = span >> 28u;
-    return span != NO_SPAN && first_sheet < stage.end_collected && last_sheet >= stage.first_collected
+    return span != NO_SPAN && first_sheet < stage.end_sheet && last_sheet >= stage.first_sheet
         && first_band < stage.end_band && last_band >= stage.first_band;
 }

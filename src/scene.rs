@@ -2,11 +2,11 @@
 
 use crate::{
     Error, Result,
-    math::{Bounds, Kernel, Sheets, View},
+    math::{Bounds, Kernel, Profile, Sheets, View},
     splat::{FOOTPRINT_BLUR, Payload, SplatSet},
-    volume::{Shade, TransferFunction, Volume},
+    volume::{Arrangement, Lattice, Shade, TransferFunction, Volume},
 };
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
 /// One thing in a scene.
@@ -81,7 +81,7 @@ impl Scene {
                 }
             }
         }
-        let before = settings.mode != Mode::Sheets || settings.classification == Classification::Pre;
+        let before = settings.classifies_samples();
         for item in &self.items {
             match item {
                 Item::Radiance(_) if settings.optics == Optics::Maximum => {
@@ -91,6 +91,10 @@ impl Scene {
                 }
                 Item::Radiance(_) => {}
                 Item::Volume(volume, kernel, _) => {
+                    let is_gaussian = matches!(kernel.profile, Profile::Gaussian(_));
+                    if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_)) && !is_gaussian {
+                        return wrong("a rectilinear volume takes a Gaussian kernel".into());
+                    }
                     if let Some(coefficients) = &volume.coefficients {
                         if before {
                             return wrong(
@@ -167,6 +171,9 @@ impl Scene {
     /// most four), a few pixels for surfaces, the finer of both where the scene holds both.
     pub fn sheets(&self, view: &View, settings: &Settings) -> Sheets {
         let bounds = self.bounds();
+        if settings.mode == Mode::AxisSheets {
+            return self.axis_sheets(view, settings, &bounds);
+        }
         let [mut near, mut far] = view.distances(&bounds);
         // Widened footprints reach beyond the bounds: a flat surface seen from the front would lie in sheets far thinner
         // than itself.
@@ -193,6 +200,59 @@ impl Scene {
     }
 }
 
+/// The planes of axis-aligned sheets.
+impl Scene {
+    /// Axis-aligned sheets: slices of the data, each in the middle of a sheet; without a lattice, as thick as sheets of the
+    /// picture would be in the middle of the scene. Distances are counted along their normal.
+    fn axis_sheets(&self, view: &View, settings: &Settings, bounds: &Bounds) -> Sheets {
+        let normal = self.sheet_normal(view);
+        let keys = bounds.corners().map(|corner| normal.dot(view.to_view(corner)));
+        let [mut near, mut far] =
+            keys.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &key| [low.min(key), high.max(key)]);
+        if view.perspective {
+            // Both sides of the eye count from it.
+            (near, far) = (near.max(-far).max(0.0), far.max(-near));
+        }
+        let slices = self.lattice().map(|lattice| {
+            let along = |step: DVec3| normal.dot(view.rotation * (lattice.axes * step)).abs();
+            // The axis that is not in the sheets.
+            let distance = [DVec3::X, DVec3::Y, DVec3::Z].map(along).into_iter().fold(0.0, f64::max);
+            let share = match &lattice.arrangement {
+                Arrangement::Cartesian => 1.0,
+                Arrangement::BodyCentred => 0.5,
+                Arrangement::Rectilinear(_) => (lattice.spacing() / lattice.edges()).max_element(),
+            };
+            (normal.dot(view.to_view(lattice.position(lattice.step_range()[0]))), distance * share)
+        });
+        let (start, thickness) = slices.unwrap_or_else(|| {
+            let middle = if view.perspective { view.to_view(bounds.center()).length() } else { 1.0 };
+            (near, settings.sheet_thickness.unwrap_or(settings.sheet_pixels * middle / view.scale))
+        });
+        let thickness = thickness.max((far - near) / Sheets::MAX as f64);
+        let first = ((near - start) / thickness - 0.5).floor();
+        Sheets::new(view, [start + (first + 0.5) * thickness, far], Some(thickness), None)
+    }
+
+    /// The lattice of the scene's volume.
+    fn lattice(&self) -> Option<&Lattice> {
+        self.items.iter().find_map(|item| match item {
+            Item::Volume(volume, ..) => Some(&volume.lattice),
+            _ => None,
+        })
+    }
+
+    /// The normal of axis-aligned sheets in view space, away from the eye: of the planes of two axes of the data (of the
+    /// world, without a lattice) that face the view most.
+    pub(crate) fn sheet_normal(&self, view: &View) -> DVec3 {
+        let axes = self.lattice().map_or(DMat3::IDENTITY, |lattice| lattice.axes);
+        let normals = (view.rotation * axes).inverse().transpose();
+        let normals = [normals.x_axis, normals.y_axis, normals.z_axis].map(DVec3::normalize);
+        let first = if normals[1].z.abs() > normals[0].z.abs() { 1 } else { 0 };
+        let nearest = if normals[2].z.abs() > normals[first].z.abs() { 2 } else { first };
+        normals[nearest] * normals[nearest].z.signum()
+    }
+}
+
 impl Item {
     /// The box around the item, footprints included.
     pub fn bounds(&self) -> Bounds {
@@ -201,7 +261,7 @@ impl Item {
             Self::Volume(volume, kernel, _) => {
                 let axes = volume.lattice.axes;
                 let unit = volume.lattice.largest_unit();
-                let axes = axes * glam::DMat3::from_diagonal(unit);
+                let axes = axes * DMat3::from_diagonal(unit);
                 let reach =
                     kernel.extent * DVec3::new(axes.row(0).length(), axes.row(1).length(), axes.row(2).length());
                 let [low, high] = volume.bounds();
@@ -212,7 +272,7 @@ impl Item {
 }
 
 /// What is composited.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Mode {
     /// Image-aligned sheets (Mueller & Crawfis 1998): sheets parallel to the picture cut every kernel into sections.
     #[default]
@@ -226,7 +286,7 @@ pub enum Mode {
 }
 
 /// The order in which single splats are composited; the picture is the same.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Order {
     #[default]
     FrontToBack,
@@ -234,7 +294,7 @@ pub enum Order {
 }
 
 /// When a field's values become colour and opacity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Classification {
     /// Everywhere along the ray inside a sheet: the values at its two faces and its mean make a parabola, and the transfer
     /// function is integrated over it. Thin shells keep their look in thick sheets.
@@ -247,7 +307,7 @@ pub enum Classification {
 }
 
 /// What a ray makes of a field.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Optics {
     /// Emission and absorption (Max 1995).
     #[default]
@@ -329,6 +389,11 @@ impl Settings {
             sheet_pixels: 8.0,
             near: None,
         }
+    }
+
+    /// Whether samples are classified before they are added: asked for, or because whole splats are composited.
+    pub fn classifies_samples(&self) -> bool {
+        self.mode != Mode::Sheets || self.classification == Classification::Pre
     }
 
     /// The light on a volume that `transfer` shows.

@@ -112,6 +112,12 @@ impl SplatSet {
     /// The widest footprint that the engine takes, in standard deviations.
     pub const MAX_EXTENT: f32 = 8.0;
 
+    /// The smallest and the largest value of a set of scalars.
+    pub fn value_range(&self) -> [f64; 2] {
+        let values = self.splats.iter().map(|splat| f64::from(splat.strength));
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+    }
+
     /// The box around all footprints, in world coordinates.
     pub fn bounds(&self) -> Bounds {
         let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);

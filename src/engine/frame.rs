@@ -12,14 +12,15 @@ use super::{
     scatter::Scatter,
     select::Select,
     shaders::Variant,
-    uniforms::{Frame, PASS_BYTES, PASS_STRIDE, Report},
+    tables::Tables,
+    uniforms::{self, Frame, PASS_BYTES, PASS_STRIDE, Report},
     upload::{Origin, PreparedScene, upload},
 };
 use crate::{
     Error, Result,
-    math::{Sheets, View},
-    scene::{Gradient, Item, Settings},
-    volume::TransferFunction,
+    math::{Profile, Sheets, View},
+    scene::{Gradient, Item, Optics, Settings},
+    volume::Arrangement,
 };
 use wgpu::{BufferUsages as Usage, util::DeviceExt};
 
@@ -60,47 +61,69 @@ impl Budget {
 const MOST_BINS: u32 = 1 << 21;
 /// Groups hold at most this many sheets (7 bits in an entry).
 const MOST_GROUP_SHIFT: u32 = 7;
-/// Entries of the transfer table: fine enough that a piecewise-linear function of 16-bit data keeps its corners.
-const TABLE: usize = 4096;
-
 /// Which light and which sources a picture has decides what is compiled.
 pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Settings, budget: Budget) -> Variant {
     let mut variant = Variant {
         perspective: view.perspective,
+        mode: settings.mode,
+        classification: settings.classification,
+        optics: settings.optics,
         scalar: false,
+        classified: false,
         lattice: false,
+        body_centred: false,
+        rectilinear: false,
         radiance: false,
         isotropic: false,
+        table_kernel: false,
         volume_shaded: false,
         surface_shaded: false,
+        gradient_opacity: false,
+        isosurfaces: 0,
+        clips: 0,
+        holes: 0,
         central: false,
         // A software adapter runs eight invocations at once: eight columns of eight pixels fill a tile.
         rows: if gpu.is_software() { 8 } else { 1 },
         most_entries: budget.tile_entries.unwrap_or(if gpu.is_software() { SOFTWARE_ENTRIES } else { u32::MAX }),
     };
+    [variant.clips, variant.holes] = uniforms::clip_counts(settings);
+    let classified = settings.classifies_samples();
+    // Light is seen in emission alone.
+    let is_lit = settings.optics == Optics::EmissionAbsorption;
     for item in &prepared.scene.items {
-        match item {
+        let transfer = match item {
             Item::Radiance(_) => {
                 variant.radiance = true;
-                variant.surface_shaded |= settings.surface_shade.is_some();
+                variant.surface_shaded |= is_lit && settings.surface_shade.is_some();
+                continue;
             }
-            Item::Scalar(_, transfer) => {
-                variant.scalar = true;
-                variant.volume_shaded = settings.shade_of(transfer).is_some();
-            }
-            Item::Volume(volume, kernel, transfer) => {
-                variant.scalar = true;
-                variant.lattice = true;
-                variant.volume_shaded = settings.shade_of(transfer).is_some();
-                let spacing = volume.lattice.spacing().max_element();
-                let near = view.distances(&item.bounds())[0];
-                // The sections of a kernel shift by ρ²σ²/2|c| between its centre and radius ρσ.
-                let flat = !view.perspective || near > ISOTROPIC_DISTANCE * kernel.extent * spacing;
-                variant.isotropic = flat && is_isotropic(volume.lattice.axes);
-            }
+            Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) => transfer,
+        };
+        let shaded = is_lit && settings.shade_of(transfer).is_some();
+        if classified {
+            variant.classified = true;
+            variant.surface_shaded |= shaded;
+        } else {
+            variant.scalar = true;
+            variant.volume_shaded = shaded;
+            variant.gradient_opacity = !transfer.gradient.is_empty() && settings.optics != Optics::Maximum;
+            variant.isosurfaces = if is_lit { transfer.isosurfaces.len() as u32 } else { 0 };
+        }
+        if let Item::Volume(volume, kernel, _) = item {
+            variant.lattice = true;
+            variant.body_centred = volume.lattice.arrangement == Arrangement::BodyCentred;
+            variant.rectilinear = matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_));
+            variant.table_kernel = !matches!(kernel.profile, Profile::Gaussian(_));
+            let spacing = volume.lattice.spacing().max_element();
+            let near = view.distances(&item.bounds())[0];
+            // The sections of a kernel shift by ρ²σ²/2|c| between its centre and radius ρσ.
+            let flat = !view.perspective || near > ISOTROPIC_DISTANCE * kernel.extent * spacing;
+            let alike = !variant.rectilinear && !variant.table_kernel && is_isotropic(volume.lattice.axes);
+            variant.isotropic = flat && alike && !classified;
         }
     }
-    variant.central = variant.volume_shaded && settings.gradient == Gradient::Central;
+    variant.central = variant.gradients() && settings.gradient == Gradient::Central;
     variant
 }
 
@@ -151,7 +174,7 @@ impl Pipelines {
 pub struct Targets {
     pub frame: wgpu::Buffer,
     pub planes: wgpu::Buffer,
-    pub transfer: wgpu::Buffer,
+    pub tables: wgpu::Buffer,
     pub needs: wgpu::Buffer,
     pub totals: wgpu::Buffer,
     pub census: wgpu::Buffer,
@@ -207,10 +230,9 @@ impl Targets {
 
     /// Bytes of GPU memory.
     pub fn bytes(&self) -> u64 {
-        let Self { frame, planes, transfer, needs, totals, census, passes, report, run_count, runs, records, .. } =
-            self;
+        let Self { frame, planes, tables, needs, totals, census, passes, report, run_count, runs, records, .. } = self;
         let Self { boxes, bins, entries, long_bins, long_count, colors, depths, .. } = self;
-        [frame, planes, transfer, needs, totals, census, passes, report, run_count, runs, records]
+        [frame, planes, tables, needs, totals, census, passes, report, run_count, runs, records]
             .into_iter()
             .chain([boxes, bins, entries, long_bins, long_count, colors, depths])
             .map(wgpu::Buffer::size)
@@ -284,7 +306,7 @@ pub fn targets(
     frame.group_shift = group_shift;
     frame.entry_capacity = budget.entries;
     frame.record_capacity = budget.record_words;
-    let table = transfer_table(prepared, &mut frame);
+    let table = tables_of(prepared, &mut frame);
 
     // The sheet before the first reaches back, the one after the last forward, without end.
     let mut planes = vec![-3e38f32];
@@ -303,7 +325,7 @@ pub fn targets(
     Ok(Targets {
         frame: uniform("frame", bytemuck::bytes_of(&frame)),
         planes: upload(gpu, "planes", bytemuck::cast_slice(&planes)),
-        transfer: upload(gpu, "transfer", bytemuck::cast_slice(&table)),
+        tables: upload(gpu, "tables", bytemuck::cast_slice(&table)),
         run_count: uniform("run count", bytemuck::bytes_of(&[prepared.runs, 0, 0, 0])),
         needs: pool.take(gpu, "needs", 8 * runs),
         totals: pool.take(gpu, "totals", 12),
@@ -331,25 +353,17 @@ pub fn targets(
     })
 }
 
-/// The scene's transfer function as a table over the values that occur.
-fn transfer_table(prepared: &PreparedScene, frame: &mut Frame) -> Vec<[f32; 4]> {
-    let shown: Option<(&TransferFunction, [f64; 2])> = prepared.scene.items.iter().find_map(|item| match item {
+/// The tables of the scene's field; a frame without one gets some of no meaning.
+fn tables_of(prepared: &PreparedScene, frame: &mut Frame) -> Vec<[f32; 4]> {
+    let field = prepared.scene.items.iter().find_map(|item| match item {
         Item::Radiance(_) => None,
-        Item::Scalar(set, transfer) => {
-            let values = set.splats.iter().map(|s| f64::from(s.strength));
-            let range = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
-            Some((transfer, range))
-        }
-        Item::Volume(volume, _, transfer) => Some((transfer, volume.range)),
+        Item::Scalar(set, transfer) => Some((transfer, set.value_range(), None)),
+        Item::Volume(volume, kernel, transfer) => Some((transfer, volume.range, Some(kernel))),
     });
-    let Some((transfer, [low, high])) = shown else { return vec![[0.0; 4]; 2] };
-    // One more than the last index reads, for the interpolation at the upper end.
-    let mut table = transfer.table([low, high], TABLE);
-    table.push(table[TABLE - 1]);
-    let last = (TABLE - 1) as f64;
-    let per_value = if high > low { last / (high - low) } else { 0.0 };
-    frame.transfer = [low as f32, per_value as f32, last as f32, 0.0];
-    table
+    let Some((transfer, range, kernel)) = field else { return vec![[0.0; 4]; 2] };
+    let tables = Tables::new(transfer, range, kernel);
+    frame.transfer = tables.transfer;
+    tables.entries
 }
 
 /// One step of a frame, for profiles.

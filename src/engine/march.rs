@@ -14,7 +14,16 @@ pub struct March(Stage);
 impl March {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
         use Binding::{Read, Uniform, Write};
-        let sources = [&variant.constants(), shaders::FRAME, shaders::NORMAL, shaders::MARCH];
+        let sources = [
+            &variant.constants(),
+            shaders::FRAME,
+            shaders::NORMAL,
+            shaders::TABLES,
+            shaders::PIXEL,
+            shaders::KERNELS,
+            shaders::SHEET,
+            shaders::MARCH,
+        ];
         let bindings = [Uniform, Read, Uniform, Read, Read, Read, Read, Write, Write, Write];
         Self(Stage::new(gpu, "march", &sources, "march", &[&bindings]))
     }
@@ -27,7 +36,7 @@ impl March {
             targets.records.as_entire_buffer_binding(),
             targets.bins.as_entire_buffer_binding(),
             targets.entries.as_entire_buffer_binding(),
-            targets.transfer.as_entire_buffer_binding(),
+            targets.tables.as_entire_buffer_binding(),
             targets.colors.as_entire_buffer_binding(),
             targets.depths.as_entire_buffer_binding(),
             targets.progress.as_entire_buffer_binding(),

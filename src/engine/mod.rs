@@ -30,6 +30,7 @@ mod select;
 mod shaders;
 mod source;
 mod stage;
+mod tables;
 mod uniforms;
 mod upload;
 

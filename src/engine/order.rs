@@ -19,7 +19,7 @@ impl Order {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
         use Binding::{Read, Uniform, Write};
         let constants = variant.constants();
-        let bindings = [Uniform, Uniform, Read, Write, Write, Write];
+        let bindings = [Uniform, Uniform, Read, Write, Write, Write, Read];
         let stage = |label, entry, arguments: &[&[Binding]]| {
             let groups = [&[bindings.as_slice()], arguments].concat();
             Stage::new(gpu, label, &[&constants, shaders::FRAME, shaders::ORDER], entry, &groups)
@@ -40,6 +40,7 @@ impl Order {
             targets.entries.as_entire_buffer_binding(),
             targets.long_bins.as_entire_buffer_binding(),
             targets.long_count.as_entire_buffer_binding(),
+            targets.records.as_entire_buffer_binding(),
         ];
         self.short.dispatch(encoder, &[&self.short.bind(gpu, 0, &buffers)], targets.bin_count.div_ceil(64));
         let arguments = self.count_long.bind(gpu, 1, &[targets.long_arguments.as_entire_buffer_binding()]);

@@ -13,7 +13,7 @@ use crate::{
     Error, Result,
     math::{Camera, View},
     picture::Picture,
-    scene::{Scene, Settings},
+    scene::{Optics, Scene, Settings},
 };
 use std::{collections::HashMap, time::Instant};
 
@@ -80,7 +80,7 @@ impl Renderer {
         let mut stats = FrameStats::default();
         for strip in self.strips(&camera.view(settings.size)?) {
             let (targets, own) = self.draw_frame(prepared, &strip, settings, false)?;
-            self.read(&targets, &strip, &mut picture)?;
+            self.read(&targets, &strip, settings, &mut picture)?;
             stats.add(own);
         }
         Ok((picture, stats))
@@ -137,6 +137,7 @@ impl Renderer {
         profile: bool,
     ) -> Result<(Targets, FrameStats)> {
         let gpu = &self.gpu;
+        prepared.scene.validate_settings(settings)?;
         let _span = tracing::debug_span!("frame", width = view.size[0], height = view.size[1]).entered();
         let variant = frame::variant(gpu, prepared, view, settings, self.budget);
         let sheets = prepared.scene.sheets(view, settings);
@@ -183,7 +184,7 @@ impl Renderer {
     }
 
     /// Appends the rows of a strip to a picture.
-    fn read(&self, targets: &Targets, view: &View, picture: &mut Picture) -> Result<()> {
+    fn read(&self, targets: &Targets, view: &View, settings: &Settings, picture: &mut Picture) -> Result<()> {
         let pixels = view.size[0] as usize * view.size[1] as usize;
         let color: Vec<[f32; 4]> =
             bytemuck::pod_collect_to_vec(&read_buffer(&self.gpu, &targets.colors, 0, 16 * pixels as u64)?);
@@ -191,7 +192,8 @@ impl Renderer {
             bytemuck::pod_collect_to_vec(&read_buffer(&self.gpu, &targets.depths, 0, 4 * pixels as u64)?);
         let width = view.size[0] as usize;
         picture.depth.extend((0..pixels).map(|i| {
-            if color[i][3] < 0.5 {
+            // The largest value has no place of its own.
+            if color[i][3] < 0.5 || settings.optics == Optics::Maximum {
                 return f32::INFINITY;
             }
             let at = glam::DVec2::new((i % width) as f64 + 0.5, (i / width) as f64 + 0.5);

@@ -1,5 +1,8 @@
 //! The shader files, and the constants that a picture's variant puts before them.
 
+use super::tables;
+use crate::scene::{Classification, Mode, Optics, Order};
+
 pub const FRAME: &str = include_str!("../../shaders/frame.wgsl");
 pub const NORMAL: &str = include_str!("../../shaders/normal.wgsl");
 pub const SAMPLE: &str = include_str!("../../shaders/sample.wgsl");
@@ -18,6 +21,10 @@ pub const SCAN: &str = include_str!("../../shaders/scan.wgsl");
 pub const SCATTER: &str = include_str!("../../shaders/scatter.wgsl");
 pub const LARGE: &str = include_str!("../../shaders/large.wgsl");
 pub const ORDER: &str = include_str!("../../shaders/order.wgsl");
+pub const TABLES: &str = include_str!("../../shaders/tables.wgsl");
+pub const PIXEL: &str = include_str!("../../shaders/pixel.wgsl");
+pub const KERNELS: &str = include_str!("../../shaders/kernels.wgsl");
+pub const SHEET: &str = include_str!("../../shaders/sheet.wgsl");
 pub const MARCH: &str = include_str!("../../shaders/march.wgsl");
 
 /// What a picture needs of the shaders. Each combination is compiled when it first occurs; what it does not need (the
@@ -25,14 +32,28 @@ pub const MARCH: &str = include_str!("../../shaders/march.wgsl");
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Variant {
     pub perspective: bool,
-    /// The scene holds scalars; they come from a lattice.
+    pub mode: Mode,
+    pub classification: Classification,
+    pub optics: Optics,
+    /// The scene holds scalars, classified after interpolation (or before).
     pub scalar: bool,
+    pub classified: bool,
+    /// Where the scalars come from: a lattice, of one of these kinds, or scattered samples.
     pub lattice: bool,
+    pub body_centred: bool,
+    pub rectilinear: bool,
     pub radiance: bool,
     /// Lattice samples are drawn with sections that do not depend on the pixel.
     pub isotropic: bool,
+    /// The field's kernel has no closed form.
+    pub table_kernel: bool,
     pub volume_shaded: bool,
     pub surface_shaded: bool,
+    pub gradient_opacity: bool,
+    pub isosurfaces: u32,
+    /// Convex parts that the scene is cut to, and boxes that are cut out.
+    pub clips: u32,
+    pub holes: u32,
     /// Gradients from neighbouring pixels.
     pub central: bool,
     /// Pixels per invocation of march, one below the other: 1, 2, 4 or 8.
@@ -41,48 +62,77 @@ pub struct Variant {
     pub most_entries: u32,
 }
 
+/// Parts of a sheet in which the transfer function is integrated. Figures are in docs/engine.md.
+const PARTS: u32 = 4;
+
 impl Variant {
     /// Pixels that a tile is wide and high, without the edge that it shares with its neighbours.
     pub fn tile_step(&self) -> u32 {
         8 - 2 * u32::from(self.central)
     }
 
-    /// Whether a sheet is shaded only when the one behind it is known.
-    pub fn waits(&self) -> bool {
-        self.scalar && self.volume_shaded
+    /// Whether a field's gradient is looked at.
+    pub fn gradients(&self) -> bool {
+        self.scalar && (self.volume_shaded || self.gradient_opacity)
     }
 
     /// The constants, as WGSL.
     pub fn constants(&self) -> String {
-        let Self {
-            perspective,
-            scalar,
-            lattice,
-            radiance,
-            isotropic,
-            volume_shaded,
-            surface_shaded,
-            central,
-            rows,
-            most_entries,
-        } = *self;
-        let general = radiance || !isotropic;
-        let waiting = u32::from(self.waits());
-        format!(
-            "const PERSPECTIVE: bool = {perspective};\nconst SCALAR: bool = {scalar};\n\
-             const LATTICE: bool = {lattice};\nconst RADIANCE_PAYLOAD: bool = {radiance};\n\
-             const ISOTROPIC_RECORDS: bool = {isotropic};\nconst GENERAL_RECORDS: bool = {general};\n\
-             const VOLUME_SHADED: bool = {volume_shaded};\nconst SURFACE_SHADED: bool = {surface_shaded};\n\
-             const CENTRAL: bool = {central};\nconst APRON: i32 = {apron};\nconst TILE_STEP: i32 = {step};\n\
-             const WAITING: u32 = {waiting}u;\nconst MARGIN: u32 = {waiting}u;\n\
-             const MAX_PASSES: u32 = {passes}u;\n\
-             const MOST_ENTRIES: u32 = {most_entries}u;\nconst LONGEST_RUN: u32 = {longest_run}u;\n\
-             const ROWS: u32 = {rows}u;\nconst LANE_ROWS: u32 = {lanes}u;\n",
-            apron = i32::from(central),
-            step = self.tile_step(),
-            lanes = 8 / rows,
-            longest_run = most_entries.saturating_mul(4),
-            passes = super::plan::MAX_PASSES,
-        )
+        let whole = self.mode != Mode::Sheets;
+        let single = matches!(self.mode, Mode::Splats(_));
+        let post = self.classification == Classification::Post;
+        let maximum = self.optics == Optics::Maximum;
+        let parabola = self.scalar && (!post || self.isosurfaces > 0);
+        let parts = if parabola { PARTS } else { 1 };
+        let radiance = self.radiance || self.classified;
+        let samples = (self.scalar || self.classified) && !self.lattice;
+        let flags = [
+            ("PERSPECTIVE", self.perspective),
+            ("SCALAR", self.scalar),
+            ("CLASSIFIED", self.classified),
+            ("LATTICE", self.lattice),
+            ("BODY_CENTRED", self.body_centred),
+            ("RECTILINEAR", self.rectilinear),
+            ("SAMPLES", samples),
+            ("SLOPES", self.scalar && (samples || self.rectilinear)),
+            ("SAMPLE_NORMALS", self.classified && self.surface_shaded),
+            ("RADIANCE_PAYLOAD", radiance),
+            ("ISOTROPIC_RECORDS", self.isotropic),
+            ("GENERAL_RECORDS", radiance || !self.isotropic),
+            ("TABLE_KERNEL", self.table_kernel),
+            ("VOLUME_SHADED", self.volume_shaded),
+            ("SURFACE_SHADED", self.surface_shaded),
+            ("GRADIENT_OPACITY", self.gradient_opacity),
+            ("GRADIENTS", self.gradients()),
+            ("CENTRAL", self.central),
+            ("WHOLE", whole),
+            ("AXIS_SHEETS", self.mode == Mode::AxisSheets),
+            ("SINGLE_SPLATS", single),
+            ("BACK_TO_FRONT", self.mode == Mode::Splats(Order::BackToFront)),
+            ("POST", post),
+            ("PARABOLA", parabola),
+            ("MAXIMUM", maximum),
+            ("XRAY", self.optics == Optics::XRay),
+        ];
+        // What closing a sheet takes of the iterations that a driver allows, in entries (see docs/engine.md).
+        let closing = (2 + self.rows * parts * (1 + self.isosurfaces) * (1 + self.holes)).div_ceil(6);
+        let counts = [
+            ("ISOSURFACES", self.isosurfaces),
+            ("PARTS", parts),
+            ("CLIPS", self.clips),
+            ("HOLES", self.holes),
+            ("HOLES_OR_ONE", self.holes.max(1)),
+            ("MAX_PASSES", super::plan::MAX_PASSES),
+            ("MOST_ENTRIES", self.most_entries),
+            ("LONGEST_RUN", self.most_entries.saturating_mul(4)),
+            ("CLOSING_ENTRIES", closing),
+            ("ROWS", self.rows),
+            ("LANE_ROWS", 8 / self.rows),
+        ];
+        let flags = flags.map(|(name, value)| format!("const {name}: bool = {value};\n")).concat();
+        let counts = counts.map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).concat();
+        let apron = i32::from(self.central);
+        let step = self.tile_step();
+        format!("{flags}{counts}const APRON: i32 = {apron};\nconst TILE_STEP: i32 = {step};\n{}", tables::constants())
     }
 }

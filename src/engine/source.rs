@@ -18,7 +18,10 @@ pub struct Sources<T> {
 pub fn per_source(make: impl Fn(&str, &[Binding]) -> Stage) -> Sources<Stage> {
     use Binding::{Read, Uniform};
     let lattice = [shaders::SAMPLE, shaders::SOURCE_LATTICE].concat();
-    Sources { splats: make(shaders::SOURCE_SPLATS, &[Uniform, Read]), lattice: make(&lattice, &[Uniform, Read, Read]) }
+    Sources {
+        splats: make(shaders::SOURCE_SPLATS, &[Uniform, Read]),
+        lattice: make(&lattice, &[Uniform, Read, Read, Uniform]),
+    }
 }
 
 impl Sources<Stage> {
@@ -37,8 +40,8 @@ impl Sources<Stage> {
                 let workgroups = chunk.count.div_ceil(WORKGROUP_CANDIDATES);
                 self.splats.dispatch(encoder, &[&groups[0], &groups[1]], workgroups);
             }
-            Origin::Lattice { selection, .. } => {
-                let own = [&chunk.uniform, &chunk.data, &selection.selected];
+            Origin::Lattice { selection, places, .. } => {
+                let own = [&chunk.uniform, &chunk.data, &selection.selected, places];
                 let own = own.map(|b| b.as_entire_buffer_binding());
                 let groups = [self.lattice.bind(gpu, 0, buffers), self.lattice.bind(gpu, 1, &own)];
                 // The number of selected samples is known on the GPU alone.

@@ -1,10 +1,10 @@
 //! The structures that Rust writes and shaders read, field by field as in shaders/frame.wgsl.
 
 use crate::{
-    math::{Sheets, View},
-    scene::{Item, Scene, Settings},
+    math::{Bounds, Kernel, Profile, Sheets, View},
+    scene::{Clip, ClipShape, Item, Mode, Scene, Settings},
     splat::SplatSet,
-    volume::{Lattice, Shade},
+    volume::{Arrangement, Isosurface, Lattice, Shade, TransferFunction},
 };
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec2, DVec3};
@@ -34,8 +34,14 @@ pub struct Frame {
     pub surface_shade: [f32; 4],
     pub isotropic: [f32; 4],
     pub transfer: [f32; 4],
+    pub kernel: [f32; 4],
+    pub sheet_normal: [f32; 4],
+    pub world: [[f32; 4]; 3],
+    pub clips: [[[f32; 4]; 2]; Settings::MAX_CLIPS],
+    pub holes: [[[f32; 4]; 2]; Settings::MAX_CLIPS],
+    pub isosurfaces: [[[f32; 4]; 2]; TransferFunction::MAX_ISOSURFACES],
 }
-const _: () = assert!(size_of::<Frame>() == 64 + 10 * 16);
+const _: () = assert!(size_of::<Frame>() == 64 + (15 + 3 * 16) * 16);
 
 /// `Source` in frame.wgsl.
 #[repr(C)]
@@ -45,17 +51,18 @@ pub struct Source {
     pub origin: [f32; 4],
     pub covariance: [[f32; 4]; 2],
     pub lattice: [u32; 4],
+    pub slices: [u32; 4],
     pub extent: f32,
     pub count: u32,
     pub first_run: u32,
     pub flags: u32,
 }
-const _: () = assert!(size_of::<Source>() == 8 * 16);
+const _: () = assert!(size_of::<Source>() == 9 * 16);
 
 /// Bytes between the passes that plan.wgsl writes: the alignment of uniform bindings.
 pub const PASS_STRIDE: u64 = 256;
 /// Bytes of `Pass` in frame.wgsl.
-pub const PASS_BYTES: u64 = 64;
+pub const PASS_BYTES: u64 = 32;
 
 /// `Report` in plan.wgsl.
 #[repr(C)]
@@ -70,6 +77,7 @@ pub struct Report {
 /// `Source::flags`.
 pub const RADIANCE: u32 = 1;
 pub const ISOTROPIC: u32 = 2;
+pub const ENDS: u32 = 4;
 
 fn wide(v: DVec3, w: f32) -> [f32; 4] {
     [v.x as f32, v.y as f32, v.z as f32, w]
@@ -95,20 +103,22 @@ impl Source {
         }
     }
 
-    /// A chunk of a lattice; `sigma` and `extent` of the kernel in sample spacings.
-    pub fn of_lattice(view: &View, lattice: &Lattice, sigma: f64, extent: f64, isotropic: bool) -> Self {
+    /// A chunk of a lattice whose samples have a kernel. Rectilinear coordinates count from the first sample.
+    pub fn of_lattice(view: &View, lattice: &Lattice, kernel: &Kernel, isotropic: bool) -> Self {
         let axes = view.rotation * lattice.axes;
-        let c = sigma * sigma * (axes * axes.transpose());
+        let own = axes * DMat3::from_diagonal(lattice.unit([0; 3]) * kernel.unit());
+        let c = own * own.transpose();
         let covariance = [
             [c.x_axis.x, c.x_axis.y, c.x_axis.z, c.y_axis.y].map(|v| v as f32),
-            [c.y_axis.z, c.z_axis.z, 0.0, 0.0].map(|v| v as f32),
+            [c.y_axis.z, c.z_axis.z, 0.0, kernel.unit()].map(|v| v as f32),
         ];
+        let is_gaussian = matches!(kernel.profile, Profile::Gaussian(_));
         Self {
             axes: columns(axes),
-            origin: wide(view.to_view(lattice.origin), 0.0),
+            origin: wide(view.to_view(lattice.position(lattice.step_range()[0])), 0.0),
             covariance,
-            extent: (extent / sigma) as f32,
-            flags: if isotropic { ISOTROPIC } else { 0 },
+            extent: kernel.radius() as f32,
+            flags: if isotropic { ISOTROPIC } else { 0 } | if is_gaussian { 0 } else { ENDS },
             ..Self::default()
         }
     }
@@ -139,19 +149,36 @@ impl Frame {
             surface_shade: shade(settings.surface_shade),
             ..Self::default()
         };
+        if settings.mode == Mode::AxisSheets {
+            frame.sheet_normal = wide(scene.sheet_normal(view), 0.0);
+        }
         for item in &scene.items {
-            match item {
-                Item::Radiance(_) => {}
-                Item::Scalar(_, transfer) => frame.volume_shade = shade(settings.shade_of(transfer)),
-                Item::Volume(volume, kernel, transfer) => {
-                    frame.volume_shade = shade(settings.shade_of(transfer));
-                    frame.set_field(view, &volume.lattice);
-                    let sigma = kernel.unit() * volume.lattice.axes.x_axis.length();
-                    let extent = kernel.radius();
-                    frame.isotropic = [sigma as f32, (1.0 / sigma) as f32, (extent * extent) as f32, 0.0];
+            let transfer = match item {
+                Item::Radiance(_) => continue,
+                Item::Scalar(set, transfer) => {
+                    frame.kernel[2] = 1.0 / set.overlap;
+                    transfer
                 }
+                Item::Volume(volume, kernel, transfer) => {
+                    frame.set_field(view, &volume.lattice);
+                    frame.set_kernel(&volume.lattice, kernel);
+                    transfer
+                }
+            };
+            frame.kernel[3] = transfer.unit as f32;
+            frame.volume_shade = shade(settings.shade_of(transfer));
+            if settings.classifies_samples() {
+                frame.surface_shade = frame.volume_shade;
+            }
+            let mut surfaces = transfer.isosurfaces.clone();
+            surfaces.sort_by(|a, b| a.value.total_cmp(&b.value));
+            for (own, surface) in frame.isosurfaces.iter_mut().zip(surfaces) {
+                let Isosurface { value, color: [red, green, blue], opacity } = surface;
+                let depth = -(1.0 - opacity).max(1e-9).ln();
+                *own = [[value, opacity, depth, 0.0], [red, green, blue, 0.0]].map(|part| part.map(|v| v as f32));
             }
         }
+        frame.set_clips(view, settings);
         frame
     }
 
@@ -159,12 +186,57 @@ impl Frame {
         let inverse = (view.rotation * lattice.axes).inverse();
         let rows = inverse.transpose();
         self.field_axes = columns(rows);
-        self.field_origin = wide(-(inverse * view.to_view(lattice.origin)), 0.0);
+        // Counted from the first sample, as far as 32-bit numbers go.
+        let [low, high] = lattice.step_range();
+        self.field_origin = wide(-(inverse * view.to_view(lattice.position(low))), 0.0);
         // A lattice of one sample across still fills its cell.
-        let last = lattice.dims.map(|n| n as f64 - 1.0);
-        let flat = |n: f64| if n > 0.0 { 0.0 } else { 0.5 };
-        let margin = DVec3::from(last.map(flat));
+        let unit = lattice.unit([0; 3]);
+        let margin = DVec3::select((high - low).cmpgt(DVec3::ZERO), DVec3::ZERO, 0.5 * unit);
         self.field_low = wide(-margin, 0.0);
-        self.field_high = wide(DVec3::from(last) + margin, 0.0);
+        self.field_high = wide(high - low + margin, 0.0);
     }
+
+    fn set_kernel(&mut self, lattice: &Lattice, kernel: &Kernel) {
+        let unit = lattice.unit([0; 3]);
+        let sigma = kernel.unit() * unit.x * lattice.axes.x_axis.length();
+        let radius = kernel.radius();
+        self.isotropic = [sigma, 1.0 / sigma, radius * radius, 0.0].map(|v| v as f32);
+        // A cell of the body-centred lattice holds two samples.
+        let overlap = match lattice.arrangement {
+            Arrangement::BodyCentred => kernel.integral() * (unit.x * unit.y * unit.z) / 0.5,
+            _ => kernel.integral(),
+        };
+        let length = kernel.extent / kernel.unit();
+        self.kernel = [length, 1.0 / length, 1.0 / overlap, 0.0].map(|v| v as f32);
+    }
+
+    /// The clips around the eye, along the world's axes: half-spaces and boxes that are kept, boxes that are cut out.
+    fn set_clips(&mut self, view: &View, settings: &Settings) {
+        self.world = columns(view.rotation.transpose());
+        let (mut clips, mut holes) = (self.clips.iter_mut(), self.holes.iter_mut());
+        for clip in &settings.clips {
+            let (slot, parts) = match clip.shape {
+                ClipShape::HalfSpace { normal, offset } => {
+                    // The complement of a half-space is another one.
+                    let size = if clip.inside { normal.length() } else { -normal.length() };
+                    let offset = (offset - normal.dot(view.position)) / size;
+                    (clips.next(), [wide(normal / size, 0.0), [offset as f32, 0.0, 0.0, 0.0]])
+                }
+                ClipShape::Box(Bounds { min, max }) => {
+                    let slot = if clip.inside { clips.next() } else { holes.next() };
+                    (slot, [wide(min - view.position, 0.0), wide(max - view.position, 1.0)])
+                }
+            };
+            if let Some(slot) = slot {
+                *slot = parts;
+            }
+        }
+    }
+}
+
+/// How many convex parts clips keep, and how many boxes they cut out.
+pub fn clip_counts(settings: &Settings) -> [u32; 2] {
+    let is_hole = |clip: &&Clip| !clip.inside && matches!(clip.shape, ClipShape::Box(_));
+    let holes = settings.clips.iter().filter(is_hole).count();
+    [(settings.clips.len() - holes) as u32, holes as u32]
 }

@@ -1,16 +1,12 @@
 //! A scene on the GPU: every item cut into chunks that fit a binding.
 
-use super::{
-    Gpu,
-    select::Selection,
-    uniforms::{ISOTROPIC, RADIANCE, Source},
-};
+use super::{Gpu, select::Selection, uniforms::Source};
 use crate::{
     Error, Result,
     math::{Kernel, View},
     scene::{Item, Scene},
     splat::{Splat, SplatSet},
-    volume::{Samples, TransferFunction, Volume},
+    volume::{Arrangement, Lattice, Samples, TransferFunction, Volume},
 };
 use std::sync::Arc;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
@@ -22,11 +18,29 @@ pub const WORKGROUP_CANDIDATES: u32 = 64 * RUN;
 /// Voxels of a chunk at most, so that a list of all of them, and their number, fit a binding of 128 MiB.
 const CHUNK_VOXELS: u64 = (1 << 25) - 1;
 
+/// Slices of the neighbouring chunks that a chunk's data hold, for gradients: layers of one kind of a body-centred lattice
+/// lie two apart.
+const NEIGHBOURS: usize = 2;
+
+/// Coordinates of a rectilinear lattice: what fits the smallest uniform binding that WebGPU promises.
+const MOST_PLACES: usize = 8192;
+
 /// What the candidates of a chunk are made from.
 #[derive(Debug)]
 pub enum Origin {
-    Splats { set: Arc<SplatSet>, radiance: bool },
-    Lattice { volume: Arc<Volume>, kernel: Kernel, first_slice: u32, selection: Selection },
+    Splats {
+        set: Arc<SplatSet>,
+        radiance: bool,
+    },
+    Lattice {
+        volume: Arc<Volume>,
+        kernel: Kernel,
+        /// First slice of the chunk; first and last slice that its data hold.
+        slices: [u32; 3],
+        selection: Selection,
+        /// Coordinates along the axes (`places` in source_lattice.wgsl).
+        places: wgpu::Buffer,
+    },
 }
 
 /// A part of an item that fits a binding.
@@ -92,37 +106,44 @@ impl PreparedScene {
     }
 
     fn add_volume(&mut self, gpu: &Gpu, volume: &Arc<Volume>, kernel: Kernel) -> Result<()> {
-        let [width, height, depth] = volume.lattice.dims;
+        let lattice = volume.drawn_lattice();
+        let [width, height, depth] = lattice.dims;
         let slice = (width * height) as u64;
-        let bytes = volume.samples.sample_bytes() as u64;
+        let bytes = volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
         let voxels = CHUNK_VOXELS.min(gpu.binding_size() / bytes.max(4));
-        let slices = (voxels / slice) as usize;
+        let slices = (voxels / slice).saturating_sub(2 * NEIGHBOURS as u64) as usize;
         if slices == 0 {
             return Err(Error::Argument(format!(
-                "one slice of the volume holds {slice} samples, more than the {voxels} that fit a binding of {}",
+                "a few slices of the volume hold {slice} samples each, more than the {voxels} that fit a binding of {}",
                 gpu.info.name
             )));
         }
+        let places = places(gpu, lattice)?;
         let ranges = volume.drawn_ranges(&kernel);
         for first in (0..depth).step_by(slices) {
-            let part = first * slice as usize..(first + slices).min(depth) * slice as usize;
-            let selection = Selection::new(gpu, &ranges[part.clone()]);
+            let end = (first + slices).min(depth);
+            let held = first.saturating_sub(NEIGHBOURS)..(end + NEIGHBOURS).min(depth);
+            let in_slices = |slices: std::ops::Range<usize>| slices.start * slice as usize..slices.end * slice as usize;
+            let own = in_slices(first..end);
+            let selection = Selection::new(gpu, &ranges[own.clone()]);
             self.bytes += selection.bytes();
             let origin = Origin::Lattice {
                 volume: volume.clone(),
                 kernel: kernel.clone(),
-                first_slice: first as u32,
+                slices: [first, held.start, held.end - 1].map(|slice| slice as u32),
                 selection,
+                places: places.clone(),
             };
-            let count = part.len() as u32;
-            let bytes = match &volume.samples {
-                Samples::U8(v) => bytemuck::cast_slice(&v[part]),
-                Samples::U16(v) => bytemuck::cast_slice(&v[part]),
-                Samples::I16(v) => bytemuck::cast_slice(&v[part]),
-                Samples::I32(v) => bytemuck::cast_slice(&v[part]),
-                Samples::F32(v) => bytemuck::cast_slice(&v[part]),
+            let part = in_slices(held);
+            let bytes = match (&volume.coefficients, &volume.samples) {
+                (Some(coefficients), _) => bytemuck::cast_slice(&coefficients.values[part]),
+                (None, Samples::U8(v)) => bytemuck::cast_slice(&v[part]),
+                (None, Samples::U16(v)) => bytemuck::cast_slice(&v[part]),
+                (None, Samples::I16(v)) => bytemuck::cast_slice(&v[part]),
+                (None, Samples::I32(v)) => bytemuck::cast_slice(&v[part]),
+                (None, Samples::F32(v)) => bytemuck::cast_slice(&v[part]),
             };
-            self.add_chunk(gpu, origin, bytes, count);
+            self.add_chunk(gpu, origin, bytes, own.len() as u32);
         }
         Ok(())
     }
@@ -142,24 +163,48 @@ impl Chunk {
     pub fn source(&self, view: &View, isotropic: bool) -> Source {
         let source = match &self.origin {
             Origin::Splats { set, radiance } => Source::of_splats(view, set, *radiance),
-            Origin::Lattice { volume, kernel, first_slice, .. } => {
-                let [width, height, _] = volume.lattice.dims.map(|n| n as u32);
-                let kind = match volume.samples {
-                    Samples::U8(_) => 0,
-                    Samples::U16(_) => 1,
-                    Samples::I16(_) => 2,
-                    Samples::I32(_) => 3,
-                    Samples::F32(_) => 4,
+            Origin::Lattice { volume, kernel, slices: [first, low, high], .. } => {
+                let lattice = volume.drawn_lattice();
+                let [width, height, depth] = lattice.dims.map(|n| n as u32);
+                let kind = match (&volume.coefficients, &volume.samples) {
+                    (Some(_), _) | (None, Samples::F32(_)) => 4,
+                    (None, Samples::U8(_)) => 0,
+                    (None, Samples::U16(_)) => 1,
+                    (None, Samples::I16(_)) => 2,
+                    (None, Samples::I32(_)) => 3,
                 };
                 Source {
-                    lattice: [width, height, *first_slice, kind],
-                    ..Source::of_lattice(view, &volume.lattice, kernel.unit(), kernel.extent, isotropic)
+                    lattice: [width, height, depth, kind],
+                    slices: [*first, *low, *high, 0],
+                    ..Source::of_lattice(view, lattice, kernel, isotropic)
                 }
             }
         };
-        debug_assert!(source.flags & (RADIANCE | ISOTROPIC) == source.flags);
         Source { count: self.count, first_run: self.first_run, ..source }
     }
+}
+
+/// The coordinate and the unit of every sample along x, then y, then z, from the first sample; nothing but on rectilinear
+/// lattices.
+fn places(gpu: &Gpu, lattice: &Lattice) -> Result<wgpu::Buffer> {
+    let mut places = vec![[0.0f32; 2]; MOST_PLACES];
+    if let Arrangement::Rectilinear(coordinates) = &lattice.arrangement {
+        let count: usize = lattice.dims.iter().sum();
+        if count > MOST_PLACES {
+            return Err(Error::Argument(format!(
+                "the rectilinear volume has {count} coordinates along its axes, more than {MOST_PLACES}"
+            )));
+        }
+        let each = (0..3).flat_map(|axis| (0..lattice.dims[axis]).map(move |at| (axis, at)));
+        for (place, (axis, at)) in places.iter_mut().zip(each) {
+            let mut index = [0; 3];
+            index[axis] = at;
+            *place = [coordinates[axis][at] - coordinates[axis][0], lattice.unit(index)[axis]].map(|v| v as f32);
+        }
+    }
+    let usage = wgpu::BufferUsages::UNIFORM;
+    let contents = bytemuck::cast_slice(&places);
+    Ok(gpu.device.create_buffer_init(&BufferInitDescriptor { label: Some("places"), contents, usage }))
 }
 
 /// A read-only storage buffer of some bytes, padded to whole words.

@@ -23,14 +23,23 @@ impl Medium {
     }
 }
 
-/// The sheets passed so far, front to back.
+/// A part of a sheet that grows evenly by optical depth.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Step {
+    /// Infinite at an opaque surface.
+    pub depth: f64,
+    /// The distances along the ray between which it lies.
+    pub span: [f64; 2],
+}
+
+/// What a ray has passed so far, front to back.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Composite {
     /// Colour multiplied by opacity.
     pub color: DVec3,
     pub opacity: f64,
     /// Optical depth passed.
-    depth: f64,
+    pub depth: f64,
     /// Distance along the ray at which half of the light is taken; infinite until then.
     pub half: f64,
 }
@@ -38,18 +47,27 @@ pub(super) struct Composite {
 impl Composite {
     pub const EMPTY: Self = Self { color: DVec3::ZERO, opacity: 0.0, depth: 0.0, half: f64::INFINITY };
 
-    /// Passes the next sheet, which lies between the distances `from` and `to`.
-    pub fn pass(&mut self, medium: Medium, [from, to]: [f64; 2]) {
+    /// Passes a medium that grows evenly between two distances.
+    pub fn pass(&mut self, medium: Medium, span: [f64; 2]) {
+        self.pass_in_steps(medium, &[Step { depth: medium.depth, span }]);
+    }
+
+    /// Passes a medium that grows by these steps.
+    pub fn pass_in_steps(&mut self, medium: Medium, steps: &[Step]) {
         let alpha = -(-medium.depth).exp_m1();
         let light = 1.0 - self.opacity;
         self.color += light * alpha * medium.color;
         self.opacity += light * alpha;
         let half = std::f64::consts::LN_2;
-        let after = self.depth + medium.depth;
-        if self.depth < half && after >= half {
-            self.half = from + (half - self.depth) / medium.depth * (to - from);
+        let mut before = self.depth;
+        for Step { depth, span: [from, to] } in steps {
+            let after = before + depth;
+            if before < half && after >= half {
+                self.half = from + (half - before) / depth * (to - from);
+            }
+            before = after;
         }
-        self.depth = after;
+        self.depth += medium.depth;
     }
 }
 

@@ -1,143 +1,223 @@
 //! The reference: what a splatkit picture is, in plain double precision on the CPU.
 //!
-//! The engine must draw these pictures; it shares no code with this module beyond the scene, the view, the list of sheets
-//! and the transfer function. Everything is brute force, pixel by pixel over all kernels, for pictures of some
-//! thousand pixels and kernels.
+//! The engine must draw these pictures; it shares no code with this module beyond the scene, the view, the list of sheets,
+//! the kernels' values and the transfer function. Everything is brute force, pixel by pixel over all kernels, for pictures
+//! of some thousand pixels and kernels. [`integrate`] is the same field without sheets, as truth for them.
 //!
 //! # The picture
-//! **Rays.** The ray of the pixel in column i and row j passes through (i + ½, j + ½): the points a + s·b̂ in view space
-//! (x right, y down, z forward), with |b̂| = 1. Sheet k is the part with planes\[k\] ≤ s < planes\[k + 1\].
+//! **Rays.** The ray of the pixel in column i and row j passes through (i + ½, j + ½): the points x(s) = a + s·b̂ in view
+//! space (x right, y down, z forward), with |b̂| = 1. Sheet k is the part with planes\[k\] ≤ s < planes\[k + 1\]; the planes
+//! are its faces.
 //!
-//! **Kernels.** Each is a Gaussian exp(−xᵀΣ⁻¹x/2) around its centre c. A splat has Σ = B·Bᵀ, turned into view space and
-//! widened by (0.35 pixel)² in every direction, so that it cannot fall between the pixels' rays; a pixel is |c|/f at the
-//! centre's distance (perspective, f the focal length in pixels) or one over the pixels per world unit (orthographic). A
-//! lattice sample has Σ = σ²·A·Aᵀ, A the steps between the samples, and is not widened.
+//! **Kernels** (Westover 1990). Each is a radial function h(|x′|) over kernel space x′ = M·(x − c), c its centre, and M = B⁻¹.
 //!
-//! **Sections** (Zwicker et al. 2001 integrate the whole kernel; here it is cut by the sheets, as in Mueller and Crawfis
-//! 1998). With M such that Σ⁻¹ = MᵀM, α = M(a − c) and β = M·b̂, the ray passes the centre at ρ = |α × β|/|β| standard
-//! deviations. Where ρ is over the kernel's extent, the ray misses the footprint. Otherwise the kernel along the ray is
-//! exp(−ρ²/2) times a Gaussian of standard deviation 1/|β| about s* = −α·β/|β|², of which sheet k holds the share
-//! Φ(|β|(planes\[k + 1\] − s*)) − Φ(|β|(planes\[k\] − s*)). It is not cut along the ray.
+//! - A splat has the Gaussian h(r) = exp(−r²/2) and its own factor B, turned into view space; Σ = B·Bᵀ is widened by
+//!   (0.35 pixel)² in every direction, so that the splat cannot fall between the pixels' rays. A pixel is |c|/f at the
+//!   centre's distance (perspective, f the focal length in pixels) or one over the pixels per world unit (orthographic).
+//! - A sample of a lattice has the profile of its volume's kernel and B = A·U·u: A the steps of the lattice, U the sample's
+//!   unit in steps, u the kernel's. It is not widened. Samples are those of `drawn_lattice` with the values `drawn_value`:
+//!   the volume's own, or the coefficients that make it sharp.
 //!
-//! **Radiance.** A splat adds the optical depth τ = strength · opacity · exp(−ρ²/2) · share. In a sheet the optical depths
-//! add, colours and normals are averaged by them, and the average is lit once where some splat has a normal.
+//! A ray passes the centre at ρ in kernel space, closest at the distance s*. Where ρ is over the radius of the footprint, the
+//! ray misses the kernel. A Gaussian is not cut along the ray; all other profiles are 0 beyond their extent.
 //!
-//! **Fields.** A sample adds the section s = √(2π)·exp(−ρ²/2)·share/|β|, a length. A sheet's value is f̄ = Σ f·s / Σ s;
-//! it has none where Σ s is under a ten-thousandth of its thickness. The value is classified after this interpolation:
-//! optical depth = extinction(f̄) · ℓ, with ℓ the length of the ray inside both the sheet and the box of the samples
-//! (for a lattice; an axis of one sample counts ± ½ of its step), or Σ s but at most the sheet's thickness (for scattered
-//! samples).
+//! **Samples** carry f + g·(x − c) and count w times. On Cartesian and body-centred lattices w = 1 and g = 0. On
+//! rectilinear ones w = 1, and g is the gradient by differences of the neighbouring samples: along each axis, with the
+//! distances d± to them, ((f₊ − f)·d₋/d₊ + (f − f₋)·d₊/d₋)/(d₋ + d₊), one-sided at the border and 0 along an axis of one
+//! sample. Scattered samples have their own w and slope, which is g in kernel space as it is before splats are widened
+//! (Franke & Nielson 1980: nodal functions blended by weights). A flat one, whose slope has no meaning in space, has g = 0.
 //!
-//! **Gradients.** Along the ray, the difference of the neighbouring sheets' values over the distance of their middles.
-//! Across it, in pixels, either the derivative of f̄ with the shares held fixed, where ∂ exp(−ρ²/2) = −exp(−ρ²/2)·½∂(ρ²)
-//! and ½∂(ρ²) = (α + s*β) · M(∂a + s*·∂b̂), or the difference of f̄ between neighbouring pixels. Differences are one-sided
-//! where a neighbour has no value, 0 where both have none. The gradient g is what has these derivatives at the middle s of
-//! the sheet: g·∂(a + s·b̂) across, g·b̂ along.
+//! # Sheets ([`Mode::Sheets`])
+//! Kernels are cut at the faces, as by Mueller & Crawfis (1998), and the field is classified after interpolation (Mueller,
+//! Möller & Crawfis 1999), inside the sheets.
 //!
-//! **Light.** Blinn and Phong's model with the light at the eye, on both sides; colours clamped to 1.
+//! **Means and faces.** Over a sheet W = Σ w·∫h ds and V = Σ w·∫(f + g·(x − c))·h ds. Its mean is f̄ = V/W; it has none, and
+//! holds no field, where W ≤ 10⁻⁴ of its thickness. At a face P = Σ w·h and Q = Σ w·(f + g·(x − c))·h, the value is
+//! Q/P; none where P ≤ 10⁻⁴. A face without a value takes f̄. The gradient at a face is that of Q/P in space,
+//! (∇Q − (Q/P)·∇P)/P, derived without regard to the footprints' rims. With central differences its parts across the picture
+//! are instead half the difference of the face's values in the neighbouring pixels: one-sided where a neighbour has none, 0
+//! where neither has one. A face without a value has no gradient.
 //!
-//! **Compositing.** In a sheet the optical depths of surface and field add and their colours mix by them. Front to back,
-//! with α = 1 − exp(−τ): C += (1 − A)·α·c, A += (1 − A)·α. The depth is where the optical depth passes ln 2, which grows
-//! evenly inside a sheet, as view-space z.
+//! **Values.** u counts from 0 at the front face to 1 at the back. [`Classification::PreIntegrated`]: f(u) is the parabola with
+//! the faces' values and the mean f̄. [`Classification::Post`]: f̄. The gradient g(u) is linear between the faces'; that of
+//! one where the other has none, and 0 where both have none.
+//!
+//! **Parts.** Field is in that part of the sheet which lies in the box of the samples (of the volume's lattice, not of the drawn
+//! one; an axis on which all lie at one place counts half a kernel unit to either side; scattered samples have no box) and in what
+//! the clips leave. Each piece of it is divided in four equal parts. (In one where f(u) = f̄ and no isosurfaces are to be met.)
+//! In a part from f(u_a) = a to f(u_b) = b, of length ℓ, all values between count alike (Engel et al. 2001):
+//! extinction κ̄ = ∫κ df/(b − a) and colour ∫κ·c df/∫κ df; for a = b, and in Post with f̄, those of the value. κ̄ is multiplied by the
+//! gradient factor of |g| in the part's middle (Levoy 1988), and for scattered samples by min(1, W/thickness). Then
+//! α = 1 − exp(−κ̄·ℓ).
+//!
+//! **Isosurfaces.** A part meets each surface of value v with (a < v) ≠ (b < v) at its share (v − a)/(b − a), the nearest
+//! first, equal ones in the order of the list. (a and b are the parabola's in Post too.) The shares of the part's optical depth
+//! before, between and behind surfaces count there, all with the part's colour and middle. A surface holds back its opacity, and
+//! is lit by g where it is met.
+//!
+//! **In a sheet,** front to back from t = 1: parts add t·α to A, with their colour c and middle u_m; surfaces add t·opacity·(lit
+//! colour) to S; t is multiplied by 1 − α or 1 − opacity. The mean colour of the parts is lit once, by g at the mean of u_m,
+//! both weighted by t·α. The field's colour is (A·c̄ + S)/(1 − t), its optical depth −ln max(t, 10⁻⁹).
+//!
+//! **Radiance.** A splat adds the optical depth τ = strength · opacity · exp(−ρ²/2) · share, the share being that of a sheet in the
+//! Gaussian along the ray (Zwicker et al. 2001 take the whole kernel). In a sheet the optical depths add. Colours and normals
+//! are averaged by them and by how much splats face the eye, 0.5 − 4·n·ĉ kept in 1/255 … 1, and the average is lit once where some
+//! splat has a normal. Sheets of less than 10⁻⁵ have none. Splats whose closest approach s* is clipped away do not count.
+//!
+//! **Compositing.** The optical depths of surface and field add, and their colours mix by them. Front to back, with
+//! α = 1 − exp(−τ): C += (1 − A)·α·c, A += (1 − A)·α. The depth, a view-space z, is where the optical depth passes ln 2. It
+//! grows evenly in a sheet with radiance; in others evenly in each part, and at once at an isosurface.
+//!
+//! **Light** is that of Blinn and Phong with the light at the eye, on both sides; colours clamped to 1. What is lit by a gradient
+//! of 0 has its ambient and diffuse parts whole.
+//!
+//! # Other ways
+//! **Optics.** The above is emission and absorption (Max 1995). [`Optics::XRay`]: the same optical depths, without isosurfaces; all
+//! colours are white and unlit. [`Optics::Maximum`]: the colour and the opacity, as it stands, of the largest f(u) at the ends of all
+//! parts of the ray; nothing without any. It has no depth.
+//!
+//! **Samples classified before** ([`Classification::Pre`], and always in the modes that follow) are radiance (Westover 1989):
+//! colour c(f) and, over a part of the ray, the optical depth κ(f)·w/o·∫h ds, with o what the kernels sum to on average.
+//! On a lattice that is ∫h over kernel space (body-centred: · 2^(−3/2)/½, unit over cell); scattered sets know theirs. Slopes do not
+//! count. Where the field is lit a sample has a normal: against the gradient g as on a rectilinear lattice (body-centred: to the next
+//! samples of the same cubic lattice; scattered: its own), none where that is 0. One shade lights the whole picture, the
+//! field's. There is no box. Kernels with negative lobes can take light back within a sheet; colours are kept in 0 … 1.
+//!
+//! **[`Mode::AxisSheets`]** (Westover 1990). n is a unit vector across two of the lattice's axes (of the world's without a
+//! lattice): of the three the one with the largest |n_z|, turned so that n_z > 0. Sheets are counted along n·c (perspective:
+//! |n·c|). A kernel's whole line adds to the sheet that its centre lies in. A face is met at the distance key/|n·b̂|
+//! (orthographic: (key − n·a)/(n·b̂)).
+//!
+//! **[`Mode::Splats`]** (Westover 1989). Whole kernels are composited one by one, each lit alone, in the order of |c|
+//! (orthographic: of c_z), then of the scene. Nearer ones than `near` are left out, and such of no or negative optical depth. The
+//! depth is at the s* of a kernel. In both modes, perspective views leave out what has its s* behind the eye.
 
+mod classify;
+mod clip;
 mod composite;
+mod face;
+mod field;
+mod gather;
+mod images;
 mod kernel;
+mod profile;
+mod quadrature;
 mod ray;
-mod section;
 mod shade;
 mod sheet;
+mod truth;
+mod whole;
 
 #[cfg(test)]
 mod tests;
 
+pub use truth::integrate;
+
+#[cfg(doc)]
+use crate::scene::Classification;
 use crate::{
     Result,
     math::{Camera, View},
     picture::Picture,
-    scene::{Gradient, Item, Scene, Settings},
-    volume::{Lattice, Shade, TransferFunction},
+    scene::{self, Clip, Gradient, Item, Mode, Optics, Scene, Settings},
+    volume::{Lattice, Shade},
 };
+use classify::Classifier;
 use composite::{Composite, Medium};
+use field::Field;
+use gather::Before;
 use glam::{DVec2, DVec3};
 use kernel::Kernel;
 use ray::Ray;
 use rayon::prelude::*;
-use sheet::{Sheet, slope};
+use sheet::Light;
 
 /// Draws a scene by the definition above: premultiplied colour, and depth. Rows are drawn in parallel; time is
 /// proportional to pixels times kernels.
 ///
 /// # Errors
-/// What [`Scene::validate`] and [`Camera::view`] find.
+/// What [`Scene::validate`], [`Scene::validate_settings`] and [`Camera::view`] find.
 pub fn render(scene: &Scene, camera: &Camera, settings: &Settings) -> Result<Picture> {
     scene.validate()?;
-    let view = camera.view(settings.size)?;
-    let frame = Frame::new(scene, view, settings);
-    let [width, height] = settings.size;
-    let rows: Vec<Vec<Composite>> = (0..height).into_par_iter().map(|row| frame.row(row)).collect();
+    scene.validate_settings(settings)?;
+    let frame = Frame::new(scene, camera.view(settings.size)?, settings);
+    let rows = (0..settings.size[1]).into_par_iter().map(|row| frame.row(row.into())).collect();
+    Ok(picture(&frame.view, rows))
+}
+
+/// The picture of what the rays of all rows have passed.
+fn picture(view: &View, rows: Vec<Vec<Composite>>) -> Picture {
+    let [width, height] = view.size;
     let mut picture = Picture { width, height, color: Vec::new(), depth: Vec::new() };
     for (row, composites) in rows.iter().enumerate() {
         for (column, composite) in composites.iter().enumerate() {
             picture.color.push(composite.color.extend(composite.opacity).as_vec4().to_array());
-            let ray = frame.ray(column as i64, row as i64);
             // An infinite distance along a ray parallel to the picture would give no number.
+            let ray = Ray::new(view, DVec2::new(column as f64, row as f64) + 0.5);
             let half = composite.half;
             picture.depth.push(if half.is_finite() { ray.point(half).z as f32 } else { f32::INFINITY });
         }
     }
-    Ok(picture)
+    picture
 }
 
-/// The scalar field of a scene.
-struct Field<'a> {
-    transfer: &'a TransferFunction,
-    /// Where the samples lie; none for scattered ones.
-    lattice: Option<&'a Lattice>,
-    shade: Option<Shade>,
+/// The nearest distance that is shown: perspective views have one.
+fn nearest(scene: &Scene, view: &View, settings: &Settings) -> f64 {
+    let usual = || 1e-3 * scene.bounds().diagonal();
+    if view.perspective { settings.near.unwrap_or_else(usual) } else { f64::NEG_INFINITY }
 }
 
-impl Field<'_> {
-    /// A length of one value as the transfer function shows it.
-    fn classify(&self, value: f64, length: f64, ray: &Ray, gradient: impl FnOnce() -> DVec3) -> Medium {
-        let color = DVec3::from(self.transfer.color(value));
-        let color = match &self.shade {
-            Some(shade) => shade::lit(color, gradient(), ray.direction, shade),
-            None => color,
-        };
-        Medium { depth: self.transfer.extinction(value) * length, color }
-    }
-}
-
-/// Optical depths below this are left out: they cannot be seen, and 32-bit sums of sections leave such remainders.
+/// Sheets of less optical depth than this are left out: they cannot be seen, and 32-bit sums of sections leave such
+/// remainders.
 const LEAST_DEPTH: f64 = 1e-5;
 
 /// A picture being drawn.
 struct Frame<'a> {
     view: View,
-    planes: Vec<f64>,
-    kernels: Vec<Kernel>,
-    field: Option<Field<'a>>,
-    surface_shade: Option<Shade>,
+    mode: Mode,
+    optics: Optics,
     gradient: Gradient,
+    clips: Vec<Clip>,
+    planes: Vec<f64>,
+    near: f64,
+    kernels: Vec<Kernel<'a>>,
+    /// A field that is classified after interpolation.
+    field: Option<Field<'a>>,
+    /// Where the samples of a volume lie.
+    lattice: Option<&'a Lattice>,
+    /// The light on radiance.
+    shade: Option<Shade>,
 }
 
 impl<'a> Frame<'a> {
     fn new(scene: &'a Scene, view: View, settings: &Settings) -> Self {
-        let field = scene.items.iter().find_map(|item| {
-            let (transfer, lattice) = match item {
-                Item::Radiance(_) => return None,
-                Item::Scalar(_, transfer) => (transfer, None),
-                Item::Volume(volume, _, transfer) => (transfer, Some(&volume.lattice)),
-            };
-            Some(Field { transfer, lattice, shade: settings.volume_shade.unwrap_or(transfer.shade) })
+        let samples = scene.items.iter().find_map(|item| match item {
+            Item::Radiance(_) => None,
+            Item::Scalar(_, transfer) => Some((transfer, None)),
+            Item::Volume(volume, _, transfer) => Some((transfer, Some(&volume.lattice))),
+        });
+        let dark = settings.optics == Optics::XRay;
+        let before = settings.mode != Mode::Sheets || settings.classification == scene::Classification::Pre;
+        let shade = samples.and_then(|(transfer, _)| settings.shade_of(transfer)).filter(|_| !dark);
+        let field = samples.filter(|_| !before).map(|(transfer, lattice)| Field {
+            classifier: Classifier::new(transfer),
+            lattice,
+            shade,
+            surfaces: if dark { &[] } else { &transfer.isosurfaces },
+            inside: settings.classification == scene::Classification::PreIntegrated,
         });
         Self {
-            planes: scene.sheets(&view, settings).planes,
-            kernels: Kernel::gather(scene, &view),
-            view,
-            field,
-            surface_shade: settings.surface_shade,
+            mode: settings.mode,
+            optics: settings.optics,
             gradient: settings.gradient,
+            clips: settings.clips.clone(),
+            planes: scene.sheets(&view, settings).planes,
+            near: nearest(scene, &view, settings),
+            kernels: gather::gather(scene, &view, before.then_some(Before { lit: shade.is_some() })),
+            field,
+            lattice: samples.and_then(|(_, lattice)| lattice),
+            shade: if before && samples.is_some() { shade } else { settings.surface_shade },
+            view,
         }
     }
 
@@ -147,30 +227,24 @@ impl<'a> Frame<'a> {
     }
 
     /// Draws a row.
-    fn row(&self, row: u32) -> Vec<Composite> {
-        let row = i64::from(row);
-        let kernels = self.kernels_of_row(row);
-        let central = self.gradient == Gradient::Central && self.field.as_ref().is_some_and(|f| f.shade.is_some());
-        let beside = central.then(|| [row - 1, row + 1].map(|row| self.kernels_of_row(row)));
-        let pixel = |column: i64| {
-            let ray = self.ray(column, row);
-            let sheets = self.sheets(&ray, &kernels);
-            let neighbours = beside.as_ref().map(|[above, below]| {
-                [
-                    (column - 1, row, &kernels),
-                    (column + 1, row, &kernels),
-                    (column, row - 1, above),
-                    (column, row + 1, below),
-                ]
-                .map(|(column, row, kernels)| self.values(&self.sheets(&self.ray(column, row), kernels)))
-            });
-            self.composite(&ray, &sheets, neighbours)
-        };
-        (0..i64::from(self.view.size[0])).map(pixel).collect()
+    fn row(&self, row: i64) -> Vec<Composite> {
+        let columns = 0..i64::from(self.view.size[0]);
+        match self.mode {
+            Mode::Sheets => self.row_of_sheets(row),
+            Mode::AxisSheets => {
+                let kernels = self.kernels_of_row(row);
+                let axis = whole::sheet_axis(&self.view, self.lattice);
+                columns.map(|column| self.pixel_of_axis_sheets(&self.ray(column, row), &kernels, axis)).collect()
+            }
+            Mode::Splats(order) => {
+                let kernels = self.kernels_of_row(row);
+                columns.map(|column| self.pixel_of_splats(&self.ray(column, row), &kernels, order)).collect()
+            }
+        }
     }
 
     /// The kernels that the rays of a row can meet: the rays of a row lie in one plane.
-    fn kernels_of_row(&self, row: i64) -> Vec<&Kernel> {
+    fn kernels_of_row(&self, row: i64) -> Vec<&Kernel<'a>> {
         let [left, right] = [0, i64::from(self.view.size[0])].map(|column| self.ray(column, row));
         let normal = if self.view.perspective { left.direction.cross(right.direction) } else { DVec3::Y };
         let offset = left.origin.dot(normal);
@@ -187,102 +261,18 @@ impl<'a> Frame<'a> {
         [self.planes[sheet], self.planes[sheet + 1]]
     }
 
-    fn thickness(&self, sheet: usize) -> f64 {
-        self.planes[sheet + 1] - self.planes[sheet]
-    }
-
-    fn middle(&self, sheet: usize) -> f64 {
-        0.5 * (self.planes[sheet] + self.planes[sheet + 1])
-    }
-
-    /// Sums the kernels over the sheets of a ray.
-    fn sheets(&self, ray: &Ray, kernels: &[&Kernel]) -> Vec<Sheet> {
-        let mut sheets = vec![Sheet::default(); self.count()];
-        for kernel in kernels {
-            let Some(crossing) = kernel.cross(ray) else { continue };
-            let reach = section::TAIL / crossing.density;
-            let first = self.planes[1..].partition_point(|&plane| plane < crossing.closest - reach);
-            let past = self.planes.partition_point(|&plane| plane < crossing.closest + reach).min(self.count());
-            for (k, sheet) in sheets.iter_mut().enumerate().take(past).skip(first) {
-                sheet.add(&kernel.load, &crossing, self.span(k));
-            }
-        }
-        sheets
-    }
-
-    /// The field's value in every sheet.
-    fn values(&self, sheets: &[Sheet]) -> Vec<Option<f64>> {
-        (0..self.count()).map(|k| sheets[k].value(self.thickness(k))).collect()
-    }
-
-    /// Colours a pixel's sheets and composites them. `neighbours`: the field's values in the pixels to the left, right,
-    /// above and below, where gradients are central differences.
-    fn composite(&self, ray: &Ray, sheets: &[Sheet], neighbours: Option<[Vec<Option<f64>>; 4]>) -> Composite {
-        let values = self.values(sheets);
-        let mut composite = Composite::EMPTY;
-        for (k, sheet) in sheets.iter().enumerate() {
-            let mut medium = self.surface(sheet, ray);
-            if let (Some(field), Some(value)) = (&self.field, values[k]) {
-                let gradient = || {
-                    let around = neighbours.as_ref().map(|pixels| pixels.each_ref().map(|values| values[k]));
-                    let across = sheet.across(value, around);
-                    self.gradient(ray, &values, k, across)
-                };
-                medium = medium.with(field.classify(value, self.length(field, ray, sheet, k), ray, gradient));
-            }
-            composite.pass(medium, self.span(k));
-        }
-        composite
-    }
-
-    /// The radiance splats of a sheet.
-    fn surface(&self, sheet: &Sheet, ray: &Ray) -> Medium {
-        if sheet.depth < LEAST_DEPTH {
+    /// Radiance, lit once.
+    fn lit(&self, light: &Light, ray: &Ray) -> Medium {
+        if light.depth <= 0.0 || light.facing <= 0.0 {
             return Medium::default();
         }
-        let color = sheet.color / sheet.facing;
-        match &self.surface_shade {
-            Some(shade) if sheet.has_normal => {
-                Medium { depth: sheet.depth, color: shade::lit(color, sheet.normal, ray.direction, shade) }
+        let color = match &self.shade {
+            _ if self.optics == Optics::XRay => DVec3::ONE,
+            Some(shade) if light.has_normal => {
+                shade::lit(light.color / light.facing, light.normal, ray.direction, shade)
             }
-            _ => Medium { depth: sheet.depth, color },
-        }
-    }
-
-    /// The length ℓ of a ray on which a sheet holds field.
-    fn length(&self, field: &Field, ray: &Ray, sheet: &Sheet, k: usize) -> f64 {
-        let [from, to] = self.span(k);
-        match field.lattice {
-            Some(lattice) => {
-                ray.within(&self.view, lattice).map_or(0.0, |[enter, leave]| (to.min(leave) - from.max(enter)).max(0.0))
-            }
-            None => sheet.length.min(to - from),
-        }
-    }
-
-    /// How far, per pixel to the right and per pixel downward, the derivative with sections held fixed is taken along the
-    /// ray instead of across it. A section stays fixed on the line on which the kernel's closest approach moves, which is
-    /// across the ray in the lattice's own steps, and so in space only where those are equal and at right angles.
-    /// Scattered samples have no common shape, and are left as they are.
-    fn lean(&self, ray: &Ray, distance: f64) -> DVec2 {
-        let lattice = self.field.as_ref().and_then(|field| field.lattice);
-        let Some(lattice) = lattice.filter(|_| self.gradient == Gradient::Analytic) else { return DVec2::ZERO };
-        let in_steps = (self.view.rotation * lattice.axes).inverse();
-        let direction = in_steps * ray.direction;
-        let [right, down] = ray.across(distance).map(|step| (in_steps * step).dot(direction));
-        DVec2::new(right, down) / direction.length_squared()
-    }
-
-    /// The field's view-space gradient in a sheet that has a value, given its derivatives across the picture; zero where
-    /// it cannot be told.
-    fn gradient(&self, ray: &Ray, values: &[Option<f64>], k: usize, across: DVec2) -> DVec3 {
-        // One step along the ray: outside the list there is no sheet, hence no value there.
-        let before = k.checked_sub(1).map(|before| (self.middle(before), values[before]));
-        let after = (k + 1 < self.count()).then(|| (self.middle(k + 1), values[k + 1]));
-        let [(first, before), (last, after)] = [before, after].map(|neighbour| neighbour.unwrap_or_default());
-        let middle = self.middle(k);
-        let along = slope([first, middle, last], [before, values[k], after]);
-        let across = across + along * self.lean(ray, middle);
-        ray.gradient(middle, across, along).unwrap_or(DVec3::ZERO)
+            _ => light.color / light.facing,
+        };
+        Medium { depth: light.depth, color: color.clamp(DVec3::ZERO, DVec3::ONE) }
     }
 }

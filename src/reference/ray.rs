@@ -1,6 +1,6 @@
 //! The ray of a pixel, and how it moves from pixel to pixel.
 
-use crate::{math::View, volume::Lattice};
+use crate::math::View;
 use glam::{DMat3, DVec2, DVec3};
 
 /// A ray in view space: the points `origin + s·direction`, and what one pixel to the right and one downward add to it.
@@ -46,31 +46,6 @@ impl Ray {
         // A derivative is the gradient's product with its step; three of them are a system of equations.
         let steps = DMat3::from_cols(right, down, self.direction).transpose();
         Some(steps.inverse() * slopes).filter(|gradient| gradient.is_finite())
-    }
-
-    /// Where the ray enters and leaves the box of a lattice's samples; `None` where it misses it. An axis with a single
-    /// sample counts half a spacing to either side.
-    pub fn within(&self, view: &View, lattice: &Lattice) -> Option<[f64; 2]> {
-        let to_index = lattice.axes.inverse();
-        let to_world = view.rotation.transpose();
-        let start = to_index * (to_world * self.origin + view.position - lattice.origin);
-        let slope = to_index * (to_world * self.direction);
-        let mut interval = [f64::NEG_INFINITY, f64::INFINITY];
-        for axis in 0..3 {
-            let [low, high] = match lattice.dims[axis] {
-                1 => [-0.5, 0.5],
-                n => [0.0, n as f64 - 1.0],
-            };
-            if slope[axis] == 0.0 {
-                if !(low..=high).contains(&start[axis]) {
-                    return None;
-                }
-                continue;
-            }
-            let [a, b] = [low, high].map(|bound| (bound - start[axis]) / slope[axis]);
-            interval = [interval[0].max(a.min(b)), interval[1].min(a.max(b))];
-        }
-        (interval[0] < interval[1]).then_some(interval)
     }
 }
 
@@ -123,28 +98,6 @@ mod tests {
                 let by_hand = DVec3::new(x, y, (along - x * b.x - y * b.y) / b.z);
                 assert!((found - by_hand).length() < 1e-9, "{by_hand}");
             }
-        }
-    }
-
-    #[test]
-    fn a_ray_crosses_a_skewed_box_where_its_faces_are() {
-        let axes = DMat3::from_cols(DVec3::new(0.3, 0.1, 0.0), DVec3::new(0.0, 0.2, 0.1), DVec3::new(0.05, 0.0, 0.4));
-        let lattice = Lattice::cartesian([5, 4, 1], DVec3::new(0.1, 0.2, 0.3), axes);
-        for view in views() {
-            let center = view.to_view(lattice.position(DVec3::new(2.0, 1.5, 0.0)));
-            let flat = if view.perspective { center.truncate() / center.z } else { center.truncate() };
-            let ray = Ray::new(&view, view.center + view.scale * flat);
-            let interval = ray.within(&view, &lattice).unwrap();
-            for s in interval {
-                let world = view.rotation.transpose() * ray.point(s) + view.position;
-                let index = lattice.axes.inverse() * (world - lattice.origin);
-                let faces = [index.x, index.x - 4.0, index.y, index.y - 3.0, index.z - 0.5, index.z + 0.5];
-                assert!(faces.iter().any(|f| f.abs() < 1e-9), "{index}");
-            }
-            let middle = ray.point(0.5 * (interval[0] + interval[1]));
-            let along = (center - middle).length();
-            assert!(along < interval[1] - interval[0]);
-            assert!(Ray::new(&view, DVec2::new(-900.0, 900.0)).within(&view, &lattice).is_none());
         }
     }
 }

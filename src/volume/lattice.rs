@@ -123,10 +123,7 @@ impl Lattice {
     /// The typical size of a sample's kernel unit in world units: what sheets are measured by.
     pub fn kernel_spacing(&self) -> f64 {
         let unit = match &self.arrangement {
-            Arrangement::Rectilinear(_) => {
-                self.spacing()
-                    / DVec3::from_array(self.axes.to_cols_array_2d().map(|axis| DVec3::from_array(axis).length()))
-            }
+            Arrangement::Rectilinear(_) => self.spacing() / self.edges(),
             _ => self.unit([0; 3]),
         };
         (self.axes.determinant().abs() * unit.x * unit.y * unit.z).cbrt()
@@ -169,9 +166,14 @@ impl Lattice {
         }
     }
 
+    /// Lengths of the axes' columns, in world units.
+    pub fn edges(&self) -> DVec3 {
+        DVec3::from_array(self.axes.to_cols_array_2d().map(|axis| DVec3::from_array(axis).length()))
+    }
+
     /// Length of the step along each axis, in world units; the mean on a rectilinear lattice.
     pub fn spacing(&self) -> DVec3 {
-        let step = DVec3::from_array(self.axes.to_cols_array_2d().map(|axis| DVec3::from_array(axis).length()));
+        let step = self.edges();
         match &self.arrangement {
             Arrangement::Rectilinear(places) => {
                 let mean = |places: &Vec<f64>| match places[..] {

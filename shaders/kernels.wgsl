@@ -1,0 +1,292 @@
+// Adds a splat to the pixels of an invocation: its sections in the four open sheets, and itself on the three planes between
+// them.
+
+const SQRT_TAU: f32 = 2.5066283;
+
+// Normal distribution function, within 2e-7 (Abramowitz & Stegun 1964, 26.2.19). Its tails must be right: what they get
+// wrong is multiplied by the strength of an opaque splat and lies in front of it.
+fn normal_cdf(t: vec3<f32>) -> vec3<f32> {
+    let x = min(abs(t), vec3(8.0));
+    var p = 1.0 + x * (0.049867347 + x * (0.0211410061 + x * (0.00327762632 + x * (3.8003575e-05 + x * (4.88906356e-05 + x * (5.382975e-06))))));
+    p *= p;
+    p *= p;
+    p *= p;
+    p *= p;
+    let tail = 0.5 / p;
+    return select(tail, 1.0 - tail, t >= vec3(0.0));
+}
+
+// Planes farther from a kernel than this, in its standard deviations, are taken as that far: nothing of it is left there, and
+// the list of planes ends in numbers that would overflow.
+const FAR: vec3<f32> = vec3(12.0);
+
+// The four sections of a window, from the distribution function at its three inner planes.
+fn sections(t: vec3<f32>, base: f32) -> vec4<f32> {
+    let f = normal_cdf(t);
+    return vec4(f.x - base, f.y - f.x, f.z - f.y, 1.0 - f.z);
+}
+
+// An isotropic lattice sample: view-space centre and value. Far from the eye the shells of the sheets are flat across its
+// footprint, so along the ray it is a few numbers for all pixels.
+fn add_isotropic(entry: u32, front: u32, first_pixel: vec2<i32>) {
+    let record = records[entry & ENTRY_RECORD];
+    let c = record.xyz;
+    let inverse_sigma = frame.isotropic.y;
+    var distance = c.z;
+    var at = frame.center + frame.scale * c.xy;
+    let per_pixel = inverse_sigma / frame.scale;
+    var q = vec3(1.0, 0.0, 1.0) * (per_pixel * per_pixel);
+    if PERSPECTIVE {
+        distance = length(c);
+        let p = c.xy / c.z;
+        at = frame.center + frame.scale * p;
+        let k = c.z * per_pixel;
+        q = vec3(1.0 + p.y * p.y, -p.x * p.y, 1.0 + p.x * p.x) * (k * k);
+    }
+    let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
+    let base = select(0.0, 1.0, (entry & ENTRY_CONTINUED) != 0u);
+    let t = clamp((near - distance) * inverse_sigma, -FAR, FAR);
+    let along = sections(t, base) * (SQRT_TAU * frame.isotropic.x);
+    let on_plane = exp(-0.5 * t * t);
+    let on_plane_z = on_plane * t * inverse_sigma;
+    let extent2 = frame.isotropic.z;
+    let dx = f32(first_pixel.x) + 0.5 - at.x;
+    let nx = q.x * dx * dx;
+    let mixed = 2.0 * q.y * dx;
+    for (var r = 0u; r < ROWS; r++) {
+        let dy = f32(first_pixel.y) + (f32(r) + 0.5 - at.y);
+        let flat2 = nx + dy * (mixed + dy * q.z);
+        let cosine2 = pixels[r].cosine * pixels[r].cosine;
+        let rho2 = flat2 * cosine2;
+        let e = select(0.0, exp(-0.5 * rho2), rho2 <= extent2);
+        let v = e * record.w;
+        pixels[r].weight += along * e;
+        pixels[r].value += along * v;
+        pixels[r].face_weight += on_plane * e;
+        pixels[r].face_value += on_plane * v;
+        if GRADIENTS {
+            if !CENTRAL {
+                let slope = vec2(q.x * dx + q.y * dy, q.y * dx + q.z * dy) * cosine2;
+                pixels[r].weight_x += on_plane * (e * slope.x);
+                pixels[r].weight_y += on_plane * (e * slope.y);
+                pixels[r].value_x += on_plane * (v * slope.x);
+                pixels[r].value_y += on_plane * (v * slope.y);
+            }
+            pixels[r].weight_z += on_plane_z * e;
+            pixels[r].value_z += on_plane_z * v;
+        }
+    }
+}
+
+// Within a sheet, what faces the eye hides what faces away: where a part is thinner than a sheet, its far side must not
+// mix into the colour and light of its near side. Far sides alone keep a little weight, so that they still have a colour.
+fn facing_weight(normal: vec3<f32>, center: vec3<f32>) -> f32 {
+    var away = normal.z;
+    if PERSPECTIVE {
+        away = dot(normal, center) / max(length(center), 1e-30);
+    }
+    return clamp(0.5 - 4.0 * away, 1.0 / 255.0, 1.0);
+}
+
+// A general record, unpacked.
+struct Loaded {
+    center: vec3<f32>,
+    strength: f32,
+    extent2: f32,
+    // Radiance, also that of samples classified before.
+    is_radiance: bool,
+    color: vec3<f32>,
+    normal: vec3<f32>,
+    facing: f32,
+    // Scalars.
+    weight: f32,
+    slope: vec3<f32>,
+}
+
+fn load(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
+    var splat: Loaded;
+    splat.center = a.xyz;
+    splat.strength = a.w;
+    splat.extent2 = abs(c.z);
+    splat.weight = 1.0;
+    splat.facing = 1.0;
+    // The sign of the squared extent tells the payloads apart.
+    splat.is_radiance = RADIANCE_PAYLOAD && (!(SCALAR || CLASSIFIED) || c.z > 0.0);
+    if RADIANCE_PAYLOAD {
+        splat.color = unpack4x8unorm(bitcast<u32>(d.x)).xyz;
+        let packed = bitcast<u32>(d.y);
+        if packed != NO_NORMAL {
+            splat.normal = decode_normal(packed);
+        }
+    }
+    if CLASSIFIED && !splat.is_radiance {
+        let shown = classify(a.w);
+        splat.color = shown.xyz;
+        splat.strength = shown.w * d.w * frame.kernel.z;
+    }
+    if RADIANCE_PAYLOAD && any(splat.normal != vec3(0.0)) {
+        splat.facing = facing_weight(splat.normal, a.xyz);
+    }
+    if SCALAR && SLOPES {
+        splat.weight = d.w;
+        splat.slope = d.xyz;
+    }
+    return splat;
+}
+
+// Any ellipsoid, with centre c and whitening M. Along a pixel's ray direction b: β = M·b; v = M·c × β, which is zero at the
+// projected centre and grows evenly from there; ρ² = |v|²/|β|²; the closest approach is where |β|²·z = L, at v × β / |β|² in
+// whitened space. All are exact in perspective, and taken from vectors, not from expanded polynomials, which cancel beside
+// the eye. See docs/engine.md.
+fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
+    let index = entry & ENTRY_RECORD;
+    let a = records[index];
+    let b = records[index + 1u];
+    let c = records[index + 2u];
+    let splat = load(a, c, records[index + 3u]);
+    let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
+    let base = select(0.0, 1.0, (entry & ENTRY_CONTINUED) != 0u);
+    // Change of the whitened ray per pixel to the right and down, and its constant part.
+    let m0 = b.xyz / frame.scale;
+    let m1 = vec3(0.0, b.w, c.x) / frame.scale;
+    let m2 = vec3(0.0, 0.0, c.y);
+    var at = frame.center + frame.scale * a.xy;
+    var whitened = m2 * a.z;
+    var v0 = cross(m0, m2);
+    var v1 = cross(m1, m2);
+    if PERSPECTIVE {
+        // A centre beside the eye projects to infinity; moving it by a thousandth of its distance cannot be seen.
+        let least = 1e-3 * length(a.xyz);
+        let z = select(a.z, select(-least, least, a.z >= 0.0), abs(a.z) < least);
+        at = frame.center + frame.scale * a.xy / z;
+        whitened = (m0 * a.x + m1 * a.y) * frame.scale + m2 * z;
+        v0 = cross(whitened, m0);
+        v1 = cross(whitened, m1);
+    }
+    let dx = f32(first_pixel.x) + 0.5 - at.x;
+    let v_column = v0 * dx;
+    let beta_column = m2 + m0 * (f32(first_pixel.x) + 0.5 - frame.center.x);
+    for (var r = 0u; r < ROWS; r++) {
+        let y = f32(first_pixel.y) + (f32(r) + 0.5);
+        let v = v_column + v1 * (y - at.y);
+        var beta = m2;
+        var l = 0.0;
+        if PERSPECTIVE {
+            beta = beta_column + m1 * (y - frame.center.y);
+            l = dot(whitened, beta);
+        } else {
+            l = dot(whitened - m0 * dx - m1 * (y - at.y), beta);
+        }
+        let size2 = dot(beta, beta);
+        let inverse = inverseSqrt(max(size2, 1e-37));
+        let rho2 = dot(v, v) * inverse * inverse;
+        let t = clamp((size2 * (near * pixels[r].cosine) - l) * inverse, -FAR, FAR);
+        // The kernel at the closest approach and on the planes, −h′/r on the planes, its sections.
+        var e = select(0.0, exp(-0.5 * rho2), rho2 <= splat.extent2);
+        var on_plane: vec3<f32>;
+        var steep: vec3<f32>;
+        var along: vec4<f32>;
+        if TABLE_KERNEL && !splat.is_radiance {
+            let rho = sqrt(rho2);
+            let half = kernel_integral(rho, 3e38);
+            let f = vec3(kernel_integral(rho, t.x), kernel_integral(rho, t.y), kernel_integral(rho, t.z));
+            along = vec4(f.x + half - 2.0 * half * base, f.y - f.x, f.z - f.y, half - f.z);
+            let k0 = kernel_at(sqrt(rho2 + t.x * t.x));
+            let k1 = kernel_at(sqrt(rho2 + t.y * t.y));
+            let k2 = kernel_at(sqrt(rho2 + t.z * t.z));
+            on_plane = vec3(k0.x, k1.x, k2.x);
+            steep = vec3(k0.y, k1.y, k2.y);
+            e = select(0.0, 1.0, rho2 <= splat.extent2);
+            along *= e;
+        } else {
+            along = sections(t, base) * (e * select(SQRT_TAU, 1.0, splat.is_radiance));
+            on_plane = exp(-0.5 * t * t) * e;
+            steep = on_plane;
+        }
+        if WHOLE {
+            along = vec4(e, 0.0, 0.0, 0.0);
+            if TABLE_KERNEL && !splat.is_radiance {
+                along.x = 2.0 * kernel_integral(sqrt(rho2), 3e38) * e;
+            } else if CLASSIFIED && !splat.is_radiance {
+                along.x = e * SQRT_TAU;
+            }
+        }
+        // Whitened length to world length along the ray.
+        let length_of = inverse / pixels[r].cosine;
+        if RADIANCE_PAYLOAD && (splat.is_radiance || CLASSIFIED) {
+            var strength = splat.strength;
+            if CLASSIFIED && !splat.is_radiance {
+                strength *= length_of;
+            }
+            if CLIPS + HOLES > 0u && !is_kept(r, l * inverse * length_of) {
+                strength = 0.0;
+            }
+            add_radiance(r, along * strength, splat);
+        } else if SCALAR {
+            var value = vec3(splat.strength);
+            var section = along * (length_of * splat.weight);
+            pixels[r].weight += section;
+            pixels[r].value += section * splat.strength;
+            on_plane *= splat.weight;
+            steep *= splat.weight;
+            let nearest = cross(v, beta) * (inverse * inverse);
+            let unit = beta * inverse;
+            if SLOPES {
+                let slope_along = dot(splat.slope, unit);
+                value += dot(splat.slope, nearest) + t * slope_along;
+                let g = on_plane;
+                let carried = vec4(-g.x, g.x - g.y, g.y - g.z, g.z) * slope_along;
+                pixels[r].value += section * dot(splat.slope, nearest) + carried * length_of;
+            }
+            pixels[r].face_weight += on_plane;
+            pixels[r].face_value += on_plane * value;
+            if GRADIENTS {
+                // How x′ moves on a plane: per pixel to the right and down, and per world unit along the ray.
+                var across = array<vec3<f32>, 2>(m0, m1);
+                var size = vec3(1.0);
+                if PERSPECTIVE {
+                    let k = pixels[r].cosine * pixels[r].cosine / frame.scale;
+                    across[0] -= beta * (pixels[r].ray.x * k);
+                    across[1] -= beta * (pixels[r].ray.y * k);
+                    size = near * pixels[r].cosine;
+                }
+                if !CENTRAL {
+                    let x = size * (dot(nearest, across[0]) + t * dot(unit, across[0]));
+                    let y = size * (dot(nearest, across[1]) + t * dot(unit, across[1]));
+                    pixels[r].weight_x += steep * x;
+                    pixels[r].weight_y += steep * y;
+                    pixels[r].value_x += steep * x * value;
+                    pixels[r].value_y += steep * y * value;
+                    if SLOPES {
+                        pixels[r].value_x -= on_plane * size * dot(splat.slope, across[0]);
+                        pixels[r].value_y -= on_plane * size * dot(splat.slope, across[1]);
+                    }
+                }
+                let z = t / length_of;
+                pixels[r].weight_z += steep * z;
+                pixels[r].value_z += steep * z * value;
+                if SLOPES {
+                    pixels[r].value_z -= on_plane * (dot(splat.slope, unit) / length_of);
+                }
+            }
+        }
+    }
+}
+
+fn add_radiance(r: u32, w: vec4<f32>, splat: Loaded) {
+    if SINGLE_SPLATS {
+        composite_single(r, w.x, splat);
+        return;
+    }
+    let w_facing = w * splat.facing;
+    pixels[r].depth += w;
+    pixels[r].facing += w_facing;
+    pixels[r].red += w_facing * splat.color.x;
+    pixels[r].green += w_facing * splat.color.y;
+    pixels[r].blue += w_facing * splat.color.z;
+    if SURFACE_SHADED {
+        pixels[r].normal_x += w_facing * splat.normal.x;
+        pixels[r].normal_y += w_facing * splat.normal.y;
+        pixels[r].normal_z += w_facing * splat.normal.z;
+    }
+}

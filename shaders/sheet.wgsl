@@ -1,0 +1,314 @@
+// Closes a sheet at one pixel: resolves its sums, classifies and shades it, and composites it.
+
+// A sheet that is filled less than this has no value, one with less optical depth no colour: such small sums may be what
+// rounding left of the sections that windows of one splat give each other. A plane with a smaller sum has no value either.
+const LEAST_FILLING: f32 = 1e-4;
+const LEAST_DEPTH: f32 = 1e-5;
+// Optical depth that counts as opaque.
+const MOST_DEPTH: f32 = 20.0;
+
+// First sheet that this invocation composites: the pass's own, or where its tile stopped.
+var<private> first_composited: u32;
+
+// Blinn's light (1977) at the eye, on both sides.
+fn lit(color: vec3<f32>, normal: vec3<f32>, direction: vec3<f32>, shade: vec4<f32>) -> vec3<f32> {
+    let size = length(normal);
+    if !(size > 1e-20) {
+        return color * (shade.x + shade.y);
+    }
+    let facing = min(abs(dot(normal, direction)) / size, 1.0);
+    return min(color * (shade.x + shade.y * facing) + shade.z * pow(facing, shade.w), vec3(1.0));
+}
+
+// Gradient in view space from the slope across the picture (per pixel) and the derivative along the ray, at a distance.
+fn gradient(r: u32, slope: vec2<f32>, along: f32, distance: f32) -> vec3<f32> {
+    let d = direction_of(r);
+    if PERSPECTIVE {
+        let g = slope * frame.scale / (pixels[r].cosine * distance) + along * d.xy;
+        return vec3(g, (along - dot(g, d.xy)) / d.z);
+    }
+    return vec3(slope * frame.scale, along);
+}
+
+fn shift(sums: vec4<f32>) -> vec4<f32> {
+    return vec4(sums.yzw, 0.0);
+}
+
+fn shift_faces(sums: vec3<f32>) -> vec3<f32> {
+    return vec3(sums.yz, 0.0);
+}
+
+// The field on the plane behind a sheet, from the first of the three open planes, which it shifts out.
+fn resolve_face(r: u32, sheet: u32) -> Face {
+    var face: Face;
+    let weight = pixels[r].face_weight.x;
+    let inverse = 1.0 / max(weight, 1e-37);
+    face.has_value = weight > LEAST_FILLING;
+    face.value = pixels[r].face_value.x * inverse;
+    if GRADIENTS {
+        var slope = vec2(0.0);
+        if !CENTRAL {
+            slope = face.value * vec2(pixels[r].weight_x.x, pixels[r].weight_y.x);
+            slope = (slope - vec2(pixels[r].value_x.x, pixels[r].value_y.x)) * inverse;
+            pixels[r].weight_x = shift_faces(pixels[r].weight_x);
+            pixels[r].weight_y = shift_faces(pixels[r].weight_y);
+            pixels[r].value_x = shift_faces(pixels[r].value_x);
+            pixels[r].value_y = shift_faces(pixels[r].value_y);
+        }
+        let along = (face.value * pixels[r].weight_z.x - pixels[r].value_z.x) * inverse;
+        pixels[r].weight_z = shift_faces(pixels[r].weight_z);
+        pixels[r].value_z = shift_faces(pixels[r].value_z);
+        // With differences between pixels, the slope along the ray waits here for those across.
+        face.gradient = vec3(slope, along);
+        if !CENTRAL {
+            face.gradient = gradient(r, slope, along, planes[sheet + 1u]);
+        }
+    }
+    pixels[r].face_weight = shift_faces(pixels[r].face_weight);
+    pixels[r].face_value = shift_faces(pixels[r].face_value);
+    return face;
+}
+
+// Resolves the front lane to a sheet and shifts it out.
+fn resolve(r: u32, sheet: u32) -> Sheet {
+    var own: Sheet;
+    if SCALAR {
+        let thickness = planes[sheet + 1u] - planes[sheet];
+        let weight = pixels[r].weight.x;
+        own.has_value = weight > LEAST_FILLING * thickness;
+        own.value = pixels[r].value.x / max(weight, 1e-37);
+        own.filling = min(weight / thickness, 1.0);
+        own.front = pixels[r].front;
+        own.back = resolve_face(r, sheet);
+        pixels[r].weight = shift(pixels[r].weight);
+        pixels[r].value = shift(pixels[r].value);
+    }
+    if RADIANCE_PAYLOAD && !SINGLE_SPLATS {
+        let depth = pixels[r].depth.x;
+        let sum = vec3(pixels[r].red.x, pixels[r].green.x, pixels[r].blue.x);
+        // Where next to nothing faces the eye, rounding may have left a weight of any sign; its colour must stay a colour.
+        var color = clamp(sum / max(pixels[r].facing.x, 1e-12), vec3(0.0), vec3(1.0));
+        if SURFACE_SHADED {
+            let normal = vec3(pixels[r].normal_x.x, pixels[r].normal_y.x, pixels[r].normal_z.x);
+            // Colours of splats without a normal stay as they are.
+            if dot(normal, normal) > 0.0 {
+                color = lit(color, normal, direction_of(r), frame.surface_shade);
+            }
+            pixels[r].normal_x = shift(pixels[r].normal_x);
+            pixels[r].normal_y = shift(pixels[r].normal_y);
+            pixels[r].normal_z = shift(pixels[r].normal_z);
+        }
+        own.radiance = select(vec4(0.0), vec4(depth * color, depth), depth >= LEAST_DEPTH);
+        pixels[r].facing = shift(pixels[r].facing);
+        pixels[r].depth = shift(pixels[r].depth);
+        pixels[r].red = shift(pixels[r].red);
+        pixels[r].green = shift(pixels[r].green);
+        pixels[r].blue = shift(pixels[r].blue);
+    }
+    return own;
+}
+
+// The field of a sheet on its way to the picture, front to back.
+struct Medium {
+    // Light that is left, and the optical depth that took the rest.
+    through: f32,
+    depth: f32,
+    // Colour times opacity of what the transfer function shows, its opacity, and its place (0 … 1) times opacity.
+    color: vec3<f32>,
+    opacity: f32,
+    place: f32,
+    // Lit colour times opacity of isosurfaces.
+    surfaces: vec3<f32>,
+    // The gradients at both faces.
+    front: vec3<f32>,
+    back: vec3<f32>,
+    // The largest value.
+    peak: f32,
+    // An isosurface took the half of the light.
+    has_hit: bool,
+}
+
+const NO_VALUE: f32 = -3e38;
+
+fn gradient_at(medium: Medium, place: f32) -> vec3<f32> {
+    return mix(medium.front, medium.back, place);
+}
+
+// The part of a sheet between two distances, in which the field is a parabola with the values of the faces at the ends and
+// the sheet's mean.
+fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<function, Medium>) {
+    let start = planes[sheet];
+    let thickness = planes[sheet + 1u] - start;
+    var curve = vec3(own.value);
+    if PARABOLA {
+        let front = select(own.value, own.front.value, own.front.has_value);
+        let back = select(own.value, own.back.value, own.back.has_value);
+        curve = vec3(front, 1.5 * own.value - 0.25 * (front + back), back);
+    }
+    let step = (end - begin) / f32(PARTS);
+    var place = (begin - start) / thickness;
+    var value = parabola(curve, place);
+    for (var part = 0u; part < PARTS; part++) {
+        let near = begin + f32(part) * step;
+        let next_place = (near + step - start) / thickness;
+        let next = parabola(curve, next_place);
+        if MAXIMUM {
+            (*medium).peak = max((*medium).peak, max(value, next));
+        } else {
+            var shown = classify_between(select(value, own.value, POST), select(next, own.value, POST));
+            let middle = 0.5 * (place + next_place);
+            if GRADIENT_OPACITY {
+                shown *= gradient_factor(length(gradient_at(*medium, middle)));
+            }
+            let depth = shown.w * step * select(own.filling, 1.0, LATTICE);
+            let color = shown.xyz / max(shown.w, 1e-20);
+            var done = 0.0;
+            for (var i = 0u; i < ISOSURFACES; i++) {
+                let surface = frame.isosurfaces[select(ISOSURFACES - 1u - i, i, next > value)];
+                let level = surface.value.x;
+                if (value < level) != (next < level) {
+                    let share = (level - value) / (next - value);
+                    pass_part(depth * (share - done), color, middle, medium);
+                    done = share;
+                    pass_surface(r, surface, mix(place, next_place, share), near + step * share, medium);
+                }
+            }
+            pass_part(depth * (1.0 - done), color, middle, medium);
+        }
+        place = next_place;
+        value = next;
+    }
+}
+
+fn parabola(curve: vec3<f32>, u: f32) -> f32 {
+    if !PARABOLA {
+        return curve.y;
+    }
+    return curve.x * (1.0 - u) * (1.0 - 2.0 * u) + 4.0 * curve.y * u * (1.0 - u) + curve.z * u * (2.0 * u - 1.0);
+}
+
+fn pass_part(depth: f32, color: vec3<f32>, place: f32, medium: ptr<function, Medium>) {
+    let share = (*medium).through * (1.0 - exp(-depth));
+    (*medium).color += share * color;
+    (*medium).opacity += share;
+    (*medium).place += share * place;
+    (*medium).through -= share;
+    (*medium).depth += depth;
+}
+
+fn pass_surface(r: u32, surface: Isosurface, place: f32, distance: f32, medium: ptr<function, Medium>) {
+    let share = (*medium).through * surface.value.y;
+    let before = pixels[r].transmittance * (*medium).through;
+    (*medium).through -= share;
+    (*medium).depth += surface.value.z;
+    if before > 0.5 && pixels[r].transmittance * (*medium).through <= 0.5 {
+        pixels[r].hit = distance;
+        (*medium).has_hit = true;
+    }
+    var color = surface.color.xyz;
+    if VOLUME_SHADED {
+        color = lit(color, gradient_at(*medium, place), direction_of(r), frame.volume_shade);
+    }
+    (*medium).surfaces += share * color;
+}
+
+// All of a sheet that the box of the samples and the clips leave.
+fn pass_field(r: u32, sheet: u32, own: Sheet) -> Medium {
+    var medium: Medium;
+    medium.through = 1.0;
+    medium.peak = NO_VALUE;
+    if GRADIENTS {
+        medium.front = select(own.back.gradient, own.front.gradient, own.front.has_value);
+        medium.back = select(own.front.gradient, own.back.gradient, own.back.has_value);
+        if !own.front.has_value && !own.back.has_value {
+            medium.front = vec3(0.0);
+            medium.back = vec3(0.0);
+        }
+    }
+    var begin = max(planes[sheet], pixels[r].inside.x);
+    let last = min(planes[sheet + 1u], pixels[r].inside.y);
+    if HOLES == 0u {
+        if begin < last {
+            pass_piece(r, sheet, own, begin, last, &medium);
+        }
+        return medium;
+    }
+    for (var piece = 0u; piece <= HOLES; piece++) {
+        // Out of the holes that `from` lies in; leaving one may lead into another.
+        for (var i = 0u; i < HOLES * HOLES; i++) {
+            let hole = pixels[r].holes[i % HOLES_OR_ONE];
+            begin = select(begin, hole.y, hole.x <= begin && begin < hole.y);
+        }
+        var end = last;
+        for (var i = 0u; i < HOLES; i++) {
+            let hole = pixels[r].holes[i];
+            end = select(end, min(end, hole.x), hole.x > begin && hole.x < hole.y);
+        }
+        if begin < end {
+            pass_piece(r, sheet, own, begin, end, &medium);
+        }
+        begin = max(begin, end);
+    }
+    return medium;
+}
+
+// Adds a sheet to the picture.
+fn composite(r: u32, sheet: u32, own: Sheet) {
+    if sheet < first_composited || sheet >= stage.end_sheet {
+        return;
+    }
+    var premultiplied = own.radiance.xyz;
+    var depth = own.radiance.w;
+    let before = pixels[r].transmittance;
+    var has_hit = false;
+    if SCALAR && own.has_value {
+        var medium = pass_field(r, sheet, own);
+        if MAXIMUM {
+            pixels[r].hit = max(pixels[r].hit, medium.peak);
+            return;
+        }
+        var color = medium.color;
+        if VOLUME_SHADED && medium.opacity > 0.0 {
+            let normal = gradient_at(medium, medium.place / medium.opacity);
+            color = medium.opacity * lit(color / medium.opacity, normal, direction_of(r), frame.volume_shade);
+        }
+        // Optical depth for opacity: τ / (1 − e^−τ), of which little is left where τ is small.
+        let field_depth = min(medium.depth, MOST_DEPTH);
+        let ratio = select(field_depth / (1.0 - exp(-field_depth)), 1.0 + 0.5 * field_depth, field_depth < 1e-2);
+        premultiplied += ratio * (color + medium.surfaces);
+        depth += field_depth;
+        has_hit = medium.has_hit;
+    }
+    if XRAY {
+        premultiplied = vec3(depth);
+    }
+    if depth > 0.0 {
+        let left = before * exp(-depth);
+        pixels[r].color += (before - left) / depth * premultiplied;
+        // Inside the sheet, optical depth counts as evenly spread; an isosurface is where it is.
+        if !has_hit && before > 0.5 && left <= 0.5 {
+            pixels[r].hit = mix(planes[sheet], planes[sheet + 1u], log(2.0 * before) / depth);
+        }
+        pixels[r].transmittance = left;
+    }
+}
+
+// Adds one splat, without sheets, before or behind what is there.
+fn composite_single(r: u32, depth: f32, splat: Loaded) {
+    var color = splat.color;
+    if SURFACE_SHADED && any(splat.normal != vec3(0.0)) {
+        color = lit(color, splat.normal, direction_of(r), frame.surface_shade);
+    }
+    let left = exp(-depth);
+    let before = pixels[r].transmittance;
+    if BACK_TO_FRONT {
+        pixels[r].color = pixels[r].color * left + (1.0 - left) * color;
+    } else {
+        pixels[r].color += before * (1.0 - left) * color;
+    }
+    pixels[r].transmittance = before * left;
+    // From behind, what those in front will take is not known: there, the nearest that takes half of the light alone counts.
+    if select(before > 0.5 && before * left <= 0.5, left <= 0.5, BACK_TO_FRONT) {
+        pixels[r].hit = select(splat.center.z, length(splat.center), PERSPECTIVE);
+    }
+}

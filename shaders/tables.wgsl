@@ -1,0 +1,65 @@
+// Functions of one value, looked up: the transfer function and its integral, the gradient's factor, the kernel's sections.
+// Mirrors engine/tables.rs, which says where each lies in `tables`.
+
+// Colour and extinction per value; their integrals (extinction times colour, extinction) from the first value on, counted in
+// entries; the factor on the extinction by gradient magnitude; the kernel and its sections.
+@group(0) @binding(6) var<storage, read> tables: array<vec4<f32>>;
+
+// A value as a place in the tables of values.
+fn place_of(value: f32) -> f32 {
+    return clamp((value - frame.transfer.x) * frame.transfer.y, 0.0, frame.transfer.z);
+}
+
+// Colour and extinction of one value.
+fn classify(value: f32) -> vec4<f32> {
+    let at = place_of(value);
+    let low = u32(at);
+    return mix(tables[low], tables[low + 1u], at - f32(low));
+}
+
+fn integral_to(at: f32) -> vec4<f32> {
+    let low = u32(at);
+    return mix(tables[INTEGRAL_TABLE + low], tables[INTEGRAL_TABLE + low + 1u], at - f32(low));
+}
+
+// Values nearer to each other than this many entries are taken as that far apart: their integrals' difference is lost in
+// rounding.
+const NARROW: f32 = 8.0;
+
+// Means over the values between two: extinction times colour, and extinction (pre-integration after Engel, Kraus & Ertl 2001,
+// without the attenuation inside, which the parts of a sheet are thin enough for).
+fn classify_between(a: f32, b: f32) -> vec4<f32> {
+    let at = vec2(place_of(a), place_of(b));
+    let middle = 0.5 * (at.x + at.y);
+    let reach = 0.5 * max(abs(at.x - at.y), NARROW);
+    let low = max(middle - reach, 0.0);
+    let high = min(middle + reach, frame.transfer.z);
+    return (integral_to(high) - integral_to(low)) / (high - low);
+}
+
+// The factor on the extinction where the gradient has a magnitude.
+fn gradient_factor(magnitude: f32) -> f32 {
+    let at = min(magnitude * frame.transfer.w, f32(GRADIENT_ENTRIES - 1u));
+    let low = u32(at);
+    return mix(tables[GRADIENT_TABLE + low].x, tables[GRADIENT_TABLE + low + 1u].x, at - f32(low));
+}
+
+// Kernel and −h′(r)/r at a radius, in kernel space.
+fn kernel_at(radius: f32) -> vec2<f32> {
+    let at = min(radius * frame.kernel.y * f32(RADIAL_ENTRIES - 1u), f32(RADIAL_ENTRIES - 1u));
+    let low = u32(at);
+    let entry = tables[RADIAL_TABLE + low];
+    return mix(entry.xy, entry.zw, at - f32(low));
+}
+
+// The kernel's integral along a line at distance `rho` from its centre, from the closest approach to t. An entry holds the
+// four corners of its cell.
+fn kernel_integral(rho: f32, t: f32) -> f32 {
+    let last = f32(SECTION_CELLS);
+    let at = min(vec2(rho, abs(t)) * frame.kernel.y * last, vec2(last - 1e-3));
+    let low = vec2<u32>(at);
+    let part = at - vec2<f32>(low);
+    let cell = tables[SECTION_TABLE + low.x * SECTION_CELLS + low.y];
+    let value = mix(mix(cell.x, cell.y, part.y), mix(cell.z, cell.w, part.y), part.x);
+    return select(-value, value, t >= 0.0);
+}

@@ -1,0 +1,168 @@
+//! Functions of one value, tabulated for march (shaders/tables.wgsl): the transfer function, its integral, the gradient's
+//! factor, the kernel and its sections. All lie in one buffer, whose parts start at fixed places.
+
+use crate::{
+    math::{Kernel, Profile},
+    volume::TransferFunction,
+};
+
+/// Entries of the transfer function: fine enough that a piecewise-linear function of 16-bit data keeps its corners.
+const VALUES: usize = 4096;
+/// Entries of the gradient's factor.
+const GRADIENTS: usize = 256;
+/// Entries of the kernel along its radius.
+const RADII: usize = 1024;
+/// Cells of the sections' table along each side.
+const SECTIONS: usize = 128;
+
+/// Where the parts start, one element more in each than its last index, for interpolation at the upper end.
+const INTEGRAL_START: usize = VALUES + 1;
+const GRADIENT_START: usize = 2 * INTEGRAL_START;
+const RADIAL_START: usize = GRADIENT_START + GRADIENTS + 1;
+const SECTION_START: usize = RADIAL_START + RADII;
+
+/// The constants that tables.wgsl reads them by.
+pub fn constants() -> String {
+    format!(
+        "const INTEGRAL_TABLE: u32 = {INTEGRAL_START}u;\nconst GRADIENT_TABLE: u32 = {GRADIENT_START}u;\n\
+         const GRADIENT_ENTRIES: u32 = {GRADIENTS}u;\nconst RADIAL_TABLE: u32 = {RADIAL_START}u;\n\
+         const RADIAL_ENTRIES: u32 = {RADII}u;\nconst SECTION_TABLE: u32 = {SECTION_START}u;\n\
+         const SECTION_CELLS: u32 = {SECTIONS}u;\n"
+    )
+}
+
+/// The tables of a picture, and the scales that values are looked up by: first value, entries per value, last index, entries
+/// per gradient magnitude.
+#[derive(Debug)]
+pub struct Tables {
+    pub entries: Vec<[f32; 4]>,
+    pub transfer: [f32; 4],
+}
+
+impl Tables {
+    /// Of a transfer function over the values that occur. Only a kernel without closed form gets tables.
+    pub fn new(transfer: &TransferFunction, [low, high]: [f64; 2], kernel: Option<&Kernel>) -> Self {
+        let last = (VALUES - 1) as f64;
+        let mut entries = transfer.table([low, high], VALUES);
+        entries.push(entries[VALUES - 1]);
+        entries.extend(integrals(transfer, [low, high]));
+        let most = transfer.gradient.last().map_or(1.0, |point| point.0.max(f64::MIN_POSITIVE));
+        let magnitude = |i: usize| most * i as f64 / (GRADIENTS - 1) as f64;
+        entries.extend((0..=GRADIENTS).map(|i| [transfer.gradient_factor(magnitude(i)) as f32, 0.0, 0.0, 0.0]));
+        if let Some(kernel) = kernel.filter(|kernel| !matches!(kernel.profile, Profile::Gaussian(_))) {
+            entries.extend(radial(kernel));
+            entries.extend(sections(kernel));
+        }
+        let per_value = if high > low { last / (high - low) } else { 0.0 };
+        let per_magnitude = (GRADIENTS - 1) as f64 / most;
+        Self { entries, transfer: [low as f32, per_value as f32, last as f32, per_magnitude as f32] }
+    }
+}
+
+/// Running integrals of extinction times colour, and of extinction, in entries. Each step is a mean over points inside it, so
+/// that a jump of the function between two entries counts where it is.
+fn integrals(transfer: &TransferFunction, [low, high]: [f64; 2]) -> Vec<[f32; 4]> {
+    const INSIDE: usize = 4;
+    let last = (VALUES - 1) as f64;
+    let mut sum = [0.0f64; 4];
+    let mut all = vec![[0.0f32; 4]];
+    for i in 0..VALUES {
+        for j in 0..INSIDE {
+            let at = (i as f64 + (j as f64 + 0.5) / INSIDE as f64).min(last);
+            let value = low + (high - low) * at / last;
+            let [red, green, blue] = transfer.color(value);
+            let extinction = transfer.extinction(value);
+            for (sum, part) in sum.iter_mut().zip([red, green, blue, 1.0]) {
+                *sum += part * extinction / INSIDE as f64;
+            }
+        }
+        all.push(sum.map(|v| v as f32));
+    }
+    all
+}
+
+/// Value and −h′(r)/r at each radius, beside those at the next.
+fn radial(kernel: &Kernel) -> Vec<[f32; 4]> {
+    let step = kernel.extent / (RADII - 1) as f64;
+    let at = |i: usize| {
+        // h′ by central differences; at the centre h′/r has a limit, which a radius beside it nearly has.
+        let r = (i as f64 * step).max(0.5 * step);
+        let d = 0.25 * step;
+        let slope =
+            (kernel.value((r + d).min(kernel.extent)) - kernel.value(r - d)) / ((r + d).min(kernel.extent) - r + d);
+        [kernel.value(i as f64 * step) as f32, (-slope / r) as f32]
+    };
+    let entries: Vec<_> = (0..RADII).map(at).collect();
+    (0..RADII)
+        .map(|i| {
+            let ([a, b], [c, d]) = (entries[i], entries[(i + 1).min(RADII - 1)]);
+            [a, b, c, d]
+        })
+        .collect()
+}
+
+/// The integral from the closest approach to t along a line at distance ρ from the centre (Westover's footprint table of 1990
+/// with one more axis), for cells of ρ and t: its four corners, (ρ, t), (ρ, t+), (ρ+, t), (ρ+, t+).
+fn sections(kernel: &Kernel) -> Vec<[f32; 4]> {
+    // Steps of the integration inside a cell.
+    const INSIDE: usize = 8;
+    let cell = kernel.extent / SECTIONS as f64;
+    let row = |i: usize| {
+        let rho = i as f64 * cell;
+        let value = |t: f64| kernel.value((rho * rho + t * t).sqrt());
+        let step = cell / INSIDE as f64;
+        let mut sum = 0.0;
+        let mut row = vec![0.0f32];
+        for j in 0..SECTIONS * INSIDE {
+            let t = j as f64 * step;
+            sum += step / 6.0 * (value(t) + 4.0 * value(t + 0.5 * step) + value(t + step));
+            if (j + 1) % INSIDE == 0 {
+                row.push(sum as f32);
+            }
+        }
+        row
+    };
+    let rows: Vec<_> = (0..=SECTIONS).map(row).collect();
+    let corners = |i: usize, j: usize| [rows[i][j], rows[i][j + 1], rows[i + 1][j], rows[i + 1][j + 1]];
+    (0..SECTIONS).flat_map(|i| (0..SECTIONS).map(move |j| (i, j))).map(|(i, j)| corners(i, j)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parts_start_where_the_shader_looks() {
+        let transfer = TransferFunction { gradient: vec![(0.0, 0.0), (2.0, 1.0)], ..TransferFunction::default() };
+        let tables = Tables::new(&transfer, [0.0, 1.0], Some(&Kernel::b_spline(2.0).unwrap()));
+        assert_eq!(tables.entries.len(), SECTION_START + SECTIONS * SECTIONS);
+        assert_eq!(tables.entries[RADIAL_START][0], 1.0);
+        let factor = tables.entries[GRADIENT_START + GRADIENTS / 2][0];
+        assert!((factor - 0.5).abs() < 0.01, "{factor}");
+    }
+
+    #[test]
+    fn integrals_are_exact_across_a_jump() {
+        let transfer =
+            TransferFunction { opacity: vec![(0.0, 0.0), (0.5, 0.0), (0.5, 0.9)], ..TransferFunction::default() };
+        let tables = Tables::new(&transfer, [0.0, 1.0], None);
+        let whole = f64::from(tables.entries[INTEGRAL_START + VALUES - 1][3]) / (VALUES - 1) as f64;
+        let expected = 0.5 * transfer.extinction(0.9);
+        assert!((whole / expected - 1.0).abs() < 1e-3, "{whole} {expected}");
+    }
+
+    #[test]
+    fn sections_add_up_to_the_kernel() {
+        let kernel = Kernel::b_spline(2.0).unwrap();
+        let cells = sections(&kernel);
+        // Twice the integrals at all ρ, over the rings around the axis, are the integral over space.
+        let cell = kernel.extent / SECTIONS as f64;
+        let ring = |i: usize| {
+            let [_, inner, _, outer] = cells[i * SECTIONS + SECTIONS - 1].map(f64::from);
+            let (a, b) = (i as f64 * cell, (i + 1) as f64 * cell);
+            2.0 * std::f64::consts::PI * (a * inner + b * outer) * (b - a)
+        };
+        let whole: f64 = (0..SECTIONS).map(ring).sum();
+        assert!((whole / kernel.integral() - 1.0).abs() < 1e-3, "{whole}");
+    }
+}

@@ -1,0 +1,222 @@
+//! How a field shows in one sheet of a ray.
+
+use super::{
+    classify::Classifier,
+    composite::{Medium, Step},
+    shade,
+};
+use crate::volume::{Isosurface, Lattice, Shade};
+use glam::DVec3;
+
+/// The scalar field of a scene, classified after interpolation.
+pub(super) struct Field<'a> {
+    pub classifier: Classifier<'a>,
+    /// Where the samples lie; none for scattered ones.
+    pub lattice: Option<&'a Lattice>,
+    pub shade: Option<Shade>,
+    /// Surfaces of one value.
+    pub surfaces: &'a [Isosurface],
+    /// Whether values inside a sheet are classified, or their mean.
+    pub inside: bool,
+}
+
+/// The field in one sheet of a ray. Places in it are counted from 0 at the front to 1 at the back.
+pub(super) struct Layer {
+    /// The distances of its faces.
+    pub span: [f64; 2],
+    pub mean: f64,
+    /// The values at the faces.
+    pub faces: [Option<f64>; 2],
+    pub gradients: [Option<DVec3>; 2],
+    /// Factor on the extinction.
+    pub filling: f64,
+}
+
+/// A part of a sheet: places, and the values there.
+struct Part {
+    places: [f64; 2],
+    values: [f64; 2],
+}
+
+/// Parts of a piece over which values count as linear.
+const PARTS: u32 = 4;
+
+/// Light that is less than this counts as none, so that optical depths stay finite.
+const LEAST_LIGHT: f64 = 1e-9;
+
+impl Field<'_> {
+    /// Whether gradients show.
+    pub fn needs_gradients(&self) -> bool {
+        self.shade.is_some() || !self.classifier.transfer.gradient.is_empty()
+    }
+
+    /// The surfaces that a part passes, each with its share of the part, in the order met.
+    fn met(&self, [a, b]: [f64; 2]) -> Vec<(f64, &Isosurface)> {
+        let crossed = self.surfaces.iter().filter(|surface| (a < surface.value) != (b < surface.value));
+        let mut met: Vec<_> = crossed.map(|surface| ((surface.value - a) / (b - a), surface)).collect();
+        // The sort is stable: equal values stay in the order of the list.
+        met.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+        met
+    }
+
+    fn lit(&self, color: DVec3, gradient: DVec3, direction: DVec3) -> DVec3 {
+        self.shade.as_ref().map_or(color, |shade| shade::lit(color, gradient, direction, shade))
+    }
+}
+
+impl Layer {
+    /// The value at a place: of the parabola that has the faces' values and the mean.
+    pub fn value(&self, u: f64) -> f64 {
+        let [front, back] = self.faces.map(|face| face.unwrap_or(self.mean));
+        let middle = 1.5 * self.mean - 0.25 * (front + back);
+        front * (1.0 - u) * (1.0 - 2.0 * u) + 4.0 * middle * u * (1.0 - u) + back * u * (2.0 * u - 1.0)
+    }
+
+    fn gradient(&self, u: f64) -> DVec3 {
+        match self.gradients {
+            [Some(front), Some(back)] => (1.0 - u) * front + u * back,
+            [Some(only), None] | [None, Some(only)] => only,
+            [None, None] => DVec3::ZERO,
+        }
+    }
+
+    fn distance(&self, u: f64) -> f64 {
+        self.span[0] + u * (self.span[1] - self.span[0])
+    }
+
+    /// Pieces of the ray, cut in parts.
+    fn parts(&self, field: &Field, pieces: &[[f64; 2]]) -> Vec<Part> {
+        let count = if field.inside || !field.surfaces.is_empty() { PARTS } else { 1 };
+        let [front, back] = self.span;
+        let parts = pieces.iter().flat_map(|&[from, to]| {
+            let place = move |i: u32| {
+                let share = f64::from(i) / f64::from(count);
+                ((1.0 - share) * from + share * to - front) / (back - front)
+            };
+            (0..count).map(move |i| {
+                let places = [place(i), place(i + 1)];
+                Part { places, values: places.map(|u| self.value(u)) }
+            })
+        });
+        parts.collect()
+    }
+
+    /// The largest value at the ends of all parts, or the mean.
+    pub fn largest(&self, field: &Field, pieces: &[[f64; 2]]) -> Option<f64> {
+        if !field.inside {
+            return (!pieces.is_empty()).then_some(self.mean);
+        }
+        self.parts(field, pieces).iter().flat_map(|part| part.values).reduce(f64::max)
+    }
+
+    /// What the pieces of the ray put on it: all together, and one after another.
+    pub fn shine(&self, field: &Field, direction: DVec3, pieces: &[[f64; 2]]) -> (Medium, Vec<Step>) {
+        let mut steps = Vec::new();
+        let mut light = 1.0;
+        // The medium: opacity, colour and place weighted by it. Surfaces: lit colours.
+        let (mut opacity, mut color, mut place) = (0.0, DVec3::ZERO, 0.0);
+        let mut surfaces = DVec3::ZERO;
+        for Part { places: [start, end], values: [a, b] } in self.parts(field, pieces) {
+            let middle = 0.5 * (start + end);
+            let (extinction, medium) =
+                if field.inside { field.classifier.between(a, b) } else { field.classifier.at(self.mean) };
+            let factor = field.classifier.transfer.gradient_factor(self.gradient(middle).length());
+            let length = self.distance(end) - self.distance(start);
+            let depth = extinction * factor * length * self.filling;
+            let at = |share: f64| start + share * (end - start);
+            let mut before = 0.0;
+            let surfaces_met = field.met([a, b]).into_iter().map(|(share, surface)| (share, Some(surface)));
+            for (share, surface) in surfaces_met.chain([(1.0, None)]) {
+                let depth = depth * (share - before);
+                let alpha = -(-depth).exp_m1();
+                opacity += light * alpha;
+                color += light * alpha * medium;
+                place += light * alpha * middle;
+                light *= 1.0 - alpha;
+                steps.push(Step { depth, span: [before, share].map(|share| self.distance(at(share))) });
+                if let Some(surface) = surface {
+                    let lit = field.lit(DVec3::from(surface.color), self.gradient(at(share)), direction);
+                    surfaces += light * surface.opacity * lit;
+                    light *= 1.0 - surface.opacity;
+                    let depth = -(1.0 - surface.opacity).ln();
+                    steps.push(Step { depth, span: [self.distance(at(share)); 2] });
+                }
+                before = share;
+            }
+        }
+        if opacity > 0.0 {
+            surfaces += opacity * field.lit(color / opacity, self.gradient(place / opacity), direction);
+        }
+        let taken = 1.0 - light;
+        if taken <= 0.0 {
+            return (Medium::default(), Vec::new());
+        }
+        (Medium { depth: -light.max(LEAST_LIGHT).ln(), color: surfaces / taken }, steps)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volume::TransferFunction;
+
+    fn layer(faces: [Option<f64>; 2], mean: f64) -> Layer {
+        Layer { span: [3.0, 5.0], mean, faces, gradients: [None; 2], filling: 1.0 }
+    }
+
+    #[test]
+    fn the_parabola_has_its_faces_and_its_mean() {
+        for (faces, mean) in [([Some(1.0), Some(3.0)], 2.0), ([Some(-1.0), Some(0.5)], 4.0), ([None, Some(7.0)], 2.0)] {
+            let layer = layer(faces, mean);
+            let steps = 1000;
+            let sum: f64 = (0..steps).map(|i| layer.value((f64::from(i) + 0.5) / f64::from(steps))).sum();
+            assert!((sum / f64::from(steps) - mean).abs() < 1e-5);
+            assert!((layer.value(0.0) - faces[0].unwrap_or(mean)).abs() < 1e-12);
+            assert!((layer.value(1.0) - faces[1].unwrap_or(mean)).abs() < 1e-12);
+        }
+        assert!((layer([Some(1.0), Some(3.0)], 2.0).value(0.25) - 1.5).abs() < 1e-12, "a line stays a line");
+    }
+
+    #[test]
+    fn surfaces_and_medium_by_hand() {
+        // Extinction 1 everywhere; a value from 0 to 8 passes two surfaces, listed the other way round.
+        let surface = |value: f64, color: [f64; 3], opacity: f64| Isosurface { value, color, opacity };
+        let transfer = TransferFunction {
+            color: vec![(0.0, [0.0, 0.0, 1.0])],
+            opacity: vec![(0.0, 1.0 - (-1.0_f64).exp())],
+            isosurfaces: vec![surface(6.0, [0.0, 1.0, 0.0], 1.0), surface(2.0, [1.0, 0.0, 0.0], 0.5)],
+            ..TransferFunction::default()
+        };
+        let field = |inside: bool| Field {
+            classifier: Classifier::new(&transfer),
+            lattice: None,
+            shade: None,
+            surfaces: &transfer.isosurfaces,
+            inside,
+        };
+        let layer = layer([Some(0.0), Some(8.0)], 4.0);
+        for inside in [true, false] {
+            let (medium, steps) = layer.shine(&field(inside), DVec3::Z, &[[3.0, 5.0]]);
+            assert!((medium.depth + 1e-9_f64.ln()).abs() < 1e-12);
+            let through = (-0.5_f64).exp();
+            let red = through * 0.5;
+            let green = red * (-1.0_f64).exp();
+            let blue = 1.0 - through + red * (1.0 - (-1.0_f64).exp());
+            assert!((medium.color - DVec3::new(red, green, blue)).length() < 1e-12, "{}", medium.color);
+            let places: Vec<f64> =
+                steps.iter().filter(|s| s.span[0] == s.span[1] && s.depth > 0.0).map(|s| s.span[0]).collect();
+            assert_eq!(places, [3.5, 4.5]);
+            // Backwards, and cut to its second half.
+            let (back, _) = Layer { faces: [Some(8.0), Some(0.0)], ..layer_like(&layer) }.shine(
+                &field(inside),
+                DVec3::Z,
+                &[[4.0, 5.0]],
+            );
+            assert!((back.depth - 1.0 - 2.0_f64.ln()).abs() < 1e-12);
+        }
+    }
+
+    fn layer_like(layer: &Layer) -> Layer {
+        Layer { ..*layer }
+    }
+}

@@ -1,0 +1,255 @@
+//! The kernels of a scene, in view space.
+
+use super::{
+    kernel::{Amount, Kernel, Load, Radiance, Sample},
+    profile::Profile,
+};
+use crate::{
+    math::{self, View},
+    scene::{Item, Scene},
+    splat::{FOOTPRINT_BLUR, Payload, Splat, SplatSet, decode_normal},
+    volume::{Arrangement, Lattice, TransferFunction, Volume},
+};
+use glam::{DMat3, DVec3};
+
+/// How samples are classified before they are added.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Before {
+    /// Whether they need normals.
+    pub lit: bool,
+}
+
+/// All kernels of a scene, in its order. `before`: samples become radiance.
+pub(super) fn gather<'a>(scene: &'a Scene, view: &View, before: Option<Before>) -> Vec<Kernel<'a>> {
+    let mut kernels = Vec::new();
+    for item in &scene.items {
+        match item {
+            Item::Radiance(set) => {
+                kernels.extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, None, view)))
+            }
+            Item::Scalar(set, transfer) => {
+                let before = before.map(|before| (before, transfer));
+                kernels.extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, before, view)));
+            }
+            Item::Volume(volume, kernel, transfer) => {
+                let before = before.map(|before| (before, transfer));
+                from_volume(&mut kernels, volume, kernel, before, view);
+            }
+        }
+    }
+    kernels
+}
+
+/// How much the colour and normal of a splat count within a sheet: what faces the eye hides what faces away. The change
+/// from one to the other is spread over a quarter of the cosine, and far sides keep enough to have a colour when alone.
+fn facing(normal: DVec3, center: DVec3, view: &View) -> f64 {
+    let ray = if view.perspective { center.normalize_or_zero() } else { DVec3::Z };
+    (0.5 - 4.0 * normal.dot(ray)).clamp(1.0 / 255.0, 1.0)
+}
+
+/// A sample as radiance: `density` times as dense as its transfer function says. Its normal points to smaller values,
+/// because fields are mostly dense inside, and surfaces face outward.
+fn classified(
+    value: f64,
+    density: f64,
+    slope: DVec3,
+    center: DVec3,
+    (before, transfer): (Before, &TransferFunction),
+    view: &View,
+) -> Load {
+    let normal = (-slope).try_normalize().filter(|_| before.lit);
+    Load::Radiance(Radiance {
+        amount: Amount::Extinction(transfer.extinction(value) * density),
+        color: DVec3::from(transfer.color(value)),
+        normal,
+        facing: normal.map_or(1.0, |normal| facing(normal, center, view)),
+    })
+}
+
+/// A splat, widened so that it does not fall between pixels; `None` where it has no volume or is not finite.
+fn from_splat<'a>(
+    set: &SplatSet,
+    splat: &Splat,
+    before: Option<(Before, &TransferFunction)>,
+    view: &View,
+) -> Option<Kernel<'a>> {
+    let center = view.to_view(set.origin + DVec3::from(splat.center.map(f64::from)));
+    let [b00, b10, b11, b20, b21, b22] = splat.factor.map(f64::from);
+    let columns = [DVec3::new(b00, b10, b20), DVec3::new(0.0, b11, b21), DVec3::new(0.0, 0.0, b22)];
+    let sharp = view.rotation * DMat3::from_cols(columns[0], columns[1], columns[2]);
+    let pixel = if view.perspective { center.length() } else { 1.0 } / view.scale;
+    let blur = DMat3::from_diagonal(DVec3::splat((FOOTPRINT_BLUR * pixel).powi(2)));
+    let factor = cholesky(sharp * sharp.transpose() + blur)?;
+    let load = match set.payload {
+        Payload::Scalar => {
+            let (weight, slope) = splat.weight_and_slope();
+            let (value, weight) = (f64::from(splat.strength), f64::from(weight));
+            // A slope across a flat kernel has no meaning in space.
+            let slope = Some(sharp.inverse().transpose() * slope.as_dvec3()).filter(|slope| slope.is_finite());
+            let slope = slope.unwrap_or(DVec3::ZERO);
+            match before {
+                Some(before) => classified(value, weight / f64::from(set.overlap), slope, center, before, view),
+                None => Load::Sample(Sample { value, weight, slope }),
+            }
+        }
+        Payload::Radiance => {
+            let [red, green, blue, opacity] = splat.color.to_le_bytes().map(|byte| f64::from(byte) / 255.0);
+            let normal = decode_normal(splat.normal).map(|normal| view.rotation * normal.as_dvec3());
+            Load::Radiance(Radiance {
+                amount: Amount::Depth(f64::from(splat.strength) * opacity),
+                color: DVec3::new(red, green, blue),
+                normal,
+                facing: normal.map_or(1.0, |normal| facing(normal, center, view)),
+            })
+        }
+    };
+    Some(Kernel::new(center, factor, set.extent.into(), Profile::Gaussian, load))
+}
+
+/// The kernels of a volume's samples.
+fn from_volume<'a>(
+    kernels: &mut Vec<Kernel<'a>>,
+    volume: &Volume,
+    shape: &'a math::Kernel,
+    before: Option<(Before, &TransferFunction)>,
+    view: &View,
+) {
+    let lattice = volume.drawn_lattice();
+    let value = |at: usize| volume.drawn_value(at);
+    let sloped = matches!(lattice.arrangement, Arrangement::Rectilinear(_));
+    let density = 1.0 / overlap(shape, lattice);
+    kernels.extend((0..lattice.len()).map(|at| {
+        let center = view.to_view(lattice.sample_position(at));
+        let unit = DMat3::from_diagonal(lattice.unit(lattice.index(at)));
+        let factor = view.rotation * lattice.axes * unit * shape.unit();
+        let slope = || view.rotation * slope(lattice, at, value);
+        let load = match before {
+            Some(before) => {
+                let slope = if before.0.lit { slope() } else { DVec3::ZERO };
+                classified(value(at), density, slope, center, before, view)
+            }
+            None => {
+                let slope = if sloped { slope() } else { DVec3::ZERO };
+                Load::Sample(Sample { value: value(at), weight: 1.0, slope })
+            }
+        };
+        Kernel::new(center, factor, shape.radius(), Profile::of(shape), load)
+    }));
+}
+
+/// What the kernels at all samples of a lattice sum to on average.
+fn overlap(shape: &math::Kernel, lattice: &Lattice) -> f64 {
+    match lattice.arrangement {
+        // Two samples in each cubic cell, and kernels in units of √½ of its edge.
+        Arrangement::BodyCentred => shape.integral() * std::f64::consts::FRAC_1_SQRT_2.powi(3) / 0.5,
+        Arrangement::Cartesian | Arrangement::Rectilinear(_) => shape.integral(),
+    }
+}
+
+/// The gradient at a sample of a lattice, in world space: along each axis the slope of the parabola through the sample and its
+/// two neighbours, one-sided at the border, 0 along an axis of one sample. Neighbours on a body-centred lattice are those of
+/// the same cubic lattice.
+fn slope(lattice: &Lattice, at: usize, value: impl Fn(usize) -> f64) -> DVec3 {
+    let index = lattice.index(at);
+    let [nx, ny, _] = lattice.dims;
+    let strides = match lattice.arrangement {
+        Arrangement::BodyCentred => [1, 1, 2],
+        _ => [1, 1, 1],
+    };
+    let here = (lattice.steps(index), value(at));
+    let along = DVec3::from_array(std::array::from_fn(|axis| {
+        let neighbour = |place: Option<usize>| {
+            let place = place.filter(|place| *place < lattice.dims[axis])?;
+            let mut index = index;
+            index[axis] = place;
+            let distance = (lattice.steps(index)[axis] - here.0[axis]).abs();
+            Some((value(index[0] + nx * (index[1] + ny * index[2])) - here.1, distance))
+        };
+        let before = neighbour(index[axis].checked_sub(strides[axis]));
+        let after = neighbour(Some(index[axis] + strides[axis]));
+        match (before, after) {
+            (Some((fall, d0)), Some((rise, d1))) => (rise * d0 / d1 - fall * d1 / d0) / (d0 + d1),
+            (None, Some((rise, distance))) => rise / distance,
+            (Some((fall, distance)), None) => -fall / distance,
+            (None, None) => 0.0,
+        }
+    }));
+    lattice.axes.inverse().transpose() * along
+}
+
+/// The lower triangular L with L·Lᵀ = `matrix`; `None` where the matrix is not positive definite.
+fn cholesky(matrix: DMat3) -> Option<DMat3> {
+    let row = |r: usize, c: usize| matrix.col(c)[r];
+    let pivot = |squared: f64| (squared > 0.0 && squared.is_finite()).then(|| squared.sqrt());
+    let l00 = pivot(row(0, 0))?;
+    let (l10, l20) = (row(1, 0) / l00, row(2, 0) / l00);
+    let l11 = pivot(row(1, 1) - l10 * l10)?;
+    let l21 = (row(2, 1) - l20 * l10) / l11;
+    let l22 = pivot(row(2, 2) - l20 * l20 - l21 * l21)?;
+    Some(DMat3::from_cols(DVec3::new(l00, l10, l20), DVec3::new(0.0, l11, l21), DVec3::new(0.0, 0.0, l22)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        math::{Camera, Projection},
+        splat::NO_NORMAL,
+        volume::Samples,
+    };
+    use std::sync::Arc;
+
+    #[test]
+    fn splats_are_widened_and_no_more() {
+        let splat = Splat {
+            center: [0.4, -0.3, 0.2],
+            strength: 1.0,
+            factor: [0.5, -0.2, 0.3, 0.4, 0.1, 0.25],
+            color: u32::MAX,
+            normal: NO_NORMAL,
+        };
+        let set = SplatSet {
+            origin: DVec3::new(0.1, 0.2, 0.3),
+            payload: Payload::Radiance,
+            splats: vec![splat],
+            extent: 8.0,
+            overlap: 1.0,
+        };
+        for projection in [Projection::Perspective { view_angle: 50.0 }, Projection::Orthographic { height: 3.0 }] {
+            let position = DVec3::new(2.0, -2.5, 1.0);
+            let camera = Camera { position, focal_point: DVec3::ZERO, view_up: DVec3::Z, projection };
+            let view = camera.view([40, 30]).unwrap();
+            let kernel = from_splat(&set, &set.splats[0], None, &view).unwrap();
+            let pixel = if view.perspective { kernel.center.length() } else { 1.0 } / view.scale;
+            // Rows of B give Σ along the world's axes: x has 0.5², x and y share −0.1.
+            let covariance = |a: DVec3, b: DVec3| kernel.covariance(view.rotation * a, view.rotation * b);
+            assert!((covariance(DVec3::X, DVec3::X) - 0.25 - (0.35 * pixel).powi(2)).abs() < 1e-9);
+            assert!((covariance(DVec3::X, DVec3::Y) + 0.1).abs() < 1e-7);
+        }
+        assert!(cholesky(DMat3::from_diagonal(DVec3::new(1.0, 0.0, 1.0))).is_none());
+        assert!(cholesky(DMat3::from_diagonal(DVec3::new(1.0, f64::NAN, 1.0))).is_none());
+    }
+
+    #[test]
+    fn slopes_of_linear_fields_are_exact_on_every_lattice() {
+        let axes = DMat3::from_cols(DVec3::new(0.3, 0.1, 0.0), DVec3::new(0.0, 0.2, 0.1), DVec3::new(0.05, 0.0, 0.4));
+        let gradient = DVec3::new(1.0, -2.0, 0.5);
+        let places = Arc::new([vec![0.0, 1.0, 1.5, 4.0], vec![-1.0, 0.5, 1.0], vec![0.0, 0.1, 3.0, 3.5]]);
+        for arrangement in [Arrangement::Cartesian, Arrangement::BodyCentred, Arrangement::Rectilinear(places)] {
+            let lattice = Lattice { arrangement, ..Lattice::cartesian([4, 3, 4], DVec3::ONE, axes) };
+            let values: Vec<f32> =
+                (0..lattice.len()).map(|at| gradient.dot(lattice.sample_position(at)) as f32).collect();
+            let volume = Volume::new(lattice, Samples::F32(values)).unwrap();
+            for at in 0..volume.len() {
+                let found = slope(&volume.lattice, at, |at| volume.value(at));
+                assert!((found - gradient).length() < 1e-5, "{found} at {at}");
+            }
+        }
+        // Of a parabola too, between unequal neighbours.
+        let places = Arc::new([vec![0.0, 1.0, 4.0], vec![0.0], vec![0.0]]);
+        let arrangement = Arrangement::Rectilinear(places);
+        let lattice = Lattice { arrangement, ..Lattice::with_spacing([3, 1, 1], DVec3::splat(0.5)) };
+        let found = slope(&lattice, 1, |at| lattice.sample_position(at).x.powi(2));
+        assert!((found - DVec3::X).length() < 1e-12, "{found}");
+    }
+}

@@ -1,0 +1,157 @@
+//! Image-aligned sheets: the pixels of [`Mode::Sheets`](crate::scene::Mode::Sheets).
+
+use super::{
+    Frame, LEAST_DEPTH, clip,
+    composite::{Composite, Medium},
+    face::Face,
+    field::{Field, Layer},
+    kernel::{Kernel, Load},
+    ray::Ray,
+    sheet::Sheet,
+};
+use crate::scene::{Gradient, Optics};
+use glam::DVec3;
+
+/// The values of a pixel's faces in the pixels to the left, right, above and below.
+type Around = [Vec<Option<f64>>; 4];
+
+impl Frame<'_> {
+    /// Draws a row.
+    pub(super) fn row_of_sheets(&self, row: i64) -> Vec<Composite> {
+        let kernels = self.kernels_of_row(row);
+        let central = self.gradient == Gradient::Central && self.field.as_ref().is_some_and(Field::needs_gradients);
+        let beside = central.then(|| [row - 1, row + 1].map(|row| self.kernels_of_row(row)));
+        let pixel = |column: i64| {
+            let ray = self.ray(column, row);
+            let around = beside.as_ref().map(|[above, below]| {
+                let neighbours = [
+                    (column - 1, row, &kernels),
+                    (column + 1, row, &kernels),
+                    (column, row - 1, above),
+                    (column, row + 1, below),
+                ];
+                neighbours.map(|(column, row, kernels)| {
+                    self.faces(&self.ray(column, row), kernels).iter().map(Face::value).collect()
+                })
+            });
+            self.pixel_of_sheets(&ray, &kernels, around)
+        };
+        (0..i64::from(self.view.size[0])).map(pixel).collect()
+    }
+
+    /// Sums the kernels over the sheets of a ray.
+    fn sheets(&self, ray: &Ray, kernels: &[&Kernel], allowed: &[[f64; 2]]) -> Vec<Sheet> {
+        let mut sheets = vec![Sheet::default(); self.count()];
+        for kernel in kernels {
+            let Some(crossing) = kernel.cross(ray) else { continue };
+            let [from, to] = crossing.span();
+            let first = self.planes[1..].partition_point(|&plane| plane < from);
+            let past = self.planes.partition_point(|&plane| plane < to).min(self.count());
+            for (k, sheet) in sheets.iter_mut().enumerate().take(past).skip(first) {
+                let part = self.span(k);
+                match &kernel.load {
+                    Load::Radiance(radiance) if clip::contains(allowed, crossing.closest) => {
+                        sheet.light.add(radiance, crossing.optical_depth(radiance.amount, part));
+                    }
+                    Load::Radiance(_) => {}
+                    Load::Sample(sample) => sheet.mean.add(sample, kernel.center, &crossing, ray, part),
+                }
+            }
+        }
+        sheets
+    }
+
+    /// Sums the samples at the faces of a ray's sheets.
+    pub(super) fn faces(&self, ray: &Ray, kernels: &[&Kernel]) -> Vec<Face> {
+        let mut faces = vec![Face::default(); self.planes.len()];
+        if self.field.is_none() {
+            return faces;
+        }
+        for kernel in kernels {
+            let Load::Sample(sample) = &kernel.load else { continue };
+            let Some(crossing) = kernel.cross(ray) else { continue };
+            let [from, to] = crossing.span();
+            let first = self.planes.partition_point(|&plane| plane < from);
+            let past = self.planes.partition_point(|&plane| plane <= to);
+            for (face, &plane) in faces.iter_mut().zip(&self.planes).take(past).skip(first) {
+                face.add(sample, kernel.center, &crossing, ray, plane);
+            }
+        }
+        faces
+    }
+
+    /// Colours a pixel's sheets and composites them.
+    pub(super) fn pixel_of_sheets(&self, ray: &Ray, kernels: &[&Kernel], around: Option<Around>) -> Composite {
+        let allowed = clip::allowed(ray, &self.view, &self.clips);
+        let sheets = self.sheets(ray, kernels, &allowed);
+        let Some(field) = &self.field else {
+            let mut composite = Composite::EMPTY;
+            sheets.iter().enumerate().for_each(|(k, sheet)| composite.pass(self.surface(sheet, ray), self.span(k)));
+            return composite;
+        };
+        let faces = self.faces(ray, kernels);
+        let gradients: Vec<Option<DVec3>> = faces
+            .iter()
+            .zip(&self.planes)
+            .enumerate()
+            .map(|(i, (face, &plane))| match &around {
+                Some(around) => face.central_gradient(ray, plane, around.each_ref().map(|values| values[i])),
+                None => face.gradient(),
+            })
+            .collect();
+        let held = match field.lattice {
+            Some(lattice) => clip::intersection(&allowed, clip::sample_box(ray, &self.view, lattice)),
+            None => allowed,
+        };
+        let layer = |k: usize| {
+            let [from, to] = self.span(k);
+            let pieces = clip::intersection(&held, Some([from, to]));
+            let mean = &sheets[k].mean;
+            let filling = if field.lattice.is_some() { 1.0 } else { (mean.weight / (to - from)).min(1.0) };
+            let layer = Layer {
+                span: [from, to],
+                mean: mean.value(to - from)?,
+                faces: [faces[k].value(), faces[k + 1].value()],
+                gradients: [gradients[k], gradients[k + 1]],
+                filling,
+            };
+            Some((layer, pieces))
+        };
+        if self.optics == Optics::Maximum {
+            let values =
+                (0..self.count()).filter_map(|k| layer(k).and_then(|(layer, pieces)| layer.largest(field, &pieces)));
+            return values.reduce(f64::max).map_or(Composite::EMPTY, |value| self.largest(field, value));
+        }
+        let mut composite = Composite::EMPTY;
+        for (k, sheet) in sheets.iter().enumerate() {
+            let surface = self.surface(sheet, ray);
+            match layer(k) {
+                Some((layer, pieces)) => {
+                    let (mut medium, steps) = layer.shine(field, ray.direction, &pieces);
+                    if self.optics == Optics::XRay {
+                        medium.color = DVec3::ONE;
+                    }
+                    if surface.depth > 0.0 {
+                        composite.pass(surface.with(medium), self.span(k));
+                    } else {
+                        composite.pass_in_steps(medium, &steps);
+                    }
+                }
+                None => composite.pass(surface, self.span(k)),
+            }
+        }
+        composite
+    }
+
+    /// The colour of the largest value on a ray.
+    fn largest(&self, field: &Field, value: f64) -> Composite {
+        let transfer = field.classifier.transfer;
+        let opacity = transfer.opacity(value);
+        Composite { color: opacity * DVec3::from(transfer.color(value)), opacity, ..Composite::EMPTY }
+    }
+
+    /// The radiance of a sheet, lit once.
+    pub(super) fn surface(&self, sheet: &Sheet, ray: &Ray) -> Medium {
+        if sheet.light.depth < LEAST_DEPTH { Medium::default() } else { self.lit(&sheet.light, ray) }
+    }
+}

@@ -1,0 +1,93 @@
+//! Kernels that are not cut: axis-aligned sheets and single splats
+//! ([`Mode::AxisSheets`](crate::scene::Mode::AxisSheets), [`Mode::Splats`](crate::scene::Mode::Splats)).
+
+use super::{
+    Frame, clip,
+    composite::{Composite, Medium},
+    kernel::{Kernel, Load},
+    ray::Ray,
+    sheet::{Light, Sheet},
+};
+use crate::{math::View, scene::Order, volume::Lattice};
+use glam::{DMat3, DVec3};
+
+/// The direction that axis-aligned sheets are counted along, in view space: at right angles to those two axes of the data
+/// which make it point into the picture most; the world's axes without a lattice.
+pub(super) fn sheet_axis(view: &View, lattice: Option<&Lattice>) -> DVec3 {
+    let axes = lattice.map_or(DMat3::IDENTITY, |lattice| lattice.axes);
+    let normals =
+        axes.inverse().transpose().to_cols_array_2d().map(|normal| view.rotation * DVec3::from(normal).normalize());
+    let best = normals.into_iter().fold(DVec3::ZERO, |best, n| if n.z.abs() > best.z.abs() { n } else { best });
+    best * best.z.signum()
+}
+
+impl Frame<'_> {
+    /// The radiance that a whole kernel puts on a ray, and where; none where it is missed, cut away or behind the eye.
+    fn whole(&self, kernel: &Kernel, ray: &Ray, allowed: &[[f64; 2]]) -> Option<(Light, f64)> {
+        let Load::Radiance(radiance) = &kernel.load else { return None };
+        let crossing = kernel.cross(ray)?;
+        let seen = !self.view.perspective || crossing.closest > 0.0;
+        if !(seen && clip::contains(allowed, crossing.closest)) {
+            return None;
+        }
+        let mut light = Light::default();
+        light.add(radiance, crossing.optical_depth(radiance.amount, [f64::NEG_INFINITY, f64::INFINITY]));
+        Some((light, crossing.closest))
+    }
+
+    /// A pixel of axis-aligned sheets.
+    pub(super) fn pixel_of_axis_sheets(&self, ray: &Ray, kernels: &[&Kernel], axis: DVec3) -> Composite {
+        let allowed = clip::allowed(ray, &self.view, &self.clips);
+        let mut sheets = vec![Sheet::default(); self.count()];
+        for kernel in kernels {
+            let key = axis.dot(kernel.center);
+            let key = if self.view.perspective { key.abs() } else { key };
+            let Some(k) =
+                self.planes.partition_point(|&plane| plane <= key).checked_sub(1).filter(|k| *k < self.count())
+            else {
+                continue;
+            };
+            if let Some((light, _)) = self.whole(kernel, ray, &allowed) {
+                sheets[k].light.join(&light);
+            }
+        }
+        let slope = axis.dot(ray.direction);
+        let distance = |key: f64| {
+            if self.view.perspective { key / slope.abs() } else { (key - axis.dot(ray.origin)) / slope }
+        };
+        let mut composite = Composite::EMPTY;
+        for (k, sheet) in sheets.iter().enumerate() {
+            composite.pass(self.surface(sheet, ray), self.span(k).map(distance));
+        }
+        composite
+    }
+
+    /// A pixel of single splats.
+    pub(super) fn pixel_of_splats(&self, ray: &Ray, kernels: &[&Kernel], order: Order) -> Composite {
+        let allowed = clip::allowed(ray, &self.view, &self.clips);
+        let distance = |kernel: &Kernel| if self.view.perspective { kernel.center.length() } else { kernel.center.z };
+        let mut splats: Vec<(f64, f64, Medium)> = kernels
+            .iter()
+            .filter(|kernel| distance(kernel) >= self.near)
+            .filter_map(|kernel| {
+                let (light, place) = self.whole(kernel, ray, &allowed)?;
+                Some((distance(kernel), place, self.lit(&light, ray)))
+            })
+            .collect();
+        // The sort is stable: equal distances stay in the order of the scene.
+        splats.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
+        let mut composite = Composite::EMPTY;
+        for (_, place, medium) in &splats {
+            composite.pass(*medium, [*place; 2]);
+        }
+        if order == Order::BackToFront {
+            (composite.color, composite.opacity) = (DVec3::ZERO, 0.0);
+            for (.., medium) in splats.iter().rev() {
+                let alpha = -(-medium.depth).exp_m1();
+                composite.color = alpha * medium.color + (1.0 - alpha) * composite.color;
+                composite.opacity = alpha + (1.0 - alpha) * composite.opacity;
+            }
+        }
+        composite
+    }
+}
