@@ -21,9 +21,9 @@ const SIGNAL: Phantom = Phantom::MarschnerLobb;
 /// The cube that is looked at: far enough from the border that no method depends on what it makes of it.
 const HALF: f64 = 0.72;
 /// Pixels along each side of a cut, a number that does not repeat with the samples.
-const PIXELS: u32 = 97;
+const PIXELS: u32 = 89;
 /// Cuts through the cube.
-const CUTS: u32 = 12;
+const CUTS: u32 = 5;
 /// Half the thickness of a cut, in samples.
 const SLICE: f64 = 2e-3;
 /// The greys stand for values from here to there: sharp kernels leave 0 … 1.
@@ -96,7 +96,7 @@ fn drawn_error(stage: &mut Stage, volume: Volume, kernel: Kernel) -> Result<Cell
         let z = depth(cut);
         let mut settings = Settings::new([PIXELS; 2]);
         settings.volume_shade = Some(None);
-        settings.sheet_thickness = Some(0.1 * spacing);
+        settings.sheet_thickness = Some(0.15 * spacing);
         settings.clips = [DVec3::Z, DVec3::NEG_Z]
             .map(|normal| {
                 let offset = normal.z * z + slice;
