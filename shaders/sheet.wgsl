@@ -148,7 +148,13 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
         if MAXIMUM {
             (*medium).peak = max((*medium).peak, max(value, next));
         } else {
-            var shown = classify_between(select(value, own.value, POST), select(next, own.value, POST));
+            var shown: vec4<f32>;
+            if POST {
+                shown = classify(own.value);
+                shown = vec4(shown.xyz * shown.w, shown.w);
+            } else {
+                shown = classify_between(value, next);
+            }
             let middle = 0.5 * (place + next_place);
             if GRADIENT_OPACITY {
                 shown *= gradient_factor(length(gradient_at(r, *medium, middle)));

@@ -49,14 +49,15 @@ impl<'a> Profile<'a> {
             }
             math::Profile::Hann => {
                 let w = 0.5 * PI / extent;
-                if r < 1e-4 {
+                let x = PI * r;
+                if x < 1e-2 {
                     // The first terms of both factors.
-                    return -PI * PI / 3.0 - 2.0 * w * w;
+                    return -PI * PI / 5.0 - 2.0 * w * w;
                 }
-                let (sin, cos) = (PI * r).sin_cos();
-                let sinc = sin / (PI * r);
+                let (sin, cos) = x.sin_cos();
+                let filter = 3.0 * (sin - x * cos) / x.powi(3);
                 let window = (w * r).cos().powi(2);
-                ((cos - sinc) / r * window - sinc * w * (2.0 * w * r).sin()) / r
+                (PI * (3.0 * sin / x.powi(2) - 3.0 * filter / x) * window - filter * w * (2.0 * w * r).sin()) / r
             }
             math::Profile::Table(values) => {
                 let scale = (values.len() - 1) as f64 / extent;

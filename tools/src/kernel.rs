@@ -3,10 +3,8 @@
 use crate::{failure::Failure, parse};
 use clap::Args;
 use splatkit::{
-    Error,
     io::{Limits, Source},
     math::Kernel,
-    volume::Volume,
 };
 use std::path::Path;
 
@@ -72,11 +70,6 @@ impl KernelFlags {
     pub fn is_sharp(&self) -> bool {
         self.sharp
     }
-}
-
-/// The volume with coefficients in place of its samples, so that the kernels pass through them.
-pub fn sharpened(_volume: Volume, _kernel: &Kernel) -> splatkit::Result<Volume> {
-    Err(Error::Argument("--sharp is not there yet".into()))
 }
 
 /// The numbers of a JSON array, or of lines.

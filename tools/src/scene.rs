@@ -3,7 +3,6 @@
 use crate::{
     camera::Subject,
     failure::Failure,
-    kernel,
     load::{Input, LoadFlags},
     progress::Progress,
     show::ShowFlags,
@@ -68,7 +67,7 @@ impl SceneFlags {
                     loaded.add(Bounds { min, max }, volume.len());
                     let volume = if show.sharp {
                         progress.stage(format!("Sharpening {}", path.display()));
-                        kernel::sharpened(volume, &show.kernel)?
+                        volume.sharpened(&show.kernel)?
                     } else {
                         volume
                     };

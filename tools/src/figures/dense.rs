@@ -4,19 +4,18 @@ use super::{
     Stage,
     report::{Cell, Table},
 };
-use crate::{failure::Failure, generate, kernel, progress::Progress};
+use crate::{failure::Failure, generate, progress::Progress};
 use glam::DVec3;
 use splatkit::{
     compare::compare_pictures,
     math::{Bounds, Camera, Kernel},
-    picture::Picture,
     reference,
     scene::{Scene, Settings},
     volume::{TransferFunction, Volume, phantoms::Phantom},
 };
 
 /// The step of the dense integration, in samples.
-const STEP: f64 = 0.02;
+const STEP: f64 = 0.05;
 
 /// A volume and how it is shown.
 pub struct Case {
@@ -53,7 +52,7 @@ pub fn generated() -> Result<Vec<Case>, Failure> {
     let ball = Phantom::Ball.sample([32; 3]).map_err(told)?;
     let head = Phantom::Head.sample([48; 3]).map_err(told)?;
     let bone = TransferFunction { unit: 0.01, ..TransferFunction::named("ct-bone", head.range)? };
-    let sharp = kernel::sharpened(specimen.clone(), &narrow)?;
+    let sharp = specimen.clone().sharpened(&narrow)?;
     let body_centred = Phantom::Specimen.sample_on(generate::body_centred(48)).map_err(told)?;
     Ok(vec![
         Case::automatic("specimen, 48³", specimen),
@@ -81,7 +80,7 @@ pub fn table(stage: &mut Stage, cases: &[Case], size: [u32; 2], progress: &Progr
         let mut settings = Settings::new(size);
         settings.volume_shade = Some(None);
         progress.stage(format!("Integrating {}", case.name));
-        let truth = integrated(&scene, &camera, &settings, STEP * case.volume.lattice.kernel_spacing())?;
+        let truth = reference::integrate(&scene, &camera, &settings, STEP * case.volume.lattice.kernel_spacing())?;
         let mut prepared = stage.prepare(&scene)?;
         let default = scene.sheets(&camera.view(size)?, &settings).step;
         let mut cells = Vec::new();
@@ -102,10 +101,4 @@ fn camera(bounds: &Bounds, size: [u32; 2]) -> splatkit::Result<Camera> {
     camera.elevation(20.0);
     camera.fit(bounds, size, 0.04)?;
     Ok(camera)
-}
-
-/// The picture that sheets come near to.
-fn integrated(scene: &Scene, camera: &Camera, settings: &Settings, step: f64) -> splatkit::Result<Picture> {
-    let fine = Settings { sheet_thickness: Some(step), ..settings.clone() };
-    reference::render(scene, camera, &fine)
 }

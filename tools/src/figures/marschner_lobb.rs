@@ -7,7 +7,7 @@ use super::{
     Stage,
     report::{Cell, Table},
 };
-use crate::{failure::Failure, generate, kernel, progress::Progress};
+use crate::{failure::Failure, generate, progress::Progress};
 use glam::DVec3;
 use splatkit::{
     math::{Camera, Kernel, Projection},
@@ -64,7 +64,7 @@ pub fn table(stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {
                 true => SIGNAL.sample_on(generate::body_centred(side)).map_err(splatkit::Error::Argument)?,
                 false => volume.clone(),
             };
-            let volume = if sharp { kernel::sharpened(volume, shape)? } else { volume };
+            let volume = if sharp { volume.sharpened(shape)? } else { volume };
             cells.push(drawn_error(stage, volume, shape.clone())?);
         }
         table.row(name, cells);
