@@ -105,12 +105,8 @@ struct Medium {
     // Light that is left, and the optical depth that took the rest.
     through: f32,
     depth: f32,
-    // Colour times opacity of what the transfer function shows, its opacity, and its place (0 … 1) times opacity.
+    // Lit colour times opacity.
     color: vec3<f32>,
-    opacity: f32,
-    place: f32,
-    // Lit colour times opacity of isosurfaces.
-    surfaces: vec3<f32>,
     // The field along the ray: values at the front and the back and the parabola's middle; the sheet's thickness.
     curve: vec3<f32>,
     thickness: f32,
@@ -155,25 +151,31 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
             } else {
                 shown = classify_between(value, next);
             }
-            let middle = 0.5 * (place + next_place);
+            var normal: vec3<f32>;
+            if GRADIENTS {
+                normal = gradient_at(r, *medium, 0.5 * (place + next_place));
+            }
             if GRADIENT_OPACITY {
-                shown *= gradient_factor(length(gradient_at(r, *medium, middle)));
+                shown *= gradient_factor(length(normal));
             }
             // Differences of integrals: what rounding leaves of them where nothing is shown must stay a colour.
             let depth = max(shown.w, 0.0) * step * select(own.filling, 1.0, LATTICE);
-            let color = clamp(shown.xyz / max(shown.w, 1e-20), vec3(0.0), vec3(1.0));
+            var color = clamp(shown.xyz / max(shown.w, 1e-20), vec3(0.0), vec3(1.0));
+            if VOLUME_SHADED {
+                color = lit(color, normal, direction_of(r), frame.volume_shade);
+            }
             var done = 0.0;
             for (var i = 0u; i < ISOSURFACES; i++) {
                 let surface = frame.isosurfaces[select(ISOSURFACES - 1u - i, i, next > value)];
                 let level = surface.value.x;
                 if (value < level) != (next < level) {
                     let share = (level - value) / (next - value);
-                    pass_part(depth * (share - done), color, middle, medium);
+                    pass_part(depth * (share - done), color, medium);
                     done = share;
                     pass_surface(r, surface, mix(place, next_place, share), near + step * share, medium);
                 }
             }
-            pass_part(depth * (1.0 - done), color, middle, medium);
+            pass_part(depth * (1.0 - done), color, medium);
         }
         place = next_place;
         value = next;
@@ -187,11 +189,9 @@ fn parabola(curve: vec3<f32>, u: f32) -> f32 {
     return curve.x * (1.0 - u) * (1.0 - 2.0 * u) + 4.0 * curve.y * u * (1.0 - u) + curve.z * u * (2.0 * u - 1.0);
 }
 
-fn pass_part(depth: f32, color: vec3<f32>, place: f32, medium: ptr<function, Medium>) {
+fn pass_part(depth: f32, color: vec3<f32>, medium: ptr<function, Medium>) {
     let share = (*medium).through * (1.0 - exp(-depth));
     (*medium).color += share * color;
-    (*medium).opacity += share;
-    (*medium).place += share * place;
     (*medium).through -= share;
     (*medium).depth += depth;
 }
@@ -209,7 +209,7 @@ fn pass_surface(r: u32, surface: Isosurface, place: f32, distance: f32, medium: 
     if VOLUME_SHADED {
         color = lit(color, gradient_at(r, *medium, place), direction_of(r), frame.volume_shade);
     }
-    (*medium).surfaces += share * color;
+    (*medium).color += share * color;
 }
 
 // All of a sheet that the box of the samples and the clips leave.
@@ -267,15 +267,10 @@ fn composite(r: u32, sheet: u32, own: Sheet) {
             pixels[r].hit = max(pixels[r].hit, medium.peak);
             return;
         }
-        var color = medium.color;
-        if VOLUME_SHADED && medium.opacity > 0.0 {
-            let normal = gradient_at(r, medium, medium.place / medium.opacity);
-            color = medium.opacity * lit(color / medium.opacity, normal, direction_of(r), frame.volume_shade);
-        }
         // Optical depth for opacity: τ / (1 − e^−τ), of which little is left where τ is small.
         let field_depth = min(medium.depth, MOST_DEPTH);
         let ratio = select(field_depth / (1.0 - exp(-field_depth)), 1.0 + 0.5 * field_depth, field_depth < 1e-2);
-        premultiplied += ratio * (color + medium.surfaces);
+        premultiplied += ratio * medium.color;
         depth += field_depth;
         has_hit = medium.has_hit;
     }

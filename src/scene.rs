@@ -167,8 +167,8 @@ impl Scene {
         extents.fold(0.0, f64::max)
     }
 
-    /// The sheets of a picture of this scene: as thick as two thirds of a kernel's radius for volumes (a kernel meets at
-    /// most four), a few pixels for surfaces, the finer of both where the scene holds both.
+    /// The sheets of a picture of this scene: 4/3 of a sample's spacing for volumes (a kernel of extent 2 meets at most four),
+    /// half of that where they are sharp, a few pixels for surfaces, the finer of both where the scene holds both.
     pub fn sheets(&self, view: &View, settings: &Settings) -> Sheets {
         let bounds = self.bounds();
         if settings.mode == Mode::AxisSheets {
@@ -189,7 +189,9 @@ impl Scene {
         for item in &self.items {
             match item {
                 Item::Volume(volume, kernel, _) if settings.sheet_thickness.is_none() => {
-                    let step = 2.0 / 3.0 * kernel.extent * volume.lattice.kernel_spacing();
+                    // Fields turn within few samples, whatever the kernel's extent; sharp ones within fewer.
+                    let most: f64 = if volume.coefficients.is_some() { 2.0 / 3.0 } else { 4.0 / 3.0 };
+                    let step = most.min(2.0 / 3.0 * kernel.extent) * volume.lattice.kernel_spacing();
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
                 }
                 Item::Volume(..) => {}

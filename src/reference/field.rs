@@ -120,14 +120,14 @@ impl Layer {
     pub fn shine(&self, field: &Field, direction: DVec3, pieces: &[[f64; 2]]) -> (Medium, Vec<Step>) {
         let mut steps = Vec::new();
         let mut light = 1.0;
-        // The medium: opacity, colour and place weighted by it. Surfaces: lit colours.
-        let (mut opacity, mut color, mut place) = (0.0, DVec3::ZERO, 0.0);
-        let mut surfaces = DVec3::ZERO;
+        // Lit colours, weighted by opacity.
+        let mut color = DVec3::ZERO;
         for Part { places: [start, end], values: [a, b] } in self.parts(field, pieces) {
-            let middle = 0.5 * (start + end);
+            let gradient = self.gradient(0.5 * (start + end), direction);
             let (extinction, medium) =
                 if field.inside { field.classifier.between(a, b) } else { field.classifier.at(self.mean) };
-            let factor = field.classifier.transfer.gradient_factor(self.gradient(middle, direction).length());
+            let factor = field.classifier.transfer.gradient_factor(gradient.length());
+            let medium = field.lit(medium, gradient, direction);
             let length = self.distance(end) - self.distance(start);
             let depth = extinction * factor * length * self.filling;
             let at = |share: f64| start + share * (end - start);
@@ -136,14 +136,12 @@ impl Layer {
             for (share, surface) in surfaces_met.chain([(1.0, None)]) {
                 let depth = depth * (share - before);
                 let alpha = -(-depth).exp_m1();
-                opacity += light * alpha;
                 color += light * alpha * medium;
-                place += light * alpha * middle;
                 light *= 1.0 - alpha;
                 steps.push(Step { depth, span: [before, share].map(|share| self.distance(at(share))) });
                 if let Some(surface) = surface {
                     let lit = field.lit(DVec3::from(surface.color), self.gradient(at(share), direction), direction);
-                    surfaces += light * surface.opacity * lit;
+                    color += light * surface.opacity * lit;
                     light *= 1.0 - surface.opacity;
                     let depth = -(1.0 - surface.opacity).ln();
                     steps.push(Step { depth, span: [self.distance(at(share)); 2] });
@@ -151,14 +149,11 @@ impl Layer {
                 before = share;
             }
         }
-        if opacity > 0.0 {
-            surfaces += opacity * field.lit(color / opacity, self.gradient(place / opacity, direction), direction);
-        }
         let taken = 1.0 - light;
         if taken <= 0.0 {
             return (Medium::default(), Vec::new());
         }
-        (Medium { depth: -light.max(LEAST_LIGHT).ln(), color: surfaces / taken }, steps)
+        (Medium { depth: -light.max(LEAST_LIGHT).ln(), color: color / taken }, steps)
     }
 }
 

@@ -52,12 +52,11 @@
 //!
 //! **Isosurfaces.** A part meets each surface of value v with (a < v) ≠ (b < v) at its share (v − a)/(b − a), the nearest
 //! first, equal ones in the order of the list. (a and b are the parabola's in Post too.) The shares of the part's optical depth
-//! before, between and behind surfaces count there, all with the part's colour and middle. A surface holds back its opacity, and
-//! is lit by g where it is met.
+//! before, between and behind surfaces count there, all with the part's colour. A surface holds back its opacity.
 //!
-//! **In a sheet,** front to back from t = 1: parts add t·α to A, with their colour c and middle u_m; surfaces add t·opacity·(lit
-//! colour) to S; t is multiplied by 1 − α or 1 − opacity. The mean colour of the parts is lit once, by g at the mean of u_m,
-//! both weighted by t·α. The field's colour is (A·c̄ + S)/(1 − t), its optical depth −ln max(t, 10⁻⁹).
+//! **In a sheet,** front to back from t = 1: parts add t·α·(lit colour) to S, surfaces t·opacity·(lit colour); t is multiplied by
+//! 1 − α or 1 − opacity. A part is lit by g in its middle, a surface by g where it is met. The field's colour is S/(1 − t), its
+//! optical depth −ln max(t, 10⁻⁹).
 //!
 //! **Radiance.** A splat adds the optical depth τ = strength · opacity · exp(−ρ²/2) · share, the share being that of a sheet in the
 //! Gaussian along the ray (Zwicker et al. 2001 take the whole kernel). In a sheet the optical depths add. Colours and normals

@@ -17,8 +17,8 @@ pub enum Phantom {
     /// What a CT scanner would see of an invented fruit: air around (0), a rind (0.35), soft flesh (0.15), in it a hard
     /// lattice along a gyroid (0.7 … 0.8) and a dense stone (1). A wedge is cut out to show the inside.
     Specimen,
-    /// Two slabs across the z axis, the front one of value 0.5 (0.025 < z < 0.175), right behind it one of value 1 (down
-    /// to −0.275): what a renderer must hide, and what it must hide behind. Both end at 0.9 from the axis.
+    /// Two slabs across the z axis in air of value 0.5: the front one of value 1 (0.025 < z < 0.175), right behind it one of
+    /// value 0 (down to −0.275), so that the edge of neither passes the other's value. Both end at 0.9 from the axis.
     Slabs,
     /// A head as a CT scanner would see it, in Hounsfield units, 1 standing for 100 mm: skin and flesh, skull, jaw and neck
     /// bones, brain, and arteries with contrast agent. The face is towards −y.
@@ -123,12 +123,12 @@ fn specimen(p: DVec3) -> f64 {
 
 fn slabs(p: DVec3) -> f64 {
     if p.truncate().abs().max_element() > 0.9 {
-        return 0.0;
+        return 0.5;
     }
     match p.z {
-        z if 0.025 < z && z < 0.175 => 0.5,
-        z if -0.275 < z && z <= 0.025 => 1.0,
-        _ => 0.0,
+        z if 0.025 < z && z < 0.175 => 1.0,
+        z if -0.275 < z && z <= 0.025 => 0.0,
+        _ => 0.5,
     }
 }
 
@@ -162,7 +162,7 @@ mod tests {
         assert!(Phantom::NAMES.iter().all(|name| Phantom::named(name).is_some()) && Phantom::named("knot").is_none());
         assert_eq!(Phantom::named("ball"), Some(Phantom::Ball));
         let slab = |z: f64| Phantom::Slabs.value(DVec3::new(0.3, -0.3, z));
-        assert_eq!([0.2, 0.1, 0.0, -0.2, -0.4].map(slab), [0.0, 0.5, 1.0, 1.0, 0.0]);
+        assert_eq!([0.2, 0.1, 0.0, -0.2, -0.4].map(slab), [0.5, 1.0, 0.0, 0.0, 0.5]);
     }
 
     #[test]

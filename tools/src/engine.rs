@@ -28,7 +28,8 @@ pub struct EngineFlags {
     /// Draws volumes and surfaces in their own colours, without light.
     #[arg(long, overrides_with = "shade")]
     no_shade: bool,
-    /// Largest thickness of a sheet, in world units; by default two thirds of a kernel's radius for volumes.
+    /// Largest thickness of a sheet, in world units; by default 4/3 of a volume's sample spacing, half of that where it is
+    /// sharp.
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     sheet_thickness: Option<f64>,
     /// Room of a depth pass: pairs of a splat and a tile. Pictures that need more take more passes.

@@ -58,8 +58,8 @@ pub fn table(stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {
 fn scene() -> Result<Scene, Failure> {
     let (blue, red) = ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
     let transfer = TransferFunction {
-        color: vec![(0.7, blue), (0.8, red)],
-        opacity: vec![(0.1, 0.0), (0.4, OPACITY)],
+        color: vec![(0.45, red), (0.55, blue)],
+        opacity: vec![(0.25, OPACITY), (0.45, 0.0), (0.55, 0.0), (0.75, OPACITY)],
         unit: SPACING,
         ..TransferFunction::default()
     };
