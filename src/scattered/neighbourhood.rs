@@ -47,9 +47,10 @@ pub(super) fn places(points: &Points, neighbours: usize) -> (Vec<Place>, Vec<u32
     let values: Vec<f64> = sums.iter().map(|(sum, count)| sum / f64::from(*count)).collect();
     let tree = Neighbours::new(&positions);
     let around = Surroundings { tree: &tree, positions: &positions, values: &values, neighbours };
-    let found: Vec<Place> = tree.order().par_iter().map(|&index| around.place(index, sums[index as usize].1)).collect();
+    let order = tree.order();
+    let found: Vec<Place> = order.par_iter().map(|&index| around.place(index, sums[index as usize].1)).collect();
     let mut places = found.clone();
-    for (&index, place) in tree.order().iter().zip(found) {
+    for (index, place) in order.into_iter().zip(found) {
         places[index as usize] = place;
     }
     (places, place_of)
@@ -64,22 +65,19 @@ struct Surroundings<'a> {
 
 impl Surroundings<'_> {
     fn place(&self, index: u32, samples: u32) -> Place {
-        let mut around: [(DVec3, f64, f64); MOST] = [(DVec3::ZERO, 0.0, 0.0); MOST];
         let (center, own) = (self.positions[index as usize], self.values[index as usize]);
-        let mut count = 0;
-        for (distance, neighbour) in self.tree.first_of::<MOST>(index, self.neighbours).iter() {
+        let nearest = self.tree.of(index, self.neighbours).into_iter().map(|(distance, neighbour)| {
             let offset = (self.positions[neighbour as usize] - center).as_dvec3();
-            around[count] = (offset, self.values[neighbour as usize] - own, f64::from(distance));
-            count += 1;
-        }
-        let around = &around[..count];
+            (offset, self.values[neighbour as usize] - own, f64::from(distance))
+        });
+        let around: Vec<(DVec3, f64, f64)> = nearest.collect();
         let Some(&(.., farthest)) = around.last() else {
             return Place { samples, spacing: 0.0, gradient: DVec3::ZERO, width: 0.0 };
         };
-        let fit = Fit::new(around, farthest);
+        let fit = Fit::new(&around, farthest);
         let [low, high] = around.iter().fold([0.0f64; 2], |[low, high], &(_, rise, _)| [low.min(rise), high.max(rise)]);
         // The ball, disc or line to the k-th neighbour holds k samples besides the own one in its middle.
-        let k = count as f64;
+        let k = around.len() as f64;
         let spacing = match fit.dimensions {
             3 => (4.0 / 3.0 * PI / k).cbrt(),
             2 => (PI / k).sqrt(),
@@ -87,7 +85,7 @@ impl Surroundings<'_> {
         };
         // A few samples all lie on the border, and so have less room.
         let spacing = farthest * spacing.min(1.0);
-        Place { samples, spacing, gradient: limited(fit.gradient, around, [low, high]), width: high - low }
+        Place { samples, spacing, gradient: limited(fit.gradient, &around, [low, high]), width: high - low }
     }
 }
 

@@ -75,12 +75,11 @@ fn shape(around: &Surroundings, width: f64, given: Option<DVec3>) -> ([f32; 6], 
 }
 
 fn surroundings(points: &[Vec3], tree: &Neighbours, index: u32) -> Surroundings {
-    let nearest = tree.of::<COUNT>(index);
+    let nearest = tree.of(index, COUNT);
     let center = points[index as usize];
-    let offsets = || nearest.iter().map(|(_, index)| (points[index as usize] - center).as_dvec3());
-    let count = offsets().count();
-    let distance = nearest.iter().nth(count / 2).map_or(0.0, |(distance, _)| f64::from(distance));
-    let mean = offsets().sum::<DVec3>() / (count + 1) as f64;
+    let offsets = || nearest.iter().map(|&(_, index)| (points[index as usize] - center).as_dvec3());
+    let distance = nearest.get(nearest.len() / 2).map_or(0.0, |&(distance, _)| f64::from(distance));
+    let mean = offsets().sum::<DVec3>() / (nearest.len() + 1) as f64;
     let mut scatter = DMat3::ZERO;
     for offset in offsets().chain([DVec3::ZERO]) {
         let d = offset - mean;
