@@ -30,7 +30,8 @@ struct Frame {
     // Ambient, diffuse, specular, power.
     volume_shade: vec4<f32>,
     surface_shade: vec4<f32>,
-    // Standard deviation of the isotropic lattice kernel (world units), its inverse, its squared extent in sigmas.
+    // Standard deviation of the isotropic lattice kernel (world units), its inverse, its squared extent in sigmas; what kernels
+    // must add up to for a value.
     isotropic: vec4<f32>,
     // First value, table entries per value, last table index; entries per gradient magnitude.
     transfer: vec4<f32>,

@@ -216,7 +216,7 @@ fn share_faces(lane: vec2<u32>) {
     for (var r = 0u; r < ROWS; r++) {
         let weight = pixels[r].face_weight.x;
         let at = (lane.y * ROWS + r) * 8u + lane.x;
-        neighbours[at] = select(NO_VALUE, pixels[r].face_value.x / max(weight, 1e-37), weight > LEAST_FILLING);
+        neighbours[at] = select(NO_VALUE, pixels[r].face_value.x / max(weight, 1e-37), weight > frame.isotropic.w);
     }
     workgroupBarrier();
 }

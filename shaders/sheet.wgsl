@@ -1,8 +1,7 @@
 // Closes a sheet at one pixel: resolves its sums, classifies and shades it, and composites it.
 
-// A sheet that is filled less than this has no value, one with less optical depth no colour: such small sums may be what
-// rounding left of the sections that windows of one splat give each other. A plane with a smaller sum has no value either.
-const LEAST_FILLING: f32 = 1e-4;
+// A sheet with less optical depth than this has no colour: such a small sum may be what rounding left of the sections that
+// windows of one splat give each other. For fields frame.isotropic.w stands for it, with a margin for kernels of both signs.
 const LEAST_DEPTH: f32 = 1e-5;
 // Optical depth that counts as opaque.
 const MOST_DEPTH: f32 = 20.0;
@@ -45,7 +44,7 @@ fn resolve_face(r: u32, sheet: u32) -> Face {
     var face: Face;
     let weight = pixels[r].face_weight.x;
     let inverse = 1.0 / max(weight, 1e-37);
-    face.has_value = weight > LEAST_FILLING;
+    face.has_value = weight > frame.isotropic.w;
     face.value = pixels[r].face_value.x * inverse;
     if GRADIENTS && !CENTRAL {
         let slope = face.value * vec2(pixels[r].weight_x.x, pixels[r].weight_y.x)
@@ -67,7 +66,7 @@ fn resolve(r: u32, sheet: u32) -> Sheet {
     if SCALAR {
         let thickness = planes[sheet + 1u] - planes[sheet];
         let weight = pixels[r].weight.x;
-        own.has_value = weight > LEAST_FILLING * thickness;
+        own.has_value = weight > frame.isotropic.w * thickness;
         own.value = pixels[r].value.x / max(weight, 1e-37);
         own.filling = min(weight / thickness, 1.0);
         own.front = pixels[r].front;

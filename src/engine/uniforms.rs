@@ -157,6 +157,7 @@ impl Frame {
                 Item::Radiance(_) => continue,
                 Item::Scalar(set, transfer) => {
                     frame.kernel[2] = 1.0 / set.overlap;
+                    frame.isotropic[3] = Kernel::default().least_sum() as f32;
                     transfer
                 }
                 Item::Volume(volume, kernel, transfer) => {
@@ -200,7 +201,7 @@ impl Frame {
         let unit = lattice.unit([0; 3]);
         let sigma = kernel.unit() * unit.x * lattice.axes.x_axis.length();
         let radius = kernel.radius();
-        self.isotropic = [sigma, 1.0 / sigma, radius * radius, 0.0].map(|v| v as f32);
+        self.isotropic = [sigma, 1.0 / sigma, radius * radius, kernel.least_sum()].map(|v| v as f32);
         // A cell of the body-centred lattice holds two samples.
         let overlap = match lattice.arrangement {
             Arrangement::BodyCentred => kernel.integral() * (unit.x * unit.y * unit.z) / 0.5,

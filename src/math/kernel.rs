@@ -125,6 +125,21 @@ impl Kernel {
         }
     }
 
+    /// Whether the kernel has negative values.
+    pub fn is_signed(&self) -> bool {
+        match &self.profile {
+            Profile::Gaussian(_) | Profile::BSpline => false,
+            Profile::Hann => self.extent > 1.43, // the filter's first zero
+            Profile::Table(values) => values.iter().any(|value| *value < 0.0),
+        }
+    }
+
+    /// What kernels must add up to at a point for it to have a value: where lobes of both signs all but cancel, at the edge
+    /// of what is drawn, their mean would be of any size.
+    pub fn least_sum(&self) -> f64 {
+        if self.is_signed() { 0.3 * self.integral() } else { 1e-4 }
+    }
+
     /// ∫ of the kernel over space, in cubed sample spacings: what its copies at every sample of a Cartesian lattice sum to
     /// on average. A Gaussian is cut by its footprint's cylinder alone.
     pub fn integral(&self) -> f64 {

@@ -3,7 +3,6 @@
 use super::{
     kernel::{Crossing, Sample},
     ray::Ray,
-    sheet::LEAST_FILLING,
 };
 use glam::{DVec2, DVec3};
 
@@ -29,23 +28,23 @@ impl Face {
         self.value_gradient += sample.weight * (carried * gradient + h * sample.slope);
     }
 
-    /// Q/P; none where next to no kernel reaches.
-    pub fn value(&self) -> Option<f64> {
-        (self.weight > LEAST_FILLING).then(|| self.value / self.weight)
+    /// Q/P; none where kernels add up to no more than `least`.
+    pub fn value(&self, least: f64) -> Option<f64> {
+        (self.weight > least).then(|| self.value / self.weight)
     }
 
     /// The gradient of the value.
-    pub fn gradient(&self) -> Option<DVec3> {
-        let value = self.value()?;
+    pub fn gradient(&self, least: f64) -> Option<DVec3> {
+        let value = self.value(least)?;
         Some((self.value_gradient - value * self.weight_gradient) / self.weight)
     }
 
     /// The gradient of the value at distance s, its part across the picture from the values in the pixels to the left, right,
     /// above and below.
-    pub fn central_gradient(&self, ray: &Ray, s: f64, around: [Option<f64>; 4]) -> Option<DVec3> {
-        let along = self.gradient()?.dot(ray.direction);
+    pub fn central_gradient(&self, least: f64, ray: &Ray, s: f64, around: [Option<f64>; 4]) -> Option<DVec3> {
+        let along = self.gradient(least)?.dot(ray.direction);
         let [left, right, above, below] = around;
-        let across = DVec2::new(slope([left, self.value(), right]), slope([above, self.value(), below]));
+        let across = DVec2::new(slope([left, self.value(least), right]), slope([above, self.value(least), below]));
         ray.gradient(s, across, along)
     }
 }

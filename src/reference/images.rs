@@ -31,7 +31,7 @@ impl Frame<'_> {
                     (column, row + 1, below),
                 ];
                 neighbours.map(|(column, row, kernels)| {
-                    self.faces(&self.ray(column, row), kernels).iter().map(Face::value).collect()
+                    self.faces(&self.ray(column, row), kernels).iter().map(|face| face.value(self.least_sum)).collect()
                 })
             });
             self.pixel_of_sheets(&ray, &kernels, around)
@@ -95,8 +95,10 @@ impl Frame<'_> {
             .zip(&self.planes)
             .enumerate()
             .map(|(i, (face, &plane))| match &around {
-                Some(around) => face.central_gradient(ray, plane, around.each_ref().map(|values| values[i])),
-                None => face.gradient(),
+                Some(around) => {
+                    face.central_gradient(self.least_sum, ray, plane, around.each_ref().map(|values| values[i]))
+                }
+                None => face.gradient(self.least_sum),
             })
             .collect();
         let held = match field.lattice {
@@ -110,8 +112,8 @@ impl Frame<'_> {
             let filling = if field.lattice.is_some() { 1.0 } else { (mean.weight / (to - from)).min(1.0) };
             let layer = Layer {
                 span: [from, to],
-                mean: mean.value(to - from)?,
-                faces: [faces[k].value(), faces[k + 1].value()],
+                mean: mean.value(self.least_sum, to - from)?,
+                faces: [&faces[k], &faces[k + 1]].map(|face| face.value(self.least_sum)),
                 gradients: [gradients[k], gradients[k + 1]],
                 filling,
             };

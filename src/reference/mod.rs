@@ -32,8 +32,8 @@
 //! Möller & Crawfis 1999), inside the sheets.
 //!
 //! **Means and faces.** Over a sheet W = Σ w·∫h ds and V = Σ w·∫(f + g·(x − c))·h ds. Its mean is f̄ = V/W; it has none, and
-//! holds no field, where W ≤ 10⁻⁴ of its thickness. At a face P = Σ w·h and Q = Σ w·(f + g·(x − c))·h, the value is
-//! Q/P; none where P ≤ 10⁻⁴. A face without a value takes f̄. The gradient at a face is that of Q/P in space,
+//! holds no field, where W ≤ 10⁻⁴ of its thickness (kernels of both signs: 3/10 of their integral). At a face P = Σ w·h and Q = Σ w·(f + g·(x − c))·h, the value is
+//! Q/P; none where P ≤ 10⁻⁴ (likewise). A face without a value takes f̄. The gradient at a face is that of Q/P in space,
 //! (∇Q − (Q/P)·∇P)/P, derived without regard to the footprints' rims. With central differences its parts across the picture
 //! are instead half the difference of the face's values in the neighbouring pixels: one-sided where a neighbour has none, 0
 //! where neither has one. A face without a value has no gradient.
@@ -184,6 +184,8 @@ struct Frame<'a> {
     lattice: Option<&'a Lattice>,
     /// The light on radiance.
     shade: Option<Shade>,
+    /// What kernels must add up to for a value.
+    least_sum: f64,
 }
 
 impl<'a> Frame<'a> {
@@ -203,7 +205,12 @@ impl<'a> Frame<'a> {
             surfaces: if dark { &[] } else { &transfer.isosurfaces },
             inside: settings.classification == Classification::PreIntegrated,
         });
+        let kernel = scene.items.iter().find_map(|item| match item {
+            Item::Volume(_, kernel, _) => Some(kernel.clone()),
+            _ => None,
+        });
         Self {
+            least_sum: kernel.unwrap_or_default().least_sum(),
             mode: settings.mode,
             optics: settings.optics,
             gradient: settings.gradient,

@@ -52,9 +52,6 @@ pub(super) struct Mean {
     value: f64,
 }
 
-/// A sheet that is filled less than this has no value, nor has a face: what reaches there are the kernels' tails alone.
-pub(super) const LEAST_FILLING: f64 = 1e-4;
-
 impl Mean {
     /// Adds the part of a kernel that lies between two distances along the ray.
     pub fn add(&mut self, sample: &Sample, center: DVec3, crossing: &Crossing, ray: &Ray, part: [f64; 2]) {
@@ -65,7 +62,7 @@ impl Mean {
     }
 
     /// f̄; none where next to no kernel reaches into the sheet.
-    pub fn value(&self, thickness: f64) -> Option<f64> {
-        (self.weight > LEAST_FILLING * thickness).then(|| self.value / self.weight)
+    pub fn value(&self, least: f64, thickness: f64) -> Option<f64> {
+        (self.weight > least * thickness).then(|| self.value / self.weight)
     }
 }

@@ -8,7 +8,6 @@ use super::{
     profile::Profile,
     ray::Ray,
     shade,
-    sheet::LEAST_FILLING,
 };
 use crate::{
     Error, Result,
@@ -81,6 +80,8 @@ struct Pointwise<'a> {
     unit: f64,
     /// Kernel space from view space, and the first sample's place in view space.
     whitening: DMat3,
+    /// What kernels must add up to for a value.
+    least_sum: f64,
     origin: DVec3,
     classifier: Classifier<'a>,
     shade: Option<Shade>,
@@ -124,6 +125,7 @@ impl<'a> Pointwise<'a> {
             tail: if matches!(profile, Profile::Gaussian) { TAIL } else { kernel.radius() },
             unit,
             whitening: (view.rotation * lattice.axes * unit).inverse(),
+            least_sum: kernel.least_sum(),
             origin: view.to_view(lattice.origin),
             classifier: Classifier::new(transfer),
             shade,
@@ -213,7 +215,7 @@ impl<'a> Pointwise<'a> {
     /// The value and the view-space gradient at a point; none where next to no kernel reaches.
     fn at(&self, points: &Points, i: usize) -> Option<(f64, DVec3)> {
         let [weight, sum] = points.sums[i];
-        let value = (weight > LEAST_FILLING).then(|| sum / weight)?;
+        let value = (weight > self.least_sum).then(|| sum / weight)?;
         let [slope, value_slope] = points.slopes[i];
         Some((value, self.whitening.transpose() * (value_slope - value * slope) / weight))
     }

@@ -172,7 +172,11 @@ impl Volume {
     pub fn drawn_ranges(&self, kernel: &Kernel) -> Cow<'_, [[u8; 2]]> {
         match &self.coefficients {
             Some(coefficients) => Cow::Borrowed(&coefficients.ranges),
-            None => Cow::Owned(neighbourhood_ranges(self, self.lattice.reach(kernel.extent))),
+            // Signed kernels overshoot, and what is left out beside them must not be missed: twice their reach.
+            None => {
+                let extent = if kernel.is_signed() { 2.0 * kernel.extent } else { kernel.extent };
+                Cow::Owned(neighbourhood_ranges(self, self.lattice.reach(extent)))
+            }
         }
     }
 
