@@ -44,12 +44,12 @@ fn gradient_factor(magnitude: f32) -> f32 {
     return mix(tables[GRADIENT_TABLE + low].x, tables[GRADIENT_TABLE + low + 1u].x, at - f32(low));
 }
 
-// Kernel and −h′(r)/r at a radius, in kernel space.
+// Kernel and −h′(r)/r at a radius, in kernel space; nothing beyond its extent, also where it ends by a step.
 fn kernel_at(radius: f32) -> vec2<f32> {
     let at = min(radius * frame.kernel.y * f32(RADIAL_ENTRIES - 1u), f32(RADIAL_ENTRIES - 1u));
     let low = u32(at);
     let entry = tables[RADIAL_TABLE + low];
-    return mix(entry.xy, entry.zw, at - f32(low));
+    return select(mix(entry.xy, entry.zw, at - f32(low)), vec2(0.0), radius > frame.kernel.x);
 }
 
 // The kernel's integral along a line at distance `rho` from its centre, from the closest approach to t. An entry holds the

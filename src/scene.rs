@@ -92,8 +92,10 @@ impl Scene {
                 Item::Radiance(_) => {}
                 Item::Volume(volume, kernel, _) => {
                     let is_gaussian = matches!(kernel.profile, Profile::Gaussian(_));
-                    if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_)) && !is_gaussian {
-                        return wrong("a rectilinear volume takes a Gaussian kernel".into());
+                    if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_)) && !is_gaussian && !before {
+                        return wrong(
+                            "a rectilinear volume takes a Gaussian kernel, unless it is classified before".into(),
+                        );
                     }
                     if let Some(coefficients) = &volume.coefficients {
                         if before {

@@ -16,10 +16,10 @@ pub struct KernelFlags {
     /// a line [default: gaussian]
     #[arg(long, value_name = "NAME|FILE")]
     kernel: Option<String>,
-    /// Standard deviation of the Gaussian [default: 0.6, or 0.7 with --sharp]
+    /// Standard deviation of the Gaussian [default: 0.6]
     #[arg(long, value_name = "SAMPLES", value_parser = parse::positive)]
     sigma: Option<f64>,
-    /// Radius of a footprint [default: 2 for gaussian and b-spline, 3 for hann and for gaussian with --sharp]
+    /// Radius of a footprint [default: 2 for gaussian and b-spline, 3 for hann]
     #[arg(long, value_name = "SAMPLES", value_parser = parse::positive)]
     extent: Option<f64>,
     /// Makes kernels pass through the samples, which they smooth otherwise.
@@ -56,10 +56,7 @@ impl KernelFlags {
     }
 
     fn gaussian(&self) -> splatkit::Result<Kernel> {
-        let default = match self.sharp {
-            false => Kernel::default(),
-            true => Kernel::gaussian(0.7, 3.0)?,
-        };
+        let default = Kernel::default();
         let sigma = self.sigma.unwrap_or(default.unit());
         // A wider kernel keeps its shape unless the user cuts it.
         let extent = self.extent.unwrap_or(default.extent.max(default.radius() * sigma));
