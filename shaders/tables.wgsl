@@ -17,11 +17,6 @@ fn classify(value: f32) -> vec4<f32> {
     return mix(tables[low], tables[low + 1u], at - f32(low));
 }
 
-fn integral_to(at: f32) -> vec4<f32> {
-    let low = u32(at);
-    return mix(tables[INTEGRAL_TABLE + low], tables[INTEGRAL_TABLE + low + 1u], at - f32(low));
-}
-
 // Values nearer to each other than this many entries are taken as that far apart: their integrals' difference is lost in
 // rounding.
 const NARROW: f32 = 8.0;
@@ -32,9 +27,10 @@ fn classify_between(a: f32, b: f32) -> vec4<f32> {
     let at = vec2(place_of(a), place_of(b));
     let middle = 0.5 * (at.x + at.y);
     let reach = 0.5 * max(abs(at.x - at.y), NARROW);
-    let low = max(middle - reach, 0.0);
-    let high = min(middle + reach, frame.transfer.z);
-    return (integral_to(high) - integral_to(low)) / (high - low);
+    // To whole entries outwards, which saves half of the look-ups; the mean moves by half an entry at most.
+    let low = max(floor(middle - reach), 0.0);
+    let high = min(ceil(middle + reach), frame.transfer.z);
+    return (tables[INTEGRAL_TABLE + u32(high)] - tables[INTEGRAL_TABLE + u32(low)]) / (high - low);
 }
 
 // The factor on the extinction where the gradient has a magnitude.

@@ -63,7 +63,7 @@ pub struct Variant {
 }
 
 /// Parts of a sheet in which the transfer function is integrated. Figures are in docs/engine.md.
-const PARTS: u32 = 4;
+const PARTS: u32 = 3;
 
 impl Variant {
     /// Pixels that a tile is wide and high, without the edge that it shares with its neighbours.

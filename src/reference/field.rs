@@ -40,7 +40,7 @@ struct Part {
 }
 
 /// Parts of a piece over which values count as linear.
-const PARTS: u32 = 4;
+const PARTS: u32 = 3;
 
 /// Light that is less than this counts as none, so that optical depths stay finite.
 const LEAST_LIGHT: f64 = 1e-9;

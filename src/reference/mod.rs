@@ -44,7 +44,7 @@
 //!
 //! **Parts.** Field is in that part of the sheet which lies in the box of the samples (of the volume's lattice, not of the drawn
 //! one; an axis on which all lie at one place counts half a kernel unit to either side; scattered samples have no box) and in what
-//! the clips leave. Each piece of it is divided in four equal parts. (In one where f(u) = f̄ and no isosurfaces are to be met.)
+//! the clips leave. Each piece of it is divided in three equal parts. (In one where f(u) = f̄ and no isosurfaces are to be met.)
 //! In a part from f(u_a) = a to f(u_b) = b, of length ℓ, all values between count alike (Engel et al. 2001):
 //! extinction κ̄ = ∫κ df/(b − a) and colour ∫κ·c df/∫κ df; for a = b, and in Post with f̄, those of the value. κ̄ is multiplied by the
 //! gradient factor of |g| in the part's middle (Levoy 1988), and for scattered samples by min(1, W/thickness). Then

@@ -17,7 +17,7 @@ pub fn table() -> splatkit::Result<Table> {
         ("Gaussian, σ 0.35, extent 2", Kernel::gaussian(0.35, 2.0)?),
         ("Gaussian, σ 0.5, extent 2", Kernel::gaussian(0.5, 2.0)?),
         ("Gaussian, σ 0.6, extent 2 (default)", Kernel::gaussian(0.6, 2.0)?),
-        ("Gaussian, σ 0.7, extent 3 (sharp)", Kernel::gaussian(0.7, 3.0)?),
+        ("Gaussian, σ 0.7, extent 3", Kernel::gaussian(0.7, 3.0)?),
         ("Gaussian, σ 1, extent 3.5", Kernel::gaussian(1.0, 3.5)?),
         ("B-spline, extent 2", Kernel::b_spline(2.0)?),
         ("Hann, extent 3", Kernel::hann(3.0)?),
