@@ -41,11 +41,19 @@ fn candidate(index: u32) -> Candidate {
         // The slope is in the splat's own whitened space: B⁻ᵀ takes it to the set's.
         let low = unpack2x16float(splat.color);
         let high = unpack2x16float(splat.normal);
-        splat.weight = low.x;
-        let z = high.y / d.y;
-        let y = (high.x - d.x * z) / b.z;
-        let x = (low.y - b.y * y - b.w * z) / b.x;
-        splat.gradient = to_view * vec3(x, y, z);
+        // Widened, a sample still counts as much over space: else what is far below a pixel would drown its surroundings.
+        // Both determinants in units of the splat's own size, where they fit 32 bits.
+        let s = splat.covariance;
+        let unit = inverseSqrt(max(s.xx + s.yy + s.zz, 1e-37));
+        let x = vec3(s.xx, s.xy, s.xz) * unit * unit;
+        let y = vec3(s.xy, s.yy, s.yz) * unit * unit;
+        let z = vec3(s.xz, s.yz, s.zz) * unit * unit;
+        let before = abs(b.x * unit * b.z * unit * d.y * unit);
+        splat.weight = low.x * before * inverseSqrt(max(dot(x, cross(y, z)), 1e-37));
+        let slope_z = high.y / d.y;
+        let slope_y = (high.x - d.x * slope_z) / b.z;
+        let slope_x = (low.y - b.y * slope_y - b.w * slope_z) / b.x;
+        splat.gradient = to_view * vec3(slope_x, slope_y, slope_z);
     }
     if (source.flags & RADIANCE) != 0u {
         splat.strength = splat.strength * f32(splat.color >> 24u) / 255.0;

@@ -83,7 +83,9 @@ fn from_splat<'a>(
     let load = match set.payload {
         Payload::Scalar => {
             let (weight, slope) = splat.weight_and_slope();
-            let (value, weight) = (f64::from(splat.strength), f64::from(weight));
+            // Widened, a sample still counts as much over space: else what is far below a pixel would drown its surroundings.
+            let thinner = (sharp.determinant() / factor.determinant()).abs();
+            let (value, weight) = (f64::from(splat.strength), f64::from(weight) * thinner);
             // A slope across a flat kernel has no meaning in space.
             let slope = Some(sharp.inverse().transpose() * slope.as_dvec3()).filter(|slope| slope.is_finite());
             let slope = slope.unwrap_or(DVec3::ZERO);

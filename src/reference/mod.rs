@@ -12,7 +12,8 @@
 //! **Kernels** (Westover 1990). Each is a radial function h(|x′|) over kernel space x′ = M·(x − c), c its centre, and M = B⁻¹.
 //!
 //! - A splat has the Gaussian h(r) = exp(−r²/2) and its own factor B, turned into view space; Σ = B·Bᵀ is widened by
-//!   (0.35 pixel)² in every direction, so that the splat cannot fall between the pixels' rays. A pixel is |c|/f at the
+//!   (0.35 pixel)² in every direction, so that the splat cannot fall between the pixels' rays (a scattered sample's weight w
+//!   is divided by how much that widens its volume). A pixel is |c|/f at the
 //!   centre's distance (perspective, f the focal length in pixels) or one over the pixels per world unit (orthographic).
 //! - A sample of a lattice has the profile of its volume's kernel and B = A·U·u: A the steps of the lattice, U the sample's
 //!   unit in steps, u the kernel's. It is not widened. Samples are those of `drawn_lattice` with the values `drawn_value`:

@@ -51,10 +51,11 @@ fn scattered_samples_fill_at_most_their_sheets() {
         let scene = Scene::new().with_samples(set(Payload::Scalar, splats), uniform([1.0; 3], 0.8));
         render(&scene, &camera, &settings).unwrap().color[0][3]
     };
-    // One sample: ∫ exp(−s²/2σ²) ds = √(2π)·σ, with σ² widened by (0.35 · 4)² (the only pixel is 4 units wide). The ends of
-    // the splat's box cut its tails.
+    // One sample: ∫ exp(−s²/2σ²) ds = √(2π)·σ, with σ² widened by (0.35 · 4)² (the only pixel is 4 units wide), and its weight
+    // less by as much as its volume is more. The ends of the splat's box cut its tails.
     let deviation = (0.8_f64.powi(2) + 1.4_f64.powi(2)).sqrt();
-    let length = (2.0 * std::f64::consts::PI).sqrt() * deviation;
+    let weight = (0.8 / deviation).powi(3);
+    let length = weight * (2.0 * std::f64::consts::PI).sqrt() * deviation;
     close(field(vec![sample(Vec3::ZERO, 7.0, 0.8)]), 1.0 - (-0.8 * length).exp(), 1e-4);
     // A hundred of them at one place: no sheet holds more of them than it is thick.
     let transfer = uniform([1.0; 3], 0.1);
@@ -65,7 +66,7 @@ fn scattered_samples_fill_at_most_their_sheets() {
     let planes = scene.sheets(&camera.view(settings.size).unwrap(), &settings).planes;
     let lengths = planes.windows(2).map(|plane| {
         let [from, to] = [0, 1].map(|i| (plane[i] - eye) / deviation);
-        (100.0 * deviation * profile::Profile::Gaussian.moments(0.0, [from, to])[0]).min(plane[1] - plane[0])
+        (100.0 * weight * deviation * profile::Profile::Gaussian.moments(0.0, [from, to])[0]).min(plane[1] - plane[0])
     });
     let found = render(&scene, &camera, &settings).unwrap().color[0][3];
     // Sheets filled to less than a ten-thousandth, the tails, have no value.
