@@ -1,4 +1,4 @@
-//! VTK's XML image data (`.vti`): a volume in one of the forms of [`vtk_xml`](super::vtk_xml).
+//! VTK's XML image data (`.vti`): a volume in one of the forms of vtk_xml.rs.
 
 use super::{
     Endian, SampleType, Source,
