@@ -17,7 +17,7 @@ const EXTENT: f32 = 3.0;
 /// are added at a place, and random samples leave no empty ball within the footprints' reach of 2.1 spacings: one of that
 /// size turns up once in e³⁹ of them.
 const SPREAD: f64 = 0.7;
-/// The range of weights, whose median is 1. Samples beyond it count for less or more than they should by their volume, but
+/// The range of weights, whose median is 1 or more. Samples beyond it count for less or more than they should by their volume, but
 /// 16 bits hold them with all their digits, and nothing beside others of weight 1 could be seen of a smaller one.
 const WEIGHTS: [f64; 2] = [1e-4, 6e4];
 /// Over the whole extent of its kernel a sample's value changes by at most this many widths of the range around it.
@@ -154,12 +154,15 @@ pub(super) fn factor(covariance: &[f32; 6]) -> Option<[f64; 6]> {
     factor.iter().all(|term| term.is_finite()).then_some(factor)
 }
 
-/// Brings the weights' median to 1 and all of them into their range.
+/// Brings the weights' median to 1 and all of them into their range. Where most kernels are far smaller than their room, the
+/// median stays above 1: weights of volume over b³ add up to (2π)^1.5 on average over space, and are to add up to 1 at least,
+/// or the wide kernels between the small ones would count as empty.
 fn settle_weights(shapes: &mut [Shape]) {
     let mut weights: Vec<f64> = shapes.iter().map(|shape| shape.weight).collect();
     let middle = weights.len() / 2;
     let median = *weights.select_nth_unstable_by(middle, f64::total_cmp).1;
-    shapes.par_iter_mut().for_each(|shape| shape.weight = (shape.weight / median).clamp(WEIGHTS[0], WEIGHTS[1]));
+    let unit = median.min(std::f64::consts::TAU.powf(1.5));
+    shapes.par_iter_mut().for_each(|shape| shape.weight = (shape.weight / unit).clamp(WEIGHTS[0], WEIGHTS[1]));
 }
 
 /// The slope in the kernel's whitened space, Bᵀ·g.
