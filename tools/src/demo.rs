@@ -56,7 +56,7 @@ const SHOTS: [Shot; 3] = [
     Shot {
         name: "volume.png",
         inputs: &[VOLUME],
-        arguments: "--size 800x600 --up +Z --zoom 1.75 --azimuth 40 --elevation 30 --sheet-thickness 0.013",
+        arguments: "--size 800x600 --up +Z --zoom 1.75 --azimuth 40 --elevation 30",
     },
     Shot {
         name: "mixed.png",
