@@ -85,22 +85,9 @@ fn within(origin: DVec3, direction: DVec3, [low, high]: [DVec3; 2]) -> Option<[f
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::math::{Bounds, Camera, Projection};
+    use super::{super::ray::tests::views, *};
+    use crate::math::Bounds;
     use glam::{DMat3, DVec2};
-
-    fn views() -> [View; 2] {
-        let projections = [Projection::Perspective { view_angle: 70.0 }, Projection::Orthographic { height: 3.0 }];
-        projections.map(|projection| {
-            let camera = Camera {
-                position: DVec3::new(3.0, -2.0, 1.0),
-                focal_point: DVec3::new(0.5, 0.5, 0.5),
-                view_up: DVec3::Z,
-                projection,
-            };
-            camera.view([40, 30]).unwrap()
-        })
-    }
 
     #[test]
     fn a_ray_crosses_a_skewed_box_where_its_faces_are() {

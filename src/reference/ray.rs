@@ -50,11 +50,12 @@ impl Ray {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::math::{Camera, Projection};
 
-    fn views() -> [View; 2] {
+    /// Both projections, from a slant.
+    pub fn views() -> [View; 2] {
         let projections = [Projection::Perspective { view_angle: 70.0 }, Projection::Orthographic { height: 3.0 }];
         projections.map(|projection| {
             let camera = Camera {
