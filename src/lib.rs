@@ -7,6 +7,7 @@
 pub mod compare;
 pub mod engine;
 pub mod error;
+pub mod hierarchy;
 pub mod io;
 pub mod math;
 pub mod picture;

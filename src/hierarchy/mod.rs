@@ -1,0 +1,6 @@
+//! Hierarchies of splats: each node one splat that stands for those below it, so that a picture takes what its pixels can
+//! show and no more (Rusinkiewicz & Levoy 2000). docs/hierarchy.md tells how a scan becomes a tree becomes a picture.
+
+mod node;
+
+pub use node::{Block, MOST_CHILDREN, Node, Tree};
