@@ -1,6 +1,12 @@
 //! Hierarchies of splats: each node one splat that stands for those below it, so that a picture takes what its pixels can
 //! show and no more (Rusinkiewicz & Levoy 2000). docs/hierarchy.md tells how a scan becomes a tree becomes a picture.
 
+mod build;
+mod cluster;
+mod merge;
 mod node;
+mod partition;
+mod sphere;
 
+pub use build::{BuildOptions, Preset, Watch};
 pub use node::{Block, MOST_CHILDREN, Node, Tree};

@@ -1,0 +1,159 @@
+//! Merged splats: what stands for several splats, seen from afar.
+//!
+//! A merged splat keeps the mass of the splats it stands for (optical depth times area), their mean place, colour and
+//! normal, and the moments of their mass about the mean. Were one of them taken for all instead, a surface would thin out
+//! from level to level.
+
+use super::Node;
+use crate::splat::{NO_NORMAL, Splat, decode_normal, encode_normal};
+use glam::Vec3;
+
+/// Full width at half height of a Gaussian, in standard deviations.
+pub(crate) const WIDTH: f32 = 2.354_82;
+
+/// A patch of even mass L across has a variance of L²/12 along it. Gaussians of that variance, L apart, leave 0.4 of the
+/// mean where four meet; with a spread of 1.2, 0.5.
+const SPREAD: f32 = 1.2;
+
+/// Merged strengths stay below this: beyond it a splat only grows wider.
+const MOST_STRENGTH: f32 = 64.0;
+
+/// A symmetric matrix: xx, xy, xz, yy, yz, zz.
+pub(crate) type Moments = [f32; 6];
+
+/// What is known of a node while its parent is made.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Mass {
+    /// Optical depth, weighted by opacity, times area.
+    pub mass: f32,
+    pub area: f32,
+    pub mean: Vec3,
+    /// About the mean, over the mass.
+    pub moments: Moments,
+}
+
+/// The covariance behind a splat's factor.
+pub(crate) fn covariance(factor: &[f32; 6]) -> Moments {
+    let [b00, b10, b11, b20, b21, b22] = *factor;
+    [b00 * b00, b00 * b10, b00 * b20, b10 * b10 + b11 * b11, b10 * b20 + b11 * b21, b20 * b20 + b21 * b21 + b22 * b22]
+}
+
+/// Cholesky's lower factor, with floors that keep it regular.
+fn factor(m: &Moments) -> [f32; 6] {
+    let [xx, xy, xz, yy, yz, zz] = *m;
+    let least = 1e-9 * (xx + yy + zz) + f32::MIN_POSITIVE;
+    let b00 = xx.max(least).sqrt();
+    let (b10, b20) = (xy / b00, xz / b00);
+    let b11 = (yy - b10 * b10).max(least).sqrt();
+    let b21 = (yz - b20 * b10) / b11;
+    let b22 = (zz - b20 * b20 - b21 * b21).max(least).sqrt();
+    [b00, b10, b11, b20, b21, b22]
+}
+
+/// The largest eigenvalue.
+fn largest(m: &Moments) -> f32 {
+    let [xx, xy, xz, yy, yz, zz] = *m;
+    let mean = (xx + yy + zz) / 3.0;
+    let (x, y, z) = (xx - mean, yy - mean, zz - mean);
+    let p = ((x * x + y * y + z * z + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0).sqrt();
+    if p <= mean * 1e-6 {
+        return mean + p;
+    }
+    let (x, y, z, xy, xz, yz) = (x / p, y / p, z / p, xy / p, xz / p, yz / p);
+    let half = (x * (y * z - yz * yz) - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz)) * 0.5;
+    mean + 2.0 * p * (half.clamp(-1.0, 1.0).acos() / 3.0).cos()
+}
+
+/// About σ₁·σ₂: the root of the sum of the principal minors, which for a flat splat is the larger two axes' alone.
+fn area(m: &Moments) -> f32 {
+    let [xx, xy, xz, yy, yz, zz] = *m;
+    (xx * yy - xy * xy + xx * zz - xz * xz + yy * zz - yz * yz).max(0.0).sqrt()
+}
+
+/// A leaf's node; `extent` is where footprints end, in standard deviations.
+pub(crate) fn leaf(splat: &Splat, extent: f32) -> Node {
+    let sigma = largest(&covariance(&splat.factor)).max(0.0).sqrt();
+    Node {
+        splat: *splat,
+        center: splat.center,
+        // Room for rounding.
+        radius: extent * sigma * (1.0 + 1e-5),
+        size: WIDTH * sigma,
+        cone: if splat.normal == NO_NORMAL { -1.0 } else { 1.0 },
+        first_child: 0,
+        children: 0,
+    }
+}
+
+impl Mass {
+    /// Of a splat that is not merged, or whose parts are no longer known.
+    pub fn of(splat: &Splat) -> Self {
+        let covariance = covariance(&splat.factor);
+        let area = area(&covariance);
+        let alpha = (splat.color >> 24) as f32 / 255.0;
+        // What is fully transparent still has a place.
+        let mass = (splat.strength * alpha * area).max(f32::MIN_POSITIVE);
+        Self { mass, area, mean: Vec3::from(splat.center), moments: covariance }
+    }
+}
+
+/// The node above `children`, whose masses are `masses`, but for its sphere and its place in the tree.
+pub(crate) fn merge(children: &[Node], masses: &[Mass]) -> (Node, Mass) {
+    let total: f32 = masses.iter().map(|m| m.mass).sum();
+    let share = |m: &Mass| m.mass / total;
+    let base = masses[0].mean;
+    let mean = base + masses.iter().map(|m| (m.mean - base) * share(m)).sum::<Vec3>();
+    let mut within = [0.0; 6];
+    let mut between = [0.0; 6];
+    let mut color = [0.0; 4];
+    let mut normal = Vec3::ZERO;
+    for (child, m) in children.iter().zip(masses) {
+        let (share, d) = (share(m), m.mean - mean);
+        let spread = [d.x * d.x, d.x * d.y, d.x * d.z, d.y * d.y, d.y * d.z, d.z * d.z];
+        for i in 0..6 {
+            within[i] += share * m.moments[i];
+            between[i] += share * spread[i];
+        }
+        for (sum, part) in color.iter_mut().zip(child.splat.color.to_le_bytes()) {
+            *sum += share * f32::from(part);
+        }
+        normal += decode_normal(child.splat.normal).unwrap_or(Vec3::ZERO) * m.area;
+    }
+    let moments: Moments = std::array::from_fn(|i| within[i] + between[i]);
+    let shown: Moments = std::array::from_fn(|i| within[i] + SPREAD * between[i]);
+    let shown_area = area(&shown).max(f32::MIN_POSITIVE);
+    let alpha = (color[3] / 255.0).max(1.0 / 255.0);
+    let packed_normal = encode_normal(normal.normalize_or_zero());
+    let splat = Splat {
+        center: mean.to_array(),
+        strength: (total / shown_area / alpha).min(MOST_STRENGTH),
+        factor: factor(&shown),
+        color: u32::from_le_bytes(color.map(|part| part.round() as u8)),
+        normal: packed_normal,
+    };
+    let sigma = largest(&covariance(&splat.factor)).max(0.0).sqrt();
+    let size = children.iter().map(|child| child.size).fold(WIDTH * sigma, f32::max);
+    let node = Node {
+        splat,
+        center: splat.center,
+        radius: 0.0,
+        size,
+        cone: cone(packed_normal, children),
+        first_child: 0,
+        children: children.len() as u32,
+    };
+    (node, Mass { mass: total, area: masses.iter().map(|m| m.area).sum(), mean, moments })
+}
+
+/// The cosine of the half-angle of the cone around an axis that holds the cones of all children.
+fn cone(axis: u32, children: &[Node]) -> f32 {
+    let Some(axis) = decode_normal(axis) else { return -1.0 };
+    let mut widest = 0.0f32;
+    for child in children {
+        let Some(own) = decode_normal(child.splat.normal).filter(|_| child.cone > -1.0) else { return -1.0 };
+        // The angle by its half chord, exact for small ones too; and room for rounding.
+        let between = 2.0 * (0.5 * axis.distance(own)).min(1.0).asin();
+        widest = widest.max(between + child.cone.acos() + 1e-4);
+    }
+    if widest < std::f32::consts::PI { widest.cos() } else { -1.0 }
+}

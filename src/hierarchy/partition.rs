@@ -1,0 +1,58 @@
+//! Cutting many splats in blocks of neighbours, by the curve that Morton (1966) drew through space.
+
+use crate::splat::Splat;
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Bits of a Morton key along each axis.
+const BITS: u32 = 10;
+
+/// A cube around some points, in which keys are counted.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Cube {
+    low: Vec3,
+    scale: f32,
+}
+
+impl Cube {
+    pub fn around(low: Vec3, high: Vec3) -> Self {
+        let edge = (high - low).max_element().max(f32::MIN_POSITIVE);
+        Self { low, scale: (1 << BITS) as f32 / edge }
+    }
+
+    /// The Morton key of a place: ten bits along each axis, interleaved.
+    pub fn key(&self, place: Vec3) -> u32 {
+        let cell = ((place - self.low) * self.scale).clamp(Vec3::ZERO, Vec3::splat(((1 << BITS) - 1) as f32));
+        spread(cell.x as u32) | spread(cell.y as u32) << 1 | spread(cell.z as u32) << 2
+    }
+}
+
+/// Two empty bits between each of the lowest ten.
+fn spread(mut bits: u32) -> u32 {
+    bits = (bits | bits << 16) & 0x0300_00ff;
+    bits = (bits | bits << 8) & 0x0300_f00f;
+    bits = (bits | bits << 4) & 0x030c_30c3;
+    (bits | bits << 2) & 0x0924_9249
+}
+
+/// The order of the splats along the curve, cut in blocks of about `wanted` splats: equal shares, so that they can be built
+/// beside each other.
+pub(crate) fn blocks(splats: &[Splat], wanted: usize) -> Vec<Vec<u32>> {
+    if splats.len() <= wanted {
+        return vec![(0..splats.len() as u32).collect()];
+    }
+    let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    let (low, high) = splats
+        .par_iter()
+        .with_min_len(1 << 14)
+        .map(|splat| Vec3::from(splat.center))
+        .fold(|| none, |(low, high), p| (low.min(p), high.max(p)))
+        .reduce(|| none, |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let cube = Cube::around(low, high);
+    let key = |(index, splat): (usize, &Splat)| u64::from(cube.key(Vec3::from(splat.center))) << 32 | index as u64;
+    let mut keys: Vec<u64> = splats.par_iter().enumerate().map(key).collect();
+    keys.par_sort_unstable();
+    let count = splats.len().div_ceil(wanted);
+    let size = splats.len().div_ceil(count);
+    keys.par_chunks(size).map(|part| part.iter().map(|&key| key as u32).collect()).collect()
+}
