@@ -2,6 +2,7 @@
 
 use crate::{
     Error, Result,
+    hierarchy::{Detail, Hierarchy},
     math::{Bounds, Kernel, Profile, Sheets, View},
     splat::{FOOTPRINT_BLUR, Payload, SplatSet},
     volume::{Arrangement, Lattice, Shade, TransferFunction, Volume},
@@ -14,6 +15,8 @@ use std::sync::Arc;
 pub enum Item {
     /// Surfels, 3D Gaussians: splats that carry their own colour and optical depth.
     Radiance(Arc<SplatSet>),
+    /// A hierarchy of such splats, of which a picture shows a cut ([`Settings::detail`]).
+    Hierarchy(Arc<Hierarchy>),
     /// Scattered samples: splats that carry a value, shown by a transfer function.
     Scalar(Arc<SplatSet>, TransferFunction),
     /// Samples on a lattice, each the centre of one kernel, shown by a transfer function.
@@ -35,6 +38,13 @@ impl Scene {
     #[must_use]
     pub fn with_splats(mut self, set: impl Into<Arc<SplatSet>>) -> Self {
         self.items.push(Item::Radiance(set.into()));
+        self
+    }
+
+    /// Adds a hierarchy of splats.
+    #[must_use]
+    pub fn with_hierarchy(mut self, hierarchy: impl Into<Arc<Hierarchy>>) -> Self {
+        self.items.push(Item::Hierarchy(hierarchy.into()));
         self
     }
 
@@ -84,12 +94,12 @@ impl Scene {
         let before = settings.classifies_samples();
         for item in &self.items {
             match item {
-                Item::Radiance(_) if settings.optics == Optics::Maximum => {
+                Item::Radiance(_) | Item::Hierarchy(_) if settings.optics == Optics::Maximum => {
                     return wrong(
                         "a maximum intensity picture takes a volume or samples alone, without surfaces".into(),
                     );
                 }
-                Item::Radiance(_) => {}
+                Item::Radiance(_) | Item::Hierarchy(_) => {}
                 Item::Volume(volume, kernel, _) => {
                     let is_gaussian = matches!(kernel.profile, Profile::Gaussian(_));
                     if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_)) && !is_gaussian && !before {
@@ -137,6 +147,7 @@ impl Scene {
             let (set, payload) = match item {
                 Item::Radiance(set) => (set, Payload::Radiance),
                 Item::Scalar(set, _) => (set, Payload::Scalar),
+                Item::Hierarchy(_) => continue,
                 Item::Volume(..) => {
                     fields += 1;
                     continue;
@@ -164,6 +175,7 @@ impl Scene {
     fn widest_extent(&self) -> f64 {
         let extents = self.items.iter().map(|item| match item {
             Item::Radiance(set) | Item::Scalar(set, _) => f64::from(set.extent),
+            Item::Hierarchy(hierarchy) => f64::from(hierarchy.header().extent),
             Item::Volume(..) => 0.0,
         });
         extents.fold(0.0, f64::max)
@@ -197,7 +209,7 @@ impl Scene {
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
                 }
                 Item::Volume(..) => {}
-                Item::Radiance(_) | Item::Scalar(..) => pixels = Some(settings.sheet_pixels),
+                Item::Radiance(_) | Item::Hierarchy(_) | Item::Scalar(..) => pixels = Some(settings.sheet_pixels),
             }
         }
         Sheets::new(view, [near, far], thickness, pixels)
@@ -262,6 +274,7 @@ impl Item {
     pub fn bounds(&self) -> Bounds {
         match self {
             Self::Radiance(set) | Self::Scalar(set, _) => set.bounds(),
+            Self::Hierarchy(hierarchy) => hierarchy.bounds(),
             Self::Volume(volume, kernel, _) => {
                 let axes = volume.lattice.axes;
                 let unit = volume.lattice.largest_unit();
@@ -370,6 +383,13 @@ pub struct Settings {
     pub sheet_thickness: Option<f64>,
     /// Largest thickness of a sheet in pixels, where the scene holds explicit splats.
     pub sheet_pixels: f64,
+    /// How fine hierarchies are drawn.
+    pub detail: Detail,
+    /// Whether nodes of hierarchies that face away from the eye are left out: a saving where the front hides them, a loss
+    /// where it does not. `None`: where the source was closed.
+    pub cull_backfaces: Option<bool>,
+    /// GPU memory that each hierarchy's pages may take, in bytes.
+    pub page_memory: u64,
     /// Perspective views show nothing nearer than this (world units); a thousandth of the scene where `None`.
     pub near: Option<f64>,
 }
@@ -391,6 +411,9 @@ impl Settings {
             surface_shade: Some(Shade { ambient: 0.2, diffuse: 0.75, specular: 0.15, power: 24.0 }),
             sheet_thickness: None,
             sheet_pixels: 8.0,
+            detail: Detail::default(),
+            cull_backfaces: None,
+            page_memory: 1 << 30,
             near: None,
         }
     }

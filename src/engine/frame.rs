@@ -4,6 +4,7 @@ use super::{
     Gpu,
     large::Large,
     march::March,
+    cut::Cut,
     measure::Measure,
     order::Order,
     plan::{self, MAX_PASSES, Plan},
@@ -93,7 +94,7 @@ pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Sett
     let is_lit = settings.optics == Optics::EmissionAbsorption;
     for item in &prepared.scene.items {
         let transfer = match item {
-            Item::Radiance(_) => {
+            Item::Radiance(_) | Item::Hierarchy(_) => {
                 variant.radiance = true;
                 variant.surface_shaded |= is_lit && settings.surface_shade.is_some();
                 continue;
@@ -356,7 +357,7 @@ pub fn targets(
 /// The tables of the scene's field; a frame without one gets some of no meaning.
 fn tables_of(prepared: &PreparedScene, frame: &mut Frame) -> Vec<[f32; 4]> {
     let field = prepared.scene.items.iter().find_map(|item| match item {
-        Item::Radiance(_) => None,
+        Item::Radiance(_) | Item::Hierarchy(_) => None,
         Item::Scalar(set, transfer) => Some((transfer, set.value_range(), None)),
         Item::Volume(volume, kernel, transfer) => Some((transfer, volume.range, Some(kernel))),
     });
@@ -369,10 +370,12 @@ fn tables_of(prepared: &PreparedScene, frame: &mut Frame) -> Vec<[f32; 4]> {
 /// One step of a frame, for profiles.
 pub type Step<'a> = (&'static str, Box<dyn Fn(&mut wgpu::CommandEncoder) + 'a>);
 
-/// The steps before the first pass: selection where the transfer function changed, then measure and plan.
+/// The steps before the first pass: selection where the transfer function changed, the cuts of hierarchies, then measure and
+/// plan.
 pub fn opening<'a>(
     gpu: &'a Gpu,
     select: &'a Select,
+    cut: &'a Cut,
     scan: &'a Scan,
     pipelines: &'a Pipelines,
     targets: &'a Targets,
@@ -380,6 +383,10 @@ pub fn opening<'a>(
 ) -> Vec<Step<'a>> {
     let mut steps: Vec<Step<'a>> = Vec::new();
     for chunk in &prepared.chunks {
+        if let Origin::Nodes { slots, .. } = &chunk.origin {
+            let own = slots.chunk(&chunk.uniform, &chunk.data);
+            steps.push(("cut", Box::new(move |encoder| cut.encode(gpu, encoder, scan, &own))));
+        }
         let Origin::Lattice { volume, selection, .. } = &chunk.origin else { continue };
         if !selection.outdated {
             continue;

@@ -5,6 +5,7 @@
 //! | pass | does |
 //! |---|---|
 //! | `select` | which samples of a volume the transfer function can show (only when it changes) |
+//! | `cut` | which nodes of a hierarchy stand for it in this view |
 //! | `measure` | which sheets each splat meets, and how much room it will need |
 //! | `plan` | cuts the frame into depth passes that fit the buffers |
 //! | `project` | per depth pass: the records of its splats, counted into bins |
@@ -15,12 +16,15 @@
 //!
 //! docs/engine.md tells the mathematics.
 
+mod cut;
 mod frame;
 mod gpu;
 mod large;
 mod march;
 mod measure;
+mod nodes;
 mod order;
+mod pace;
 mod plan;
 mod project;
 mod renderer;

@@ -2,15 +2,19 @@
 
 use super::{
     Budget, Gpu, PreparedScene,
+    cut::{Cut, finest_within, tally_bytes},
     frame::{self, Pipelines, Pool, Step, Targets},
+    pace::Pace,
     scan::Scan,
     select::Select,
     shaders::Variant,
     uniforms::Report,
+    nodes::Forest,
     upload::Origin,
 };
 use crate::{
     Error, Result,
+    hierarchy::Detail,
     math::{Camera, View},
     picture::Picture,
     scene::{Optics, Scene, Settings},
@@ -23,6 +27,8 @@ pub struct Renderer {
     gpu: Gpu,
     budget: Budget,
     select: Select,
+    cut: Cut,
+    pace: Pace,
     scan: Scan,
     pipelines: HashMap<Variant, Pipelines>,
     pool: Pool,
@@ -39,6 +45,10 @@ pub struct FrameStats {
     pub passes: u32,
     /// GPU memory held by the scene and by the frame.
     pub gpu_bytes: u64,
+    /// Hierarchies: the cut, in pixels.
+    pub cut_pixels: f64,
+    /// Pages of hierarchies that the view needed and that had no room; the nodes above them were drawn.
+    pub missing_pages: u64,
     /// Milliseconds of each step, in order; only from [`Renderer::profile`].
     pub steps: Vec<(&'static str, f64)>,
 }
@@ -54,6 +64,8 @@ impl Renderer {
             gpu: gpu.clone(),
             budget,
             select: Select::new(gpu),
+            cut: Cut::new(gpu),
+            pace: Pace::default(),
             scan: Scan::new(gpu),
             pipelines: HashMap::new(),
             pool: Pool::default(),
@@ -78,11 +90,15 @@ impl Renderer {
         let [width, height] = settings.size;
         let mut picture = Picture { width, height, color: Vec::new(), depth: Vec::new() };
         let mut stats = FrameStats::default();
-        for strip in self.strips(&camera.view(settings.size)?) {
-            let (targets, own) = self.draw_frame(prepared, &strip, settings, false)?;
+        let view = camera.view(settings.size)?;
+        let detail = self.paced(&view, settings.detail);
+        let start = Instant::now();
+        for strip in self.strips(&view) {
+            let (targets, own) = self.draw_frame(prepared, &strip, settings, detail, false)?;
             self.read(&targets, &strip, settings, &mut picture)?;
             stats.add(own);
         }
+        self.note(start, settings.detail);
         Ok((picture, stats))
     }
 
@@ -109,10 +125,29 @@ impl Renderer {
         profile: bool,
     ) -> Result<FrameStats> {
         let mut stats = FrameStats::default();
-        for strip in self.strips(&camera.view(settings.size)?) {
-            stats.add(self.draw_frame(prepared, &strip, settings, profile)?.1);
+        let view = camera.view(settings.size)?;
+        let detail = self.paced(&view, settings.detail);
+        let start = Instant::now();
+        for strip in self.strips(&view) {
+            stats.add(self.draw_frame(prepared, &strip, settings, detail, profile)?.1);
         }
+        self.note(start, settings.detail);
         Ok(stats)
+    }
+
+    /// A detail asked for in milliseconds, in pixels; others as they are.
+    fn paced(&mut self, view: &View, detail: Detail) -> Detail {
+        match detail {
+            Detail::Milliseconds(_) => Detail::Pixels(self.pace.next(view)),
+            _ => detail,
+        }
+    }
+
+    /// Takes note of a picture's time.
+    fn note(&mut self, start: Instant, detail: Detail) {
+        if let Detail::Milliseconds(wanted) = detail {
+            self.pace.took(start.elapsed().as_secs_f64() * 1e3, wanted);
+        }
     }
 
     /// The view cut in strips of whole rows whose colours (16 bytes a pixel) fit a binding.
@@ -134,22 +169,24 @@ impl Renderer {
         prepared: &mut PreparedScene,
         view: &View,
         settings: &Settings,
+        detail: Detail,
         profile: bool,
     ) -> Result<(Targets, FrameStats)> {
-        let gpu = &self.gpu;
         prepared.scene.validate_settings(settings)?;
         let _span = tracing::debug_span!("frame", width = view.size[0], height = view.size[1]).entered();
+        let cut_pixels = self.cut_hierarchies(prepared, view, settings, detail)?;
+        let gpu = &self.gpu;
         let variant = frame::variant(gpu, prepared, view, settings, self.budget);
         let sheets = prepared.scene.sheets(view, settings);
         let targets = frame::targets(gpu, &mut self.pool, prepared, &variant, view, &sheets, settings, self.budget)?;
         let pipelines = self.pipelines.entry(variant).or_insert_with(|| Pipelines::new(gpu, &variant));
-        for chunk in &prepared.chunks {
+        for chunk in prepared.chunks.iter().filter(|chunk| !matches!(chunk.origin, Origin::Nodes { .. })) {
             let lattice = matches!(chunk.origin, Origin::Lattice { .. });
-            let source = chunk.source(view, variant.isotropic && lattice);
+            let source = chunk.source(view, variant.isotropic && lattice, &prepared.forests);
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
         }
         let mut times = Vec::new();
-        let steps = frame::opening(gpu, &self.select, &self.scan, pipelines, &targets, prepared);
+        let steps = frame::opening(gpu, &self.select, &self.cut, &self.scan, pipelines, &targets, prepared);
         let first = frame::depth_pass(gpu, &self.scan, pipelines, &targets, prepared, 0);
         submit(gpu, steps.into_iter().chain(first), profile.then_some(&mut times))?;
         finish_tiles(gpu, pipelines, &targets, 0, profile.then_some(&mut times))?;
@@ -178,9 +215,66 @@ impl Renderer {
             entries: u64::from(report.entries),
             passes: report.passes,
             gpu_bytes: prepared.bytes + targets.bytes(),
+            cut_pixels,
+            missing_pages: prepared.forests.iter().map(|forest| forest.missing as u64).sum(),
             steps: times,
         };
         Ok((targets, stats))
+    }
+
+    /// Brings the pages that a view needs to the GPU and sets the cuts of all hierarchies; gives the pixels of the cut.
+    fn cut_hierarchies(
+        &self,
+        prepared: &mut PreparedScene,
+        view: &View,
+        settings: &Settings,
+        detail: Detail,
+    ) -> Result<f64> {
+        if prepared.forests.is_empty() {
+            return Ok(0.0);
+        }
+        let (gpu, cull) = (&self.gpu, settings.cull_backfaces);
+        let mut pixels = match detail {
+            Detail::Pixels(pixels) => pixels,
+            // The pages of a cut hold several times what it draws.
+            Detail::Splats(most) => {
+                let finest = |forest: &Forest| forest.finest_within(view, cull, most.saturating_mul(8).max(1 << 16));
+                prepared.forests.iter().map(finest).fold(0.0, f64::max)
+            }
+            Detail::Milliseconds(_) => 1.0,
+        };
+        let cuts = |prepared: &PreparedScene, pixels| {
+            prepared.forests.iter().map(|forest| forest.cut(view, pixels, cull)).collect::<Vec<_>>()
+        };
+        let own = cuts(prepared, pixels);
+        prepared.update_forests(gpu, &own, settings.page_memory)?;
+        for chunk in prepared.chunks.iter().filter(|chunk| matches!(chunk.origin, Origin::Nodes { .. })) {
+            let source = chunk.source(view, false, &prepared.forests);
+            gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
+        }
+        if let Detail::Splats(most) = detail {
+            pixels = pixels.max(self.finest_cut(prepared, most)?);
+            for (forest, cut) in prepared.forests.iter().zip(cuts(prepared, pixels)) {
+                forest.set_cut(gpu, &cut);
+            }
+        }
+        Ok(pixels)
+    }
+
+    /// The finest cut, in pixels, that draws no more than `most` of the nodes at hand.
+    fn finest_cut(&self, prepared: &PreparedScene, most: u64) -> Result<f64> {
+        let gpu = &self.gpu;
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        let counters = super::buffer(gpu, "tally", tally_bytes(), usage);
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("tally") });
+        for chunk in &prepared.chunks {
+            if let Origin::Nodes { slots, .. } = &chunk.origin {
+                self.cut.encode_tally(gpu, &mut encoder, &slots.chunk(&chunk.uniform, &chunk.data), &counters);
+            }
+        }
+        gpu.queue.submit([encoder.finish()]);
+        let tally: Vec<i32> = bytemuck::pod_collect_to_vec(&read_buffer(gpu, &counters, 0, tally_bytes())?);
+        Ok(finest_within(&tally, most))
     }
 
     /// Appends the rows of a strip to a picture.
@@ -211,6 +305,8 @@ impl FrameStats {
         self.entries += other.entries;
         self.passes += other.passes;
         self.gpu_bytes = self.gpu_bytes.max(other.gpu_bytes);
+        self.cut_pixels = self.cut_pixels.max(other.cut_pixels);
+        self.missing_pages = self.missing_pages.max(other.missing_pages);
         for (name, time) in other.steps {
             match self.steps.iter_mut().find(|step| step.0 == name) {
                 Some(step) => step.1 += time,

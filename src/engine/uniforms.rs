@@ -94,11 +94,17 @@ fn shade(s: Option<Shade>) -> [f32; 4] {
 impl Source {
     /// A chunk of explicit splats.
     pub fn of_splats(view: &View, set: &SplatSet, radiance: bool) -> Self {
+        let flags = if radiance { RADIANCE } else { 0 };
+        Self { flags, ..Self::of_radiance(view, set.origin, set.extent) }
+    }
+
+    /// A chunk of radiance splats around an origin in the world.
+    pub fn of_radiance(view: &View, origin: DVec3, extent: f32) -> Self {
         Self {
             axes: columns(view.rotation),
-            origin: wide(view.to_view(set.origin), 0.0),
-            extent: set.extent,
-            flags: if radiance { RADIANCE } else { 0 },
+            origin: wide(view.to_view(origin), 0.0),
+            extent,
+            flags: RADIANCE,
             ..Self::default()
         }
     }
@@ -154,7 +160,7 @@ impl Frame {
         }
         for item in &scene.items {
             let transfer = match item {
-                Item::Radiance(_) => continue,
+                Item::Radiance(_) | Item::Hierarchy(_) => continue,
                 Item::Scalar(set, transfer) => {
                     frame.kernel[2] = 1.0 / set.overlap;
                     frame.isotropic[3] = Kernel::default().least_sum() as f32;

@@ -1,8 +1,14 @@
 //! A scene on the GPU: every item cut into chunks that fit a binding.
 
-use super::{Gpu, select::Selection, uniforms::Source};
+use super::{
+    Gpu,
+    nodes::{Forest, Growth, Slots},
+    select::Selection,
+    uniforms::Source,
+};
 use crate::{
     Error, Result,
+    hierarchy::Cut,
     math::{Kernel, View},
     scene::{Item, Scene},
     splat::{Splat, SplatSet},
@@ -31,6 +37,11 @@ pub enum Origin {
     Splats {
         set: Arc<SplatSet>,
         radiance: bool,
+    },
+    /// Slots for pages of the hierarchy of this number.
+    Nodes {
+        forest: usize,
+        slots: Box<Slots>,
     },
     Lattice {
         volume: Arc<Volume>,
@@ -62,6 +73,8 @@ pub struct Chunk {
 pub struct PreparedScene {
     pub(super) scene: Scene,
     pub(super) chunks: Vec<Chunk>,
+    /// The hierarchies, in the scene's order.
+    pub(super) forests: Vec<Forest>,
     /// Runs of candidates in all chunks.
     pub(super) runs: u32,
     /// Bytes of GPU memory that the scene holds.
@@ -72,10 +85,11 @@ impl PreparedScene {
     /// Uploads a scene. The scene's splats and samples are shared with the caller's, not copied.
     pub(super) fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
         scene.validate()?;
-        let mut prepared = Self { scene: scene.clone(), chunks: Vec::new(), runs: 0, bytes: 0 };
+        let mut prepared = Self { scene: scene.clone(), chunks: Vec::new(), forests: Vec::new(), runs: 0, bytes: 0 };
         for item in &scene.items {
             match item {
                 Item::Radiance(set) => prepared.add_splats(gpu, set, true),
+                Item::Hierarchy(hierarchy) => prepared.forests.push(Forest::new(gpu, hierarchy)),
                 Item::Scalar(set, _) => prepared.add_splats(gpu, set, false),
                 Item::Volume(volume, kernel, _) => prepared.add_volume(gpu, volume, kernel.clone())?,
             }
@@ -150,6 +164,30 @@ impl PreparedScene {
 
     fn add_chunk(&mut self, gpu: &Gpu, origin: Origin, bytes: &[u8], count: u32) {
         let data = upload(gpu, "chunk", bytes);
+        self.push_chunk(gpu, origin, data, count);
+    }
+
+    /// Brings what the cuts of all hierarchies need to the GPU, within `room` bytes each.
+    pub(super) fn update_forests(&mut self, gpu: &Gpu, cuts: &[Cut], room: u64) -> Result<()> {
+        for (index, cut) in cuts.iter().enumerate() {
+            let own: Vec<(&Slots, &wgpu::Buffer)> = self
+                .chunks
+                .iter()
+                .filter_map(|chunk| match &chunk.origin {
+                    Origin::Nodes { forest, slots } if *forest == index => Some((slots.as_ref(), &chunk.data)),
+                    _ => None,
+                })
+                .collect();
+            let grown = self.forests[index].update(gpu, cut, room, &own)?;
+            for Growth { slots, splats, capacity, bytes } in grown {
+                self.bytes += bytes - splats.size();
+                self.push_chunk(gpu, Origin::Nodes { forest: index, slots: Box::new(slots) }, splats, capacity);
+            }
+        }
+        Ok(())
+    }
+
+    fn push_chunk(&mut self, gpu: &Gpu, origin: Origin, data: wgpu::Buffer, count: u32) {
         let uniform = super::buffer(gpu, "source", size_of::<Source>() as u64, wgpu::BufferUsages::UNIFORM);
         let spans = super::buffer(gpu, "spans", 4 * u64::from(count), wgpu::BufferUsages::STORAGE);
         self.bytes += data.size() + spans.size();
@@ -160,8 +198,12 @@ impl PreparedScene {
 
 impl Chunk {
     /// The chunk's uniform for a view.
-    pub fn source(&self, view: &View, isotropic: bool) -> Source {
+    pub fn source(&self, view: &View, isotropic: bool, forests: &[Forest]) -> Source {
         let source = match &self.origin {
+            Origin::Nodes { forest, .. } => {
+                let header = forests[*forest].hierarchy.header();
+                Source::of_radiance(view, header.origin, header.extent)
+            }
             Origin::Splats { set, radiance } => Source::of_splats(view, set, *radiance),
             Origin::Lattice { volume, kernel, slices: [first, low, high], .. } => {
                 let lattice = volume.drawn_lattice();

@@ -27,6 +27,8 @@ pub(super) fn gather<'a>(scene: &'a Scene, view: &View, before: Option<Before>) 
             Item::Radiance(set) => {
                 kernels.extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, None, view)))
             }
+            // Its cut is a set of its own by now.
+            Item::Hierarchy(_) => {}
             Item::Scalar(set, transfer) => {
                 let before = before.map(|before| (before, transfer));
                 kernels.extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, before, view)));

@@ -138,9 +138,23 @@ use sheet::Light;
 pub fn render(scene: &Scene, camera: &Camera, settings: &Settings) -> Result<Picture> {
     scene.validate()?;
     scene.validate_settings(settings)?;
-    let frame = Frame::new(scene, camera.view(settings.size)?, settings);
+    let view = camera.view(settings.size)?;
+    let flat = with_cuts(scene, &view, settings)?;
+    let frame = Frame::new(scene, &flat, view, settings);
     let rows = (0..settings.size[1]).into_par_iter().map(|row| frame.row(row.into())).collect();
     Ok(picture(&frame.view, rows))
+}
+
+/// The scene with the splats of hierarchies' cuts in their place.
+fn with_cuts(scene: &Scene, view: &View, settings: &Settings) -> Result<Scene> {
+    let flat = |item: &Item| match item {
+        Item::Hierarchy(hierarchy) => {
+            let cut = hierarchy.read_tree()?.cut(view, settings.detail, settings.cull_backfaces)?;
+            Ok(Item::Radiance(cut.into()))
+        }
+        other => Ok(other.clone()),
+    };
+    Ok(Scene { items: scene.items.iter().map(flat).collect::<Result<_>>()? })
 }
 
 /// The picture of what the rays of all rows have passed.
@@ -190,9 +204,10 @@ struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    fn new(scene: &'a Scene, view: View, settings: &Settings) -> Self {
-        let samples = scene.items.iter().find_map(|item| match item {
-            Item::Radiance(_) => None,
+    /// `flat` is the scene with its hierarchies cut.
+    fn new(scene: &Scene, flat: &'a Scene, view: View, settings: &Settings) -> Self {
+        let samples = flat.items.iter().find_map(|item| match item {
+            Item::Radiance(_) | Item::Hierarchy(_) => None,
             Item::Scalar(_, transfer) => Some((transfer, None)),
             Item::Volume(volume, _, transfer) => Some((transfer, Some(&volume.lattice))),
         });
@@ -218,7 +233,7 @@ impl<'a> Frame<'a> {
             clips: settings.clips.clone(),
             planes: scene.sheets(&view, settings).planes,
             near: nearest(scene, &view, settings),
-            kernels: gather::gather(scene, &view, before.then_some(Before { lit: shade.is_some() })),
+            kernels: gather::gather(flat, &view, before.then_some(Before { lit: shade.is_some() })),
             field,
             lattice: samples.and_then(|(_, lattice)| lattice),
             shade: if before && samples.is_some() { shade } else { settings.surface_shade },

@@ -1,0 +1,342 @@
+//! Hierarchies on the GPU: their pages in slots, as many as a view needs and the room allows.
+//!
+//! Slots lie in chunks, each as large as a binding holds. Before a frame the pages that the view may need are found by
+//! their bounds, the coarse ones first; those not at hand are read and take free slots, or the slots of pages that no
+//! recent view needed. Where there is no room for more, the nodes above them are drawn instead.
+
+use super::{Gpu, cut::runs_of};
+use crate::{
+    Result,
+    hierarchy::{self, CutSphere, Hierarchy, Page},
+    math::View,
+};
+use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
+use std::sync::Arc;
+use wgpu::BufferUsages as Usage;
+
+/// Nodes of a slot (`SLOT_NODES` in nodes.wgsl): the most of a page.
+pub const SLOT_NODES: u32 = hierarchy::PAGE_NODES as u32;
+/// Slots of a chunk at most: a node's number has 22 bits in cut.wgsl's list.
+const MOST_SLOTS: u64 = (1 << 22) / SLOT_NODES as u64;
+const NO_PAGE: u32 = u32::MAX;
+/// Pages read before they are sent.
+const BATCH: usize = 64;
+
+/// `Node` in nodes.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+struct GpuNode {
+    center: [f32; 3],
+    radius: f32,
+    size: f32,
+    cone: f32,
+    child_page: u32,
+    parent_size: f32,
+    parent_center: [f32; 3],
+    parent_radius: f32,
+}
+const _: () = assert!(size_of::<GpuNode>() == size_of::<crate::splat::Splat>());
+
+/// Bytes that a slot takes: nodes and splats.
+const SLOT_BYTES: u64 = 2 * SLOT_NODES as u64 * size_of::<GpuNode>() as u64;
+
+/// `Cut` in nodes.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+struct GpuCut {
+    sides: [[f32; 4]; 4],
+    scale: f32,
+    fineness: f32,
+    perspective: u32,
+    culls: u32,
+    sin_margin: f32,
+    cos_margin: f32,
+    unused: [f32; 2],
+}
+
+/// The buffers of one chunk of slots, beside its splats.
+#[derive(Debug)]
+pub struct Slots {
+    nodes: wgpu::Buffer,
+    slots: wgpu::Buffer,
+    runs: wgpu::Buffer,
+    pub selected: wgpu::Buffer,
+    pub arguments: wgpu::Buffer,
+    resident: wgpu::Buffer,
+    cut: wgpu::Buffer,
+    first_slot: usize,
+    count: usize,
+}
+
+/// What the cut binds of a chunk.
+pub struct NodeChunk<'a> {
+    pub source: &'a wgpu::Buffer,
+    pub splats: &'a wgpu::Buffer,
+    pub slots: &'a Slots,
+    pub runs: &'a wgpu::Buffer,
+    pub selected: &'a wgpu::Buffer,
+    pub arguments: &'a wgpu::Buffer,
+    pub capacity: u32,
+}
+
+impl NodeChunk<'_> {
+    pub fn bindings(&self) -> [wgpu::BufferBinding<'_>; 6] {
+        let Slots { cut, nodes, slots, resident, .. } = self.slots;
+        [self.source, cut, nodes, self.splats, slots, resident].map(|b| b.as_entire_buffer_binding())
+    }
+}
+
+impl Slots {
+    pub fn chunk<'a>(&'a self, source: &'a wgpu::Buffer, splats: &'a wgpu::Buffer) -> NodeChunk<'a> {
+        NodeChunk {
+            source,
+            splats,
+            slots: self,
+            runs: &self.runs,
+            selected: &self.selected,
+            arguments: &self.arguments,
+            capacity: self.count as u32 * SLOT_NODES,
+        }
+    }
+}
+
+/// A chunk that a hierarchy has grown by, for the caller to keep with the others.
+#[derive(Debug)]
+pub struct Growth {
+    pub slots: Slots,
+    pub splats: wgpu::Buffer,
+    pub capacity: u32,
+    pub bytes: u64,
+}
+
+/// The pages of one hierarchy that are at hand.
+#[derive(Debug)]
+pub struct Forest {
+    pub hierarchy: Arc<Hierarchy>,
+    resident: wgpu::Buffer,
+    cut: wgpu::Buffer,
+    /// The page in each slot, and the last frame that needed it.
+    slots: Vec<Option<(u32, u64)>>,
+    /// The slot of each page.
+    slot_of: Vec<Option<u32>>,
+    frame: u64,
+    /// Pages that the last view needed and that found no room.
+    pub missing: usize,
+}
+
+impl Forest {
+    pub fn new(gpu: &Gpu, hierarchy: &Arc<Hierarchy>) -> Self {
+        let pages = hierarchy.pages().len();
+        Self {
+            hierarchy: hierarchy.clone(),
+            resident: super::buffer(gpu, "resident pages", pages.div_ceil(32) as u64 * 4, Usage::STORAGE),
+            cut: super::buffer(gpu, "cut", size_of::<GpuCut>() as u64, Usage::UNIFORM),
+            slots: Vec::new(),
+            slot_of: vec![None; pages],
+            frame: 0,
+            missing: 0,
+        }
+    }
+
+    /// The cut of this hierarchy in a view.
+    pub fn cut(&self, view: &View, pixels: f64, cull: Option<bool>) -> hierarchy::Cut {
+        let header = self.hierarchy.header();
+        hierarchy::Cut::new(view, header.origin, pixels, cull.unwrap_or(header.closed))
+    }
+
+    /// The pages that a cut may need, the coarse ones first, with all pages above them.
+    pub fn needed(&self, cut: &hierarchy::Cut) -> Vec<u32> {
+        let pages = self.hierarchy.pages();
+        let test = |entry: &hierarchy::PageEntry| entry.parent_pages.is_empty() || cut.may_refine(&parents_of(entry));
+        let mut needed: Vec<bool> = pages.par_iter().with_min_len(1 << 10).map(test).collect();
+        for index in (0..pages.len()).rev() {
+            if needed[index] {
+                for parent in pages[index].parent_pages.clone() {
+                    needed[parent as usize] = true;
+                }
+            }
+        }
+        let mut needed: Vec<u32> = (0..).zip(needed).filter(|(_, needed)| *needed).map(|(index, _)| index).collect();
+        let coarseness = |page: &u32| pages[*page as usize].largest_parent_size;
+        needed.sort_by(|a, b| coarseness(b).total_cmp(&coarseness(a)));
+        needed
+    }
+
+    /// The finest cut, in pixels, whose pages hold no more than `most` nodes.
+    pub fn finest_within(&self, view: &View, cull: Option<bool>, most: u64) -> f64 {
+        let pages = self.hierarchy.pages();
+        let nodes = |pixels: f64| {
+            let needed = self.needed(&self.cut(view, pixels, cull));
+            needed.iter().map(|&page| u64::from(pages[page as usize].nodes)).sum::<u64>()
+        };
+        if nodes(0.0) <= most {
+            return 0.0;
+        }
+        let (mut fine, mut coarse) = (-10.0f64, 16.0f64);
+        for _ in 0..12 {
+            let middle = (fine + coarse) * 0.5;
+            *(if nodes(middle.exp2()) <= most { &mut coarse } else { &mut fine }) = middle;
+        }
+        coarse.exp2()
+    }
+
+    /// Sets the cut without changing what is at hand.
+    pub fn set_cut(&self, gpu: &Gpu, cut: &hierarchy::Cut) {
+        let (sin_margin, cos_margin) = hierarchy::cone_margin();
+        let uniform = GpuCut {
+            sides: cut.sides.map(|side| side.to_array()),
+            scale: cut.scale,
+            fineness: cut.fineness,
+            perspective: u32::from(cut.perspective),
+            culls: u32::from(cut.culls),
+            sin_margin,
+            cos_margin,
+            unused: [0.0; 2],
+        };
+        gpu.queue.write_buffer(&self.cut, 0, bytemuck::bytes_of(&uniform));
+    }
+
+    /// Brings the pages that a cut needs to the GPU, within `room` bytes. `chunks` are this hierarchy's, in order, each with
+    /// its splats; those that it grows by are returned.
+    pub fn update(
+        &mut self,
+        gpu: &Gpu,
+        cut: &hierarchy::Cut,
+        room: u64,
+        chunks: &[(&Slots, &wgpu::Buffer)],
+    ) -> Result<Vec<Growth>> {
+        self.frame += 1;
+        self.set_cut(gpu, cut);
+        let mut needed = self.needed(cut);
+        let most = usize::try_from(room / SLOT_BYTES).unwrap_or(usize::MAX).max(1);
+        self.missing = needed.len().saturating_sub(most);
+        needed.truncate(most);
+        let mut absent = Vec::new();
+        for &page in &needed {
+            match self.slot_of[page as usize] {
+                Some(slot) => self.slots[slot as usize] = Some((page, self.frame)),
+                None => absent.push(page),
+            }
+        }
+        let free = self.slots.iter().filter(|slot| slot.is_none()).count();
+        let mut grown = Vec::new();
+        while self.slots.len() < most && free + grown_slots(&grown) < absent.len() {
+            let wanted = (absent.len() - free - grown_slots(&grown)).min(most - self.slots.len());
+            grown.push(self.grow(gpu, wanted));
+        }
+        let all: Vec<(&Slots, &wgpu::Buffer)> =
+            chunks.iter().copied().chain(grown.iter().map(|g: &Growth| (&g.slots, &g.splats))).collect();
+        self.load(gpu, &absent, &all)?;
+        self.describe(gpu, &all);
+        Ok(grown)
+    }
+
+    /// A chunk with room for about `wanted` more pages.
+    fn grow(&mut self, gpu: &Gpu, wanted: usize) -> Growth {
+        let most = (gpu.binding_size() / (SLOT_BYTES / 2)).min(MOST_SLOTS) as usize;
+        // A view's neighbours need some more; the last chunk of a small file need not be larger than it.
+        let left = self.slot_of.len() - self.slots.len().min(self.slot_of.len());
+        let count = (wanted + wanted / 4 + 1).min(left.max(1)).max(wanted).min(most);
+        let capacity = count as u32 * SLOT_NODES;
+        let half = count as u64 * SLOT_BYTES / 2;
+        let slots = Slots {
+            nodes: super::buffer(gpu, "nodes", half, Usage::STORAGE),
+            slots: super::buffer(gpu, "slots", 4 * count as u64, Usage::STORAGE),
+            runs: super::buffer(gpu, "cut runs", 4 * u64::from(runs_of(capacity)), Usage::STORAGE),
+            selected: super::buffer(gpu, "drawn nodes", 4 * (u64::from(capacity) + 1), Usage::STORAGE),
+            arguments: super::buffer(gpu, "drawn arguments", 12, Usage::STORAGE | Usage::INDIRECT),
+            resident: self.resident.clone(),
+            cut: self.cut.clone(),
+            first_slot: self.slots.len(),
+            count,
+        };
+        self.slots.extend(std::iter::repeat_n(None, count));
+        let bytes = 2 * half + slots.runs.size() + slots.selected.size();
+        Growth { slots, splats: super::buffer(gpu, "node splats", half, Usage::STORAGE), capacity, bytes }
+    }
+
+    /// Reads pages and puts them in slots that are free or whose pages were not needed for longest.
+    fn load(&mut self, gpu: &Gpu, absent: &[u32], chunks: &[(&Slots, &wgpu::Buffer)]) -> Result<()> {
+        let mut places: Vec<u32> = (0..self.slots.len() as u32).collect();
+        let last_needed = |slot: &u32| self.slots[*slot as usize].map_or(0, |(_, frame)| frame);
+        places.retain(|slot| last_needed(slot) < self.frame);
+        places.sort_by_key(last_needed);
+        let mut places = places.into_iter();
+        for batch in absent.chunks(BATCH) {
+            let pages: Vec<Page> =
+                batch.par_iter().map(|&page| self.hierarchy.read_page(page as usize)).collect::<Result<_>>()?;
+            for (&page, content) in batch.iter().zip(&pages) {
+                let Some(slot) = places.next() else {
+                    self.missing += 1;
+                    continue;
+                };
+                if let Some((old, _)) = self.slots[slot as usize] {
+                    self.slot_of[old as usize] = None;
+                }
+                self.slots[slot as usize] = Some((page, self.frame));
+                self.slot_of[page as usize] = Some(slot);
+                let holder = chunks.iter().find(|(s, _)| (s.first_slot..s.first_slot + s.count).contains(&(slot as usize)));
+                let Some((slots, splats)) = holder else { continue };
+                let offset = (slot as usize - slots.first_slot) as u64 * SLOT_BYTES / 2;
+                let nodes: Vec<GpuNode> = (0..content.nodes.len()).map(|index| gpu_node(content, index)).collect();
+                let own: Vec<crate::splat::Splat> = content.nodes.iter().map(|node| node.splat).collect();
+                gpu.queue.write_buffer(&slots.nodes, offset, bytemuck::cast_slice(&nodes));
+                gpu.queue.write_buffer(splats, offset, bytemuck::cast_slice(&own));
+            }
+            // What is written waits in staging memory until something is submitted.
+            gpu.queue.submit([]);
+        }
+        Ok(())
+    }
+
+    /// Tells the GPU which pages take part in this frame, and which are at hand.
+    fn describe(&self, gpu: &Gpu, chunks: &[(&Slots, &wgpu::Buffer)]) {
+        let mut bits = vec![0u32; self.slot_of.len().div_ceil(32)];
+        // Pages at hand that the view does not need, or that are beyond its room, count as not at hand.
+        for (page, _) in self.slots.iter().flatten().filter(|(_, frame)| *frame == self.frame) {
+            bits[*page as usize / 32] |= 1 << (page % 32);
+        }
+        gpu.queue.write_buffer(&self.resident, 0, bytemuck::cast_slice(&bits));
+        for (slots, _) in chunks {
+            let own = &self.slots[slots.first_slot..slots.first_slot + slots.count];
+            let counts: Vec<u32> = own
+                .iter()
+                .map(|slot| match slot {
+                    Some((page, frame)) if *frame == self.frame => self.hierarchy.pages()[*page as usize].nodes,
+                    _ => 0,
+                })
+                .collect();
+            gpu.queue.write_buffer(&slots.slots, 0, bytemuck::cast_slice(&counts));
+        }
+    }
+}
+
+/// A sphere that holds the spheres of all parents of a page's nodes, and the largest of their sizes.
+fn parents_of(entry: &hierarchy::PageEntry) -> CutSphere {
+    CutSphere { center: entry.parents_center, radius: entry.parents_radius, size: entry.largest_parent_size }
+}
+
+fn grown_slots(grown: &[Growth]) -> usize {
+    grown.iter().map(|growth| growth.slots.count).sum()
+}
+
+fn gpu_node(page: &Page, index: usize) -> GpuNode {
+    let node = &page.nodes[index];
+    let parent = page.parent(index);
+    let child_page = page.child_pages[index];
+    // A portal gives way to its block wherever that is at hand.
+    let size = if page.is_portal(index) { f32::MAX } else { node.size };
+    let CutSphere { center, radius, size: parent_size } =
+        parent.unwrap_or(CutSphere { center: [0.0; 3], radius: 0.0, size: -1.0 });
+    GpuNode {
+        center: node.center,
+        radius: node.radius,
+        size,
+        cone: node.cone,
+        child_page: if child_page == u32::MAX { NO_PAGE } else { child_page },
+        parent_size,
+        parent_center: center,
+        parent_radius: radius,
+    }
+}
