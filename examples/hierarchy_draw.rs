@@ -1,5 +1,5 @@
-use splatkit::{engine::*, hierarchy::*, io, math::*, scene::*, surface::SurfelOptions, compare};
 use glam::DVec3;
+use splatkit::{compare, engine::*, hierarchy::*, io, math::*, scene::*, surface::SurfelOptions};
 use std::{sync::Arc, time::Instant};
 fn main() {
     let path = std::env::args().nth(1).unwrap();
@@ -21,16 +21,30 @@ fn main() {
         camera.position = camera.focal_point + (camera.position - camera.focal_point) / zoom;
         let (truth, stats) = renderer.render(&mut flat, &camera, &settings).unwrap();
         println!("zoom {zoom}: plain splats {} entries {}", stats.splats, stats.entries);
-        let t = Instant::now(); renderer.draw(&mut flat, &camera, &settings).unwrap(); println!("  {:?}", t.elapsed());
+        let t = Instant::now();
+        renderer.draw(&mut flat, &camera, &settings).unwrap();
+        println!("  {:?}", t.elapsed());
         for pixels in [0.0, 0.5, 1.0, 2.0, 4.0] {
             settings.detail = Detail::Pixels(pixels);
             let (picture, stats) = renderer.render(&mut prepared, &camera, &settings).unwrap();
-            let t = Instant::now(); renderer.draw(&mut prepared, &camera, &settings).unwrap(); let time = t.elapsed();
+            let t = Instant::now();
+            renderer.draw(&mut prepared, &camera, &settings).unwrap();
+            let time = t.elapsed();
             let view = camera.view(settings.size).unwrap();
             let oracle = tree.selected(&Cut::new(&view, tree.origin, pixels, false));
             let c = compare::compare(&bytes(&truth), &bytes(&picture), [size; 2]).unwrap();
-            println!("  cut {pixels}: {} splats (CPU {}), {:?} dB, {time:?}, {:?}", stats.splats, oracle.len(), c.psnr, stats.missing_pages);
-            std::fs::write(format!("/tmp/h_{zoom}_{pixels}.png"), picture.encode(splatkit::picture::PictureFormat::Png, None).unwrap()).unwrap();
+            println!(
+                "  cut {pixels}: {} splats (CPU {}), {:?} dB, {time:?}, {:?}",
+                stats.splats,
+                oracle.len(),
+                c.psnr,
+                stats.missing_pages
+            );
+            std::fs::write(
+                format!("/tmp/h_{zoom}_{pixels}.png"),
+                picture.encode(splatkit::picture::PictureFormat::Png, None).unwrap(),
+            )
+            .unwrap();
         }
         let t = Instant::now();
         let p = renderer.profile(&mut prepared, &camera, &settings).unwrap();

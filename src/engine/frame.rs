@@ -2,9 +2,9 @@
 
 use super::{
     Gpu,
+    cut::Cut,
     large::Large,
     march::March,
-    cut::Cut,
     measure::Measure,
     order::Order,
     plan::{self, MAX_PASSES, Plan},

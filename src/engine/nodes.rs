@@ -276,7 +276,8 @@ impl Forest {
                 }
                 self.slots[slot as usize] = Some((page, self.frame));
                 self.slot_of[page as usize] = Some(slot);
-                let holder = chunks.iter().find(|(s, _)| (s.first_slot..s.first_slot + s.count).contains(&(slot as usize)));
+                let holder =
+                    chunks.iter().find(|(s, _)| (s.first_slot..s.first_slot + s.count).contains(&(slot as usize)));
                 let Some((slots, splats)) = holder else { continue };
                 let offset = (slot as usize - slots.first_slot) as u64 * SLOT_BYTES / 2;
                 let nodes: Vec<GpuNode> = (0..content.nodes.len()).map(|index| gpu_node(content, index)).collect();

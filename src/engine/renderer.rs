@@ -4,12 +4,12 @@ use super::{
     Budget, Gpu, PreparedScene,
     cut::{Cut, finest_within, tally_bytes},
     frame::{self, Pipelines, Pool, Step, Targets},
+    nodes::Forest,
     pace::Pace,
     scan::Scan,
     select::Select,
     shaders::Variant,
     uniforms::Report,
-    nodes::Forest,
     upload::Origin,
 };
 use crate::{

@@ -2,7 +2,7 @@
 
 use super::{
     Block, Node, Tree,
-    cluster::cluster,
+    cluster::{box_of, cluster},
     merge::leaf,
     partition,
     sphere::{self, Sphere, enclosing, nest, raise},
@@ -61,8 +61,9 @@ impl Tree {
         let raised: Vec<(Block, Vec<u8>)> = parts
             .into_par_iter()
             .map(|part| {
-                let leaves: Vec<Node> = part.iter().map(|&i| leaf(&splats[i as usize], set.extent)).collect();
-                let (mut block, _) = cluster(&leaves, options.preset);
+                let boxes: Vec<_> = part.iter().map(|&i| box_of(&splats[i as usize])).collect();
+                let leaf = |i: u32| leaf(&splats[part[i as usize] as usize], set.extent);
+                let (mut block, _) = cluster(&boxes, leaf, options.preset);
                 let heights = raise(&mut block);
                 let count = part.len() as u64;
                 watch(built.fetch_add(count, Ordering::Relaxed) + count, total);
@@ -102,8 +103,9 @@ impl Tree {
 
 /// The block above the roots of others, all of which lie in `outer`, and the place of each root's portal in it.
 pub(crate) fn join(roots: &[Node], preset: Preset, outer: Sphere) -> (Block, Vec<u32>) {
-    let leaves: Vec<Node> = roots.iter().map(|root| Node { children: 0, first_child: 0, ..*root }).collect();
-    let (mut block, sources) = cluster(&leaves, preset);
+    let boxes: Vec<_> = roots.iter().map(|root| box_of(&root.splat)).collect();
+    let leaf = |i: u32| Node { children: 0, first_child: 0, ..roots[i as usize] };
+    let (mut block, sources) = cluster(&boxes, leaf, preset);
     let heights = raise(&mut block);
     nest(&mut block, &heights, Some(outer));
     let mut portals = vec![0; roots.len()];

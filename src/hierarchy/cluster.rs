@@ -1,6 +1,10 @@
 //! Which nodes become siblings: pairs found by obvhs, joined to groups of up to eight.
 
-use super::{Block, MOST_CHILDREN, Node, Preset, merge::Mass, merge::merge};
+use super::{
+    Block, MOST_CHILDREN, Node, Preset,
+    merge::{Mass, WIDTH, covariance, merge},
+};
+use crate::splat::Splat;
 use glam::Vec3;
 use obvhs::{
     aabb::Aabb,
@@ -8,18 +12,21 @@ use obvhs::{
     ploc::{PlocBuilder, PlocSearchDistance, SortPrecision},
 };
 
-/// The block above `leaves`: every node but for its sphere. There is at least one leaf; the root is one only where it is
-/// the only one. Also tells which leaf is at each leaf's place.
-pub(super) fn cluster(leaves: &[Node], preset: Preset) -> (Block, Vec<u32>) {
-    if let [only] = leaves {
-        return (Block { nodes: vec![*only], portal: None }, vec![0]);
+/// The block above leaves that have these boxes: every node but for its sphere. `leaf` makes the leaf of a box. There is at
+/// least one; the root is one only where it is the only one. Also tells which box is behind each leaf.
+pub(super) fn cluster(boxes: &[Aabb], leaf: impl Fn(u32) -> Node, preset: Preset) -> (Block, Vec<u32>) {
+    if boxes.len() == 1 {
+        return (Block { nodes: vec![leaf(0)], portal: None }, vec![0]);
     }
-    let pairs = pairs(leaves, preset);
+    let pairs = pairs(boxes, preset);
     let groups = groups(&pairs);
-    let mut nodes: Vec<Node> = Vec::with_capacity(leaves.len() + leaves.len() / 3);
+    let room = boxes.len() + boxes.len() / 4;
+    let mut nodes: Vec<Node> = Vec::with_capacity(room);
     // The pair behind each node, breadth first.
-    let mut order = vec![0u32];
-    nodes.push(leaves[0]);
+    let mut order = Vec::with_capacity(room);
+    order.push(0u32);
+    let blank = leaf(0);
+    nodes.push(blank);
     let mut sources = vec![0];
     let mut next = 0;
     let mut items = Vec::with_capacity(MOST_CHILDREN);
@@ -32,16 +39,21 @@ pub(super) fn cluster(leaves: &[Node], preset: Preset) -> (Block, Vec<u32>) {
             nodes[next].children = items.len() as u32;
             for &item in &items {
                 let pair = &pairs.nodes[item as usize];
-                // An inner node's place is taken by what is made below.
-                let primitive = if pair.is_leaf() { pairs.primitive_indices[pair.first_index as usize] } else { 0 };
-                nodes.push(leaves[primitive as usize]);
-                sources.push(primitive);
+                if pair.is_leaf() {
+                    let source = pairs.primitive_indices[pair.first_index as usize];
+                    nodes.push(leaf(source));
+                    sources.push(source);
+                } else {
+                    // Its place is taken by what is made below.
+                    nodes.push(blank);
+                    sources.push(0);
+                }
                 order.push(item);
             }
         }
         next += 1;
     }
-    let mut masses = vec![Mass::of(&leaves[0].splat); nodes.len()];
+    let mut masses = vec![Mass::of(&blank.splat); nodes.len()];
     for index in (0..nodes.len()).rev() {
         let Node { first_child, children, .. } = nodes[index];
         if children == 0 {
@@ -56,16 +68,16 @@ pub(super) fn cluster(leaves: &[Node], preset: Preset) -> (Block, Vec<u32>) {
     (Block { nodes, portal: None }, sources)
 }
 
+/// The box by which a splat finds its neighbours: its place counts, and its size where sizes differ; whole footprints
+/// overlap too much to tell neighbours.
+pub(super) fn box_of(splat: &Splat) -> Aabb {
+    let [xx, _, _, yy, _, zz] = covariance(&splat.factor);
+    let (center, reach) = (Vec3::from(splat.center), 0.5 * WIDTH * (0.5 * (xx + yy + zz)).sqrt());
+    Aabb::new((center - reach).into(), (center + reach).into())
+}
+
 /// A binary hierarchy over the leaves' boxes.
-fn pairs(leaves: &[Node], preset: Preset) -> Bvh2 {
-    let boxes: Vec<Aabb> = leaves
-        .iter()
-        .map(|leaf| {
-            // The place counts, and the size where sizes differ; whole footprints overlap too much to tell neighbours.
-            let (center, reach) = (Vec3::from(leaf.splat.center), 0.5 * leaf.size);
-            Aabb::new((center - reach).into(), (center + reach).into())
-        })
-        .collect();
+fn pairs(boxes: &[Aabb], preset: Preset) -> Bvh2 {
     let (distance, threshold) = match preset {
         Preset::Fastest => (PlocSearchDistance::Minimum, 0),
         Preset::Fast => (PlocSearchDistance::VeryLow, 2),
@@ -73,8 +85,8 @@ fn pairs(leaves: &[Node], preset: Preset) -> Bvh2 {
         Preset::Slow => (PlocSearchDistance::Medium, 1),
         Preset::Best => (PlocSearchDistance::VeryHigh, 0),
     };
-    let indices = (0..leaves.len() as u32).collect();
-    PlocBuilder::new().build(distance, &boxes, indices, SortPrecision::U64, threshold)
+    let indices = (0..boxes.len() as u32).collect();
+    PlocBuilder::new().build(distance, boxes, indices, SortPrecision::U64, threshold)
 }
 
 /// Which inner nodes of the binary hierarchy stay nodes: bottom-up, two pairs join while they hold at most eight items

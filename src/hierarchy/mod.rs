@@ -13,5 +13,3 @@ pub use build::{BuildOptions, Preset, Watch};
 pub(crate) use cut::cone_margin;
 pub use cut::{BLEND_BAND, Cut, CutSphere, Detail, SHARE_UNIT};
 pub use node::{Block, MOST_CHILDREN, Node, Tree};
-mod stub;
-pub use stub::*;

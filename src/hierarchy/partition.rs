@@ -3,6 +3,7 @@
 use crate::splat::Splat;
 use glam::Vec3;
 use rayon::prelude::*;
+use rdst::RadixSort;
 
 /// Bits of a Morton key along each axis.
 const BITS: u32 = 10;
@@ -50,8 +51,8 @@ pub(crate) fn blocks(splats: &[Splat], wanted: usize) -> Vec<Vec<u32>> {
         .reduce(|| none, |a, b| (a.0.min(b.0), a.1.max(b.1)));
     let cube = Cube::around(low, high);
     let key = |(index, splat): (usize, &Splat)| u64::from(cube.key(Vec3::from(splat.center))) << 32 | index as u64;
-    let mut keys: Vec<u64> = splats.par_iter().enumerate().map(key).collect();
-    keys.par_sort_unstable();
+    let mut keys: Vec<u64> = splats.par_iter().enumerate().with_min_len(1 << 14).map(key).collect();
+    keys.radix_sort_unstable();
     let count = splats.len().div_ceil(wanted);
     let size = splats.len().div_ceil(count);
     keys.par_chunks(size).map(|part| part.iter().map(|&key| key as u32).collect()).collect()

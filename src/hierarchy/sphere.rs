@@ -6,7 +6,7 @@
 //! around descendants a few levels below, which stick out less. Where that one reaches out of the parent's, its centre moves
 //! towards the parent's until it does not; at the parent's own centre it would be the parent's sphere.
 
-use super::{Block, Node};
+use super::{Block, MOST_CHILDREN, Node};
 use glam::DVec3;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,12 +16,12 @@ pub(crate) struct Sphere {
 }
 
 /// Steps towards the smallest sphere where there are many nodes, and where there are few.
-const FEW_ROUNDS: u32 = 6;
+const FEW_ROUNDS: u32 = 4;
 const MANY_ROUNDS: u32 = 96;
 /// Nodes this many levels above the leaves, and higher ones, are fitted to their descendants.
 const FITTED_HEIGHT: u8 = 3;
-/// How many levels below them these descendants are.
-const LEVELS_BELOW: u32 = 2;
+/// How many levels below them these descendants are; one more for the root and its children.
+const LEVELS_BELOW: u32 = 1;
 
 impl Sphere {
     pub fn of(node: &Node) -> Self {
@@ -102,8 +102,7 @@ pub(crate) fn raise(block: &mut Block) -> Vec<u8> {
         heights[index] = 1 + heights[children.clone()].iter().copied().max().unwrap_or(0);
         around.clear();
         around.extend(nodes[children].iter().map(Sphere::of));
-        let rounds = if heights[index] < FITTED_HEIGHT { FEW_ROUNDS } else { 4 * FEW_ROUNDS };
-        Sphere::around(&around, rounds).give(&mut nodes[index]);
+        Sphere::around(&around, FEW_ROUNDS).give(&mut nodes[index]);
     }
     heights
 }
@@ -124,9 +123,11 @@ pub(crate) fn nest(block: &mut Block, heights: &[u8], outer: Option<Sphere>) {
             continue;
         }
         around.clear();
-        descendants(nodes, heights, index, &mut around);
         let is_fitted = heights[index] >= FITTED_HEIGHT;
-        let own = if is_fitted { Sphere::around(&around, MANY_ROUNDS) } else { Sphere::of(&nodes[index]) };
+        let is_high = index <= MOST_CHILDREN;
+        descendants(nodes, heights, index, if is_high { LEVELS_BELOW + 1 } else { LEVELS_BELOW }, &mut around);
+        let rounds = if is_high { MANY_ROUNDS } else { 4 * FEW_ROUNDS };
+        let own = if is_fitted { Sphere::around(&around, rounds) } else { Sphere::of(&nodes[index]) };
         let fitted = outer.map_or(own, |outer| own.inside(outer, &around));
         fitted.give(&mut nodes[index]);
     }
@@ -159,10 +160,16 @@ pub(crate) fn enclosing(spheres: &[Sphere]) -> Sphere {
     };
     let mut farthest = Vec::with_capacity(2 * DIRECTIONS);
     for direction in (0..DIRECTIONS).map(direction) {
-        for side in [direction, -direction] {
-            let along = |s: &&Sphere| s.center.dot(side) + s.radius;
-            farthest.extend(spheres.iter().max_by(|a, b| along(a).total_cmp(&along(b))));
+        let mut ends = [(f64::NEG_INFINITY, None); 2];
+        for sphere in spheres {
+            let along = sphere.center.dot(direction);
+            for (end, along) in ends.iter_mut().zip([along + sphere.radius, sphere.radius - along]) {
+                if along > end.0 {
+                    *end = (along, Some(*sphere));
+                }
+            }
         }
+        farthest.extend(ends.into_iter().filter_map(|(_, sphere)| sphere));
     }
     let around = Sphere::around(&farthest, 1 << 12);
     Sphere { radius: Sphere::reach(around.center, spheres) * (1.0 + 1e-6), ..around }
@@ -173,7 +180,7 @@ pub(crate) fn children_of(node: &Node) -> std::ops::Range<usize> {
 }
 
 /// The spheres of descendants some levels below a node, but none lower than the nodes whose spheres stay as they are.
-fn descendants(nodes: &[Node], heights: &[u8], index: usize, found: &mut Vec<Sphere>) {
+fn descendants(nodes: &[Node], heights: &[u8], index: usize, levels: u32, found: &mut Vec<Sphere>) {
     fn walk(nodes: &[Node], heights: &[u8], index: usize, levels: u32, found: &mut Vec<Sphere>) {
         for child in children_of(&nodes[index]) {
             if levels == 0 || heights[child] < FITTED_HEIGHT {
@@ -183,5 +190,5 @@ fn descendants(nodes: &[Node], heights: &[u8], index: usize, found: &mut Vec<Sph
             }
         }
     }
-    walk(nodes, heights, index, LEVELS_BELOW, found);
+    walk(nodes, heights, index, levels, found);
 }
