@@ -8,7 +8,7 @@ fn main() {
     let set = mesh.surfels(&SurfelOptions::default()).unwrap();
     let tree = Tree::build(&set, &BuildOptions::default(), &|_, _| ()).unwrap();
     println!("{} blocks, {} leaves", tree.blocks.len(), tree.leaf_count());
-    let hierarchy = Arc::new(Hierarchy::from_tree(&tree));
+    let hierarchy = Arc::new(Hierarchy::from_tree(tree.clone()).unwrap());
     let gpu = Gpu::headless(&AdapterChoice::Automatic).unwrap();
     let mut renderer = Renderer::new(&gpu);
     let plain = Scene::new().with_splats(set);

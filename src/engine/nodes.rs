@@ -7,7 +7,10 @@
 use super::{Gpu, cut::runs_of};
 use crate::{
     Result,
-    hierarchy::{self, CutSphere, Hierarchy, Page},
+    hierarchy::{
+        self, CutSphere, Hierarchy,
+        file::{PAGE_NODES, Page, PageEntry},
+    },
     math::View,
 };
 use bytemuck::{Pod, Zeroable};
@@ -16,10 +19,9 @@ use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
 
 /// Nodes of a slot (`SLOT_NODES` in nodes.wgsl): the most of a page.
-pub const SLOT_NODES: u32 = hierarchy::PAGE_NODES as u32;
+pub const SLOT_NODES: u32 = PAGE_NODES as u32;
 /// Slots of a chunk at most: a node's number has 22 bits in cut.wgsl's list.
 const MOST_SLOTS: u64 = (1 << 22) / SLOT_NODES as u64;
-const NO_PAGE: u32 = u32::MAX;
 /// Pages read before they are sent.
 const BATCH: usize = 64;
 
@@ -148,8 +150,10 @@ impl Forest {
     /// The pages that a cut may need, the coarse ones first, with all pages above them.
     pub fn needed(&self, cut: &hierarchy::Cut) -> Vec<u32> {
         let pages = self.hierarchy.pages();
-        let test = |entry: &hierarchy::PageEntry| entry.parent_pages.is_empty() || cut.may_refine(&parents_of(entry));
-        let mut needed: Vec<bool> = pages.par_iter().with_min_len(1 << 10).map(test).collect();
+        let test = |(page, entry): (usize, &PageEntry)| {
+            self.hierarchy.is_present(page as u32) && (page == 0 || cut.may_refine(&parents_of(entry)))
+        };
+        let mut needed: Vec<bool> = pages.par_iter().enumerate().with_min_len(1 << 10).map(test).collect();
         for index in (0..pages.len()).rev() {
             if needed[index] {
                 for parent in pages[index].parent_pages.clone() {
@@ -265,7 +269,7 @@ impl Forest {
         let mut places = places.into_iter();
         for batch in absent.chunks(BATCH) {
             let pages: Vec<Page> =
-                batch.par_iter().map(|&page| self.hierarchy.read_page(page as usize)).collect::<Result<_>>()?;
+                batch.par_iter().map(|&page| self.hierarchy.read_page(page)).collect::<Result<_>>()?;
             for (&page, content) in batch.iter().zip(&pages) {
                 let Some(slot) = places.next() else {
                     self.missing += 1;
@@ -314,7 +318,7 @@ impl Forest {
 }
 
 /// A sphere that holds the spheres of all parents of a page's nodes, and the largest of their sizes.
-fn parents_of(entry: &hierarchy::PageEntry) -> CutSphere {
+fn parents_of(entry: &PageEntry) -> CutSphere {
     CutSphere { center: entry.parents_center, radius: entry.parents_radius, size: entry.largest_parent_size }
 }
 
@@ -324,7 +328,7 @@ fn grown_slots(grown: &[Growth]) -> usize {
 
 fn gpu_node(page: &Page, index: usize) -> GpuNode {
     let node = &page.nodes[index];
-    let parent = page.parent(index);
+    let parent = page.parents.get(page.parent[index] as usize).copied();
     let child_page = page.child_pages[index];
     // A portal gives way to its block wherever that is at hand.
     let size = if page.is_portal(index) { f32::MAX } else { node.size };
@@ -335,7 +339,7 @@ fn gpu_node(page: &Page, index: usize) -> GpuNode {
         radius: node.radius,
         size,
         cone: node.cone,
-        child_page: if child_page == u32::MAX { NO_PAGE } else { child_page },
+        child_page,
         parent_size,
         parent_center: center,
         parent_radius: radius,

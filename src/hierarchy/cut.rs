@@ -6,7 +6,7 @@
 //! the picture is its parent's number less its own. Along every way from the root to a leaf the shares add up to one: a node
 //! fades out while its children fade in, and nothing pops.
 
-use super::{Node, Tree};
+use super::{Node, Tree, file::CutSphere};
 use crate::{
     Result,
     math::View,
@@ -44,21 +44,6 @@ const MOST_PIXELS: f32 = 1e9;
 
 /// Normals within a splat turn: a node counts as facing away only where its cone is turned away by this angle more.
 const CONE_MARGIN_DEGREES: f64 = 15.0;
-
-/// What decides how far a node is refined.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CutSphere {
-    pub center: [f32; 3],
-    pub radius: f32,
-    pub size: f32,
-}
-
-impl CutSphere {
-    /// A node's own.
-    pub fn of(node: &Node) -> Self {
-        Self { center: node.center, radius: node.radius, size: node.size }
-    }
-}
 
 /// A cut of one hierarchy in one view. All in 32 bits, as on the GPU, which does the same (shaders/cut.wgsl).
 #[derive(Debug, Clone, Copy)]

@@ -4,12 +4,16 @@
 mod build;
 mod cluster;
 mod cut;
+pub mod file;
 mod merge;
 mod node;
 mod partition;
 mod sphere;
+mod validate;
 
 pub use build::{BuildOptions, Preset, Watch};
 pub(crate) use cut::cone_margin;
-pub use cut::{BLEND_BAND, Cut, CutSphere, Detail, SHARE_UNIT};
+pub use cut::{BLEND_BAND, Cut, Detail, SHARE_UNIT};
+pub use file::{CutSphere, Hierarchy};
 pub use node::{Block, MOST_CHILDREN, Node, Tree};
+pub use validate::{Finding, Severity, validate};

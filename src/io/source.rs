@@ -47,6 +47,12 @@ impl<'a> Source<'a> {
         self.bytes.as_deref().unwrap_or(&[])
     }
 
+    /// The map itself, for those who read from it later; `None` for an empty file. While it is held, the file must not be
+    /// shortened: a new one has to take its name instead.
+    pub(crate) fn into_map(self) -> Option<memmap2::Mmap> {
+        self.bytes
+    }
+
     /// An input error at a place of this file (`"line 12"`, `"byte 407"`, `"header"`).
     pub fn error(&self, place: impl Into<String>, message: impl Into<String>) -> Error {
         Error::input(self.path, place, message)

@@ -1,0 +1,148 @@
+//! Looking for damage.
+
+use super::{
+    directory::{NO_PORTAL, PageEntry},
+    pages::{Around, pages},
+    read::{Hierarchy, hash_start},
+    write::{arounds, parents},
+};
+use crate::{
+    Error,
+    hierarchy::{
+        Finding, Node,
+        validate::{Findings, check_block, check_portals},
+    },
+    io::Limits,
+    splat::NO_NORMAL,
+};
+use std::path::Path;
+
+/// What [`check`](check()) found.
+#[derive(Debug, Clone, Default)]
+pub struct Report {
+    /// Empty for a sound file.
+    pub findings: Vec<Finding>,
+}
+
+impl Report {
+    pub fn is_sound(&self) -> bool {
+        self.findings.is_empty()
+    }
+}
+
+/// Checks a file: header, directory, every checksum and the hash, then every promise of the tree
+/// ([`validate`](crate::hierarchy::validate())) block by block. One block is in memory at a time.
+///
+/// Nothing is an error: a file that cannot be opened is a finding.
+pub fn check(path: &Path, limits: &Limits) -> Report {
+    let mut findings = Findings::default();
+    match Hierarchy::open(path, limits) {
+        Ok(hierarchy) => contents(&hierarchy, &mut findings),
+        Err(error) => findings.push(finding("open", &error)),
+    }
+    Report { findings: findings.finish() }
+}
+
+fn contents(hierarchy: &Hierarchy, findings: &mut Findings) {
+    let bytes = hierarchy.bytes();
+    if let Some(start) = hash_start(bytes) {
+        // Threads help where there are many bytes.
+        let found = blake3::hash(&bytes[..start]);
+        if bytes[start..] != *found.as_bytes() {
+            let message = "the hash of the whole file does not fit";
+            findings.push(Finding::error("hash", format!("byte {start}"), message));
+        }
+    }
+    let directory = hierarchy.directory();
+    let mut roots: Vec<(Option<u32>, Option<Node>)> = Vec::new();
+    let mut top = Vec::new();
+    let mut leaves = 0;
+    let mut has_normals = false;
+    for (number, entry) in directory.blocks.iter().enumerate() {
+        let block = match hierarchy.read_block(number as u32) {
+            Ok(block) => block,
+            Err(error) => {
+                findings.push(finding("page", &error));
+                if number > 0 {
+                    roots.push((Some(entry.portal), None));
+                }
+                continue;
+            }
+        };
+        check_block(number, &block.nodes, findings);
+        let first = entry.first_page as usize;
+        let stated = &directory.pages[first..first + entry.pages as usize];
+        check_entries(hierarchy, first, stated, &block.nodes, &top, entry.portal, findings);
+        if number == 0 && hierarchy.is_joined() {
+            top = block.nodes;
+            continue;
+        }
+        let drawn = block.nodes.iter().filter(|node| node.is_leaf());
+        leaves += drawn.clone().count() as u64;
+        has_normals |= drawn.clone().any(|node| node.splat.normal != NO_NORMAL);
+        if number > 0 {
+            roots.push((Some(entry.portal), block.nodes.first().copied()));
+        }
+    }
+    if !top.is_empty() {
+        let roots: Vec<_> = roots.iter().map(|(portal, root)| (*portal, root.as_ref())).collect();
+        check_portals(&top, None, &roots, findings);
+    }
+    let header = hierarchy.header();
+    let is_whole = roots.iter().all(|(_, root)| root.is_some());
+    if is_whole && leaves != header.leaves {
+        let message = format!("it tells of {} leaves, and {leaves} are there", header.leaves);
+        findings.push(Finding::error("counts", "header", message));
+    }
+    if is_whole && has_normals != header.has_normals {
+        findings.push(Finding::error("attributes", "header", "what it tells of normals is not so"));
+    }
+}
+
+/// Checks what the directory tells of the pages of a block.
+fn check_entries(
+    hierarchy: &Hierarchy,
+    first: usize,
+    stated: &[PageEntry],
+    nodes: &[Node],
+    top: &[Node],
+    portal: u32,
+    findings: &mut Findings,
+) {
+    if crate::hierarchy::file::in_order(nodes).is_err() {
+        return;
+    }
+    let _ = hierarchy;
+    let runs = pages(nodes);
+    let around = arounds(nodes, &runs);
+    if runs.len() != stated.len() {
+        let message = format!("its nodes fill {} pages, and it has {}", runs.len(), stated.len());
+        findings.push(Finding::error("directory", format!("page {first}"), message));
+        return;
+    }
+    let above = match portal {
+        NO_PORTAL => None,
+        portal => parents(top).get(portal as usize).copied().flatten(),
+    };
+    for (index, (entry, mut wanted)) in stated.iter().zip(around).enumerate() {
+        if let (0, Some(parent)) = (index, above) {
+            wanted = Around::parents(&top[parent as usize..=parent as usize]);
+        }
+        let found = Around {
+            center: entry.parents_center,
+            radius: entry.parents_radius,
+            largest_size: entry.largest_parent_size,
+        };
+        if entry.nodes as usize != runs[index].nodes.len() || found != wanted {
+            let message = format!("the parents of its nodes are in {wanted:?}, and it tells of {found:?}");
+            findings.push(Finding::error("directory", format!("page {}", first + index), message));
+        }
+    }
+}
+
+fn finding(code: &'static str, error: &Error) -> Finding {
+    match error {
+        Error::Input { place, message, .. } => Finding::error(code, place.clone(), message.clone()),
+        other => Finding::error(code, "file", other.to_string()),
+    }
+}

@@ -1,0 +1,187 @@
+//! The header: what the file as a whole holds.
+
+use super::{
+    MAGIC, VERSION,
+    bytes::{Cursor, Put},
+};
+use crate::math::Bounds;
+use glam::DVec3;
+
+/// Which axis of the source points up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum UpAxis {
+    X,
+    Y,
+    Z,
+}
+
+/// What a file tells about the whole hierarchy. Lengths are world units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Header {
+    /// World position that all places are relative to.
+    pub origin: DVec3,
+    /// The box around all footprints, in world coordinates.
+    pub bounds: Bounds,
+    /// Footprints end this many standard deviations from the centre.
+    pub extent: f32,
+    /// Whether the source was closed ([`Tree::closed`](crate::hierarchy::Tree::closed)).
+    pub closed: bool,
+    /// Whether leaves differ in colour.
+    pub has_color: bool,
+    /// Whether any leaf has a normal.
+    pub has_normals: bool,
+    /// Whether every bit of the nodes is kept.
+    pub lossless: bool,
+    /// Points of the source: vertices or samples.
+    pub source_points: u64,
+    /// Splats at the finest level.
+    pub leaves: u64,
+    /// All nodes, portals among them.
+    pub nodes: u64,
+    /// Unknown where `None`.
+    pub up: Option<UpAxis>,
+    /// The name of the world's unit (`"m"`); empty where unknown.
+    pub unit: String,
+    /// The name of the file that this one was made from; empty where there is none.
+    pub source: String,
+}
+
+/// What stands before the texts.
+pub const FIXED: usize = 160;
+
+/// A header as it stands in the file, with what the reader needs to find the rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stored {
+    pub header: Header,
+    /// Bytes of the whole file.
+    pub file_bytes: u64,
+    pub blocks: u32,
+    pub pages: u32,
+}
+
+impl Stored {
+    /// Bytes of the header with its checksum.
+    pub fn length(&self) -> usize {
+        FIXED + self.header.unit.len() + self.header.source.len() + 4
+    }
+
+    pub fn encode(&self) -> Vec<u8> {
+        let header = &self.header;
+        let mut out = Vec::with_capacity(self.length());
+        out.put(&MAGIC);
+        out.u32(VERSION);
+        let flags = [header.closed, header.has_color, header.has_normals, header.lossless];
+        out.u32(flags.iter().enumerate().map(|(bit, &flag)| u32::from(flag) << bit).sum());
+        out.u64(self.file_bytes);
+        out.dvec3(header.origin);
+        out.dvec3(header.bounds.min);
+        out.dvec3(header.bounds.max);
+        out.u64(header.source_points);
+        out.u64(header.leaves);
+        out.u64(header.nodes);
+        out.f32s(&[header.extent]);
+        out.u32(self.blocks);
+        out.u32(self.pages);
+        out.put(&[header.up.map_or(0, |axis| axis as u8 + 1), 0, 0, 0]);
+        out.u32(header.unit.len() as u32);
+        out.u32(header.source.len() as u32);
+        out.put(&[0; FIXED - 144]);
+        debug_assert_eq!(out.len(), FIXED);
+        out.put(header.unit.as_bytes());
+        out.put(header.source.as_bytes());
+        out.u32(crc32fast::hash(&out));
+        out
+    }
+
+    /// Reads the header at the beginning of a file.
+    pub fn decode(bytes: &[u8]) -> Result<Self, Refusal> {
+        if bytes.len() < MAGIC.len() {
+            let begins = MAGIC.starts_with(bytes);
+            return Err(if begins { Refusal::Incomplete } else { Refusal::Foreign });
+        }
+        let mut cursor = Cursor::new(bytes);
+        if cursor.array() != Some(MAGIC) {
+            return Err(Refusal::Foreign);
+        }
+        let version = cursor.u32().ok_or(Refusal::Incomplete)?;
+        if version != VERSION {
+            return Err(Refusal::Version(version));
+        }
+        // The texts' lengths decide where the checksum stands, which decides whether they can be believed.
+        let (unit, source) = texts(bytes).ok_or(Refusal::Incomplete)?;
+        let end = FIXED + unit + source;
+        let text = bytes.get(..end).ok_or(Refusal::Incomplete)?;
+        let stated = Cursor::new(&bytes[end..]).u32().ok_or(Refusal::Incomplete)?;
+        if stated != crc32fast::hash(text) {
+            return Err(Refusal::Damaged("its checksum does not fit"));
+        }
+        Self::fields(cursor, &text[FIXED..], unit).ok_or(Refusal::Incomplete)?
+    }
+
+    fn fields(mut cursor: Cursor, texts: &[u8], unit: usize) -> Option<Result<Self, Refusal>> {
+        let flags = cursor.u32()?;
+        let file_bytes = cursor.u64()?;
+        let origin = cursor.dvec3()?;
+        let bounds = Bounds { min: cursor.dvec3()?, max: cursor.dvec3()? };
+        let [source_points, leaves, nodes] = [cursor.u64()?, cursor.u64()?, cursor.u64()?];
+        let extent = cursor.f32()?;
+        let [blocks, pages] = [cursor.u32()?, cursor.u32()?];
+        let up = match cursor.u8()? {
+            0 => None,
+            1 => Some(UpAxis::X),
+            2 => Some(UpAxis::Y),
+            3 => Some(UpAxis::Z),
+            _ => return Some(Err(Refusal::Damaged("it names an axis that there is not"))),
+        };
+        let (Ok(unit), Ok(source)) = (std::str::from_utf8(&texts[..unit]), std::str::from_utf8(&texts[unit..])) else {
+            return Some(Err(Refusal::Damaged("its texts are not UTF-8")));
+        };
+        let sound = flags < 16
+            && origin.is_finite()
+            && bounds.min.is_finite()
+            && bounds.max.is_finite()
+            && !bounds.is_empty()
+            && extent > 0.0
+            && extent.is_finite()
+            && (1..=nodes).contains(&leaves)
+            && (1..=pages).contains(&blocks);
+        if !sound {
+            return Some(Err(Refusal::Damaged("its values contradict each other")));
+        }
+        let flag = |bit: u32| flags >> bit & 1 == 1;
+        let header = Header {
+            origin,
+            bounds,
+            extent,
+            closed: flag(0),
+            has_color: flag(1),
+            has_normals: flag(2),
+            lossless: flag(3),
+            source_points,
+            leaves,
+            nodes,
+            up,
+            unit: unit.into(),
+            source: source.into(),
+        };
+        Some(Ok(Self { header, file_bytes, blocks, pages }))
+    }
+}
+
+/// The lengths of the two texts.
+fn texts(bytes: &[u8]) -> Option<(usize, usize)> {
+    let mut cursor = Cursor::new(bytes.get(136..FIXED)?);
+    Some((cursor.u32()? as usize, cursor.u32()? as usize))
+}
+
+/// Why a header is not taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refusal {
+    /// The bytes end before it does.
+    Incomplete,
+    /// Another kind of file.
+    Foreign,
+    /// Another version of this kind.
+    Version(u32),
+    Damaged(&'static str),
+}

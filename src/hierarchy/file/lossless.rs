@@ -1,0 +1,72 @@
+//! Pages that keep every bit: the bytes of the nodes, sorted by where in a node they stand, then compressed.
+
+use super::bytes::Cursor;
+use crate::{hierarchy::Node, splat::Splat};
+
+/// Bytes of a node as it is kept: the splat, centre, radius, size, cone, where its children are and how many.
+const NODE_BYTES: usize = 80;
+
+/// What zstd does for the size. Higher levels take much longer for a few parts in a thousand.
+const LEVEL: i32 = 3;
+
+pub fn encode(nodes: &[Node]) -> Vec<u8> {
+    let mut planes = vec![0; nodes.len() * NODE_BYTES];
+    for (index, node) in nodes.iter().enumerate() {
+        for (plane, byte) in to_bytes(node).into_iter().enumerate() {
+            planes[plane * nodes.len() + index] = byte;
+        }
+    }
+    zstd::bulk::compress(&planes, LEVEL).expect("memory can be compressed")
+}
+
+/// The nodes of a page of `count`; what is wrong where there are none.
+pub fn decode(bytes: &[u8], count: usize) -> Result<Vec<Node>, String> {
+    let length = count * NODE_BYTES;
+    let planes = zstd::bulk::decompress(bytes, length).map_err(|e| format!("it cannot be unpacked: {e}"))?;
+    if planes.len() != length {
+        return Err(format!("it unpacks to {} bytes where {length} were expected", planes.len()));
+    }
+    let mut node = [0; NODE_BYTES];
+    let nodes = (0..count).map(|index| {
+        for (plane, byte) in node.iter_mut().enumerate() {
+            *byte = planes[plane * count + index];
+        }
+        from_bytes(&node)
+    });
+    nodes.collect::<Option<_>>().ok_or_else(|| "a node is incomplete".into())
+}
+
+fn to_bytes(node: &Node) -> [u8; NODE_BYTES] {
+    let Node { splat, center, radius, size, cone, first_child, children } = *node;
+    let mut words = Vec::with_capacity(NODE_BYTES / 4);
+    words.extend(splat.center.map(f32::to_bits));
+    words.push(splat.strength.to_bits());
+    words.extend(splat.factor.map(f32::to_bits));
+    words.extend([splat.color, splat.normal]);
+    words.extend(center.map(f32::to_bits));
+    words.extend([radius, size, cone].map(f32::to_bits));
+    words.extend([first_child, children]);
+    let mut out = [0; NODE_BYTES];
+    out.chunks_exact_mut(4).zip(words).for_each(|(out, word)| out.copy_from_slice(&word.to_le_bytes()));
+    out
+}
+
+fn from_bytes(bytes: &[u8; NODE_BYTES]) -> Option<Node> {
+    let mut cursor = Cursor::new(bytes);
+    let splat = Splat {
+        center: cursor.f32s()?,
+        strength: cursor.f32()?,
+        factor: cursor.f32s()?,
+        color: cursor.u32()?,
+        normal: cursor.u32()?,
+    };
+    Some(Node {
+        splat,
+        center: cursor.f32s()?,
+        radius: cursor.f32()?,
+        size: cursor.f32()?,
+        cone: cursor.f32()?,
+        first_child: cursor.u32()?,
+        children: cursor.u32()?,
+    })
+}

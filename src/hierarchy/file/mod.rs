@@ -1,0 +1,39 @@
+//! The file of a hierarchy, `.splk`: pages of nodes, coarse ones first, behind a directory that tells where they stand.
+//! docs/splk.md describes it byte by byte.
+//!
+//! [`write`](write()) and [`Writer`] make it, [`Hierarchy`] reads it page by page or as a whole, [`check`](check()) looks for
+//! damage.
+
+mod bytes;
+mod check;
+mod directory;
+mod header;
+mod lossless;
+mod page;
+mod pages;
+mod read;
+mod spill;
+#[cfg(test)]
+mod tests;
+mod write;
+
+pub use check::{Report, check};
+pub use directory::PageEntry;
+pub use header::{Header, UpAxis};
+pub use read::{CutSphere, Hierarchy, NO_PAGE, Page};
+pub use write::{Top, Whole, WriteOptions, Writer, to_bytes, write};
+
+/// The most nodes of a page.
+pub const PAGE_NODES: usize = 4096;
+
+/// How a file begins: a name, and line ends that a transfer as text would change.
+const MAGIC: [u8; 8] = *b"SPLK\r\n\x1a\n";
+
+/// The version that is written, and the newest that is read.
+const VERSION: u32 = 1;
+
+/// Bytes of the BLAKE3 hash at the end of a file.
+const HASH: usize = 32;
+
+pub(in crate::hierarchy) use page::joint_angle;
+pub(in crate::hierarchy) use pages::{in_order, reach};

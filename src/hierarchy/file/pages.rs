@@ -1,0 +1,117 @@
+//! How a block is cut into pages, and what a page must know of the nodes above it.
+
+use super::PAGE_NODES;
+use crate::hierarchy::{MOST_CHILDREN, Node};
+use glam::DVec3;
+use std::ops::Range;
+
+/// Whether the nodes stand breadth first with the children of one after those of the one before, which makes where
+/// children stand follow from how many there are.
+pub fn in_order(nodes: &[Node]) -> Result<(), String> {
+    if nodes.is_empty() {
+        return Err("there are no nodes".into());
+    }
+    if u32::try_from(nodes.len()).is_err() {
+        return Err(format!("there are {} nodes, more than 32 bits can name", nodes.len()));
+    }
+    let mut next = 1;
+    for (index, node) in nodes.iter().enumerate() {
+        if next <= index {
+            return Err(format!("node {index} is nobody's child"));
+        }
+        if node.children as usize > MOST_CHILDREN {
+            return Err(format!("node {index} has {} children; {MOST_CHILDREN} are the most", node.children));
+        }
+        let wanted = if node.is_leaf() { 0 } else { next as u32 };
+        if node.first_child != wanted {
+            return Err(format!("the children of node {index} stand at {}, not at {wanted}", node.first_child));
+        }
+        next += node.children as usize;
+    }
+    if next != nodes.len() {
+        return Err(format!("{} nodes are there, and {next} are pointed to", nodes.len()));
+    }
+    Ok(())
+}
+
+/// A page of a block: numbers in the block.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Run {
+    pub nodes: Range<usize>,
+    /// A range that holds the parents of its nodes, but for the root, which has none.
+    pub parents: Range<usize>,
+    /// Where the children of its nodes stand.
+    pub children: Range<usize>,
+}
+
+/// Cuts a block into pages, and no group of siblings in two.
+pub fn pages(nodes: &[Node]) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::with_capacity(nodes.len() / (PAGE_NODES - MOST_CHILDREN) + 1);
+    let (mut start, mut end, mut first_parent, mut first_child) = (0, 1, 0, 1);
+    let mut push = |nodes_of: Range<usize>, parents: Range<usize>| {
+        let count: usize = nodes[nodes_of.clone()].iter().map(|node| node.children as usize).sum();
+        runs.push(Run { nodes: nodes_of, parents, children: first_child..first_child + count });
+        first_child += count;
+    };
+    for (index, node) in nodes.iter().enumerate() {
+        let group = node.children as usize;
+        if end + group - start > PAGE_NODES {
+            push(start..end, first_parent..index);
+            (start, first_parent) = (end, index);
+        }
+        end += group;
+    }
+    push(start..end, first_parent..nodes.len());
+    runs
+}
+
+/// Where each level of a block begins, and where the last one ends.
+pub fn levels(nodes: &[Node]) -> Vec<usize> {
+    let mut bounds = vec![0, 1];
+    loop {
+        let level = bounds[bounds.len() - 2]..bounds[bounds.len() - 1];
+        let children: usize = nodes[level.clone()].iter().map(|node| node.children as usize).sum();
+        if children == 0 {
+            return bounds;
+        }
+        bounds.push(level.end + children);
+    }
+}
+
+/// A sphere around the spheres of some nodes, and the largest of their sizes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Around {
+    pub center: [f32; 3],
+    pub radius: f32,
+    pub largest_size: f32,
+}
+
+impl Around {
+    /// What is around everything: a page with a root that has no parent is always needed.
+    pub const EVERYTHING: Self = Self { center: [0.0; 3], radius: f32::INFINITY, largest_size: f32::INFINITY };
+
+    /// Around the nodes that have children.
+    pub fn parents(nodes: &[Node]) -> Self {
+        let nodes = nodes.iter().filter(|node| !node.is_leaf());
+        let (low, high) = nodes.clone().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), node| {
+            let (center, radius) = (node.center().as_dvec3(), f64::from(node.radius));
+            (low.min(center - radius), high.max(center + radius))
+        });
+        let center = ((low + high) * 0.5).as_vec3();
+        let reach = nodes.clone().map(|node| reach(center.as_dvec3(), node)).fold(0.0, f64::max);
+        let largest_size = nodes.map(|node| node.size).fold(0.0, f32::max);
+        Self { center: center.to_array(), radius: round_up(reach), largest_size }
+    }
+}
+
+/// How far a node's sphere reaches from a place.
+pub fn reach(from: DVec3, node: &Node) -> f64 {
+    from.distance(node.center().as_dvec3()) + f64::from(node.radius)
+}
+
+/// The next 32-bit number above, with room for the rounding of what led to it.
+pub fn round_up(value: f64) -> f32 {
+    let value = value * (1.0 + 1e-12);
+    let near = value as f32;
+    if f64::from(near) < value { near.next_up() } else { near }
+}

@@ -1,0 +1,487 @@
+//! Reading: the directory at once, pages one by one as a picture needs them, or everything.
+
+use super::{
+    HASH,
+    directory::{Directory, NO_PORTAL, PageEntry, Place, Trouble},
+    header::{Header, Refusal, Stored},
+    page,
+    pages::{in_order, pages},
+    write::arounds,
+};
+use crate::{
+    Error, Result,
+    hierarchy::{Block, Node, Tree},
+    io::{Limits, Source},
+    math::Bounds,
+};
+use rayon::prelude::*;
+use std::{
+    collections::{HashMap, VecDeque},
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex},
+};
+
+/// In [`Page::child_pages`]: a leaf, which has none.
+pub const NO_PAGE: u32 = u32::MAX;
+
+/// What decides whether a node is refined. Lengths are world units, the centre relative to the tree's origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CutSphere {
+    pub center: [f32; 3],
+    pub radius: f32,
+    pub size: f32,
+}
+
+impl CutSphere {
+    pub fn of(node: &Node) -> Self {
+        Self { center: node.center, radius: node.radius, size: node.size }
+    }
+}
+
+/// A page as it was read.
+#[derive(Debug, Clone)]
+pub struct Page {
+    /// Its nodes, which follow one another in their block; [`Node::first_child`] counts in the block.
+    pub nodes: Vec<Node>,
+    /// The parents of its nodes, each once, with the very values that they have as nodes of their own pages. The parent of
+    /// a block's root is that of its portal.
+    pub parents: Vec<CutSphere>,
+    /// For each node, which of `parents` is its own; `u32::MAX` for the root of the tree.
+    pub parent: Vec<u32>,
+    /// For each node, the page that holds its children, or, for a portal, the first page of its block; [`NO_PAGE`] for a
+    /// leaf.
+    pub child_pages: Vec<u32>,
+    /// Whether the leaves of this page are portals, which are never drawn.
+    pub has_portals: bool,
+}
+
+impl Page {
+    /// Whether a node is a portal: its block's root is to be drawn in its place.
+    pub fn is_portal(&self, node: usize) -> bool {
+        self.has_portals && self.nodes[node].is_leaf()
+    }
+}
+
+/// A hierarchy to read from: a file, its bytes, or a tree in memory.
+pub struct Hierarchy {
+    path: PathBuf,
+    store: Store,
+    header: Header,
+    directory: Directory,
+    /// Which block stands in the place of a leaf of block 0.
+    portals: HashMap<u32, u32>,
+    families: Mutex<Families>,
+    most_bytes: u64,
+}
+
+impl std::fmt::Debug for Hierarchy {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Hierarchy").field("path", &self.path).field("header", &self.header).finish_non_exhaustive()
+    }
+}
+
+enum Store {
+    Mapped(Option<memmap2::Mmap>),
+    Bytes(Vec<u8>),
+    Blocks(Vec<Block>),
+}
+
+impl Hierarchy {
+    /// Opens a file: reads and checks the header and the directory, and maps the rest.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for other files, other versions, damaged headers and directories, and files that are cut off;
+    /// [`Error::Limit`] and [`Error::File`] as for every input.
+    pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
+        let map = Source::open(path, limits)?.into_map();
+        Self::new(path, Store::Mapped(map), limits, false)
+    }
+
+    /// Opens the beginning of a file that is still coming, or was cut off: a coarser model. Pages that are not there are
+    /// told by [`is_present`](Self::is_present).
+    ///
+    /// # Errors
+    /// As of [`open`](Self::open), where not even the header and the directory are whole.
+    pub fn open_prefix(path: &Path, limits: &Limits) -> Result<Self> {
+        let map = Source::open(path, limits)?.into_map();
+        Self::new(path, Store::Mapped(map), limits, true)
+    }
+
+    /// Takes the bytes of a file; `name` is what errors call it.
+    ///
+    /// # Errors
+    /// As of [`open`](Self::open).
+    pub fn from_bytes(bytes: Vec<u8>, name: &Path, limits: &Limits) -> Result<Self> {
+        Self::new(name, Store::Bytes(bytes), limits, false)
+    }
+
+    fn new(path: &Path, store: Store, limits: &Limits, may_be_cut: bool) -> Result<Self> {
+        let bytes = store.bytes();
+        let stored = Stored::decode(bytes).map_err(|refusal| refused(path, refusal))?;
+        let directory = Directory::decode(bytes, &stored).map_err(|trouble| match trouble {
+            Trouble::Incomplete => incomplete(path, "directory"),
+            Trouble::Damaged(message) => damaged(path, "directory", message),
+        })?;
+        let Stored { header, file_bytes, .. } = stored;
+        let present = bytes.len() as u64;
+        if present > file_bytes {
+            let message = format!("the file has {} bytes behind its end", present - file_bytes);
+            return Err(damaged(path, format!("byte {file_bytes}"), message));
+        }
+        if present < file_bytes && !may_be_cut {
+            return Err(incomplete(path, format!("byte {present} of {file_bytes}")));
+        }
+        for (what, found) in [("the number of leaves", header.leaves), ("the number of points", header.source_points)] {
+            if found > limits.points {
+                return Err(Error::Limit { file: path.into(), what: what.into(), found, limit: limits.points });
+            }
+        }
+        Ok(Self::assemble(path, store, header, directory, limits.bytes))
+    }
+
+    /// Takes a tree as it is; nothing is encoded.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where the nodes of a block are not in the order of [`Block`], or blocks and portals do not fit.
+    pub fn from_tree(tree: Tree) -> Result<Self> {
+        let mut directory = Directory::default();
+        let mut portals = Vec::new();
+        let Some(top) = tree.blocks.first() else {
+            return Err(Error::Argument("the hierarchy has no blocks".into()));
+        };
+        for (number, block) in tree.blocks.iter().enumerate() {
+            let refuse = |message| Error::Argument(format!("block {number} of the hierarchy: {message}"));
+            in_order(&block.nodes).map_err(refuse)?;
+            let runs = pages(&block.nodes);
+            directory.push_block(&runs, &arounds(&block.nodes, &runs), &vec![Place::default(); runs.len()]);
+            match (number, block.portal) {
+                (0, None) => {}
+                (1.., Some(portal)) if top.nodes.get(portal as usize).is_some_and(Node::is_leaf) => {
+                    portals.push(portal)
+                }
+                (_, portal) => return Err(refuse(format!("its portal is {portal:?}"))),
+            }
+        }
+        let leaves = top.nodes.iter().filter(|node| node.is_leaf()).count();
+        directory.hang(&top.nodes, &portals);
+        let mut sorted = portals.clone();
+        sorted.sort_unstable();
+        sorted.dedup();
+        if tree.is_joined() && (sorted.len() != leaves || portals.len() != leaves) {
+            let message = format!("{} blocks hang below the {leaves} portals of the hierarchy", portals.len());
+            return Err(Error::Argument(message));
+        }
+        directory.link();
+        let header = Header {
+            origin: tree.origin,
+            bounds: tree.bounds,
+            extent: tree.extent,
+            closed: tree.closed,
+            has_color: true,
+            has_normals: true,
+            lossless: true,
+            source_points: tree.source_points,
+            leaves: tree.leaf_count(),
+            nodes: tree.blocks.iter().map(|block| block.nodes.len() as u64).sum(),
+            up: None,
+            unit: String::new(),
+            source: String::new(),
+        };
+        Ok(Self::assemble(Path::new("memory"), Store::Blocks(tree.blocks), header, directory, u64::MAX))
+    }
+
+    fn assemble(path: &Path, store: Store, header: Header, directory: Directory, most_bytes: u64) -> Self {
+        let below = directory.blocks.iter().enumerate().skip(1);
+        Self {
+            path: path.to_owned(),
+            store,
+            header,
+            portals: below.map(|(number, block)| (block.portal, number as u32)).collect(),
+            directory,
+            families: Mutex::default(),
+            most_bytes,
+        }
+    }
+
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The box around all footprints, in world coordinates.
+    pub fn bounds(&self) -> Bounds {
+        self.header.bounds
+    }
+
+    /// All pages, block by block; the first is that of the root.
+    pub fn pages(&self) -> &[PageEntry] {
+        &self.directory.pages
+    }
+
+    /// Whether the leaves of block 0 are portals.
+    pub fn is_joined(&self) -> bool {
+        self.directory.blocks.len() > 1
+    }
+
+    /// Whether a page is there: all are, but where only the beginning of a file is.
+    pub fn is_present(&self, page: u32) -> bool {
+        let Place { offset, bytes, .. } = self.directory.pages[page as usize].place;
+        match &self.store {
+            Store::Blocks(_) => true,
+            store => offset + u64::from(bytes) <= store.bytes().len() as u64,
+        }
+    }
+
+    /// Reads and decodes a page, its checksum checked. Any thread may; pages whose parents were read lately are faster.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a page that is damaged or not there, and where the pages above it are; [`Error::Argument`] for
+    /// a page that there is not.
+    pub fn read_page(&self, page: u32) -> Result<Page> {
+        let entry = self.entry(page)?;
+        let nodes = self.read_nodes(page)?;
+        let own: Arc<[Family]> = families(&nodes).into();
+        let is_first = entry.first_node == 0;
+        let mut parents = Vec::new();
+        let mut parent = Vec::with_capacity(nodes.len());
+        if is_first {
+            parent.push(match self.directory.blocks[entry.block as usize].portal {
+                NO_PORTAL | 0 => u32::MAX,
+                portal => {
+                    let above = self.families(entry.parent_pages.start)?;
+                    let family = above.partition_point(|family| family.first_child <= portal).checked_sub(1);
+                    let family = family.map(|index| above[index]).filter(|family| family.has(portal));
+                    let family = family.ok_or_else(|| self.torn(page))?;
+                    parents.push(family.parent);
+                    0
+                }
+            });
+        }
+        let mut add = |families: &[Family]| {
+            let nodes = self.directory.nodes(page);
+            let begin = families.partition_point(|family| family.first_child < nodes.start);
+            for family in families[begin..].iter().take_while(|family| family.first_child < nodes.end) {
+                if family.first_child != nodes.start + parent.len() as u32 {
+                    return Err(self.torn(page));
+                }
+                parent.extend(std::iter::repeat_n(parents.len() as u32, family.children as usize));
+                parents.push(family.parent);
+            }
+            Ok(())
+        };
+        if !is_first {
+            for above in entry.parent_pages.clone() {
+                add(&self.families(above)?)?;
+            }
+        }
+        add(&own)?;
+        if parent.len() != nodes.len() {
+            return Err(self.torn(page));
+        }
+        self.families.lock().unwrap_or_else(|e| e.into_inner()).keep(page, own);
+        let has_portals = self.is_joined() && entry.block == 0;
+        let child_pages = self.child_pages(page, &nodes)?;
+        Ok(Page { nodes, parents, parent, child_pages, has_portals })
+    }
+
+    /// Reads everything.
+    ///
+    /// # Errors
+    /// Those of [`read_page`](Self::read_page), and [`Error::Limit`] where the tree is larger than the limits allow.
+    pub fn read_tree(&self) -> Result<Tree> {
+        let found = self.header.nodes.saturating_mul(size_of::<Node>() as u64);
+        if found > self.most_bytes {
+            let what = "the size of the tree in bytes".into();
+            return Err(Error::Limit { file: self.path.clone(), what, found, limit: self.most_bytes });
+        }
+        let blocks = (0..self.directory.blocks.len() as u32).map(|block| self.read_block(block));
+        Ok(Tree {
+            origin: self.header.origin,
+            extent: self.header.extent,
+            closed: self.header.closed,
+            bounds: self.header.bounds,
+            source_points: self.header.source_points,
+            blocks: blocks.collect::<Result<_>>()?,
+        })
+    }
+
+    pub(super) fn read_block(&self, block: u32) -> Result<Block> {
+        let entry = self.directory.blocks[block as usize];
+        let pages = entry.first_page..entry.first_page + entry.pages;
+        let pages: Vec<Vec<Node>> = pages.into_par_iter().map(|page| self.read_nodes(page)).collect::<Result<_>>()?;
+        Ok(Block { nodes: pages.concat(), portal: Some(entry.portal).filter(|&portal| portal != NO_PORTAL) })
+    }
+
+    pub(super) fn directory(&self) -> &Directory {
+        &self.directory
+    }
+
+    /// All bytes of a file; none of a tree in memory.
+    pub(super) fn bytes(&self) -> &[u8] {
+        self.store.bytes()
+    }
+
+    fn entry(&self, page: u32) -> Result<&PageEntry> {
+        let count = self.directory.pages.len();
+        self.directory
+            .pages
+            .get(page as usize)
+            .ok_or_else(|| Error::Argument(format!("there is no page {page} among {count}")))
+    }
+
+    /// The nodes of a page alone.
+    fn read_nodes(&self, page: u32) -> Result<Vec<Node>> {
+        let entry = self.entry(page)?;
+        if let Store::Blocks(blocks) = &self.store {
+            let nodes = self.directory.nodes(page);
+            return Ok(blocks[entry.block as usize].nodes[nodes.start as usize..nodes.end as usize].to_vec());
+        }
+        let Place { offset, bytes: length, crc } = entry.place;
+        let place = || format!("page {page} (byte {offset})");
+        let all = self.store.bytes();
+        let end = offset.saturating_add(u64::from(length)).min(all.len() as u64);
+        if end < offset.saturating_add(u64::from(length)) {
+            return Err(incomplete(&self.path, place()));
+        }
+        let bytes = &all[offset as usize..end as usize];
+        if crc32fast::hash(bytes) != crc {
+            return Err(damaged(&self.path, place(), "its checksum does not fit"));
+        }
+        let children = self.directory.children(page);
+        let nodes = page::decode(bytes, entry.nodes as usize, entry.first_child, self.header.extent)
+            .map_err(|message| damaged(&self.path, place(), message))?;
+        let counted: u64 = nodes.iter().map(|node| u64::from(node.children)).sum();
+        if counted != u64::from(children.end - children.start) {
+            let message = format!("its nodes have {counted} children where the directory tells of {}", children.len());
+            return Err(damaged(&self.path, place(), message));
+        }
+        Ok(nodes)
+    }
+
+    /// The nodes of a page that have children.
+    fn families(&self, page: u32) -> Result<Arc<[Family]>> {
+        if let Some(held) = self.families.lock().unwrap_or_else(|e| e.into_inner()).get(page) {
+            return Ok(held);
+        }
+        let read: Arc<[Family]> = families(&self.read_nodes(page)?).into();
+        self.families.lock().unwrap_or_else(|e| e.into_inner()).keep(page, read.clone());
+        Ok(read)
+    }
+
+    fn child_pages(&self, page: u32, nodes: &[Node]) -> Result<Vec<u32>> {
+        let entry = &self.directory.pages[page as usize];
+        let has_portals = self.is_joined() && entry.block == 0;
+        // Children follow one another, so their pages do.
+        let mut below = NO_PAGE;
+        let child_page = |(index, node): (usize, &Node)| {
+            if !node.is_leaf() {
+                if below == NO_PAGE || !self.directory.nodes(below).contains(&node.first_child) {
+                    below = self.directory.page_of(entry.block, node.first_child);
+                }
+                return Ok(below);
+            }
+            if !has_portals {
+                return Ok(NO_PAGE);
+            }
+            let number = entry.first_node + index as u32;
+            let block = self.portals.get(&number).ok_or_else(|| {
+                damaged(&self.path, format!("page {page}"), format!("no block hangs below the portal at node {number}"))
+            })?;
+            Ok(self.directory.blocks[*block as usize].first_page)
+        };
+        nodes.iter().enumerate().map(child_page).collect()
+    }
+
+    /// A page that does not fit those above it.
+    fn torn(&self, page: u32) -> Error {
+        damaged(&self.path, format!("page {page}"), "its nodes are not the children of those above")
+    }
+}
+
+impl Store {
+    fn bytes(&self) -> &[u8] {
+        match self {
+            Self::Mapped(map) => map.as_deref().unwrap_or(&[]),
+            Self::Bytes(bytes) => bytes,
+            Self::Blocks(_) => &[],
+        }
+    }
+}
+
+/// A node with children, as these see it.
+#[derive(Debug, Clone, Copy)]
+struct Family {
+    first_child: u32,
+    children: u32,
+    parent: CutSphere,
+}
+
+impl Family {
+    fn has(&self, node: u32) -> bool {
+        (self.first_child..self.first_child + self.children).contains(&node)
+    }
+}
+
+fn families(nodes: &[Node]) -> Vec<Family> {
+    let inner = nodes.iter().filter(|node| !node.is_leaf());
+    let family =
+        |node: &Node| Family { first_child: node.first_child, children: node.children, parent: CutSphere::of(node) };
+    inner.map(family).collect()
+}
+
+/// The inner nodes of the pages that were read last, so that reading from coarse to fine decodes each page once.
+#[derive(Default)]
+struct Families {
+    held: HashMap<u32, Arc<[Family]>>,
+    /// Oldest first.
+    order: VecDeque<u32>,
+    count: usize,
+}
+
+/// Inner nodes that are held: 56 MiB.
+const MOST_FAMILIES: usize = 2 << 20;
+
+impl Families {
+    fn get(&self, page: u32) -> Option<Arc<[Family]>> {
+        self.held.get(&page).cloned()
+    }
+
+    fn keep(&mut self, page: u32, families: Arc<[Family]>) {
+        if families.is_empty() || self.held.contains_key(&page) {
+            return;
+        }
+        self.count += families.len();
+        self.held.insert(page, families);
+        self.order.push_back(page);
+        while self.count > MOST_FAMILIES && self.order.len() > 1 {
+            let oldest = self.order.pop_front().and_then(|page| self.held.remove(&page));
+            self.count -= oldest.map_or(0, |families| families.len());
+        }
+    }
+}
+
+pub(super) fn refused(path: &Path, refusal: Refusal) -> Error {
+    match refusal {
+        Refusal::Incomplete => incomplete(path, "header"),
+        Refusal::Foreign => Error::input(path, "header", "is no hierarchy of splats")
+            .hint("give a .splk file, or convert the source to one"),
+        Refusal::Version(version) => {
+            Error::input(path, "header", format!("is of version {version}; version {} can be read", super::VERSION))
+                .hint("convert the source again, or use the release that wrote the file")
+        }
+        Refusal::Damaged(message) => damaged(path, "header", message),
+    }
+}
+
+pub(super) fn incomplete(path: &Path, place: impl Into<String>) -> Error {
+    Error::input(path, place, "the file is incomplete: it ends before its last page")
+        .hint("copy or convert it again; what is there can be opened as a prefix once header and directory are whole")
+}
+
+pub(super) fn damaged(path: &Path, place: impl Into<String>, message: impl Into<String>) -> Error {
+    Error::input(path, place, message).hint("the file is damaged: copy or convert it again")
+}
+
+/// Where the hash of a file begins.
+pub(super) fn hash_start(bytes: &[u8]) -> Option<usize> {
+    bytes.len().checked_sub(HASH)
+}

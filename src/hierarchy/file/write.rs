@@ -1,0 +1,307 @@
+//! Writing: block by block, so that no more than one block is in memory at a time.
+
+use super::{
+    HASH,
+    directory::{Directory, Place},
+    header::{Header, Stored, UpAxis},
+    page,
+    pages::{Around, Run, in_order, pages},
+    spill::{Spill, Target},
+};
+use crate::{
+    Error, Result,
+    hierarchy::{Node, Tree},
+    math::Bounds,
+    splat::NO_NORMAL,
+};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+/// How a hierarchy is written, and what the file says of where it comes from.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct WriteOptions {
+    /// Keep every bit, at about eight times the size.
+    pub lossless: bool,
+    /// Which axis of the source points up.
+    pub up: Option<UpAxis>,
+    /// The name of the world's unit.
+    pub unit: String,
+    /// The name of the source.
+    pub source: String,
+}
+
+/// What is known of a hierarchy once all its blocks are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Whole {
+    /// World position that all places are relative to.
+    pub origin: DVec3,
+    /// The box around all footprints, in world coordinates.
+    pub bounds: Bounds,
+    pub closed: bool,
+    pub source_points: u64,
+}
+
+/// The block that joins the others.
+#[derive(Debug, Clone, Copy)]
+pub struct Top<'a> {
+    /// Its nodes, breadth first; its leaves are portals.
+    pub nodes: &'a [Node],
+    /// For each block, in the order in which they were written, the leaf in whose place its root stands.
+    pub portals: &'a [u32],
+}
+
+/// Writes a file block by block. The pages wait in a file beside it; it appears whole, with [`finish`](Self::finish), or
+/// not at all.
+pub struct Writer {
+    path: Option<PathBuf>,
+    options: WriteOptions,
+    extent: f32,
+    spill: Spill,
+    /// Of the ordinary blocks.
+    directory: Directory,
+    roots: Vec<Node>,
+    contents: Contents,
+}
+
+impl Writer {
+    /// Begins a file of splats whose footprints end `extent` standard deviations from their centres.
+    ///
+    /// # Errors
+    /// [`Error::File`] where nothing can be written beside `path`; [`Error::Argument`] for an extent that is no positive
+    /// number.
+    pub fn new(path: &Path, extent: f32, options: &WriteOptions) -> Result<Self> {
+        Self::begin(Some(path.to_owned()), extent, options, || Spill::beside(path))
+    }
+
+    fn begin(
+        path: Option<PathBuf>,
+        extent: f32,
+        options: &WriteOptions,
+        spill: impl FnOnce() -> Result<Spill>,
+    ) -> Result<Self> {
+        if !(extent > 0.0 && extent.is_finite()) {
+            return Err(Error::Argument(format!("the extent is {extent}; a positive number is needed")));
+        }
+        Ok(Self {
+            path,
+            options: options.clone(),
+            extent,
+            spill: spill()?,
+            directory: Directory::default(),
+            roots: Vec::new(),
+            contents: Contents::default(),
+        })
+    }
+
+    /// Writes an ordinary block, breadth first, places relative to the tree's origin, and gives its root as it will be
+    /// read: what the block that joins it with others has to stand above.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for nodes that are not in the order of [`Block`](crate::hierarchy::Block), or have values that
+    /// are not finite; [`Error::File`] where they cannot be written.
+    pub fn block(&mut self, nodes: &[Node]) -> Result<Node> {
+        let number = self.roots.len();
+        let refuse = |message: String| Error::Argument(format!("block {number} of the hierarchy: {message}"));
+        in_order(nodes).map_err(refuse)?;
+        let odd = nodes.par_iter().position_first(|node| !page::is_finite(node));
+        if let Some(node) = odd {
+            return Err(refuse(format!("node {node} has a value that is not finite")));
+        }
+        let runs = pages(nodes);
+        let coded = page::encode(nodes, &runs, self.extent, self.options.lossless);
+        let root = coded.nodes[0];
+        self.contents.add(&coded.nodes);
+        let around = arounds(&coded.nodes, &runs);
+        let places = self.push(&coded.pages)?;
+        self.directory.push_block(&runs, &around, &places);
+        self.roots.push(root);
+        Ok(root)
+    }
+
+    /// Ends the file. One block needs nothing above it; several need the block that joins them, whose leaves take the
+    /// bounds of the roots in their place, and whose other nodes grow where they must.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where `top` does not fit the blocks that were written; [`Error::File`] where the file cannot
+    /// be written.
+    pub fn finish(self, top: Option<Top>, whole: &Whole) -> Result<()> {
+        let path = self.path.clone();
+        let target = || path.as_deref().map_or(Ok(Target::Memory(Vec::new())), Target::at);
+        self.end(top, whole, target).map(|_| ())
+    }
+
+    fn end(mut self, top: Option<Top>, whole: &Whole, target: impl FnOnce() -> Result<Target>) -> Result<Vec<u8>> {
+        let mut directory = match (top, self.roots.len()) {
+            (_, 0) => return Err(Error::Argument("the hierarchy has no blocks".into())),
+            (None, 1) => std::mem::take(&mut self.directory),
+            (None, count) => return Err(Error::Argument(format!("nothing joins the {count} blocks of the hierarchy"))),
+            (Some(top), _) => self.join(top)?,
+        };
+        directory.link();
+        let order = directory.coarse_first();
+        let spilled: Vec<Place> = directory.pages.iter().map(|page| page.place).collect();
+        let mut stored = Stored {
+            header: self.header(&directory, whole),
+            file_bytes: 0,
+            blocks: directory.blocks.len() as u32,
+            pages: directory.pages.len() as u32,
+        };
+        let mut at = stored.length() as u64 + Directory::length(directory.blocks.len(), directory.pages.len());
+        for &page in &order {
+            let place = &mut directory.pages[page as usize].place;
+            place.offset = at;
+            at += u64::from(place.bytes);
+        }
+        stored.file_bytes = at + HASH as u64;
+        let mut out = target()?;
+        let mut hash = blake3::Hasher::new();
+        let mut put = |bytes: &[u8]| {
+            hash.update(bytes);
+            out.write_all(bytes)
+        };
+        let pieces = order.iter().map(|&page| (spilled[page as usize].offset, spilled[page as usize].bytes));
+        let written = put(&stored.encode())
+            .and_then(|()| put(&directory.encode()))
+            .and_then(|()| self.spill.replay(pieces, &mut put))
+            .and_then(|()| out.write_all(hash.finalize().as_bytes()));
+        written.map_err(|e| Error::file(self.path.as_deref().unwrap_or(Path::new("memory")), "write", e))?;
+        out.end()
+    }
+
+    /// The directory of all blocks, with the one on top written too.
+    fn join(&mut self, top: Top) -> Result<Directory> {
+        let refuse = |message: String| Error::Argument(format!("the block that joins the others: {message}"));
+        in_order(top.nodes).map_err(refuse)?;
+        let mut nodes = top.nodes.to_vec();
+        let leaves = nodes.iter().filter(|node| node.is_leaf()).count();
+        if top.portals.len() != self.roots.len() || leaves != self.roots.len() {
+            let [portals, blocks] = [top.portals.len(), self.roots.len()];
+            return Err(refuse(format!("it has {leaves} leaves and {portals} portals for {blocks} blocks")));
+        }
+        let mut is_taken = vec![false; nodes.len()];
+        for (root, &portal) in self.roots.iter().zip(top.portals) {
+            let portal = portal as usize;
+            if !nodes.get(portal).is_some_and(Node::is_leaf) || std::mem::replace(&mut is_taken[portal], true) {
+                return Err(refuse(format!("node {portal} is no portal, or that of two blocks")));
+            }
+            nodes[portal] = Node { first_child: 0, children: 0, ..*root };
+        }
+        page::enclose(&mut nodes);
+        if let Some(node) = nodes.iter().position(|node| !page::is_finite(node)) {
+            return Err(refuse(format!("node {node} has a value that is not finite")));
+        }
+        let runs = pages(&nodes);
+        let coded = page::encode(&nodes, &runs, self.extent, true);
+        let places = self.push(&coded.pages)?;
+        let mut directory = Directory::default();
+        directory.push_block(&runs, &arounds(&nodes, &runs), &places);
+        directory.append(std::mem::take(&mut self.directory));
+        directory.hang(&nodes, top.portals);
+        Ok(directory)
+    }
+
+    fn push(&mut self, pages: &[Vec<u8>]) -> Result<Vec<Place>> {
+        let mut places = Vec::with_capacity(pages.len());
+        for bytes in pages {
+            let offset = self.spill.push(bytes);
+            let offset =
+                offset.map_err(|e| Error::file(self.path.as_deref().unwrap_or(Path::new("memory")), "write", e))?;
+            places.push(Place { offset, bytes: bytes.len() as u32, crc: crc32fast::hash(bytes) });
+        }
+        Ok(places)
+    }
+
+    fn header(&self, directory: &Directory, whole: &Whole) -> Header {
+        Header {
+            origin: whole.origin,
+            bounds: whole.bounds,
+            extent: self.extent,
+            closed: whole.closed,
+            has_color: self.contents.has_color,
+            has_normals: self.contents.has_normals,
+            lossless: self.options.lossless,
+            source_points: whole.source_points,
+            leaves: self.contents.leaves,
+            nodes: directory.blocks.iter().map(|block| u64::from(block.nodes)).sum(),
+            up: self.options.up,
+            unit: self.options.unit.clone(),
+            source: self.options.source.clone(),
+        }
+    }
+}
+
+/// What the leaves of ordinary blocks have.
+#[derive(Default)]
+struct Contents {
+    leaves: u64,
+    has_color: bool,
+    has_normals: bool,
+    /// Red, green and blue of the first leaf.
+    color: Option<u32>,
+}
+
+impl Contents {
+    fn add(&mut self, nodes: &[Node]) {
+        for node in nodes.iter().filter(|node| node.is_leaf()) {
+            let color = node.splat.color & 0xff_ffff;
+            self.leaves += 1;
+            self.has_color |= *self.color.get_or_insert(color) != color;
+            self.has_normals |= node.splat.normal != NO_NORMAL;
+        }
+    }
+}
+
+/// What is around the parents of the nodes of each page of a block.
+pub(super) fn arounds(nodes: &[Node], runs: &[Run]) -> Vec<Around> {
+    let around = |run: &Run| match run.nodes.start {
+        0 => Around::EVERYTHING,
+        _ => Around::parents(&nodes[run.parents.clone()]),
+    };
+    runs.par_iter().map(around).collect()
+}
+
+/// The parent of each node of a block; `None` for the root.
+pub(super) fn parents(nodes: &[Node]) -> Vec<Option<u32>> {
+    let mut parents = vec![None];
+    for (index, node) in nodes.iter().enumerate() {
+        parents.extend(std::iter::repeat_n(Some(index as u32), node.children as usize));
+    }
+    parents
+}
+
+/// Writes a whole hierarchy: a temporary file beside `path` that takes its name once it is complete.
+///
+/// # Errors
+/// Those of [`Writer`]; also [`Error::Argument`] where the blocks of a joined tree do not say which portals they hang
+/// below.
+pub fn write(tree: &Tree, path: &Path, options: &WriteOptions) -> Result<()> {
+    all(tree, Writer::new(path, tree.extent, options)?, || Target::at(path)).map(|_| ())
+}
+
+/// The bytes of the file that [`write`](write()) would write.
+///
+/// # Errors
+/// As of [`write`](write()).
+pub fn to_bytes(tree: &Tree, options: &WriteOptions) -> Result<Vec<u8>> {
+    let writer = Writer::begin(None, tree.extent, options, || Ok(Spill::Memory(Vec::new())))?;
+    all(tree, writer, || Ok(Target::Memory(Vec::new())))
+}
+
+fn all(tree: &Tree, mut writer: Writer, target: impl FnOnce() -> Result<Target>) -> Result<Vec<u8>> {
+    let Tree { origin, bounds, closed, source_points, .. } = *tree;
+    let whole = Whole { origin, bounds, closed, source_points };
+    let below = &tree.blocks[usize::from(tree.is_joined())..];
+    for block in below {
+        writer.block(&block.nodes)?;
+    }
+    if !tree.is_joined() {
+        return writer.end(None, &whole, target);
+    }
+    let portals: Option<Vec<u32>> = below.iter().map(|block| block.portal).collect();
+    let portals = portals.ok_or_else(|| Error::Argument("a block of the hierarchy has no portal".into()))?;
+    writer.end(Some(Top { nodes: &tree.blocks[0].nodes, portals: &portals }), &whole, target)
+}

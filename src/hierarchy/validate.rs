@@ -1,0 +1,185 @@
+//! What must hold in every hierarchy.
+
+use super::{
+    Node, Tree,
+    file::{in_order, joint_angle, reach},
+};
+use crate::splat::decode_normal;
+use glam::DVec3;
+
+/// How bad a finding is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Severity {
+    /// Worth knowing; pictures are right.
+    Warning,
+    /// Pictures may be wrong, or nothing can be read.
+    Error,
+}
+
+/// Something that is not as it must be.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Finding {
+    /// A name for this kind of finding, the same in every release: `sphere`, `cone`, `size`, `order`, …
+    pub code: &'static str,
+    pub severity: Severity,
+    /// Where: a block and a node, a page, the header.
+    pub place: String,
+    /// What was found and what was expected.
+    pub message: String,
+}
+
+impl Finding {
+    pub fn error(code: &'static str, place: impl Into<String>, message: impl Into<String>) -> Self {
+        Self { code, severity: Severity::Error, place: place.into(), message: message.into() }
+    }
+}
+
+/// Findings, but no more of one kind than anyone reads.
+#[derive(Debug, Default)]
+pub struct Findings {
+    list: Vec<Finding>,
+    left_out: Vec<(&'static str, usize)>,
+}
+
+/// Findings of one kind that are told one by one.
+const MOST: usize = 16;
+
+impl Findings {
+    pub fn push(&mut self, finding: Finding) {
+        let code = finding.code;
+        if self.list.iter().filter(|other| other.code == code).count() < MOST {
+            self.list.push(finding);
+        } else if let Some((_, count)) = self.left_out.iter_mut().find(|(other, _)| *other == code) {
+            *count += 1;
+        } else {
+            self.left_out.push((code, 1));
+        }
+    }
+
+    pub fn finish(mut self) -> Vec<Finding> {
+        let more = self.left_out.iter();
+        let more = more.map(|(code, count)| Finding::error(code, "further places", format!("{count} more of these")));
+        self.list.extend(more.collect::<Vec<_>>());
+        self.list
+    }
+}
+
+/// Checks every promise of [`Node`], [`Block`](super::Block) and [`Tree`]: each child's sphere in its parent's, each child's
+/// cone in its parent's, no size below a child's, children behind their parents and in order, blocks in the places of
+/// portals that bound their roots, numbers finite. Bounds may miss by what 32-bit numbers round: 10⁻⁶ of the radius and of
+/// the cosine. Finds nothing in a sound tree.
+pub fn validate(tree: &Tree) -> Vec<Finding> {
+    let mut findings = Findings::default();
+    let sound = tree.origin.is_finite() && tree.bounds.min.is_finite() && tree.bounds.max.is_finite();
+    if !sound || tree.bounds.is_empty() {
+        findings.push(Finding::error("bounds", "tree", "its origin or its bounds are none"));
+    }
+    if !(tree.extent > 0.0 && tree.extent.is_finite()) {
+        findings.push(Finding::error("extent", "tree", format!("its extent is {}", tree.extent)));
+    }
+    if tree.blocks.is_empty() {
+        findings.push(Finding::error("blocks", "tree", "it has no blocks"));
+    }
+    for (number, block) in tree.blocks.iter().enumerate() {
+        check_block(number, &block.nodes, &mut findings);
+    }
+    if let Some((top, below)) = tree.blocks.split_first() {
+        let roots = below.iter().map(|block| (block.portal, block.nodes.first()));
+        check_portals(&top.nodes, top.portal, &roots.collect::<Vec<_>>(), &mut findings);
+    }
+    findings.finish()
+}
+
+/// Checks the nodes of a block.
+pub fn check_block(number: usize, nodes: &[Node], findings: &mut Findings) {
+    let place = |node: usize| format!("block {number}, node {node}");
+    if let Err(message) = in_order(nodes) {
+        findings.push(Finding::error("order", format!("block {number}"), message));
+        return;
+    }
+    for (index, node) in nodes.iter().enumerate() {
+        if let Some(message) = values(node) {
+            findings.push(Finding::error("values", place(index), message));
+            continue;
+        }
+        let first = node.first_child as usize;
+        for (child, below) in nodes[first..first + node.children as usize].iter().enumerate() {
+            bounds(node, below, || format!("block {number}, node {}", first + child), findings);
+        }
+    }
+}
+
+/// Checks that each portal has its block, and bounds its root.
+pub fn check_portals(
+    top: &[Node],
+    own_portal: Option<u32>,
+    roots: &[(Option<u32>, Option<&Node>)],
+    findings: &mut Findings,
+) {
+    let mut portal = |message: String| findings.push(Finding::error("portal", "block 0", message));
+    if let Some(own) = own_portal {
+        portal(format!("it hangs below node {own}; it is the one that others hang below"));
+    }
+    if roots.is_empty() {
+        return;
+    }
+    let mut taken = vec![false; top.len()];
+    for (number, (portal_of, _)) in roots.iter().enumerate() {
+        let at = portal_of.map(|at| at as usize).filter(|&at| top.get(at).is_some_and(Node::is_leaf));
+        match at {
+            Some(at) if !taken[at] => taken[at] = true,
+            Some(at) => portal(format!("two blocks hang below node {at}")),
+            None => portal(format!("block {} hangs below {portal_of:?}, which is no leaf", number + 1)),
+        }
+    }
+    for (index, _) in top.iter().enumerate().filter(|&(index, node)| node.is_leaf() && !taken[index]) {
+        portal(format!("no block hangs below node {index}"));
+    }
+    for (number, (portal_of, root)) in roots.iter().enumerate() {
+        if let (Some(node), Some(root)) = (portal_of.and_then(|at| top.get(at as usize)), root) {
+            bounds(node, root, || format!("block {}, node 0", number + 1), findings);
+        }
+    }
+}
+
+/// What is wrong with a node by itself.
+fn values(node: &Node) -> Option<String> {
+    let Node { splat, center, radius, size, cone, .. } = node;
+    let numbers = splat.center.iter().chain(&splat.factor).chain(center).chain([&splat.strength, radius, size, cone]);
+    if !numbers.copied().all(f32::is_finite) {
+        return Some("a value is not finite".into());
+    }
+    if *radius < 0.0 || *size < 0.0 {
+        return Some(format!("its radius is {radius}, its size {size}"));
+    }
+    if !(-1.0..=1.0).contains(cone) {
+        return Some(format!("the cosine of its cone is {cone}"));
+    }
+    let normal = decode_normal(splat.normal);
+    if normal.is_some_and(|normal| !normal.is_finite()) {
+        return Some("its normal is none".into());
+    }
+    None
+}
+
+/// Checks that a node bounds one below it.
+fn bounds(node: &Node, below: &Node, place: impl Fn() -> String, findings: &mut Findings) {
+    let center: DVec3 = node.center().as_dvec3();
+    let (reach, radius) = (reach(center, below), f64::from(node.radius));
+    if reach > radius * (1.0 + 1e-6) {
+        let message = format!("its sphere ends {reach} from its parent's centre, whose own has radius {radius}");
+        findings.push(Finding::error("sphere", place(), message));
+    }
+    if below.size > node.size {
+        let message = format!("its size is {}, its parent's {}", below.size, node.size);
+        findings.push(Finding::error("size", place(), message));
+    }
+    if node.cone > -1.0 {
+        let wanted = libm::cos(joint_angle(node, below));
+        if f64::from(node.cone) > wanted + 1e-6 {
+            let message =
+                format!("its cone needs one of cosine {wanted} around its parent's normal, which has {}", node.cone);
+            findings.push(Finding::error("cone", place(), message));
+        }
+    }
+}
