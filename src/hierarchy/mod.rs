@@ -3,6 +3,8 @@
 
 pub mod file;
 mod node;
+#[cfg(test)]
+mod testing;
 mod validate;
 
 pub use file::Hierarchy;

@@ -35,5 +35,7 @@ const VERSION: u32 = 1;
 /// Bytes of the BLAKE3 hash at the end of a file.
 const HASH: usize = 32;
 
+#[cfg(test)]
+pub(in crate::hierarchy) use page::enclose;
 pub(in crate::hierarchy) use page::joint_angle;
 pub(in crate::hierarchy) use pages::{in_order, reach};
