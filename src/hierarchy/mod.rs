@@ -4,7 +4,7 @@
 pub mod file;
 mod node;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 mod validate;
 
 pub use file::Hierarchy;

@@ -4,13 +4,18 @@
 //! [`write`](write()) and [`Writer`] make it, [`Hierarchy`] reads it page by page or as a whole, [`check`](check()) looks for
 //! damage.
 
+mod bounds;
 mod bytes;
 mod check;
+mod column;
 mod directory;
 mod header;
 mod lossless;
+mod lossy;
+mod octahedron;
 mod page;
 mod pages;
+mod quantise;
 mod read;
 mod spill;
 #[cfg(test)]
