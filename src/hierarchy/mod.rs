@@ -9,9 +9,11 @@ mod merge;
 mod node;
 mod partition;
 mod sphere;
+#[cfg(test)]
+pub(crate) mod testing;
 mod validate;
 
-pub use build::{BuildOptions, Preset, Watch};
+pub use build::{BuildOptions, Preset, Watch, build_file};
 pub(crate) use cut::cone_margin;
 pub use cut::{BLEND_BAND, Cut, Detail, SHARE_UNIT};
 pub use file::{CutSphere, Hierarchy};

@@ -37,18 +37,20 @@ pub fn decode(bytes: &[u8], count: usize) -> Result<Vec<Node>, String> {
 }
 
 fn to_bytes(node: &Node) -> [u8; NODE_BYTES] {
-    let Node { splat, center, radius, size, cone, first_child, children } = *node;
-    let mut words = Vec::with_capacity(NODE_BYTES / 4);
-    words.extend(splat.center.map(f32::to_bits));
-    words.push(splat.strength.to_bits());
-    words.extend(splat.factor.map(f32::to_bits));
-    words.extend([splat.color, splat.normal]);
-    words.extend(center.map(f32::to_bits));
-    words.extend([radius, size, cone].map(f32::to_bits));
-    words.extend([first_child, children]);
     let mut out = [0; NODE_BYTES];
-    out.chunks_exact_mut(4).zip(words).for_each(|(out, word)| out.copy_from_slice(&word.to_le_bytes()));
+    out.chunks_exact_mut(4).zip(words(node)).for_each(|(out, word)| out.copy_from_slice(&word.to_le_bytes()));
     out
+}
+
+/// The bits of all fields.
+pub fn words(node: &Node) -> [u32; NODE_BYTES / 4] {
+    let Node { splat, center, radius, size, cone, first_child, children } = *node;
+    let [b0, b1, b2, b3, b4, b5] = splat.factor.map(f32::to_bits);
+    let [x, y, z] = splat.center.map(f32::to_bits);
+    let [cx, cy, cz] = center.map(f32::to_bits);
+    let [strength, radius, size, cone] = [splat.strength, radius, size, cone].map(f32::to_bits);
+    let Splat { color, normal, .. } = splat;
+    [x, y, z, strength, b0, b1, b2, b3, b4, b5, color, normal, cx, cy, cz, radius, size, cone, first_child, children]
 }
 
 fn from_bytes(bytes: &[u8; NODE_BYTES]) -> Option<Node> {

@@ -4,13 +4,18 @@
 //! [`write`](write()) and [`Writer`] make it, [`Hierarchy`] reads it page by page or as a whole, [`check`](check()) looks for
 //! damage.
 
+mod bounds;
 mod bytes;
 mod check;
+mod column;
 mod directory;
 mod header;
 mod lossless;
+mod lossy;
+mod octahedron;
 mod page;
 mod pages;
+mod quantise;
 mod read;
 mod spill;
 #[cfg(test)]
@@ -35,5 +40,7 @@ const VERSION: u32 = 1;
 /// Bytes of the BLAKE3 hash at the end of a file.
 const HASH: usize = 32;
 
+#[cfg(test)]
+pub(in crate::hierarchy) use page::enclose;
 pub(in crate::hierarchy) use page::joint_angle;
 pub(in crate::hierarchy) use pages::{in_order, reach};

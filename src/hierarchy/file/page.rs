@@ -1,14 +1,18 @@
 //! Pages as bytes: which code each has, and how a block becomes pages.
 
 use super::{
-    lossless,
-    pages::{Run, reach, round_up},
+    bounds, lossless, lossy,
+    pages::{Run, levels, reach, round_up},
+    quantise::Shape,
 };
 use crate::{hierarchy::Node, splat::decode_normal};
+use glam::Vec3;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The first byte of a page.
 const LOSSLESS: u8 = 0;
+const LOSSY: u8 = 1;
 
 /// A block in pages, and its nodes as these will be read.
 pub struct Coded {
@@ -17,20 +21,137 @@ pub struct Coded {
 }
 
 /// Encodes a block whose nodes are in order.
-pub fn encode(nodes: &[Node], runs: &[Run], _extent: f32, _is_lossless: bool) -> Coded {
-    let page = |run: &Run| {
-        let mut out = vec![LOSSLESS];
-        out.extend(lossless::encode(&nodes[run.nodes.clone()]));
-        out
+pub fn encode(nodes: &[Node], runs: &[Run], extent: f32, is_lossless: bool) -> Coded {
+    let mut nodes = nodes.to_vec();
+    if is_lossless {
+        let pages = runs.par_iter().map(|run| lossless_page(&nodes[run.nodes.clone()])).collect();
+        return Coded { nodes, pages };
+    }
+    let codes = quantise(&mut nodes, runs, extent);
+    let bounds = bound(&mut nodes, &codes, extent);
+    let firsts = codes.iter().scan(0, |next, codes| {
+        let first = *next;
+        *next += codes.inner;
+        Some(first)
+    });
+    let firsts: Vec<usize> = firsts.collect();
+    let page = |((run, page), first): ((&Run, &PageCodes), &usize)| {
+        let own: Option<Vec<bounds::Code>> = bounds[*first..*first + page.inner].iter().copied().collect();
+        match (&page.codes, own) {
+            (Some(codes), Some(own)) => {
+                let mut out = vec![LOSSY];
+                lossy::encode(&nodes[run.nodes.clone()], codes, &own, &mut out);
+                out
+            }
+            _ => lossless_page(&nodes[run.nodes.clone()]),
+        }
     };
-    Coded { nodes: nodes.to_vec(), pages: runs.par_iter().map(page).collect() }
+    let pages = runs.par_iter().zip(&codes).zip(&firsts).map(page).collect();
+    Coded { nodes, pages }
+}
+
+fn lossless_page(nodes: &[Node]) -> Vec<u8> {
+    let mut out = vec![LOSSLESS];
+    out.extend(lossless::encode(nodes));
+    out
+}
+
+/// What is known of a page before the bounds of its inner nodes are.
+struct PageCodes {
+    /// `None` for a page that only the lossless way can tell.
+    codes: Option<lossy::Codes>,
+    /// How many inner nodes it has.
+    inner: usize,
+}
+
+/// Replaces all splats by those that will be read.
+fn quantise(nodes: &mut [Node], runs: &[Run], extent: f32) -> Vec<PageCodes> {
+    let groups: Vec<(Vec<Range<usize>>, &Run)> = runs.iter().map(|run| (siblings(nodes, run), run)).collect();
+    let mut rest = nodes;
+    let mut parts = Vec::with_capacity(runs.len());
+    for (groups, run) in groups {
+        let (part, behind) = rest.split_at_mut(run.nodes.len());
+        parts.push((part, groups));
+        rest = behind;
+    }
+    let page = |(part, groups): (&mut [Node], Vec<Range<usize>>)| {
+        groups.into_iter().for_each(|group| line_up(part, group));
+        let given = part.to_vec();
+        let codes = lossy::quantise(part, extent);
+        if codes.is_none() {
+            part.copy_from_slice(&given);
+        }
+        PageCodes { codes, inner: part.iter().filter(|node| !node.is_leaf()).count() }
+    };
+    parts.into_par_iter().map(page).collect()
+}
+
+/// The groups of siblings on a page, counted from its first node.
+fn siblings(nodes: &[Node], run: &Run) -> Vec<Range<usize>> {
+    let start = run.nodes.start;
+    let parents = nodes[run.parents.clone()].iter().filter(|node| !node.is_leaf());
+    let children = parents.map(|node| node.first_child as usize..(node.first_child + node.children) as usize);
+    children.filter(|group| run.nodes.contains(&group.start)).map(|group| group.start - start..group.end - start).collect()
+}
+
+/// Puts the leaves among siblings in an order in which each is near the one before: nothing depends on their order, and
+/// short ways take few bits.
+fn line_up(nodes: &mut [Node], group: Range<usize>) {
+    for slot in group.clone().filter(|&slot| slot > 0) {
+        if !nodes[slot].is_leaf() {
+            continue;
+        }
+        let last = Vec3::from(nodes[slot - 1].splat.center);
+        let distance = |&at: &usize| Vec3::from(nodes[at].splat.center).distance_squared(last);
+        let leaves = (slot..group.end).filter(|&at| nodes[at].is_leaf());
+        let next = leaves.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        nodes.swap(slot, next.unwrap_or(slot));
+    }
+}
+
+/// Gives all inner nodes bounds around their children as these will be read, level by level from below; `None` where only
+/// the lossless way can tell them.
+fn bound(nodes: &mut [Node], codes: &[PageCodes], extent: f32) -> Vec<Option<bounds::Code>> {
+    let inner: Vec<u32> = (0..nodes.len() as u32).filter(|&node| !nodes[node as usize].is_leaf()).collect();
+    let shapes = codes.iter().flat_map(|page| match &page.codes {
+        Some(codes) => codes.shapes.iter().copied().map(Some).collect(),
+        None => vec![None; page.inner],
+    });
+    let shapes: Vec<Option<Shape>> = shapes.collect();
+    let mut out = vec![None; inner.len()];
+    for level in levels(nodes).windows(2).rev() {
+        let place = |node: usize| inner.partition_point(|&other| (other as usize) < node);
+        let some = place(level[0])..place(level[1]);
+        let bounded = some.clone().into_par_iter().with_min_len(256).map(|at| {
+            let mut node = nodes[inner[at] as usize];
+            let first = node.first_child as usize;
+            let children = &nodes[first..first + node.children as usize];
+            let code = shapes[at].and_then(|shape| {
+                let mut coded = node;
+                let code = bounds::Code::encode(&mut coded, children, &shape, extent)?;
+                node = coded;
+                Some(code)
+            });
+            if code.is_none() {
+                enclose_children(&mut node, children);
+            }
+            (node, code)
+        });
+        let bounded: Vec<(Node, Option<bounds::Code>)> = bounded.collect();
+        for (at, (node, code)) in some.zip(bounded) {
+            nodes[inner[at] as usize] = node;
+            out[at] = code;
+        }
+    }
+    out
 }
 
 /// The nodes of a page of `count`, the children of the first of which stand at `first_child`; or what is wrong with it.
-pub fn decode(bytes: &[u8], count: usize, first_child: u32, _extent: f32) -> Result<Vec<Node>, String> {
+pub fn decode(bytes: &[u8], count: usize, first_child: u32, extent: f32) -> Result<Vec<Node>, String> {
     let (&code, rest) = bytes.split_first().ok_or("it is empty")?;
     let nodes = match code {
         LOSSLESS => lossless::decode(rest, count)?,
+        LOSSY => lossy::decode(rest, count, first_child, extent)?,
         other => return Err(format!("it has the unknown code {other}")),
     };
     let mut next = first_child;
@@ -63,13 +184,15 @@ pub fn enclose(nodes: &mut [Node]) {
         let first = nodes[index].first_child as usize;
         let (above, below) = nodes.split_at_mut(first);
         let node = &mut above[index];
-        let children = &below[..node.children as usize];
-        let center = node.center().as_dvec3();
-        node.radius = children.iter().map(|child| round_up(reach(center, child))).fold(node.radius, f32::max);
-        node.size = children.iter().map(|child| child.size).fold(node.size, f32::max);
-        let cone = children.iter().map(|child| cosine_below(joint_angle(node, child))).fold(node.cone, f32::min);
-        node.cone = cone;
+        enclose_children(node, &below[..node.children as usize]);
     }
+}
+
+fn enclose_children(node: &mut Node, children: &[Node]) {
+    let center = node.center().as_dvec3();
+    node.radius = children.iter().map(|child| round_up(reach(center, child))).fold(node.radius, f32::max);
+    node.size = children.iter().map(|child| child.size).fold(node.size, f32::max);
+    node.cone = children.iter().map(|child| cosine_below(joint_angle(node, child))).fold(node.cone, f32::min);
 }
 
 /// The half-angle of the cone around the normal of a node that holds a child's; π where there is none.
@@ -85,7 +208,7 @@ pub fn joint_angle(node: &Node, child: &Node) -> f64 {
 }
 
 /// The cosine of a half-angle, never above it.
-fn cosine_below(angle: f64) -> f32 {
+pub fn cosine_below(angle: f64) -> f32 {
     if angle >= std::f64::consts::PI {
         return -1.0;
     }
