@@ -3,16 +3,20 @@
 use super::{
     Block, Node, Tree,
     cluster::{box_of, cluster},
+    file::{Top, Whole, WriteOptions, Writer},
     merge::leaf,
     partition,
-    sphere::{self, Sphere, enclosing, nest, raise},
+    sphere::{Sphere, enclosing, nest, raise},
 };
 use crate::{
     Error, Result,
     splat::{Payload, SplatSet},
 };
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::{
+    path::Path,
+    sync::atomic::{AtomicU64, Ordering},
+};
 
 /// How much time building may take for how good a tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -54,31 +58,15 @@ impl Tree {
     pub fn build(set: &SplatSet, options: &BuildOptions, watch: Watch<'_>) -> Result<Self> {
         let _span = tracing::info_span!("build").entered();
         check(set)?;
-        let splats = &set.splats;
-        let parts = partition::blocks(splats, options.block_splats.max(64));
+        let parts = partition::blocks(&set.splats, options.block_splats.max(64));
+        let outer = (parts.len() > 1).then(|| around(set));
         let built = AtomicU64::new(0);
-        let total = splats.len() as u64;
-        let raised: Vec<(Block, Vec<u8>)> = parts
+        let mut blocks: Vec<Block> = parts
             .into_par_iter()
             .map(|part| {
-                let boxes: Vec<_> = part.iter().map(|&i| box_of(&splats[i as usize])).collect();
-                let leaf = |i: u32| leaf(&splats[part[i as usize] as usize], set.extent);
-                let (mut block, _) = cluster(&boxes, leaf, options.preset);
-                let heights = raise(&mut block);
+                let block = block_of(set, &part, options.preset, outer);
                 let count = part.len() as u64;
-                watch(built.fetch_add(count, Ordering::Relaxed) + count, total);
-                (block, heights)
-            })
-            .collect();
-        let outer = (raised.len() > 1).then(|| {
-            let all: Vec<Vec<Sphere>> =
-                raised.par_iter().map(|(block, heights)| sphere::parts(block, heights)).collect();
-            enclosing(&all.concat())
-        });
-        let mut blocks: Vec<Block> = raised
-            .into_par_iter()
-            .map(|(mut block, heights)| {
-                nest(&mut block, &heights, outer);
+                watch(built.fetch_add(count, Ordering::Relaxed) + count, set.splats.len() as u64);
                 block
             })
             .collect();
@@ -95,10 +83,92 @@ impl Tree {
             extent: set.extent,
             closed: options.closed,
             bounds: set.bounds(),
-            source_points: options.source_points.unwrap_or(total),
+            source_points: options.source_points.unwrap_or(set.splats.len() as u64),
             blocks,
         })
     }
+}
+
+/// Builds the tree of a set and writes it, a few blocks at a time, so that no more of it is in memory.
+///
+/// # Errors
+/// Those of [`Tree::build`], and [`Error::File`] where the file cannot be written; then there is none.
+pub fn build_file(
+    set: &SplatSet,
+    path: &Path,
+    build: &BuildOptions,
+    write: &WriteOptions,
+    watch: Watch<'_>,
+) -> Result<()> {
+    let _span = tracing::info_span!("build").entered();
+    check(set)?;
+    let parts = partition::blocks(&set.splats, build.block_splats.max(64));
+    let mut builder = Builder::new(path, set.extent, (parts.len() > 1).then(|| around(set)), build.preset, write)?;
+    let mut built = 0;
+    for parts in parts.chunks(2 * rayon::current_num_threads()) {
+        builder.add(parts.par_iter().map(|part| block_of(set, part, build.preset, builder.outer)).collect())?;
+        built += parts.iter().map(|part| part.len() as u64).sum::<u64>();
+        watch(built, set.splats.len() as u64);
+    }
+    builder.finish(&Whole {
+        origin: set.origin,
+        bounds: set.bounds(),
+        closed: build.closed,
+        source_points: build.source_points.unwrap_or(set.splats.len() as u64),
+    })
+}
+
+/// Writes blocks as they come, and joins them at the end.
+pub(crate) struct Builder {
+    writer: Writer,
+    /// What holds all blocks, where there are several.
+    pub outer: Option<Sphere>,
+    preset: Preset,
+    roots: Vec<Node>,
+}
+
+impl Builder {
+    pub fn new(
+        path: &Path,
+        extent: f32,
+        outer: Option<Sphere>,
+        preset: Preset,
+        options: &WriteOptions,
+    ) -> Result<Self> {
+        Ok(Self { writer: Writer::new(path, extent, options)?, outer, preset, roots: Vec::new() })
+    }
+
+    pub fn add(&mut self, blocks: Vec<Block>) -> Result<()> {
+        for block in blocks {
+            self.roots.push(self.writer.block(&block.nodes)?);
+        }
+        Ok(())
+    }
+
+    pub fn finish(self, whole: &Whole) -> Result<()> {
+        if self.roots.len() == 1 {
+            return self.writer.finish(None, whole);
+        }
+        let spheres: Vec<Sphere> = self.roots.iter().map(Sphere::of).collect();
+        let outer = self.outer.unwrap_or_else(|| Sphere::around(&spheres, 1 << 10));
+        let (top, portals) = join(&self.roots, self.preset, outer);
+        self.writer.finish(Some(Top { nodes: &top.nodes, portals: &portals }), whole)
+    }
+}
+
+/// The block of some splats of a set; its root's sphere lies in `outer`.
+pub(crate) fn block_of(set: &SplatSet, part: &[u32], preset: Preset, outer: Option<Sphere>) -> Block {
+    let splat = |i: u32| &set.splats[i as usize];
+    let boxes: Vec<_> = part.iter().map(|&i| box_of(splat(i))).collect();
+    let (mut block, _) = cluster(&boxes, |i| leaf(splat(part[i as usize]), set.extent), preset);
+    let heights = raise(&mut block);
+    nest(&mut block, &heights, outer);
+    block
+}
+
+/// A sphere around all footprints of a set that is nearly the smallest.
+fn around(set: &SplatSet) -> Sphere {
+    enclosing(&set.splats, |splat| Sphere::of(&leaf(splat, set.extent)), |splat| splat.center.into())
 }
 
 /// The block above the roots of others, all of which lie in `outer`, and the place of each root's portal in it.

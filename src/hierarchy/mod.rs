@@ -5,6 +5,7 @@ mod build;
 mod cluster;
 mod cut;
 pub mod file;
+mod leaves;
 mod merge;
 mod node;
 mod partition;

@@ -7,7 +7,8 @@
 //! towards the parent's until it does not; at the parent's own centre it would be the parent's sphere.
 
 use super::{Block, MOST_CHILDREN, Node};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sphere {
@@ -85,7 +86,9 @@ impl Sphere {
             let middle = (out + within) * 0.5;
             *(if fits(&at(middle)) { &mut within } else { &mut out }) = middle;
         }
-        if within == 1.0 { outer } else { at(within) }
+        let fitted = at(within);
+        // Rounding may leave no room at all; and a caller's `outer` may not hold what it promised.
+        if within < 1.0 || Self::reach(outer.center, spheres) <= outer.radius { fitted } else { own }
     }
 }
 
@@ -133,46 +136,78 @@ pub(crate) fn nest(block: &mut Block, heights: &[u8], outer: Option<Sphere>) {
     }
 }
 
-/// Spheres of a raised block that together hold all of it, small against it.
-pub(crate) fn parts(block: &Block, heights: &[u8]) -> Vec<Sphere> {
-    let mut found = Vec::new();
-    for (node, &height) in block.nodes.iter().zip(heights) {
-        let held = children_of(node).filter(|&child| heights[child] < FITTED_HEIGHT);
-        if height >= FITTED_HEIGHT {
-            found.extend(held.map(|child| Sphere::of(&block.nodes[child])));
-        }
-    }
-    if found.is_empty() { vec![Sphere::of(&block.nodes[0])] } else { found }
-}
+/// Directions in which the farthest spheres are looked for: the axes of a cube, of its edges and of its corners.
+const DIRECTIONS: [[f32; 3]; 13] = [
+    [1.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [1.0, 1.0, 0.0],
+    [1.0, -1.0, 0.0],
+    [1.0, 0.0, 1.0],
+    [1.0, 0.0, -1.0],
+    [0.0, 1.0, 1.0],
+    [0.0, 1.0, -1.0],
+    [1.0, 1.0, 1.0],
+    [1.0, 1.0, -1.0],
+    [1.0, -1.0, 1.0],
+    [-1.0, 1.0, 1.0],
+];
 
-/// Directions in which the farthest spheres are looked for.
-const DIRECTIONS: usize = 49;
+/// How often what lies farthest outside is taken in.
+const MOST_GROWTHS: usize = 12;
+/// What may lie outside before the sphere is grown to hold it, in parts of its radius.
+const OUTSIDE: f64 = 0.005;
 
-/// A sphere around very many that is nearly the smallest: the one around what is farthest in many directions, grown to hold
-/// the rest.
-pub(crate) fn enclosing(spheres: &[Sphere]) -> Sphere {
-    // Spread evenly over half of all directions by the golden angle.
-    let direction = |i: usize| {
-        let z = (i as f64 + 0.5) / DIRECTIONS as f64;
-        let turn = i as f64 * 2.399_963_229_728_653;
-        let around = (1.0 - z * z).sqrt();
-        DVec3::new(around * libm::cos(turn), around * libm::sin(turn), z)
-    };
-    let mut farthest = Vec::with_capacity(2 * DIRECTIONS);
-    for direction in (0..DIRECTIONS).map(direction) {
-        let mut ends = [(f64::NEG_INFINITY, None); 2];
-        for sphere in spheres {
-            let along = sphere.center.dot(direction);
-            for (end, along) in ends.iter_mut().zip([along + sphere.radius, sphere.radius - along]) {
-                if along > end.0 {
-                    *end = (along, Some(*sphere));
+/// A sphere around very many that is nearly the smallest: around what is farthest in some directions, then what lies
+/// farthest outside of that, and so on (a core set, Bădoiu & Clarkson 2003).
+pub(crate) fn enclosing<T: Sync>(
+    items: &[T],
+    sphere: impl Fn(&T) -> Sphere + Sync,
+    place: impl Fn(&T) -> Vec3 + Sync,
+) -> Sphere {
+    let none = [[(f32::NEG_INFINITY, 0usize); 2]; DIRECTIONS.len()];
+    let farther = |a: (f32, usize), b: (f32, usize)| if b.0 > a.0 { b } else { a };
+    let extremes = items
+        .par_chunks(1 << 14)
+        .enumerate()
+        .map(|(chunk, items)| {
+            let mut found = none;
+            for (index, item) in items.iter().enumerate() {
+                let place = place(item);
+                for (ends, direction) in found.iter_mut().zip(DIRECTIONS) {
+                    let along = place.dot(Vec3::from(direction));
+                    for (end, along) in ends.iter_mut().zip([along, -along]) {
+                        if along > end.0 {
+                            *end = (along, (chunk << 14) + index);
+                        }
+                    }
                 }
             }
+            found
+        })
+        .reduce(|| none, |a, b| std::array::from_fn(|i| std::array::from_fn(|j| farther(a[i][j], b[i][j]))));
+    let mut core: Vec<Sphere> = extremes.iter().flatten().map(|&(_, index)| sphere(&items[index])).collect();
+    let mut around = Sphere::around(&core, 1 << 12);
+    for _ in 0..MOST_GROWTHS {
+        let reach = |item: &T| {
+            let own = sphere(item);
+            (own.center.distance(around.center) + own.radius, own)
+        };
+        let farther = |a: (f64, Sphere), b: (f64, Sphere)| if b.0 > a.0 { b } else { a };
+        let farthest = items.par_iter().with_min_len(1 << 14).map(reach).reduce(|| (0.0, around), farther);
+        if farthest.0 <= around.radius * (1.0 + OUTSIDE) {
+            around.radius = around.radius.max(farthest.0) * (1.0 + 1e-6);
+            return around;
         }
-        farthest.extend(ends.into_iter().filter_map(|(_, sphere)| sphere));
+        core.push(farthest.1);
+        around = Sphere::around(&core, 1 << 12);
     }
-    let around = Sphere::around(&farthest, 1 << 12);
-    Sphere { radius: Sphere::reach(around.center, spheres) * (1.0 + 1e-6), ..around }
+    let reach = |item: &T| {
+        let own = sphere(item);
+        own.center.distance(around.center) + own.radius
+    };
+    around.radius = items.par_iter().with_min_len(1 << 14).map(reach).reduce(|| 0.0, f64::max) * (1.0 + 1e-6);
+    around
 }
 
 pub(crate) fn children_of(node: &Node) -> std::ops::Range<usize> {

@@ -13,6 +13,8 @@ pub enum Kind {
     Volume,
     /// [`load_samples`](super::load_samples)
     Samples,
+    /// [`Hierarchy::open`](crate::hierarchy::Hierarchy::open)
+    Hierarchy,
 }
 
 impl Kind {
@@ -34,9 +36,13 @@ impl Kind {
             Some("ply") => return of_ply(),
             Some("vtk") => return of_vtk(),
             Some("obj" | "gltf" | "glb") => return Ok(Some(Self::Mesh)),
+            Some("splk") => return Ok(Some(Self::Hierarchy)),
             Some("vti" | "vtr" | "nrrd" | "nhdr") => return Ok(Some(Self::Volume)),
             Some("vtu" | "vtp" | "csv" | "txt" | "xyzv" | "npy") => return Ok(Some(Self::Samples)),
             _ => {}
+        }
+        if start.starts_with(b"SPLK") {
+            return Ok(Some(Self::Hierarchy));
         }
         let text = start.trim_ascii_start();
         if text.starts_with(b"ply") {

@@ -8,6 +8,8 @@ mod paint;
 mod refine;
 mod shapes;
 mod surfels;
+mod survey;
 
 pub use mesh::{Material, Mesh, Texture};
 pub use surfels::SurfelOptions;
+pub use survey::Survey;

@@ -172,7 +172,7 @@ fn corner(mesh: &Mesh, index: u32) -> DVec3 {
 }
 
 /// Whether a triangle is more than a line, at the precision of its coordinates.
-fn has_area(mesh: &Mesh, [a, b, c]: [u32; 3]) -> bool {
+pub(super) fn has_area(mesh: &Mesh, [a, b, c]: [u32; 3]) -> bool {
     let [a, b, c] = [a, b, c].map(|index| corner(mesh, index));
     let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
     (b - a).cross(c - a).length() > longest * 1e-10

@@ -33,7 +33,7 @@ pub fn settings(scene: &Scene, settings: &Settings) -> Value {
             Some(field)
         }
         Item::Scalar(_, transfer) => Some(shown(transfer)),
-        Item::Radiance(_) => None,
+        Item::Radiance(_) | Item::Hierarchy(_) => None,
     });
     json!({
         "mode": mode,

@@ -5,6 +5,7 @@ use clap::{Args, ValueEnum};
 use splatkit::{
     Error,
     engine::{AdapterChoice, Budget, Gpu, Renderer},
+    hierarchy::Detail,
     picture::Picture,
     scene::{self, Item, Settings},
 };
@@ -32,9 +33,26 @@ pub struct EngineFlags {
     /// sharp.
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     sheet_thickness: Option<f64>,
+    /// Hierarchies: the most pixels that a splat may be wide, but for those of the finest level; 0 draws that level
+    /// [default: 1]
+    #[arg(long, value_name = "PIXELS", value_parser = parse::not_negative)]
+    cut: Option<f64>,
+    /// Hierarchies: about the most splats of a picture, instead of --cut.
+    #[arg(long, value_name = "SPLATS", conflicts_with = "cut", value_parser = clap::value_parser!(u64).range(1..))]
+    budget: Option<u64>,
+    /// Hierarchies: about the milliseconds that a frame may take, instead of --cut; frames after a view that rests are finer
+    /// and finer.
+    #[arg(long, value_name = "MS", conflicts_with_all = ["cut", "budget"], value_parser = parse::positive)]
+    frame_time: Option<f64>,
+    /// Hierarchies: GPU memory for each one's pages, in bytes or with KiB, MiB or GiB [default: 1GiB]
+    #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
+    memory: Option<u64>,
+    /// Hierarchies: whether splats that face away are left out [default: where the surface is closed]
+    #[arg(long, value_name = "BOOL")]
+    cull_backfaces: Option<bool>,
     /// Room of a depth pass: pairs of a splat and a tile. Pictures that need more take more passes.
     #[arg(long, value_name = "ENTRIES", value_parser = clap::value_parser!(u32).range(1..))]
-    budget: Option<u32>,
+    pass_entries: Option<u32>,
     #[command(flatten)]
     method: MethodFlags,
     #[command(flatten)]
@@ -58,7 +76,7 @@ impl EngineFlags {
 
     pub fn renderer(&self, gpu: &Gpu) -> Renderer {
         let mut budget = Budget::default();
-        if let Some(entries) = self.budget {
+        if let Some(entries) = self.pass_entries {
             budget.entries = entries;
         }
         Renderer::with_budget(gpu, budget)
@@ -87,9 +105,19 @@ impl EngineFlags {
         if self.shade {
             let own = loaded.scene.items.iter().find_map(|item| match item {
                 Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) => transfer.shade,
-                Item::Radiance(_) => None,
+                Item::Radiance(_) | Item::Hierarchy(_) => None,
             });
             settings.volume_shade = Some(Some(own.unwrap_or_default()));
+        }
+        settings.detail = match (self.cut, self.budget, self.frame_time) {
+            (Some(pixels), ..) => Detail::Pixels(pixels * f64::from(factor)),
+            (_, Some(splats), _) => Detail::Splats(splats),
+            (_, _, Some(milliseconds)) => Detail::Milliseconds(milliseconds),
+            _ => Detail::default(),
+        };
+        settings.cull_backfaces = self.cull_backfaces;
+        if let Some(memory) = self.memory {
+            settings.page_memory = memory;
         }
         self.method.apply(&mut settings);
         settings.clips = self.clip.clips(&loaded.scene, &loaded.subject.bounds)?;

@@ -16,6 +16,8 @@ pub enum Failure {
     Usage(String),
     /// A result that could not be written.
     Output { file: PathBuf, message: String, hint: Option<&'static str> },
+    /// A file that `check` found damaged; what is wrong has been told.
+    Damaged { file: PathBuf, findings: usize },
     /// Pictures that differ by more than the user allows.
     Comparison(String),
 }
@@ -34,6 +36,7 @@ impl Failure {
             Self::Library(Error::Input { .. } | Error::Limit { .. } | Error::File { .. } | Error::NothingToDraw(_)) => {
                 3
             }
+            Self::Damaged { .. } => 3,
             Self::Comparison(_) => 5,
         }
     }
@@ -53,6 +56,7 @@ impl Failure {
             ),
             Self::Library(Error::Argument(_)) | Self::Usage(_) => Some("`splatkit help` lists the options"),
             Self::Library(Error::File { .. }) | Self::Comparison(_) => None,
+            Self::Damaged { .. } => Some("make it again from its source, or fetch it again"),
             Self::Output { hint, .. } => *hint,
         }
     }
@@ -76,6 +80,7 @@ impl fmt::Display for Failure {
         match self {
             Self::Library(error) => error.fmt(out),
             Self::Usage(message) | Self::Comparison(message) => out.write_str(message),
+            Self::Damaged { file, findings } => write!(out, "{}: {findings} findings", file.display()),
             Self::Output { file, message, .. } => write!(out, "{}: {message}", file.display()),
         }
     }

@@ -8,7 +8,7 @@ use crate::{
 };
 use clap::Args;
 use serde_json::{Map, Value, json};
-use splatkit::{Error, scattered::Points, surface::Mesh, volume::Volume};
+use splatkit::{Error, hierarchy::Hierarchy, scattered::Points, surface::Mesh, volume::Volume};
 use std::path::PathBuf;
 
 #[derive(Args, Debug)]
@@ -32,13 +32,14 @@ impl Info {
             Input::Mesh(mesh) => (mesh.positions.len(), of_mesh(mesh)),
             Input::Volume(volume) => (volume.len(), of_volume(volume)),
             Input::Samples(points) => (points.len(), of_samples(points)),
+            Input::Hierarchy(hierarchy) => (hierarchy.header().source_points as usize, of_hierarchy(hierarchy)),
         };
         facts.insert("file".into(), json!(self.file));
         facts.insert("count".into(), json!(count));
         facts.insert("bytes".into(), json!(bytes));
         facts.insert("bytes_per_point".into(), json!(bytes as f64 / count.max(1) as f64));
         // Only hierarchies have more.
-        facts.insert("levels".into(), json!(1));
+        facts.entry("levels").or_insert(json!(1));
         if self.json {
             return output::line(Value::Object(facts));
         }
@@ -55,6 +56,16 @@ impl Info {
             "attributes",
             "materials",
             "textures",
+            "splats",
+            "nodes",
+            "levels",
+            "blocks",
+            "pages",
+            "closed",
+            "lossless",
+            "up",
+            "unit",
+            "source",
             "bytes",
             "bytes_per_point",
         ];
@@ -96,6 +107,30 @@ fn of_volume(volume: &Volume) -> Map<String, Value> {
     facts.insert("range".into(), json!(volume.range));
     facts.insert("attributes".into(), json!(["value"]));
     facts.insert("bounds".into(), bounds(Some(volume.bounds())));
+    facts
+}
+
+fn of_hierarchy(hierarchy: &Hierarchy) -> Map<String, Value> {
+    let header = hierarchy.header();
+    let attributes: Vec<&str> = [("position", true), ("normal", header.has_normals), ("color", header.has_color)]
+        .into_iter()
+        .filter_map(|(name, present)| present.then_some(name))
+        .collect();
+    let mut facts = Map::new();
+    facts.insert("kind".into(), json!("hierarchy"));
+    facts.insert("splats".into(), json!(header.leaves));
+    facts.insert("nodes".into(), json!(header.nodes));
+    facts.insert("pages".into(), json!(hierarchy.pages().len()));
+    facts.insert("closed".into(), json!(header.closed));
+    facts.insert("lossless".into(), json!(header.lossless));
+    facts.insert("up".into(), header.up.map_or(Value::Null, |up| json!(format!("{up:?}"))));
+    for (name, text) in [("unit", &header.unit), ("source", &header.source)] {
+        if !text.is_empty() {
+            facts.insert(name.into(), json!(text));
+        }
+    }
+    facts.insert("attributes".into(), json!(attributes));
+    facts.insert("bounds".into(), bounds(Some([header.bounds.min, header.bounds.max])));
     facts
 }
 

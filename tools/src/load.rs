@@ -5,18 +5,20 @@ use clap::Args;
 use glam::DVec3;
 use splatkit::{
     Error,
+    hierarchy::Hierarchy,
     io::{self, Endian, Kind, Limits, RawLayout, SampleType},
     scattered::{Points, SampleOptions},
     surface::Mesh,
     volume::Volume,
 };
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 /// What an input holds.
 pub enum Input {
     Mesh(Mesh),
     Volume(Volume),
     Samples(Points),
+    Hierarchy(Arc<Hierarchy>),
 }
 
 /// How raw files are read, and how much any file may claim.
@@ -85,8 +87,14 @@ impl LoadFlags {
         Ok(match kind {
             Kind::Mesh => Input::Mesh(io::load_mesh(path, &limits)?),
             Kind::Volume => Input::Volume(io::load_volume(path, &limits, layout.as_ref())?),
+            Kind::Hierarchy => Input::Hierarchy(Arc::new(Hierarchy::open(path, &limits)?)),
             Kind::Samples => Input::Samples(io::load_samples(path, &limits, self.scalar.as_deref())?),
         })
+    }
+
+    /// Whether a file is a hierarchy, sound or not.
+    pub fn is_hierarchy(&self, path: &Path) -> Result<bool, Failure> {
+        Ok(Kind::of(path, &self.limits(), false)? == Some(Kind::Hierarchy))
     }
 
     /// How scattered samples become splats.
@@ -103,7 +111,7 @@ impl LoadFlags {
 
 fn unknown(path: &Path) -> Error {
     Error::input(path, "file", "is of no kind that can be read").hint(
-        "meshes and clouds: .ply, .obj, .gltf, .glb; volumes: .vti, .vtr, .vtk, .nrrd, .nhdr, and raw samples (also packed \
+        "hierarchies: .splk; meshes and clouds: .ply, .obj, .gltf, .glb; volumes: .vti, .vtr, .vtk, .nrrd, .nhdr, and raw samples (also packed \
          by gzip) with --dims and --type; scattered samples: .vtu, .vtp, .vtk, .npy, .csv, .txt, .xyzv, and .ply with --scalar",
     )
 }

@@ -3,6 +3,7 @@
 
 mod bench;
 mod camera;
+mod check;
 mod clip;
 mod compare;
 mod convert;
@@ -53,8 +54,10 @@ enum Task {
     Render(Box<render::Render>),
     /// Tells what is in a file.
     Info(info::Info),
-    /// Writes a volume in another format, or on another lattice.
-    Convert(convert::Convert),
+    /// Makes a hierarchy of splats from meshes and clouds; writes 3D Gaussians; writes volumes on other lattices.
+    Convert(Box<convert::Convert>),
+    /// Looks for damage in a hierarchy, or for what is odd in another input.
+    Check(check::Check),
     /// Compares two pictures.
     Compare(compare::Compare),
     /// Measures frame times: the camera turns by 5 degrees between frames.
@@ -77,6 +80,7 @@ fn main() -> ExitCode {
         Task::Render(task) => task.run(&progress),
         Task::Info(task) => task.run(&progress),
         Task::Convert(task) => task.run(&progress),
+        Task::Check(task) => task.run(&progress),
         Task::Compare(task) => task.run(),
         Task::Bench(task) => task.run(&progress),
         Task::Demo(task) => task.run(&progress),

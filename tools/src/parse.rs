@@ -100,6 +100,25 @@ pub fn neighbours(text: &str) -> Result<usize, String> {
     text.parse().ok().filter(|count| (4..=64).contains(count)).ok_or_else(|| "a number from 4 to 64 is needed".into())
 }
 
+/// A number that is not below 0.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|v: &f64| *v >= 0.0 && v.is_finite()).ok_or_else(|| "a number from 0 on is needed".into())
+}
+
+/// `1000000`, `512MiB`, `1.5GiB`, …
+pub fn bytes(text: &str) -> Result<u64, String> {
+    let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len()));
+    let factor = match unit.to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "k" | "kib" => 1024.0,
+        "m" | "mib" => 1024.0 * 1024.0,
+        "g" | "gib" => 1024.0 * 1024.0 * 1024.0,
+        _ => return Err("the units are KiB, MiB and GiB".into()),
+    };
+    let number = positive(number.trim()).map_err(|_| "a number of bytes, such as 512MiB, is needed".to_owned())?;
+    Ok((number * factor) as u64)
+}
+
 /// A number.
 pub fn finite(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| "a number is needed".into())

@@ -12,11 +12,16 @@ impl Progress {
             return Self(ProgressBar::hidden());
         }
         let bar = ProgressBar::new_spinner();
-        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} ({elapsed})") {
-            bar.set_style(style);
-        }
         bar.enable_steady_tick(Duration::from_millis(100));
-        Self(bar)
+        let progress = Self(bar);
+        progress.spin();
+        progress
+    }
+
+    fn spin(&self) {
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} ({elapsed})") {
+            self.0.set_style(style);
+        }
     }
 
     /// Names what begins now.
@@ -25,8 +30,36 @@ impl Progress {
         self.0.set_message(name.into());
     }
 
+    /// Names what begins now, of which there is so much.
+    pub fn bar(&self, name: impl Into<String>, total: u64) -> Bar<'_> {
+        self.stage(name);
+        self.0.set_length(total);
+        self.0.set_position(0);
+        let form = "{spinner} {msg} {wide_bar} {human_pos}/{human_len} ({per_sec}, {eta} left)";
+        if let Ok(style) = ProgressStyle::with_template(form) {
+            self.0.set_style(style);
+        }
+        Bar(self)
+    }
+
     /// Takes the line away.
     pub fn clear(&self) {
         self.0.finish_and_clear();
+    }
+}
+
+/// A stage whose end is known: a bar with its rate and the time that is left.
+pub struct Bar<'a>(&'a Progress);
+
+impl Bar<'_> {
+    /// Tells how much is done.
+    pub fn set(&self, done: u64) {
+        self.0.0.set_position(done);
+    }
+}
+
+impl Drop for Bar<'_> {
+    fn drop(&mut self) {
+        self.0.spin();
     }
 }

@@ -9,7 +9,9 @@ use crate::{
 };
 use clap::Args;
 use glam::DVec3;
-use splatkit::{Error, math::Bounds, scene::Scene, surface::SurfelOptions, volume::TransferFunction};
+use splatkit::{
+    Error, hierarchy::file::UpAxis, math::Bounds, scene::Scene, surface::SurfelOptions, volume::TransferFunction,
+};
 use std::{
     path::{Path, PathBuf},
     time::Instant,
@@ -61,6 +63,16 @@ impl SceneFlags {
                     loaded.scene = loaded.scene.with_splats(splats);
                     loaded.subject.up = DVec3::Y;
                 }
+                Input::Hierarchy(hierarchy) => {
+                    let header = hierarchy.header();
+                    loaded.add(header.bounds, header.leaves as usize);
+                    loaded.subject.up = match header.up {
+                        Some(UpAxis::X) => DVec3::X,
+                        Some(UpAxis::Z) => DVec3::Z,
+                        Some(UpAxis::Y) | None => DVec3::Y,
+                    };
+                    loaded.scene = loaded.scene.with_hierarchy(hierarchy);
+                }
                 Input::Volume(volume) => {
                     let transfer = show.transfer(path, volume.range, || TransferFunction::automatic(&volume))?;
                     let [min, max] = volume.bounds();
@@ -103,7 +115,7 @@ impl Loaded {
 }
 
 /// Names the file in errors that do not know it.
-fn in_file(path: &Path, error: Error) -> Error {
+pub fn in_file(path: &Path, error: Error) -> Error {
     match error {
         Error::NothingToDraw(what) => Error::NothingToDraw(format!("{}: {what}", path.display())),
         Error::Argument(what) => Error::input(path, "content", what),

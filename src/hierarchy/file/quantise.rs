@@ -298,7 +298,12 @@ impl Code {
             turn,
             normal: [0, 1].map(|i| place[i] - before.normal[i]),
             position: [0; 3],
-            color: [luma[0] - before.color[0], luma[1] - before.color[1], luma[2] - before.color[2], (splat.color >> 24) as i32],
+            color: [
+                luma[0] - before.color[0],
+                luma[1] - before.color[1],
+                luma[2] - before.color[2],
+                (splat.color >> 24) as i32,
+            ],
             strength,
         };
         // Once all else is known, the steps of the position are.

@@ -31,7 +31,8 @@ fn same(a: &Tree, b: &Tree) {
 
 fn trees() -> Vec<Tree> {
     let small = [1, 2, 9, 500].map(|count| tree(&surface(count, 1)));
-    let large = [tree(&surface(20_000, 2)), joined(&surface(12_000, 3), 5), joined(&cloud(40, 4), 40), tree(&cloud(5_000, 5))];
+    let large =
+        [tree(&surface(20_000, 2)), joined(&surface(12_000, 3), 5), joined(&cloud(40, 4), 40), tree(&cloud(5_000, 5))];
     small.into_iter().chain(large).collect()
 }
 

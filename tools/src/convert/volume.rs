@@ -1,55 +1,34 @@
-//! `splatkit convert`.
+//! Volumes: in another format, or on another lattice.
 
-use crate::{
-    failure::Failure,
-    load::{Input, LoadFlags},
-    output,
-    progress::Progress,
-};
-use clap::{Args, ValueEnum};
+use super::Convert;
+use crate::{failure::Failure, load::Input, output, progress::Progress};
+use clap::ValueEnum;
 use serde_json::json;
 use splatkit::{
     Error, io,
     volume::{self, Arrangement, Volume},
 };
-use std::path::{Path, PathBuf};
-
-#[derive(Args, Debug)]
-pub struct Convert {
-    /// A volume.
-    file: PathBuf,
-    /// The file to write: .nrrd.
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
-    /// Resamples a Cartesian volume: bcc is the body-centred cubic lattice, 29.3 % fewer samples for the same detail in all
-    /// directions [default: the file's lattice]
-    #[arg(long, value_name = "NAME")]
-    lattice: Option<Wanted>,
-    /// Replaces a file that is there already.
-    #[arg(long)]
-    overwrite: bool,
-    /// Writes JSON.
-    #[arg(long)]
-    json: bool,
-    #[command(flatten)]
-    load: LoadFlags,
-}
 
 /// The lattices that can be asked for.
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq)]
-enum Wanted {
+pub enum Wanted {
     Cartesian,
     Bcc,
 }
 
 impl Convert {
-    pub fn run(self, progress: &Progress) -> Result<(), Failure> {
-        require_nrrd(&self.output)?;
-        output::check(&self.output, self.overwrite)?;
-        progress.stage(format!("Reading {}", self.file.display()));
-        let Input::Volume(volume) = self.load.open(&self.file)? else {
-            let file = self.file.display();
-            return Err(Failure::Usage(format!("{file} holds a mesh or cloud, but only volumes can be converted")));
+    /// Writes the volume as .nrrd.
+    pub(super) fn volume(self, progress: &Progress) -> Result<(), Failure> {
+        let [file] = &self.files[..] else {
+            return Err(Failure::Usage("volumes are converted one by one".into()));
+        };
+        if self.dry_run {
+            return Err(Failure::Usage("--dry-run is for hierarchies; a volume's size is that of its samples".into()));
+        }
+        progress.stage(format!("Reading {}", file.display()));
+        let Input::Volume(volume) = self.load.open(file)? else {
+            let file = file.display();
+            return Err(Failure::Usage(format!("{file} holds no volume; write surfaces as .splk or .ply")));
         };
         let count = volume.len();
         progress.stage("Resampling");
@@ -72,13 +51,6 @@ impl Convert {
         output::line(format_args!("samples read      {count}"))?;
         output::line(format_args!("samples written   {} ({nx} × {ny} × {nz}, {lattice})", volume.len()))
     }
-}
-
-fn require_nrrd(path: &Path) -> Result<(), Failure> {
-    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("nrrd")) {
-        return Ok(());
-    }
-    Err(Failure::Usage(format!("{}: only .nrrd files can be written", path.display())))
 }
 
 fn on_lattice(volume: Volume, wanted: Option<Wanted>) -> Result<Volume, Error> {

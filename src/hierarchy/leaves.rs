@@ -1,0 +1,27 @@
+//! The finest level alone.
+
+use super::Hierarchy;
+use crate::{
+    Result,
+    splat::{Payload, Splat, SplatSet},
+};
+use rayon::prelude::*;
+
+impl Hierarchy {
+    /// The splats of the finest level, page by page: what the hierarchy was built of, as its file keeps them.
+    ///
+    /// # Errors
+    /// Those of [`read_page`](Self::read_page).
+    pub fn leaves(&self) -> Result<SplatSet> {
+        let of_page = |page: u32| {
+            let page = self.read_page(page)?;
+            let nodes = page.nodes.iter().filter(|node| node.is_leaf() && !page.has_portals);
+            Ok(nodes.map(|node| node.splat).collect::<Vec<Splat>>())
+        };
+        let pages: Vec<Vec<Splat>> =
+            (0..self.pages().len() as u32).into_par_iter().map(of_page).collect::<Result<_>>()?;
+        let header = self.header();
+        let splats = pages.concat();
+        Ok(SplatSet { origin: header.origin, payload: Payload::Radiance, splats, extent: header.extent, overlap: 1.0 })
+    }
+}

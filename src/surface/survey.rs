@@ -1,0 +1,130 @@
+//! What a mesh is like: whether it is closed, and what of it is odd.
+
+use super::{Mesh, surfels::has_area};
+use crate::math::weld::first_of_equals;
+use rayon::prelude::*;
+
+/// How much of a mesh is odd.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Survey {
+    /// Positions with a coordinate that is not finite.
+    pub not_finite: usize,
+    /// Positions that are those of an earlier vertex.
+    pub duplicates: usize,
+    /// Triangles that are no more than a line.
+    pub without_area: usize,
+    /// Vertices of no triangle, in a mesh that has any.
+    pub unused: usize,
+}
+
+impl Mesh {
+    /// Whether the triangles bound a solid: along every edge as many run one way as the other. From outside, such a surface
+    /// hides its own back.
+    ///
+    /// Edges are not listed: each adds a number made of its ends by a hash, or takes it away, by its direction. The sum over a
+    /// closed surface is zero; over another one it is, by chance, once in 2⁶⁴.
+    pub fn is_closed(&self) -> bool {
+        if self.triangles.is_empty() {
+            return false;
+        }
+        let sum = |name: &(dyn Fn(u32) -> u32 + Sync)| {
+            let of_triangle = |t: &[u32; 3]| {
+                let [a, b, c] = t.map(name);
+                edge(a, b).wrapping_add(edge(b, c)).wrapping_add(edge(c, a))
+            };
+            let triangles = self.triangles.par_iter().with_min_len(1 << 14);
+            triangles.map(of_triangle).reduce(|| 0, u64::wrapping_add)
+        };
+        if sum(&|vertex| vertex) == 0 {
+            return true;
+        }
+        // Files split vertices at seams, or give every triangle its own. Scans that share all have fewer than that.
+        if self.positions.len() <= self.triangles.len() / 4 * 3 && self.uvs.is_empty() && self.normals.is_empty() {
+            return false;
+        }
+        let first = first_of_equals(&self.positions);
+        sum(&|vertex| first[vertex as usize]) == 0
+    }
+
+    /// Looks through the mesh for what gives nothing to draw.
+    pub fn survey(&self) -> Survey {
+        let first = first_of_equals(&self.positions);
+        let mut is_used = vec![false; self.positions.len()];
+        for vertex in self.triangles.iter().flatten() {
+            if let Some(used) = is_used.get_mut(*vertex as usize) {
+                *used = true;
+            }
+        }
+        let used = is_used.iter().filter(|used| **used).count();
+        Survey {
+            not_finite: self.positions.par_iter().filter(|p| !p.is_finite()).count(),
+            duplicates: (0..).zip(&first).filter(|(index, first)| *index != **first).count(),
+            without_area: self.triangles.par_iter().filter(|&&triangle| !has_area(self, triangle)).count(),
+            unused: if self.triangles.is_empty() { 0 } else { self.positions.len() - used },
+        }
+    }
+}
+
+/// A number for an edge, the negative of it for its reverse.
+fn edge(a: u32, b: u32) -> u64 {
+    let (low, high) = (a.min(b), a.max(b));
+    // The finalizer of SplitMix64 (Steele, Lea & Flood 2014).
+    let mut z = (u64::from(low) << 32 | u64::from(high)).wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^= z >> 31;
+    if a < b {
+        z
+    } else if a > b {
+        z.wrapping_neg()
+    } else {
+        0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    fn tetrahedron() -> Mesh {
+        Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
+            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
+            ..Mesh::default()
+        }
+    }
+
+    #[test]
+    fn a_solid_is_closed_until_a_triangle_is_missing_or_turned() {
+        assert!(tetrahedron().is_closed());
+        let mut open = tetrahedron();
+        open.triangles.pop();
+        assert!(!open.is_closed());
+        let mut turned = tetrahedron();
+        turned.triangles[2].swap(0, 1);
+        assert!(!turned.is_closed());
+    }
+
+    #[test]
+    fn triangles_with_vertices_of_their_own_may_bound_a_solid() {
+        let whole = tetrahedron();
+        let corners: Vec<u32> = whole.triangles.iter().flatten().copied().collect();
+        let split = Mesh {
+            positions: corners.iter().map(|&corner| whole.positions[corner as usize]).collect(),
+            triangles: (0..4).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+            ..Mesh::default()
+        };
+        assert!(split.is_closed());
+        assert_eq!(split.survey().duplicates, 8);
+    }
+
+    #[test]
+    fn odd_parts_are_counted() {
+        let mut mesh = tetrahedron();
+        mesh.positions.extend([Vec3::ZERO, Vec3::splat(f32::NAN)]);
+        mesh.triangles.push([0, 1, 1]);
+        let survey = mesh.survey();
+        assert_eq!(survey, Survey { not_finite: 1, duplicates: 1, without_area: 1, unused: 2 });
+    }
+}

@@ -1,0 +1,101 @@
+//! `splatkit check`.
+
+use crate::{
+    failure::Failure,
+    load::{Input, LoadFlags},
+    output,
+    progress::Progress,
+};
+use clap::Args;
+use serde_json::json;
+use splatkit::{
+    hierarchy::{Finding, Severity, file},
+    surface::{Mesh, SurfelOptions},
+};
+use std::path::PathBuf;
+
+#[derive(Args, Debug)]
+pub struct Check {
+    /// A hierarchy, whose every checksum and promise is checked; or another input, which is read and looked through.
+    file: PathBuf,
+    #[command(flatten)]
+    load: LoadFlags,
+    /// Writes JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Check {
+    pub fn run(self, progress: &Progress) -> Result<(), Failure> {
+        progress.stage(format!("Checking {}", self.file.display()));
+        let findings = if self.load.is_hierarchy(&self.file)? {
+            file::check(&self.file, &self.load.limits()).findings
+        } else {
+            match self.load.open(&self.file)? {
+                Input::Mesh(mesh) => of_mesh(&mesh),
+                // What is wrong with these is an error on reading.
+                Input::Volume(_) | Input::Samples(_) | Input::Hierarchy(_) => Vec::new(),
+            }
+        };
+        progress.clear();
+        let ok = findings.iter().all(|finding| finding.severity != Severity::Error);
+        if self.json {
+            let findings: Vec<_> = findings.iter().map(as_json).collect();
+            output::line(json!({ "ok": ok, "findings": findings }))?;
+        } else {
+            for finding in &findings {
+                let severity = name_of(finding.severity);
+                output::line(format_args!("{severity} ({}) {}: {}", finding.code, finding.place, finding.message))?;
+            }
+            output::line(if ok { "sound" } else { "damaged" })?;
+        }
+        if ok { Ok(()) } else { Err(Failure::Damaged { file: self.file, findings: findings.len() }) }
+    }
+}
+
+fn name_of(severity: Severity) -> &'static str {
+    match severity {
+        Severity::Warning => "warning",
+        Severity::Error => "error",
+    }
+}
+
+fn as_json(finding: &Finding) -> serde_json::Value {
+    json!({
+        "code": finding.code,
+        "severity": name_of(finding.severity),
+        "where": finding.place,
+        "message": finding.message,
+    })
+}
+
+/// What a mesh or cloud has that gives nothing to draw, or draws otherwise than meant.
+fn of_mesh(mesh: &Mesh) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let mut warn = |code, place: &str, message: String| {
+        findings.push(Finding { code, severity: Severity::Warning, place: place.into(), message });
+    };
+    let survey = mesh.survey();
+    let of = |count: usize, all: usize| format!("{count} of {all}");
+    let (points, triangles) = (mesh.positions.len(), mesh.triangles.len());
+    if survey.not_finite > 0 {
+        warn("not-finite", "positions", format!("{} are not finite", of(survey.not_finite, points)));
+    }
+    if survey.duplicates > 0 {
+        warn("duplicates", "positions", format!("{} are at the place of another", of(survey.duplicates, points)));
+    }
+    if survey.without_area > 0 {
+        warn("no-area", "triangles", format!("{} have no area", of(survey.without_area, triangles)));
+    }
+    if survey.unused > 0 {
+        warn("unused", "positions", format!("{} belong to no triangle", of(survey.unused, points)));
+    }
+    if triangles > 0 && !mesh.is_closed() {
+        warn("open", "triangles", "the surface has borders; its back can be seen through them".into());
+    }
+    if let Err(error) = mesh.surfels(&SurfelOptions::default()) {
+        let message = error.to_string();
+        findings.push(Finding { code: "nothing", severity: Severity::Error, place: "content".into(), message });
+    }
+    findings
+}

@@ -1,0 +1,246 @@
+//! Meshes, clouds and hierarchies: to a hierarchy, or to 3D Gaussians.
+
+use super::Convert;
+use crate::{failure::Failure, load::Input, output, parse, progress::Progress, render::milliseconds, scene::in_file};
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use splatkit::{
+    Error,
+    hierarchy::{
+        self, BuildOptions,
+        file::{UpAxis, WriteOptions},
+    },
+    io,
+    splat::{Splat, SplatSet},
+    surface::SurfelOptions,
+};
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+/// How hierarchies are made.
+#[derive(Args, Debug, Clone)]
+#[command(next_help_heading = "Hierarchy")]
+pub struct SurfaceFlags {
+    /// How much time building may take for how good a tree.
+    #[arg(long, value_enum, value_name = "NAME", default_value_t = Preset::Balanced)]
+    preset: Preset,
+    /// Keeps every bit of the splats, at about eight times the size.
+    #[arg(long)]
+    lossless: bool,
+    /// A factor on all radii; below 1 surfaces may show holes.
+    #[arg(long, value_name = "FACTOR", value_parser = parse::positive, default_value_t = 1.0)]
+    radius_scale: f64,
+    /// The axis that points up, for viewers of the result.
+    #[arg(long, value_name = "AXIS")]
+    up: Option<Up>,
+    /// The unit of lengths, for viewers of the result, such as m or mm.
+    #[arg(long, value_name = "NAME", default_value = "")]
+    unit: String,
+}
+
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq)]
+enum Preset {
+    Fastest,
+    Fast,
+    Balanced,
+    Slow,
+    Best,
+}
+
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq)]
+enum Up {
+    X,
+    Y,
+    Z,
+}
+
+/// The splats of all inputs, and what is known of their source.
+struct Gathered {
+    set: SplatSet,
+    closed: bool,
+    points: u64,
+    read_ms: f64,
+    splats_ms: f64,
+}
+
+/// Splats that a dry run tries.
+const SAMPLE: usize = 1 << 17;
+
+impl Convert {
+    /// Writes a hierarchy (`splk`) or 3D Gaussians (`ply`).
+    pub(super) fn surface(self, extension: &str, progress: &Progress) -> Result<(), Failure> {
+        if self.lattice.is_some() {
+            return Err(Failure::Usage("--lattice is for volumes".into()));
+        }
+        let gathered = self.gather(progress)?;
+        if self.dry_run {
+            return self.expect(&gathered, progress);
+        }
+        let start = Instant::now();
+        if extension == "ply" {
+            progress.stage(format!("Writing {}", self.output.display()));
+            todo!();
+        } else {
+            let bar = progress.bar("Building the hierarchy", gathered.set.splats.len() as u64);
+            let watch = |done: u64, _: u64| bar.set(done);
+            let (build, write) = self.surface.options(&gathered, &self.files);
+            hierarchy::build_file(&gathered.set, &self.output, &build, &write, &watch)?;
+        }
+        progress.clear();
+        let build_ms = milliseconds(start);
+        let bytes = self.output.metadata().map_err(|e| Error::file(&self.output, "read", e))?.len();
+        let per_point = bytes as f64 / gathered.points as f64;
+        if self.json {
+            return output::line(json!({
+                "file": self.output,
+                "points": gathered.points,
+                "splats": gathered.set.splats.len(),
+                "closed": gathered.closed,
+                "bytes": bytes,
+                "bytes_per_point": per_point,
+                "read_ms": gathered.read_ms,
+                "splats_ms": gathered.splats_ms,
+                "build_ms": build_ms,
+            }));
+        }
+        output::line(format_args!("points          {}", gathered.points))?;
+        output::line(format_args!("splats          {}", gathered.set.splats.len()))?;
+        output::line(format_args!("bytes           {bytes} ({per_point:.2} a point)"))?;
+        let [read, splats, build] = [gathered.read_ms, gathered.splats_ms, build_ms].map(|ms| ms / 1e3);
+        output::line(format_args!(
+            "time            {read:.2} s reading, {splats:.2} s splats, {build:.2} s tree and file"
+        ))
+    }
+
+    /// Reads all inputs and makes splats of them, around the first one's origin.
+    fn gather(&self, progress: &Progress) -> Result<Gathered, Failure> {
+        let mut gathered: Option<Gathered> = None;
+        for path in &self.files {
+            let own = self.splats_of(path, progress)?;
+            match &mut gathered {
+                None => gathered = Some(own),
+                Some(all) => all.join(own, path)?,
+            }
+        }
+        gathered.ok_or_else(|| Failure::Usage("there is nothing to convert".into()))
+    }
+
+    fn splats_of(&self, path: &Path, progress: &Progress) -> Result<Gathered, Failure> {
+        progress.stage(format!("Reading {}", path.display()));
+        let start = Instant::now();
+        let input = self.load.open(path)?;
+        let read_ms = milliseconds(start);
+        let start = Instant::now();
+        let (set, closed, points) = match input {
+            Input::Mesh(mesh) => {
+                progress.stage(format!("Making splats of {} points", mesh.positions.len()));
+                let radius_scale = self.surface.radius_scale as f32;
+                let options = SurfelOptions { radius_scale, ..SurfelOptions::default() };
+                let set = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
+                (set, mesh.is_closed(), mesh.positions.len() as u64)
+            }
+            Input::Hierarchy(hierarchy) => {
+                progress.stage("Reading the splats of the finest level");
+                let header = hierarchy.header();
+                (hierarchy.leaves()?, header.closed, header.source_points)
+            }
+            Input::Volume(_) | Input::Samples(_) => {
+                let file = path.display();
+                return Err(Failure::Usage(format!(
+                    "{file} holds a volume or samples; hierarchies are made of meshes and clouds"
+                )));
+            }
+        };
+        Ok(Gathered { set, closed, points, read_ms, splats_ms: milliseconds(start) })
+    }
+
+    /// Tells what a conversion would take, by that of a run of the splats.
+    fn expect(&self, gathered: &Gathered, progress: &Progress) -> Result<(), Failure> {
+        progress.stage("Trying a part");
+        let splats = &gathered.set.splats;
+        let count = splats.len().min(SAMPLE);
+        let first = (splats.len() - count) / 2;
+        let SplatSet { origin, payload, extent, overlap, .. } = gathered.set;
+        let part = SplatSet { origin, payload, splats: splats[first..first + count].to_vec(), extent, overlap };
+        let (build, write) = self.surface.options(gathered, &self.files);
+        let start = Instant::now();
+        let tree = hierarchy::Tree::build(&part, &build, &|_, _| ())?;
+        let bytes = hierarchy::file::to_bytes(&tree, &write)?.len() as f64;
+        let share = splats.len() as f64 / count as f64;
+        let build_ms = milliseconds(start) * share;
+        let bytes = (bytes * share) as u64;
+        // Splats, their order along the curve, and the blocks at work.
+        let memory = splats.len() as u64 * (size_of::<Splat>() as u64 + 16) + (build.block_splats as u64 * 2000);
+        progress.clear();
+        if self.json {
+            return output::line(json!({
+                "points": gathered.points,
+                "splats": splats.len(),
+                "expected_bytes": bytes,
+                "expected_memory": memory,
+                "expected_build_ms": build_ms,
+                "read_ms": gathered.read_ms,
+                "splats_ms": gathered.splats_ms,
+            }));
+        }
+        output::line(format_args!("points          {}", gathered.points))?;
+        output::line(format_args!("splats          {}", splats.len()))?;
+        output::line(format_args!("bytes           about {bytes}"))?;
+        output::line(format_args!("memory          about {} MiB beside the input's", memory >> 20))?;
+        let [read, made] = [gathered.read_ms, gathered.splats_ms].map(|ms| ms / 1e3);
+        let build = build_ms / 1e3;
+        output::line(format_args!(
+            "time            {read:.2} s reading, {made:.2} s splats, about {build:.1} s tree and file"
+        ))
+    }
+}
+
+impl Gathered {
+    /// Adds the splats of another input.
+    fn join(&mut self, other: Self, path: &Path) -> Result<(), Failure> {
+        if other.set.extent != self.set.extent {
+            return Err(Error::input(path, "splats", "their footprints end elsewhere than the first input's").into());
+        }
+        let shift = other.set.origin - self.set.origin;
+        self.set.splats.extend(other.set.splats.into_iter().map(|splat| {
+            let center = glam::Vec3::from(splat.center).as_dvec3() + shift;
+            Splat { center: center.as_vec3().to_array(), ..splat }
+        }));
+        self.closed &= other.closed;
+        self.points += other.points;
+        self.read_ms += other.read_ms;
+        self.splats_ms += other.splats_ms;
+        Ok(())
+    }
+}
+
+impl SurfaceFlags {
+    fn options(&self, gathered: &Gathered, files: &[PathBuf]) -> (BuildOptions, WriteOptions) {
+        let build = BuildOptions {
+            preset: match self.preset {
+                Preset::Fastest => hierarchy::Preset::Fastest,
+                Preset::Fast => hierarchy::Preset::Fast,
+                Preset::Balanced => hierarchy::Preset::Balanced,
+                Preset::Slow => hierarchy::Preset::Slow,
+                Preset::Best => hierarchy::Preset::Best,
+            },
+            closed: gathered.closed,
+            source_points: Some(gathered.points),
+            ..BuildOptions::default()
+        };
+        let name = |path: &PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
+        let write = WriteOptions {
+            lossless: self.lossless,
+            up: self.up.map(|up| match up {
+                Up::X => UpAxis::X,
+                Up::Y => UpAxis::Y,
+                Up::Z => UpAxis::Z,
+            }),
+            unit: self.unit.clone(),
+            source: files.iter().filter_map(name).collect::<Vec<_>>().join(", "),
+        };
+        (build, write)
+    }
+}
