@@ -4,10 +4,11 @@ mod adjacency;
 mod cloud;
 mod ellipse;
 mod mesh;
+mod orient;
 mod paint;
 mod refine;
 mod shapes;
 mod surfels;
 
-pub use mesh::{Material, Mesh, Texture};
+pub use mesh::{Material, Mesh, Sensor, Texture};
 pub use surfels::SurfelOptions;
