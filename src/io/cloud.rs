@@ -18,6 +18,7 @@ pub(super) struct Cloud {
     pub colors: Vec<[u8; 4]>,
     /// Where scanners stood, in world coordinates, and the points that they saw.
     pub sensors: Vec<(DVec3, Range<usize>)>,
+    pub z_is_up: bool,
 }
 
 impl Cloud {
@@ -37,6 +38,7 @@ impl Cloud {
             positions,
             normals: self.normals.into_par_iter().map(positions::unit).collect(),
             colors: self.colors,
+            z_is_up: self.z_is_up,
             sensors: sensors.filter(|sensor| sensor.position.is_finite()).collect(),
             ..Mesh::default()
         })

@@ -29,7 +29,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
         let scans = file.pointclouds();
         let claimed = scans.iter().fold(0u64, |sum, scan| sum.saturating_add(scan.records));
         source.check_points("the number of points", claimed)?;
-        let mut cloud = Cloud::default();
+        let mut cloud = Cloud { z_is_up: true, ..Cloud::default() };
         let mut intensities = Vec::new();
         let mut has_colors = false;
         for (number, scan) in scans.iter().enumerate() {

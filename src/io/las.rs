@@ -29,7 +29,8 @@ pub fn read(source: &Source) -> Result<Mesh> {
     if left_out > 0 {
         tracing::info!(points = left_out, "withheld points are left out");
     }
-    let mut cloud = Cloud { positions: points.par_iter().map(|p| header.position(p)).collect(), ..Cloud::default() };
+    let positions = points.par_iter().map(|point| header.position(point)).collect();
+    let mut cloud = Cloud { positions, z_is_up: true, ..Cloud::default() };
     if header.color_at.is_some() {
         cloud.colors = colors_of_16_bits(&points.par_iter().map(|p| p.color).collect::<Vec<[u16; 3]>>());
     }

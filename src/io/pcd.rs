@@ -52,6 +52,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
         normals: normals.unwrap_or_default(),
         colors: colors.unwrap_or_default(),
         sensors: sensor.map(|place| (place, 0..kept.len())).into_iter().collect(),
+        z_is_up: false,
     };
     cloud.into_mesh(source, |point| format!("point {}", kept[point]))
 }

@@ -66,7 +66,8 @@ pub fn read(source: &Source) -> Result<Mesh> {
                 .hint("name the columns in the first line"));
         }
     }
-    let mut cloud = Cloud { positions: rows().map(|row| three(row, layout.position)).collect(), ..Cloud::default() };
+    let positions = rows().map(|row| three(row, layout.position)).collect();
+    let mut cloud = Cloud { positions, z_is_up: true, ..Cloud::default() };
     if let Some(columns) = layout.normal {
         cloud.normals = rows().map(|row| three(row, columns).as_vec3()).collect::<Vec<Vec3>>();
     }

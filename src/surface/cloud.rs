@@ -18,6 +18,9 @@ const COUNT: usize = 10;
 /// Standard deviation of a surfel, in the median distance to the neighbours (1.2 spacings on a square grid of points,
 /// of which 0.39 are needed there; the rest is for irregular ones).
 const SPREAD: f32 = 0.45;
+/// A point is drawn at most this many times as wide as its neighbours are by their own neighbours: honest spacings change
+/// gradually.
+const WIDER: f32 = 2.0;
 /// A point is lone where its neighbours are this many times as far from it as from their own neighbours.
 const LONE: f32 = 4.0;
 /// No point is drawn more than this many times as wide as the median one. Scanners sample what is far this much more
@@ -26,7 +29,7 @@ const LARGEST: f32 = 16.0;
 
 /// The neighbourhood of a point.
 struct Surroundings {
-    /// Itself where there are fewer.
+    /// The neighbours; itself where there are fewer.
     nearest: [u32; COUNT],
     /// Median distance to the neighbours; 0 without any.
     distance: f32,
@@ -42,7 +45,16 @@ pub(super) fn surfels(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
     let first = first_of_equals(&mesh.positions);
     let kept: Vec<u32> = (0..).zip(first).filter(|&(index, first)| index == first).map(|(index, _)| index).collect();
     let points: Vec<Vec3> = kept.par_iter().map(|&index| mesh.positions[index as usize]).collect();
-    let around = surroundings(&points);
+    let tree = Neighbours::new(&points);
+    // All that follows is in the tree's order, where neighbours are near each other in memory too.
+    let order = tree.order();
+    let mut places = vec![0u32; points.len()];
+    order.iter().zip(0..).for_each(|(&point, place)| places[point as usize] = place);
+    let around: Vec<Surroundings> =
+        order.par_iter().map(|&point| Surroundings::of(&points, &tree, point, &places)).collect();
+    drop(tree);
+    let points: Vec<Vec3> = order.par_iter().map(|&point| points[point as usize]).collect();
+    let kept: Vec<u32> = order.into_par_iter().map(|point| kept[point as usize]).collect();
     let (spacing, lone) = spacings(&around);
     report(mesh.positions.len() - points.len(), &lone);
     let mut normals: Vec<Vec3> = around.par_iter().map(|around| around.normal).collect();
@@ -51,23 +63,20 @@ pub(super) fn surfels(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
         let nearest: Vec<[u32; COUNT]> = around.par_iter().map(|around| around.nearest).collect();
         orient(&points, &spacing, &nearest, &free, &mut normals);
     }
-    (0..points.len())
-        .into_par_iter()
-        .map(|point| {
-            let index = kept[point] as usize;
-            let width = f64::from(spacing[point] * SPREAD * options.radius_scale);
-            // The plane of a lone point's neighbours is not its own.
-            let known = !lone[point] || !free[point];
-            let normal = Some(normals[point].as_dvec3()).filter(|normal| known && *normal != DVec3::ZERO);
-            Splat {
-                center: points[point].to_array(),
-                strength: options.optical_depth,
-                factor: shape(&around[point], width, normal),
-                color: pack(point_color(mesh, index)),
-                normal: normal.map_or(NO_NORMAL, |normal| encode_normal(normal.as_vec3())),
-            }
-        })
-        .collect()
+    let surfel = |at: usize| {
+        let width = f64::from(spacing[at] * SPREAD * options.radius_scale);
+        // The plane of a lone point's neighbours is not its own.
+        let known = !lone[at] || !free[at];
+        let normal = Some(normals[at].as_dvec3()).filter(|normal| known && *normal != DVec3::ZERO);
+        Splat {
+            center: points[at].to_array(),
+            strength: options.optical_depth,
+            factor: shape(&around[at], width, normal),
+            color: pack(point_color(mesh, kept[at] as usize)),
+            normal: normal.map_or(NO_NORMAL, |normal| encode_normal(normal.as_vec3())),
+        }
+    };
+    places.into_par_iter().map(|place| surfel(place as usize)).collect()
 }
 
 /// How far apart the points are around each, and which are lone: those take the spacing of their neighbours.
@@ -83,7 +92,7 @@ fn spacings(around: &[Surroundings]) -> (Vec<f32>, Vec<bool>) {
             let mut others = own.nearest.map(|index| around[index as usize].distance);
             let usual = *others.select_nth_unstable_by(COUNT / 2, f32::total_cmp).1;
             let lone = own.distance > usual * LONE;
-            let distance = if lone { usual } else { own.distance };
+            let distance = if lone { usual } else { own.distance.min(usual * WIDER) };
             (if distance > 0.0 { distance.min(typical * LARGEST) } else { typical }, lone)
         })
         .unzip()
@@ -100,18 +109,17 @@ fn settle_known(mesh: &Mesh, kept: &[u32], normals: &mut [Vec3]) -> Vec<bool> {
             given.is_none()
         })
         .collect();
-    for sensor in &mesh.sensors {
-        // `kept` rises, so the points of a range lie together.
-        let start = kept.partition_point(|&index| (index as usize) < sensor.points.start);
-        let end = kept.partition_point(|&index| (index as usize) < sensor.points.end).max(start);
-        let points = kept[start..end].par_iter().zip(&mut normals[start..end]).zip(&mut free[start..end]);
-        points.filter(|(_, free)| **free).for_each(|((&index, normal), free)| {
-            if normal.dot(sensor.position - mesh.positions[index as usize]) < 0.0 {
-                *normal = -*normal;
+    normals.par_iter_mut().zip(&mut free).zip(kept).filter(|((_, free), _)| **free).for_each(
+        |((normal, free), &index)| {
+            let at = mesh.sensors.partition_point(|sensor| sensor.points.start <= index as usize);
+            let sensor = at.checked_sub(1).map(|at| &mesh.sensors[at]);
+            if let Some(sensor) = sensor.filter(|sensor| sensor.points.contains(&(index as usize))) {
+                let sight = sensor.position - mesh.positions[index as usize];
+                *normal = if normal.dot(sight) < 0.0 { -*normal } else { *normal };
+                *free = false;
             }
-            *free = false;
-        });
-    }
+        },
+    );
     free
 }
 
@@ -136,20 +144,9 @@ fn shape(around: &Surroundings, width: f64, normal: Option<DVec3>) -> [f32; 6] {
     factor(tensor, x, normal.cross(x), normal)
 }
 
-fn surroundings(points: &[Vec3]) -> Vec<Surroundings> {
-    let tree = Neighbours::new(points);
-    // Asked in the tree's order, which is faster, and put back into that of the points.
-    let order = tree.order();
-    let asked: Vec<Surroundings> = order.par_iter().map(|&index| Surroundings::of(points, &tree, index)).collect();
-    let mut place = vec![0u32; points.len()];
-    order.iter().zip(0..).for_each(|(&index, at)| place[index as usize] = at);
-    drop(order);
-    let mut asked: Vec<Option<Surroundings>> = asked.into_par_iter().map(Some).collect();
-    place.iter().filter_map(|&at| asked[at as usize].take()).collect()
-}
-
 impl Surroundings {
-    fn of(points: &[Vec3], tree: &Neighbours, index: u32) -> Self {
+    /// Of a point; `places` numbers its neighbours.
+    fn of(points: &[Vec3], tree: &Neighbours, index: u32, places: &[u32]) -> Self {
         let found = tree.of(index, COUNT);
         let center = points[index as usize];
         let offsets = || found.iter().map(|&(_, index)| (points[index as usize] - center).as_dvec3());
@@ -161,8 +158,8 @@ impl Surroundings {
         }
         let ([large, middle, _], axes) = eigen(scatter);
         let is_plane = middle > large * 1e-4;
-        let mut nearest = [index; COUNT];
-        nearest.iter_mut().zip(&found).for_each(|(slot, &(_, index))| *slot = index);
+        let mut nearest = [places[index as usize]; COUNT];
+        nearest.iter_mut().zip(&found).for_each(|(slot, &(_, index))| *slot = places[index as usize]);
         Self {
             nearest,
             distance: found.get(found.len() / 2).map_or(0.0, |&(distance, _)| distance),

@@ -21,8 +21,11 @@ pub struct Mesh {
     /// The material of each triangle, an index into `materials`; empty where there are none.
     pub triangle_materials: Vec<u32>,
     pub materials: Vec<Material>,
-    /// Where scanners stood; empty where the file does not say. The points that they saw face them.
+    /// Where scanners stood, in the order of the points that they saw; empty where the file does not say. Those points
+    /// face them.
     pub sensors: Vec<Sensor>,
+    /// Whether +Z is up by the custom of the format, as in surveying.
+    pub z_is_up: bool,
 }
 
 /// The place of a scanner.
