@@ -167,6 +167,6 @@ struct Fields<'a> {
 impl Fields<'_> {
     fn at<const N: usize>(&self, at: usize) -> Result<[u8; N], String> {
         let found = self.bytes.get(at..).and_then(|rest| rest.first_chunk()).copied();
-        found.ok_or_else(|| format!("{} needs {N} bytes at {at}, but there are {}", self.place, self.bytes.len()))
+        found.ok_or_else(|| format!("{} reaches to byte {}, but there are {}", self.place, at + N, self.bytes.len()))
     }
 }

@@ -45,9 +45,9 @@ fn header(minor: u8, format: u8, start: usize, records: u32, points: u64) -> Vec
     } else {
         put(107, &(points as u32).to_le_bytes());
     }
-    for axis in 0..3 {
+    for (axis, offset) in OFFSET.iter().enumerate() {
         put(131 + 8 * axis, &SCALE.to_le_bytes());
-        put(155 + 8 * axis, &OFFSET[axis].to_le_bytes());
+        put(155 + 8 * axis, &offset.to_le_bytes());
     }
     header
 }
