@@ -25,8 +25,8 @@ impl Kind {
     ///
     /// Tables of text (`.xyz`, `.pts`, `.asc`, `.csv`, `.txt`) are samples where a scalar is asked for. Else `.xyz`, `.pts`
     /// and `.asc` are clouds; `.csv` and `.txt` are clouds if their first line names a colour or a normal but no `value` or
-    /// `scalar`, if it names nothing but `x`, `y`, `z`, or if it has 3, 6, 7 or 9 numbers and no names, and samples
-    /// otherwise. `.xyzv` are samples.
+    /// `scalar`, if it names nothing but `x`, `y`, `z`, or if it has 3, 6, 7 or 9 numbers and no names (or one, as the
+    /// count of points that `.pts` files begin with), and samples otherwise. `.xyzv` are samples.
     ///
     /// # Errors
     /// Those of opening the file; [`Error::Input`](crate::Error::Input) for a PLY file or a legacy VTK file with a malformed

@@ -31,6 +31,9 @@ pub fn load_mesh(path: &Path, limits: &Limits) -> Result<Mesh> {
         _ if start.starts_with(b"solid ") => stl::read(&source),
         _ => Err(source
             .error("path", format!("“.{extension}” is no mesh format that can be read"))
-            .hint("meshes and clouds are read from .ply, .obj, .gltf, .glb, .stl, .las, .laz, .e57, .pcd, .xyz, .pts, .asc, .csv and .txt")),
+            .hint(
+                "meshes and clouds are read from .ply, .obj, .gltf, .glb, .stl, .las, .laz, .e57, .pcd, .xyz, .pts, .asc, .csv \
+                 and .txt",
+            )),
     }
 }

@@ -27,10 +27,11 @@ const LONE: f32 = 4.0;
 /// coarsely than what is near.
 const LARGEST: f32 = 16.0;
 
+/// The neighbours of a point; itself where there are fewer.
+type Nearest = [u32; COUNT];
+
 /// The neighbourhood of a point.
 struct Surroundings {
-    /// The neighbours; itself where there are fewer.
-    nearest: [u32; COUNT],
     /// Median distance to the neighbours; 0 without any.
     distance: f32,
     /// Unit normal of the plane of the neighbours, of either side; zero where they show none.
@@ -50,17 +51,16 @@ pub(super) fn surfels(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
     let order = tree.order();
     let mut places = vec![0u32; points.len()];
     order.iter().zip(0..).for_each(|(&point, place)| places[point as usize] = place);
-    let around: Vec<Surroundings> =
-        order.par_iter().map(|&point| Surroundings::of(&points, &tree, point, &places)).collect();
+    let (nearest, around): (Vec<Nearest>, Vec<Surroundings>) =
+        order.par_iter().map(|&point| surroundings(&points, &tree, point, &places)).unzip();
     drop(tree);
     let points: Vec<Vec3> = order.par_iter().map(|&point| points[point as usize]).collect();
     let kept: Vec<u32> = order.into_par_iter().map(|point| kept[point as usize]).collect();
-    let (spacing, lone) = spacings(&around);
+    let (spacing, lone) = spacings(&around, &nearest);
     report(mesh.positions.len() - points.len(), &lone);
     let mut normals: Vec<Vec3> = around.par_iter().map(|around| around.normal).collect();
     let free = settle_known(mesh, &kept, &mut normals);
     if free.par_iter().any(|&free| free) {
-        let nearest: Vec<[u32; COUNT]> = around.par_iter().map(|around| around.nearest).collect();
         orient(&points, &spacing, &nearest, &free, &mut normals);
     }
     let surfel = |at: usize| {
@@ -80,7 +80,7 @@ pub(super) fn surfels(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
 }
 
 /// How far apart the points are around each, and which are lone: those take the spacing of their neighbours.
-fn spacings(around: &[Surroundings]) -> (Vec<f32>, Vec<bool>) {
+fn spacings(around: &[Surroundings], nearest: &[Nearest]) -> (Vec<f32>, Vec<bool>) {
     let mut distances: Vec<f32> = around.par_iter().map(|around| around.distance).collect();
     let middle = distances.len() / 2;
     let typical = if distances.is_empty() { 0.0 } else { *distances.select_nth_unstable_by(middle, f32::total_cmp).1 };
@@ -88,8 +88,9 @@ fn spacings(around: &[Surroundings]) -> (Vec<f32>, Vec<bool>) {
     let typical = if typical > 0.0 { typical } else { 0.5 };
     around
         .par_iter()
-        .map(|own| {
-            let mut others = own.nearest.map(|index| around[index as usize].distance);
+        .zip(nearest)
+        .map(|(own, nearest)| {
+            let mut others = nearest.map(|index| around[index as usize].distance);
             let usual = *others.select_nth_unstable_by(COUNT / 2, f32::total_cmp).1;
             let lone = own.distance > usual * LONE;
             let distance = if lone { usual } else { own.distance.min(usual * WIDER) };
@@ -144,30 +145,28 @@ fn shape(around: &Surroundings, width: f64, normal: Option<DVec3>) -> [f32; 6] {
     factor(tensor, x, normal.cross(x), normal)
 }
 
-impl Surroundings {
-    /// Of a point; `places` numbers its neighbours.
-    fn of(points: &[Vec3], tree: &Neighbours, index: u32, places: &[u32]) -> Self {
-        let found = tree.of(index, COUNT);
-        let center = points[index as usize];
-        let offsets = || found.iter().map(|&(_, index)| (points[index as usize] - center).as_dvec3());
-        let mean = offsets().sum::<DVec3>() / (found.len() + 1) as f64;
-        let mut scatter = DMat3::ZERO;
-        for offset in offsets().chain([DVec3::ZERO]) {
-            let d = offset - mean;
-            scatter += DMat3::from_cols(d * d.x, d * d.y, d * d.z);
-        }
-        let ([large, middle, _], axes) = eigen(scatter);
-        let is_plane = middle > large * 1e-4;
-        let mut nearest = [places[index as usize]; COUNT];
-        nearest.iter_mut().zip(&found).for_each(|(slot, &(_, index))| *slot = places[index as usize]);
-        Self {
-            nearest,
-            distance: found.get(found.len() / 2).map_or(0.0, |&(distance, _)| distance),
-            normal: if is_plane { axes[2].as_vec3() } else { Vec3::ZERO },
-            long: axes[0].as_vec3(),
-            stretch: if is_plane { (large / middle).sqrt().min(2.0) as f32 } else { 1.0 },
-        }
+/// What is around a point; `places` numbers its neighbours.
+fn surroundings(points: &[Vec3], tree: &Neighbours, index: u32, places: &[u32]) -> (Nearest, Surroundings) {
+    let found = tree.of(index, COUNT);
+    let center = points[index as usize];
+    let offsets = || found.iter().map(|&(_, index)| (points[index as usize] - center).as_dvec3());
+    let mean = offsets().sum::<DVec3>() / (found.len() + 1) as f64;
+    let mut scatter = DMat3::ZERO;
+    for offset in offsets().chain([DVec3::ZERO]) {
+        let d = offset - mean;
+        scatter += DMat3::from_cols(d * d.x, d * d.y, d * d.z);
     }
+    let ([large, middle, _], axes) = eigen(scatter);
+    let is_plane = middle > large * 1e-4;
+    let mut nearest = [places[index as usize]; COUNT];
+    nearest.iter_mut().zip(&found).for_each(|(slot, &(_, index))| *slot = places[index as usize]);
+    let around = Surroundings {
+        distance: found.get(found.len() / 2).map_or(0.0, |&(distance, _)| distance),
+        normal: if is_plane { axes[2].as_vec3() } else { Vec3::ZERO },
+        long: axes[0].as_vec3(),
+        stretch: if is_plane { (large / middle).sqrt().min(2.0) as f32 } else { 1.0 },
+    };
+    (nearest, around)
 }
 
 #[cfg(test)]
