@@ -1,16 +1,12 @@
-//! Tables of numbers as text (`.csv`, `.txt`, `.xyzv`): a sample a line, with a line of names or without.
-//!
-//! Columns are parted by the first of these that the first line has: semicolons, commas, tabs, and else any white space.
-//! (The csv crate takes single bytes only, not runs of spaces.) Lines that are empty or begin with `#` or `//` are passed
-//! over, but for a first one that names the columns. Numbers have points, no decimal commas.
+//! Scattered samples as tables of text (`.csv`, `.txt`, `.xyzv`): a sample a line, with a line of names or without.
 
 use super::{
     Source,
     gather::{Columns, choose, gather},
+    text::Text,
 };
 use crate::{Result, scattered::Points};
 use glam::DVec3;
-use rayon::prelude::*;
 
 /// Columns of a covariance.
 const COVARIANCE: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
@@ -23,61 +19,25 @@ const COVARIANCE: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
 /// [`Error::Input`](crate::Error::Input) with the line, for columns that are not these, lines of another length, what is no
 /// number, and numbers that are not finite; [`Error::Limit`](crate::Error::Limit) for more lines than points are allowed.
 pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
-    let bytes = source.bytes();
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let mut lines: Vec<(usize, &[u8])> = Vec::new();
-    for (number, line) in bytes.split(|&b| b == b'\n').enumerate() {
-        let line = line.trim_ascii();
-        let comment = line.starts_with(b"#") || line.starts_with(b"//");
-        // A comment may name the columns, if it comes first.
-        if !line.is_empty() && (!comment || lines.is_empty() && names_columns(line)) {
-            lines.push((number + 1, line));
-        }
-    }
-    source.check_points("the number of lines", lines.len() as u64)?;
-    let Some(&(_, first)) = lines.first() else { return Err(source.error("file", "holds no lines of numbers")) };
-    let separator = [b';', b',', b'\t'].into_iter().find(|separator| first.contains(separator));
-    let header: Vec<String> = words(first, separator).map(name).collect();
-    let named = !header.iter().all(|word| word.parse::<f64>().is_ok());
-    let rows = if named { &lines[1..] } else { &lines };
-    let layout =
-        if named { Layout::named(source, lines[0].0, &header, scalar)? } else { Layout::plain(source, header.len())? };
-    let width = header.len();
-    let mut table = vec![0.0f64; rows.len() * width];
-    table.par_chunks_mut(width).zip(rows).try_for_each(|(row, &(number, line))| {
-        let place = || format!("line {number}");
-        let mut count = 0;
-        for word in words(line, separator) {
-            if let Some(slot) = row.get_mut(count).filter(|_| layout.uses(count)) {
-                let text = String::from_utf8_lossy(word);
-                let text = text.trim_matches('"');
-                *slot = text.parse().map_err(|_| {
-                    let shown: String = text.chars().take(40).collect();
-                    source.error(place(), format!("“{shown}” is not a number"))
-                })?;
-                if !slot.is_finite() {
-                    return Err(source.error(place(), format!("number {} is {slot}", count + 1)));
-                }
-            }
-            count += 1;
-        }
-        if count != width {
-            return Err(source.error(place(), format!("has {count} columns, but the first line has {width}")));
-        }
-        Ok(())
-    })?;
+    let text = Text::of(source, |_, _| false)?;
+    let layout = match &text.names {
+        Some(names) => Layout::named(source, text.first, names, scalar)?,
+        None => Layout::plain(source, text.width)?,
+    };
+    let table = text.numbers(source, |column| layout.uses(column))?;
+    let (count, width) = (text.len(), text.width);
     let value = |row: usize, column: usize| table[row * width + column];
-    let column = |column: usize| (0..rows.len()).map(move |row| value(row, column));
+    let column = |column: usize| (0..count).map(move |row| value(row, column));
     let columns = Columns {
         values: column(layout.value).collect(),
         radii: layout.radius.map_or(Vec::new(), |radius| column(radius).map(|radius| radius as f32).collect()),
         covariances: layout
             .covariance
-            .map_or(Vec::new(), |terms| (0..rows.len()).map(|row| terms.map(|term| value(row, term) as f32)).collect()),
+            .map_or(Vec::new(), |terms| (0..count).map(|row| terms.map(|term| value(row, term) as f32)).collect()),
     };
     let [x, y, z] = layout.position;
     let position = |row| DVec3::new(value(row, x), value(row, y), value(row, z));
-    gather(source, rows.len(), position, |row| format!("line {}", rows[row].0), columns)
+    gather(source, count, position, |row| text.place(row), columns)
 }
 
 /// Which column means what.
@@ -127,26 +87,6 @@ impl Layout {
             || self.radius == Some(column)
             || self.covariance.is_some_and(|terms| terms.contains(&column))
     }
-}
-
-/// Whether a comment is a line of names.
-fn names_columns(line: &[u8]) -> bool {
-    let separators = |b: &u8| b.is_ascii_whitespace() || matches!(b, b',' | b';' | b'#');
-    let has = |name: &[u8]| line.split(separators).any(|word| word.eq_ignore_ascii_case(name));
-    has(b"x") && has(b"y") && has(b"z")
-}
-
-/// The words of a line; a comment's sign is none.
-fn words(line: &[u8], separator: Option<u8>) -> impl Iterator<Item = &[u8]> {
-    let line = if line.starts_with(b"#") { line[1..].trim_ascii() } else { line };
-    line.split(move |&b| separator.map_or(b.is_ascii_whitespace(), |separator| b == separator))
-        .map(<[u8]>::trim_ascii)
-        .filter(move |word| separator.is_some() || !word.is_empty())
-}
-
-/// A column's name, out of its quotes.
-fn name(word: &[u8]) -> String {
-    String::from_utf8_lossy(word).trim_matches('"').trim().to_owned()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! What a file holds: told by its extension, and where that leaves it open by its content.
 
-use super::{Limits, Source, ply, vtk};
+use super::{Limits, Source, ply, vtk, xyz};
 use crate::Result;
 use std::path::Path;
 
@@ -17,10 +17,18 @@ pub enum Kind {
     Hierarchy,
 }
 
+/// How LAS, E57 and PCD files begin, and STL files of text.
+const MESHES: [&[u8]; 4] = [b"LASF", b"ASTM-E57", b"# .PCD", b"solid "];
+
 impl Kind {
     /// The kind of a file; none where neither its name nor its first bytes tell. A PLY file with faces is a mesh; one without
     /// is a cloud, or where a scalar is asked for (`with_scalar`) samples. Legacy VTK files are volumes or samples by the
     /// data set that they hold.
+    ///
+    /// Tables of text (`.xyz`, `.pts`, `.asc`, `.csv`, `.txt`) are samples where a scalar is asked for. Else `.xyz`, `.pts`
+    /// and `.asc` are clouds; `.csv` and `.txt` are clouds if their first line names a colour or a normal but no `value` or
+    /// `scalar`, if it names nothing but `x`, `y`, `z`, or if it has 3, 6, 7 or 9 numbers and no names (or one, as the
+    /// count of points that `.pts` files begin with), and samples otherwise. `.xyzv` are samples.
     ///
     /// # Errors
     /// Those of opening the file; [`Error::Input`](crate::Error::Input) for a PLY file or a legacy VTK file with a malformed
@@ -35,8 +43,10 @@ impl Kind {
         match extension.as_deref() {
             Some("ply") => return of_ply(),
             Some("vtk") => return of_vtk(),
-            Some("obj" | "gltf" | "glb") => return Ok(Some(Self::Mesh)),
             Some("splk") => return Ok(Some(Self::Hierarchy)),
+            Some("obj" | "gltf" | "glb" | "stl" | "las" | "laz" | "e57" | "pcd") => return Ok(Some(Self::Mesh)),
+            Some("xyz" | "pts" | "asc") => return Ok(Some(if with_scalar { Self::Samples } else { Self::Mesh })),
+            Some("csv" | "txt") if !with_scalar && xyz::is_cloud(&source) => return Ok(Some(Self::Mesh)),
             Some("vti" | "vtr" | "nrrd" | "nhdr") => return Ok(Some(Self::Volume)),
             Some("vtu" | "vtp" | "csv" | "txt" | "xyzv" | "npy") => return Ok(Some(Self::Samples)),
             _ => {}
@@ -57,7 +67,7 @@ impl Kind {
             Some(Self::Volume)
         } else if start.starts_with(b"\x93NUMPY") {
             Some(Self::Samples)
-        } else if text.starts_with(b"glTF") || text.starts_with(b"{") {
+        } else if text.starts_with(b"glTF") || text.starts_with(b"{") || MESHES.iter().any(|m| start.starts_with(m)) {
             Some(Self::Mesh)
         } else {
             None

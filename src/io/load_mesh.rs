@@ -1,10 +1,11 @@
 //! One door for all mesh and cloud formats.
 
-use super::{Limits, Source, gltf, obj, ply};
+use super::{Limits, Source, e57, gltf, las, obj, pcd, ply, stl, xyz};
 use crate::{Result, surface::Mesh};
 use std::path::Path;
 
-/// Reads a mesh or cloud: PLY, OBJ, glTF or GLB, by the file's extension, or by its first bytes where that is another.
+/// Reads a mesh or cloud: PLY, OBJ, glTF, GLB, STL, LAS, LAZ, E57, PCD, or a table of text (XYZ, PTS, ASC, CSV, TXT), by
+/// the file's extension, or by its first bytes where that is another.
 ///
 /// # Errors
 /// Those of the format's reader; [`Error::Input`](crate::Error::Input) for a file of none of these formats.
@@ -17,10 +18,22 @@ pub fn load_mesh(path: &Path, limits: &Limits) -> Result<Mesh> {
         "ply" => ply::read(&source),
         "obj" => obj::read(&source),
         "gltf" | "glb" => gltf::read(&source),
+        "stl" => stl::read(&source),
+        "las" | "laz" => las::read(&source),
+        "e57" => e57::read(&source),
+        "pcd" => pcd::read(&source),
+        "xyz" | "pts" | "asc" | "csv" | "txt" => xyz::read(&source),
         _ if start.starts_with(b"ply") => ply::read(&source),
         _ if start.starts_with(b"glTF") || start.starts_with(b"{") => gltf::read(&source),
+        _ if start.starts_with(b"LASF") => las::read(&source),
+        _ if start.starts_with(b"ASTM-E57") => e57::read(&source),
+        _ if start.starts_with(b"# .PCD") => pcd::read(&source),
+        _ if start.starts_with(b"solid ") => stl::read(&source),
         _ => Err(source
             .error("path", format!("“.{extension}” is no mesh format that can be read"))
-            .hint("meshes and clouds are read from .ply, .obj, .gltf and .glb")),
+            .hint(
+                "meshes and clouds are read from .ply, .obj, .gltf, .glb, .stl, .las, .laz, .e57, .pcd, .xyz, .pts, .asc, .csv \
+                 and .txt",
+            )),
     }
 }

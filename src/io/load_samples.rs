@@ -19,7 +19,7 @@ pub fn load_samples(path: &Path, limits: &Limits, scalar: Option<&str>) -> Resul
         "vtu" | "vtp" => vtu::read(&source, scalar),
         "vtk" => vtk::read_samples(&source, scalar),
         "npy" => npy::read(&source),
-        "csv" | "txt" | "xyzv" => csv::read(&source, scalar),
+        "csv" | "txt" | "xyzv" | "xyz" | "pts" | "asc" => csv::read(&source, scalar),
         _ if start.starts_with(b"ply") => ply::read_samples(&source, scalar),
         _ if start.windows(8).any(|w| w == b"<VTKFile") => vtu::read(&source, scalar),
         _ if start.starts_with(b"# vtk DataFile") => vtk::read_samples(&source, scalar),

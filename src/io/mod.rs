@@ -3,23 +3,30 @@
 //! [`load_mesh`], [`load_volume`] and [`load_samples`] look at the name and the first bytes, and give a mesh (or cloud), a
 //! volume or scattered samples; [`Kind`] tells which of them a file needs.
 
+mod cloud;
 pub mod csv;
+pub mod e57;
 mod gather;
 pub mod gltf;
+mod isolate;
 mod kind;
+pub mod las;
 mod limits;
 mod load_mesh;
 mod load_samples;
 pub mod npy;
 pub mod nrrd;
 pub mod obj;
+pub mod pcd;
 pub mod ply;
 mod positions;
 pub mod raw;
 mod sample_type;
 mod source;
+pub mod stl;
 #[cfg(test)]
 mod testing;
+mod text;
 mod texture;
 pub mod vti;
 pub mod vtk;
@@ -28,6 +35,7 @@ mod vtk_cells;
 mod vtk_xml;
 pub mod vtr;
 pub mod vtu;
+pub mod xyz;
 
 pub use kind::Kind;
 pub use limits::Limits;

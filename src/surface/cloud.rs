@@ -3,6 +3,7 @@
 use super::{
     Mesh, SurfelOptions,
     ellipse::{Tensor, factor, lower},
+    orient::orient,
     paint::{pack, point_color},
 };
 use crate::{
@@ -16,75 +17,157 @@ use rayon::prelude::*;
 const COUNT: usize = 10;
 /// Standard deviation of a surfel, in the median distance to the neighbours (1.2 spacings on a square grid of points,
 /// of which 0.39 are needed there; the rest is for irregular ones).
-const SPREAD: f64 = 0.45;
-/// A point far from all others is drawn at most this many times as wide as the median one.
-const LARGEST: f64 = 4.0;
+const SPREAD: f32 = 0.45;
+/// A point is drawn at most this many times as wide as its neighbours are by their own neighbours: honest spacings change
+/// gradually.
+const WIDER: f32 = 2.0;
+/// A point is lone where its neighbours are this many times as far from it as from their own neighbours.
+const LONE: f32 = 4.0;
+/// No point is drawn more than this many times as wide as the median one. Scanners sample what is far this much more
+/// coarsely than what is near.
+const LARGEST: f32 = 16.0;
+
+/// The neighbours of a point; itself where there are fewer.
+type Nearest = [u32; COUNT];
 
 /// The neighbourhood of a point.
 struct Surroundings {
     /// Median distance to the neighbours; 0 without any.
-    distance: f64,
-    /// Axes by falling variance, and the variances.
-    axes: [DVec3; 3],
-    variances: [f64; 3],
+    distance: f32,
+    /// Unit normal of the plane of the neighbours, of either side; zero where they show none.
+    normal: Vec3,
+    /// The direction in which the neighbours lie furthest apart, and how much further than across it, at most 2.
+    long: Vec3,
+    stretch: f32,
 }
 
+/// Surfels in the order of the points; for those that coincide, of the first one.
 pub(super) fn surfels(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
     let first = first_of_equals(&mesh.positions);
     let kept: Vec<u32> = (0..).zip(first).filter(|&(index, first)| index == first).map(|(index, _)| index).collect();
     let points: Vec<Vec3> = kept.par_iter().map(|&index| mesh.positions[index as usize]).collect();
     let tree = Neighbours::new(&points);
-    let around: Vec<Surroundings> =
-        (0..points.len()).into_par_iter().map(|index| surroundings(&points, &tree, index as u32)).collect();
-    let mut distances: Vec<f64> = around.par_iter().map(|s| s.distance).collect();
+    // All that follows is in the tree's order, where neighbours are near each other in memory too.
+    let order = tree.order();
+    let mut places = vec![0u32; points.len()];
+    order.iter().zip(0..).for_each(|(&point, place)| places[point as usize] = place);
+    let (nearest, around): (Vec<Nearest>, Vec<Surroundings>) =
+        order.par_iter().map(|&point| surroundings(&points, &tree, point, &places)).unzip();
+    drop(tree);
+    let points: Vec<Vec3> = order.par_iter().map(|&point| points[point as usize]).collect();
+    let kept: Vec<u32> = order.into_par_iter().map(|point| kept[point as usize]).collect();
+    let (spacing, lone) = spacings(&around, &nearest);
+    report(mesh.positions.len() - points.len(), &lone);
+    let mut normals: Vec<Vec3> = around.par_iter().map(|around| around.normal).collect();
+    let free = settle_known(mesh, &kept, &mut normals);
+    if free.par_iter().any(|&free| free) {
+        orient(&points, &spacing, &nearest, &free, &mut normals);
+    }
+    let surfel = |at: usize| {
+        let width = f64::from(spacing[at] * SPREAD * options.radius_scale);
+        // The plane of a lone point's neighbours is not its own.
+        let known = !lone[at] || !free[at];
+        let normal = Some(normals[at].as_dvec3()).filter(|normal| known && *normal != DVec3::ZERO);
+        Splat {
+            center: points[at].to_array(),
+            strength: options.optical_depth,
+            factor: shape(&around[at], width, normal),
+            color: pack(point_color(mesh, kept[at] as usize)),
+            normal: normal.map_or(NO_NORMAL, |normal| encode_normal(normal.as_vec3())),
+        }
+    };
+    places.into_par_iter().map(|place| surfel(place as usize)).collect()
+}
+
+/// How far apart the points are around each, and which are lone: those take the spacing of their neighbours.
+fn spacings(around: &[Surroundings], nearest: &[Nearest]) -> (Vec<f32>, Vec<bool>) {
+    let mut distances: Vec<f32> = around.par_iter().map(|around| around.distance).collect();
     let middle = distances.len() / 2;
-    let typical = if distances.is_empty() { 0.0 } else { *distances.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    let typical = if distances.is_empty() { 0.0 } else { *distances.select_nth_unstable_by(middle, f32::total_cmp).1 };
     // A single point has no scale of its own; it becomes a ball of about unit diameter.
     let typical = if typical > 0.0 { typical } else { 0.5 };
-    kept.par_iter()
-        .zip(around)
-        .map(|(&index, around)| {
-            let distance = if around.distance > 0.0 { around.distance.min(typical * LARGEST) } else { typical };
-            let width = distance * SPREAD * f64::from(options.radius_scale);
-            let given = mesh.normals.get(index as usize).filter(|normal| normal.length_squared() > 0.25);
-            let (factor, normal) = shape(&around, width, given.map(|normal| normal.as_dvec3().normalize()));
-            Splat {
-                center: mesh.positions[index as usize].to_array(),
-                strength: options.optical_depth,
-                factor,
-                color: pack(point_color(mesh, index as usize)),
-                normal: normal.map_or(NO_NORMAL, |normal| encode_normal(normal.as_vec3())),
-            }
+    around
+        .par_iter()
+        .zip(nearest)
+        .map(|(own, nearest)| {
+            let mut others = nearest.map(|index| around[index as usize].distance);
+            let usual = *others.select_nth_unstable_by(COUNT / 2, f32::total_cmp).1;
+            let lone = own.distance > usual * LONE;
+            let distance = if lone { usual } else { own.distance.min(usual * WIDER) };
+            (if distance > 0.0 { distance.min(typical * LARGEST) } else { typical }, lone)
         })
-        .collect()
+        .unzip()
 }
 
-/// The factor and the normal of a point's surfel: a disc in the plane of its normal, drawn out to at most 1 : 2 where
-/// the neighbours lie further apart in one direction; a ball where they show no plane.
-fn shape(around: &Surroundings, width: f64, given: Option<DVec3>) -> ([f32; 6], Option<DVec3>) {
-    let [large, middle, _] = around.variances;
-    let is_plane = middle > large * 1e-4;
-    let normal = given.or(is_plane.then_some(around.axes[2]));
-    let Some(normal) = normal else { return (lower([DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * width)), None) };
-    let long = (around.axes[0] - normal * normal.dot(around.axes[0])).try_normalize();
-    let x = long.unwrap_or_else(|| normal.any_orthonormal_vector());
-    let stretch = if is_plane { (large / middle).sqrt().min(2.0) } else { 1.0 };
-    let variance = width * width;
+/// Puts in the normals that the file gives, and turns those that a scanner saw towards it. What is left is free.
+fn settle_known(mesh: &Mesh, kept: &[u32], normals: &mut [Vec3]) -> Vec<bool> {
+    let mut free: Vec<bool> = normals
+        .par_iter_mut()
+        .zip(kept)
+        .map(|(normal, &index)| {
+            let given = mesh.normals.get(index as usize).filter(|given| given.length_squared() > 0.25);
+            *normal = given.map_or(*normal, |given| given.normalize());
+            given.is_none()
+        })
+        .collect();
+    normals.par_iter_mut().zip(&mut free).zip(kept).filter(|((_, free), _)| **free).for_each(
+        |((normal, free), &index)| {
+            let at = mesh.sensors.partition_point(|sensor| sensor.points.start <= index as usize);
+            let sensor = at.checked_sub(1).map(|at| &mesh.sensors[at]);
+            if let Some(sensor) = sensor.filter(|sensor| sensor.points.contains(&(index as usize))) {
+                let sight = sensor.position - mesh.positions[index as usize];
+                *normal = if normal.dot(sight) < 0.0 { -*normal } else { *normal };
+                *free = false;
+            }
+        },
+    );
+    free
+}
+
+fn report(coincident: usize, lone: &[bool]) {
+    let lone = lone.par_iter().filter(|&&lone| lone).count();
+    if coincident > 0 {
+        tracing::info!(coincident, "points at the place of another are left out");
+    }
+    if lone > 0 {
+        tracing::info!(lone, "points far from all others are drawn no wider than their neighbours");
+    }
+}
+
+/// The factor of a point's surfel: a disc in the plane of its normal, drawn out where the neighbours lie further apart in
+/// one direction; a ball where there is no normal.
+fn shape(around: &Surroundings, width: f64, normal: Option<DVec3>) -> [f32; 6] {
+    let Some(normal) = normal else { return lower([DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * width)) };
+    let long = around.long.as_dvec3();
+    let x = (long - normal * normal.dot(long)).try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+    let (variance, stretch) = (width * width, f64::from(around.stretch));
     let tensor = Tensor { xx: variance * stretch, xy: 0.0, yy: variance / stretch };
-    (factor(tensor, x, normal.cross(x), normal), Some(normal))
+    factor(tensor, x, normal.cross(x), normal)
 }
 
-fn surroundings(points: &[Vec3], tree: &Neighbours, index: u32) -> Surroundings {
-    let nearest = tree.of(index, COUNT);
+/// What is around a point; `places` numbers its neighbours.
+fn surroundings(points: &[Vec3], tree: &Neighbours, index: u32, places: &[u32]) -> (Nearest, Surroundings) {
+    let found = tree.of(index, COUNT);
     let center = points[index as usize];
-    let offsets = || nearest.iter().map(|&(_, index)| (points[index as usize] - center).as_dvec3());
-    let distance = nearest.get(nearest.len() / 2).map_or(0.0, |&(distance, _)| f64::from(distance));
-    let mean = offsets().sum::<DVec3>() / (nearest.len() + 1) as f64;
+    let offsets = || found.iter().map(|&(_, index)| (points[index as usize] - center).as_dvec3());
+    let mean = offsets().sum::<DVec3>() / (found.len() + 1) as f64;
     let mut scatter = DMat3::ZERO;
     for offset in offsets().chain([DVec3::ZERO]) {
         let d = offset - mean;
         scatter += DMat3::from_cols(d * d.x, d * d.y, d * d.z);
     }
-    let (variances, axes) = eigen(scatter);
-    Surroundings { distance, axes, variances }
+    let ([large, middle, _], axes) = eigen(scatter);
+    let is_plane = middle > large * 1e-4;
+    let mut nearest = [places[index as usize]; COUNT];
+    nearest.iter_mut().zip(&found).for_each(|(slot, &(_, index))| *slot = places[index as usize]);
+    let around = Surroundings {
+        distance: found.get(found.len() / 2).map_or(0.0, |&(distance, _)| distance),
+        normal: if is_plane { axes[2].as_vec3() } else { Vec3::ZERO },
+        long: axes[0].as_vec3(),
+        stretch: if is_plane { (large / middle).sqrt().min(2.0) as f32 } else { 1.0 },
+    };
+    (nearest, around)
 }
+
+#[cfg(test)]
+mod tests;

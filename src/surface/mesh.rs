@@ -1,7 +1,7 @@
 //! What a mesh or cloud file says, whatever its format.
 
 use glam::{DVec3, Vec2, Vec3};
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 /// A triangle mesh, or a point cloud when it has no triangles.
 ///
@@ -21,6 +21,20 @@ pub struct Mesh {
     /// The material of each triangle, an index into `materials`; empty where there are none.
     pub triangle_materials: Vec<u32>,
     pub materials: Vec<Material>,
+    /// Where scanners stood, in the order of the points that they saw; empty where the file does not say. Those points
+    /// face them.
+    pub sensors: Vec<Sensor>,
+    /// Whether +Z is up by the custom of the format, as in surveying.
+    pub z_is_up: bool,
+}
+
+/// The place of a scanner.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensor {
+    /// Relative to the mesh's origin, as the positions.
+    pub position: Vec3,
+    /// The points that were seen from there.
+    pub points: Range<usize>,
 }
 
 /// A base colour, and a texture that it multiplies.

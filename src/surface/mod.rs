@@ -4,12 +4,13 @@ mod adjacency;
 mod cloud;
 mod ellipse;
 mod mesh;
+mod orient;
 mod paint;
 mod refine;
 mod shapes;
 mod surfels;
 mod survey;
 
-pub use mesh::{Material, Mesh, Texture};
+pub use mesh::{Material, Mesh, Sensor, Texture};
 pub use surfels::SurfelOptions;
 pub use survey::Survey;

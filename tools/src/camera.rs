@@ -43,7 +43,8 @@ pub struct CameraFlags {
     /// Draws without perspective.
     #[arg(long)]
     orthographic: bool,
-    /// The scene's up axis: +Y by default, +Z where all inputs are volumes.
+    /// The scene's up axis: +Y by default, +Z where all inputs are volumes, samples, or clouds of a surveyor's format (LAS,
+    /// E57, tables of points).
     #[arg(long, value_name = "AXIS", value_parser = parse::axis, allow_hyphen_values = true)]
     up: Option<DVec3>,
 }

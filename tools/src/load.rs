@@ -40,8 +40,8 @@ pub struct LoadFlags {
     /// Raw volumes: bytes before the first sample.
     #[arg(long, value_name = "BYTES", requires = "dims")]
     header: Option<u64>,
-    /// Scattered samples: the property, column or array that holds the values. A PLY file without faces is read as samples
-    /// with it, as a cloud without.
+    /// Scattered samples: the property, column or array that holds the values. A PLY file without faces
+    /// and a table of points are read as samples with it, as clouds without.
     #[arg(long, value_name = "NAME")]
     scalar: Option<String>,
     /// Scattered samples: one radius for all, in world units, of two standard deviations [default: the file's, or from the
@@ -111,7 +111,9 @@ impl LoadFlags {
 
 fn unknown(path: &Path) -> Error {
     Error::input(path, "file", "is of no kind that can be read").hint(
-        "hierarchies: .splk; meshes and clouds: .ply, .obj, .gltf, .glb; volumes: .vti, .vtr, .vtk, .nrrd, .nhdr, and raw samples (also packed \
-         by gzip) with --dims and --type; scattered samples: .vtu, .vtp, .vtk, .npy, .csv, .txt, .xyzv, and .ply with --scalar",
+        "hierarchies: .splk; meshes: .ply, .obj, .gltf, .glb, .stl; clouds: .ply, .las, .laz, .e57, .pcd, .xyz, .pts, .asc, and .csv and .txt whose \
+         columns are a position, a colour or a normal; volumes: .vti, .vtr, .vtk, .nrrd, .nhdr, and raw samples (also packed \
+         by gzip) with --dims and --type; scattered samples: .vtu, .vtp, .vtk, .npy, .csv, .txt, .xyzv, and .ply and tables of \
+         points with --scalar",
     )
 }

@@ -61,7 +61,9 @@ impl SceneFlags {
                     let bounds = mesh.bounds().map_or(splats.bounds(), |[min, max]| Bounds { min, max });
                     loaded.add(bounds, splats.splats.len());
                     loaded.scene = loaded.scene.with_splats(splats);
-                    loaded.subject.up = DVec3::Y;
+                    if !mesh.z_is_up {
+                        loaded.subject.up = DVec3::Y;
+                    }
                 }
                 Input::Hierarchy(hierarchy) => {
                     let header = hierarchy.header();

@@ -22,6 +22,17 @@ fn folder(name: &str) -> Folder {
     folder.put("negative.json", "[-1, 0]");
     folder.put("twins.csv", "x,y,z,value\n1,2,3,4\n1,2,3,8\n");
     folder.put("hole.csv", "x,y,z,value\n1,2,3,4\n1,nan,3,8\n");
+    folder.put("cut.las", [&b"LASF"[..], &[0; 100]].concat());
+    folder.put("cut.laz", "LAS");
+    folder.put("cut.e57", [&b"ASTM-E57"[..], &[0; 1016]].concat());
+    folder.put("cut.stl", [&[b' '; 80][..], &9u32.to_le_bytes(), &[0; 50]].concat());
+    folder.put("open.stl", "solid of one\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n");
+    folder.put("short.pts", "3\n1 2 3\n4 5 6\n");
+    folder.put("five.xyz", "1 2 3 4 5\n");
+    folder.put("gone.csv", "x,y,z,red,green\n1,2,3,4,5\n");
+    let fields = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\n";
+    folder.put("many.pcd", format!("{fields}POINTS 4294967295\nDATA binary\n0123456789"));
+    folder.put("none.pcd", format!("{fields}POINTS 1\nDATA ascii\nnan nan nan\n"));
     folder.put(
         "crossed.nrrd",
         b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nlattice:=fcc\nencoding: raw\n\n12345678",
@@ -52,6 +63,22 @@ const WRONG: &[(&str, i32, &str)] = &[
     ("crossed.nrrd", 3, "crossed.nrrd: lattice: “fcc” is not a lattice that is known"),
     ("hole.csv", 3, "hole.csv: line 3"),
     ("a.nrrd --sharp --sigma 2", 2, "smaller sigma"),
+    // Meshes and clouds.
+    ("cut.las", 3, "cut.las: header: the header reaches to byte 105, but there are 104"),
+    ("cut.laz", 3, "cut.laz: header: does not begin with “LASF”"),
+    ("cut.e57", 3, "cut.e57: file: is no E57 file that can be read"),
+    ("cut.stl", 3, "cut.stl: header: counts 9 facets, which need 534 bytes, but the file has 134"),
+    ("open.stl", 3, "open.stl: line 4: the file ends before “endsolid”: it is cut"),
+    ("short.pts", 3, "short.pts: line 1: counts 3 points, but there are 2"),
+    ("five.xyz", 3, "five.xyz: line 1: has 5 columns without names"),
+    ("gone.csv", 3, "gone.csv: line 1: has 2 scalars to choose from"),
+    ("many.pcd", 3, "many.pcd: the number of points is 4294967295, over the limit"),
+    (
+        "many.pcd --limit-points 5000000000",
+        3,
+        "many.pcd: the size of the points in bytes is 51539607540, over the limit",
+    ),
+    ("none.pcd", 3, "none.pcd: file: holds no points"),
     // Kernels.
     ("a.nrrd --sigma 0", 2, "invalid value '0' for '--sigma <SAMPLES>': a number above 0 is needed"),
     ("a.nrrd --sigma 3 --extent 1", 2, "a Gaussian of sigma 3 cut at 1 samples is a block; cut it at 3 or more"),
@@ -110,6 +137,29 @@ fn each_wrong_input_has_its_message() {
         folder.run(&format!("render {arguments} -o out.png")).fails(*code, &[message]);
     }
     assert!(!folder.path("out.png").exists());
+}
+
+#[test]
+fn clouds_of_every_text_draw() {
+    let folder = Folder::new("clouds");
+    let points: Vec<[usize; 3]> = (0..400).map(|i| [i % 20, i / 20, (i % 20) * (i / 20) / 20]).collect();
+    let lines = |end: &str| points.iter().map(|[x, y, z]| format!("{x} {y} {z}{end}\n")).collect::<String>();
+    let fields = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nVIEWPOINT 9 9 99 1 0 0 0\nPOINTS 400\nDATA ascii\n";
+    for (name, content) in [
+        ("a.xyz", lines("")),
+        ("a.txt", lines(" 255 128 0")),
+        ("a.csv", format!("x y z red green blue\n{}", lines(" 255 128 0"))),
+        ("a.pts", format!("400\n{}", lines(" -700 255 128 0"))),
+        ("a.pcd", format!("{fields}{}", lines(""))),
+        (
+            "b.stl",
+            "solid\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid".into(),
+        ),
+    ] {
+        folder.put(name, content);
+        let found = folder.json(&format!("render {name} -o out.png --overwrite --json --size 32x24"));
+        assert!(found["splats"].as_u64().is_some_and(|count| count >= 3), "{name}: {found}");
+    }
 }
 
 #[test]

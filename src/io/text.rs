@@ -1,0 +1,130 @@
+//! Tables of numbers as text: their lines, the names of their columns and their numbers.
+//!
+//! Columns are parted by the first of these that the first line has: semicolons, commas, tabs, and else any white space.
+//! (The csv crate takes single bytes only, not runs of spaces.) Lines that are empty or begin with `#` or `//` are passed
+//! over, but for a first one that names the columns. Numbers have points, no decimal commas.
+
+use super::Source;
+use crate::Result;
+use rayon::prelude::*;
+
+/// A table whose lines are found but whose numbers are not read yet.
+pub(super) struct Text<'a> {
+    /// The names of the columns, where the first line gives some.
+    pub names: Option<Vec<String>>,
+    /// Columns of the first line.
+    pub width: usize,
+    /// The number of the first line in the file.
+    pub first: usize,
+    /// The rows with the numbers of their lines.
+    rows: Vec<(usize, &'a [u8])>,
+    separator: Option<u8>,
+}
+
+impl<'a> Text<'a> {
+    /// Finds the lines of a file. Those that `skip` tells are passed over.
+    pub fn of(source: &'a Source, skip: impl Fn(usize, &[u8]) -> bool) -> Result<Self> {
+        let mut lines: Vec<(usize, &[u8])> = Vec::new();
+        for (number, line) in (1..).zip(without_mark(source.bytes()).split(|&b| b == b'\n')) {
+            let line = line.trim_ascii();
+            if is_row(line, lines.is_empty()) && !skip(number, line) {
+                lines.push((number, line));
+            }
+        }
+        source.check_points("the number of lines", lines.len() as u64)?;
+        let Some(&(first, line)) = lines.first() else { return Err(source.error("file", "holds no lines of numbers")) };
+        let (separator, words) = split(line);
+        let names = has_names(&words).then(|| words.clone());
+        if names.is_some() {
+            lines.remove(0);
+        }
+        Ok(Self { names, width: words.len(), first, rows: lines, separator })
+    }
+
+    /// The number of rows.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Where a row is, for an error.
+    pub fn place(&self, row: usize) -> String {
+        format!("line {}", self.rows[row].0)
+    }
+
+    /// The numbers of all rows, one row after the other; zero in the columns that are not asked for, which may hold
+    /// anything.
+    pub fn numbers(&self, source: &Source, asked: impl Fn(usize) -> bool + Sync) -> Result<Vec<f64>> {
+        let width = self.width;
+        let mut table = vec![0.0f64; self.rows.len() * width];
+        table.par_chunks_mut(width).zip(&self.rows).try_for_each(|(row, &(number, line))| {
+            let place = || format!("line {number}");
+            let mut count = 0;
+            for word in words(line, self.separator) {
+                if let Some(slot) = row.get_mut(count).filter(|_| asked(count)) {
+                    let text = String::from_utf8_lossy(word);
+                    let text = text.trim_matches('"');
+                    *slot = text.parse().map_err(|_| {
+                        let shown: String = text.chars().take(40).collect();
+                        source.error(place(), format!("“{shown}” is not a number"))
+                    })?;
+                    if !slot.is_finite() {
+                        return Err(source.error(place(), format!("number {} is {slot}", count + 1)));
+                    }
+                }
+                count += 1;
+            }
+            if count != width {
+                return Err(source.error(place(), format!("has {count} columns, but the first line has {width}")));
+            }
+            Ok(())
+        })?;
+        Ok(table)
+    }
+}
+
+/// The words of the first line that counts, and whether they are names; none in a file without such a line.
+pub(super) fn first_words(bytes: &[u8]) -> Option<(Vec<String>, bool)> {
+    let line = without_mark(bytes).split(|&b| b == b'\n').map(<[u8]>::trim_ascii).find(|line| is_row(line, true))?;
+    let words = split(line).1;
+    let named = has_names(&words);
+    Some((words, named))
+}
+
+/// Without the byte order mark that some writers of UTF-8 begin with.
+fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
+
+/// Whether a line is one of the table. A comment may name the columns, if it comes first.
+fn is_row(line: &[u8], first: bool) -> bool {
+    let comment = line.starts_with(b"#") || line.starts_with(b"//");
+    !line.is_empty() && (!comment || first && names_columns(line))
+}
+
+/// Whether a comment is a line of names.
+fn names_columns(line: &[u8]) -> bool {
+    let separators = |b: &u8| b.is_ascii_whitespace() || matches!(b, b',' | b';' | b'#' | b'/');
+    let has = |name: &[u8]| line.split(separators).any(|word| word.eq_ignore_ascii_case(name));
+    has(b"x") && has(b"y") && has(b"z")
+}
+
+fn has_names(words: &[String]) -> bool {
+    !words.iter().all(|word| word.parse::<f64>().is_ok())
+}
+
+/// The separator that a first line tells, and its words, out of their quotes.
+fn split(line: &[u8]) -> (Option<u8>, Vec<String>) {
+    let separator = [b';', b',', b'\t'].into_iter().find(|separator| line.contains(separator));
+    let name = |word: &[u8]| String::from_utf8_lossy(word).trim_matches('"').trim().to_owned();
+    (separator, words(line, separator).map(name).collect())
+}
+
+/// The words of a line; a comment's sign is none.
+fn words(line: &[u8], separator: Option<u8>) -> impl Iterator<Item = &[u8]> {
+    let sign = line.iter().take_while(|&&b| matches!(b, b'#' | b'/')).count();
+    line[sign..]
+        .trim_ascii()
+        .split(move |&b| separator.map_or(b.is_ascii_whitespace(), |separator| b == separator))
+        .map(<[u8]>::trim_ascii)
+        .filter(move |word| separator.is_some() || !word.is_empty())
+}

@@ -1,0 +1,127 @@
+use super::*;
+use crate::{splat::decode_normal, surface::Sensor};
+use std::f32::consts::TAU;
+
+fn random() -> impl FnMut() -> f32 {
+    let mut state = 7u32;
+    move || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / (1 << 24) as f32
+    }
+}
+
+/// Points spread evenly over a sphere of radius 1, along a spiral.
+fn sphere(count: usize, center: Vec3) -> Vec<Vec3> {
+    let golden = TAU * (3.0 - 5f32.sqrt()) / 2.0;
+    (0..count)
+        .map(|i| {
+            let z = 1.0 - (2 * i + 1) as f32 / count as f32;
+            let (sin, cos) = (golden * i as f32).sin_cos();
+            center + Vec3::new(cos, sin, 0.0) * (1.0 - z * z).sqrt() + Vec3::Z * z
+        })
+        .collect()
+}
+
+fn torus(count: usize) -> Vec<Vec3> {
+    let mut random = random();
+    (0..count)
+        .map(|_| {
+            let (around, along) = (random() * TAU, random() * TAU);
+            let ring = 2.0 + around.cos();
+            Vec3::new(ring * along.cos(), ring * along.sin(), around.sin())
+        })
+        .collect()
+}
+
+fn cloud(positions: Vec<Vec3>) -> Mesh {
+    Mesh { positions, ..Mesh::default() }
+}
+
+/// The normals of the surfels, one for each point.
+fn normals(mesh: &Mesh) -> Vec<Vec3> {
+    let splats = surfels(mesh, &SurfelOptions::default());
+    assert_eq!(splats.len(), mesh.positions.len());
+    splats.iter().map(|splat| decode_normal(splat.normal).expect("a normal")).collect()
+}
+
+/// The part of the points whose normal is on the same side as `outward`.
+fn agreement(mesh: &Mesh, outward: impl Fn(Vec3) -> Vec3) -> f64 {
+    let right = normals(mesh).iter().zip(&mesh.positions).filter(|(n, p)| n.dot(outward(**p)) > 0.0).count();
+    right as f64 / mesh.positions.len() as f64
+}
+
+#[test]
+fn closed_surfaces_face_outward() {
+    let center = Vec3::new(40.0, -7.0, 3.0);
+    assert!(agreement(&cloud(sphere(5000, center)), |p| p - center) >= 0.999);
+    let ring = |p: Vec3| p - Vec3::new(p.x, p.y, 0.0).normalize() * 2.0;
+    assert!(agreement(&cloud(torus(20_000)), ring) >= 0.999);
+    // Each of two, and one inside another.
+    let far = Vec3::X * 5.0;
+    let both = [sphere(2000, Vec3::ZERO), sphere(2000, far)].concat();
+    assert!(agreement(&cloud(both), |p| if p.x < 2.5 { p } else { p - far }) >= 0.999);
+    let inner = sphere(3000, Vec3::ZERO).iter().map(|&p| p * 3.0).chain(sphere(3000, Vec3::ZERO)).collect();
+    assert!(agreement(&cloud(inner), |p| p) >= 0.999);
+}
+
+/// Points on the plane z = `height`, about 1 apart.
+fn sheet(height: f32) -> Vec<Vec3> {
+    let mut random = random();
+    (0..2500).map(|i| Vec3::new((i % 50) as f32 + 0.6 * random(), (i / 50) as f32 + 0.6 * random(), height)).collect()
+}
+
+#[test]
+fn sheets_near_each_other_each_have_one_side() {
+    let mesh = cloud([sheet(0.0), sheet(5.0)].concat());
+    assert!(agreement(&mesh, |p| Vec3::Z * (p.z - 2.5)) >= 0.999, "both face away from the middle");
+    assert!(agreement(&cloud(sheet(3.0)), |_| Vec3::Z) >= 0.999, "one alone faces up");
+}
+
+#[test]
+fn what_a_scanner_saw_faces_it_and_what_the_file_says_stays() {
+    let mut mesh = cloud([sheet(0.0), sheet(5.0)].concat());
+    // Each sheet was seen from between them.
+    mesh.sensors = vec![Sensor { position: Vec3::new(25.0, 25.0, 2.5), points: 0..5000 }];
+    assert!(agreement(&mesh, |p| Vec3::Z * (2.5 - p.z)) == 1.0);
+    mesh.sensors[0].points = 2500..9999;
+    assert!(agreement(&mesh, |_| Vec3::NEG_Z) == 1.0, "the other one is free, and faces outward");
+    mesh.normals = (0..5000).map(|i| if i % 2 == 0 { Vec3::X } else { Vec3::ZERO }).collect();
+    let found = normals(&mesh);
+    assert!((0..5000).all(|i| if i % 2 == 0 { found[i].x > 0.999 } else { found[i].z < -0.999 }));
+}
+
+#[test]
+fn lone_points_are_small_and_change_no_others() {
+    let plain = cloud(sheet(0.0));
+    let options = SurfelOptions::default();
+    let before = surfels(&plain, &options);
+    let mut mesh = plain.clone();
+    // One just above the sheet, one far off, and a pair.
+    mesh.positions
+        .extend([[25.5, 25.5, 12.0], [1e5, 0.0, 0.0], [-300.0, 0.0, 7.0], [-300.0, 0.0, 8.0]].map(Vec3::from));
+    let after = surfels(&mesh, &options);
+    assert_eq!(before, after[..2500]);
+    let widest = |splats: &[Splat]| splats.iter().flat_map(|s| s.factor).fold(0f32, |widest, b| widest.max(b.abs()));
+    assert!(widest(&after[2500..]) <= 1.5 * widest(&before), "{} {}", widest(&after[2500..]), widest(&before));
+}
+
+/// A part that was scanned from further away is sampled more coarsely, and covered all the same.
+#[test]
+fn coarse_parts_keep_their_width() {
+    let coarse = sheet(0.0).iter().map(|&p| p * 10.0 + Vec3::X * 100.0).collect::<Vec<_>>();
+    let splats = surfels(&cloud([sheet(0.0), sheet(9.0), coarse].concat()), &SurfelOptions::default());
+    let mean = |splats: &[Splat]| splats.iter().map(|s| f64::from(s.factor[0])).sum::<f64>() / splats.len() as f64;
+    let ratio = mean(&splats[5000..]) / mean(&splats[..2500]);
+    assert!((9.0..11.0).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn the_same_each_time() {
+    let mesh = cloud(torus(3000));
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let once = surfels(&mesh, &SurfelOptions::default());
+    assert_eq!(once, alone.install(|| surfels(&mesh, &SurfelOptions::default())));
+    for count in 0..25 {
+        assert_eq!(surfels(&cloud(torus(count)), &SurfelOptions::default()).len(), count);
+    }
+}

@@ -1,0 +1,188 @@
+//! One side for all normals of a cloud.
+//!
+//! Planes fitted to neighbours have no side. Neighbouring normals that are nearly parallel tell each other's side most
+//! reliably, so sides spread along the minimum spanning tree of the neighbour graph under the weight 1 − |n·m| (Hoppe,
+//! DeRose, Duchamp, McDonald and Stuetzle, Surface Reconstruction from Unorganized Points, 1992). The tree is never
+//! walked: Kruskal's algorithm joins sets whose members know their side relative to the set's root.
+//!
+//! Then every connected part is turned as a whole. By the divergence theorem the sum of area · n·p over a closed surface
+//! is three times its volume where the normals point outward, so its sign tells which side is out, whatever the shape; an
+//! open part is turned away from the centre of the cloud. Where the sum tells nothing, as on flat ground, the part
+//! faces up (+z).
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+/// A sum below this part of the largest possible one tells no side.
+const LEAST_VOTE: f64 = 0.03;
+/// A part is taken as closed where its mean normal is shorter.
+const CLOSED: f64 = 0.2;
+
+/// Gives the normals one side. Zero normals have none and connect nothing, nor do those that are not `free`: these stay
+/// as they are. A point may be among its own `neighbours`. `spacing` tells the area that a point stands for.
+pub(super) fn orient<const N: usize>(
+    points: &[Vec3],
+    spacing: &[f32],
+    neighbours: &[[u32; N]],
+    free: &[bool],
+    normals: &mut [Vec3],
+) {
+    let mut sets = Sets::new(points.len());
+    for edge in edges(neighbours, free, normals) {
+        let (from, to) = ends(edge, neighbours);
+        sets.join(from as u32, to as u32, normals[from].dot(normals[to]) < 0.0);
+    }
+    let taking_part: Vec<usize> = (0..points.len()).filter(|&index| free[index]).collect();
+    let center = points.iter().map(|p| p.as_dvec3()).sum::<DVec3>() / points.len().max(1) as f64;
+    let mut parts = vec![0u32; points.len()];
+    let mut votes: Vec<Votes> = Vec::new();
+    for &index in &taking_part {
+        let (root, turned) = sets.find(index as u32);
+        if turned {
+            normals[index] = -normals[index];
+        }
+        // The part's number is kept with its root, counted from 1.
+        let root = root as usize;
+        if parts[root] == 0 {
+            votes.push(Votes::default());
+            parts[root] = votes.len() as u32;
+        }
+        let area = f64::from(spacing[index]).powi(2);
+        votes[parts[root] as usize - 1].add(points[index].as_dvec3() - center, normals[index].as_dvec3(), area);
+    }
+    let inward: Vec<bool> = votes.iter().map(Votes::face_inward).collect();
+    for index in taking_part {
+        let (root, _) = sets.find(index as u32);
+        if inward[parts[root as usize] as usize - 1] {
+            normals[index] = -normals[index];
+        }
+    }
+}
+
+/// Bits of an edge below its weight: the number of its place among all neighbours.
+const PLACE: u32 = 40;
+
+/// The edges of the neighbour graph, lightest first, each once.
+fn edges<const N: usize>(neighbours: &[[u32; N]], free: &[bool], normals: &[Vec3]) -> Vec<u64> {
+    let takes_part = |index: usize| free[index] && normals[index] != Vec3::ZERO;
+    let mut edges: Vec<u64> = (0..neighbours.len())
+        .into_par_iter()
+        .filter(|&from| takes_part(from))
+        .flat_map_iter(|from| {
+            neighbours[from].iter().enumerate().filter_map(move |(slot, &to)| {
+                let to = to as usize;
+                // Where both name each other, the one with the smaller index does.
+                let again = to < from && neighbours[to].contains(&(from as u32));
+                if again || to == from || !takes_part(to) {
+                    return None;
+                }
+                let weight = (1.0 - normals[from].dot(normals[to]).abs()).clamp(0.0, 1.0);
+                let weight = (f64::from(weight) * f64::from((1 << (u64::BITS - PLACE)) - 1)) as u64;
+                Some(weight << PLACE | (from * N + slot) as u64)
+            })
+        })
+        .collect();
+    edges.par_sort_unstable();
+    edges
+}
+
+fn ends<const N: usize>(edge: u64, neighbours: &[[u32; N]]) -> (usize, usize) {
+    let place = (edge & ((1 << PLACE) - 1)) as usize;
+    (place / N, neighbours[place / N][place % N] as usize)
+}
+
+/// Disjoint sets of points; each knows whether it is turned against its set's root.
+struct Sets {
+    parent: Vec<u32>,
+    /// Against the parent.
+    turned: Vec<bool>,
+    size: Vec<u32>,
+}
+
+impl Sets {
+    fn new(count: usize) -> Self {
+        Self { parent: (0..count as u32).collect(), turned: vec![false; count], size: vec![1; count] }
+    }
+
+    /// The root of a point's set, and whether the point is turned against it.
+    fn find(&mut self, point: u32) -> (u32, bool) {
+        let mut at = point as usize;
+        let mut turned = false;
+        loop {
+            let parent = self.parent[at] as usize;
+            let above = self.parent[parent];
+            if above as usize == parent {
+                return (above, turned ^ self.turned[at]);
+            }
+            // Halves the path for the next time.
+            self.parent[at] = above;
+            self.turned[at] ^= self.turned[parent];
+            turned ^= self.turned[at];
+            at = above as usize;
+        }
+    }
+
+    /// Makes one set of two. `opposed`: the two points are turned against each other as they were at first.
+    fn join(&mut self, a: u32, b: u32, opposed: bool) {
+        let ((a, a_turned), (b, b_turned)) = (self.find(a), self.find(b));
+        if a == b {
+            return;
+        }
+        let (root, child) = if self.size[a as usize] >= self.size[b as usize] { (a, b) } else { (b, a) };
+        self.parent[child as usize] = root;
+        self.turned[child as usize] = opposed ^ a_turned ^ b_turned;
+        self.size[root as usize] += self.size[child as usize];
+    }
+}
+
+/// Sums over a connected part: area, area · p, area · p², area · n and area · n·p.
+#[derive(Default)]
+struct Votes {
+    area: f64,
+    positions: DVec3,
+    squares: f64,
+    normals: DVec3,
+    fluxes: f64,
+}
+
+impl Votes {
+    /// Adds a point, its position relative to the centre of the cloud.
+    fn add(&mut self, position: DVec3, normal: DVec3, area: f64) {
+        self.area += area;
+        self.positions += position * area;
+        self.squares += position.length_squared() * area;
+        self.normals += normal * area;
+        self.fluxes += position.dot(normal) * area;
+    }
+
+    fn face_inward(&self) -> bool {
+        let own_center = self.positions / self.area.max(f64::MIN_POSITIVE);
+        // Around any centre the sum over a closed part is the same, but around its own it is most precise.
+        let closed = self.normals.length() < CLOSED * self.area;
+        let center = if closed { own_center } else { DVec3::ZERO };
+        let flux = self.fluxes - center.dot(self.normals);
+        let squares = self.squares - 2.0 * center.dot(self.positions) + center.length_squared() * self.area;
+        let largest = (squares.max(0.0) * self.area).sqrt();
+        if flux.abs() > LEAST_VOTE * largest { flux < 0.0 } else { self.normals.z < 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_know_their_sides() {
+        // A ring of 100 points of random sides, joined in an order of strides.
+        let side = |point: u32| point.wrapping_mul(2_654_435_761) >> 31 == 1;
+        let mut sets = Sets::new(100);
+        for step in 0..100 {
+            let (a, b) = (step * 37 % 100, (step * 37 + 1) % 100);
+            sets.join(a, b, side(a) != side(b));
+        }
+        let (root, _) = sets.find(0);
+        for point in 0..100 {
+            assert_eq!(sets.find(point), (root, side(point) != side(root)), "{point}");
+        }
+    }
+}
