@@ -59,7 +59,7 @@ impl Tree {
         let _span = tracing::info_span!("build").entered();
         check(set)?;
         let parts = partition::blocks(&set.splats, options.block_splats.max(64));
-        let outer = (parts.len() > 1).then(|| around(set));
+        let outer = around(set);
         let built = AtomicU64::new(0);
         let mut blocks: Vec<Block> = parts
             .into_par_iter()
@@ -70,7 +70,7 @@ impl Tree {
                 block
             })
             .collect();
-        if let Some(outer) = outer {
+        if blocks.len() > 1 {
             let roots: Vec<Node> = blocks.iter().map(|block| block.nodes[0]).collect();
             let (top, portals) = join(&roots, options.preset, outer);
             for (block, portal) in blocks.iter_mut().zip(portals) {
@@ -103,7 +103,7 @@ pub fn build_file(
     let _span = tracing::info_span!("build").entered();
     check(set)?;
     let parts = partition::blocks(&set.splats, build.block_splats.max(64));
-    let mut builder = Builder::new(path, set.extent, (parts.len() > 1).then(|| around(set)), build.preset, write)?;
+    let mut builder = Builder::new(path, set.extent, around(set), build.preset, write)?;
     let mut built = 0;
     for parts in parts.chunks(2 * rayon::current_num_threads()) {
         builder.add(parts.par_iter().map(|part| block_of(set, part, build.preset, builder.outer)).collect())?;
@@ -121,8 +121,8 @@ pub fn build_file(
 /// Writes blocks as they come, and joins them at the end.
 pub(crate) struct Builder {
     writer: Writer,
-    /// What holds all blocks, where there are several.
-    pub outer: Option<Sphere>,
+    /// What holds all leaves.
+    pub outer: Sphere,
     preset: Preset,
     roots: Vec<Node>,
 }
@@ -131,7 +131,7 @@ impl Builder {
     pub fn new(
         path: &Path,
         extent: f32,
-        outer: Option<Sphere>,
+        outer: Sphere,
         preset: Preset,
         options: &WriteOptions,
     ) -> Result<Self> {
@@ -149,15 +149,13 @@ impl Builder {
         if self.roots.len() == 1 {
             return self.writer.finish(None, whole);
         }
-        let spheres: Vec<Sphere> = self.roots.iter().map(Sphere::of).collect();
-        let outer = self.outer.unwrap_or_else(|| Sphere::around(&spheres, 1 << 10));
-        let (top, portals) = join(&self.roots, self.preset, outer);
+        let (top, portals) = join(&self.roots, self.preset, self.outer);
         self.writer.finish(Some(Top { nodes: &top.nodes, portals: &portals }), whole)
     }
 }
 
 /// The block of some splats of a set; its root's sphere lies in `outer`.
-pub(crate) fn block_of(set: &SplatSet, part: &[u32], preset: Preset, outer: Option<Sphere>) -> Block {
+pub(crate) fn block_of(set: &SplatSet, part: &[u32], preset: Preset, outer: Sphere) -> Block {
     let splat = |i: u32| &set.splats[i as usize];
     let boxes: Vec<_> = part.iter().map(|&i| box_of(splat(i))).collect();
     let (mut block, _) = cluster(&boxes, |i| leaf(splat(part[i as usize]), set.extent), preset);
@@ -177,7 +175,7 @@ pub(crate) fn join(roots: &[Node], preset: Preset, outer: Sphere) -> (Block, Vec
     let leaf = |i: u32| Node { children: 0, first_child: 0, ..roots[i as usize] };
     let (mut block, sources) = cluster(&boxes, leaf, preset);
     let heights = raise(&mut block);
-    nest(&mut block, &heights, Some(outer));
+    nest(&mut block, &heights, outer);
     let mut portals = vec![0; roots.len()];
     for (place, (node, source)) in (0..).zip(block.nodes.iter().zip(sources)) {
         if node.is_leaf() {

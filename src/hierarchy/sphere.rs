@@ -2,11 +2,12 @@
 //!
 //! The smallest sphere around spheres is found by moving a centre towards what reaches farthest, by smaller and smaller
 //! steps (Bădoiu & Clarkson 2003). Built from children alone, spheres grow on their way up: each sticks out of what it
-//! holds, and the next must hold that too. So above the lowest levels, from the root down, a node gets the smallest sphere
-//! around descendants a few levels below, which stick out less. Where that one reaches out of the parent's, its centre moves
-//! towards the parent's until it does not; at the parent's own centre it would be the parent's sphere.
+//! holds, and the next must hold that too. So the root gets the smallest sphere around the leaves, and from there down every
+//! node one that lies in its parent's: that around its children where it does, or around descendants some levels below,
+//! which stick out less; else its centre moves towards the parent's until it does. At the parent's own centre it would be
+//! the parent's sphere.
 
-use super::{Block, MOST_CHILDREN, Node};
+use super::{Block, Node};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -18,10 +19,10 @@ pub(crate) struct Sphere {
 
 /// Steps towards the smallest sphere where there are many nodes, and where there are few.
 const FEW_ROUNDS: u32 = 4;
-const MANY_ROUNDS: u32 = 96;
-/// Nodes this many levels above the leaves, and higher ones, are fitted to their descendants.
+const MANY_ROUNDS: u32 = 16;
+/// Nodes this many levels above the leaves, and higher ones, are fitted to descendants below their children.
 const FITTED_HEIGHT: u8 = 3;
-/// How many levels below them these descendants are; one more for the root and its children.
+/// How many levels below the children these descendants are.
 const LEVELS_BELOW: u32 = 1;
 
 impl Sphere {
@@ -67,28 +68,24 @@ impl Sphere {
         best
     }
 
-    /// The sphere around others whose centre is the nearest to `self`'s on the way to the centre of `outer`, such that it lies
-    /// in `outer`, which holds all of them.
-    fn inside(self, outer: Self, spheres: &[Self]) -> Self {
+    /// Whether this one holds another, with room for what rounding to 32 bits adds.
+    fn holds(&self, other: &Self) -> bool {
+        other.center.distance(self.center) + other.radius <= self.radius * (1.0 - 4.0 * f64::from(f32::EPSILON))
+    }
+
+    /// A sphere around others that lies in `outer`, which holds them all, with a centre as near to `self`'s as can be on the
+    /// way to that of `outer`.
+    fn moved_inside(self, outer: &Self, spheres: &[Self]) -> Self {
         let at = |part: f64| {
             let center = self.center.lerp(outer.center, part);
             Self { center, radius: Self::reach(center, spheres) }
         };
-        // Room for what rounding to 32 bits adds.
-        let room = outer.radius * (1.0 - 4.0 * f64::from(f32::EPSILON));
-        let fits = |s: &Self| s.center.distance(outer.center) + s.radius <= room;
-        let own = at(0.0);
-        if fits(&own) {
-            return own;
-        }
         let (mut out, mut within) = (0.0, 1.0);
         for _ in 0..12 {
             let middle = (out + within) * 0.5;
-            *(if fits(&at(middle)) { &mut within } else { &mut out }) = middle;
+            *(if outer.holds(&at(middle)) { &mut within } else { &mut out }) = middle;
         }
-        let fitted = at(within);
-        // Rounding may leave no room at all; and a caller's `outer` may not hold what it promised.
-        if within < 1.0 || Self::reach(outer.center, spheres) <= outer.radius { fitted } else { own }
+        if within == 1.0 { *outer } else { at(within) }
     }
 }
 
@@ -110,30 +107,59 @@ pub(crate) fn raise(block: &mut Block) -> Vec<u8> {
     heights
 }
 
-/// Makes the spheres of the higher nodes of a raised block as small as they can be inside their parents'; the root's lies
-/// in `outer`, where there is one.
-pub(crate) fn nest(block: &mut Block, heights: &[u8], outer: Option<Sphere>) {
+/// Moves the spheres of a raised block into their parents', and makes those of higher nodes smaller. The root's lies in
+/// `outer`, which holds all leaves.
+pub(crate) fn nest(block: &mut Block, heights: &[u8], outer: Sphere) {
     let nodes = &mut block.nodes;
-    let mut parents = vec![0usize; nodes.len()];
-    for (index, node) in nodes.iter().enumerate() {
+    let mut parents = vec![0u32; nodes.len()];
+    for (index, node) in (0..).zip(nodes.iter()) {
         parents[children_of(node)].fill(index);
     }
     let mut around = Vec::new();
     // Parents come before their children, so each finds its parent's final sphere.
     for index in 0..nodes.len() {
-        let outer = if index == 0 { outer } else { Some(Sphere::of(&nodes[parents[index]])) };
-        if nodes[index].is_leaf() || (index > 0 && heights[parents[index]] < FITTED_HEIGHT) {
+        if nodes[index].is_leaf() {
             continue;
         }
-        around.clear();
-        let is_fitted = heights[index] >= FITTED_HEIGHT;
-        let is_high = index <= MOST_CHILDREN;
-        descendants(nodes, heights, index, if is_high { LEVELS_BELOW + 1 } else { LEVELS_BELOW }, &mut around);
-        let rounds = if is_high { MANY_ROUNDS } else { 4 * FEW_ROUNDS };
-        let own = if is_fitted { Sphere::around(&around, rounds) } else { Sphere::of(&nodes[index]) };
-        let fitted = outer.map_or(own, |outer| own.inside(outer, &around));
-        fitted.give(&mut nodes[index]);
+        let outer = if index == 0 { outer } else { Sphere::of(&nodes[parents[index] as usize]) };
+        let mut levels = LEVELS_BELOW;
+        let mut own = Sphere::of(&nodes[index]);
+        if heights[index] >= FITTED_HEIGHT {
+            descendants(nodes, index, levels, &mut around);
+            own = Sphere::around(&around, MANY_ROUNDS);
+        } else if outer.holds(&own) {
+            continue;
+        }
+        if !outer.holds(&own) {
+            descendants(nodes, index, levels, &mut around);
+            // What sticks out of the outer sphere is looked at more closely; the leaves do not.
+            while levels < u32::from(heights[index]) && Sphere::reach(outer.center, &around) > outer.radius {
+                levels += 1;
+                descendants(nodes, index, levels, &mut around);
+            }
+            own = own.moved_inside(&outer, &around);
+        }
+        own.give(&mut nodes[index]);
     }
+}
+
+pub(crate) fn children_of(node: &Node) -> std::ops::Range<usize> {
+    node.first_child as usize..(node.first_child + node.children) as usize
+}
+
+/// The spheres of descendants some levels below the children of a node, or of leaves where there are none so deep.
+fn descendants(nodes: &[Node], index: usize, levels: u32, found: &mut Vec<Sphere>) {
+    fn walk(nodes: &[Node], index: usize, levels: u32, found: &mut Vec<Sphere>) {
+        for child in children_of(&nodes[index]) {
+            if levels == 0 || nodes[child].is_leaf() {
+                found.push(Sphere::of(&nodes[child]));
+            } else {
+                walk(nodes, child, levels - 1, found);
+            }
+        }
+    }
+    found.clear();
+    walk(nodes, index, levels, found);
 }
 
 /// Directions in which the farthest spheres are looked for: the axes of a cube, of its edges and of its corners.
@@ -208,22 +234,4 @@ pub(crate) fn enclosing<T: Sync>(
     };
     around.radius = items.par_iter().with_min_len(1 << 14).map(reach).reduce(|| 0.0, f64::max) * (1.0 + 1e-6);
     around
-}
-
-pub(crate) fn children_of(node: &Node) -> std::ops::Range<usize> {
-    node.first_child as usize..(node.first_child + node.children) as usize
-}
-
-/// The spheres of descendants some levels below a node, but none lower than the nodes whose spheres stay as they are.
-fn descendants(nodes: &[Node], heights: &[u8], index: usize, levels: u32, found: &mut Vec<Sphere>) {
-    fn walk(nodes: &[Node], heights: &[u8], index: usize, levels: u32, found: &mut Vec<Sphere>) {
-        for child in children_of(&nodes[index]) {
-            if levels == 0 || heights[child] < FITTED_HEIGHT {
-                found.push(Sphere::of(&nodes[child]));
-            } else {
-                walk(nodes, heights, child, levels - 1, found);
-            }
-        }
-    }
-    walk(nodes, heights, index, levels, found);
 }

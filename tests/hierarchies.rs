@@ -1,0 +1,320 @@
+//! Trees of splats: what every one promises, and that pictures of their cuts are those of the splats.
+
+use glam::{DVec3, Vec3};
+use splatkit::{
+    compare::compare_pictures,
+    engine::{AdapterChoice, Gpu, Renderer},
+    hierarchy::{
+        BuildOptions, Cut, Detail, Hierarchy, Preset, SHARE_UNIT, Severity, Tree,
+        file::{WriteOptions, to_bytes},
+        validate,
+    },
+    io::Limits,
+    math::{Bounds, Camera, View},
+    picture::Picture,
+    reference,
+    scene::{Scene, Settings},
+    splat::SplatSet,
+    surface::{Mesh, SurfelOptions},
+};
+use std::path::Path;
+
+/// A knotted tube of about so many vertices, coloured by place.
+fn knot(count: u32) -> SplatSet {
+    let around = f64::from(count / 12).sqrt() as u32;
+    let mut mesh = Mesh::knot(12 * around, around);
+    mesh.origin = DVec3::new(1000.0, -2000.0, 300.0);
+    mesh.colors = mesh
+        .positions
+        .iter()
+        .map(|p| (p.normalize() * 100.0 + 150.0).extend(255.0).to_array().map(|v| v as u8))
+        .collect();
+    mesh.surfels(&SurfelOptions::default()).expect("surfels")
+}
+
+fn build(set: &SplatSet, block_splats: usize) -> Tree {
+    Tree::build(set, &BuildOptions { block_splats, ..BuildOptions::default() }, &|_, _| ()).expect("a tree")
+}
+
+/// Looks at a set from where it fills this part of the picture.
+fn camera(bounds: &Bounds, part: f64) -> Camera {
+    let mut camera = Camera::framing(bounds, DVec3::new(1.0, -2.0, 0.7), DVec3::Z, 1.0);
+    camera.position = camera.focal_point + (camera.position - camera.focal_point) / part;
+    camera
+}
+
+fn renderer() -> Renderer {
+    Renderer::new(&Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver"))
+}
+
+fn settings(pixels: f64) -> Settings {
+    Settings { detail: Detail::Pixels(pixels), ..Settings::new([160, 160]) }
+}
+
+fn decibels(a: &Picture, b: &Picture) -> f64 {
+    compare_pictures(a, b).expect("pictures of one size").psnr.unwrap_or(f64::INFINITY)
+}
+
+#[test]
+fn trees_of_every_preset_keep_their_promises_and_all_splats() {
+    let set = knot(20_000);
+    let mut wanted: Vec<[u8; 48]> = set.splats.iter().map(bytes).collect();
+    wanted.sort_unstable();
+    for preset in [Preset::Fastest, Preset::Fast, Preset::Balanced, Preset::Slow, Preset::Best] {
+        for block_splats in [1 << 20, 1000] {
+            let options = BuildOptions { preset, block_splats, ..BuildOptions::default() };
+            let tree = Tree::build(&set, &options, &|_, _| ()).expect("a tree");
+            assert_eq!(tree.is_joined(), block_splats == 1000);
+            let errors: Vec<_> = validate(&tree).into_iter().filter(|f| f.severity == Severity::Error).collect();
+            assert!(errors.is_empty(), "{preset:?}: {errors:?}");
+            let mut leaves: Vec<[u8; 48]> =
+                tree.nodes().filter(|node| node.is_leaf()).map(|node| bytes(&node.splat)).collect();
+            leaves.sort_unstable();
+            assert_eq!(leaves, wanted, "{preset:?}");
+            let inner = tree.nodes().count() - leaves.len();
+            assert!(inner * 4 < leaves.len(), "{inner} nodes above {} leaves", leaves.len());
+        }
+    }
+}
+
+fn bytes(splat: &splatkit::splat::Splat) -> [u8; 48] {
+    bytemuck::cast(*splat)
+}
+
+/// The smallest sphere around the leaves' spheres, nearly: by many small steps.
+fn smallest_sphere(tree: &Tree) -> f64 {
+    let leaves: Vec<(DVec3, f64)> = tree
+        .nodes()
+        .filter(|node| node.is_leaf())
+        .map(|node| (Vec3::from(node.center).as_dvec3(), f64::from(node.radius)))
+        .collect();
+    let mut center = leaves.iter().map(|leaf| leaf.0).sum::<DVec3>() / leaves.len() as f64;
+    let mut best = f64::INFINITY;
+    for round in 0..2000 {
+        let reach = |leaf: &&(DVec3, f64)| leaf.0.distance(center) + leaf.1;
+        let Some(far) = leaves.iter().max_by(|a, b| reach(a).total_cmp(&reach(b))) else { break };
+        best = best.min(reach(&far));
+        center += (far.0 - center) / f64::from(round + 2);
+    }
+    best
+}
+
+#[test]
+fn root_spheres_are_nearly_the_smallest() {
+    for (name, set) in
+        [("knot", knot(20_000)), ("ball", Mesh::sphere(5).surfels(&SurfelOptions::default()).expect("surfels"))]
+    {
+        for block_splats in [1 << 20, 1000] {
+            let tree = build(&set, block_splats);
+            let inflation = f64::from(tree.blocks[0].nodes[0].radius) / smallest_sphere(&tree);
+            println!("{name} in blocks of {block_splats}: {inflation:.3}");
+            assert!((0.999..1.05).contains(&inflation), "{name}: {inflation}");
+        }
+    }
+}
+
+/// Along every way from the root to a leaf the shares of a cut add up to the whole.
+#[test]
+fn shares_add_up_on_every_way_down() {
+    let set = knot(5_000);
+    for block_splats in [1 << 20, 500] {
+        let tree = build(&set, block_splats);
+        for (part, pixels) in [(1.0, 4.0), (0.5, 2.0), (0.1, 1.0), (3.0, 30.0)] {
+            let view = camera(&set.bounds(), part).view([4000, 4000]).expect("a view");
+            // The picture is so wide that nothing is beside it.
+            let view = View { center: view.center + 1e6, size: [2_000_000; 2], ..view };
+            let cut = Cut::new(&view, tree.origin, pixels, false);
+            let selected: std::collections::HashMap<*const _, u32> =
+                tree.selected(&cut).into_iter().map(|(node, share)| (std::ptr::from_ref(node), share)).collect();
+            let share =
+                |node: &splatkit::hierarchy::Node| selected.get(&std::ptr::from_ref(node)).copied().unwrap_or(0);
+            let mut ways = 0;
+            let mut open = vec![(0usize, 0usize, 0u32)];
+            while let Some((block, index, above)) = open.pop() {
+                let node = &tree.blocks[block].nodes[index];
+                let child_block = tree.blocks.iter().position(|b| block == 0 && b.portal == Some(index as u32));
+                if let Some(child) = child_block {
+                    open.push((child, 0, above));
+                    continue;
+                }
+                let sum = above + share(node);
+                if node.is_leaf() {
+                    assert_eq!(sum, SHARE_UNIT);
+                    ways += 1;
+                }
+                open.extend(
+                    (node.first_child..node.first_child + node.children).map(|child| (block, child as usize, sum)),
+                );
+            }
+            assert_eq!(ways, set.splats.len());
+        }
+    }
+}
+
+/// The engine selects on the GPU what the CPU finds, in one block and in many, in memory and from a file.
+#[test]
+fn the_engine_draws_the_cut_that_the_oracle_finds() {
+    let set = knot(8_000);
+    let mut renderer = renderer();
+    for block_splats in [1 << 20, 700] {
+        let tree = build(&set, block_splats);
+        let file = to_bytes(&tree, &WriteOptions { lossless: true, ..WriteOptions::default() }).expect("a file");
+        let file = Hierarchy::from_bytes(file, Path::new("memory"), &Limits::default()).expect("a hierarchy");
+        let memory = Hierarchy::from_tree(tree.clone()).expect("a hierarchy");
+        for hierarchy in [memory, file] {
+            let mut prepared = renderer.prepare(&Scene::new().with_hierarchy(hierarchy)).expect("prepared");
+            for (part, pixels) in [(1.0, 0.0), (1.0, 3.0), (0.3, 1.0), (0.3, 4.0), (2.5, 5.0)] {
+                for orthographic in [false, true] {
+                    let mut camera = camera(&set.bounds(), part);
+                    if orthographic {
+                        camera.make_orthographic();
+                    }
+                    let settings = settings(pixels);
+                    let (found, stats) = renderer.render(&mut prepared, &camera, &settings).expect("a picture");
+                    let view = camera.view(settings.size).expect("a view");
+                    let cut = tree.cut(&view, settings.detail, None).expect("a cut");
+                    if part <= 1.0 {
+                        assert_eq!(stats.splats, cut.splats.len() as u64, "{part} {pixels}");
+                    }
+                    let mut flat = renderer.prepare(&Scene::new().with_splats(cut)).expect("prepared");
+                    // The same sheets need the same bounds, which a cut's splats have but nearly.
+                    let (expected, _) = renderer.render(&mut flat, &camera, &settings).expect("a picture");
+                    let agreement = decibels(&found, &expected);
+                    assert!(agreement > 40.0, "{part} {pixels}: {agreement:.1} dB");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_engine_matches_the_reference() {
+    let set = knot(1_500);
+    let tree = build(&set, 300);
+    let scene = Scene::new().with_hierarchy(Hierarchy::from_tree(tree).expect("a hierarchy"));
+    let mut renderer = renderer();
+    let mut prepared = renderer.prepare(&scene).expect("prepared");
+    for pixels in [0.0, 2.0, 6.0] {
+        let settings = Settings { detail: Detail::Pixels(pixels), ..Settings::new([64, 64]) };
+        let camera = camera(&scene.bounds(), 0.9);
+        let (found, _) = renderer.render(&mut prepared, &camera, &settings).expect("a picture");
+        let expected = reference::render(&scene, &camera, &settings).expect("a picture");
+        let agreement = decibels(&found, &expected);
+        println!("{pixels}: {agreement:.1} dB");
+        assert!(agreement > 50.0, "{pixels}: {agreement:.1} dB");
+    }
+}
+
+/// Pixels that all of the leaves' picture's neighbourhood covers, but the cut's does not.
+fn holes(leaves: &Picture, cut: &Picture) -> usize {
+    let [width, height] = [leaves.width as i32, leaves.height as i32];
+    let covered = |x: i32, y: i32| {
+        (0..width).contains(&x) && (0..height).contains(&y) && leaves.color[(y * width + x) as usize][3] > 0.99
+    };
+    let inside = |x: i32, y: i32| (-2..=2).all(|i| (-2..=2).all(|j| covered(x + i, y + j)));
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    pixels.filter(|&(x, y)| inside(x, y) && cut.color[(y * width + x) as usize][3] < 0.9).count()
+}
+
+#[test]
+fn coarse_cuts_have_no_holes_and_look_like_the_leaves() {
+    let set = knot(60_000);
+    let hierarchy = Hierarchy::from_tree(build(&set, 1 << 16)).expect("a hierarchy");
+    let mut renderer = renderer();
+    let mut prepared = renderer.prepare(&Scene::new().with_hierarchy(hierarchy)).expect("prepared");
+    for part in [0.9, 0.4, 0.15] {
+        let camera = camera(&set.bounds(), part);
+        let (leaves, all) = renderer.render(&mut prepared, &camera, &settings(0.0)).expect("a picture");
+        let mut last = f64::INFINITY;
+        for (pixels, least) in [(1.0, 40.0), (2.0, 33.0), (4.0, 28.0)] {
+            let (cut, stats) = renderer.render(&mut prepared, &camera, &settings(pixels)).expect("a picture");
+            let agreement = decibels(&cut, &leaves);
+            println!("{part} {pixels}: {} of {} splats, {agreement:.1} dB", stats.splats, all.splats);
+            assert_eq!(holes(&leaves, &cut), 0, "{part} {pixels}");
+            assert!(agreement > least, "{part} {pixels}: {agreement:.1} dB");
+            assert!(agreement <= last + 3.0, "coarser cuts are no better");
+            last = agreement;
+        }
+    }
+}
+
+#[test]
+fn a_budget_of_splats_is_kept_and_used() {
+    let set = knot(30_000);
+    let hierarchy = Hierarchy::from_tree(build(&set, 4000)).expect("a hierarchy");
+    let mut renderer = renderer();
+    let mut prepared = renderer.prepare(&Scene::new().with_hierarchy(hierarchy)).expect("prepared");
+    for most in [100, 1000, 10_000, 1_000_000] {
+        let settings = Settings { detail: Detail::Splats(most), ..settings(0.0) };
+        let camera = camera(&set.bounds(), 0.9);
+        let (_, stats) = renderer.render(&mut prepared, &camera, &settings).expect("a picture");
+        let all = set.splats.len() as u64;
+        assert!(stats.splats <= most && stats.splats * 2 > most.min(all), "{} of {most}", stats.splats);
+    }
+}
+
+/// With room for few pages the coarse ones are drawn: less sharp, but whole. With more room the picture is that of all.
+#[test]
+fn a_page_cache_of_any_size_draws_a_whole_picture() {
+    let set = knot(120_000);
+    let tree = build(&set, 20_000);
+    let mut renderer = renderer();
+    let camera = camera(&set.bounds(), 0.9);
+    let mut draw = |room: u64, detail: f64| {
+        let hierarchy = Hierarchy::from_tree(tree.clone()).expect("a hierarchy");
+        let mut prepared = renderer.prepare(&Scene::new().with_hierarchy(hierarchy)).expect("prepared");
+        let settings = Settings { page_memory: room, ..settings(detail) };
+        renderer.render(&mut prepared, &camera, &settings).expect("a picture")
+    };
+    let (all, stats) = draw(1 << 30, 0.0);
+    assert_eq!((stats.missing_pages, stats.splats), (0, set.splats.len() as u64));
+    let mut last = 0.0;
+    for pages in [4, 12, 24] {
+        let (some, stats) = draw(pages * 4096 * 96, 0.0);
+        assert!(stats.missing_pages > 0 && stats.splats < set.splats.len() as u64);
+        assert_eq!(holes(&all, &some), 0, "{pages} pages");
+        let agreement = decibels(&some, &all);
+        println!("{pages} pages: {} missing, {} splats, {agreement:.1} dB", stats.missing_pages, stats.splats);
+        assert!(agreement > last, "{agreement}");
+        last = agreement;
+    }
+}
+
+/// Pages come and go while the view moves; what is drawn does not depend on what was at hand before.
+#[test]
+fn a_view_looks_the_same_however_it_was_reached() {
+    let set = knot(60_000);
+    let tree = build(&set, 10_000);
+    let mut renderer = renderer();
+    let hierarchy = || Hierarchy::from_tree(tree.clone()).expect("a hierarchy");
+    let mut wanderer = renderer.prepare(&Scene::new().with_hierarchy(hierarchy())).expect("prepared");
+    for part in [0.1, 2.0, 0.9, 4.0, 0.3] {
+        let camera = camera(&set.bounds(), part);
+        let settings = Settings { page_memory: 20 * 4096 * 96, ..settings(2.0) };
+        let (found, _) = renderer.render(&mut wanderer, &camera, &settings).expect("a picture");
+        let mut fresh = renderer.prepare(&Scene::new().with_hierarchy(hierarchy())).expect("prepared");
+        let (expected, _) = renderer.render(&mut fresh, &camera, &settings).expect("a picture");
+        // The order of the splats differs, and with it the rounding of their sums.
+        assert!(decibels(&found, &expected) > 60.0, "{part}: {:.1} dB", decibels(&found, &expected));
+    }
+}
+
+#[test]
+fn a_closed_surface_looks_the_same_without_what_faces_away() {
+    let set = knot(30_000);
+    let hierarchy = Hierarchy::from_tree(build(&set, 1 << 16)).expect("a hierarchy");
+    let mut renderer = renderer();
+    let mut prepared = renderer.prepare(&Scene::new().with_hierarchy(hierarchy)).expect("prepared");
+    for pixels in [0.0, 2.0] {
+        let camera = camera(&set.bounds(), 0.9);
+        let mut draw = |cull| {
+            let settings = Settings { cull_backfaces: Some(cull), ..settings(pixels) };
+            renderer.render(&mut prepared, &camera, &settings).expect("a picture")
+        };
+        let ((all, whole), (front, culled)) = (draw(false), draw(true));
+        let agreement = decibels(&front, &all);
+        println!("{pixels}: {} of {} splats, {agreement:.1} dB", culled.splats, whole.splats);
+        assert!(culled.splats * 10 < whole.splats * 8);
+        assert!(agreement > 40.0, "{agreement:.1} dB");
+    }
+}
