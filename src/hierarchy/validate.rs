@@ -177,7 +177,8 @@ fn bounds(node: &Node, below: &Node, place: impl Fn() -> String, findings: &mut 
     if node.cone > -1.0 {
         let wanted = libm::cos(joint_angle(node, below));
         if f64::from(node.cone) > wanted + 1e-6 {
-            let message = format!("its cone needs one of cosine {wanted} around its parent's normal, which has {}", node.cone);
+            let message =
+                format!("its cone needs one of cosine {wanted} around its parent's normal, which has {}", node.cone);
             findings.push(Finding::error("cone", place(), message));
         }
     }

@@ -91,10 +91,15 @@ impl Code {
         let radius = children.iter().map(|child| reach(center, child)).fold(0.0, f64::max) * (1.0 + 1e-12);
         let size = children.iter().map(|child| child.size).fold(0.0, f32::max);
         code.radius = (f64::from(RADIUS_STEPS) * libm::log2(radius / own)).ceil().clamp(-4096.0, 4096.0) as i32 - 1;
-        code.size = ((f64::from(SIZE_STEPS) * libm::log2(f64::from(size) / (FULL_WIDTH * largest))).ceil().clamp(0.0, 4096.0) as i32 - 1).max(0);
-        let is_around = |node: &Node| node.cone == -1.0 || children.iter().all(|child| {
-            f64::from(node.cone) <= libm::cos(joint_angle(node, child))
-        });
+        code.size = ((f64::from(SIZE_STEPS) * libm::log2(f64::from(size) / (FULL_WIDTH * largest)))
+            .ceil()
+            .clamp(0.0, 4096.0) as i32
+            - 1)
+        .max(0);
+        let is_around = |node: &Node| {
+            node.cone == -1.0
+                || children.iter().all(|child| f64::from(node.cone) <= libm::cos(joint_angle(node, child)))
+        };
         loop {
             code.decode(node, shape, extent)?;
             match () {

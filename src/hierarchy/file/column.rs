@@ -253,7 +253,9 @@ mod tests {
 
     #[test]
     fn classes_hold_every_number() {
-        for value in (0..2000).chain((4..32).flat_map(|bit| [(1u32 << bit) - 1, 1 << bit, 1 << bit | 5])).chain([u32::MAX]) {
+        for value in
+            (0..2000).chain((4..32).flat_map(|bit| [(1u32 << bit) - 1, 1 << bit, 1 << bit | 5])).chain([u32::MAX])
+        {
             let (class, bits) = class(value);
             let (least, same) = least(class).unwrap();
             assert_eq!((bits, value - least < 1 << bits), (same, true), "{value}");

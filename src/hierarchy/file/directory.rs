@@ -195,7 +195,8 @@ impl Directory {
     pub fn decode(bytes: &[u8], stored: &Stored) -> Result<Self, Trouble> {
         let start = stored.length();
         let length = Self::length(stored.blocks as usize, stored.pages as usize);
-        let Some(all) = usize::try_from(length).ok().and_then(|length| bytes.get(start..start.checked_add(length)?)) else {
+        let Some(all) = usize::try_from(length).ok().and_then(|length| bytes.get(start..start.checked_add(length)?))
+        else {
             return Err(Trouble::Incomplete);
         };
         let (content, stated) = all.split_at(all.len() - 4);

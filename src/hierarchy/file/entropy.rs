@@ -63,7 +63,8 @@ impl Table {
         if listed.count() + 1 != codes.len() || codes.len() > SYMBOLS {
             return None;
         }
-        let frequencies: Vec<u32> = codes.iter().map(|&code| if code == REST { left } else { frequency(code) }).collect();
+        let frequencies: Vec<u32> =
+            codes.iter().map(|&code| if code == REST { left } else { frequency(code) }).collect();
         let starts = frequencies.iter().scan(0, |next, &frequency| {
             let start = *next;
             *next += frequency;

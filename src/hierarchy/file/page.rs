@@ -91,7 +91,10 @@ fn siblings(nodes: &[Node], run: &Run) -> Vec<Range<usize>> {
     let start = run.nodes.start;
     let parents = nodes[run.parents.clone()].iter().filter(|node| !node.is_leaf());
     let children = parents.map(|node| node.first_child as usize..(node.first_child + node.children) as usize);
-    children.filter(|group| run.nodes.contains(&group.start)).map(|group| group.start - start..group.end - start).collect()
+    children
+        .filter(|group| run.nodes.contains(&group.start))
+        .map(|group| group.start - start..group.end - start)
+        .collect()
 }
 
 /// Puts the leaves among siblings in an order in which each is near the one before: nothing depends on their order, and

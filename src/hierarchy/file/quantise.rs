@@ -267,13 +267,14 @@ impl Code {
     /// All that is left once the shape is known.
     fn splat(&self, shape: &Shape, is_leaf: bool, before: &mut Before) -> Option<Splat> {
         let axes = &shape.axes;
-        let normal =
-            if self.axes == Axes::Bare { NO_NORMAL } else { octahedron::packed(before.facing, before.normal) };
+        let normal = if self.axes == Axes::Bare { NO_NORMAL } else { octahedron::packed(before.facing, before.normal) };
         let step = shape.step(is_leaf);
         let [x, y, z] = self.position.map(|count| step * f64::from(count));
         let across = axes[0] * x + axes[1] * y;
         let direction = if self.axes == Axes::Normal { Some(axes[2]) } else { None };
-        let center = DVec3::from(before.center.map(f64::from)) + across + axes[2] * (rise(before.direction, direction, across) + z);
+        let center = DVec3::from(before.center.map(f64::from))
+            + across
+            + axes[2] * (rise(before.direction, direction, across) + z);
         before.center = center.to_array().map(|value| value as f32);
         before.direction = direction;
         for (before, more) in before.color.iter_mut().zip(self.color) {
@@ -282,7 +283,11 @@ impl Code {
         let alpha = u32::try_from(self.color[3]).ok().filter(|&alpha| alpha < 256)?;
         let strength = match self.strength {
             NO_STRENGTH => 0.0,
-            steps => (f64::from(before.strength) * power(steps.clamp(-MOST_STRENGTH, MOST_STRENGTH) * (PARTS / STRENGTH_STEPS))) as f32,
+            steps => {
+                (f64::from(before.strength)
+                    * power(steps.clamp(-MOST_STRENGTH, MOST_STRENGTH) * (PARTS / STRENGTH_STEPS)))
+                    as f32
+            }
         };
         let color = color(before.color)? | alpha << 24;
         let splat = Splat { center: before.center, strength, factor: shape.factor(), color, normal };
@@ -325,7 +330,12 @@ impl Code {
             turn,
             normal: [0, 1].map(|i| place[i] - before.normal[i]),
             position: [0; 3],
-            color: [luma[0] - before.color[0], luma[1] - before.color[1], luma[2] - before.color[2], (splat.color >> 24) as i32],
+            color: [
+                luma[0] - before.color[0],
+                luma[1] - before.color[1],
+                luma[2] - before.color[2],
+                (splat.color >> 24) as i32,
+            ],
             strength,
         };
         // Once all else is known, the steps of the position are.

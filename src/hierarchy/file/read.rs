@@ -150,7 +150,9 @@ impl Hierarchy {
             directory.push_block(&runs, &arounds(&block.nodes, &runs), &vec![Place::default(); runs.len()]);
             match (number, block.portal) {
                 (0, None) => {}
-                (1.., Some(portal)) if top.nodes.get(portal as usize).is_some_and(Node::is_leaf) => portals.push(portal),
+                (1.., Some(portal)) if top.nodes.get(portal as usize).is_some_and(Node::is_leaf) => {
+                    portals.push(portal)
+                }
                 (_, portal) => return Err(refuse(format!("its portal is {portal:?}"))),
             }
         }
@@ -314,7 +316,10 @@ impl Hierarchy {
 
     fn entry(&self, page: u32) -> Result<&PageEntry> {
         let count = self.directory.pages.len();
-        self.directory.pages.get(page as usize).ok_or_else(|| Error::Argument(format!("there is no page {page} among {count}")))
+        self.directory
+            .pages
+            .get(page as usize)
+            .ok_or_else(|| Error::Argument(format!("there is no page {page} among {count}")))
     }
 
     /// The nodes of a page alone.

@@ -208,8 +208,8 @@ impl Writer {
         let mut places = Vec::with_capacity(pages.len());
         for bytes in pages {
             let offset = self.spill.push(bytes);
-            let offset = offset
-                .map_err(|e| Error::file(self.path.as_deref().unwrap_or(Path::new("memory")), "write", e))?;
+            let offset =
+                offset.map_err(|e| Error::file(self.path.as_deref().unwrap_or(Path::new("memory")), "write", e))?;
             places.push(Place { offset, bytes: bytes.len() as u32, crc: crc32fast::hash(bytes) });
         }
         Ok(places)
