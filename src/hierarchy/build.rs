@@ -128,13 +128,7 @@ pub(crate) struct Builder {
 }
 
 impl Builder {
-    pub fn new(
-        path: &Path,
-        extent: f32,
-        outer: Sphere,
-        preset: Preset,
-        options: &WriteOptions,
-    ) -> Result<Self> {
+    pub fn new(path: &Path, extent: f32, outer: Sphere, preset: Preset, options: &WriteOptions) -> Result<Self> {
         Ok(Self { writer: Writer::new(path, extent, options)?, outer, preset, roots: Vec::new() })
     }
 

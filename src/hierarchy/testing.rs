@@ -165,9 +165,10 @@ fn branch(leaves: &mut [Node]) -> Branch {
         return Branch::Leaf(*leaf);
     }
     let node = merge(leaves);
+    let count = leaves.len();
     let mut groups = vec![leaves];
     // Not every node has all children that it could have.
-    let most = 3 + (node.splat.center[0].to_bits() % 6) as usize;
+    let most = if count <= 8 { 8 } else { 4 + (node.splat.center[0].to_bits() % 5) as usize };
     while groups.len() < most {
         let Some(largest) = (0..groups.len()).filter(|&g| groups[g].len() > 1).max_by_key(|&g| groups[g].len()) else {
             break;

@@ -4,6 +4,7 @@
 //! columns that mean something here are decoded in parallel. Other elements and columns are passed over. A text file
 //! that ends within its very last number cannot be told from a whole one and reads as that shorter number.
 
+mod gaussians;
 mod header;
 mod rows;
 mod samples;
@@ -17,6 +18,7 @@ use crate::{
     Result,
     surface::{Material, Mesh},
 };
+pub use gaussians::{write_gaussian_leaves, write_gaussians};
 use glam::{DVec3, Vec2, Vec3};
 use header::{Element, width};
 use ply_rs::ply::{PropertyType, ScalarType};

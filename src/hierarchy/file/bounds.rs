@@ -3,21 +3,24 @@
 use super::{
     page::{cosine_below, joint_angle},
     pages::reach,
-    quantise::{FULL_WIDTH, Shape, power},
+    quantise::{FULL_WIDTH, PARTS, Shape, power},
 };
 use crate::{hierarchy::Node, splat::NO_NORMAL};
 use glam::DVec3;
 use std::{f64::consts::PI, sync::LazyLock};
 
 /// Steps of a sphere's centre in the reach of the splat's own footprint.
-const CENTER_STEPS: f64 = 32.0;
+const CENTER_STEPS: f64 = 24.0;
+/// Steps of the radius and of the size in a doubling.
+const RADIUS_STEPS: i32 = 24;
+const SIZE_STEPS: i32 = 16;
 /// Half-angles of cones are this far apart.
-const CONE_STEP: f64 = PI / 90.0;
+const CONE_STEP: f64 = PI / 60.0;
 /// The cone of half a turn, beyond which there is none worth telling.
-const NO_CONE: i32 = 46;
+const NO_CONE: i32 = 31;
 /// The farthest that a centre may be: beyond, no number of 32 bits tells it.
 const MOST_STEPS: f64 = (1 << 20) as f64;
-const MOST_POWER: i32 = 32 * 64;
+const MOST_POWER: i32 = RADIUS_STEPS * 64;
 
 /// The bounds of an inner node.
 #[derive(Debug, Clone, Copy)]
@@ -64,8 +67,8 @@ impl Code {
             center += *axis * (f64::from(steps) * own / CENTER_STEPS);
         }
         node.center = center.to_array().map(|value| value as f32);
-        node.radius = (own * power(self.radius)) as f32;
-        node.size = (FULL_WIDTH * largest * power(self.size * 2)) as f32;
+        node.radius = (own * power(self.radius * (PARTS / RADIUS_STEPS))) as f32;
+        node.size = (FULL_WIDTH * largest * power(self.size * (PARTS / SIZE_STEPS))) as f32;
         (node.center.iter().chain([&node.radius, &node.size]).copied().all(f32::is_finite)).then_some(())
     }
 
@@ -87,9 +90,12 @@ impl Code {
         let center = node.center().as_dvec3();
         let radius = children.iter().map(|child| reach(center, child)).fold(0.0, f64::max) * (1.0 + 1e-12);
         let size = children.iter().map(|child| child.size).fold(0.0, f32::max);
-        code.radius = (32.0 * libm::log2(radius / own)).ceil().clamp(-4096.0, 4096.0) as i32 - 1;
-        code.size =
-            ((16.0 * libm::log2(f64::from(size) / (FULL_WIDTH * largest))).ceil().clamp(0.0, 4096.0) as i32 - 1).max(0);
+        code.radius = (f64::from(RADIUS_STEPS) * libm::log2(radius / own)).ceil().clamp(-4096.0, 4096.0) as i32 - 1;
+        code.size = ((f64::from(SIZE_STEPS) * libm::log2(f64::from(size) / (FULL_WIDTH * largest)))
+            .ceil()
+            .clamp(0.0, 4096.0) as i32
+            - 1)
+        .max(0);
         let is_around = |node: &Node| {
             node.cone == -1.0
                 || children.iter().all(|child| f64::from(node.cone) <= libm::cos(joint_angle(node, child)))

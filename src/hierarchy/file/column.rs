@@ -1,17 +1,12 @@
 //! Columns of whole numbers as bytes.
 //!
-//! Every number becomes a class, which tells its size to a quarter, and the bits below. The classes of all columns go
-//! through zstd, which comes near their entropy; the bits below are as good as random and stand as they are.
+//! Every number becomes a class, which tells its size to a quarter, and the bits below. Classes take about their entropy;
+//! the bits below are as good as random and stand as they are.
 
-use super::bytes::Cursor;
-use std::cell::RefCell;
-use zstd::stream::raw::{Encoder, InBuffer, Operation, OutBuffer};
-
-/// What zstd does for the size. Classes hardly repeat in longer runs, so that searching longer gains nothing.
-const LEVEL: i32 = 1;
-
-/// The most bytes of the classes of a page and of what stands before them.
-const MOST_BYTES: usize = 1 << 19;
+use super::{
+    bytes::{Cursor, Put},
+    entropy::{Decoder, Encoder, SYMBOLS, Table},
+};
 
 /// How the numbers of a column became what is coded, each 0 or above.
 #[derive(Clone, Copy, PartialEq)]
@@ -58,55 +53,46 @@ fn least(class: u8) -> Option<(u32, u32)> {
 /// Collects the columns of a page.
 #[derive(Default)]
 pub struct Columns {
-    /// Each column's mode, base and classes.
-    planes: Vec<u8>,
-    ends: Vec<usize>,
+    /// Each column's mode and base, and the table of its classes.
+    heads: Vec<u8>,
+    classes: Vec<(Vec<u8>, Table)>,
     bits: Bits,
 }
 
 impl Columns {
     pub fn push(&mut self, values: &[i32]) {
         let (mode, base) = choose(values);
-        self.planes.push(mode as u8);
-        self.planes.extend(base.to_le_bytes());
-        let mut before = 0;
-        for &value in values.iter().filter(|_| mode != Mode::Constant) {
-            let (class, bits) = class(coded(mode, base, before, value));
-            self.planes.push(class);
-            self.bits.put(coded(mode, base, before, value), bits);
-            before = value;
+        self.heads.push(mode as u8);
+        if matches!(mode, Mode::Constant | Mode::Above) {
+            self.heads.extend(base.to_le_bytes());
         }
-        self.ends.push(self.planes.len());
+        if mode == Mode::Constant {
+            return;
+        }
+        let mut counts = [0; SYMBOLS];
+        let mut before = 0;
+        let class = |&value: &i32| {
+            let coded = coded(mode, base, before, value);
+            let (class, bits) = class(coded);
+            counts[usize::from(class)] += 1;
+            self.bits.put(coded, bits);
+            before = value;
+            class
+        };
+        let classes: Vec<u8> = values.iter().map(class).collect();
+        let table = Table::of(&counts);
+        table.write(&mut self.heads);
+        self.classes.push((classes, table));
     }
 
-    /// The bytes: lengths of the classes before and after zstd, these, then the bits below.
+    /// The bytes: the heads of the columns, all classes, then the bits below; the first two behind their lengths.
     pub fn finish(self, out: &mut Vec<u8>) {
-        thread_local! {
-            static ENCODER: RefCell<Option<Encoder<'static>>> = const { RefCell::new(None) };
+        let mut encoder = Encoder::new();
+        self.classes.iter().rev().for_each(|(classes, table)| encoder.put(classes, table));
+        for part in [self.heads, encoder.finish()] {
+            out.u32(part.len() as u32);
+            out.extend(part);
         }
-        let mut packed = vec![0; zstd::zstd_safe::compress_bound(self.planes.len()) + 64 * (self.ends.len() + 1)];
-        let length = ENCODER.with_borrow_mut(|encoder| {
-            let encoder = encoder.get_or_insert_with(|| Encoder::new(LEVEL).expect("zstd has this level"));
-            encoder.reinit().expect("zstd can begin anew");
-            let mut to = OutBuffer::around(&mut packed);
-            let mut start = 0;
-            for &end in &self.ends {
-                let mut from = InBuffer::around(&self.planes[start..end]);
-                while from.pos < end - start {
-                    encoder.run(&mut from, &mut to).expect("memory can be compressed");
-                }
-                // Each column in a block of its own, with a table of its own, where there is enough to tell.
-                if end - start > 64 {
-                    while encoder.flush(&mut to).expect("memory can be compressed") > 0 {}
-                }
-                start = end;
-            }
-            while encoder.finish(&mut to, true).expect("memory can be compressed") > 0 {}
-            to.pos()
-        });
-        out.extend((self.planes.len() as u32).to_le_bytes());
-        out.extend((length as u32).to_le_bytes());
-        out.extend(&packed[..length]);
         out.extend(self.bits.finish());
     }
 }
@@ -119,7 +105,7 @@ fn choose(values: &[i32]) -> (Mode, i32) {
     }
     let least = values.iter().copied().min().unwrap_or(0);
     let cost = |mode: Mode| {
-        let mut counts = [0u32; 128];
+        let mut counts = [0u32; SYMBOLS];
         let mut total = 0.0;
         let mut before = 0;
         for &value in values {
@@ -147,44 +133,38 @@ fn coded(mode: Mode, base: i32, before: i32, value: i32) -> u32 {
 }
 
 /// Takes the columns of a page one after another.
-pub struct Planes {
-    planes: Vec<u8>,
-    at: usize,
-    bits: BitReader,
+pub struct Planes<'a> {
+    heads: Cursor<'a>,
+    classes: Decoder<'a>,
+    bits: BitReader<'a>,
 }
 
-impl Planes {
+impl<'a> Planes<'a> {
     /// What [`Columns::finish`] gave, which ends with `bytes`.
-    pub fn new(bytes: &[u8]) -> Result<Self, String> {
+    pub fn new(bytes: &'a [u8]) -> Result<Self, String> {
         let mut cursor = Cursor::new(bytes);
-        let lengths = cursor.u32().zip(cursor.u32()).ok_or("it ends before its columns")?;
-        let (length, packed) = (lengths.0 as usize, lengths.1 as usize);
-        if length > MOST_BYTES {
-            return Err(format!("it claims {length} bytes of columns; {MOST_BYTES} are the most"));
-        }
-        let packed = cursor.take(packed).ok_or("it ends within its columns")?;
-        let planes = zstd::bulk::decompress(packed, length).map_err(|e| format!("it cannot be unpacked: {e}"))?;
-        if planes.len() != length {
-            return Err(format!("it unpacks to {} bytes where {length} were expected", planes.len()));
-        }
-        let rest = cursor.take(cursor.remaining()).unwrap_or(&[]);
-        Ok(Self { planes, at: 0, bits: BitReader::new(rest) })
+        let mut part = || {
+            let length = cursor.u32()? as usize;
+            cursor.take(length)
+        };
+        let (heads, classes) = part().zip(part()).ok_or("it ends within its columns")?;
+        let classes = Decoder::new(classes).ok_or("it has no classes")?;
+        let bits = BitReader::new(cursor.take(cursor.remaining()).unwrap_or(&[]));
+        Ok(Self { heads: Cursor::new(heads), classes, bits })
     }
 
     pub fn column(&mut self, count: usize) -> Result<Vec<i32>, String> {
         let ends = || "it ends before its last column".to_owned();
-        let mut cursor = Cursor::new(&self.planes[self.at..]);
-        let mode = cursor.u8().ok_or_else(ends)?;
-        let base = cursor.u32().ok_or_else(ends)? as i32;
-        self.at += 5;
+        let mode = self.heads.u8().ok_or_else(ends)?;
+        let base = if mode < 2 { self.heads.u32().ok_or_else(ends)? as i32 } else { 0 };
         if mode == Mode::Constant as u8 {
             return Ok(vec![base; count]);
         }
-        let classes = cursor.take(count).ok_or_else(ends)?;
-        self.at += count;
+        let table = Table::read(&mut self.heads).ok_or("the frequencies of a column do not add up")?;
+        let classes = self.classes.take(count, &table).ok_or_else(ends)?;
         let mut values = Vec::with_capacity(count);
         let mut before = 0i32;
-        for &class in classes {
+        for class in classes {
             let (least, bits) = least(class).ok_or("a class is none")?;
             let coded = least + self.bits.take(bits).ok_or("it ends before its last bits")?;
             before = match mode {
@@ -200,10 +180,10 @@ impl Planes {
 
     /// That nothing is left over.
     pub fn end(self) -> Result<(), String> {
-        if self.at == self.planes.len() && self.bits.is_at_end() {
+        if self.heads.remaining() == 0 && self.classes.is_at_end() && self.bits.is_at_end() {
             Ok(())
         } else {
-            Err("it goes on behind its last column".into())
+            Err("its columns do not end where it does".into())
         }
     }
 }
@@ -236,16 +216,16 @@ impl Bits {
     }
 }
 
-struct BitReader {
-    bytes: Vec<u8>,
+struct BitReader<'a> {
+    bytes: &'a [u8],
     at: usize,
     held: u64,
     count: u32,
 }
 
-impl BitReader {
-    fn new(bytes: &[u8]) -> Self {
-        Self { bytes: bytes.to_vec(), at: 0, held: 0, count: 0 }
+impl<'a> BitReader<'a> {
+    fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, at: 0, held: 0, count: 0 }
     }
 
     fn take(&mut self, count: u32) -> Option<u32> {

@@ -30,6 +30,7 @@ pub fn quantise(nodes: &mut [Node], extent: f32) -> Option<Codes> {
         center: nodes[0].splat.center,
         normal: [0; 2],
         color: [0; 3],
+        direction: None,
     };
     let mut before = begin;
     let mut codes = Vec::with_capacity(nodes.len());
@@ -175,7 +176,7 @@ pub fn decode(bytes: &[u8], count: usize, first_child: u32, extent: f32) -> Resu
     if facing >= 6 {
         return Err(format!("it faces the unknown axis {facing}"));
     }
-    let mut before = Before { facing, strength, center, normal: [0; 2], color: [0; 3] };
+    let mut before = Before { facing, strength, center, normal: [0; 2], color: [0; 3], direction: None };
     let mut planes = Planes::new(cursor.take(cursor.remaining()).unwrap_or(&[]))?;
     let children = planes.column(count)?;
     if let Some(odd) = children.iter().find(|&&children| !(0..=MOST_CHILDREN as i32).contains(&children)) {

@@ -9,6 +9,7 @@ mod bytes;
 mod check;
 mod column;
 mod directory;
+mod entropy;
 mod header;
 mod lossless;
 mod lossy;

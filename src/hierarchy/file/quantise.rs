@@ -12,18 +12,18 @@ use std::{f64::consts::PI, sync::LazyLock};
 pub const FULL_WIDTH: f64 = 2.354_820_045_030_949_3;
 
 /// Steps of the largest standard deviation in a doubling.
-const SIGMA_STEPS: i32 = 16;
+const SIGMA_STEPS: i32 = 12;
 /// Steps of the ratio of the two standard deviations in the ellipse's plane in a doubling.
-const RATIO_STEPS: i32 = 8;
+const RATIO_STEPS: i32 = 6;
 /// Steps of the ratio across the plane in a doubling.
 const THICKNESS_STEPS: i32 = 4;
 /// Steps of the strength in a doubling.
-const STRENGTH_STEPS: i32 = 32;
+const STRENGTH_STEPS: i32 = 24;
 
 /// Steps of a leaf's position in the width of its splat, along each axis: no more than 1/64 of it is lost in all.
 const LEAF_STEPS: f64 = 56.0;
 /// The same of other nodes, which are drawn where this is less than a tenth of a pixel.
-const INNER_STEPS: f64 = 16.0;
+const INNER_STEPS: f64 = 8.0;
 
 /// Steps of a quaternion's parts, each way.
 const TURN_STEPS: i32 = 511;
@@ -33,14 +33,19 @@ const NO_STRENGTH: i32 = i16::MIN as i32;
 
 /// The codes that may be: what is beyond makes no splat.
 const MOST_RATIO: i32 = 16 * RATIO_STEPS;
+const MOST_STRENGTH: i32 = 300 * STRENGTH_STEPS;
 const MOST_THICKNESS: i32 = 20 * THICKNESS_STEPS;
 const MOST_STEPS: f64 = (1 << 28) as f64;
 
-/// 2^(k/32).
+/// Parts of a doubling that powers are told in.
+pub const PARTS: i32 = 48;
+
+/// 2^(k/48).
 pub fn power(k: i32) -> f64 {
-    static PARTS: LazyLock<[f64; 32]> = LazyLock::new(|| std::array::from_fn(|part| libm::exp2(part as f64 / 32.0)));
-    let exponent = k.div_euclid(32).clamp(-1022, 1023);
-    PARTS[k.rem_euclid(32) as usize] * f64::from_bits(((exponent + 1023) as u64) << 52)
+    static TABLE: LazyLock<[f64; PARTS as usize]> =
+        LazyLock::new(|| std::array::from_fn(|part| libm::exp2(part as f64 / f64::from(PARTS))));
+    let exponent = k.div_euclid(PARTS).clamp(-1022, 1023);
+    TABLE[k.rem_euclid(PARTS) as usize] * f64::from_bits(((exponent + 1023) as u64) << 52)
 }
 
 /// What the axes of a splat are.
@@ -92,6 +97,8 @@ pub struct Before {
     pub center: [f32; 3],
     pub normal: [i32; 2],
     pub color: [i32; 3],
+    /// Its normal, where its axes are those of it.
+    pub direction: Option<DVec3>,
 }
 
 /// The ellipsoid of a splat.
@@ -121,10 +128,11 @@ impl Shape {
     }
 
     /// The steps of positions along the axes.
-    fn steps(&self, is_leaf: bool) -> [f64; 3] {
+    fn step(&self, is_leaf: bool) -> f64 {
         let steps = if is_leaf { LEAF_STEPS } else { INNER_STEPS };
         let [first, second, _] = self.sigma;
-        [first, second, second].map(|sigma| sigma * FULL_WIDTH / steps)
+        // Along a long ellipse no coarser than across it.
+        first.min(2.0 * second) * FULL_WIDTH / steps
     }
 }
 
@@ -138,7 +146,7 @@ fn table(ratio: i32) -> &'static [[f64; 2]] {
     static TABLES: LazyLock<Vec<Vec<[f64; 2]>>> = LazyLock::new(|| {
         let tables = (0..=MOST_RATIO).map(|ratio| {
             let wide = libm::exp2(f64::from(ratio) / f64::from(RATIO_STEPS));
-            let count = (16.0 * (wide - 1.0 / wide)).ceil().clamp(1.0, 256.0);
+            let count = (8.0 * (wide - 1.0 / wide)).ceil().clamp(1.0, 256.0);
             let direction = |k: usize| PI * k as f64 / count;
             (0..count as usize).map(|k| [libm::cos(direction(k)), libm::sin(direction(k))]).collect()
         });
@@ -194,6 +202,14 @@ fn turn([x, y, z]: [DVec3; 3]) -> [i32; 4] {
     out
 }
 
+/// How far a smooth surface rises along the normal of a node on the way `across` it from the one before: a chord of a
+/// parabola lies across the mean of the normals at its ends.
+fn rise(before: Option<DVec3>, normal: Option<DVec3>, across: DVec3) -> f64 {
+    let (Some(before), Some(normal)) = (before, normal) else { return 0.0 };
+    let both = 1.0 + before.dot(normal);
+    if both > 0.5 { -across.dot(before) / both } else { 0.0 }
+}
+
 /// Luma and chromas of red, green and blue, reversibly (YCoCg-R, Malvar & Sullivan 2003).
 fn luma(color: u32) -> [i32; 3] {
     let [r, g, b] = [0, 8, 16].map(|shift| (color >> shift & 255) as i32);
@@ -216,24 +232,27 @@ fn color([luma, orange, green]: [i32; 3]) -> Option<u32> {
 impl Code {
     /// The splat behind a code, and its shape; `None` for codes of no splat. `before` becomes what this node leaves.
     pub fn decode(&self, is_leaf: bool, before: &mut Before) -> Option<(Splat, Shape)> {
+        let shape = self.shape(before)?;
+        Some((self.splat(&shape, is_leaf, before)?, shape))
+    }
+
+    /// The ellipsoid, and the normal as the new one before.
+    fn shape(&self, before: &mut Before) -> Option<Shape> {
         let is_shape = (0..=MOST_RATIO).contains(&self.ratio)
             && (-MOST_THICKNESS..=MOST_THICKNESS).contains(&self.thickness)
             && (-160 * SIGMA_STEPS..160 * SIGMA_STEPS).contains(&self.sigma);
         if !is_shape {
             return None;
         }
-        let first = self.sigma * (32 / SIGMA_STEPS);
-        let second = first - self.ratio * (32 / RATIO_STEPS);
-        let third = second - self.thickness * (32 / THICKNESS_STEPS);
+        let first = self.sigma * (PARTS / SIGMA_STEPS);
+        let second = first - self.ratio * (PARTS / RATIO_STEPS);
+        let third = second - self.thickness * (PARTS / THICKNESS_STEPS);
         let sigma = [power(first), power(second), power(third)];
-        let mut normal = NO_NORMAL;
         if self.axes != Axes::Bare {
-            let place = [0, 1].map(|i| before.normal[i].wrapping_add(self.normal[i]));
-            if !octahedron::contains(place) {
+            before.normal = [0, 1].map(|i| before.normal[i].wrapping_add(self.normal[i]));
+            if !octahedron::contains(before.normal) {
                 return None;
             }
-            before.normal = place;
-            normal = octahedron::packed(before.facing, place);
         }
         let axes = match self.axes {
             Axes::Normal if (0..angles(self.ratio) as i32).contains(&self.angle) => {
@@ -242,24 +261,38 @@ impl Code {
             Axes::Normal => return None,
             Axes::Own | Axes::Bare => axes_of_turn(self.turn)?,
         };
-        let shape = Shape { axes, sigma };
-        let mut center = DVec3::from(before.center.map(f64::from));
-        for ((axis, step), count) in axes.iter().zip(shape.steps(is_leaf)).zip(self.position) {
-            center += *axis * (step * f64::from(count));
-        }
+        Some(Shape { axes, sigma })
+    }
+
+    /// All that is left once the shape is known.
+    fn splat(&self, shape: &Shape, is_leaf: bool, before: &mut Before) -> Option<Splat> {
+        let axes = &shape.axes;
+        let normal = if self.axes == Axes::Bare { NO_NORMAL } else { octahedron::packed(before.facing, before.normal) };
+        let step = shape.step(is_leaf);
+        let [x, y, z] = self.position.map(|count| step * f64::from(count));
+        let across = axes[0] * x + axes[1] * y;
+        let direction = if self.axes == Axes::Normal { Some(axes[2]) } else { None };
+        let center = DVec3::from(before.center.map(f64::from))
+            + across
+            + axes[2] * (rise(before.direction, direction, across) + z);
         before.center = center.to_array().map(|value| value as f32);
+        before.direction = direction;
         for (before, more) in before.color.iter_mut().zip(self.color) {
             *before = before.wrapping_add(more);
         }
         let alpha = u32::try_from(self.color[3]).ok().filter(|&alpha| alpha < 256)?;
         let strength = match self.strength {
             NO_STRENGTH => 0.0,
-            steps => (f64::from(before.strength) * power(steps * (32 / STRENGTH_STEPS))) as f32,
+            steps => {
+                (f64::from(before.strength)
+                    * power(steps.clamp(-MOST_STRENGTH, MOST_STRENGTH) * (PARTS / STRENGTH_STEPS)))
+                    as f32
+            }
         };
         let color = color(before.color)? | alpha << 24;
         let splat = Splat { center: before.center, strength, factor: shape.factor(), color, normal };
         let numbers = splat.center.iter().chain(&splat.factor).chain([&splat.strength]);
-        numbers.copied().all(f32::is_finite).then_some((splat, shape))
+        numbers.copied().all(f32::is_finite).then_some(splat)
     }
 
     /// The code of a splat, and what comes back of it. `None` for splats beyond what codes can tell: without width, of
@@ -272,7 +305,6 @@ impl Code {
         let sigma = round(first, SIGMA_STEPS);
         let first = f64::from(sigma) / f64::from(SIGMA_STEPS);
         let ratio = round(first - second, RATIO_STEPS).clamp(0, MOST_RATIO);
-        let second = first - f64::from(ratio) / f64::from(RATIO_STEPS);
         let thickness = round(second - third, THICKNESS_STEPS).clamp(-MOST_THICKNESS, MOST_THICKNESS);
         let place = normal.map_or(before.normal, |normal| octahedron::nearest(before.facing, normal));
         let mut angle = 0;
@@ -307,13 +339,19 @@ impl Code {
             strength,
         };
         // Once all else is known, the steps of the position are.
-        let (_, shape) = code.decode(is_leaf, &mut before.clone())?;
+        let shape = code.shape(before)?;
         let away = DVec3::from(splat.center.map(f64::from)) - DVec3::from(before.center.map(f64::from));
-        for ((count, axis), step) in code.position.iter_mut().zip(shape.axes).zip(shape.steps(is_leaf)) {
-            let steps = (away.dot(axis) / step).round();
-            *count = if steps.abs() < MOST_STEPS { steps as i32 } else { return None };
-        }
-        let (splat, shape) = code.decode(is_leaf, before)?;
+        let step = shape.step(is_leaf);
+        let whole = |length: f64| {
+            let steps = (length / step).round();
+            (steps.abs() < MOST_STEPS).then_some(steps as i32)
+        };
+        let [x, y, z] = shape.axes;
+        let (first, second) = (whole(away.dot(x))?, whole(away.dot(y))?);
+        let across = x * (step * f64::from(first)) + y * (step * f64::from(second));
+        let direction = if axes == Axes::Normal { Some(z) } else { None };
+        code.position = [first, second, whole(away.dot(z) - rise(before.direction, direction, across))?];
+        let splat = code.splat(&shape, is_leaf, before)?;
         Some((code, splat, shape))
     }
 }

@@ -118,3 +118,289 @@ fn a_file_is_written_whole_and_is_sound() {
     drop(Writer::new(&folder.path().join("other.splk"), 3.0, &options(false)).unwrap());
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left of what was not finished");
 }
+
+/// What one file is read as: a tree, or the error of opening or of some page.
+fn try_all(bytes: Vec<u8>) -> crate::Result<Tree> {
+    let hierarchy = Hierarchy::from_bytes(bytes, Path::new("memory"), &Limits::default())?;
+    for page in 0..hierarchy.pages().len() as u32 {
+        hierarchy.read_page(page)?;
+    }
+    hierarchy.read_tree()
+}
+
+fn input_error(result: crate::Result<impl Sized>, what: &str) {
+    match result {
+        Err(crate::Error::Input { place, message, hint, .. }) => {
+            assert!(!place.is_empty() && !message.is_empty() && hint.is_some(), "{what}: {place}: {message}");
+        }
+        Err(other) => panic!("{what}: {other}"),
+        Ok(_) => panic!("{what} was not told"),
+    }
+}
+
+fn small_files() -> Vec<Vec<u8>> {
+    let trees = [joined(&surface(120, 8), 3), tree(&cloud(40, 9))];
+    trees.iter().flat_map(|tree| [true, false].map(|lossless| to_bytes(tree, &options(lossless)).unwrap())).collect()
+}
+
+#[test]
+fn every_flipped_byte_is_told() {
+    let folder = Folder::new();
+    for bytes in small_files() {
+        let hash = bytes.len() - HASH;
+        for at in 0..bytes.len() {
+            let mut broken = bytes.clone();
+            broken[at] ^= 1 << (at % 8);
+            if at < hash {
+                input_error(try_all(broken.clone()), &format!("byte {at}"));
+            }
+            // Files are slow to write, so that not every one of those is.
+            if at >= hash || at % 61 == 0 {
+                let path = folder.write("broken.splk", &broken);
+                assert!(!check(&path, &Limits::default()).is_sound(), "byte {at}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_prefix_is_incomplete() {
+    let folder = Folder::new();
+    for bytes in small_files() {
+        for end in 0..bytes.len() {
+            input_error(try_all(bytes[..end].to_vec()), &format!("cut at {end}"));
+        }
+        let path = folder.write("long.splk", [&bytes[..], b"more"].concat());
+        input_error(Hierarchy::open(&path, &Limits::default()), "a longer file");
+        let path = folder.write("cut.splk", &bytes[..bytes.len() / 2]);
+        let report = check(&path, &Limits::default());
+        assert!(report.findings[0].message.contains("incomplete"), "{:?}", report.findings);
+    }
+}
+
+#[test]
+fn the_beginning_of_a_file_is_a_coarse_model() {
+    let folder = Folder::new();
+    let bytes = to_bytes(&joined(&surface(40_000, 3), 3), &options(false)).unwrap();
+    let whole = open(bytes.clone());
+    let mut most = 0;
+    for part in 1..10 {
+        let path = folder.write(&format!("{part}.splk"), &bytes[..bytes.len() * part / 10]);
+        let prefix = Hierarchy::open_prefix(&path, &Limits::default()).unwrap();
+        let mut present = 0;
+        for page in 0..prefix.pages().len() as u32 {
+            if prefix.is_present(page) {
+                assert_eq!(prefix.read_page(page).unwrap().nodes, whole.read_page(page).unwrap().nodes);
+                let above = prefix.pages()[page as usize].parent_pages.clone();
+                assert!(above.into_iter().all(|above| prefix.is_present(above)), "parents come first");
+                present += 1;
+            } else {
+                input_error(prefix.read_page(page), "a page that is not there");
+            }
+        }
+        assert!(present >= most);
+        most = present;
+    }
+    assert!(most > 5);
+}
+
+/// A file with its header changed, checksums and hash made to fit.
+fn forged(bytes: &[u8], change: impl Fn(&mut [u8])) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    let stored = header::Stored::decode(&bytes).unwrap();
+    let start = stored.length();
+    let end = start + directory::Directory::length(stored.blocks as usize, stored.pages as usize) as usize;
+    change(&mut bytes);
+    for range in [0..start, start..end] {
+        let crc = crc32fast::hash(&bytes[range.start..range.end - 4]);
+        bytes[range.end - 4..range.end].copy_from_slice(&crc.to_le_bytes());
+    }
+    let hash = bytes.len() - HASH;
+    let found = blake3::hash(&bytes[..hash]);
+    bytes[hash..].copy_from_slice(found.as_bytes());
+    bytes
+}
+
+#[test]
+fn lies_are_told_though_checksums_fit() {
+    let bytes = to_bytes(&joined(&surface(9_000, 8), 2), &options(false)).unwrap();
+    assert!(try_all(forged(&bytes, |_| ())).is_ok());
+    let start = header::Stored::decode(&bytes).unwrap().length();
+    // Versions, counts of leaves, nodes, blocks and pages; then every word of the directory.
+    let directory_end = start + directory::Directory::length(3, open(bytes.clone()).pages().len()) as usize - 4;
+    for at in [8, 16, 104, 112, 124, 128].into_iter().chain((start..directory_end).step_by(4)) {
+        for change in [1u32, 0x0100_0000, u32::MAX] {
+            let broken = forged(&bytes, |bytes| {
+                let word = u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) ^ change;
+                bytes[at..at + 4].copy_from_slice(&word.to_le_bytes());
+            });
+            let folder = Folder::new();
+            let path = folder.write("forged.splk", &broken);
+            assert!(!check(&path, &Limits::default()).is_sound(), "word {at} ^ {change:x}");
+            try_all(broken).ok();
+        }
+    }
+    let future = forged(&bytes, |bytes| bytes[8] = 9);
+    match try_all(future) {
+        Err(crate::Error::Input { message, .. }) => assert!(message.contains("version 9"), "{message}"),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Pages whose checksums fit but whose bytes are anything: an error or some nodes, never a panic.
+#[test]
+fn pages_of_noise_are_survived() {
+    let mut random = crate::hierarchy::testing::Random(11);
+    for splats in [surface(600, 1), cloud(600, 2)] {
+        let tree = tree(&splats);
+        let nodes = &tree.blocks[0].nodes;
+        let runs = pages::pages(nodes);
+        for lossless in [true, false] {
+            let page = page::encode(nodes, &runs, tree.extent, lossless).pages.swap_remove(0);
+            for _ in 0..3000 {
+                let mut broken = page.clone();
+                for _ in 0..1 + random.below(3) {
+                    let at = if random.next() < 0.5 {
+                        random.below(broken.len().min(200))
+                    } else {
+                        random.below(broken.len())
+                    };
+                    broken[at] = random.below(256) as u8;
+                }
+                broken.truncate(if random.next() < 0.3 { random.below(broken.len()) } else { broken.len() });
+                if let Ok(nodes) = page::decode(&broken, runs[0].nodes.len(), 1, tree.extent) {
+                    assert_eq!(nodes.len(), runs[0].nodes.len());
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn bounds_hold_exactly_for_what_is_read() {
+    for tree in trees() {
+        let read = open(to_bytes(&tree, &options(false)).unwrap()).read_tree().unwrap();
+        assert_eq!(validate(&read), []);
+        for block in &read.blocks {
+            for node in &block.nodes {
+                let first = node.first_child as usize;
+                for child in &block.nodes[first..first + node.children as usize] {
+                    assert!(pages::reach(node.center().as_dvec3(), child) <= f64::from(node.radius));
+                    assert!(child.size <= node.size);
+                    let cone = libm::cos(page::joint_angle(node, child));
+                    assert!(node.cone == -1.0 || f64::from(node.cone) <= cone);
+                }
+            }
+        }
+    }
+}
+
+/// Leaves in the order of their positions, as that among siblings may change.
+fn sorted_leaves(tree: &Tree) -> Vec<crate::hierarchy::Node> {
+    let mut leaves: Vec<_> = tree.blocks[0].nodes.iter().copied().filter(|node| node.is_leaf()).collect();
+    leaves.sort_by(|a, b| a.splat.color.cmp(&b.splat.color));
+    leaves
+}
+
+#[test]
+fn losses_keep_to_the_promises() {
+    use crate::hierarchy::testing::ellipsoid;
+    let mut splats = surface(30_000, 6);
+    // A colour of its own tells each leaf.
+    splats.iter_mut().enumerate().for_each(|(index, splat)| splat.color = index as u32 | 0xff00_0000);
+    let tree = tree(&splats);
+    let bytes = to_bytes(&tree, &options(false)).unwrap();
+    let read = open(bytes).read_tree().unwrap();
+    let (before, after) = (sorted_leaves(&tree), sorted_leaves(&read));
+    let (mut sum, mut most) = (0.0, 0.0f64);
+    for (a, b) in before.iter().zip(&after) {
+        assert_eq!((a.splat.color, a.splat.strength), (b.splat.color, b.splat.strength));
+        let away = glam::Vec3::from(a.splat.center).distance(glam::Vec3::from(b.splat.center));
+        assert!(away <= b.size / 64.0, "{away} of {}", b.size);
+        let inflation = b.radius / a.radius;
+        assert!((0.97..1.031).contains(&inflation), "{inflation}");
+        let normals = [a, b].map(|node| octahedron::unpacked(node.splat.normal).unwrap());
+        let angle = libm::acos(normals[0].dot(normals[1]).min(1.0)).to_degrees();
+        (sum, most) = (sum + angle, most.max(angle));
+        let ([one, two], [three, four]) =
+            ([0, 1].map(|i| ellipsoid(&a.splat).0[i]), [0, 1].map(|i| ellipsoid(&b.splat).0[i]));
+        assert!((three / one - 1.0).abs() < 0.03 && (four / two - 1.0).abs() < 0.1);
+        // The ellipse as a whole: how much wider or narrower it is in any direction.
+        let [own, its] = [a, b].map(|node| crate::hierarchy::testing::covariance(&node.splat));
+        let along = ellipsoid(&a.splat).1;
+        for axis in &along[..2] {
+            let ratio = (axis.dot(its * *axis) / axis.dot(own * *axis)).sqrt();
+            assert!((0.85..1.15).contains(&ratio), "{ratio}");
+        }
+    }
+    assert!(sum / before.len() as f64 <= 0.67 && most <= 1.9, "normals: {} {most}", sum / before.len() as f64);
+}
+
+#[test]
+fn what_was_read_is_written_as_it_was() {
+    for splats in [surface(9, 2), surface(4_000, 3)] {
+        let first = open(to_bytes(&tree(&splats), &options(false)).unwrap()).read_tree().unwrap();
+        let again = open(to_bytes(&first, &options(false)).unwrap()).read_tree().unwrap();
+        let (before, after) = (sorted_leaves(&first), sorted_leaves(&again));
+        for (a, b) in before.iter().zip(&after) {
+            // Siblings may change places, and with them what positions are told from.
+            let away = glam::Vec3::from(a.splat.center).distance(glam::Vec3::from(b.splat.center));
+            assert!(away <= a.size / 64.0);
+            assert_eq!((a.size, a.splat.normal, a.splat.color), (b.size, b.splat.normal, b.splat.color));
+        }
+    }
+}
+
+#[test]
+fn a_smooth_surface_takes_few_bytes() {
+    let mut splats = surface(30_000, 6);
+    splats.iter_mut().for_each(|splat| splat.color = 0xffff_ffff);
+    let bytes = to_bytes(&tree(&splats), &options(false)).unwrap();
+    assert!(bytes.len() < 30_000 * 6, "{}", bytes.len());
+}
+
+#[test]
+fn splats_beyond_the_codes_are_kept_whole() {
+    let mut splats = surface(300, 1);
+    splats[0].strength = -1.0;
+    splats[150].center = [1e30, 0.0, 0.0];
+    let tree = tree(&splats);
+    let read = open(to_bytes(&tree, &options(false)).unwrap()).read_tree().unwrap();
+    assert_eq!(validate(&read), []);
+    assert!(read.nodes().any(|node| node.splat.strength == -1.0));
+}
+
+#[test]
+fn disorder_is_refused() {
+    let sound = tree(&surface(50, 1));
+    let refused = |change: fn(&mut Tree)| {
+        let mut tree = sound.clone();
+        change(&mut tree);
+        assert!(!validate(&tree).is_empty());
+        assert!(matches!(to_bytes(&tree, &options(false)), Err(crate::Error::Argument(_))));
+    };
+    refused(|tree| tree.blocks.clear());
+    refused(|tree| tree.blocks[0].nodes.clear());
+    refused(|tree| tree.blocks[0].nodes[0].first_child = 2);
+    refused(|tree| tree.blocks[0].nodes[0].children = 9);
+    refused(|tree| tree.blocks[0].nodes.truncate(20));
+    refused(|tree| tree.blocks[0].nodes[3].radius = f32::NAN);
+    refused(|tree| tree.extent = 0.0);
+    refused(|tree| tree.blocks.push(tree.blocks[0].clone()));
+}
+
+#[test]
+fn validation_finds_what_is_loose() {
+    let sound = tree(&surface(500, 1));
+    let found = |change: fn(&mut [crate::hierarchy::Node]), code: &str| {
+        let mut tree = sound.clone();
+        change(&mut tree.blocks[0].nodes);
+        let codes: Vec<&str> = validate(&tree).iter().map(|finding| finding.code).collect();
+        assert!(codes.contains(&code), "{code}: {codes:?}");
+    };
+    found(|nodes| nodes[0].radius *= 0.99, "sphere");
+    found(|nodes| nodes[1].center[0] += 0.5, "sphere");
+    found(|nodes| nodes[0].size = nodes[1].size * 0.5, "size");
+    found(|nodes| nodes[1].cone = 1.0, "cone");
+    found(|nodes| nodes[2].splat.center[1] = f32::INFINITY, "values");
+}
