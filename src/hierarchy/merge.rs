@@ -12,8 +12,12 @@ use glam::Vec3;
 pub(crate) const WIDTH: f32 = 2.354_82;
 
 /// A patch of even mass L across has a variance of L²/12 along it. Gaussians of that variance, L apart, leave 0.4 of the
-/// mean where four meet; with a spread of 1.2, 0.5.
-const SPREAD: f32 = 1.2;
+/// mean where four meet; with a spread of 1.3, 0.6.
+const SPREAD: f32 = 1.3;
+
+/// From this optical depth on splats count as opaque: then what spreading thins out is made up for, so that irregular
+/// groups leave no holes between them.
+const OPAQUE: f32 = 4.0;
 
 /// Merged strengths stay below this: beyond it a splat only grows wider.
 const MOST_STRENGTH: f32 = 64.0;
@@ -111,6 +115,7 @@ pub(crate) fn merge(children: &[Node], masses: &[Mass]) -> (Node, Mass) {
     let mut between = [0.0; 6];
     let mut color = [0.0; 4];
     let mut normal = Vec3::ZERO;
+    let mut depth = 0.0;
     for (child, m) in children.iter().zip(masses) {
         let (share, d) = (share(m), m.mean - mean);
         let spread = [d.x * d.x, d.x * d.y, d.x * d.z, d.y * d.y, d.y * d.z, d.z * d.z];
@@ -121,16 +126,18 @@ pub(crate) fn merge(children: &[Node], masses: &[Mass]) -> (Node, Mass) {
         for (sum, part) in color.iter_mut().zip(child.splat.color.to_le_bytes()) {
             *sum += share * f32::from(part);
         }
+        depth += share * child.splat.strength;
         normal += decode_normal(child.splat.normal).unwrap_or(Vec3::ZERO) * m.area;
     }
     let moments: Moments = std::array::from_fn(|i| within[i] + between[i]);
     let shown: Moments = std::array::from_fn(|i| within[i] + SPREAD * between[i]);
     let shown_area = area(&shown).max(f32::MIN_POSITIVE);
     let alpha = (color[3] / 255.0).max(1.0 / 255.0);
+    let made_up = 1.0 + (SPREAD - 1.0) * (depth / OPAQUE).min(1.0);
     let packed_normal = encode_normal(normal.normalize_or_zero());
     let splat = Splat {
         center: mean.to_array(),
-        strength: (total / shown_area / alpha).min(MOST_STRENGTH),
+        strength: (total / shown_area / alpha * made_up).min(MOST_STRENGTH),
         factor: factor(&shown),
         color: u32::from_le_bytes(color.map(|part| part.round() as u8)),
         normal: packed_normal,
