@@ -19,7 +19,7 @@ pub mod raw;
 mod sample_type;
 mod source;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 mod texture;
 pub mod vti;
 pub mod vtk;

@@ -43,7 +43,7 @@ pub fn write_gaussian_leaves(tree: &Tree, path: &Path) -> Result<()> {
 fn write_all<'a>(count: u64, splats: impl Iterator<Item = &'a Splat>, origin: DVec3, path: &Path) -> Result<()> {
     let file = std::fs::File::create(path).map_err(|e| Error::file(path, "create", e))?;
     let mut out = std::io::BufWriter::new(file);
-    let mut write = || {
+    let write = || {
         writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {count}")?;
         PROPERTIES.iter().try_for_each(|name| writeln!(out, "property float {name}"))?;
         writeln!(out, "end_header")?;
@@ -53,7 +53,7 @@ fn write_all<'a>(count: u64, splats: impl Iterator<Item = &'a Splat>, origin: DV
         }
         out.flush()
     };
-    write().map_err(|e| Error::file(path, "write", e))
+    write().map_err(|e: std::io::Error| Error::file(path, "write", e))
 }
 
 /// The numbers of one splat, in the order of [`PROPERTIES`].
