@@ -25,7 +25,8 @@ mod sample_type;
 mod source;
 pub mod stl;
 #[cfg(test)]
-mod testing;
+#[cfg(test)]
+pub(crate) mod testing;
 mod text;
 mod texture;
 pub mod vti;

@@ -96,16 +96,13 @@ impl Code {
             .clamp(0.0, 4096.0) as i32
             - 1)
         .max(0);
-        let is_around = |node: &Node| {
-            node.cone == -1.0
-                || children.iter().all(|child| f64::from(node.cone) <= libm::cos(joint_angle(node, child)))
-        };
+        let cosine = libm::cos(angle);
         loop {
             code.decode(node, shape, extent)?;
             match () {
                 () if f64::from(node.radius) < radius => code.radius += 1,
                 () if node.size < size => code.size += 1,
-                () if !is_around(node) => code.cone += 1,
+                () if node.cone > -1.0 && f64::from(node.cone) > cosine => code.cone += 1,
                 () => return Some(code),
             }
         }

@@ -31,10 +31,6 @@ impl<'a> Cursor<'a> {
         self.array().map(u8::from_le_bytes)
     }
 
-    pub fn u16(&mut self) -> Option<u16> {
-        self.array().map(u16::from_le_bytes)
-    }
-
     pub fn u32(&mut self) -> Option<u32> {
         self.array().map(u32::from_le_bytes)
     }
@@ -64,10 +60,6 @@ impl<'a> Cursor<'a> {
 /// Appends numbers.
 pub trait Put {
     fn put(&mut self, bytes: &[u8]);
-
-    fn u16(&mut self, value: u16) {
-        self.put(&value.to_le_bytes());
-    }
 
     fn u32(&mut self, value: u32) {
         self.put(&value.to_le_bytes());

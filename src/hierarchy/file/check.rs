@@ -2,7 +2,7 @@
 
 use super::{
     directory::{NO_PORTAL, PageEntry},
-    pages::{Around, pages},
+    pages::{Around, in_order, pages},
     read::{Hierarchy, hash_start},
     write::{arounds, parents},
 };
@@ -72,7 +72,7 @@ fn contents(hierarchy: &Hierarchy, findings: &mut Findings) {
         check_block(number, &block.nodes, findings);
         let first = entry.first_page as usize;
         let stated = &directory.pages[first..first + entry.pages as usize];
-        check_entries(hierarchy, first, stated, &block.nodes, &top, entry.portal, findings);
+        check_entries(first, stated, &block.nodes, &top, entry.portal, findings);
         if number == 0 && hierarchy.is_joined() {
             top = block.nodes;
             continue;
@@ -101,7 +101,6 @@ fn contents(hierarchy: &Hierarchy, findings: &mut Findings) {
 
 /// Checks what the directory tells of the pages of a block.
 fn check_entries(
-    hierarchy: &Hierarchy,
     first: usize,
     stated: &[PageEntry],
     nodes: &[Node],
@@ -109,10 +108,9 @@ fn check_entries(
     portal: u32,
     findings: &mut Findings,
 ) {
-    if crate::hierarchy::file::in_order(nodes).is_err() {
+    if in_order(nodes).is_err() {
         return;
     }
-    let _ = hierarchy;
     let runs = pages(nodes);
     let around = arounds(nodes, &runs);
     if runs.len() != stated.len() {

@@ -56,8 +56,21 @@ pub fn nearest(facing: u8, direction: DVec3) -> [i32; 2] {
     }
     let (u, v) = (u.floor() as i32, v.floor() as i32);
     let candidates = [[u, v], [u + 1, v], [u, v + 1], [u + 1, v + 1]].map(|place| place.map(|p| p.clamp(-HALF, HALF)));
-    let cosine = |&place: &[i32; 2]| self::direction(facing, place).dot(direction);
-    candidates.into_iter().max_by(|a, b| cosine(a).total_cmp(&cosine(b))).expect("there are four")
+    // Squares of cosines, as all of them are positive, take no root.
+    let nearness = |&place: &[i32; 2]| {
+        let [x, y, z] = turned(facing, point(place)).map(f64::from);
+        let along = x * direction.x + y * direction.y + z * direction.z;
+        along * along / (x * x + y * y + z * z)
+    };
+    let [mut best, others @ ..] = candidates;
+    let mut most = nearness(&best);
+    for other in others {
+        let found = nearness(&other);
+        if found > most {
+            (best, most) = (other, found);
+        }
+    }
+    best
 }
 
 /// The unit direction of a place.

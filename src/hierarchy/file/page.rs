@@ -206,8 +206,9 @@ pub fn joint_angle(node: &Node, child: &Node) -> f64 {
         return std::f64::consts::PI;
     }
     let (own, its) = (own.as_dvec3(), its.as_dvec3());
+    let cone = if child.cone < 1.0 { libm::acos(f64::from(child.cone)) } else { 0.0 };
     let between = libm::atan2(own.cross(its).length(), own.dot(its));
-    (between + libm::acos(f64::from(child.cone).min(1.0))).min(std::f64::consts::PI)
+    (between + cone).min(std::f64::consts::PI)
 }
 
 /// The cosine of a half-angle, never above it.

@@ -295,10 +295,10 @@ fn bounds_hold_exactly_for_what_is_read() {
     }
 }
 
-/// Leaves in the order of their positions, as that among siblings may change.
+/// Leaves in the order of their colours, as that among siblings may change.
 fn sorted_leaves(tree: &Tree) -> Vec<crate::hierarchy::Node> {
     let mut leaves: Vec<_> = tree.blocks[0].nodes.iter().copied().filter(|node| node.is_leaf()).collect();
-    leaves.sort_by(|a, b| a.splat.color.cmp(&b.splat.color));
+    leaves.sort_by_key(|leaf| leaf.splat.color);
     leaves
 }
 

@@ -53,7 +53,7 @@ fn write_all<'a>(count: u64, splats: impl Iterator<Item = &'a Splat>, origin: DV
         }
         out.flush()
     };
-    write().map_err(|e| Error::file(path, "write", e))
+    write().map_err(|e: std::io::Error| Error::file(path, "write", e))
 }
 
 /// The numbers of one splat, in the order of [`PROPERTIES`].
