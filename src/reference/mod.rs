@@ -2,7 +2,8 @@
 //!
 //! The engine must draw these pictures; it shares no code with this module beyond the scene, the view, the list of sheets,
 //! the kernels' values and the transfer function. Everything is brute force, pixel by pixel over all kernels, for pictures
-//! of some thousand pixels and kernels. [`integrate`] is the same field without sheets, as truth for them.
+//! of some thousand pixels and kernels. [`integrate`] is the same field without sheets, as truth for them; [`trace`] draws
+//! triangles, as truth for surfels.
 //!
 //! # The picture
 //! **Rays.** The ray of the pixel in column i and row j passes through (i + ½, j + ½): the points x(s) = a + s·b̂ in view
@@ -100,6 +101,7 @@ mod field;
 mod gather;
 mod images;
 mod kernel;
+mod mesh;
 mod profile;
 mod quadrature;
 mod ray;
@@ -111,6 +113,7 @@ mod whole;
 #[cfg(test)]
 mod tests;
 
+pub use mesh::trace;
 pub use truth::integrate;
 
 use crate::{

@@ -7,7 +7,10 @@ mod mesh;
 mod paint;
 mod refine;
 mod shapes;
+mod smooth;
 mod surfels;
 
 pub use mesh::{Material, Mesh, Texture};
+pub(crate) use paint::color_at;
+pub(crate) use smooth::corner_normals;
 pub use surfels::SurfelOptions;

@@ -15,7 +15,6 @@ use super::{
 };
 use crate::{
     Error, Result,
-    math::weld::first_of_equals,
     splat::{Payload, Splat, SplatSet, encode_normal},
 };
 use glam::{DVec2, DVec3};
@@ -131,21 +130,9 @@ impl Mesh {
 fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
     let Some([low, high]) = mesh.bounds() else { return Vec::new() };
     let diagonal = (high - low).length() as f32;
-    // Files split vertices at seams of texture and material, or give every triangle its own. A seam must not show, so
-    // vertices at one place are one; but not where the file has normals, which may be split to be seen.
-    let may_be_split =
-        !mesh.uvs.is_empty() || mesh.materials.len() > 1 || mesh.positions.len() > mesh.triangles.len() / 4 * 3;
-    let is_split = mesh.normals.is_empty() && may_be_split;
     let fine = refine(mesh, diagonal * options.largest_spacing, options.most_triangles);
     let mesh = fine.as_ref();
-    let keep: Vec<bool> = mesh.triangles.par_iter().map(|&triangle| has_area(mesh, triangle)).collect();
-    let adjacency = if is_split {
-        let first = first_of_equals(&mesh.positions);
-        let triangles: Vec<[u32; 3]> = mesh.triangles.par_iter().map(|t| t.map(|i| first[i as usize])).collect();
-        Adjacency::new(&triangles, mesh.positions.len(), &keep)
-    } else {
-        Adjacency::new(&mesh.triangles, mesh.positions.len(), &keep)
-    };
+    let adjacency = Adjacency::of(mesh);
     let maker = Maker {
         mesh,
         adjacency: &adjacency,
@@ -169,13 +156,6 @@ fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
 
 fn corner(mesh: &Mesh, index: u32) -> DVec3 {
     mesh.positions[index as usize].as_dvec3()
-}
-
-/// Whether a triangle is more than a line, at the precision of its coordinates.
-fn has_area(mesh: &Mesh, [a, b, c]: [u32; 3]) -> bool {
-    let [a, b, c] = [a, b, c].map(|index| corner(mesh, index));
-    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-    (b - a).cross(c - a).length() > longest * 1e-10
 }
 
 /// A triangle as one of its vertices sees it.
