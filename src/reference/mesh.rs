@@ -124,7 +124,7 @@ impl<'a> Traced<'a> {
                 Some(shade) => shade::lit(color, normal, direction, shade),
                 None => color,
             };
-            composite.pass(Medium { depth: -(1.0 - f64::from(opacity)).ln(), color }, [met.distance; 2]);
+            composite.pass(Medium { depth: -(1.0 - f64::from(opacity.min(1.0))).ln(), color }, [met.distance; 2]);
             from = met.distance + 1e-9 * (met.distance + self.size);
         }
         composite
@@ -169,4 +169,102 @@ fn meet(origin: DVec3, direction: DVec3, [a, b, c]: [DVec3; 3]) -> Option<Met> {
     // A flat determinant gives no numbers, which no comparison lets through.
     let inside = v >= 0.0 && w >= 0.0 && v + w <= 1.0;
     inside.then(|| Met { distance: ac.dot(turned) / determinant, weights: [1.0 - v - w, v, w] })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        compare::compare_pictures, math::Projection, reference::render, scene::Scene, surface::SurfelOptions,
+        volume::Shade,
+    };
+
+    fn camera(projection: Projection) -> Camera {
+        let position = DVec3::new(0.6, 2.5, 3.0);
+        Camera { position, focal_point: DVec3::ZERO, view_up: DVec3::Y, projection }
+    }
+
+    #[test]
+    fn a_sphere_is_lit_as_by_hand() {
+        let mut sphere = Mesh::sphere(5);
+        sphere.colors = vec![[255, 128, 0, 255]; sphere.positions.len()];
+        let camera = camera(Projection::Orthographic { height: 3.0 });
+        let mut settings = Settings::new([48, 36]);
+        let shade = Shade { ambient: 0.1, diffuse: 0.6, specular: 0.2, power: 8.0 };
+        settings.surface_shade = Some(shade);
+        let picture = trace(&sphere, 60.0, &camera, &settings, 1).unwrap();
+        for (at, pixel) in picture.color.iter().enumerate() {
+            let place = (DVec2::new((at % 48) as f64, (at / 48) as f64) + 0.5 - DVec2::new(24.0, 18.0)) / 12.0;
+            let radius = place.length();
+            if radius < 0.97 {
+                let cosine = (1.0 - radius * radius).sqrt();
+                let red = 0.7_f64.min(0.1 + 0.6 * cosine) + 0.2 * cosine.powi(8);
+                assert!((f64::from(pixel[0]) - red).abs() < 0.01, "{place} {pixel:?} {red}");
+                assert!((f64::from(pixel[2]) - 0.2 * cosine.powi(8)).abs() < 0.01 && pixel[3] > 0.999);
+                let depth = camera.position.length() - cosine;
+                assert!((f64::from(picture.depth[at]) - depth).abs() < 0.01);
+            } else if radius > 1.01 {
+                assert_eq!(*pixel, [0.0; 4]);
+            }
+        }
+    }
+
+    #[test]
+    fn rays_are_spread_over_pixels_and_pass_what_is_thin() {
+        // A square from 0 to 1 whose edge cuts pixels in half, half opaque, with another behind it.
+        let square = |z: f32| [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| Vec3::new(x, y, z));
+        let mesh = Mesh {
+            positions: [square(0.0), square(-1.0)].concat(),
+            colors: [[[255, 255, 255, 128]; 4], [[0, 0, 0, 255]; 4]].concat(),
+            triangles: vec![[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]],
+            ..Mesh::default()
+        };
+        let camera = Camera {
+            position: DVec3::new(0.5, 0.5, 5.0),
+            focal_point: DVec3::new(0.5, 0.5, 0.0),
+            view_up: DVec3::Y,
+            projection: Projection::Orthographic { height: 1.0 },
+        };
+        let mut settings = Settings::new([9, 8]);
+        settings.surface_shade = None;
+        let picture = trace(&mesh, 60.0, &camera, &settings, 4).unwrap();
+        let row = &picture.color[3 * 9..4 * 9];
+        let half = 128.0 / 255.0;
+        assert!((row[4][0] - half).abs() < 1e-6 && row[4][3] == 1.0, "{:?}", row[4]);
+        for edge in [row[0], row[8]] {
+            assert!((edge[3] - 0.5).abs() < 1e-6 && (edge[0] - 0.5 * half).abs() < 1e-6, "{edge:?}");
+        }
+    }
+
+    #[test]
+    fn surfels_show_their_mesh() {
+        let camera = camera(Projection::Perspective { view_angle: 38.0 });
+        let settings = Settings::new([96, 96]);
+        for (name, mesh, least) in
+            [("sphere", Mesh::sphere(3), 30.0), ("knot", knot(), 26.0), ("cube", Mesh::cube(1.4), 24.5)]
+        {
+            let options = SurfelOptions { largest_spacing: 1.0 / 24.0, ..SurfelOptions::default() };
+            let scene = Scene::new().with_splats(mesh.surfels(&options).unwrap());
+            let truth = trace(&mesh, options.crease_angle_degrees, &camera, &settings, 4).unwrap();
+            let found = compare_pictures(&render(&scene, &camera, &settings).unwrap(), &truth).unwrap().psnr.unwrap();
+            assert!(found > least, "{name}: {found} dB");
+        }
+    }
+
+    /// One whose triangles face inward.
+    fn knot() -> Mesh {
+        let mut mesh = Mesh::knot(160, 20);
+        mesh.positions.iter_mut().for_each(|place| *place *= 0.3);
+        mesh.normals.clear();
+        mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(0, 1));
+        mesh
+    }
+
+    #[test]
+    fn what_cannot_be_traced_is_told() {
+        let camera = camera(Projection::Perspective { view_angle: 30.0 });
+        let settings = Settings::new([4, 4]);
+        assert!(matches!(trace(&Mesh::default(), 60.0, &camera, &settings, 1), Err(Error::NothingToDraw(_))));
+        assert!(matches!(trace(&Mesh::cube(1.0), 60.0, &camera, &settings, 0), Err(Error::Argument(_))));
+    }
 }

@@ -16,6 +16,8 @@
 //!   (0.35 pixel)² in every direction, so that the splat cannot fall between the pixels' rays (a scattered sample's weight w
 //!   is divided by how much that widens its volume). A pixel is |c|/f at the
 //!   centre's distance (perspective, f the focal length in pixels) or one over the pixels per world unit (orthographic).
+//!   Opaque things must not grow by that: radiance with a normal n steps back along it, c − 2.4·(σ′ − σ)·n, with σ and σ′ the
+//!   splat's standard deviations along n before and after.
 //! - A sample of a lattice has the profile of its volume's kernel and B = A·U·u: A the steps of the lattice, U the sample's
 //!   unit in steps, u the kernel's. It is not widened. Samples are those of `drawn_lattice` with the values `drawn_value`:
 //!   the volume's own, or the coefficients that make it sharp.

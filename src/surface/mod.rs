@@ -2,7 +2,9 @@
 
 mod adjacency;
 mod cloud;
+mod disc;
 mod ellipse;
+mod fan;
 mod mesh;
 mod paint;
 mod refine;

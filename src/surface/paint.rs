@@ -4,7 +4,7 @@ use super::{Material, Mesh, Texture};
 use glam::Vec2;
 
 /// Drawn where a mesh says nothing of its colour.
-const NEUTRAL: [f32; 4] = [0.8, 0.8, 0.8, 1.0];
+pub(super) const NEUTRAL: [f32; 4] = [0.8, 0.8, 0.8, 1.0];
 
 impl Texture {
     /// The mean colour over the parallelogram from `uv` along `a` and `b`; its samples are about two texels apart, but at

@@ -1,6 +1,9 @@
 //! Which triangles around a vertex are smooth with each other, and the normals that they share.
 
-use super::{Mesh, adjacency::Adjacency};
+use super::{
+    Mesh,
+    adjacency::{Connected, may_be_split},
+};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -51,24 +54,23 @@ impl Groups {
 /// weighted by angle. Triangles without area have their vertices' normals alone, or zero.
 pub(crate) fn corner_normals(mesh: &Mesh, crease_angle_degrees: f32) -> Vec<[Vec3; 3]> {
     let given = |vertex: u32| mesh.normals.get(vertex as usize).filter(|normal| normal.length_squared() > 0.25);
-    let adjacency = Adjacency::of(mesh);
+    let adjacency = Connected::new(mesh, may_be_split(mesh)).adjacency;
     let own: Vec<Vec<(u32, Vec3)>> = (0..mesh.positions.len())
         .into_par_iter()
         .map_init(
             || Groups::new(crease_angle_degrees),
             |groups, vertex| {
                 groups.clear();
-                let corners = adjacency.corners(vertex);
-                let around: Vec<(usize, Vec3)> = corners
-                    .iter()
-                    .map(|&at| {
-                        let (normal, angle) = at_corner(mesh, at);
-                        (groups.place(normal), normal * angle)
+                let corners = adjacency.corners(vertex).iter();
+                let around: Vec<(u32, usize, Vec3)> = corners
+                    .filter_map(|&at| {
+                        let (normal, angle) = at_corner(mesh, at)?;
+                        Some((at, groups.place(normal), normal * angle))
                     })
                     .collect();
-                let sum = |group| around.iter().filter(|(own, _)| *own == group).map(|(_, normal)| *normal).sum::<Vec3>();
+                let sum = |group| around.iter().filter(|t| t.1 == group).map(|t| t.2).sum::<Vec3>();
                 let normals: Vec<Vec3> = (0..groups.len()).map(|group| sum(group).normalize_or_zero()).collect();
-                corners.iter().zip(&around).map(|(&at, &(group, _))| (at, normals[group])).collect()
+                around.iter().map(|&(at, group, _)| (at, normals[group])).collect()
             },
         )
         .collect();
@@ -86,11 +88,42 @@ pub(crate) fn corner_normals(mesh: &Mesh, crease_angle_degrees: f32) -> Vec<[Vec
     normals
 }
 
-/// A triangle's unit normal, and its angle (radians) at a corner.
-fn at_corner(mesh: &Mesh, at: u32) -> (Vec3, f32) {
+/// A triangle's unit normal, and its angle (radians) at a corner; none where it has no area.
+fn at_corner(mesh: &Mesh, at: u32) -> Option<(Vec3, f32)> {
     let indices = mesh.triangles[at as usize / 3];
     let [a, b, c] = [0, 1, 2].map(|i| mesh.positions[indices[(at as usize + i) % 3] as usize].as_dvec3());
     let cross = (b - a).cross(c - a);
     let twice_area = cross.length();
-    ((cross / twice_area).as_vec3(), twice_area.atan2((b - a).dot(c - a)) as f32)
+    let longest = (b - a).length_squared().max((c - a).length_squared());
+    (twice_area > longest * 1e-6).then(|| ((cross / twice_area).as_vec3(), twice_area.atan2((b - a).dot(c - a)) as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_are_cones_around_their_first() {
+        let mut groups = Groups::new(30.0);
+        let turned = |degrees: f32| Vec3::new(degrees.to_radians().cos(), degrees.to_radians().sin(), 0.0);
+        assert_eq!([0.0, 29.0, 31.0, 16.0, 14.0, 62.0].map(|angle| groups.place(turned(angle))), [0, 0, 1, 1, 0, 2]);
+        groups.clear();
+        assert_eq!((groups.place(turned(90.0)), groups.len()), (0, 1));
+    }
+
+    #[test]
+    fn corners_have_the_normals_of_their_side() {
+        let cube = Mesh::cube(2.0);
+        for (triangle, normals) in cube.triangles.iter().zip(corner_normals(&cube, 75.0)) {
+            let [a, b, c] = triangle.map(|vertex| cube.positions[vertex as usize]);
+            let flat = (b - a).cross(c - a).normalize();
+            assert!(normals.iter().all(|normal| normal.dot(flat) > 0.9999));
+        }
+        let sphere = Mesh::sphere(3);
+        for (triangle, normals) in sphere.triangles.iter().zip(corner_normals(&sphere, 75.0)) {
+            for (normal, &vertex) in normals.iter().zip(triangle) {
+                assert!(normal.dot(sphere.positions[vertex as usize].normalize()) > 0.999);
+            }
+        }
+    }
 }

@@ -174,9 +174,10 @@ fn around(at: usize, [width, height]: [usize; 2], reach: usize) -> impl Iterator
 /// Whether depth jumps between a pixel and the next ones to the right and below.
 fn is_step(depth: &[f32], at: usize, width: usize, scale: f64) -> bool {
     let own = depth[at];
-    [1, width].iter().filter_map(|step| depth.get(at + step)).any(|&next| {
-        f64::from((next - own).abs()) * scale > STEP * f64::from(own.min(next))
-    })
+    [1, width]
+        .iter()
+        .filter_map(|step| depth.get(at + step))
+        .any(|&next| f64::from((next - own).abs()) * scale > STEP * f64::from(own.min(next)))
 }
 
 /// The distance to the nearest covered pixel, at most 64.
@@ -184,7 +185,8 @@ fn nearest(at: usize, size: [usize; 2], covered: impl Fn(usize) -> bool) -> f64 
     let place = |at: usize| [(at % size[0]) as f64, (at / size[0]) as f64];
     let [x, y] = place(at);
     for reach in [2, 8, 64] {
-        let distances = around(at, size, reach).filter(|&i| covered(i)).map(|i| (place(i)[0] - x).hypot(place(i)[1] - y));
+        let distances =
+            around(at, size, reach).filter(|&i| covered(i)).map(|i| (place(i)[0] - x).hypot(place(i)[1] - y));
         let least = distances.fold(f64::INFINITY, f64::min);
         if least <= reach as f64 {
             return least;
@@ -210,8 +212,18 @@ pub fn table(
             RAYS * RAYS
         ),
         &[
-            "mesh", "splats", "PSNR", "at outline", "at steps", "elsewhere", "outside", "mean px", "95 % px", "left open",
-            "< 0.9", "< 0.5",
+            "mesh",
+            "splats",
+            "PSNR",
+            "at outline",
+            "at steps",
+            "elsewhere",
+            "outside",
+            "mean px",
+            "95 % px",
+            "left open",
+            "< 0.9",
+            "< 0.5",
         ],
     );
     for source in sources {
