@@ -2,6 +2,8 @@
 
 // The picture is sampled at pixel centres: a blur of this many pixels keeps small splats from falling between them.
 const FOOTPRINT_BLUR: f32 = 0.35;
+// Opaque things must not grow by that: see splat.rs.
+const STEP_BACK: f32 = 2.4;
 
 // A splat in view space, widened.
 fn splat_at(index: u32) -> Candidate {
@@ -52,7 +54,11 @@ fn splat_at(index: u32) -> Candidate {
     if (source.flags & RADIANCE) != 0u {
         splat.strength = splat.strength * f32(splat.color >> 24u) / 255.0;
         if splat.normal != NO_NORMAL {
-            splat.normal = encode_normal(to_view * decode_normal(splat.normal));
+            let normal = to_view * decode_normal(splat.normal);
+            splat.normal = encode_normal(normal);
+            let own = vec3(dot(c0, normal), dot(c1, normal), dot(c2, normal));
+            let own2 = dot(own, own);
+            splat.center -= normal * (STEP_BACK * (sqrt(own2 + blur2) - sqrt(own2)));
         }
     }
     return splat;

@@ -4,7 +4,7 @@ use crate::{
     Error, Result,
     hierarchy::{Detail, Hierarchy},
     math::{Bounds, Kernel, Profile, Sheets, View},
-    splat::{FOOTPRINT_BLUR, Payload, SplatSet},
+    splat::{FOOTPRINT_BLUR, Payload, STEP_BACK, SplatSet},
     volume::{Arrangement, Lattice, Shade, TransferFunction, Volume},
 };
 use glam::{DMat3, DVec3};
@@ -171,14 +171,15 @@ impl Scene {
         Ok(())
     }
 
-    /// The largest extent of the scene's splat sets, in standard deviations; 0 without any.
-    fn widest_extent(&self) -> f64 {
-        let extents = self.items.iter().map(|item| match item {
-            Item::Radiance(set) | Item::Scalar(set, _) => f64::from(set.extent),
-            Item::Hierarchy(hierarchy) => f64::from(hierarchy.header().extent),
+    /// How far from its centre a splat of the scene can reach, in the standard deviations that widening adds; 0 without any.
+    fn widest_reach(&self) -> f64 {
+        let reaches = self.items.iter().map(|item| match item {
+            Item::Radiance(set) => f64::from(set.extent) + STEP_BACK,
+            Item::Scalar(set, _) => f64::from(set.extent),
+            Item::Hierarchy(hierarchy) => f64::from(hierarchy.header().extent) + STEP_BACK,
             Item::Volume(..) => 0.0,
         });
-        extents.fold(0.0, f64::max)
+        reaches.fold(0.0, f64::max)
     }
 
     /// The sheets of a picture of this scene: 4/3 of a sample's spacing for volumes (a kernel of extent 2 meets at most four),
@@ -189,9 +190,9 @@ impl Scene {
             return self.axis_sheets(view, settings, &bounds);
         }
         let [mut near, mut far] = view.distances(&bounds);
-        // Widened footprints reach beyond the bounds: a flat surface seen from the front would lie in sheets far thinner
-        // than itself.
-        let reach = FOOTPRINT_BLUR * self.widest_extent() / view.scale;
+        // Widened footprints, which may have stepped back, reach beyond the bounds: a flat surface seen from the front would
+        // lie in sheets far thinner than itself.
+        let reach = FOOTPRINT_BLUR * self.widest_reach() / view.scale;
         if view.perspective {
             (near, far) = (near * (1.0 - reach), far * (1.0 + reach));
             near = near.max(settings.near.unwrap_or(1e-3 * bounds.diagonal()));

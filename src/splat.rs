@@ -59,6 +59,10 @@ pub const NO_NORMAL: u32 = 0x8000_8000;
 /// Lattice samples are not: their kernels overlap.
 pub const FOOTPRINT_BLUR: f64 = 0.35;
 
+/// How far radiance with a normal steps back along it when it is widened, in the standard deviations that are added. Where
+/// opaque splats overlap, half of the light is gone about so far from their middle: outlines stay where they are.
+pub const STEP_BACK: f64 = 2.4;
+
 /// What the splats of a set carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Payload {

@@ -7,7 +7,7 @@ use super::{
 use crate::{
     math::{self, View},
     scene::{Item, Scene},
-    splat::{FOOTPRINT_BLUR, Payload, Splat, SplatSet, decode_normal},
+    splat::{FOOTPRINT_BLUR, Payload, STEP_BACK, Splat, SplatSet, decode_normal},
     volume::{Arrangement, Lattice, TransferFunction, Volume},
 };
 use glam::{DMat3, DVec3};
@@ -82,6 +82,7 @@ fn from_splat<'a>(
     let pixel = if view.perspective { center.length() } else { 1.0 } / view.scale;
     let blur = DMat3::from_diagonal(DVec3::splat((FOOTPRINT_BLUR * pixel).powi(2)));
     let factor = cholesky(sharp * sharp.transpose() + blur)?;
+    let mut center = center;
     let load = match set.payload {
         Payload::Scalar => {
             let (weight, slope) = splat.weight_and_slope();
@@ -99,6 +100,10 @@ fn from_splat<'a>(
         Payload::Radiance => {
             let [red, green, blue, opacity] = splat.color.to_le_bytes().map(|byte| f64::from(byte) / 255.0);
             let normal = decode_normal(splat.normal).map(|normal| view.rotation * normal.as_dvec3());
+            if let Some(normal) = normal {
+                let thickness = |factor: DMat3| (factor.transpose() * normal).length();
+                center -= STEP_BACK * (thickness(factor) - thickness(sharp)) * normal;
+            }
             Load::Radiance(Radiance {
                 amount: Amount::Depth(f64::from(splat.strength) * opacity),
                 color: DVec3::new(red, green, blue),

@@ -2,7 +2,8 @@
 //!
 //! The engine must draw these pictures; it shares no code with this module beyond the scene, the view, the list of sheets,
 //! the kernels' values and the transfer function. Everything is brute force, pixel by pixel over all kernels, for pictures
-//! of some thousand pixels and kernels. [`integrate`] is the same field without sheets, as truth for them.
+//! of some thousand pixels and kernels. [`integrate`] is the same field without sheets, as truth for them; [`trace`] draws
+//! triangles, as truth for surfels.
 //!
 //! # The picture
 //! **Rays.** The ray of the pixel in column i and row j passes through (i + ½, j + ½): the points x(s) = a + s·b̂ in view
@@ -15,6 +16,8 @@
 //!   (0.35 pixel)² in every direction, so that the splat cannot fall between the pixels' rays (a scattered sample's weight w
 //!   is divided by how much that widens its volume). A pixel is |c|/f at the
 //!   centre's distance (perspective, f the focal length in pixels) or one over the pixels per world unit (orthographic).
+//!   Opaque things must not grow by that: radiance with a normal n steps back along it, c − 2.4·(σ′ − σ)·n, with σ and σ′ the
+//!   splat's standard deviations along n before and after.
 //! - A sample of a lattice has the profile of its volume's kernel and B = A·U·u: A the steps of the lattice, U the sample's
 //!   unit in steps, u the kernel's. It is not widened. Samples are those of `drawn_lattice` with the values `drawn_value`:
 //!   the volume's own, or the coefficients that make it sharp.
@@ -100,6 +103,7 @@ mod field;
 mod gather;
 mod images;
 mod kernel;
+mod mesh;
 mod profile;
 mod quadrature;
 mod ray;
@@ -111,6 +115,7 @@ mod whole;
 #[cfg(test)]
 mod tests;
 
+pub use mesh::trace;
 pub use truth::integrate;
 
 use crate::{

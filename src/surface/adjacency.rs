@@ -1,21 +1,55 @@
 //! Which triangle corners meet at each vertex.
 
-/// The corners at each vertex, in two flat arrays. Corner `3·t + i` is the `i`-th of triangle `t`.
+use super::Mesh;
+use crate::math::weld::first_of_equals;
+use rayon::prelude::*;
+use std::borrow::Cow;
+
+/// The corners at each vertex. Corner `3·t + i` is the `i`-th of triangle `t`.
 pub(super) struct Adjacency {
+    /// Vertices of each part but the last.
+    step: usize,
+    parts: Vec<Part>,
+}
+
+/// The corners at a range of vertices, in two flat arrays.
+struct Part {
     /// Where each vertex's corners begin; one more entry than vertices.
     starts: Vec<u32>,
     corners: Vec<u32>,
 }
 
 impl Adjacency {
-    /// Triangles for which `keep` is false are left out. All indices must be below `vertices`, and there must be at most
-    /// `u32::MAX` corners.
-    pub fn new(triangles: &[[u32; 3]], vertices: usize, keep: &[bool]) -> Self {
-        let kept = || triangles.iter().zip(keep).enumerate().filter(|(_, (_, keep))| **keep);
-        let mut starts = vec![0u32; vertices + 1];
-        for (_, (triangle, _)) in kept() {
+    /// All indices must be below `vertices`, and there must be at most `u32::MAX` corners.
+    pub fn new(triangles: &[[u32; 3]], vertices: usize) -> Self {
+        // Each task looks at all triangles, but cares for its own vertices alone: no two write to the same place, and the
+        // order does not depend on their number.
+        let step = vertices.div_ceil(rayon::current_num_threads()).max(1);
+        let parts = (0..vertices.div_ceil(step)).into_par_iter().map(|part| {
+            let first = part * step;
+            Part::new(triangles, first as u32, step.min(vertices - first) as u32)
+        });
+        Self { step, parts: parts.collect() }
+    }
+
+    /// The corners at a vertex, in ascending order.
+    pub fn corners(&self, vertex: usize) -> &[u32] {
+        let part = &self.parts[vertex / self.step];
+        let vertex = vertex % self.step;
+        &part.corners[part.starts[vertex] as usize..part.starts[vertex + 1] as usize]
+    }
+}
+
+impl Part {
+    fn new(triangles: &[[u32; 3]], first: u32, count: u32) -> Self {
+        let mut starts = vec![0u32; count as usize + 1];
+        for triangle in triangles {
             for &vertex in triangle {
-                starts[vertex as usize] += 1;
+                // Smaller ones wrap around and are too large.
+                let own = vertex.wrapping_sub(first);
+                if own < count {
+                    starts[own as usize] += 1;
+                }
             }
         }
         // From counts to the ends of the ranges; filling from the back turns ends into starts.
@@ -25,20 +59,46 @@ impl Adjacency {
             *entry = end;
         }
         let mut corners = vec![0u32; end as usize];
-        for (index, (triangle, _)) in triangles.iter().zip(keep).enumerate().rev().filter(|(_, (_, keep))| **keep) {
+        for (index, triangle) in triangles.iter().enumerate().rev() {
             for (corner, &vertex) in triangle.iter().enumerate().rev() {
-                let slot = &mut starts[vertex as usize];
-                *slot -= 1;
-                corners[*slot as usize] = (index * 3 + corner) as u32;
+                let own = vertex.wrapping_sub(first);
+                if own < count {
+                    let slot = &mut starts[own as usize];
+                    *slot -= 1;
+                    corners[*slot as usize] = (index * 3 + corner) as u32;
+                }
             }
         }
         Self { starts, corners }
     }
+}
 
-    /// The corners at a vertex, in ascending order.
-    pub fn corners(&self, vertex: usize) -> &[u32] {
-        &self.corners[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
+/// A mesh's triangles, as its surface hangs together.
+pub(super) struct Connected<'a> {
+    /// The triangles by places: vertices at one place are the first of them.
+    pub places: Cow<'a, [[u32; 3]]>,
+    pub adjacency: Adjacency,
+}
+
+impl<'a> Connected<'a> {
+    /// With `is_split`, vertices at one place are one; but not where the file has normals, which may be split to be seen.
+    pub fn new(mesh: &'a Mesh, is_split: bool) -> Self {
+        let places: Cow<[[u32; 3]]> = if is_split {
+            let first = first_of_equals(&mesh.positions);
+            mesh.triangles.par_iter().map(|t| t.map(|i| first[i as usize])).collect()
+        } else {
+            Cow::Borrowed(&mesh.triangles)
+        };
+        let joined: &[[u32; 3]] = if mesh.normals.is_empty() { &places } else { &mesh.triangles };
+        let adjacency = Adjacency::new(joined, mesh.positions.len());
+        Self { places, adjacency }
     }
+}
+
+/// Whether several vertices of a mesh may lie at one place. Files split vertices at seams of texture and material, or give
+/// every triangle its own; a seam must not show.
+pub(super) fn may_be_split(mesh: &Mesh) -> bool {
+    !mesh.uvs.is_empty() || mesh.materials.len() > 1 || mesh.positions.len() > mesh.triangles.len() / 4 * 3
 }
 
 #[cfg(test)]
@@ -46,12 +106,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn corners_of_kept_triangles_in_order() {
-        let adjacency = Adjacency::new(&[[0, 1, 2], [2, 1, 3], [3, 3, 0]], 5, &[true, true, false]);
-        assert_eq!(adjacency.corners(0), [0]);
-        assert_eq!(adjacency.corners(1), [1, 4]);
+    fn corners_in_order() {
+        let adjacency = Adjacency::new(&[[0, 1, 2], [2, 1, 3], [0, 4, 1]], 6);
+        assert_eq!(adjacency.corners(0), [0, 6]);
+        assert_eq!(adjacency.corners(1), [1, 4, 8]);
         assert_eq!(adjacency.corners(2), [2, 3]);
         assert_eq!(adjacency.corners(3), [5]);
-        assert!(adjacency.corners(4).is_empty());
+        assert_eq!(adjacency.corners(4), [7]);
+        assert!(adjacency.corners(5).is_empty());
     }
 }

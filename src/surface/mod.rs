@@ -2,15 +2,20 @@
 
 mod adjacency;
 mod cloud;
+mod disc;
 mod ellipse;
+mod fan;
 mod mesh;
 mod orient;
 mod paint;
 mod refine;
 mod shapes;
+mod smooth;
 mod surfels;
 mod survey;
 
 pub use mesh::{Material, Mesh, Sensor, Texture};
+pub(crate) use paint::color_at;
+pub(crate) use smooth::corner_normals;
 pub use surfels::SurfelOptions;
 pub use survey::Survey;

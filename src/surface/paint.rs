@@ -1,10 +1,10 @@
 //! The colour of a mesh at a corner: vertex colour × material colour × texture.
 
-use super::{Mesh, Texture};
+use super::{Material, Mesh, Texture};
 use glam::Vec2;
 
 /// Drawn where a mesh says nothing of its colour.
-const NEUTRAL: [f32; 4] = [0.8, 0.8, 0.8, 1.0];
+pub(super) const NEUTRAL: [f32; 4] = [0.8, 0.8, 0.8, 1.0];
 
 impl Texture {
     /// The mean colour over the parallelogram from `uv` along `a` and `b`; its samples are about two texels apart, but at
@@ -51,11 +51,7 @@ impl Texture {
 pub(super) fn corner_color(mesh: &Mesh, triangle: usize, corner: usize) -> [f32; 4] {
     let [vertex, next, last] = [0, 1, 2].map(|i| mesh.triangles[triangle][(corner + i) % 3] as usize);
     let material = mesh.triangle_materials.get(triangle).map(|&index| &mesh.materials[index as usize]);
-    let mut color = match material {
-        Some(material) => material.color,
-        None if mesh.colors.is_empty() => NEUTRAL,
-        None => [1.0; 4],
-    };
+    let mut color = base_color(mesh, material);
     let mut multiply = |by: [f32; 4]| color.iter_mut().zip(by).for_each(|(part, by)| *part *= by);
     if let Some(own) = mesh.colors.get(vertex) {
         multiply(own.map(|part| f32::from(part) / 255.0));
@@ -65,6 +61,31 @@ pub(super) fn corner_color(mesh: &Mesh, triangle: usize, corner: usize) -> [f32;
         multiply(texture.mean(uv, (mesh.uvs[next] - uv) * 0.5, (mesh.uvs[last] - uv) * 0.5));
     }
     color
+}
+
+/// The colour at a place of a triangle, given by barycentric coordinates; channels in 0 … 1.
+pub(crate) fn color_at(mesh: &Mesh, triangle: usize, weights: [f32; 3]) -> [f32; 4] {
+    let vertices = mesh.triangles[triangle].map(|vertex| vertex as usize);
+    let material = mesh.triangle_materials.get(triangle).map(|&index| &mesh.materials[index as usize]);
+    let mut color = base_color(mesh, material);
+    let mut multiply = |by: [f32; 4]| color.iter_mut().zip(by).for_each(|(part, by)| *part *= by);
+    if !mesh.colors.is_empty() {
+        let part = |i: usize, v: usize| f32::from(mesh.colors[v][i]) / 255.0;
+        multiply(std::array::from_fn(|i| vertices.iter().zip(weights).map(|(&v, weight)| weight * part(i, v)).sum()));
+    }
+    let texture = material.and_then(|material| material.texture.as_ref());
+    if let Some(texture) = texture.filter(|_| !mesh.uvs.is_empty()) {
+        multiply(texture.sample(vertices.iter().zip(weights).map(|(&v, weight)| weight * mesh.uvs[v]).sum()));
+    }
+    color
+}
+
+fn base_color(mesh: &Mesh, material: Option<&Material>) -> [f32; 4] {
+    match material {
+        Some(material) => material.color,
+        None if mesh.colors.is_empty() => NEUTRAL,
+        None => [1.0; 4],
+    }
 }
 
 /// The colour of a point that belongs to no triangle.

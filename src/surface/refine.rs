@@ -4,8 +4,8 @@
 //! beside them cut in two, three or four. Both neighbours of an edge see it halved, so no gap opens between them.
 //! Halving would also multiply needles (two long edges and a short one) across, so these are cut in slabs.
 
-use super::Mesh;
-use glam::{Vec2, Vec3};
+use super::{Mesh, smooth::corner_normals};
+use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -22,13 +22,63 @@ struct Wanted<'a> {
     coarser: f32,
 }
 
+/// A mesh of small triangles.
+pub(super) struct Refined<'a> {
+    pub mesh: Cow<'a, Mesh>,
+    /// Which triangle of the mesh before each was cut from; none where nothing was cut.
+    pub sources: Option<Vec<u32>>,
+}
+
 /// The mesh with no edge longer than `length` (in its unit), and textured triangles cut to about the size of the texels.
 /// Lengths grow where there would be more than about `most` triangles.
-pub(super) fn refine(mesh: &Mesh, length: f32, most: usize) -> Cow<'_, Mesh> {
-    let mut wanted = Wanted { mesh, length, coarser: 1.0 };
+pub(super) fn refine(mesh: &Mesh, length: f32, most: usize) -> Refined<'_> {
+    let wanted = Wanted { mesh, length, coarser: 1.0 };
+    if mesh.triangles.par_iter().enumerate().all(|(index, &t)| wanted.is_small(index, t)) {
+        return Refined { mesh: Cow::Borrowed(mesh), sources: None };
+    }
+    // While triangles are cut, the number of the one that each was cut from stands in its material's place.
+    let mut fine = Mesh { triangle_materials: (0..mesh.triangles.len() as u32).collect(), ..mesh.clone() };
+    cut_all(&mut fine, wanted, most);
+    let sources = std::mem::take(&mut fine.triangle_materials);
+    if !mesh.triangle_materials.is_empty() {
+        fine.triangle_materials = sources.par_iter().map(|&source| mesh.triangle_materials[source as usize]).collect();
+    }
+    Refined { mesh: Cow::Owned(fine), sources: Some(sources) }
+}
+
+/// The triangles that those of a refined mesh were cut from.
+pub(super) struct Origin<'a> {
+    mesh: &'a Mesh,
+    sources: Vec<u32>,
+    normals: Vec<[Vec3; 3]>,
+}
+
+impl<'a> Origin<'a> {
+    pub fn new(mesh: &'a Mesh, sources: Vec<u32>, crease_angle_degrees: f32) -> Self {
+        Self { mesh, sources, normals: corner_normals(mesh, crease_angle_degrees) }
+    }
+
+    pub fn mesh(&self) -> &'a Mesh {
+        self.mesh
+    }
+
+    /// The normal at a corner of the `fine` mesh, interpolated between those of the whole triangle; of any length.
+    pub fn normal(&self, fine: &Mesh, at: u32) -> Vec3 {
+        let source = self.sources[at as usize / 3] as usize;
+        let [a, b, c] = self.mesh.triangles[source].map(|vertex| self.mesh.positions[vertex as usize].as_dvec3());
+        let place = fine.positions[fine.triangles[at as usize / 3][at as usize % 3] as usize].as_dvec3();
+        let cross = (b - a).cross(c - a);
+        let part = |from: DVec3, to: DVec3| (from - place).cross(to - place).dot(cross) / cross.length_squared();
+        let weights = [part(b, c), part(c, a), part(a, b)];
+        self.normals[source].iter().zip(weights).map(|(normal, weight)| *normal * weight as f32).sum()
+    }
+}
+
+fn cut_all(fine: &mut Mesh, mut wanted: Wanted, most: usize) {
+    let (mesh, length) = (wanted.mesh, wanted.length);
     let budget = most.max(mesh.triangles.len()) as f64;
     for _ in 0..8 {
-        let expected = wanted.expected();
+        let expected = wanted.expected(fine);
         if expected <= budget * 1.1 {
             break;
         }
@@ -37,49 +87,53 @@ pub(super) fn refine(mesh: &Mesh, length: f32, most: usize) -> Cow<'_, Mesh> {
         wanted.coarser *= factor;
         wanted.length = length * (wanted.coarser * FINEST).max(1.0);
     }
-    let mut fine = Cow::Borrowed(mesh);
     // Triangles before `settled` have no long edge.
     let mut settled = 0;
     loop {
-        slice_needles(&mut fine, &wanted, settled);
-        let mut marked = marked_edges(&fine, &wanted, settled);
+        slice_needles(fine, &wanted, settled);
+        let mut marked = marked_edges(fine, &wanted, settled);
         if marked.is_empty() || fine.positions.len() + marked.len() > u32::MAX as usize {
-            return fine;
+            return;
         }
         marked.par_sort_unstable();
         marked.dedup();
-        settled = cut(fine.to_mut(), &marked, settled);
+        settled = cut(fine, &marked, settled);
     }
 }
 
 impl Wanted<'_> {
     /// The size of a texel along an edge, in texels: how long it is in its triangle's texture; 0 without one.
-    fn texels(&self, mesh: &Mesh, triangle: usize, a: u32, b: u32) -> f32 {
-        let material = mesh.triangle_materials.get(triangle).map(|&index| &self.mesh.materials[index as usize]);
+    fn texels(&self, mesh: &Mesh, source: usize, a: u32, b: u32) -> f32 {
+        let material = self.mesh.triangle_materials.get(source).map(|&index| &self.mesh.materials[index as usize]);
         let Some(texture) = material.and_then(|material| material.texture.as_ref()) else { return 0.0 };
         let (Some(&a), Some(&b)) = (mesh.uvs.get(a as usize), mesh.uvs.get(b as usize)) else { return 0.0 };
         ((a - b) * Vec2::new(texture.width as f32, texture.height as f32)).length()
     }
 
     /// How many times too long an edge is; up to 1 it may stay.
-    fn excess(&self, mesh: &Mesh, triangle: usize, a: u32, b: u32) -> f32 {
+    fn excess(&self, mesh: &Mesh, source: usize, a: u32, b: u32) -> f32 {
         let length = (mesh.positions[a as usize] - mesh.positions[b as usize]).length();
-        let texels = self.texels(mesh, triangle, a, b) / (TEXELS * self.coarser);
+        let texels = self.texels(mesh, source, a, b) / (TEXELS * self.coarser);
         let finest = length / (self.length * FINEST * self.coarser).min(self.length);
         (length / self.length).max(texels.min(finest))
     }
 
+    /// Whether a triangle of the mesh may stay whole.
+    fn is_small(&self, triangle: usize, t: [u32; 3]) -> bool {
+        [(0, 1), (1, 2), (2, 0)].iter().all(|&(i, j)| self.excess(self.mesh, triangle, t[i], t[j]) <= 1.0)
+    }
+
     /// About how many triangles there will be.
-    fn expected(&self) -> f64 {
-        let mesh = self.mesh;
-        let parts = |(index, t): (usize, &[u32; 3])| {
-            let [p, q, r] = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| f64::from(self.excess(mesh, index, t[i], t[j])));
+    fn expected(&self, mesh: &Mesh) -> f64 {
+        let parts = |(t, &source): (&[u32; 3], &u32)| {
+            let [p, q, r] =
+                [(0, 1), (1, 2), (2, 0)].map(|(i, j)| f64::from(self.excess(mesh, source as usize, t[i], t[j])));
             // The triangle measured in the lengths that are wanted, by Heron; a cut leaves edges of about 0.7.
             let s = (p + q + r) * 0.5;
             let area = (s * (s - p) * (s - q) * (s - r)).max(0.0).sqrt();
             (area / 0.21).max(p.max(q).max(r)).max(1.0)
         };
-        mesh.triangles.par_iter().enumerate().map(parts).sum()
+        mesh.triangles.par_iter().zip(&mesh.triangle_materials).map(parts).sum()
     }
 }
 
@@ -91,10 +145,11 @@ struct Needle {
 }
 
 /// Cuts the triangles with two long edges and a short one in slabs across, each as long as it may be.
-fn slice_needles(fine: &mut Cow<Mesh>, wanted: &Wanted, settled: usize) {
+fn slice_needles(mesh: &mut Mesh, wanted: &Wanted, settled: usize) {
     let needle = |(index, &t): (usize, &[u32; 3])| {
         let triangle = settled + index;
-        let excess = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| wanted.excess(fine, triangle, t[i], t[j]));
+        let source = mesh.triangle_materials[triangle] as usize;
+        let excess = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| wanted.excess(mesh, source, t[i], t[j]));
         let short = (0..3).min_by(|&i, &j| excess[i].total_cmp(&excess[j]))?;
         let longest = excess[(short + 1) % 3].max(excess[(short + 2) % 3]);
         let least = excess[(short + 1) % 3].min(excess[(short + 2) % 3]);
@@ -104,7 +159,7 @@ fn slice_needles(fine: &mut Cow<Mesh>, wanted: &Wanted, settled: usize) {
         let corners = [t[(short + 2) % 3], t[short], t[(short + 1) % 3]];
         is_needle.then(|| Needle { triangle, corners, parts: (longest / step).ceil().min(1e6) as u32 })
     };
-    let needles: Vec<Needle> = fine.triangles[settled..].par_iter().enumerate().filter_map(needle).collect();
+    let needles: Vec<Needle> = mesh.triangles[settled..].par_iter().enumerate().filter_map(needle).collect();
     if needles.is_empty() {
         return;
     }
@@ -113,7 +168,7 @@ fn slice_needles(fine: &mut Cow<Mesh>, wanted: &Wanted, settled: usize) {
         needles.iter().flat_map(|n| [1, 2].map(|i| (sorted((n.corners[0], n.corners[i])), n.parts))).collect();
     edges.par_sort_unstable_by_key(|&(edge, parts)| (edge, std::cmp::Reverse(parts)));
     edges.dedup_by_key(|&mut (edge, _)| edge);
-    let mut next = fine.positions.len() as u64;
+    let mut next = mesh.positions.len() as u64;
     let mut starts = Vec::with_capacity(edges.len());
     let mut new = Vec::new();
     for &((a, b), parts) in &edges {
@@ -124,7 +179,6 @@ fn slice_needles(fine: &mut Cow<Mesh>, wanted: &Wanted, settled: usize) {
     if next > u64::from(u32::MAX) {
         return;
     }
-    let mesh = fine.to_mut();
     add_vertices(mesh, &new);
     // Vertex `i` of `parts` from `from` to `to`, and `parts`.
     let chain = |from: u32, to: u32| {
@@ -142,7 +196,7 @@ fn slice_needles(fine: &mut Cow<Mesh>, wanted: &Wanted, settled: usize) {
     for needle in &needles {
         let [tip, a, b] = needle.corners;
         let ((left, left_at), (right, right_at)) = (chain(tip, a), chain(tip, b));
-        let material = mesh.triangle_materials.get(needle.triangle).copied();
+        let source = mesh.triangle_materials[needle.triangle];
         mesh.triangles[needle.triangle] = [tip, left_at(1), right_at(1)];
         let (mut i, mut j) = (1, 1);
         while i < left || j < right {
@@ -156,7 +210,7 @@ fn slice_needles(fine: &mut Cow<Mesh>, wanted: &Wanted, settled: usize) {
                 j += 1;
                 mesh.triangles.push([l, right_at(j), r]);
             }
-            mesh.triangle_materials.extend(material);
+            mesh.triangle_materials.push(source);
         }
     }
 }
@@ -168,7 +222,8 @@ fn marked_edges(mesh: &Mesh, wanted: &Wanted, settled: usize) -> Vec<(u32, u32)>
         .enumerate()
         .flat_map_iter(|(index, &t)| {
             let edges = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
-            let excess = edges.map(|(a, b)| wanted.excess(mesh, settled + index, a, b));
+            let source = mesh.triangle_materials[settled + index] as usize;
+            let excess = edges.map(|(a, b)| wanted.excess(mesh, source, a, b));
             // Only the longest, and those about as long: a flat triangle is cut along its length first.
             let least = (excess.iter().fold(0.0, |a: f32, &b| a.max(b)) * 0.7).max(1.0);
             edges.into_iter().zip(excess).filter_map(move |(edge, excess)| (excess > least).then_some(sorted(edge)))
@@ -191,23 +246,16 @@ fn cut(mesh: &mut Mesh, marked: &[(u32, u32)], settled: usize) -> usize {
     let middles: Vec<_> = marked.iter().map(|&(a, b)| (a, b, 0.5)).collect();
     add_vertices(mesh, &middles);
     let positions = &mesh.positions;
-    let with_materials = !mesh.triangle_materials.is_empty();
-    let open: Vec<([u32; 3], u32)> = mesh.triangles[settled..]
-        .iter()
-        .enumerate()
-        .map(|(i, &t)| (t, if with_materials { mesh.triangle_materials[settled + i] } else { 0 }))
-        .collect();
-    let parts: Vec<_> = open.par_iter().map(|&(t, material)| (split(t, halves(t), positions), material)).collect();
+    let open = mesh.triangles[settled..].par_iter().zip(&mesh.triangle_materials[settled..]);
+    let parts: Vec<_> = open.map(|(&t, &source)| (split(t, halves(t), positions), source)).collect();
     mesh.triangles.truncate(settled);
     mesh.triangle_materials.truncate(settled);
     let mut now_settled = settled;
     for whole in [true, false] {
-        for ((pieces, count), material) in &parts {
+        for ((pieces, count), source) in &parts {
             if (*count == 1) == whole {
                 mesh.triangles.extend_from_slice(&pieces[..*count]);
-                if with_materials {
-                    mesh.triangle_materials.extend(std::iter::repeat_n(*material, *count));
-                }
+                mesh.triangle_materials.extend(std::iter::repeat_n(*source, *count));
             }
         }
         if whole {
@@ -284,7 +332,7 @@ mod tests {
     fn no_edge_stays_long_and_the_area_is_kept() {
         for apex in [Vec3::new(0.3, 0.8, 0.0), Vec3::new(0.5, 1e-3, 0.0), Vec3::new(0.0, 3.0, 0.0)] {
             let mesh = one(apex);
-            let fine = refine(&mesh, 0.1, 1 << 20);
+            let fine = refine(&mesh, 0.1, 1 << 20).mesh;
             for t in &fine.triangles {
                 for (i, j) in [(0, 1), (1, 2), (2, 0)] {
                     assert!(fine.positions[t[i] as usize].distance(fine.positions[t[j] as usize]) <= 0.1001);
@@ -297,18 +345,32 @@ mod tests {
     #[test]
     fn a_sliver_is_cut_along_its_length_only() {
         let mesh = one(Vec3::new(0.5, 1e-3, 0.0));
-        assert!(refine(&mesh, 0.01, 1 << 20).triangles.len() < 400);
+        assert!(refine(&mesh, 0.01, 1 << 20).mesh.triangles.len() < 400);
     }
 
     #[test]
     fn the_budget_holds() {
         let mesh = one(Vec3::new(0.3, 0.8, 0.0));
-        let count = refine(&mesh, 1e-4, 10_000).triangles.len();
+        let count = refine(&mesh, 1e-4, 10_000).mesh.triangles.len();
         assert!((2_000..40_000).contains(&count), "{count}");
     }
 
     #[test]
     fn small_triangles_are_borrowed() {
-        assert!(matches!(refine(&one(Vec3::Y), 2.0, 100), Cow::Borrowed(_)));
+        assert!(refine(&one(Vec3::Y), 2.0, 100).sources.is_none());
+    }
+
+    #[test]
+    fn normals_are_those_of_the_whole_triangles() {
+        let sphere = Mesh::sphere(1);
+        let fine = refine(&sphere, 0.1, 1 << 20);
+        let origin = Origin::new(&sphere, fine.sources.unwrap(), 60.0);
+        for (index, triangle) in fine.mesh.triangles.iter().enumerate() {
+            for (corner, &vertex) in triangle.iter().enumerate() {
+                // Normals that change linearly over a triangle, as its places do, go on being the same.
+                let found = origin.normal(&fine.mesh, (3 * index + corner) as u32).normalize();
+                assert!(found.dot(fine.mesh.positions[vertex as usize].normalize()) > 0.9999, "{found}");
+            }
+        }
     }
 }

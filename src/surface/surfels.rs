@@ -1,32 +1,32 @@
 //! From meshes and clouds to elliptic surfels.
 //!
-//! Large triangles are cut first ([`refine`]). Then every vertex gives one surfel for each smooth group of the triangles
-//! around it, in the plane of the group's mean normal, with the smallest ellipse found that is at least as wide as what
-//! each of those triangles asks for ([`Tensor::of_triangle`]). So three surfels of its own cover each triangle, and
-//! a surface has no holes, whatever its triangles look like.
+//! Large triangles are cut first ([`refine`]). Then every vertex gives one surfel for each nearly flat group of the triangles
+//! around it ([`Maker`]), in the plane of the group's normal. A surfel has the moments of its triangles: where they lie all
+//! around the vertex, it is centred there; at a boundary or a crease it is moved inward and is narrow across, so that half of
+//! the light is gone near the edge. Then it is widened as far as it must to cover its share of each triangle, so
+//! that a surface has no holes, whatever its triangles look like.
 
 use super::{
     Mesh,
-    adjacency::Adjacency,
+    adjacency::{Connected, may_be_split},
     cloud,
-    ellipse::{Tensor, factor},
-    paint::{corner_color, pack},
-    refine::refine,
+    fan::{Made, Maker, Sums},
+    refine::{Origin, refine},
 };
 use crate::{
     Error, Result,
-    math::weld::first_of_equals,
-    splat::{Payload, Splat, SplatSet, encode_normal},
+    splat::{Payload, Splat, SplatSet},
 };
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// How surfels are made from a mesh or cloud.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfelOptions {
     /// Factor on all radii. Below 1 the surface may show holes.
     pub radius_scale: f32,
-    /// Optical depth at the centre of a surfel. Each triangle has at least 0.76 of it everywhere.
+    /// Optical depth at the centre of a surfel. Triangles have most of it nearly everywhere, and nowhere inside less than 0.28.
     pub optical_depth: f32,
     /// Neighbouring triangles whose normals differ by more meet in a crease; 60 at most.
     pub crease_angle_degrees: f32,
@@ -58,8 +58,10 @@ impl Mesh {
     /// Surfels that cover the triangles without holes, or, where there are none, stand for the points. World units;
     /// centres relative to the mesh's origin; the order depends on the input only.
     ///
-    /// Colours are vertex colour × material × texture. A surfel has the file's normal at its vertex, or the
-    /// angle-weighted normal of its group of triangles. Triangles without area, and vertices that no triangle uses, give
+    /// Colours are vertex colour × material × texture. A surfel has the file's normal at its vertex, or the angle-weighted
+    /// normal of the triangles that are smooth with its own there (over a triangle that was cut, interpolated), and lies across
+    /// it where that is within 20° of its triangles' mean normal. Normals of a closed mesh without any are turned outward.
+    /// Triangles without area, and vertices that no triangle uses, give
     /// nothing; nor do points that coincide with another.
     ///
     /// # Errors
@@ -130,156 +132,50 @@ impl Mesh {
 
 fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
     let Some([low, high]) = mesh.bounds() else { return Vec::new() };
-    let diagonal = (high - low).length() as f32;
-    // Files split vertices at seams of texture and material, or give every triangle its own. A seam must not show, so
-    // vertices at one place are one; but not where the file has normals, which may be split to be seen.
-    let may_be_split =
-        !mesh.uvs.is_empty() || mesh.materials.len() > 1 || mesh.positions.len() > mesh.triangles.len() / 4 * 3;
-    let is_split = mesh.normals.is_empty() && may_be_split;
-    let fine = refine(mesh, diagonal * options.largest_spacing, options.most_triangles);
-    let mesh = fine.as_ref();
-    let keep: Vec<bool> = mesh.triangles.par_iter().map(|&triangle| has_area(mesh, triangle)).collect();
-    let adjacency = if is_split {
-        let first = first_of_equals(&mesh.positions);
-        let triangles: Vec<[u32; 3]> = mesh.triangles.par_iter().map(|t| t.map(|i| first[i as usize])).collect();
-        Adjacency::new(&triangles, mesh.positions.len(), &keep)
-    } else {
-        Adjacency::new(&mesh.triangles, mesh.positions.len(), &keep)
-    };
-    let maker = Maker {
-        mesh,
-        adjacency: &adjacency,
-        options,
-        crease: f64::from(options.crease_angle_degrees.min(60.0)).to_radians().cos(),
-    };
-    let parts: Vec<Vec<Splat>> = (0..mesh.positions.len().div_ceil(CHUNK))
+    let largest = ((high - low).length() as f32 * options.largest_spacing).max(f32::MIN_POSITIVE);
+    // Most large meshes are fine enough, and right side out. One look at the triangles finds that out and makes the surfels.
+    let parts = make(mesh, None, options, largest, 1.0);
+    let is_coarse = parts.iter().any(|part| part.longest > 1.0);
+    let is_textured = !mesh.uvs.is_empty() && mesh.materials.iter().any(|material| material.texture.is_some());
+    let sums = parts.iter().fold(Sums::default(), |sums, part| sums.with(part.sums));
+    let outward = if sums.are_inside_out(largest) { -1.0 } else { 1.0 };
+    if !is_coarse && !is_textured && outward == 1.0 {
+        return joined(parts);
+    }
+    drop(parts);
+    let fine = refine(mesh, largest, options.most_triangles);
+    let origin = fine.sources.map(|sources| Origin::new(mesh, sources, options.crease_angle_degrees));
+    joined(make(&fine.mesh, origin.as_ref(), options, largest, outward))
+}
+
+/// The surfels of all vertices, in parts.
+fn make(mesh: &Mesh, origin: Option<&Origin>, options: &SurfelOptions, unit: f32, outward: f32) -> Vec<Made> {
+    let connected = Connected::new(mesh, may_be_split(origin.map_or(mesh, Origin::mesh)));
+    let plain = mesh.materials.is_empty() && (mesh.colors.is_empty() || matches!(connected.places, Cow::Borrowed(_)));
+    let maker = Maker { mesh, connected: &connected, options, origin, unit, outward, plain };
+    (0..mesh.positions.len().div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| {
-            let mut splats = Vec::with_capacity(CHUNK);
-            let mut around = Vec::new();
-            let mut seeds = Vec::new();
-            for vertex in chunk * CHUNK..((chunk + 1) * CHUNK).min(mesh.positions.len()) {
-                maker.vertex(vertex, &mut around, &mut seeds, &mut splats);
-            }
-            splats
+            let vertices = chunk * CHUNK..((chunk + 1) * CHUNK).min(mesh.positions.len());
+            let mut made = Made::new(options, CHUNK);
+            vertices.for_each(|vertex| maker.vertex(vertex, &mut made));
+            made
         })
-        .collect();
-    parts.concat()
+        .collect()
 }
 
-fn corner(mesh: &Mesh, index: u32) -> DVec3 {
-    mesh.positions[index as usize].as_dvec3()
-}
-
-/// Whether a triangle is more than a line, at the precision of its coordinates.
-pub(super) fn has_area(mesh: &Mesh, [a, b, c]: [u32; 3]) -> bool {
-    let [a, b, c] = [a, b, c].map(|index| corner(mesh, index));
-    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-    (b - a).cross(c - a).length() > longest * 1e-10
-}
-
-/// A triangle as one of its vertices sees it.
-struct Around {
-    triangle: usize,
-    /// Which of its corners the vertex is.
-    corner: usize,
-    /// Unit normal.
-    normal: DVec3,
-    area: f64,
-    /// At this vertex.
-    angle: f64,
-    edges: [DVec3; 3],
-    group: usize,
-}
-
-struct Maker<'a> {
-    mesh: &'a Mesh,
-    adjacency: &'a Adjacency,
-    options: &'a SurfelOptions,
-    /// Cosine of the crease angle.
-    crease: f64,
-}
-
-impl Maker<'_> {
-    /// Adds the surfels of a vertex. `around` and `seeds` are room to work in.
-    fn vertex(&self, vertex: usize, around: &mut Vec<Around>, seeds: &mut Vec<DVec3>, splats: &mut Vec<Splat>) {
-        around.clear();
-        seeds.clear();
-        for &at in self.adjacency.corners(vertex) {
-            let mut triangle = self.around(at);
-            // A group is a cone around its first normal, so that no surfel is far from the plane of a triangle it has to
-            // cover, even where many small steps add up to a large turn. There are never more than a few groups.
-            let nearest = seeds
-                .iter()
-                .enumerate()
-                .map(|(group, seed): (usize, &DVec3)| (group, seed.dot(triangle.normal)))
-                .filter(|&(_, cosine)| cosine >= self.crease)
-                .max_by(|a, b| a.1.total_cmp(&b.1));
-            triangle.group = nearest.map_or(seeds.len(), |(group, _)| group);
-            if nearest.is_none() {
-                seeds.push(triangle.normal);
-            }
-            around.push(triangle);
-        }
-        for (group, &seed) in seeds.iter().enumerate() {
-            splats.push(self.surfel(vertex, seed, || around.iter().filter(|t| t.group == group)));
-        }
+/// The surfels of all parts, in order.
+fn joined(parts: Vec<Made>) -> Vec<Splat> {
+    let mut splats = bytemuck::zeroed_vec(parts.iter().map(|part| part.splats.len()).sum());
+    let mut rest = &mut splats[..];
+    let mut pairs = Vec::with_capacity(parts.len());
+    for part in parts {
+        let (place, after) = rest.split_at_mut(part.splats.len());
+        pairs.push((place, part.splats));
+        rest = after;
     }
-
-    fn around(&self, at: u32) -> Around {
-        let triangle = at as usize / 3;
-        let indices = self.mesh.triangles[triangle];
-        let [a, b, c] = [0, 1, 2].map(|i| corner(self.mesh, indices[(at as usize + i) % 3]));
-        let edges = [b - a, c - b, a - c];
-        let cross = edges[0].cross(-edges[2]);
-        let double_area = cross.length();
-        Around {
-            triangle,
-            corner: at as usize % 3,
-            normal: cross / double_area,
-            area: double_area * 0.5,
-            angle: double_area.atan2(edges[0].dot(-edges[2])),
-            edges,
-            group: 0,
-        }
-    }
-
-    fn surfel<'t, I>(&self, vertex: usize, seed: DVec3, group: impl Fn() -> I) -> Splat
-    where
-        I: Iterator<Item = &'t Around>,
-    {
-        let sum: DVec3 = group().map(|t| t.normal * t.angle).sum();
-        let normal = sum.try_normalize().unwrap_or(seed);
-        let (x, y) = normal.any_orthonormal_pair();
-        let mut tensor: Option<Tensor> = None;
-        let mut color = [0.0; 4];
-        let mut area = 0.0;
-        for triangle in group() {
-            // Seen along the triangle's normal the surfel must be wide enough, so the edges are laid on the surfel's
-            // plane in that direction.
-            let slope = normal.dot(triangle.normal).max(0.25);
-            let edges = triangle.edges.map(|edge| {
-                let laid = edge - triangle.normal * (normal.dot(edge) / slope);
-                DVec2::new(laid.dot(x), laid.dot(y))
-            });
-            let asked = Tensor::of_triangle(edges);
-            tensor = Some(tensor.map_or(asked, |tensor| tensor.join(asked)));
-            let own = corner_color(self.mesh, triangle.triangle, triangle.corner);
-            color.iter_mut().zip(own).for_each(|(sum, own)| *sum += own * triangle.area as f32);
-            area += triangle.area as f32;
-        }
-        let scale = f64::from(self.options.radius_scale).powi(2);
-        let Tensor { xx, xy, yy } = tensor.unwrap_or(Tensor::disc(0.0));
-        let tensor = Tensor { xx: xx * scale, xy: xy * scale, yy: yy * scale };
-        let given = self.mesh.normals.get(vertex).filter(|normal| normal.length_squared() > 0.25);
-        Splat {
-            center: self.mesh.positions[vertex].to_array(),
-            strength: self.options.optical_depth,
-            factor: factor(tensor, x, y, normal),
-            color: pack(color.map(|sum| sum / area)),
-            normal: encode_normal(given.copied().unwrap_or(normal.as_vec3())),
-        }
-    }
+    pairs.into_par_iter().for_each(|(place, part)| place.copy_from_slice(&part));
+    splats
 }
 
 #[cfg(test)]

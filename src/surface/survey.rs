@@ -1,6 +1,6 @@
 //! What a mesh is like: whether it is closed, and what of it is odd.
 
-use super::{Mesh, surfels::has_area};
+use super::Mesh;
 use crate::math::weld::first_of_equals;
 use rayon::prelude::*;
 
@@ -63,6 +63,14 @@ impl Mesh {
             unused: if self.triangles.is_empty() { 0 } else { self.positions.len() - used },
         }
     }
+}
+
+/// Whether a triangle is more than a line, at the precision of its coordinates.
+fn has_area(mesh: &Mesh, triangle: [u32; 3]) -> bool {
+    let [Some(a), Some(b), Some(c)] = triangle.map(|index| mesh.positions.get(index as usize)) else { return false };
+    let [a, b, c] = [a, b, c].map(|place| place.as_dvec3());
+    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+    (b - a).cross(c - a).length() > longest * 1e-10
 }
 
 /// A number for an edge, the negative of it for its reverse.

@@ -15,7 +15,7 @@ const ELEVATION: f64 = 20.0;
 /// Camera: by default the whole scene is seen from the front, turned to the right and above.
 ///
 /// The front is seen along −z where +Y is up, as in VTK; along +y where +Z is up.
-#[derive(Args, Debug, Clone)]
+#[derive(Args, Debug, Clone, Default)]
 #[command(next_help_heading = "Camera")]
 pub struct CameraFlags {
     /// Where the camera stands.

@@ -1,6 +1,6 @@
-//! `splatkit generate`: phantoms as files, to try the other commands on.
+//! `splatkit generate`: phantoms and large scans as files, to try the other commands on.
 
-use crate::{failure::Failure, output, parse, progress::Progress};
+use crate::{failure::Failure, output, parse, progress::Progress, scan};
 use clap::{Args, ValueEnum};
 use glam::{DMat3, DVec3};
 use splatkit::{
@@ -11,10 +11,11 @@ use std::{fmt::Write, path::PathBuf};
 
 #[derive(Args, Debug)]
 pub struct Generate {
-    /// marschner-lobb, ball, specimen, slabs or head (in Hounsfield units, 1 standing for 100 mm).
-    #[arg(value_parser = phantom)]
-    phantom: Phantom,
-    /// A volume as .nrrd, one on a rectilinear lattice that is densest in the middle as .vtr, or scattered samples as .csv.
+    /// marschner-lobb, ball, specimen, slabs or head (in Hounsfield units, 1 standing for 100 mm); scan for a mesh.
+    #[arg(value_parser = what)]
+    what: What,
+    /// A volume as .nrrd, one on a rectilinear lattice that is densest in the middle as .vtr, or scattered samples as .csv; a
+    /// scan as .ply.
     #[arg(short, long, value_name = "FILE", value_parser = target)]
     output: PathBuf,
     /// Samples along each axis of the cube from −1 to 1.
@@ -23,8 +24,11 @@ pub struct Generate {
     /// How they lie in a .nrrd. Body-centred cubic: 29.3 % fewer for as many as --dims says along x.
     #[arg(long, value_enum, default_value_t = Places::Cartesian)]
     lattice: Places,
-    /// Scattered samples in a .csv.
-    #[arg(long, value_name = "COUNT", default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    /// The mesh that a scan is made from: its triangles are cut in four again and again, its surface set in waves.
+    #[arg(long, value_name = "MESH", required_if_eq("what", "scan"))]
+    from: Option<PathBuf>,
+    /// Scattered samples in a .csv; the most vertices of a scan.
+    #[arg(long, value_name = "COUNT", default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(1..=50_000_000))]
     points: u32,
     /// Replaces a file that is there already.
     #[arg(long)]
@@ -40,15 +44,24 @@ enum Places {
     Bcc,
 }
 
-fn phantom(name: &str) -> Result<Phantom, String> {
-    Phantom::named(name).ok_or_else(|| format!("use {}", Phantom::NAMES.join(", ")))
+#[derive(Debug, Clone, Copy)]
+enum What {
+    Phantom(Phantom),
+    Scan,
+}
+
+fn what(name: &str) -> Result<What, String> {
+    if name == "scan" {
+        return Ok(What::Scan);
+    }
+    Phantom::named(name).map(What::Phantom).ok_or_else(|| format!("use {} or scan", Phantom::NAMES.join(", ")))
 }
 
 fn target(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match path.extension().and_then(|extension| extension.to_str()) {
-        Some("nrrd" | "vtr" | "csv") => Ok(path),
-        _ => Err("the file's name ends in .nrrd, .vtr or .csv".into()),
+        Some("nrrd" | "vtr" | "csv" | "ply") => Ok(path),
+        _ => Err("the file's name ends in .nrrd, .vtr, .csv or .ply".into()),
     }
 }
 
@@ -56,20 +69,31 @@ impl Generate {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
         output::check(&self.output, self.overwrite)?;
         progress.stage(format!("Making {}", self.output.display()));
-        match self.output.extension().and_then(|extension| extension.to_str()) {
-            Some("csv") => output::write(&self.output, scattered(self.phantom, self.points).as_bytes()),
-            Some("vtr") => output::write(&self.output, rectilinear(self.phantom, self.dims).as_bytes()),
-            _ => {
-                let volume = self.volume().map_err(Error::Argument)?;
+        let extension = self.output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+        match (self.what, &self.from, extension) {
+            (What::Scan, Some(from), "ply") => {
+                let mesh = io::load_mesh(from, &io::Limits::default())?;
+                output::write(&self.output, &scan::ply(&scan::scan(&mesh, self.points as usize)))
+            }
+            (What::Scan, ..) => Err(Failure::Usage("a scan is made --from a mesh and written as .ply".into())),
+            (_, _, "ply") => Err(Failure::Usage("phantoms are written as .nrrd, .vtr or .csv".into())),
+            (What::Phantom(phantom), _, "csv") => {
+                output::write(&self.output, scattered(phantom, self.points).as_bytes())
+            }
+            (What::Phantom(phantom), _, "vtr") => {
+                output::write(&self.output, rectilinear(phantom, self.dims).as_bytes())
+            }
+            (What::Phantom(phantom), ..) => {
+                let volume = self.volume(phantom).map_err(Error::Argument)?;
                 output::write_by(&self.output, |path| io::nrrd::write(&volume, path))
             }
         }
     }
 
-    fn volume(&self) -> Result<Volume, String> {
+    fn volume(&self, phantom: Phantom) -> Result<Volume, String> {
         match self.lattice {
-            Places::Cartesian => self.phantom.sample(self.dims),
-            Places::Bcc => self.phantom.sample_on(body_centred(self.dims[0])),
+            Places::Cartesian => phantom.sample(self.dims),
+            Places::Bcc => phantom.sample_on(body_centred(self.dims[0])),
         }
     }
 }

@@ -22,6 +22,7 @@ mod output;
 mod parse;
 mod progress;
 mod render;
+mod scan;
 mod scene;
 mod show;
 
@@ -64,7 +65,7 @@ enum Task {
     Bench(Box<bench::Bench>),
     /// Makes a mesh and a volume and draws them: pictures and timings with no download.
     Demo(demo::Demo),
-    /// Writes a phantom: a volume or scattered samples to try the other commands on.
+    /// Writes a phantom: a volume or scattered samples to try the other commands on; or a large scan.
     Generate(generate::Generate),
     /// Measures the quality of what is drawn: the tables of docs/volumes.md.
     Figures(figures::Figures),

@@ -32,7 +32,7 @@ fn least_depth(mesh: &Mesh, set: &SplatSet) -> f64 {
         |n: usize| (0..=n).flat_map(move |i| (0..=n - i).map(move |j| (i as f64 / n as f64, j as f64 / n as f64)));
     (mesh.triangles.par_iter().step_by(step))
         .map(|&t| {
-            let [a, b, c] = t.map(|index| corner(mesh, index));
+            let [a, b, c] = t.map(|index| mesh.positions[index as usize].as_dvec3());
             let normal = (b - a).cross(c - a).normalize();
             let n = if mesh.triangles.len() < 100 { 60 } else { 8 };
             points(n).map(|(u, v)| depth(set, a + (b - a) * u + (c - a) * v, normal)).fold(f64::INFINITY, f64::min)
@@ -59,6 +59,8 @@ fn needles() -> Mesh {
 
 #[test]
 fn surfaces_have_no_holes() {
+    // At a boundary half of the light is gone, and at a crease each side adds as much.
+    let bound = |name: &str| if name == "cube" || name == "needles" { 0.6 } else { 2.2 };
     let coarse = SurfelOptions { largest_spacing: 10.0, ..SurfelOptions::default() };
     for (name, mesh) in [
         ("sphere 1", Mesh::sphere(1)),
@@ -69,12 +71,12 @@ fn surfaces_have_no_holes() {
         ("knot of long quads", Mesh::knot(60, 48)),
     ] {
         let least = least_depth(&mesh, &mesh.surfels(&coarse).expect("surfels"));
-        assert!(least >= 5.9, "{name}, not cut: {least}");
+        assert!(least >= bound(name), "{name}, not cut: {least}");
     }
     for (name, mesh) in [("cube", Mesh::cube(2.0)), ("needles", needles()), ("sphere 0", Mesh::sphere(0))] {
         let fine = SurfelOptions { largest_spacing: 0.05, ..SurfelOptions::default() };
         let least = least_depth(&mesh, &mesh.surfels(&fine).expect("surfels"));
-        assert!(least >= 5.9, "{name}: {least}");
+        assert!(least >= bound(name), "{name}: {least}");
     }
 }
 
@@ -100,12 +102,29 @@ fn normals_point_outward() {
 }
 
 #[test]
+fn a_mesh_that_is_inside_out_is_turned() {
+    let mut mesh = Mesh::sphere(3);
+    let whole = surfels(&mesh).splats;
+    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    for (turned, splat) in surfels(&mesh).splats.iter().zip(&whole) {
+        let [a, b] = [turned, splat].map(|splat| decode_normal(splat.normal).expect("a normal"));
+        assert!(a.dot(b) > 0.9999);
+        assert!(Vec3::from_array(turned.center).distance(Vec3::from_array(splat.center)) < 1e-4);
+    }
+    // The file's own normals are believed.
+    mesh.normals = mesh.positions.iter().map(|p| -p.normalize()).collect();
+    let inward = decode_normal(surfels(&mesh).splats[0].normal).expect("a normal");
+    assert!(inward.dot(mesh.positions[0]) < 0.0);
+}
+
+#[test]
 fn a_cube_keeps_its_creases() {
     let set = surfels(&Mesh::cube(2.0));
     for splat in &set.splats {
         let normal = decode_normal(splat.normal).expect("a normal");
         assert!(normal.abs().max_element() > 0.9999, "{normal}");
-        assert!((normal.dot(Vec3::from_array(splat.center)) - 1.0).abs() < 1e-3);
+        // No more than by its thickness behind its side.
+        assert!((0.99..=1.0).contains(&normal.dot(Vec3::from_array(splat.center))), "{splat:?}");
     }
     let whole = SurfelOptions { largest_spacing: 10.0, ..SurfelOptions::default() };
     assert_eq!(Mesh::cube(2.0).surfels(&whole).expect("surfels").splats.len(), 24);
@@ -113,7 +132,7 @@ fn a_cube_keeps_its_creases() {
 
 #[test]
 fn ellipses_stay_close_to_the_surface() {
-    // Beyond the rim of a square cut to 1/128 of its diagonal nothing is left at two spacings.
+    // Of a square cut to 1/128 of its diagonal. Half of the light is gone near its rim.
     let mesh = Mesh {
         positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
@@ -121,7 +140,10 @@ fn ellipses_stay_close_to_the_surface() {
     };
     let set = surfels(&mesh);
     let spacing = 2f64.sqrt() / 128.0;
-    assert!(depth(&set, DVec3::new(0.5, -spacing * 1.5, 0.0), DVec3::Z) < 0.2);
+    for along in 0..40 {
+        let at = |below: f64| depth(&set, DVec3::new(0.3 + 0.01 * f64::from(along), -spacing * below, 0.0), DVec3::Z);
+        assert!(at(0.3) < 0.6 && at(-0.1) > 0.8, "{} {}", at(0.3), at(-0.1));
+    }
     assert!(depth(&set, DVec3::new(0.5, 0.5, spacing), DVec3::X) < 1e-3);
 }
 
@@ -217,7 +239,7 @@ fn a_split_mesh_is_as_a_whole_one() {
     let soup = Mesh { positions, triangles, ..Mesh::default() };
     let (whole, soup) = (surfels(&mesh), surfels(&soup));
     assert_eq!(whole.splats.len(), soup.splats.len());
-    assert!(least_depth(&mesh, &soup) >= 5.9);
+    assert!(least_depth(&mesh, &soup) >= 2.2);
     for splat in &soup.splats {
         let normal = decode_normal(splat.normal).expect("a normal");
         assert!(normal.dot(Vec3::from_array(splat.center).normalize()) > 0.99);

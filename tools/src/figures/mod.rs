@@ -6,6 +6,7 @@ mod marschner_lobb;
 mod popping;
 mod report;
 mod ripple;
+mod surfaces;
 
 use crate::{failure::Failure, load::LoadFlags, output, parse, progress::Progress};
 use clap::Args;
@@ -17,13 +18,20 @@ use splatkit::{
     picture::Picture,
     scene::{Scene, Settings},
 };
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Args, Debug)]
 pub struct Figures {
     /// Volumes that are drawn in sheets and by dense integration too, beside the generated ones.
     #[arg(value_name = "VOLUME")]
     files: Vec<PathBuf>,
+    /// Meshes that are drawn as surfels and traced as triangles; with the axis that is up where that is not +Y. Measures
+    /// these alone.
+    #[arg(long, value_name = "MESH[:AXIS]", num_args = 1.., value_parser = surfaces::Source::parse, conflicts_with_all = ["files", "only"])]
+    surfaces: Vec<surfaces::Source>,
+    /// Writes the pictures of surfaces to this folder.
+    #[arg(long, value_name = "FOLDER", requires = "surfaces")]
+    pictures: Option<PathBuf>,
     /// Leaves out all but these.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "PART,…")]
     only: Vec<Part>,
@@ -80,7 +88,7 @@ impl Figures {
         let gpu = Gpu::headless(&choice)?;
         let mut stage = Stage { renderer: Renderer::new(&gpu) };
         let mut report = Report { adapter: gpu.info.name.clone(), tables: Vec::new() };
-        let wanted = |part| self.only.is_empty() || self.only.contains(&part);
+        let wanted = |part| self.surfaces.is_empty() && (self.only.is_empty() || self.only.contains(&part));
         if wanted(Part::Ripple) {
             report.tables.push(ripple::table()?);
         }
@@ -95,6 +103,11 @@ impl Figures {
         }
         if wanted(Part::Dense) {
             report.tables.push(self.dense(&mut stage, progress)?);
+        }
+        if !self.surfaces.is_empty() {
+            let open = |path: &Path| self.load.open(path);
+            let pictures = self.pictures.as_deref();
+            report.tables.push(surfaces::table(&mut stage, &self.surfaces, open, pictures, progress)?);
         }
         progress.clear();
         if let Some(block) = block {

@@ -1,0 +1,316 @@
+//! The surfels of one vertex: one for each nearly flat group of the triangles around it.
+
+use super::{
+    Mesh, SurfelOptions,
+    adjacency::Connected,
+    disc::{Ellipse, Moments},
+    paint::{NEUTRAL, corner_color, pack},
+    refine::Origin,
+    smooth::Groups,
+};
+use crate::splat::{STEP_BACK, Splat, encode_normal};
+use glam::{DVec3, Vec2, Vec3};
+
+/// A surfel stands for triangles whose normals differ from the first one's by no more (degrees).
+const FLAT: f32 = 22.0;
+/// A surfel lies across its shading normal where that is no farther from its triangles' mean normal (cosine of 20°).
+const ALIKE: f32 = 0.94;
+/// A triangle is steep where its normal's product with the surfel's is less.
+const STEEP: f32 = 0.95;
+/// Covariance of a surfel in that of the triangles around its vertex. On a mesh of equilateral triangles of side 1 the
+/// standard deviation is 0.35, and the surfels' sum is nowhere below 0.767 times the strength of one.
+const SPREAD: f32 = 0.35 * 0.35 * 24.0 / 5.0;
+/// The most squared distances, in standard deviations, that a surfel may have from the middles of the edges at its vertex,
+/// from the centroids of the triangles, and from the vertex itself. Two surfels at the middle of an edge, and three at a
+/// centroid, then have 0.31 and 0.29 of the strength of one; narrower ones leave holes, wider ones reach over outlines.
+const MIDDLE: f32 = 3.8;
+const CENTROID: f32 = 4.7;
+const CORNER: f32 = 5.0;
+/// The thickness of a surfel, in its smaller standard deviation.
+const THICKNESS: f32 = 0.12;
+/// How high above its vertex a surfel lies, of the mean height of the triangles around a vertex.
+const SAG: f32 = 0.4;
+
+/// A triangle as one of its vertices sees it. Lengths are in the maker's unit.
+struct Around {
+    at: u32,
+    /// Unit normal.
+    normal: Vec3,
+    area: f32,
+    /// At this vertex, in radians.
+    angle: f32,
+    /// To the next corner and to the last one, and where those are.
+    edges: [Vec3; 2],
+    places: [u32; 2],
+    /// The edges in the plane of the surfel.
+    laid: [Vec2; 2],
+    flat: usize,
+    smooth: usize,
+}
+
+/// Makes the surfels of a mesh's vertices.
+pub(super) struct Maker<'a> {
+    pub mesh: &'a Mesh,
+    pub connected: &'a Connected<'a>,
+    pub options: &'a SurfelOptions,
+    /// Where a mesh's triangles were cut, what they are cut from.
+    pub origin: Option<&'a Origin<'a>>,
+    /// The lengths that edges are measured in: their products fit 32 bits whatever the mesh's size.
+    pub unit: f32,
+    /// −1 where the mesh is inside out.
+    pub outward: f32,
+    /// Whether all corners at a vertex have its colour.
+    pub plain: bool,
+}
+
+/// Surfels of some vertices, and what was seen of the triangles around them.
+pub(super) struct Made {
+    pub splats: Vec<Splat>,
+    /// The square of the longest edge, in units.
+    pub longest: f32,
+    pub sums: Sums,
+    around: Vec<Around>,
+    flat: Groups,
+    smooth: Groups,
+    /// Normals of the smooth groups.
+    normals: Vec<Vec3>,
+}
+
+impl Made {
+    /// Nothing yet, with room for `capacity` surfels.
+    pub fn new(options: &SurfelOptions, capacity: usize) -> Self {
+        let crease = options.crease_angle_degrees;
+        Self {
+            splats: Vec::with_capacity(capacity),
+            longest: 0.0,
+            sums: Sums::default(),
+            around: Vec::new(),
+            flat: Groups::new(crease.min(FLAT)),
+            smooth: Groups::new(crease),
+            normals: Vec::new(),
+        }
+    }
+}
+
+impl Maker<'_> {
+    /// Adds the surfels of a vertex.
+    pub fn vertex(&self, vertex: usize, made: &mut Made) {
+        let Made { splats, longest, sums, around, flat, smooth, normals } = made;
+        around.clear();
+        flat.clear();
+        let (mut area, mut cross) = (0.0, Vec3::ZERO);
+        let per_unit = 1.0 / self.unit;
+        for &at in self.connected.adjacency.corners(vertex) {
+            if let Some(mut triangle) = self.around(at, per_unit, longest) {
+                triangle.flat = flat.place(triangle.normal);
+                area += triangle.area;
+                cross += triangle.normal * triangle.area;
+                around.push(triangle);
+            }
+        }
+        sums.add(self.mesh.positions[vertex], area, cross);
+        if flat.len() == 1 && self.origin.is_none() {
+            splats.extend(self.surfel(vertex, around, None));
+            return;
+        }
+        self.shade(around, smooth, normals);
+        around.sort_by_key(|t| t.flat);
+        for group in around.chunk_by_mut(|a, b| a.flat == b.flat) {
+            let shading = group.iter().map(|t| normals[t.smooth] * t.angle).sum();
+            splats.extend(self.surfel(vertex, group, Some(shading)));
+        }
+    }
+
+    /// What a corner's vertex sees; `longest` grows to the square of the longest edge there.
+    fn around(&self, at: u32, per_unit: f32, longest: &mut f32) -> Option<Around> {
+        let (triangle, corner) = (at as usize / 3, at as usize % 3);
+        let turned = |[a, b, c]: [u32; 3]| match corner {
+            0 => [a, b, c],
+            1 => [b, c, a],
+            _ => [c, a, b],
+        };
+        let [here, next, last] = turned(self.mesh.triangles[triangle]).map(|v| self.mesh.positions[v as usize]);
+        let (a, b) = ((next - here) * per_unit, (last - here) * per_unit);
+        let cross = a.cross(b);
+        let (square, longer) = (cross.length_squared(), a.length_squared().max(b.length_squared()));
+        *longest = longest.max(longer);
+        // No more than a line, at the precision of 32 bits.
+        if square <= longer * longer * 1e-12 {
+            return None;
+        }
+        let twice_area = square.sqrt();
+        let [_, next, last] = turned(self.connected.places[triangle]);
+        Some(Around {
+            at,
+            normal: cross * (1.0 / twice_area),
+            area: twice_area * 0.5,
+            angle: angle(twice_area, a.dot(b)),
+            edges: [a, b],
+            places: [next, last],
+            laid: [Vec2::ZERO; 2],
+            flat: 0,
+            smooth: 0,
+        })
+    }
+
+    /// Finds the shading normals of the triangles' corners, and tells each which it is.
+    fn shade(&self, around: &mut [Around], smooth: &mut Groups, normals: &mut Vec<Vec3>) {
+        normals.clear();
+        if let Some(origin) = self.origin {
+            for (index, triangle) in around.iter_mut().enumerate() {
+                triangle.smooth = index;
+                normals.push(origin.normal(self.mesh, triangle.at));
+            }
+            return;
+        }
+        smooth.clear();
+        for triangle in around.iter_mut() {
+            triangle.smooth = smooth.place(triangle.normal);
+        }
+        normals.resize(smooth.len(), Vec3::ZERO);
+        for triangle in around.iter() {
+            normals[triangle.smooth] += triangle.normal * triangle.angle;
+        }
+        normals.iter_mut().for_each(|normal| *normal = normal.normalize_or_zero());
+    }
+
+    /// The surfel of a group of triangles; `shading` is their normal, of any length, where it is not their mean.
+    fn surfel(&self, vertex: usize, group: &mut [Around], shading: Option<Vec3>) -> Option<Splat> {
+        let first = group.first()?.normal;
+        let own = group.iter().map(|t| t.normal * t.angle).sum::<Vec3>().try_normalize().unwrap_or(first);
+        let given = self.mesh.normals.get(vertex).filter(|normal| normal.length_squared() > 0.25);
+        let shading = match given {
+            Some(given) => given.normalize(),
+            None => shading.and_then(Vec3::try_normalize).unwrap_or(own),
+        };
+        let normal = if shading.dot(own).abs() >= ALIKE { shading } else { own };
+        let (x, y) = normal.any_orthonormal_pair();
+        let mut moments = Moments::default();
+        let mut height = 0.0;
+        // Around a whole vertex each neighbour is met twice: nothing is left of the bits of their numbers.
+        let mut rim = 0;
+        for t in group.iter_mut() {
+            t.laid = t.edges.map(|edge| Vec2::new(edge.dot(x), edge.dot(y)));
+            let slope = normal.dot(t.normal);
+            // Seen along a steep triangle's normal the surfel must be wide enough, so edges are laid on its plane in that
+            // direction.
+            if slope.abs() < STEEP {
+                let down = Vec2::new(t.normal.dot(x), t.normal.dot(y)) / (slope.signum() * slope.abs().max(0.5));
+                t.laid = [0, 1].map(|i| t.laid[i] - down * normal.dot(t.edges[i]));
+            }
+            moments.add(t.area, t.laid[0], t.laid[1]);
+            height += t.area * normal.dot(t.edges[0] + t.edges[1]);
+            rim ^= mixed(t.places[0]) ^ mixed(t.places[1]);
+        }
+        let is_open = rim != 0;
+        let area = moments.area();
+        let mut ellipse: Ellipse = moments.ellipse(is_open, SPREAD);
+        if is_open {
+            ellipse.reach(Vec2::ZERO, CORNER);
+        }
+        for t in group.iter() {
+            let [a, b] = t.laid;
+            ellipse.reach(a * 0.5, MIDDLE);
+            if is_open {
+                // Else it is the next triangle's first one.
+                ellipse.reach(b * 0.5, MIDDLE);
+            }
+            ellipse.reach((a + b) * (1.0 / 3.0), CENTROID);
+        }
+        let scale = self.options.radius_scale;
+        let thickness = THICKNESS * ellipse.narrowest() * scale;
+        let outward = if given.is_some() { shading } else { shading * self.outward };
+        // Where the surface is on average; and behind it by what the surfel reaches toward the outside.
+        let sag = if is_open { 1.0 } else { SAG } * height / (3.0 * area);
+        let aside = x * ellipse.center.x + y * ellipse.center.y;
+        let offset = aside + normal * sag - outward * (STEP_BACK as f32 * thickness);
+        Some(Splat {
+            center: (self.mesh.positions[vertex] + offset * self.unit).to_array(),
+            strength: self.options.optical_depth,
+            factor: ellipse.factor([x, y, normal], scale * self.unit, thickness * self.unit),
+            color: self.color(vertex, group, area),
+            normal: encode_normal(outward),
+        })
+    }
+
+    /// The mean colour of the triangles at their corners.
+    fn color(&self, vertex: usize, group: &[Around], area: f32) -> u32 {
+        if self.plain {
+            // Packed as it is in memory, red lowest.
+            return self.mesh.colors.get(vertex).map_or_else(|| pack(NEUTRAL), |color| u32::from_le_bytes(*color));
+        }
+        let mut color = [0.0; 4];
+        for t in group {
+            let own = corner_color(self.mesh, t.at as usize / 3, t.at as usize % 3);
+            color.iter_mut().zip(own).for_each(|(sum, own)| *sum += own * t.area / area);
+        }
+        pack(color)
+    }
+}
+
+/// What tells whether a mesh is inside out, summed over the corners of its triangles.
+#[derive(Debug, Default, Clone, Copy)]
+pub(super) struct Sums {
+    area: f64,
+    /// Place times area.
+    place: DVec3,
+    /// Normal times area, and the place's product with that: nine times the volume of the tetrahedra to the origin.
+    cross: DVec3,
+    volume: f64,
+}
+
+impl Sums {
+    fn add(&mut self, place: Vec3, area: f32, cross: Vec3) {
+        let (place, area, cross) = (place.as_dvec3(), f64::from(area), cross.as_dvec3());
+        self.area += area;
+        self.place += place * area;
+        self.cross += cross;
+        self.volume += place.dot(cross);
+    }
+
+    pub fn with(self, other: Self) -> Self {
+        Self {
+            area: self.area + other.area,
+            place: self.place + other.place,
+            cross: self.cross + other.cross,
+            volume: self.volume + other.volume,
+        }
+    }
+
+    /// Whether there is a volume, and a negative one. It is counted from the centre of the area, so that an open surface has
+    /// one only as far as it is curved. `unit` is the length that areas are counted in the square of.
+    pub fn are_inside_out(&self, unit: f32) -> bool {
+        let volume = (self.volume - self.cross.dot(self.place) / self.area) / (9.0 * f64::from(unit));
+        volume < -1e-3 * (self.area / 3.0).powf(1.5)
+    }
+}
+
+/// Spreads the bits of a number, so that exclusive sums of different numbers do not cancel by chance.
+fn mixed(place: u32) -> u64 {
+    let product = (u64::from(place) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    product ^ (product >> 29)
+}
+
+/// The angle of a sine ≥ 0 and a cosine of any common length, within 1e-5 (Abramowitz & Stegun 1964, 4.4.47).
+fn angle(sine: f32, cosine: f32) -> f32 {
+    use std::f32::consts::{FRAC_PI_2, PI};
+    let steep = cosine.abs();
+    let t = sine.min(steep) / sine.max(steep);
+    let s = t * t;
+    let sharp = t * (0.999_866 + s * (-0.330_299_5 + s * (0.180_141 + s * (-0.085_133 + s * 0.020_835_1))));
+    let acute = if sine > steep { FRAC_PI_2 - sharp } else { sharp };
+    if cosine < 0.0 { PI - acute } else { acute }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_near_enough() {
+        for step in 0..=255 {
+            let expected = f32::from(step as u8) * std::f32::consts::PI / 255.0;
+            assert!((angle(expected.sin().max(0.0) * 7.0, expected.cos() * 7.0) - expected).abs() < 2e-5);
+        }
+    }
+}

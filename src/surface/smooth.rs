@@ -1,0 +1,129 @@
+//! Which triangles around a vertex are smooth with each other, and the normals that they share.
+
+use super::{
+    Mesh,
+    adjacency::{Connected, may_be_split},
+};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Creases sharper than this stay creases, whatever the options say (degrees): surfels lie in the plane of their group.
+const SHARPEST: f32 = 60.0;
+
+/// The smooth groups of the triangles around one vertex.
+///
+/// A group is a cone around its first normal, so that no normal of it is far from the plane of a triangle in it, even where
+/// many small steps add up to a large turn. There are never more than a few groups.
+pub(super) struct Groups {
+    /// Cosine of the crease angle.
+    crease: f32,
+    seeds: Vec<Vec3>,
+}
+
+impl Groups {
+    pub fn new(crease_angle_degrees: f32) -> Self {
+        Self { crease: crease_angle_degrees.min(SHARPEST).to_radians().cos(), seeds: Vec::new() }
+    }
+
+    /// Forgets the vertex before.
+    pub fn clear(&mut self) {
+        self.seeds.clear();
+    }
+
+    pub fn len(&self) -> usize {
+        self.seeds.len()
+    }
+
+    /// The group of a triangle with this unit normal: the nearest within the crease angle, or a new one.
+    pub fn place(&mut self, normal: Vec3) -> usize {
+        let mut nearest = (self.seeds.len(), self.crease);
+        for (group, seed) in self.seeds.iter().enumerate() {
+            let cosine = seed.dot(normal);
+            if cosine >= nearest.1 && (cosine > nearest.1 || nearest.0 == self.seeds.len()) {
+                nearest = (group, cosine);
+            }
+        }
+        if nearest.0 == self.seeds.len() {
+            self.seeds.push(normal);
+        }
+        nearest.0
+    }
+}
+
+/// The normal that each triangle has at its corners: the file's at the vertex, or the mean of the corner's smooth group,
+/// weighted by angle. Triangles without area have their vertices' normals alone, or zero.
+pub(crate) fn corner_normals(mesh: &Mesh, crease_angle_degrees: f32) -> Vec<[Vec3; 3]> {
+    let given = |vertex: u32| mesh.normals.get(vertex as usize).filter(|normal| normal.length_squared() > 0.25);
+    let adjacency = Connected::new(mesh, may_be_split(mesh)).adjacency;
+    let own: Vec<Vec<(u32, Vec3)>> = (0..mesh.positions.len())
+        .into_par_iter()
+        .map_init(
+            || Groups::new(crease_angle_degrees),
+            |groups, vertex| {
+                groups.clear();
+                let corners = adjacency.corners(vertex).iter();
+                let around: Vec<(u32, usize, Vec3)> = corners
+                    .filter_map(|&at| {
+                        let (normal, angle) = at_corner(mesh, at)?;
+                        Some((at, groups.place(normal), normal * angle))
+                    })
+                    .collect();
+                let sum = |group| around.iter().filter(|t| t.1 == group).map(|t| t.2).sum::<Vec3>();
+                let normals: Vec<Vec3> = (0..groups.len()).map(|group| sum(group).normalize_or_zero()).collect();
+                around.iter().map(|&(at, group, _)| (at, normals[group])).collect()
+            },
+        )
+        .collect();
+    let mut normals = vec![[Vec3::ZERO; 3]; mesh.triangles.len()];
+    for (at, normal) in own.into_iter().flatten() {
+        normals[at as usize / 3][at as usize % 3] = normal;
+    }
+    if !mesh.normals.is_empty() {
+        normals.par_iter_mut().zip(&mesh.triangles).for_each(|(normals, triangle)| {
+            for (normal, &vertex) in normals.iter_mut().zip(triangle) {
+                *normal = given(vertex).map_or(*normal, |given| given.normalize());
+            }
+        });
+    }
+    normals
+}
+
+/// A triangle's unit normal, and its angle (radians) at a corner; none where it has no area.
+fn at_corner(mesh: &Mesh, at: u32) -> Option<(Vec3, f32)> {
+    let indices = mesh.triangles[at as usize / 3];
+    let [a, b, c] = [0, 1, 2].map(|i| mesh.positions[indices[(at as usize + i) % 3] as usize].as_dvec3());
+    let cross = (b - a).cross(c - a);
+    let twice_area = cross.length();
+    let longest = (b - a).length_squared().max((c - a).length_squared());
+    (twice_area > longest * 1e-6).then(|| ((cross / twice_area).as_vec3(), twice_area.atan2((b - a).dot(c - a)) as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_are_cones_around_their_first() {
+        let mut groups = Groups::new(30.0);
+        let turned = |degrees: f32| Vec3::new(degrees.to_radians().cos(), degrees.to_radians().sin(), 0.0);
+        assert_eq!([0.0, 29.0, 31.0, 16.0, 14.0, 62.0].map(|angle| groups.place(turned(angle))), [0, 0, 1, 1, 0, 2]);
+        groups.clear();
+        assert_eq!((groups.place(turned(90.0)), groups.len()), (0, 1));
+    }
+
+    #[test]
+    fn corners_have_the_normals_of_their_side() {
+        let cube = Mesh::cube(2.0);
+        for (triangle, normals) in cube.triangles.iter().zip(corner_normals(&cube, 75.0)) {
+            let [a, b, c] = triangle.map(|vertex| cube.positions[vertex as usize]);
+            let flat = (b - a).cross(c - a).normalize();
+            assert!(normals.iter().all(|normal| normal.dot(flat) > 0.9999));
+        }
+        let sphere = Mesh::sphere(3);
+        for (triangle, normals) in sphere.triangles.iter().zip(corner_normals(&sphere, 75.0)) {
+            for (normal, &vertex) in normals.iter().zip(triangle) {
+                assert!(normal.dot(sphere.positions[vertex as usize].normalize()) > 0.999);
+            }
+        }
+    }
+}
