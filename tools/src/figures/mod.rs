@@ -2,6 +2,8 @@
 
 mod bleeding;
 mod dense;
+mod detail;
+mod files;
 mod marschner_lobb;
 mod popping;
 mod report;
@@ -32,6 +34,10 @@ pub struct Figures {
     /// Writes the pictures of surfaces to this folder.
     #[arg(long, value_name = "FOLDER", requires = "surfaces")]
     pictures: Option<PathBuf>,
+    /// Hierarchies, meshes and clouds of which cuts are drawn from near and far; with the axis that is up where that is not
+    /// +Y. Measures these alone.
+    #[arg(long, value_name = "FILE[:AXIS]", num_args = 1.., value_parser = surfaces::Source::parse, conflicts_with_all = ["files", "only"])]
+    detail: Vec<surfaces::Source>,
     /// Leaves out all but these.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "PART,…")]
     only: Vec<Part>,
@@ -88,7 +94,9 @@ impl Figures {
         let gpu = Gpu::headless(&choice)?;
         let mut stage = Stage { renderer: Renderer::new(&gpu) };
         let mut report = Report { adapter: gpu.info.name.clone(), tables: Vec::new() };
-        let wanted = |part| self.surfaces.is_empty() && (self.only.is_empty() || self.only.contains(&part));
+        let wanted = |part| {
+            self.surfaces.is_empty() && self.detail.is_empty() && (self.only.is_empty() || self.only.contains(&part))
+        };
         if wanted(Part::Ripple) {
             report.tables.push(ripple::table()?);
         }
@@ -107,7 +115,11 @@ impl Figures {
         if !self.surfaces.is_empty() {
             let open = |path: &Path| self.load.open(path);
             let pictures = self.pictures.as_deref();
-            report.tables.push(surfaces::table(&mut stage, &self.surfaces, open, pictures, progress)?);
+            report.tables.extend(surfaces::tables(&mut stage, &self.surfaces, open, pictures, progress)?);
+        }
+        if !self.detail.is_empty() {
+            let open = |path: &Path| self.load.open(path);
+            report.tables.extend(detail::tables(&mut stage, &self.detail, open, progress)?);
         }
         progress.clear();
         if let Some(block) = block {

@@ -65,7 +65,7 @@ fn camera(bounds: &Bounds, degrees: f64) -> Camera {
 }
 
 /// The largest change of a channel, and the root mean square of all.
-fn change(a: &Picture, b: &Picture) -> [f64; 2] {
+pub fn change(a: &Picture, b: &Picture) -> [f64; 2] {
     let channels = a.color.iter().flatten().zip(b.color.iter().flatten());
     let changes = channels.map(|(a, b)| f64::from((a - b).abs()));
     let [largest, squares] = changes.fold([0.0, 0.0], |[most, sum]: [f64; 2], c| [most.max(c), sum + c * c]);

@@ -1,7 +1,7 @@
 //! Surfels against the triangles that they stand for.
 
 use super::{
-    Stage,
+    Stage, files,
     report::{Cell, Table},
 };
 use crate::{
@@ -15,6 +15,7 @@ use glam::DVec3;
 use splatkit::{
     Error,
     compare::compare_pictures,
+    hierarchy::{BuildOptions, Detail, Tree},
     math::{Bounds, Camera},
     picture::Picture,
     reference,
@@ -36,7 +37,7 @@ const STEP: f64 = 8.0;
 #[derive(Debug, Clone)]
 pub struct Source {
     pub path: PathBuf,
-    up: DVec3,
+    pub up: DVec3,
 }
 
 impl Source {
@@ -48,7 +49,7 @@ impl Source {
     }
 
     /// The name of its rows.
-    fn name(&self) -> String {
+    pub fn name(&self) -> String {
         self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
     }
 }
@@ -72,12 +73,13 @@ impl Truth {
     }
 
     /// What a scene that stands for the mesh looks like, and how far that is from the truth. `scene` may hold all splats or
-    /// some level of detail of them.
-    pub fn measure(&self, stage: &mut Stage, scene: &Scene) -> splatkit::Result<(Picture, Found)> {
+    /// a hierarchy, of which `detail` is drawn. Also gives how many splats were drawn.
+    pub fn measure(&self, stage: &mut Stage, scene: &Scene, detail: Detail) -> splatkit::Result<(Picture, Found, u64)> {
         let mut prepared = stage.prepare(scene)?;
-        let picture = stage.draw(&mut prepared, &self.camera, &self.settings)?;
+        let settings = Settings { detail, ..self.settings.clone() };
+        let (picture, stats) = stage.renderer.render(&mut prepared, &self.camera, &settings)?;
         let found = Found::between(&picture, &self.picture, self.camera.view(self.settings.size)?.scale)?;
-        Ok((picture, found))
+        Ok((picture, found, stats.splats))
     }
 }
 
@@ -142,14 +144,14 @@ impl Found {
     }
 
     /// In the order of [`table`]'s columns.
-    fn cells(&self, splats: usize) -> Vec<Cell> {
+    fn cells(&self, splats: u64) -> Vec<Cell> {
         let count = |value: usize| Cell::Number(value as f64, 0);
         let percent = |value: f64| Cell::Number(100.0 * value, 2);
         let mean = self.over.iter().sum::<f64>() / self.over.len().max(1) as f64;
         let high = self.over.get(self.over.len() * 95 / 100).copied().unwrap_or(0.0);
         let covered = self.covered.max(1) as f64;
         vec![
-            count(splats),
+            Cell::Number(splats as f64, 0),
             self.psnr.map_or(Cell::None, |psnr| Cell::Number(psnr, 2)),
             percent(self.shares[0]),
             percent(self.shares[1]),
@@ -195,13 +197,14 @@ fn nearest(at: usize, size: [usize; 2], covered: impl Fn(usize) -> bool) -> f64 
     64.0
 }
 
-pub fn table(
+pub fn tables(
     stage: &mut Stage,
     sources: &[Source],
     open: impl Fn(&Path) -> Result<Input, Failure>,
     keep: Option<&Path>,
     progress: &Progress,
-) -> Result<Table, Failure> {
+) -> Result<[Table; 2], Failure> {
+    let mut sizes = files::table();
     let mut table = Table::new(
         "Surfels against triangles.",
         format!(
@@ -235,16 +238,28 @@ pub fn table(
         let truth = Truth::of(&mesh, source.up)?;
         progress.stage(format!("Drawing {}", source.path.display()));
         let splats = mesh.surfels(&SurfelOptions::default())?;
-        let count = splats.splats.len();
-        let (picture, found) = truth.measure(stage, &Scene::new().with_splats(splats))?;
+        let options = BuildOptions {
+            closed: mesh.is_closed(),
+            source_points: Some(mesh.positions.len() as u64),
+            ..BuildOptions::default()
+        };
+        let tree = Tree::build(&splats, &options, &|_, _| ())?;
+        let (picture, found, drawn) = truth.measure(stage, &Scene::new().with_splats(splats), Detail::default())?;
+        table.row(source.name(), found.cells(drawn));
+        let (hierarchy, cells) = files::row(&tree)?;
+        sizes.row(source.name(), cells);
+        let scene = Scene::new().with_hierarchy(hierarchy);
+        for (name, pixels) in [("file, leaves", 0.0), ("file, 1 pixel", 1.0), ("file, 2 pixels", 2.0)] {
+            let (_, found, drawn) = truth.measure(stage, &scene, Detail::Pixels(pixels))?;
+            table.row(format!("{}, {name}", source.name()), found.cells(drawn));
+        }
         if let Some(folder) = keep {
             for (what, picture) in [("truth", &truth.picture), ("splats", &picture)] {
                 picture.save(&folder.join(format!("{}_{what}.png", source.name())), Some([0.0; 3]))?;
             }
         }
-        table.row(source.name(), found.cells(count));
     }
-    Ok(table)
+    Ok([table, sizes])
 }
 
 #[cfg(test)]

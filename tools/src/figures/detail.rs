@@ -1,0 +1,130 @@
+//! What a cut costs and how steady it is: the splats and the time of a picture from near and far, and how much it changes
+//! while the camera goes away.
+
+use super::{
+    Stage,
+    popping::change,
+    report::{Cell, Table},
+    surfaces::Source,
+};
+use crate::{
+    camera::{CameraFlags, Subject},
+    failure::Failure,
+    load::Input,
+    progress::Progress,
+    render::milliseconds,
+};
+use splatkit::{
+    Error,
+    hierarchy::{BuildOptions, Detail, Hierarchy, Tree},
+    math::Camera,
+    scene::{Scene, Settings},
+    surface::SurfelOptions,
+};
+use std::{path::Path, sync::Arc, time::Instant};
+
+/// Pixels along each side of the pictures that are timed, and of those of the sweep.
+const PIXELS: u32 = 1024;
+const SWEEP_PIXELS: u32 = 256;
+/// Pictures of the sweep, and how much farther away its end is than its beginning.
+const SWEEP: u32 = 200;
+const FARTHEST: f64 = 16.0;
+/// Frames of which the middle one's time counts.
+const FRAMES: usize = 5;
+/// The cut, in pixels.
+const CUT: f64 = 1.0;
+
+/// The hierarchy of a file, made of a mesh or cloud where it is one.
+fn hierarchy(source: &Source, input: Input) -> Result<Arc<Hierarchy>, Failure> {
+    match input {
+        Input::Hierarchy(hierarchy) => Ok(hierarchy),
+        Input::Mesh(mesh) => {
+            let options = BuildOptions { closed: mesh.is_closed(), ..BuildOptions::default() };
+            let tree = Tree::build(&mesh.surfels(&SurfelOptions::default())?, &options, &|_, _| ())?;
+            Ok(Arc::new(Hierarchy::from_tree(tree)?))
+        }
+        _ => Err(Error::input(&source.path, "file", "is no mesh, cloud or hierarchy").into()),
+    }
+}
+
+/// A camera that sees all, from so many times as far away.
+fn camera(hierarchy: &Hierarchy, source: &Source, size: [u32; 2], farther: f64) -> splatkit::Result<Camera> {
+    let subject = Subject { bounds: hierarchy.bounds(), up: source.up };
+    let mut camera = CameraFlags::default().camera(&subject, size)?;
+    camera.position = camera.focal_point + (camera.position - camera.focal_point) * farther;
+    Ok(camera)
+}
+
+pub fn tables(
+    stage: &mut Stage,
+    sources: &[Source],
+    open: impl Fn(&Path) -> Result<Input, Failure>,
+    progress: &Progress,
+) -> Result<[Table; 2], Failure> {
+    let mut cost = Table::new(
+        "Cost of a cut.",
+        format!(
+            "Pictures of {PIXELS}² pixels, all of the model in view, and from 4 and 16 times as far; a cut of {CUT} pixel. The \
+             middle of {FRAMES} frames, after one that brought the pages."
+        ),
+        &["model", "splats", "drawn", "ms", "drawn, ¼ as wide", "ms", "drawn, 1/16", "ms", "GPU MiB"],
+    );
+    let mut sweep = Table::new(
+        "Zoom sweep.",
+        format!(
+            "{SWEEP} pictures of {SWEEP_PIXELS}² pixels while the camera goes {FARTHEST} times as far away: the largest root \
+             mean square change from one to the next, in steps of 1/255, of a cut of {CUT} pixel and of the leaves."
+        ),
+        &["model", "cut", "leaves", "ratio"],
+    );
+    for source in sources {
+        progress.stage(format!("Reading {}", source.path.display()));
+        let hierarchy = hierarchy(source, open(&source.path)?)?;
+        let leaves = hierarchy.header().leaves as f64;
+        let mut scene = stage.prepare(&Scene::new().with_hierarchy(hierarchy.clone()))?;
+        let mut cells = vec![Cell::Number(leaves, 0)];
+        let mut settings = Settings::new([PIXELS; 2]);
+        settings.detail = Detail::Pixels(CUT);
+        let mut memory = 0;
+        for farther in [1.0, 4.0, 16.0] {
+            progress.stage(format!("Timing {}, {farther} times as far", source.name()));
+            let camera = camera(&hierarchy, source, settings.size, farther)?;
+            stage.renderer.draw(&mut scene, &camera, &settings)?;
+            let mut times = Vec::new();
+            let mut splats = 0;
+            for _ in 0..FRAMES {
+                let start = Instant::now();
+                let stats = stage.renderer.draw(&mut scene, &camera, &settings)?;
+                times.push(milliseconds(start));
+                (splats, memory) = (stats.splats, stats.gpu_bytes);
+            }
+            times.sort_by(f64::total_cmp);
+            cells.extend([Cell::Number(splats as f64, 0), Cell::Number(times[FRAMES / 2], 1)]);
+        }
+        cells.push(Cell::Number((memory >> 20) as f64, 0));
+        cost.row(source.name(), cells);
+
+        settings.size = [SWEEP_PIXELS; 2];
+        let mut changes = Vec::new();
+        for detail in [CUT, 0.0] {
+            settings.detail = Detail::Pixels(detail);
+            let mut last = None;
+            let mut largest: f64 = 0.0;
+            for frame in 0..SWEEP {
+                progress.stage(format!("Zooming {}, picture {frame} of {SWEEP}", source.name()));
+                let farther = FARTHEST.powf(f64::from(frame) / f64::from(SWEEP - 1));
+                let camera = camera(&hierarchy, source, settings.size, farther)?;
+                let picture = stage.draw(&mut scene, &camera, &settings)?;
+                if let Some(last) = &last {
+                    largest = largest.max(255.0 * change(last, &picture)[1]);
+                }
+                last = Some(picture);
+            }
+            changes.push(largest);
+        }
+        let ratio = changes[0] / changes[1];
+        sweep
+            .row(source.name(), [(changes[0], 3), (changes[1], 3), (ratio, 3)].map(|(v, n)| Cell::Number(v, n)).into());
+    }
+    Ok([cost, sweep])
+}

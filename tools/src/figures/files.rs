@@ -1,0 +1,144 @@
+//! What a hierarchy's file keeps of its splats, and in how many bytes.
+
+use super::report::{Cell, Table};
+use glam::{DVec3, Vec3};
+use splatkit::{
+    hierarchy::{
+        Block, Node, Tree,
+        file::{Hierarchy, WriteOptions, to_bytes},
+    },
+    io::Limits,
+    splat::decode_normal,
+};
+use std::path::Path;
+
+/// Leaves whose neighbours are looked for.
+const SAMPLE: usize = 1000;
+/// Neighbours whose mean distance is the spacing.
+const NEIGHBOURS: usize = 6;
+
+pub fn table() -> Table {
+    Table::new(
+        "Files.",
+        format!(
+            "Bytes of the file a point of the source and a splat; nodes a leaf; the error of a leaf's place in parts of the \
+             spacing (the mean distance of {NEIGHBOURS} neighbours), of its normal in degrees, and the factor on its radius, each \
+             the mean and the largest (of places {SAMPLE} leaves, of which the largest hundredth is left out, and the largest); the \
+             radius of the root over that of the smallest sphere."
+        ),
+        &[
+            "model",
+            "points",
+            "splats",
+            "bytes a point",
+            "a splat",
+            "nodes a leaf",
+            "place, mean",
+            "99 %",
+            "largest",
+            "normal, mean",
+            "largest",
+            "radius, mean",
+            "largest",
+            "root",
+        ],
+    )
+}
+
+/// Writes a tree, reads it, and compares.
+pub fn row(tree: &Tree) -> splatkit::Result<(Hierarchy, Vec<Cell>)> {
+    let bytes = to_bytes(tree, &WriteOptions::default())?;
+    let length = bytes.len() as f64;
+    let hierarchy = Hierarchy::from_bytes(bytes, Path::new("memory"), &Limits::default())?;
+    let read = hierarchy.read_tree()?;
+    let pairs: Vec<(&Node, &Node)> =
+        tree.blocks.iter().zip(&read.blocks).flat_map(|(a, b)| leaves(a, b, tree.is_joined())).collect();
+    let count = pairs.len() as f64;
+    let places: Vec<Vec3> = pairs.iter().map(|(a, _)| Vec3::from(a.splat.center)).collect();
+    let mut errors: Vec<f64> = (0..pairs.len())
+        .step_by((pairs.len() / SAMPLE).max(1))
+        .map(|index| {
+            let error = Vec3::from(pairs[index].1.splat.center).distance(places[index]);
+            f64::from(error) / spacing(&places, index)
+        })
+        .collect();
+    errors.sort_by(f64::total_cmp);
+    let angle = |(a, b): &(&Node, &Node)| match (decode_normal(a.splat.normal), decode_normal(b.splat.normal)) {
+        (Some(a), Some(b)) => 2.0 * f64::from(a.distance(b) * 0.5).asin().to_degrees(),
+        _ => 0.0,
+    };
+    let radius = |(a, b): &(&Node, &Node)| f64::from(b.radius / a.radius);
+    let mean = |of: &dyn Fn(&(&Node, &Node)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
+    let largest = |of: &dyn Fn(&(&Node, &Node)) -> f64| pairs.iter().map(of).fold(0.0, f64::max);
+    let root = f64::from(read.blocks[0].nodes[0].radius) / smallest_sphere(&pairs);
+    let cells = vec![
+        Cell::Number(tree.source_points as f64, 0),
+        Cell::Number(count, 0),
+        Cell::Number(length / tree.source_points as f64, 2),
+        Cell::Number(length / count, 2),
+        Cell::Number(read.nodes().count() as f64 / count, 3),
+        Cell::Number(errors.iter().sum::<f64>() / errors.len() as f64, 4),
+        Cell::Number(errors[errors.len() * 99 / 100], 4),
+        Cell::Number(errors[errors.len() - 1], 4),
+        Cell::Number(mean(&angle), 3),
+        Cell::Number(largest(&angle), 3),
+        Cell::Number(mean(&radius), 4),
+        Cell::Number(largest(&radius), 4),
+        Cell::Number(root, 4),
+    ];
+    Ok((hierarchy, cells))
+}
+
+/// The leaves of a block beside what was read of them. Writing may change the order of siblings, and nothing else.
+fn leaves<'a>(block: &'a Block, read: &'a Block, joined: bool) -> Vec<(&'a Node, &'a Node)> {
+    let mut pairs = Vec::new();
+    if joined && block.portal.is_none() {
+        return pairs;
+    }
+    for node in block.nodes.iter().filter(|node| node.children > 0) {
+        let range = node.first_child as usize..(node.first_child + node.children) as usize;
+        let mut left: Vec<&Node> = read.nodes[range.clone()].iter().filter(|node| node.is_leaf()).collect();
+        for own in block.nodes[range].iter().filter(|node| node.is_leaf()) {
+            let place = Vec3::from(own.splat.center);
+            let distance = |other: &Node| {
+                let turned = decode_normal(own.splat.normal).zip(decode_normal(other.splat.normal));
+                // Splats of one vertex share their place and differ in direction.
+                place.distance(other.splat.center.into()) + own.size * 0.1 * turned.map_or(0.0, |(a, b)| a.distance(b))
+            };
+            let nearest = (0..left.len()).min_by(|&a, &b| distance(left[a]).total_cmp(&distance(left[b])));
+            if let Some(nearest) = nearest {
+                pairs.push((own, left.swap_remove(nearest)));
+            }
+        }
+    }
+    pairs
+}
+
+/// The mean distance of the nearest neighbours, other than those at the same place.
+fn spacing(places: &[Vec3], index: usize) -> f64 {
+    let mut nearest = [f32::INFINITY; NEIGHBOURS];
+    for place in places {
+        let distance = place.distance_squared(places[index]);
+        if distance > 0.0 && distance < nearest[NEIGHBOURS - 1] {
+            let at = nearest.partition_point(|&other| other < distance);
+            nearest[at..].rotate_right(1);
+            nearest[at] = distance;
+        }
+    }
+    nearest.iter().filter(|d| d.is_finite()).map(|d| f64::from(d.sqrt())).sum::<f64>() / NEIGHBOURS as f64
+}
+
+/// The radius of the smallest sphere around the leaves' as they were, nearly: by many small steps.
+fn smallest_sphere(pairs: &[(&Node, &Node)]) -> f64 {
+    let spheres: Vec<(DVec3, f64)> =
+        pairs.iter().map(|(a, _)| (Vec3::from(a.center).as_dvec3(), f64::from(a.radius))).collect();
+    let mut center = spheres.iter().map(|sphere| sphere.0).sum::<DVec3>() / spheres.len() as f64;
+    let mut best = f64::INFINITY;
+    for round in 0..1000 {
+        let reach = |sphere: &&(DVec3, f64)| sphere.0.distance(center) + sphere.1;
+        let Some(far) = spheres.iter().max_by(|a, b| reach(a).total_cmp(&reach(b))) else { break };
+        best = best.min(reach(&far));
+        center += (far.0 - center) / f64::from(round + 2);
+    }
+    best
+}
