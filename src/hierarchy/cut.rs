@@ -43,7 +43,7 @@ const LEAST_PIXELS: f64 = 1e-9;
 const MOST_PIXELS: f32 = 1e9;
 
 /// Normals within a splat turn: a node counts as facing away only where its cone is turned away by this angle more.
-const CONE_MARGIN_DEGREES: f64 = 15.0;
+const CONE_MARGIN_DEGREES: f64 = 25.0;
 
 /// A cut of one hierarchy in one view. All in 32 bits, as on the GPU, which does the same (shaders/cut.wgsl).
 #[derive(Debug, Clone, Copy)]

@@ -12,7 +12,7 @@ use crate::splat::{STEP_BACK, Splat, encode_normal};
 use glam::{DVec3, Vec2, Vec3};
 
 /// A surfel stands for triangles whose normals differ from the first one's by no more (degrees).
-const FLAT: f32 = 22.0;
+const FLAT: f32 = 30.0;
 /// A surfel lies across its shading normal where that is no farther from its triangles' mean normal (cosine of 20°).
 const ALIKE: f32 = 0.94;
 /// A triangle is steep where its normal's product with the surfel's is less.
