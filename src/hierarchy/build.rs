@@ -59,7 +59,7 @@ impl Tree {
         let _span = tracing::info_span!("build").entered();
         check(set)?;
         let parts = partition::blocks(&set.splats, options.block_splats.max(64));
-        let outer = around(set);
+        let outer = enclosing(&set.splats, set.extent);
         let built = AtomicU64::new(0);
         let mut blocks: Vec<Block> = parts
             .into_par_iter()
@@ -103,7 +103,7 @@ pub fn build_file(
     let _span = tracing::info_span!("build").entered();
     check(set)?;
     let parts = partition::blocks(&set.splats, build.block_splats.max(64));
-    let mut builder = Builder::new(path, set.extent, around(set), build.preset, write)?;
+    let mut builder = Builder::new(path, set.extent, enclosing(&set.splats, set.extent), build.preset, write)?;
     let mut built = 0;
     for parts in parts.chunks(2 * rayon::current_num_threads()) {
         builder.add(parts.par_iter().map(|part| block_of(set, part, build.preset, builder.outer)).collect())?;
@@ -156,11 +156,6 @@ pub(crate) fn block_of(set: &SplatSet, part: &[u32], preset: Preset, outer: Sphe
     let heights = raise(&mut block);
     nest(&mut block, &heights, outer);
     block
-}
-
-/// A sphere around all footprints of a set that is nearly the smallest.
-fn around(set: &SplatSet) -> Sphere {
-    enclosing(&set.splats, |splat| Sphere::of(&leaf(splat, set.extent)), |splat| splat.center.into())
 }
 
 /// The block above the roots of others, all of which lie in `outer`, and the place of each root's portal in it.

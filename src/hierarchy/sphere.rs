@@ -7,7 +7,8 @@
 //! which stick out less; else its centre moves towards the parent's until it does. At the parent's own centre it would be
 //! the parent's sphere.
 
-use super::{Block, Node};
+use super::{Block, Node, merge::leaf};
+use crate::splat::Splat;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -184,22 +185,20 @@ const MOST_GROWTHS: usize = 12;
 /// What may lie outside before the sphere is grown to hold it, in parts of its radius.
 const OUTSIDE: f64 = 0.005;
 
-/// A sphere around very many that is nearly the smallest: around what is farthest in some directions, then what lies
-/// farthest outside of that, and so on (a core set, Bădoiu & Clarkson 2003).
-pub(crate) fn enclosing<T: Sync>(
-    items: &[T],
-    sphere: impl Fn(&T) -> Sphere + Sync,
-    place: impl Fn(&T) -> Vec3 + Sync,
-) -> Sphere {
+/// A sphere around the footprints of very many splats that is nearly the smallest: around what is farthest in some
+/// directions, then what lies farthest outside of that, and so on (a core set, Bădoiu & Clarkson 2003). Footprints end
+/// `extent` standard deviations from their centres.
+pub(crate) fn enclosing(splats: &[Splat], extent: f32) -> Sphere {
+    let sphere = |splat: &Splat| Sphere::of(&leaf(splat, extent));
     let none = [[(f32::NEG_INFINITY, 0usize); 2]; DIRECTIONS.len()];
     let farther = |a: (f32, usize), b: (f32, usize)| if b.0 > a.0 { b } else { a };
-    let extremes = items
+    let extremes = splats
         .par_chunks(1 << 14)
         .enumerate()
-        .map(|(chunk, items)| {
+        .map(|(chunk, splats)| {
             let mut found = none;
-            for (index, item) in items.iter().enumerate() {
-                let place = place(item);
+            for (index, splat) in splats.iter().enumerate() {
+                let place = Vec3::from(splat.center);
                 for (ends, direction) in found.iter_mut().zip(DIRECTIONS) {
                     let along = place.dot(Vec3::from(direction));
                     for (end, along) in ends.iter_mut().zip([along, -along]) {
@@ -212,26 +211,30 @@ pub(crate) fn enclosing<T: Sync>(
             found
         })
         .reduce(|| none, |a, b| std::array::from_fn(|i| std::array::from_fn(|j| farther(a[i][j], b[i][j]))));
-    let mut core: Vec<Sphere> = extremes.iter().flatten().map(|&(_, index)| sphere(&items[index])).collect();
+    let mut core: Vec<Sphere> = extremes.iter().flatten().map(|&(_, index)| sphere(&splats[index])).collect();
     let mut around = Sphere::around(&core, 1 << 12);
-    for _ in 0..MOST_GROWTHS {
-        let reach = |item: &T| {
-            let own = sphere(item);
-            (own.center.distance(around.center) + own.radius, own)
+    for growth in 0.. {
+        // Most splats lie so far inside that their size need not be known: a splat's largest standard deviation is at most
+        // the root of the sum of all variances.
+        let center = around.center.as_vec3();
+        let outside = |splat: &Splat| {
+            let variances: f32 = splat.factor.iter().map(|entry| entry * entry).sum();
+            let most = Vec3::from(splat.center).distance(center) + extent * variances.sqrt();
+            (f64::from(most) > around.radius).then(|| {
+                let own = sphere(splat);
+                (own.center.distance(around.center) + own.radius, own)
+            })
         };
         let farther = |a: (f64, Sphere), b: (f64, Sphere)| if b.0 > a.0 { b } else { a };
-        let farthest = items.par_iter().with_min_len(1 << 14).map(reach).reduce(|| (0.0, around), farther);
-        if farthest.0 <= around.radius * (1.0 + OUTSIDE) {
-            around.radius = around.radius.max(farthest.0) * (1.0 + 1e-6);
-            return around;
+        let all = splats.par_iter().with_min_len(1 << 14).filter_map(outside);
+        let farthest = all.reduce(|| (0.0, around), farther);
+        if growth == MOST_GROWTHS || farthest.0 <= around.radius * (1.0 + OUTSIDE) {
+            // Room for rounding.
+            around.radius = around.radius.max(farthest.0) * (1.0 + 1e-5);
+            break;
         }
         core.push(farthest.1);
         around = Sphere::around(&core, 1 << 12);
     }
-    let reach = |item: &T| {
-        let own = sphere(item);
-        own.center.distance(around.center) + own.radius
-    };
-    around.radius = items.par_iter().with_min_len(1 << 14).map(reach).reduce(|| 0.0, f64::max) * (1.0 + 1e-6);
     around
 }
