@@ -19,7 +19,7 @@ pub struct ClipFlags {
     clip: Vec<Shape>,
     /// Removes what is inside: the same shapes.
     #[arg(long, value_name = "SHAPE", value_parser = Shape::parse)]
-    cut: Vec<Shape>,
+    cut_out: Vec<Shape>,
 }
 
 /// A shape as it was given.
@@ -46,9 +46,9 @@ enum Place {
 impl ClipFlags {
     /// What is wrong whatever the scene.
     pub fn check(&self) -> Result<(), Failure> {
-        let (count, most) = (self.clip.len() + self.cut.len(), Settings::MAX_CLIPS);
+        let (count, most) = (self.clip.len() + self.cut_out.len(), Settings::MAX_CLIPS);
         if count > most {
-            return Err(Failure::Usage(format!("{count} shapes of --clip and --cut are more than {most}")));
+            return Err(Failure::Usage(format!("{count} shapes of --clip and --cut-out are more than {most}")));
         }
         Ok(())
     }
@@ -80,7 +80,7 @@ impl ClipFlags {
 
     fn shapes(&self) -> impl Iterator<Item = (&'static str, bool, &Shape)> {
         let kept = self.clip.iter().map(|shape| ("--clip", true, shape));
-        kept.chain(self.cut.iter().map(|shape| ("--cut", false, shape)))
+        kept.chain(self.cut_out.iter().map(|shape| ("--cut-out", false, shape)))
     }
 }
 

@@ -115,3 +115,15 @@ fn start_log(command: &Command) {
         .with_span_events(tracing_subscriber::fmt::format::FmtSpan::CLOSE)
         .init();
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Command;
+    use clap::CommandFactory;
+
+    /// Flags of a name that two groups share, and the like, are found by clap alone, and only here.
+    #[test]
+    fn the_flags_go_together() {
+        Command::command().debug_assert();
+    }
+}

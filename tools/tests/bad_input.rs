@@ -97,15 +97,15 @@ const WRONG: &[(&str, i32, &str)] = &[
         "nothing to draw: --clip 'box:20,20,20:30,30,30' leaves nothing of the scene, which lies between [0, 0, 0] and [15, 15, 15]",
     ),
     ("a.nrrd --clip x<-100%", 3, "nothing to draw: --clip 'x<-100%' leaves nothing of the scene"),
-    ("a.nrrd --cut plane:0,0,1,99", 3, "nothing to draw: --cut 'plane:0,0,1,99' leaves nothing of the scene"),
+    ("a.nrrd --cut-out plane:0,0,1,99", 3, "nothing to draw: --cut-out 'plane:0,0,1,99' leaves nothing of the scene"),
     ("a.nrrd --clip box:1,1,1:0,2,2", 2, "the first corner of a box must lie below the second on every axis"),
     ("a.nrrd --clip box:50%,0,0:1,9,9", 2, "a clip box from [7.5, 0, 0] to [1, 9, 9] holds nothing"),
     ("a.nrrd --clip plane:0,0,0,1", 2, "a plane needs a direction that is not 0,0,0"),
     ("a.nrrd --clip w<3", 2, "the forms are plane:NX,NY,NZ,OFFSET, box:X0,Y0,Z0:X1,Y1,Z1 and 'x<AT' or 'x>AT'"),
     (
-        "a.nrrd --clip x<9 --clip x<9 --clip x<9 --clip x<9 --clip x<9 --cut x<1 --cut x<1 --cut x<1 --cut x<1",
+        "a.nrrd --clip x<9 --clip x<9 --clip x<9 --clip x<9 --clip x<9 --cut-out x<1 --cut-out x<1 --cut-out x<1 --cut-out x<1",
         2,
-        "9 shapes of --clip and --cut are more than 8",
+        "9 shapes of --clip and --cut-out are more than 8",
     ),
     // What does not go together.
     ("a.nrrd --back-to-front", 2, "--back-to-front is an order of single splats: it needs --mode splats"),
@@ -181,7 +181,7 @@ fn what_is_unusual_draws() {
         "a.nrrd --mode splats --back-to-front",
         "a.nrrd --mip",
         "a.nrrd --x-ray",
-        "a.nrrd --clip plane:1,1,0,15 --clip y>20% --cut box:0,0,0:50%,50%,50%",
+        "a.nrrd --clip plane:1,1,0,15 --clip y>20% --cut-out box:0,0,0:50%,50%,50%",
     ] {
         let found = folder.json(&format!("render {arguments} -o out.png --overwrite --json --size 32x24"));
         let settings = &found["settings"];

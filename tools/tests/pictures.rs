@@ -157,7 +157,7 @@ fn adapters_are_listed_and_chosen() {
     assert!(String::from_utf8_lossy(&output.stdout).contains(list[0]["name"].as_str().unwrap()));
     folder.run("render a.ply -o a.png --gpu nonexistent").fails(4, &["nonexistent", "splatkit gpus"]);
     folder.run("render a.ply -o a.png --gpu 99").fails(4, &["99"]);
-    folder.run(&format!("render a.ply -o a.png --gpu 0 --budget 100000 {SMALL}")).ok();
+    folder.run(&format!("render a.ply -o a.png --gpu 0 --pass-entries 100000 {SMALL}")).ok();
 }
 
 #[test]

@@ -77,7 +77,7 @@ fn scattered_samples_fill_at_most_their_sheets() {
 fn assert_linear(scene: &Scene, projection: Projection, slope: DVec3, constant: f64, reach: f64, tolerance: f64) {
     let settings = Settings { sheet_thickness: Some(0.2), ..Settings::new([32, 24]) };
     let view = camera(projection).view(settings.size).unwrap();
-    let frame = Frame::new(scene, view, &settings);
+    let frame = Frame::new(scene, scene, view, &settings);
     let everywhere: Vec<&Kernel> = frame.kernels.iter().collect();
     let mut met = 0;
     for (column, row) in [(15, 11), (17, 14), (14, 13)] {
@@ -204,7 +204,7 @@ fn heavier_samples_count_more() {
     let scene = Scene::new()
         .with_samples(set(Payload::Scalar, vec![at(-0.2, 1.0, 3.0), at(0.2, 5.0, 1.0)]), uniform([1.0; 3], 0.8));
     let settings = unshaded([1, 1]);
-    let frame = Frame::new(&scene, from_above(5.0, 0.1).view([1, 1]).unwrap(), &settings);
+    let frame = Frame::new(&scene, &scene, from_above(5.0, 0.1).view([1, 1]).unwrap(), &settings);
     let everywhere: Vec<&Kernel> = frame.kernels.iter().collect();
     let faces = frame.faces(&frame.ray(0, 0), &everywhere);
     close(faces[faces.len() / 2].value(1e-4).unwrap(), 2.0, 1e-9);
@@ -220,7 +220,7 @@ fn the_mean_of_a_sample_with_a_slope_is_that_of_many_points() {
     let settings = unshaded([4001, 4001]);
     for projection in PROJECTIONS {
         let view = camera(projection).view(settings.size).unwrap();
-        let frame = Frame::new(&scene, view, &settings);
+        let frame = Frame::new(&scene, &scene, view, &settings);
         let ray = frame.ray(2000, 2000);
         let kernel = &frame.kernels[0];
         let kernel::Load::Sample(carried) = &kernel.load else { panic!("a sample is no radiance") };

@@ -88,7 +88,7 @@ fn a_surface_in_a_translucent_volume_is_veiled_by_what_lies_before_it() {
                 .with_splats(SplatSet { extent: 3.0, ..set(Payload::Radiance, vec![wall]) });
             let settings = Settings { sheet_thickness: Some(0.01), ..unshaded([801, 801]) };
             let view = camera.view(settings.size).unwrap();
-            let frame = Frame::new(&scene, view, &settings);
+            let frame = Frame::new(&scene, &scene, view, &settings);
             for (column, row) in [(400, 400), (420, 370)] {
                 let ray = frame.ray(column, row);
                 let composite = pixel(&frame, column, row);
