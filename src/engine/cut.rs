@@ -97,6 +97,7 @@ mod tests {
         assert_eq!(finest_within(&tally, 100), 2f64.powi(-8));
         assert_eq!(finest_within(&tally, 99), 1.0);
         assert_eq!(finest_within(&tally, 39), 2.0);
-        assert_eq!(finest_within(&tally, 10), 4.0);
+        assert_eq!(finest_within(&tally, 10), 2.0);
+        assert_eq!(finest_within(&tally, 9), 4.0);
     }
 }

@@ -10,7 +10,14 @@ use crate::{
     scene::SceneFlags,
 };
 use clap::{Args, Parser};
-use splatkit::{Error, io, picture::PictureFormat, surface::Mesh, volume::phantoms::Phantom};
+use splatkit::{
+    Error,
+    hierarchy::{BuildOptions, build_file, file::WriteOptions},
+    io,
+    picture::PictureFormat,
+    surface::{Mesh, SurfelOptions},
+    volume::phantoms::Phantom,
+};
 use std::{ffi::OsString, path::PathBuf, time::Instant};
 
 #[derive(Args, Debug)]
@@ -27,6 +34,7 @@ pub struct Demo {
 }
 
 const MESH: &str = "knot.ply";
+const TREE: &str = "knot.splk";
 const VOLUME: &str = "specimen.nrrd";
 const TRANSFER: &str = "specimen.json";
 /// The knot reaches 3.4 from its centre; the specimen's radius is 0.9.
@@ -51,8 +59,14 @@ struct Shot {
     arguments: &'static str,
 }
 
-const SHOTS: [Shot; 3] = [
+const SHOTS: [Shot; 4] = [
     Shot { name: "mesh.png", inputs: &[MESH], arguments: "--size 800x600 --azimuth 0 --elevation 20 --zoom 1.3" },
+    // Coarse enough to see what a hierarchy is made of.
+    Shot {
+        name: "hierarchy.png",
+        inputs: &[TREE],
+        arguments: "--size 800x600 --azimuth 0 --elevation 20 --zoom 1.3 --cut 12",
+    },
     Shot {
         name: "volume.png",
         inputs: &[VOLUME],
@@ -87,7 +101,7 @@ impl Demo {
 
     fn make_inputs(&self, progress: &Progress) -> Result<(), Failure> {
         std::fs::create_dir_all(&self.folder).map_err(|e| Failure::output(&self.folder, e))?;
-        for name in [MESH, VOLUME, TRANSFER].into_iter().chain(SHOTS.iter().map(|shot| shot.name)) {
+        for name in [MESH, TREE, VOLUME, TRANSFER].into_iter().chain(SHOTS.iter().map(|shot| shot.name)) {
             output::check(&self.folder.join(name), self.overwrite)?;
         }
         progress.stage("Making a mesh and a volume");
@@ -96,6 +110,15 @@ impl Demo {
         mesh.positions.iter_mut().for_each(|p| *p *= KNOT_SCALE);
         let specimen = Phantom::Specimen.sample([128; 3]).map_err(Error::Argument)?;
         output::write_by(&self.folder.join(MESH), |path| io::ply::write(&mesh, path))?;
+        progress.stage("Building a hierarchy");
+        let build = BuildOptions {
+            closed: mesh.is_closed(),
+            source_points: Some(mesh.positions.len() as u64),
+            ..BuildOptions::default()
+        };
+        let write = WriteOptions { source: MESH.into(), ..WriteOptions::default() };
+        let splats = mesh.surfels(&SurfelOptions::default())?;
+        build_file(&splats, &self.folder.join(TREE), &build, &write, &|_, _| ())?;
         output::write_by(&self.folder.join(VOLUME), |path| io::nrrd::write(&specimen, path))?;
         output::write(&self.folder.join(TRANSFER), SHOWN.as_bytes())
     }
