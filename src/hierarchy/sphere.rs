@@ -137,7 +137,7 @@ pub(crate) fn nest(block: &mut Block, heights: &[u8], outer: Option<Sphere>) {
 }
 
 /// Directions in which the farthest spheres are looked for: the axes of a cube, of its edges and of its corners.
-const DIRECTIONS: [[f32; 3]; 13] = [
+pub(super) const DIRECTIONS: [[f32; 3]; 13] = [
     [1.0, 0.0, 0.0],
     [0.0, 1.0, 0.0],
     [0.0, 0.0, 1.0],

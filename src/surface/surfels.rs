@@ -49,7 +49,7 @@ impl Default for SurfelOptions {
 }
 
 /// Where footprints end, in standard deviations.
-pub(super) const EXTENT: f32 = 3.0;
+pub(crate) const EXTENT: f32 = 3.0;
 
 /// Vertices of one parallel task.
 const CHUNK: usize = 1 << 12;
@@ -85,7 +85,7 @@ impl Mesh {
         Some([self.origin + low.as_dvec3(), self.origin + high.as_dvec3()])
     }
 
-    fn check(&self, options: &SurfelOptions) -> Result<()> {
+    pub(super) fn check(&self, options: &SurfelOptions) -> Result<()> {
         let values = [
             ("radius_scale", options.radius_scale),
             ("optical_depth", options.optical_depth),
@@ -131,13 +131,25 @@ impl Mesh {
 fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
     let Some([low, high]) = mesh.bounds() else { return Vec::new() };
     let diagonal = (high - low).length() as f32;
-    // Files split vertices at seams of texture and material, or give every triangle its own. A seam must not show, so
-    // vertices at one place are one; but not where the file has normals, which may be split to be seen.
-    let may_be_split =
-        !mesh.uvs.is_empty() || mesh.materials.len() > 1 || mesh.positions.len() > mesh.triangles.len() / 4 * 3;
-    let is_split = mesh.normals.is_empty() && may_be_split;
+    let has_seams = !mesh.uvs.is_empty() || mesh.materials.len() > 1;
+    let is_split = mesh.normals.is_empty() && may_be_split(has_seams, mesh.positions.len(), mesh.triangles.len());
     let fine = refine(mesh, diagonal * options.largest_spacing, options.most_triangles);
-    let mesh = fine.as_ref();
+    of_vertices(&fine, is_split, options, |_| true)
+}
+
+/// Files split vertices at seams of texture and material, or give every triangle its own. A seam must not show, so
+/// vertices at one place are one; but not where the file has normals, which may be split to be seen.
+pub(super) fn may_be_split(has_seams: bool, vertices: usize, triangles: usize) -> bool {
+    has_seams || vertices > triangles / 4 * 3
+}
+
+/// The surfels of those vertices of a refined mesh that are wanted.
+pub(super) fn of_vertices(
+    mesh: &Mesh,
+    is_split: bool,
+    options: &SurfelOptions,
+    is_wanted: impl Fn(usize) -> bool + Sync,
+) -> Vec<Splat> {
     let keep: Vec<bool> = mesh.triangles.par_iter().map(|&triangle| has_area(mesh, triangle)).collect();
     let adjacency = if is_split {
         let first = first_of_equals(&mesh.positions);
@@ -158,7 +170,8 @@ fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
             let mut splats = Vec::with_capacity(CHUNK);
             let mut around = Vec::new();
             let mut seeds = Vec::new();
-            for vertex in chunk * CHUNK..((chunk + 1) * CHUNK).min(mesh.positions.len()) {
+            let vertices = chunk * CHUNK..((chunk + 1) * CHUNK).min(mesh.positions.len());
+            for vertex in vertices.filter(|&vertex| is_wanted(vertex)) {
                 maker.vertex(vertex, &mut around, &mut seeds, &mut splats);
             }
             splats
