@@ -74,8 +74,9 @@ impl Sphere {
             let center = self.center.lerp(outer.center, part);
             Self { center, radius: Self::reach(center, spheres) }
         };
-        // Room for what rounding to 32 bits adds.
-        let room = outer.radius * (1.0 - 4.0 * f64::from(f32::EPSILON));
+        // Room for what rounding to 32 bits adds: to the radius, and to a centre that may be far from the origin.
+        let rounded = 4.0 * outer.radius + 2.0 * outer.center.abs().max_element();
+        let room = outer.radius - rounded * f64::from(f32::EPSILON);
         let fits = |s: &Self| s.center.distance(outer.center) + s.radius <= room;
         let own = at(0.0);
         if fits(&own) {

@@ -96,7 +96,7 @@ impl<'a> Judged<'a> {
             found.is_ok()
         });
         let kept: Vec<u32> = order.into_par_iter().map(|point| kept[point as usize]).collect();
-        let (spacing, lone) = spacings(&around, &nearest);
+        let (spacing, lone) = spacings(&around, &nearest, known.spacing);
         report(mesh.positions.len() - points.len(), &lone);
         let mut normals: Vec<Vec3> = around.par_iter().map(|around| around.normal).collect();
         let free = settle_known(mesh, &kept, &mut normals);
@@ -122,11 +122,14 @@ impl<'a> Judged<'a> {
     }
 }
 
-/// How far apart the points are around each, and which are lone: those take the spacing of their neighbours.
-fn spacings(around: &[Surroundings], nearest: &[Nearest]) -> (Vec<f32>, Vec<bool>) {
-    let mut distances: Vec<f32> = around.par_iter().map(|around| around.distance).collect();
-    let middle = distances.len() / 2;
-    let typical = if distances.is_empty() { 0.0 } else { *distances.select_nth_unstable_by(middle, f32::total_cmp).1 };
+/// How far apart the points are around each, where about so much is typical, and which are lone: those take the spacing of their neighbours.
+fn spacings(around: &[Surroundings], nearest: &[Nearest], typical: Option<f32>) -> (Vec<f32>, Vec<bool>) {
+    let median = || {
+        let mut distances: Vec<f32> = around.par_iter().map(|around| around.distance).collect();
+        let middle = distances.len() / 2;
+        if distances.is_empty() { 0.0 } else { *distances.select_nth_unstable_by(middle, f32::total_cmp).1 }
+    };
+    let typical = typical.unwrap_or_else(median);
     // A single point has no scale of its own; it becomes a ball of about unit diameter.
     let typical = if typical > 0.0 { typical } else { 0.5 };
     around

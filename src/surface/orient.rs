@@ -18,9 +18,11 @@ const LEAST_VOTE: f64 = 0.03;
 /// A part is taken as closed where its mean normal is shorter.
 const CLOSED: f64 = 0.2;
 
-/// What is known of the sides from outside of the points: they may be a part of a cloud.
+/// What is known from outside of points that are a part of a cloud.
 #[derive(Default)]
 pub(crate) struct Known {
+    /// About the median distance of neighbours in the cloud; that of the points where `None`.
+    pub spacing: Option<f32>,
     /// The centre of the cloud; that of the points where `None`.
     pub center: Option<DVec3>,
     /// Normals whose side is settled, by point; the connected parts that they are in follow them.

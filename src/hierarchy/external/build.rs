@@ -156,7 +156,8 @@ impl Part {
         region: u32,
         options: &ExternalOptions,
     ) -> Result<Vec<Splat>> {
-        let mut known = Known { center: Some(input.input.center), normals: Vec::new() };
+        let spacing = Some(input.input.regions.spacing);
+        let mut known = Known { spacing, center: Some(input.input.center), normals: Vec::new() };
         let Some(sides) = sides else {
             let splats = cloud_piece(&self.mesh, &self.owned, known, &options.surfels)?;
             return Ok(splats.into_iter().map(|(_, splat)| splat).collect());

@@ -31,6 +31,8 @@ pub struct Regions {
     /// How far the neighbours of the points in each coarse cell may be; of cut ones in `cut`.
     reach: Vec<f32>,
     cut: BTreeMap<u64, f32>,
+    /// About the median distance between points that are next to each other, taken as those of a surface.
+    pub spacing: f32,
 }
 
 /// A cell that is not cut any further.
@@ -83,6 +85,7 @@ impl Regions {
         let mut held = 0;
         let mut reach = vec![0.0; 1 << (3 * FINE_BITS - BELOW_COARSE)];
         let mut cut = BTreeMap::new();
+        let mut typical = Vec::with_capacity(cells.len());
         let larger = Larger::of(cells);
         for cell in cells {
             if held > 0 && held + cell.count > most {
@@ -94,6 +97,8 @@ impl Regions {
             let edge = cube.edge() / (1u64 << (FINE_BITS - below / 3)) as f32;
             let spacings = (REACH_ON_SURFACE / (count as f32).sqrt()).max(REACH_IN_SOLID / (count as f32).cbrt());
             let own = edge * spacings.min(1.0);
+            // Points at one place count as one.
+            typical.push((edge / (count as f32).sqrt(), if cell.below > 0 { cell.count } else { 1 }));
             if cell.below == BELOW_COARSE {
                 reach[(cell.start >> BELOW_COARSE) as usize] = own;
             } else {
@@ -101,7 +106,7 @@ impl Regions {
                 cut.insert(cell.start, own);
             }
         }
-        let mut regions = Self { cube, starts, coarse: Vec::new(), reach, cut };
+        let mut regions = Self { cube, starts, coarse: Vec::new(), reach, cut, spacing: middle(typical) };
         let region_of = |index: u64| {
             let (start, end) = (index << BELOW_COARSE, ((index + 1) << BELOW_COARSE) - 1);
             let region = regions.search(start);
@@ -156,6 +161,18 @@ impl Regions {
             }
         }
     }
+}
+
+/// The median of values that count so many times.
+fn middle(mut values: Vec<(f32, u64)>) -> f32 {
+    values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let mut left = values.iter().map(|(_, count)| count).sum::<u64>() / 2;
+    let at = values.iter().find(|(_, count)| {
+        let is_here = *count > left;
+        left = left.saturating_sub(*count);
+        is_here
+    });
+    at.map_or(0.0, |(value, _)| *value)
 }
 
 /// How many points there are in the cells larger than the coarse ones, by level: one cell, eight, …
