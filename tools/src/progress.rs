@@ -81,7 +81,7 @@ impl Stages<'_> {
     /// another end, is another stage.
     pub fn set(&self, name: &'static str, done: u64, total: u64) {
         let Ok(mut now) = self.now.lock() else { return };
-        if !now.as_ref().is_some_and(|(at, end, _)| (*at, *end) == (name, total)) {
+        if now.as_ref().is_none_or(|(at, end, _)| (*at, *end) != (name, total)) {
             // The last bar goes before the next comes.
             *now = None;
             let bar = if total > 0 { Some(self.progress.bar(name, total)) } else { None };

@@ -61,10 +61,9 @@ impl Pieces {
             let stride = if is_face { triangle_stride(element) } else { element.stride() };
             let Some(stride) = stride.filter(|_| element.name != "tristrips") else { return Ok(None) };
             let left = source.bytes().len() - at;
-            let Some(size) = element.count.checked_mul(stride).filter(|&size| size <= left) else {
-                // Faces with fewer corners may still fit.
-                return if is_face { Ok(None) } else { Err(cut(source, element, left / stride)) };
-            };
+            let size = element.count.checked_mul(stride).filter(|&size| size <= left);
+            // Some faces might have fewer corners than three, but what would they be for?
+            let Some(size) = size else { return Err(cut(source, element, left / stride)) };
             let rows = Rows { at, count: element.count, stride, big };
             at += size;
             if is_face || element.name == "vertex" {

@@ -22,7 +22,7 @@ impl Convert {
         progress: &Progress,
     ) -> Result<(), Failure> {
         let [wanted, most_mib] = [need.bytes, most].map(|bytes| bytes >> 20);
-        if !need.in_pieces || extension != "splk" {
+        if !need.in_pieces? || extension != "splk" {
             return Err(Failure::Usage(format!(
                 "this takes about {wanted} MiB, but only {most_mib} MiB may be taken, and only binary PLY of points or \
                  triangles, LAS and LAZ become hierarchies in less; --memory allows more"

@@ -7,30 +7,39 @@ use splatkit::{
 use std::path::{Path, PathBuf};
 
 /// What converting files as a whole takes.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub struct Need {
     /// Bytes, about; of a file whose header tells no counts by its size.
     pub bytes: u64,
-    /// Whether all files can be read in pieces.
-    pub in_pieces: bool,
+    /// Whether all files can be read in pieces, or what is wrong with one.
+    pub in_pieces: splatkit::Result<bool>,
 }
 
-/// Of a file that tells no counts: what is made of it, beside its own bytes.
+/// Of a file that tells no counts: what is made of it for each of its bytes, and with them.
 const OF_BYTE: u64 = 4;
+/// The same of a hierarchy, whose splats are packed.
+const OF_PACKED_BYTE: u64 = 24;
 
 /// About what converting files takes where all of them are in memory.
-pub fn need(files: &[PathBuf], limits: &Limits) -> splatkit::Result<Need> {
-    let mut need = Need { bytes: 0, in_pieces: true };
+pub fn need(files: &[PathBuf], limits: &Limits) -> Need {
+    let mut need = Need { bytes: 0, in_pieces: Ok(true) };
     for file in files {
-        match Stream::open(file, limits)? {
-            Some(stream) => need.bytes += memory_of_whole(stream.counts()) + file_bytes(file),
-            None => {
-                need.bytes += file_bytes(file) * OF_BYTE;
-                need.in_pieces = false;
+        let is_packed = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("splk"));
+        let guess = file_bytes(file) * if is_packed { OF_PACKED_BYTE } else { OF_BYTE };
+        match Stream::open(file, limits) {
+            Ok(Some(stream)) => need.bytes += memory_of_whole(stream.counts()) + file_bytes(file),
+            Ok(None) => {
+                need.bytes += guess;
+                need.in_pieces = need.in_pieces.map(|_| false);
+            }
+            // Where the file fits, its reader tells what is wrong with it.
+            Err(error) => {
+                need.bytes += guess;
+                need.in_pieces = need.in_pieces.and(Err(error));
             }
         }
     }
-    Ok(need)
+    need
 }
 
 fn file_bytes(file: &Path) -> u64 {

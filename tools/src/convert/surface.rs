@@ -79,7 +79,7 @@ impl Convert {
             return Err(Failure::Usage("--lattice is for volumes".into()));
         }
         let most = self.surface.memory.or_else(memory::usual).unwrap_or(u64::MAX);
-        let need = memory::need(&self.files, &self.load.limits())?;
+        let need = memory::need(&self.files, &self.load.limits());
         if need.bytes > most {
             return self.in_regions(extension, need, most, progress);
         }
