@@ -48,7 +48,7 @@ fn what_can_only_be_read_as_a_whole_is_told() {
     let folder = Folder::new("as_a_whole");
     folder.put("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     folder.run("convert a.obj -o a.splk --memory 100").fails(2, &["--memory allows more"]);
-    folder.run("convert a.obj -o a.splk --memory much").fails(2, &["a number of bytes"]);
+    folder.run("convert a.obj -o a.splk --memory much").fails(2, &["the units are KiB"]);
     // Cut among its faces.
     let whole = sheet(150);
     folder.put("cut.ply", &whole[..whole.len() - 100]);
