@@ -174,7 +174,7 @@ pub(crate) fn join(roots: &[Node], preset: Preset, outer: Sphere) -> (Block, Vec
     (block, portals)
 }
 
-fn check(set: &SplatSet) -> Result<()> {
+pub(super) fn check(set: &SplatSet) -> Result<()> {
     if set.payload != Payload::Radiance {
         return Err(Error::Argument("a hierarchy is built of splats that carry colour, not of samples".into()));
     }

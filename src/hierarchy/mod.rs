@@ -4,6 +4,7 @@
 mod build;
 mod cluster;
 mod cut;
+pub mod external;
 pub mod file;
 mod leaves;
 mod merge;

@@ -7,6 +7,8 @@ use rdst::RadixSort;
 
 /// Bits of a Morton key along each axis.
 const BITS: u32 = 10;
+/// And of a fine one.
+pub(crate) const FINE_BITS: u32 = 21;
 
 /// A cube around some points, in which keys are counted.
 #[derive(Debug, Clone, Copy)]
@@ -25,6 +27,24 @@ impl Cube {
     pub fn key(&self, place: Vec3) -> u32 {
         let cell = ((place - self.low) * self.scale).clamp(Vec3::ZERO, Vec3::splat(((1 << BITS) - 1) as f32));
         spread(cell.x as u32) | spread(cell.y as u32) << 1 | spread(cell.z as u32) << 2
+    }
+
+    /// As [`key`](Self::key), of [`FINE_BITS`] bits along each axis.
+    pub fn fine_key(&self, place: Vec3) -> u64 {
+        let scale = f64::from(self.scale) * f64::from(1 << (FINE_BITS - BITS));
+        let cell = (place - self.low).as_dvec3() * scale;
+        let [x, y, z] = cell.to_array().map(|cell| cell.clamp(0.0, f64::from((1 << FINE_BITS) - 1)) as u32);
+        let low = (1 << BITS) - 1;
+        let part = |shift: u32| {
+            let [x, y, z] = [x, y, z].map(|cell| cell >> shift & low);
+            u64::from(spread(x) | spread(y) << 1 | spread(z) << 2)
+        };
+        part(0) | part(BITS) << (3 * BITS) | part(2 * BITS) << (6 * BITS)
+    }
+
+    /// The edge of the cube.
+    pub fn edge(&self) -> f32 {
+        (1 << BITS) as f32 / self.scale
     }
 }
 

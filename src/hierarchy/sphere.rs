@@ -69,9 +69,12 @@ impl Sphere {
         best
     }
 
-    /// Whether this one holds another, with room for what rounding to 32 bits adds.
+    /// Whether this one holds another, with room for what rounding to 32 bits adds: to the radius, and to a centre that may be
+    /// far from the origin.
     fn holds(&self, other: &Self) -> bool {
-        other.center.distance(self.center) + other.radius <= self.radius * (1.0 - 4.0 * f64::from(f32::EPSILON))
+        let rounded = 4.0 * self.radius + 2.0 * self.center.abs().max_element();
+        let room = self.radius - rounded * f64::from(f32::EPSILON);
+        other.center.distance(self.center) + other.radius <= room
     }
 
     /// A sphere around others that lies in `outer`, which holds them all, with a centre as near to `self`'s as can be on the
@@ -164,7 +167,7 @@ fn descendants(nodes: &[Node], index: usize, levels: u32, found: &mut Vec<Sphere
 }
 
 /// Directions in which the farthest spheres are looked for: the axes of a cube, of its edges and of its corners.
-const DIRECTIONS: [[f32; 3]; 13] = [
+pub(super) const DIRECTIONS: [[f32; 3]; 13] = [
     [1.0, 0.0, 0.0],
     [0.0, 1.0, 0.0],
     [0.0, 0.0, 1.0],

@@ -57,11 +57,13 @@ pub(super) fn greys(intensities: &[f32]) -> Vec<[u8; 4]> {
     if low >= high {
         return Vec::new();
     }
-    let grey = |&value: &f32| {
-        let grey = ((value - low) / (high - low) * 255.0).round() as u8;
-        [grey, grey, grey, 255]
-    };
-    intensities.par_iter().map(grey).collect()
+    intensities.par_iter().map(|&value| grey(value, low, high)).collect()
+}
+
+/// The grey of an intensity where black is at `low` and white at `high`.
+pub(super) fn grey(value: f32, low: f32, high: f32) -> [u8; 4] {
+    let grey = ((value - low) / (high - low) * 255.0).round() as u8;
+    [grey, grey, grey, 255]
 }
 
 /// Colours of 16 bits as bytes. Some writers store bytes in the 16 bits: then none is larger than 255. Empty where all are
@@ -71,8 +73,14 @@ pub(super) fn colors_of_16_bits(colors: &[[u16; 3]]) -> Vec<[u8; 4]> {
     if largest == 0 {
         return Vec::new();
     }
+    colors.par_iter().map(|&color| color_of_16_bits(color, largest)).collect()
+}
+
+/// One such colour, where the largest number of all is known.
+pub(super) fn color_of_16_bits(color: [u16; 3], largest: u16) -> [u8; 4] {
     let byte = |value: u16| if largest > 255 { ((u32::from(value) * 255 + 32767) / 65535) as u8 } else { value as u8 };
-    colors.par_iter().map(|&[r, g, b]| [byte(r), byte(g), byte(b), 255]).collect()
+    let [r, g, b] = color.map(byte);
+    [r, g, b, 255]
 }
 
 #[cfg(test)]

@@ -5,8 +5,11 @@
 //! crate unpacks the chunks of points (`packed`).
 
 mod packed;
+mod pieces;
 #[cfg(test)]
 mod tests;
+
+pub(super) use pieces::Pieces;
 
 use super::{
     Source,
@@ -41,6 +44,12 @@ pub fn read(source: &Source) -> Result<Mesh> {
 }
 
 fn plain(source: &Source, header: &Header) -> Result<Vec<Point>> {
+    let data = plain_bytes(source, header)?;
+    Ok(data.par_chunks_exact(header.size).filter_map(|record| header.point(record)).collect())
+}
+
+/// The bytes of points that are not packed.
+fn plain_bytes<'a>(source: &'a Source, header: &Header) -> Result<&'a [u8]> {
     let data = &source.bytes()[header.start..];
     let size = (header.points as u64).saturating_mul(header.size as u64);
     if (data.len() as u64) < size {
@@ -52,7 +61,7 @@ fn plain(source: &Source, header: &Header) -> Result<Vec<Point>> {
         );
         return Err(source.error("header", message).hint("the file is cut"));
     }
-    Ok(data[..size as usize].par_chunks_exact(header.size).filter_map(|record| header.point(record)).collect())
+    Ok(&data[..size as usize])
 }
 
 /// What matters here of a point.

@@ -24,6 +24,7 @@ pub mod raw;
 mod sample_type;
 mod source;
 pub mod stl;
+mod stream;
 #[cfg(test)]
 #[cfg(test)]
 pub(crate) mod testing;
@@ -45,6 +46,8 @@ pub use load_samples::load_samples;
 pub use raw::RawLayout;
 pub use sample_type::{Endian, SampleType};
 pub use source::Source;
+pub(crate) use stream::StreamPoint;
+pub use stream::{Counts, Stream};
 
 use crate::{Result, volume::Volume};
 use std::path::Path;

@@ -6,6 +6,7 @@
 
 mod gaussians;
 mod header;
+mod pieces;
 mod rows;
 mod samples;
 mod table;
@@ -21,6 +22,7 @@ use crate::{
 pub use gaussians::{write_gaussian_leaves, write_gaussians};
 use glam::{DVec3, Vec2, Vec3};
 use header::{Element, width};
+pub(super) use pieces::Pieces;
 use ply_rs::ply::{PropertyType, ScalarType};
 use rayon::prelude::*;
 use rows::{List, Rows};
@@ -119,14 +121,7 @@ fn fill(
         mesh.normals = (0..count).into_par_iter().map(|row| positions::unit(normal(row))).collect();
     }
     if has(COLOR, 3) {
-        let scale = [0, 1, 2, 3].map(|channel| {
-            columns[COLOR + channel].map(|column| match &element.columns[column].kind {
-                PropertyType::Scalar(ScalarType::Float | ScalarType::Double) => 255.0,
-                PropertyType::Scalar(ScalarType::UShort | ScalarType::Short) => 255.0 / 65535.0,
-                _ => 1.0,
-            })
-        });
-        debug_assert_eq!(COLOR + 3, ALPHA);
+        let scale = color_scale(element, columns);
         let channel = |row, channel: usize| match scale[channel] {
             Some(scale) => (value(row, COLOR + channel) * scale).round() as u8,
             None => 255,
@@ -139,6 +134,18 @@ fn fill(
         mesh.uvs = (0..count).into_par_iter().map(uv).collect();
     }
     Ok(())
+}
+
+/// What makes a byte of each channel of colour; none for one that there is not.
+fn color_scale(element: &Element, columns: &[Option<usize>; ROLES.len()]) -> [Option<f64>; 4] {
+    debug_assert_eq!(COLOR + 3, ALPHA);
+    [0, 1, 2, 3].map(|channel| {
+        columns[COLOR + channel].map(|column| match &element.columns[column].kind {
+            PropertyType::Scalar(ScalarType::Float | ScalarType::Double) => 255.0,
+            PropertyType::Scalar(ScalarType::UShort | ScalarType::Short) => 255.0 / 65535.0,
+            _ => 1.0,
+        })
+    })
 }
 
 fn read_faces(source: &Source, element: &Element, rows: &Rows, vertices: usize) -> Result<Vec<[u32; 3]>> {

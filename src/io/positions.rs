@@ -1,7 +1,7 @@
 //! From the doubles of a file to 32-bit positions around an origin.
 
 use super::Source;
-use crate::Result;
+use crate::{Error, Result};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -18,9 +18,7 @@ pub(super) fn settle(
 ) -> Result<(DVec3, Vec<Vec3>)> {
     let bad = (0..count).into_par_iter().find_first(|&row| !position(row).is_finite());
     if let Some(row) = bad {
-        return Err(source
-            .error(place(row), format!("the position {} is not finite", position(row)))
-            .hint("remove the point, or write the file again without undefined coordinates"));
+        return Err(not_finite(source, place(row), position(row)));
     }
     if count == 0 {
         return Ok((DVec3::ZERO, Vec::new()));
@@ -30,12 +28,25 @@ pub(super) fn settle(
         .into_par_iter()
         .map(|row| (position(row), position(row)))
         .reduce(|| (start, start), |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let origin = origin(source, low, high)?;
+    Ok((origin, (0..count).into_par_iter().map(|row| (position(row) - origin).as_vec3()).collect()))
+}
+
+/// The origin for positions between two corners.
+pub(super) fn origin(source: &Source, low: DVec3, high: DVec3) -> Result<DVec3> {
     let (center, extent) = (low * 0.5 + high * 0.5, (high * 0.5 - low * 0.5).max_element());
     let origin = if center.abs().max_element() > 16.0 * extent { center.round() } else { DVec3::ZERO };
     if (low - origin).abs().max((high - origin).abs()).max_element() > LARGEST {
         return Err(source.error("positions", format!("spread from {low} to {high}, more than 32 bits can hold")));
     }
-    Ok((origin, (0..count).into_par_iter().map(|row| (position(row) - origin).as_vec3()).collect()))
+    Ok(origin)
+}
+
+/// The error of a position that is not finite.
+pub(super) fn not_finite(source: &Source, place: String, position: DVec3) -> Error {
+    source
+        .error(place, format!("the position {position} is not finite"))
+        .hint("remove the point, or write the file again without undefined coordinates")
 }
 
 /// A normal of unit length, or zero where the file's is unusable.

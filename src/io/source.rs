@@ -47,6 +47,17 @@ impl<'a> Source<'a> {
         self.bytes.as_deref().unwrap_or(&[])
     }
 
+    /// Gives the pages of the map that were read back to the system: those who go through a file larger than memory do so
+    /// now and then. They are read again where they are asked for again.
+    pub(super) fn release(&self) {
+        #[cfg(unix)]
+        if let Some(bytes) = &self.bytes {
+            // SAFETY: the map is of a file and read only, so what is dropped reads again as it was. Where the advice is
+            // not taken, nothing is lost.
+            unsafe { bytes.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) }.ok();
+        }
+    }
+
     /// The map itself, for those who read from it later; `None` for an empty file. While it is held, the file must not be
     /// shortened: a new one has to take its name instead.
     pub(crate) fn into_map(self) -> Option<memmap2::Mmap> {

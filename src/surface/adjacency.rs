@@ -97,8 +97,14 @@ impl<'a> Connected<'a> {
 
 /// Whether several vertices of a mesh may lie at one place. Files split vertices at seams of texture and material, or give
 /// every triangle its own; a seam must not show.
-pub(super) fn may_be_split(mesh: &Mesh) -> bool {
-    !mesh.uvs.is_empty() || mesh.materials.len() > 1 || mesh.positions.len() > mesh.triangles.len() / 4 * 3
+pub(super) fn is_split(mesh: &Mesh) -> bool {
+    let has_seams = !mesh.uvs.is_empty() || mesh.materials.len() > 1;
+    may_be_split(has_seams, mesh.positions.len(), mesh.triangles.len())
+}
+
+/// As [`is_split`], of what is known of a mesh.
+pub(super) fn may_be_split(has_seams: bool, vertices: usize, triangles: usize) -> bool {
+    has_seams || vertices > triangles / 4 * 3
 }
 
 #[cfg(test)]

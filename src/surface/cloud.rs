@@ -3,7 +3,7 @@
 use super::{
     Mesh, SurfelOptions,
     ellipse::{Tensor, factor, lower},
-    orient::orient,
+    orient::{Known, orient},
     paint::{pack, point_color},
 };
 use crate::{
@@ -43,47 +43,93 @@ struct Surroundings {
 
 /// Surfels in the order of the points; for those that coincide, of the first one.
 pub(super) fn surfels(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
-    let first = first_of_equals(&mesh.positions);
-    let kept: Vec<u32> = (0..).zip(first).filter(|&(index, first)| index == first).map(|(index, _)| index).collect();
-    let points: Vec<Vec3> = kept.par_iter().map(|&index| mesh.positions[index as usize]).collect();
-    let tree = Neighbours::new(&points);
-    // All that follows is in the tree's order, where neighbours are near each other in memory too.
-    let order = tree.order();
-    let mut places = vec![0u32; points.len()];
-    order.iter().zip(0..).for_each(|(&point, place)| places[point as usize] = place);
-    let (nearest, around): (Vec<Nearest>, Vec<Surroundings>) =
-        order.par_iter().map(|&point| surroundings(&points, &tree, point, &places)).unzip();
-    drop(tree);
-    let points: Vec<Vec3> = order.par_iter().map(|&point| points[point as usize]).collect();
-    let kept: Vec<u32> = order.into_par_iter().map(|point| kept[point as usize]).collect();
-    let (spacing, lone) = spacings(&around, &nearest);
-    report(mesh.positions.len() - points.len(), &lone);
-    let mut normals: Vec<Vec3> = around.par_iter().map(|around| around.normal).collect();
-    let free = settle_known(mesh, &kept, &mut normals);
-    if free.par_iter().any(|&free| free) {
-        orient(&points, &spacing, &nearest, &free, &mut normals);
-    }
-    let surfel = |at: usize| {
-        let width = f64::from(spacing[at] * SPREAD * options.radius_scale);
-        // The plane of a lone point's neighbours is not its own.
-        let known = !lone[at] || !free[at];
-        let normal = Some(normals[at].as_dvec3()).filter(|normal| known && *normal != DVec3::ZERO);
-        Splat {
-            center: points[at].to_array(),
-            strength: options.optical_depth,
-            factor: shape(&around[at], width, normal),
-            color: pack(point_color(mesh, kept[at] as usize)),
-            normal: normal.map_or(NO_NORMAL, |normal| encode_normal(normal.as_vec3())),
-        }
-    };
-    places.into_par_iter().map(|place| surfel(place as usize)).collect()
+    let judged = Judged::new(mesh, Known::default());
+    judged.places.par_iter().map(|&place| judged.surfel(place as usize, options)).collect()
 }
 
-/// How far apart the points are around each, and which are lone: those take the spacing of their neighbours.
-fn spacings(around: &[Surroundings], nearest: &[Nearest]) -> (Vec<f32>, Vec<bool>) {
-    let mut distances: Vec<f32> = around.par_iter().map(|around| around.distance).collect();
-    let middle = distances.len() / 2;
-    let typical = if distances.is_empty() { 0.0 } else { *distances.select_nth_unstable_by(middle, f32::total_cmp).1 };
+/// The surfels of those points that are wanted, with their indices. What is `known` is named by index.
+pub(super) fn some_surfels(
+    mesh: &Mesh,
+    options: &SurfelOptions,
+    known: Known,
+    is_wanted: impl Fn(usize) -> bool + Sync,
+) -> Vec<(u32, Splat)> {
+    let judged = Judged::new(mesh, known);
+    let wanted = judged.places.par_iter().map(|&place| place as usize);
+    let wanted = wanted.filter(|&place| is_wanted(judged.kept[place] as usize));
+    wanted.map(|place| (judged.kept[place], judged.surfel(place, options))).collect()
+}
+
+/// What has been found out of the points at different places, in an order in which neighbours are near each other.
+struct Judged<'a> {
+    mesh: &'a Mesh,
+    /// The place of each point in the order.
+    places: Vec<u32>,
+    /// The index of each in the mesh.
+    kept: Vec<u32>,
+    points: Vec<Vec3>,
+    around: Vec<Surroundings>,
+    spacing: Vec<f32>,
+    lone: Vec<bool>,
+    normals: Vec<Vec3>,
+    free: Vec<bool>,
+}
+
+impl<'a> Judged<'a> {
+    fn new(mesh: &'a Mesh, mut known: Known) -> Self {
+        let first = first_of_equals(&mesh.positions);
+        let kept: Vec<u32> =
+            (0..).zip(first).filter(|&(index, first)| index == first).map(|(index, _)| index).collect();
+        let points: Vec<Vec3> = kept.par_iter().map(|&index| mesh.positions[index as usize]).collect();
+        let tree = Neighbours::new(&points);
+        // All that follows is in the tree's order, where neighbours are near each other in memory too.
+        let order = tree.order();
+        let mut places = vec![0u32; points.len()];
+        order.iter().zip(0..).for_each(|(&point, place)| places[point as usize] = place);
+        let (nearest, around): (Vec<Nearest>, Vec<Surroundings>) =
+            order.par_iter().map(|&point| surroundings(&points, &tree, point, &places)).unzip();
+        drop(tree);
+        let points: Vec<Vec3> = order.par_iter().map(|&point| points[point as usize]).collect();
+        // Points that coincide with another are not known.
+        known.normals.retain_mut(|(index, _)| {
+            let found = kept.binary_search(index).map(|point| *index = places[point]);
+            found.is_ok()
+        });
+        let kept: Vec<u32> = order.into_par_iter().map(|point| kept[point as usize]).collect();
+        let (spacing, lone) = spacings(&around, &nearest, known.spacing);
+        report(mesh.positions.len() - points.len(), &lone);
+        let mut normals: Vec<Vec3> = around.par_iter().map(|around| around.normal).collect();
+        let free = settle_known(mesh, &kept, &mut normals);
+        if free.par_iter().any(|&free| free) {
+            orient(&points, &spacing, &nearest, &free, &known, &mut normals);
+        }
+        Self { mesh, places, kept, points, around, spacing, lone, normals, free }
+    }
+
+    /// The surfel of the point at a place in the order.
+    fn surfel(&self, at: usize, options: &SurfelOptions) -> Splat {
+        let width = f64::from(self.spacing[at] * SPREAD * options.radius_scale);
+        // The plane of a lone point's neighbours is not its own.
+        let known = !self.lone[at] || !self.free[at];
+        let normal = Some(self.normals[at].as_dvec3()).filter(|normal| known && *normal != DVec3::ZERO);
+        Splat {
+            center: self.points[at].to_array(),
+            strength: options.optical_depth,
+            factor: shape(&self.around[at], width, normal),
+            color: pack(point_color(self.mesh, self.kept[at] as usize)),
+            normal: normal.map_or(NO_NORMAL, |normal| encode_normal(normal.as_vec3())),
+        }
+    }
+}
+
+/// How far apart the points are around each, where about so much is typical, and which are lone: those take the spacing of their neighbours.
+fn spacings(around: &[Surroundings], nearest: &[Nearest], typical: Option<f32>) -> (Vec<f32>, Vec<bool>) {
+    let median = || {
+        let mut distances: Vec<f32> = around.par_iter().map(|around| around.distance).collect();
+        let middle = distances.len() / 2;
+        if distances.is_empty() { 0.0 } else { *distances.select_nth_unstable_by(middle, f32::total_cmp).1 }
+    };
+    let typical = typical.unwrap_or_else(median);
     // A single point has no scale of its own; it becomes a ball of about unit diameter.
     let typical = if typical > 0.0 { typical } else { 0.5 };
     around

@@ -268,6 +268,18 @@ impl Sums {
         self.volume += place.dot(cross);
     }
 
+    /// Adds the corners of a triangle; `unit` as of [`are_inside_out`](Self::are_inside_out).
+    pub fn add_triangle(&mut self, corners: [Vec3; 3], unit: f32) {
+        let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+        let cross = (b - a).cross(c - a) * (0.5 / f64::from(unit).powi(2));
+        for place in [a, b, c] {
+            self.area += cross.length();
+            self.place += place * cross.length();
+            self.cross += cross;
+            self.volume += place.dot(cross);
+        }
+    }
+
     pub fn with(self, other: Self) -> Self {
         Self {
             area: self.area + other.area,

@@ -8,6 +8,7 @@ mod fan;
 mod mesh;
 mod orient;
 mod paint;
+mod piece;
 mod refine;
 mod shapes;
 mod smooth;
@@ -15,7 +16,10 @@ mod surfels;
 mod survey;
 
 pub use mesh::{Material, Mesh, Sensor, Texture};
+pub(crate) use orient::Known;
 pub(crate) use paint::color_at;
+pub(crate) use piece::{MeshPieces, Triangles, cloud_piece};
 pub(crate) use smooth::corner_normals;
+pub(crate) use surfels::EXTENT;
 pub use surfels::SurfelOptions;
 pub use survey::Survey;

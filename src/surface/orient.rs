@@ -18,6 +18,17 @@ const LEAST_VOTE: f64 = 0.03;
 /// A part is taken as closed where its mean normal is shorter.
 const CLOSED: f64 = 0.2;
 
+/// What is known from outside of points that are a part of a cloud.
+#[derive(Default)]
+pub(crate) struct Known {
+    /// About the median distance of neighbours in the cloud; that of the points where `None`.
+    pub spacing: Option<f32>,
+    /// The centre of the cloud; that of the points where `None`.
+    pub center: Option<DVec3>,
+    /// Normals whose side is settled, by point; the connected parts that they are in follow them.
+    pub normals: Vec<(u32, Vec3)>,
+}
+
 /// Gives the normals one side. Zero normals have none and connect nothing, nor do those that are not `free`: these stay
 /// as they are. A point may be among its own `neighbours`. `spacing` tells the area that a point stands for.
 pub(super) fn orient<const N: usize>(
@@ -25,6 +36,7 @@ pub(super) fn orient<const N: usize>(
     spacing: &[f32],
     neighbours: &[[u32; N]],
     free: &[bool],
+    known: &Known,
     normals: &mut [Vec3],
 ) {
     let mut sets = Sets::new(points.len());
@@ -33,7 +45,8 @@ pub(super) fn orient<const N: usize>(
         sets.join(from as u32, to as u32, normals[from].dot(normals[to]) < 0.0);
     }
     let taking_part: Vec<usize> = (0..points.len()).filter(|&index| free[index]).collect();
-    let center = points.iter().map(|p| p.as_dvec3()).sum::<DVec3>() / points.len().max(1) as f64;
+    let own_center = || points.iter().map(|p| p.as_dvec3()).sum::<DVec3>() / points.len().max(1) as f64;
+    let center = known.center.unwrap_or_else(own_center);
     let mut parts = vec![0u32; points.len()];
     let mut votes: Vec<Votes> = Vec::new();
     for &index in &taking_part {
@@ -49,6 +62,10 @@ pub(super) fn orient<const N: usize>(
         }
         let area = f64::from(spacing[index]).powi(2);
         votes[parts[root] as usize - 1].add(points[index].as_dvec3() - center, normals[index].as_dvec3(), area);
+    }
+    for &(index, settled) in known.normals.iter().filter(|(index, _)| free[*index as usize]) {
+        let (root, _) = sets.find(index);
+        votes[parts[root as usize] as usize - 1].settled += f64::from(normals[index as usize].dot(settled));
     }
     let inward: Vec<bool> = votes.iter().map(Votes::face_inward).collect();
     for index in taking_part {
@@ -143,6 +160,8 @@ struct Votes {
     squares: f64,
     normals: DVec3,
     fluxes: f64,
+    /// How far the normals agree with settled ones.
+    settled: f64,
 }
 
 impl Votes {
@@ -156,6 +175,9 @@ impl Votes {
     }
 
     fn face_inward(&self) -> bool {
+        if self.settled != 0.0 {
+            return self.settled < 0.0;
+        }
         let own_center = self.positions / self.area.max(f64::MIN_POSITIVE);
         // Around any centre the sum over a closed part is the same, but around its own it is most precise.
         let closed = self.normals.length() < CLOSED * self.area;

@@ -128,13 +128,37 @@ impl Wanted<'_> {
         let parts = |(t, &source): (&[u32; 3], &u32)| {
             let [p, q, r] =
                 [(0, 1), (1, 2), (2, 0)].map(|(i, j)| f64::from(self.excess(mesh, source as usize, t[i], t[j])));
-            // The triangle measured in the lengths that are wanted, by Heron; a cut leaves edges of about 0.7.
-            let s = (p + q + r) * 0.5;
-            let area = (s * (s - p) * (s - q) * (s - r)).max(0.0).sqrt();
-            (area / 0.21).max(p.max(q).max(r)).max(1.0)
+            pieces([p, q, r])
         };
         mesh.triangles.par_iter().zip(&mesh.triangle_materials).map(parts).sum()
     }
+}
+
+/// About how many triangles are made of one whose edges are so many times too long.
+pub(super) fn pieces([p, q, r]: [f64; 3]) -> f64 {
+    // The triangle measured in the lengths that are wanted, by Heron; a cut leaves edges of about 0.7.
+    let s = (p + q + r) * 0.5;
+    let area = (s * (s - p) * (s - q) * (s - r)).max(0.0).sqrt();
+    (area / 0.21).max(p.max(q).max(r)).max(1.0)
+}
+
+/// The length that edges without texture may have where there is a budget of triangles: `length`, or more where `expected`,
+/// which tells about how many a length leads to, is above it.
+pub(super) fn affordable<E>(
+    length: f32,
+    budget: f64,
+    mut expected: impl FnMut(f32) -> Result<f64, E>,
+) -> Result<f32, E> {
+    let (mut coarser, mut wanted) = (1.0f32, length);
+    for _ in 0..8 {
+        let count = expected(wanted)?;
+        if count <= budget * 1.1 {
+            break;
+        }
+        coarser *= (count / budget).sqrt() as f32;
+        wanted = length * (coarser * FINEST).max(1.0);
+    }
+    Ok(wanted)
 }
 
 /// A needle's corners from its tip on, and into how many parts its long edges are to be cut.

@@ -2,7 +2,7 @@
 
 use super::{
     Mesh,
-    adjacency::{Connected, may_be_split},
+    adjacency::{Connected, is_split},
 };
 use glam::Vec3;
 use rayon::prelude::*;
@@ -54,7 +54,7 @@ impl Groups {
 /// weighted by angle. Triangles without area have their vertices' normals alone, or zero.
 pub(crate) fn corner_normals(mesh: &Mesh, crease_angle_degrees: f32) -> Vec<[Vec3; 3]> {
     let given = |vertex: u32| mesh.normals.get(vertex as usize).filter(|normal| normal.length_squared() > 0.25);
-    let adjacency = Connected::new(mesh, may_be_split(mesh)).adjacency;
+    let adjacency = Connected::new(mesh, is_split(mesh)).adjacency;
     let own: Vec<Vec<(u32, Vec3)>> = (0..mesh.positions.len())
         .into_par_iter()
         .map_init(

@@ -8,7 +8,7 @@
 
 use super::{
     Mesh,
-    adjacency::{Connected, may_be_split},
+    adjacency::{Connected, is_split},
     cloud,
     fan::{Made, Maker, Sums},
     refine::{Origin, refine},
@@ -49,7 +49,7 @@ impl Default for SurfelOptions {
 }
 
 /// Where footprints end, in standard deviations.
-pub(super) const EXTENT: f32 = 3.0;
+pub(crate) const EXTENT: f32 = 3.0;
 
 /// Vertices of one parallel task.
 const CHUNK: usize = 1 << 12;
@@ -87,7 +87,7 @@ impl Mesh {
         Some([self.origin + low.as_dvec3(), self.origin + high.as_dvec3()])
     }
 
-    fn check(&self, options: &SurfelOptions) -> Result<()> {
+    pub(super) fn check(&self, options: &SurfelOptions) -> Result<()> {
         let values = [
             ("radius_scale", options.radius_scale),
             ("optical_depth", options.optical_depth),
@@ -134,7 +134,7 @@ fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
     let Some([low, high]) = mesh.bounds() else { return Vec::new() };
     let largest = ((high - low).length() as f32 * options.largest_spacing).max(f32::MIN_POSITIVE);
     // Most large meshes are fine enough, and right side out. One look at the triangles finds that out and makes the surfels.
-    let parts = make(mesh, None, options, largest, 1.0);
+    let parts = make(mesh, None, is_split(mesh), options, [largest, 1.0], |_| true);
     let is_coarse = parts.iter().any(|part| part.longest > 1.0);
     let is_textured = !mesh.uvs.is_empty() && mesh.materials.iter().any(|material| material.texture.is_some());
     let sums = parts.iter().fold(Sums::default(), |sums, part| sums.with(part.sums));
@@ -145,12 +145,39 @@ fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
     drop(parts);
     let fine = refine(mesh, largest, options.most_triangles);
     let origin = fine.sources.map(|sources| Origin::new(mesh, sources, options.crease_angle_degrees));
-    joined(make(&fine.mesh, origin.as_ref(), options, largest, outward))
+    joined(make(&fine.mesh, origin.as_ref(), is_split(mesh), options, [largest, outward], |_| true))
 }
 
-/// The surfels of all vertices, in parts.
-fn make(mesh: &Mesh, origin: Option<&Origin>, options: &SurfelOptions, unit: f32, outward: f32) -> Vec<Made> {
-    let connected = Connected::new(mesh, may_be_split(origin.map_or(mesh, Origin::mesh)));
+/// The surfels of the wanted vertices of a part of a mesh, as they are in the whole: `largest` is the length that edges are
+/// measured in, `outward` is −1 where it is inside out. With `cut`, edges longer than that are cut, and the vertices that
+/// this adds are wanted too.
+pub(super) fn of_part(
+    part: &Mesh,
+    is_split: bool,
+    options: &SurfelOptions,
+    [largest, outward]: [f32; 2],
+    cut: Option<f32>,
+    is_wanted: impl Fn(usize) -> bool + Sync,
+) -> Vec<Splat> {
+    let Some(length) = cut else {
+        return joined(make(part, None, is_split, options, [largest, outward], is_wanted));
+    };
+    // Whoever chose the length has kept to the budget.
+    let fine = refine(part, length, usize::MAX >> 1);
+    let origin = fine.sources.map(|sources| Origin::new(part, sources, options.crease_angle_degrees));
+    joined(make(&fine.mesh, origin.as_ref(), is_split, options, [largest, outward], is_wanted))
+}
+
+/// The surfels of all wanted vertices, in parts.
+fn make(
+    mesh: &Mesh,
+    origin: Option<&Origin>,
+    is_split: bool,
+    options: &SurfelOptions,
+    [unit, outward]: [f32; 2],
+    is_wanted: impl Fn(usize) -> bool + Sync,
+) -> Vec<Made> {
+    let connected = Connected::new(mesh, is_split);
     let plain = mesh.materials.is_empty() && (mesh.colors.is_empty() || matches!(connected.places, Cow::Borrowed(_)));
     let maker = Maker { mesh, connected: &connected, options, origin, unit, outward, plain };
     (0..mesh.positions.len().div_ceil(CHUNK))
@@ -158,7 +185,7 @@ fn make(mesh: &Mesh, origin: Option<&Origin>, options: &SurfelOptions, unit: f32
         .map(|chunk| {
             let vertices = chunk * CHUNK..((chunk + 1) * CHUNK).min(mesh.positions.len());
             let mut made = Made::new(options, CHUNK);
-            vertices.for_each(|vertex| maker.vertex(vertex, &mut made));
+            vertices.filter(|&vertex| is_wanted(vertex)).for_each(|vertex| maker.vertex(vertex, &mut made));
             made
         })
         .collect()

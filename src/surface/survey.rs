@@ -1,7 +1,8 @@
 //! What a mesh is like: whether it is closed, and what of it is odd.
 
-use super::Mesh;
+use super::{Mesh, adjacency::may_be_split};
 use crate::math::weld::first_of_equals;
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// How much of a mesh is odd.
@@ -38,8 +39,9 @@ impl Mesh {
         if sum(&|vertex| vertex) == 0 {
             return true;
         }
-        // Files split vertices at seams, or give every triangle its own. Scans that share all have fewer than that.
-        if self.positions.len() <= self.triangles.len() / 4 * 3 && self.uvs.is_empty() && self.normals.is_empty() {
+        // Scans that share all vertices have fewer than files that split them.
+        let has_seams = !self.uvs.is_empty() || !self.normals.is_empty();
+        if !may_be_split(has_seams, self.positions.len(), self.triangles.len()) {
             return false;
         }
         let first = first_of_equals(&self.positions);
@@ -74,13 +76,30 @@ fn has_area(mesh: &Mesh, triangle: [u32; 3]) -> bool {
 }
 
 /// A number for an edge, the negative of it for its reverse.
-fn edge(a: u32, b: u32) -> u64 {
-    let (low, high) = (a.min(b), a.max(b));
-    // The finalizer of SplitMix64 (Steele, Lea & Flood 2014).
-    let mut z = (u64::from(low) << 32 | u64::from(high)).wrapping_add(0x9e37_79b9_7f4a_7c15);
+pub(super) fn edge(a: u32, b: u32) -> u64 {
+    signed(a, b, mixed(u64::from(a.min(b)) << 32 | u64::from(a.max(b))))
+}
+
+/// As [`edge`], of the places of its ends; edges of one place have one number.
+pub(super) fn edge_of_places(a: Vec3, b: Vec3) -> u64 {
+    // Adding zero makes the two zeros one.
+    let name = |p: Vec3| {
+        let bits = (p + Vec3::ZERO).to_array().map(|value| u64::from(value.to_bits()));
+        mixed(bits[0] << 32 | bits[1]) ^ mixed(!bits[2])
+    };
+    let (a, b) = (name(a), name(b));
+    signed(a, b, mixed(a.min(b) ^ a.max(b).rotate_left(32)))
+}
+
+/// The finalizer of SplitMix64 (Steele, Lea & Flood 2014).
+fn mixed(bits: u64) -> u64 {
+    let mut z = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^= z >> 31;
+    z ^ (z >> 31)
+}
+
+fn signed<T: Ord>(a: T, b: T, z: u64) -> u64 {
     if a < b {
         z
     } else if a > b {
@@ -93,7 +112,6 @@ fn edge(a: u32, b: u32) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Vec3;
 
     fn tetrahedron() -> Mesh {
         Mesh {

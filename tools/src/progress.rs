@@ -1,7 +1,7 @@
 //! What the command is doing, on a terminal's stderr; nothing anywhere else.
 
 use indicatif::{ProgressBar, ProgressStyle};
-use std::{io::IsTerminal, time::Duration};
+use std::{io::IsTerminal, sync::Mutex, time::Duration};
 
 /// One line that names the stage at work.
 pub struct Progress(ProgressBar);
@@ -42,6 +42,11 @@ impl Progress {
         Bar(self)
     }
 
+    /// Stages that name themselves as they come.
+    pub fn stages(&self) -> Stages<'_> {
+        Stages { progress: self, now: Mutex::new(None) }
+    }
+
     /// Takes the line away.
     pub fn clear(&self) {
         self.0.finish_and_clear();
@@ -61,5 +66,32 @@ impl Bar<'_> {
 impl Drop for Bar<'_> {
     fn drop(&mut self) {
         self.0.spin();
+    }
+}
+
+/// Stages one after the other, each with its bar where its end is known.
+pub struct Stages<'a> {
+    progress: &'a Progress,
+    /// The stage at work and its end.
+    now: Mutex<Option<(&'static str, u64, Option<Bar<'a>>)>>,
+}
+
+impl Stages<'_> {
+    /// Tells how much of a stage is done, of how much; 0 where that is not known. What comes under another name, or with
+    /// another end, is another stage.
+    pub fn set(&self, name: &'static str, done: u64, total: u64) {
+        let Ok(mut now) = self.now.lock() else { return };
+        if now.as_ref().is_none_or(|(at, end, _)| (*at, *end) != (name, total)) {
+            // The last bar goes before the next comes.
+            *now = None;
+            let bar = if total > 0 { Some(self.progress.bar(name, total)) } else { None };
+            if bar.is_none() {
+                self.progress.stage(name);
+            }
+            *now = Some((name, total, bar));
+        }
+        if let Some((_, _, Some(bar))) = &*now {
+            bar.set(done);
+        }
     }
 }

@@ -45,3 +45,4 @@ const HASH: usize = 32;
 pub(in crate::hierarchy) use page::enclose;
 pub(in crate::hierarchy) use page::joint_angle;
 pub(in crate::hierarchy) use pages::{in_order, reach};
+pub(in crate::hierarchy) use spill::Part;

@@ -25,7 +25,14 @@ impl Part {
         Ok(Self { path, wanted: wanted.to_owned(), file: Some(file) })
     }
 
-    fn file(&mut self) -> &mut File {
+    /// Takes the file's name away where a system lets files live without: then nothing is left of it whatever happens.
+    pub fn hide(self) -> Self {
+        #[cfg(unix)]
+        std::fs::remove_file(&self.path).ok();
+        self
+    }
+
+    pub fn file(&mut self) -> &mut File {
         self.file.as_mut().expect("is there until the part is dropped")
     }
 
@@ -78,7 +85,7 @@ impl Write for PartFile {
 impl Spill {
     /// Beside a file that is to be.
     pub fn beside(wanted: &Path) -> Result<Self> {
-        let part = BufWriter::with_capacity(1 << 20, PartFile(Part::create(wanted, "pages")?));
+        let part = BufWriter::with_capacity(1 << 20, PartFile(Part::create(wanted, "pages")?.hide()));
         Ok(Self::Disk { part, length: 0 })
     }
 

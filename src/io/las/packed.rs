@@ -12,13 +12,13 @@ use laz::{
     record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor},
 };
 use rayon::prelude::*;
-use std::io::Cursor;
+use std::{io::Cursor, ops::Range};
 
-/// A chunk: its bytes and its points.
-struct Chunk<'a> {
-    number: usize,
-    bytes: &'a [u8],
-    points: usize,
+/// A chunk: where its bytes are in the file, and its points.
+pub(super) struct Chunk {
+    pub number: usize,
+    pub bytes: Range<usize>,
+    pub points: usize,
 }
 
 pub fn read(source: &Source, header: &Header) -> Result<Vec<Point>> {
@@ -33,7 +33,7 @@ pub fn read(source: &Source, header: &Header) -> Result<Vec<Point>> {
 }
 
 /// How the points are packed: one of the file's records of variable length says it.
-fn layout(source: &Source, header: &Header) -> Result<LazVlr> {
+pub(super) fn layout(source: &Source, header: &Header) -> Result<LazVlr> {
     let place = "record of LASzip";
     let bytes = source.bytes();
     let (mut at, count) = header.records;
@@ -76,7 +76,7 @@ fn check(header: &Header, items: &[LazItem]) -> Result<(), String> {
 }
 
 /// The chunks by the table that the file keeps of them.
-fn chunks<'a>(source: &'a Source, header: &Header, layout: &LazVlr) -> Result<Vec<Chunk<'a>>> {
+pub(super) fn chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<Chunk>> {
     let bytes = source.bytes();
     let wrong = |message: String| source.error("table of chunks", message);
     let field = Fields { bytes, place: "the table of chunks" };
@@ -104,7 +104,7 @@ fn chunks<'a>(source: &'a Source, header: &Header, layout: &LazVlr) -> Result<Ve
         let Some(end) = end.filter(|&end| end <= table) else {
             return Err(wrong(format!("chunk {number} ends behind the packed points")));
         };
-        chunks.push(Chunk { number, bytes: &bytes[at..end], points });
+        chunks.push(Chunk { number, bytes: at..end, points });
         at = end;
         left -= points;
     }
@@ -116,11 +116,11 @@ fn chunks<'a>(source: &'a Source, header: &Header, layout: &LazVlr) -> Result<Ve
 }
 
 /// Unpacks a chunk point by point, so that memory grows with what was really unpacked.
-fn unpack(source: &Source, header: &Header, layout: &LazVlr, chunk: &Chunk) -> Result<Vec<Point>> {
+pub(super) fn unpack(source: &Source, header: &Header, layout: &LazVlr, chunk: &Chunk) -> Result<Vec<Point>> {
     let wrong = |message: String| source.error(format!("chunk {}", chunk.number), message);
-    let input = Cursor::new(chunk.bytes);
+    let input = Cursor::new(&source.bytes()[chunk.bytes.clone()]);
     let mut decoder: Box<dyn RecordDecompressor<Cursor<&[u8]>>> = if header.format >= 6 {
-        check_layers(header, layout, chunk).map_err(wrong)?;
+        check_layers(source, header, layout, chunk).map_err(wrong)?;
         Box::new(LayeredPointRecordDecompressor::new(input))
     } else {
         Box::new(SequentialPointRecordDecompressor::new(input))
@@ -137,7 +137,8 @@ fn unpack(source: &Source, header: &Header, layout: &LazVlr, chunk: &Chunk) -> R
 }
 
 /// A chunk of layers begins with its first point, its count and the size of each layer, which the decoder makes room for.
-fn check_layers(header: &Header, layout: &LazVlr, chunk: &Chunk) -> Result<(), String> {
+fn check_layers(source: &Source, header: &Header, layout: &LazVlr, chunk: &Chunk) -> Result<(), String> {
+    let bytes = &source.bytes()[chunk.bytes.clone()];
     let layers = layout.items().iter().map(|item| match item.item_type() {
         LazItemType::Point14 => 9,
         LazItemType::RGBNIR14 => 2,
@@ -145,11 +146,11 @@ fn check_layers(header: &Header, layout: &LazVlr, chunk: &Chunk) -> Result<(), S
         _ => 1,
     });
     let first = header.size + 4;
-    let sizes = chunk.bytes.get(first..first + 4 * layers.sum::<usize>());
+    let sizes = bytes.get(first..first + 4 * layers.sum::<usize>());
     let Some(sizes) = sizes else { return Err("ends before its layers".into()) };
     let size = |bytes: &[u8]| u64::from(bytes.iter().rev().fold(0u32, |size, &byte| size << 8 | u32::from(byte)));
     let claimed: u64 = sizes.chunks_exact(4).map(size).sum();
-    let present = chunk.bytes.len() - first - sizes.len();
+    let present = bytes.len() - first - sizes.len();
     if claimed > present as u64 {
         return Err(format!("claims {claimed} bytes of layers, but has {present}"));
     }

@@ -199,7 +199,7 @@ fn text_place(source: &Source, element: &Element, row: usize, line: &[u8]) -> St
     format!("element “{}”, row {row}, byte {byte}", element.name)
 }
 
-fn cut(source: &Source, element: &Element, rows: usize) -> Error {
+pub(super) fn cut(source: &Source, element: &Element, rows: usize) -> Error {
     source
         .error(
             format!("element “{}”, row {rows}, byte {}", element.name, source.bytes().len()),
@@ -266,7 +266,7 @@ fn walk(
 }
 
 /// Bytes of a row whose only list holds three values.
-fn triangle_stride(element: &Element) -> Option<usize> {
+pub(super) fn triangle_stride(element: &Element) -> Option<usize> {
     let mut lists = 0;
     let mut stride = 0;
     for column in &element.columns {
@@ -282,7 +282,7 @@ fn triangle_stride(element: &Element) -> Option<usize> {
 }
 
 /// Offset in the row, and type of the length, of an element's first list.
-fn list_place(element: &Element) -> (usize, &ScalarType) {
+pub(super) fn list_place(element: &Element) -> (usize, &ScalarType) {
     let mut offset = 0;
     for column in &element.columns {
         match &column.kind {

@@ -1,5 +1,7 @@
 //! `splatkit convert`: what is written decides what is made of the inputs.
 
+mod external;
+mod memory;
 mod surface;
 mod volume;
 

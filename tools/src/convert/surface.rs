@@ -1,6 +1,6 @@
 //! Meshes, clouds and hierarchies: to a hierarchy, or to 3D Gaussians.
 
-use super::Convert;
+use super::{Convert, memory};
 use crate::{failure::Failure, load::Input, output, parse, progress::Progress, render::milliseconds, scene::in_file};
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -10,7 +10,6 @@ use splatkit::{
         self, BuildOptions,
         file::{UpAxis, WriteOptions},
     },
-    io,
     splat::{Splat, SplatSet},
     surface::SurfelOptions,
 };
@@ -38,6 +37,11 @@ pub struct SurfaceFlags {
     /// The unit of lengths, for viewers of the result, such as m or mm.
     #[arg(long, value_name = "NAME", default_value = "")]
     unit: String,
+    /// What a conversion may take, such as 8GiB. Binary PLY of points or triangles, LAS and LAZ that would take more are
+    /// converted region by region, with files of about their size beside the output meanwhile [default: three quarters of
+    /// the memory that there is]
+    #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
+    memory: Option<u64>,
 }
 
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq)]
@@ -74,9 +78,14 @@ impl Convert {
         if self.lattice.is_some() {
             return Err(Failure::Usage("--lattice is for volumes".into()));
         }
+        let most = self.surface.memory.or_else(memory::usual).unwrap_or(u64::MAX);
+        let need = memory::need(&self.files, &self.load.limits());
+        if need.bytes > most {
+            return self.in_regions(extension, need, most, progress);
+        }
         let gathered = self.gather(progress)?;
         if self.dry_run {
-            return self.expect(&gathered, progress);
+            return self.expect(&gathered, need, progress);
         }
         let start = Instant::now();
         if extension == "ply" {
@@ -85,7 +94,7 @@ impl Convert {
         } else {
             let bar = progress.bar("Building the hierarchy", gathered.set.splats.len() as u64);
             let watch = |done: u64, _: u64| bar.set(done);
-            let (build, write) = self.surface.options(&gathered, &self.files);
+            let (build, write) = (self.surface.build_options(&gathered), self.surface.write_options(&self.files));
             hierarchy::build_file(&gathered.set, &self.output, &build, &write, &watch)?;
         }
         progress.clear();
@@ -136,10 +145,9 @@ impl Convert {
         let (set, closed, points) = match input {
             Input::Mesh(mesh) => {
                 progress.stage(format!("Making splats of {} points", mesh.positions.len()));
-                let radius_scale = self.surface.radius_scale as f32;
-                let options = SurfelOptions { radius_scale, ..SurfelOptions::default() };
-                let set = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
-                (set, mesh.is_closed(), mesh.positions.len() as u64)
+                let closed = mesh.is_closed();
+                let set = mesh.surfels(&self.surface.surfel_options()).map_err(|e| in_file(path, e))?;
+                (set, closed, mesh.positions.len() as u64)
             }
             Input::Hierarchy(hierarchy) => {
                 progress.stage("Reading the splats of the finest level");
@@ -157,29 +165,27 @@ impl Convert {
     }
 
     /// Tells what a conversion would take, by that of a run of the splats.
-    fn expect(&self, gathered: &Gathered, progress: &Progress) -> Result<(), Failure> {
+    fn expect(&self, gathered: &Gathered, need: memory::Need, progress: &Progress) -> Result<(), Failure> {
         progress.stage("Trying a part");
         let splats = &gathered.set.splats;
         let count = splats.len().min(SAMPLE);
         let first = (splats.len() - count) / 2;
         let SplatSet { origin, payload, extent, overlap, .. } = gathered.set;
         let part = SplatSet { origin, payload, splats: splats[first..first + count].to_vec(), extent, overlap };
-        let (build, write) = self.surface.options(gathered, &self.files);
+        let (build, write) = (self.surface.build_options(gathered), self.surface.write_options(&self.files));
         let start = Instant::now();
         let tree = hierarchy::Tree::build(&part, &build, &|_, _| ())?;
         let bytes = hierarchy::file::to_bytes(&tree, &write)?.len() as f64;
         let share = splats.len() as f64 / count as f64;
         let build_ms = milliseconds(start) * share;
         let bytes = (bytes * share) as u64;
-        // Splats, their order along the curve, and the blocks at work.
-        let memory = splats.len() as u64 * (size_of::<Splat>() as u64 + 16) + (build.block_splats as u64 * 2000);
         progress.clear();
         if self.json {
             return output::line(json!({
                 "points": gathered.points,
                 "splats": splats.len(),
                 "expected_bytes": bytes,
-                "expected_memory": memory,
+                "expected_memory": need.bytes,
                 "expected_build_ms": build_ms,
                 "read_ms": gathered.read_ms,
                 "splats_ms": gathered.splats_ms,
@@ -188,7 +194,7 @@ impl Convert {
         output::line(format_args!("points          {}", gathered.points))?;
         output::line(format_args!("splats          {}", splats.len()))?;
         output::line(format_args!("bytes           about {bytes}"))?;
-        output::line(format_args!("memory          about {} MiB beside the input's", memory >> 20))?;
+        output::line(format_args!("memory          about {} MiB", need.bytes >> 20))?;
         let [read, made] = [gathered.read_ms, gathered.splats_ms].map(|ms| ms / 1e3);
         let build = build_ms / 1e3;
         output::line(format_args!(
@@ -217,21 +223,32 @@ impl Gathered {
 }
 
 impl SurfaceFlags {
-    fn options(&self, gathered: &Gathered, files: &[PathBuf]) -> (BuildOptions, WriteOptions) {
-        let build = BuildOptions {
-            preset: match self.preset {
-                Preset::Fastest => hierarchy::Preset::Fastest,
-                Preset::Fast => hierarchy::Preset::Fast,
-                Preset::Balanced => hierarchy::Preset::Balanced,
-                Preset::Slow => hierarchy::Preset::Slow,
-                Preset::Best => hierarchy::Preset::Best,
-            },
+    pub(super) fn preset(&self) -> hierarchy::Preset {
+        match self.preset {
+            Preset::Fastest => hierarchy::Preset::Fastest,
+            Preset::Fast => hierarchy::Preset::Fast,
+            Preset::Balanced => hierarchy::Preset::Balanced,
+            Preset::Slow => hierarchy::Preset::Slow,
+            Preset::Best => hierarchy::Preset::Best,
+        }
+    }
+
+    pub(super) fn surfel_options(&self) -> SurfelOptions {
+        SurfelOptions { radius_scale: self.radius_scale as f32, ..SurfelOptions::default() }
+    }
+
+    fn build_options(&self, gathered: &Gathered) -> BuildOptions {
+        BuildOptions {
+            preset: self.preset(),
             closed: gathered.closed,
             source_points: Some(gathered.points),
             ..BuildOptions::default()
-        };
+        }
+    }
+
+    pub(super) fn write_options(&self, files: &[PathBuf]) -> WriteOptions {
         let name = |path: &PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
-        let write = WriteOptions {
+        WriteOptions {
             lossless: self.lossless,
             up: self.up.map(|up| match up {
                 Up::X => UpAxis::X,
@@ -240,7 +257,6 @@ impl SurfaceFlags {
             }),
             unit: self.unit.clone(),
             source: files.iter().filter_map(name).collect::<Vec<_>>().join(", "),
-        };
-        (build, write)
+        }
     }
 }

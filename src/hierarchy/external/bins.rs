@@ -1,0 +1,89 @@
+//! Records sorted in bins by their arrival, in a file without a name.
+
+use super::super::file::Part;
+use crate::{Error, Result};
+use bytemuck::Pod;
+use std::{
+    io::{Read, Seek, SeekFrom, Write},
+    path::{Path, PathBuf},
+};
+
+/// Bytes that wait in memory for all bins together.
+const WAITING: usize = 64 << 20;
+
+/// Some bins of records. Each keeps its records in the order in which they came.
+pub struct Bins<T> {
+    part: Part,
+    /// The file beside which this one is, for errors.
+    wanted: PathBuf,
+    /// Where the file ends.
+    end: u64,
+    waiting: Vec<Vec<T>>,
+    /// Records of a bin that wait at most.
+    most: usize,
+    /// Where the runs of each bin are in the file, and how many records they hold.
+    runs: Vec<Vec<(u64, usize)>>,
+    counts: Vec<usize>,
+}
+
+impl<T: Pod> Bins<T> {
+    /// So many empty bins, in a file beside `wanted` that tells itself from others by `name`.
+    ///
+    /// # Errors
+    /// [`Error::File`] where none can be made.
+    pub fn beside(wanted: &Path, name: &str, bins: usize) -> Result<Self> {
+        let most = (WAITING / bins.max(1) / size_of::<T>()).clamp(64, 1 << 16);
+        let part = Part::create(wanted, name)?.hide();
+        let (waiting, runs) = (vec![Vec::new(); bins], vec![Vec::new(); bins]);
+        Ok(Self { part, wanted: wanted.to_owned(), end: 0, waiting, most, runs, counts: vec![0; bins] })
+    }
+
+    pub fn push(&mut self, bin: u32, record: T) -> Result<()> {
+        self.waiting[bin as usize].push(record);
+        self.counts[bin as usize] += 1;
+        if self.waiting[bin as usize].len() >= self.most { self.flush(bin as usize) } else { Ok(()) }
+    }
+
+    fn flush(&mut self, bin: usize) -> Result<()> {
+        let waiting = &mut self.waiting[bin];
+        if waiting.is_empty() {
+            return Ok(());
+        }
+        let bytes: &[u8] = bytemuck::cast_slice(waiting);
+        let file = self.part.file();
+        let written = file.seek(SeekFrom::Start(self.end)).and_then(|_| file.write_all(bytes));
+        written.map_err(|e| Error::file(&self.wanted, "write beside", e))?;
+        self.runs[bin].push((self.end, waiting.len()));
+        self.end += bytes.len() as u64;
+        waiting.clear();
+        Ok(())
+    }
+
+    /// Writes what waits, and gives the memory back.
+    pub fn settle(&mut self) -> Result<()> {
+        for bin in 0..self.waiting.len() {
+            self.flush(bin)?;
+            self.waiting[bin] = Vec::new();
+        }
+        Ok(())
+    }
+
+    /// How many records a bin holds.
+    pub fn count(&self, bin: u32) -> usize {
+        self.counts[bin as usize]
+    }
+
+    /// The records of a bin.
+    pub fn read(&mut self, bin: u32) -> Result<Vec<T>> {
+        let mut records = vec![T::zeroed(); self.count(bin)];
+        let (file, mut next) = (self.part.file(), 0);
+        for &(at, count) in &self.runs[bin as usize] {
+            let run = bytemuck::cast_slice_mut(&mut records[next..next + count]);
+            let read = file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(run));
+            read.map_err(|e| Error::file(&self.wanted, "read what was written beside", e))?;
+            next += count;
+        }
+        records[next..].copy_from_slice(&self.waiting[bin as usize]);
+        Ok(records)
+    }
+}

@@ -1,0 +1,181 @@
+//! Region by region: surfels, blocks of them, and these written.
+
+use super::{
+    super::{
+        build::{Builder, block_of, check},
+        partition,
+        sphere::Sphere,
+    },
+    ExternalOptions, Stage, StageWatch,
+    bins::Bins,
+    distribute::Distributed,
+    survey::Triangulated,
+};
+use crate::{
+    Result,
+    io::StreamPoint,
+    math::Bounds,
+    splat::{Payload, Splat, SplatSet, decode_normal},
+    surface::{EXTENT, Known, Mesh, cloud_piece},
+};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use std::path::Path;
+
+/// Of the core's radius: how far the surfels of a cloud are taken to reach. Where one reaches farther, its block's sphere
+/// sticks out, and what is above grows with it.
+const CLOUD_REACH: f64 = 0.01;
+
+/// What is built of all inputs.
+pub struct Work<'a> {
+    pub builder: Builder,
+    pub origin: DVec3,
+    pub bounds: Bounds,
+    pub options: &'a ExternalOptions,
+    /// Of all inputs.
+    pub points: u64,
+    /// Points whose region is done.
+    pub built: u64,
+    pub splats: u64,
+    pub watch: StageWatch<'a>,
+}
+
+/// A point's number, and its normal as surfels have it.
+type Side = [u32; 2];
+
+impl Distributed<'_> {
+    /// A sphere around all footprints, relative to `origin`.
+    pub fn around(&self, origin: DVec3, options: &ExternalOptions) -> Sphere {
+        let scale = f64::from(options.surfels.radius_scale);
+        let reach = match &self.input.mesh {
+            Some(mesh) => f64::from(EXTENT * mesh.longest) * scale,
+            None => self.input.core.radius * CLOUD_REACH * scale,
+        };
+        let center = self.input.core.center + (self.input.stream.origin() - origin);
+        Sphere { center, radius: (self.radius + reach) * (1.0 + 1e-6) }
+    }
+}
+
+impl Work<'_> {
+    /// Builds all regions of an input.
+    pub fn input(&mut self, mut input: Distributed, wanted: &Path, number: usize) -> Result<()> {
+        let regions = input.input.regions() as u32;
+        let orients = input.input.mesh.is_none() && !input.input.stream.has_normals();
+        let mut sides = match orients {
+            true => Some(Bins::<Side>::beside(wanted, &format!("sides{number}"), regions as usize)?),
+            false => None,
+        };
+        (self.watch)(Stage::Building, self.built, self.points);
+        for region in 0..regions {
+            let part = Part::read(&mut input, region)?;
+            let splats = match &input.input.mesh {
+                Some(mesh) => part.of_mesh(mesh, region == input.input.regions.count() as u32, self.options)?,
+                None => part.of_cloud(&input, sides.as_mut(), region, self.options)?,
+            };
+            let owned = part.owned.iter().filter(|owned| **owned).count() as u64;
+            drop(part);
+            self.add(splats, input.input.stream.origin())?;
+            self.built += owned;
+            (self.watch)(Stage::Building, self.built, self.points);
+        }
+        Ok(())
+    }
+
+    /// Builds the blocks of some splats around the origin of their input.
+    fn add(&mut self, mut splats: Vec<Splat>, origin: DVec3) -> Result<()> {
+        if splats.is_empty() {
+            return Ok(());
+        }
+        let shift = origin - self.origin;
+        if shift != DVec3::ZERO {
+            splats.par_iter_mut().for_each(|splat| {
+                splat.center = (Vec3::from(splat.center).as_dvec3() + shift).as_vec3().to_array();
+            });
+        }
+        self.splats += splats.len() as u64;
+        let set = SplatSet { origin: self.origin, payload: Payload::Radiance, splats, extent: EXTENT, overlap: 1.0 };
+        check(&set)?;
+        self.bounds = self.bounds.union(set.bounds());
+        let parts = partition::blocks(&set.splats, self.options.block_splats.max(64));
+        for parts in parts.chunks(2 * rayon::current_num_threads()) {
+            let block = |part: &Vec<u32>| block_of(&set, part, self.options.preset, self.builder.outer);
+            let blocks = parts.par_iter().map(block).collect();
+            self.builder.add(blocks)?;
+        }
+        Ok(())
+    }
+}
+
+/// A region as a mesh of its own.
+struct Part {
+    mesh: Mesh,
+    /// The number of each point in the input, rising.
+    indices: Vec<u32>,
+    /// Whether the region answers for it.
+    owned: Vec<bool>,
+}
+
+impl Part {
+    fn read(input: &mut Distributed, region: u32) -> Result<Self> {
+        let mut points: Vec<StreamPoint> = input.points.read(region)?;
+        points.par_sort_by_key(|point| point.index);
+        points.dedup_by_key(|point| point.index);
+        let owner = |point: &StreamPoint| input.input.owner(Vec3::from(point.position)) == region;
+        let owned = points.par_iter().map(owner).collect();
+        let indices: Vec<u32> = points.par_iter().map(|point| point.index).collect();
+        let stream = &input.input.stream;
+        let mut mesh = Mesh { origin: stream.origin(), ..Mesh::default() };
+        mesh.positions = points.par_iter().map(|point| Vec3::from(point.position)).collect();
+        if stream.has_normals() {
+            mesh.normals = points.par_iter().map(|point| Vec3::from(point.normal)).collect();
+        }
+        if stream.has_colors() {
+            mesh.colors = points.par_iter().map(|point| point.color).collect();
+        }
+        drop(points);
+        if let Some(triangles) = &mut input.triangles {
+            mesh.triangles = triangles.read(region)?;
+            let place = |index: u32| indices.binary_search(&index).unwrap_or(0) as u32;
+            mesh.triangles.par_iter_mut().for_each(|triangle| *triangle = triangle.map(place));
+        }
+        Ok(Self { mesh, indices, owned })
+    }
+
+    fn of_mesh(&self, mesh: &Triangulated, is_long: bool, options: &ExternalOptions) -> Result<Vec<Splat>> {
+        if self.mesh.triangles.is_empty() {
+            return Ok(Vec::new());
+        }
+        mesh.pieces.surfels(&self.mesh, &self.owned, is_long, &options.surfels)
+    }
+
+    /// Sides that other regions told are followed, and what is near others told to those that come later.
+    fn of_cloud(
+        &self,
+        input: &Distributed,
+        sides: Option<&mut Bins<Side>>,
+        region: u32,
+        options: &ExternalOptions,
+    ) -> Result<Vec<Splat>> {
+        let spacing = Some(input.input.regions.spacing);
+        let mut known = Known { spacing, center: Some(input.input.center), normals: Vec::new() };
+        let Some(sides) = sides else {
+            let splats = cloud_piece(&self.mesh, &self.owned, known, &options.surfels)?;
+            return Ok(splats.into_iter().map(|(_, splat)| splat).collect());
+        };
+        known.normals = sides.read(region)?.into_iter().filter_map(|side| self.known(side)).collect();
+        let splats = cloud_piece(&self.mesh, &self.owned, known, &options.surfels)?;
+        let mut around = Vec::new();
+        for (point, splat) in &splats {
+            input.input.regions.around(Vec3::from(splat.center), &mut around);
+            for &other in around.iter().filter(|&&other| other > region) {
+                sides.push(other, [self.indices[*point as usize], splat.normal])?;
+            }
+        }
+        Ok(splats.into_iter().map(|(_, splat)| splat).collect())
+    }
+
+    fn known(&self, [index, normal]: Side) -> Option<(u32, Vec3)> {
+        let point = self.indices.binary_search(&index).ok()?;
+        Some((point as u32, decode_normal(normal)?))
+    }
+}

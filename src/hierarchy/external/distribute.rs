@@ -1,0 +1,150 @@
+//! The second look at an input: every point and triangle to the regions that need it.
+
+use super::{
+    Stage, StageWatch,
+    bins::Bins,
+    survey::{Surveyed, name},
+};
+use crate::{Result, io::StreamPoint};
+use glam::Vec3;
+use std::{collections::HashSet, path::Path};
+
+/// An input in regions: each answers for its own points, and has what is around them. The last region of a mesh answers for
+/// the corners of triangles that are to be cut, wherever they are.
+pub struct Distributed<'a> {
+    pub input: Surveyed<'a>,
+    pub points: Bins<StreamPoint>,
+    pub triangles: Option<Bins<[u32; 3]>>,
+    /// How far the farthest point is from the centre of the core.
+    pub radius: f64,
+}
+
+impl Surveyed<'_> {
+    /// How many regions answer for points.
+    pub fn regions(&self) -> usize {
+        self.regions.count() + usize::from(self.mesh.as_ref().is_some_and(|mesh| !mesh.long.is_empty()))
+    }
+
+    /// The region that answers for a point at a place.
+    pub fn owner(&self, place: Vec3) -> u32 {
+        match &self.mesh {
+            Some(mesh) if !mesh.long.is_empty() && mesh.long.contains(&name(place)) => self.regions.count() as u32,
+            _ => self.regions.of(place),
+        }
+    }
+}
+
+/// What a piece of the input gives to each region, in order.
+struct Shares<T> {
+    items: Vec<(u32, T)>,
+    seen: u64,
+    radius: f64,
+}
+
+/// Distributes an input to files beside `wanted`, of names that end in `number`.
+pub fn distribute<'a>(
+    input: Surveyed<'a>,
+    most: u64,
+    wanted: &Path,
+    number: usize,
+    watch: StageWatch<'_>,
+) -> Result<Distributed<'a>> {
+    let bins = input.regions();
+    let mut points = Bins::beside(wanted, &format!("points{number}"), bins)?;
+    let mut radius = 0.0f64;
+    let total = input.stream.point_count();
+    let mut done = 0;
+    // Points at one place are one, and where they are more than a region may hold only the first is taken.
+    let mut crowd = Crowd::new(&input, most);
+    let share = |found: &[StreamPoint]| shares(&input, found);
+    input.stream.points(share, |shares| {
+        radius = radius.max(shares.radius);
+        done += shares.seen;
+        watch(Stage::Distributing, done, total);
+        for (region, point) in shares.items {
+            if crowd.takes(&mut points, region, &point) {
+                points.push(region, point)?;
+            }
+        }
+        Ok(())
+    })?;
+    let mut triangles = None;
+    if input.mesh.is_some() {
+        let mut bins = Bins::beside(wanted, &format!("triangles{number}"), bins)?;
+        let total = input.stream.counts().triangles;
+        let mut done = 0;
+        input.stream.triangles(
+            |found| (triangle_shares(&input, found), found.len() as u64),
+            |((corners, foreign), seen)| {
+                done += seen;
+                watch(Stage::Distributing, done, total);
+                corners.into_iter().try_for_each(|(region, triangle)| bins.push(region, triangle))?;
+                foreign.into_iter().try_for_each(|(region, point)| points.push(region, point))
+            },
+        )?;
+        bins.settle()?;
+        triangles = Some(bins);
+    }
+    points.settle()?;
+    Ok(Distributed { input, points, triangles, radius })
+}
+
+/// The points of a piece for their owners and, of a cloud, for the regions around.
+fn shares(input: &Surveyed, found: &[StreamPoint]) -> Shares<StreamPoint> {
+    let mut items = Vec::with_capacity(found.len() + found.len() / 8);
+    let mut around = Vec::new();
+    let mut radius = 0.0f64;
+    for point in found {
+        let place = Vec3::from(point.position);
+        radius = radius.max(place.as_dvec3().distance(input.core.center));
+        items.push((input.owner(place), *point));
+        if input.mesh.is_none() {
+            input.regions.around(place, &mut around);
+            items.extend(around.iter().map(|&region| (region, *point)));
+        }
+    }
+    Shares { items, seen: found.len() as u64, radius }
+}
+
+type Owned<T> = Vec<(u32, T)>;
+
+/// The triangles of a piece for all regions that own a corner, and the corners that these do not own.
+fn triangle_shares(input: &Surveyed, found: &[[u32; 3]]) -> (Owned<[u32; 3]>, Owned<StreamPoint>) {
+    let mut triangles = Vec::with_capacity(found.len() + found.len() / 8);
+    let mut foreign = Vec::new();
+    for &triangle in found {
+        let owners = triangle.map(|vertex| input.owner(input.stream.position(vertex)));
+        for (corner, &region) in owners.iter().enumerate() {
+            if owners[..corner].contains(&region) {
+                continue;
+            }
+            triangles.push((region, triangle));
+            let others = triangle.iter().zip(owners).filter(|&(_, owner)| owner != region);
+            foreign.extend(others.map(|(&vertex, _)| (region, input.stream.vertex(vertex))));
+        }
+    }
+    (triangles, foreign)
+}
+
+/// Keeps points at one place from filling a region of a cloud.
+struct Crowd {
+    most: usize,
+    is_cloud: bool,
+    /// The places of regions that have more points than they may.
+    places: Vec<Option<HashSet<[u32; 3]>>>,
+}
+
+impl Crowd {
+    fn new(input: &Surveyed, most: u64) -> Self {
+        // A region's neighbours may make it larger.
+        let most = usize::try_from(most).unwrap_or(usize::MAX).saturating_mul(2);
+        Self { most, is_cloud: input.mesh.is_none(), places: vec![None; input.regions()] }
+    }
+
+    fn takes(&mut self, points: &mut Bins<StreamPoint>, region: u32, point: &StreamPoint) -> bool {
+        if !self.is_cloud || points.count(region) < self.most {
+            return true;
+        }
+        self.places[region as usize].get_or_insert_default().insert(name(Vec3::from(point.position)))
+    }
+}

@@ -1,0 +1,141 @@
+//! From files larger than memory to a hierarchy: in regions, one after the other.
+//!
+//! A first look finds where the points are (`survey`) and cuts space in regions of about as many points each (`regions`). A
+//! second one gives each region its points and what is around them (`distribute`), by way of files without names beside the
+//! one that is wanted (`bins`). Then each region's surfels are made, built into blocks and written (`build`).
+//!
+//! The leaves are those of the whole that fits in memory: of meshes exactly, but where cutting long edges puts a vertex at
+//! the place of another that no long edge meets. Points of a cloud are judged by the neighbours found within the region and
+//! some way beyond; sides of normals are handed on from region to region.
+
+mod bins;
+mod build;
+mod distribute;
+mod regions;
+mod survey;
+
+use super::{Preset, build::Builder, file::WriteOptions, sphere::Sphere};
+use crate::{
+    Error, Result,
+    hierarchy::file::Whole,
+    io::{Counts, Limits, Stream},
+    math::Bounds,
+    surface::{EXTENT, SurfelOptions},
+};
+use std::path::{Path, PathBuf};
+
+/// What is at work.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Going through the input.
+    Reading,
+    /// Giving points and triangles to the regions.
+    Distributing,
+    /// Making surfels and blocks of them.
+    Building,
+    /// Putting the file together.
+    Writing,
+}
+
+/// Told of each finished part: how much of a stage is done, of how much; points, triangles or splats. A stage may begin anew
+/// for the next input, or the next look at it.
+pub type StageWatch<'a> = &'a (dyn Fn(Stage, u64, u64) + Sync);
+
+/// How a file is converted in regions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExternalOptions {
+    /// Bytes of memory that are to suffice, about; regions are made as small as that needs, down to a thousand points.
+    pub memory: u64,
+    pub preset: Preset,
+    /// Splats of a block.
+    pub block_splats: usize,
+    pub surfels: SurfelOptions,
+}
+
+/// What was converted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Converted {
+    pub points: u64,
+    pub splats: u64,
+    /// See [`Tree::closed`](super::Tree::closed).
+    pub closed: bool,
+    pub regions: usize,
+}
+
+/// Bytes that a region takes for each of its points at most, with its triangles, neighbours, surfels and their blocks.
+const OF_POINT: u64 = 1000;
+/// The most points of a region; larger ones make nothing better.
+const MOST_POINTS: u64 = 1 << 22;
+const FEWEST_POINTS: u64 = 1 << 10;
+
+/// About how many bytes making a hierarchy of a file takes where all of it is in memory: of a mesh its arrays, which corners
+/// meet at its vertices, and splats in parts and as a whole; of a cloud its arrays, the tree that finds neighbours, what is
+/// found of them, and the edges along which sides are told; with splats, their order and the blocks at work.
+pub fn memory_of_whole(counts: Counts) -> u64 {
+    const BLOCKS: u64 = 200 << 20;
+    if counts.triangles > 0 {
+        BLOCKS + 140 * counts.points + 26 * counts.triangles
+    } else {
+        BLOCKS + 330 * counts.points
+    }
+}
+
+/// Converts files, each read as a [`Stream`], to one hierarchy, as [`build_file`](super::build_file) makes it of the surfels
+/// of all. Memory is for one region at a time; the disk beside `path` has to hold about 40 bytes a point and 14 a triangle
+/// meanwhile.
+///
+/// # Errors
+/// Those of [`Stream::open`] and of reading on; [`Error::Argument`] for a file that can only be read as a whole, and for
+/// options of [`Mesh::surfels`](crate::surface::Mesh::surfels) that are no positive numbers; [`Error::NothingToDraw`] where
+/// nothing is left; [`Error::File`] where something cannot be written. Then nothing is left of the file.
+pub fn convert(
+    files: &[PathBuf],
+    limits: &Limits,
+    path: &Path,
+    options: &ExternalOptions,
+    write: &WriteOptions,
+    watch: StageWatch<'_>,
+) -> Result<Converted> {
+    let _span = tracing::info_span!("convert").entered();
+    let most = (options.memory / OF_POINT).clamp(FEWEST_POINTS, MOST_POINTS);
+    let mut inputs = Vec::new();
+    for (number, file) in files.iter().enumerate() {
+        let stream = Stream::open(file, limits)?.ok_or_else(|| {
+            Error::Argument(format!("{}: a file of this kind can only be read as a whole", file.display()))
+        })?;
+        let input = survey::survey(stream, most, &options.surfels, watch)?;
+        tracing::info!(file = %file.display(), regions = input.regions(), "cut in regions");
+        inputs.push(distribute::distribute(input, most, path, number, watch)?);
+    }
+    let Some(first) = inputs.first() else { return Err(Error::NothingToDraw("there are no files".into())) };
+    let origin = first.input.stream.origin();
+    let spheres: Vec<Sphere> = inputs.iter().map(|input| input.around(origin, options)).collect();
+    let outer = Sphere::around(&spheres, 1 << 10);
+    let mut done = Converted {
+        points: inputs.iter().map(|input| input.input.stream.point_count()).sum(),
+        splats: 0,
+        closed: inputs.iter().all(|input| input.input.mesh.as_ref().is_some_and(|mesh| mesh.pieces.is_closed)),
+        regions: inputs.iter().map(|input| input.input.regions()).sum(),
+    };
+    let mut work = build::Work {
+        builder: Builder::new(path, EXTENT, outer, options.preset, write)?,
+        origin,
+        bounds: Bounds::EMPTY,
+        options,
+        points: done.points,
+        built: 0,
+        splats: 0,
+        watch,
+    };
+    for (number, input) in inputs.into_iter().enumerate() {
+        work.input(input, path, number)?;
+    }
+    if work.splats == 0 {
+        return Err(Error::NothingToDraw("no point is left, or no triangle has an area".into()));
+    }
+    done.splats = work.splats;
+    watch(Stage::Writing, 0, 0);
+    let Converted { points, closed, .. } = done;
+    work.builder.finish(&Whole { origin, bounds: work.bounds, closed, source_points: points })?;
+    Ok(done)
+}

@@ -1,0 +1,156 @@
+//! The first looks at an input: where its points are, and what its triangles are like.
+
+use super::{
+    super::{
+        partition::Cube,
+        sphere::{DIRECTIONS, Sphere},
+    },
+    Stage, StageWatch,
+    regions::Regions,
+};
+use crate::{
+    Result,
+    io::Stream,
+    surface::{MeshPieces, SurfelOptions, Triangles},
+};
+use glam::{DVec3, Vec3};
+use std::collections::HashSet;
+
+/// An input that has been looked through.
+pub struct Surveyed<'a> {
+    pub stream: Stream<'a>,
+    pub regions: Regions,
+    /// Nearly the smallest around those points that are farthest in some directions.
+    pub core: Sphere,
+    /// The mean of all points.
+    pub center: DVec3,
+    /// Of a mesh.
+    pub mesh: Option<Triangulated>,
+}
+
+/// What is known of the triangles of a mesh.
+pub struct Triangulated {
+    pub pieces: MeshPieces,
+    /// The places of the corners of triangles that are to be cut: what is at them is made on its own.
+    pub long: HashSet<[u32; 3]>,
+    /// The longest edge that stays.
+    pub longest: f32,
+}
+
+/// What names a place, whatever the sign of its zeros.
+pub fn name(place: Vec3) -> [u32; 3] {
+    (place + Vec3::ZERO).to_array().map(f32::to_bits)
+}
+
+/// Goes through the input as often as it takes.
+pub fn survey<'a>(
+    mut stream: Stream<'a>,
+    most: u64,
+    options: &SurfelOptions,
+    watch: StageWatch<'_>,
+) -> Result<Surveyed<'a>> {
+    let counted = stream.counts();
+    stream.settle(&|done| watch(Stage::Reading, done, counted.points))?;
+    let [low, high] = stream.bounds();
+    let cube = Cube::around(low, high);
+    let (mut extremes, mut sum) = (Extremes::default(), DVec3::ZERO);
+    let mut is_first = true;
+    let regions = Regions::cut(cube, most, |count| {
+        let wants_extremes = std::mem::take(&mut is_first);
+        let mut done = 0;
+        stream.points(
+            |points| {
+                let places = || points.iter().map(|point| Vec3::from(point.position));
+                let keys: Vec<u64> = places().map(|place| cube.fine_key(place)).collect();
+                let mut found = Extremes::default();
+                if wants_extremes {
+                    places().for_each(|place| found.add(place));
+                }
+                (keys, found, places().map(Vec3::as_dvec3).sum::<DVec3>())
+            },
+            |(keys, found, more)| {
+                if wants_extremes {
+                    extremes.join(&found);
+                    sum += more;
+                }
+                count(&keys);
+                done += keys.len() as u64;
+                watch(Stage::Reading, done, stream.point_count());
+                Ok(())
+            },
+        )
+    })?;
+    let mesh = if counted.triangles > 0 { Some(triangulated(&stream, options, watch)?) } else { None };
+    let center = sum / stream.point_count().max(1) as f64;
+    Ok(Surveyed { core: extremes.core(), stream, regions, center, mesh })
+}
+
+fn triangulated(stream: &Stream, options: &SurfelOptions, watch: StageWatch<'_>) -> Result<Triangulated> {
+    let (counts, origin) = (stream.counts(), stream.origin());
+    let [low, high] = stream.bounds().map(|corner| origin + corner.as_dvec3());
+    let look = |length: f32| {
+        let mut seen = Triangles::default();
+        let mut done = 0;
+        stream.triangles(
+            |triangles| {
+                let mut seen = Triangles::default();
+                for &triangle in triangles {
+                    seen.add(triangle, triangle.map(|vertex| stream.position(vertex)), length);
+                }
+                (seen, triangles.len() as u64)
+            },
+            |(more, count)| {
+                seen.join(more);
+                done += count;
+                watch(Stage::Reading, done, counts.triangles);
+                Ok(())
+            },
+        )?;
+        Ok(seen)
+    };
+    let (pieces, seen) = MeshPieces::new(
+        [counts.points as usize, counts.triangles as usize],
+        [stream.has_normals(), stream.has_uvs()],
+        (high - low).length() as f32,
+        options,
+        look,
+    )?;
+    let longest = seen.longest.min(pieces.length);
+    Ok(Triangulated { pieces, long: seen.long.into_iter().map(name).collect(), longest })
+}
+
+/// The places that are farthest in each of some directions, and against it.
+struct Extremes([[(f32, Vec3); 2]; DIRECTIONS.len()]);
+
+impl Default for Extremes {
+    fn default() -> Self {
+        Self([[(f32::NEG_INFINITY, Vec3::ZERO); 2]; DIRECTIONS.len()])
+    }
+}
+
+impl Extremes {
+    fn add(&mut self, place: Vec3) {
+        for (ends, direction) in self.0.iter_mut().zip(DIRECTIONS) {
+            let along = place.dot(Vec3::from(direction));
+            for (end, along) in ends.iter_mut().zip([along, -along]) {
+                if along > end.0 {
+                    *end = (along, place);
+                }
+            }
+        }
+    }
+
+    fn join(&mut self, other: &Self) {
+        for (end, other) in self.0.iter_mut().flatten().zip(other.0.iter().flatten()) {
+            if other.0 > end.0 {
+                *end = *other;
+            }
+        }
+    }
+
+    fn core(&self) -> Sphere {
+        let places = self.0.iter().flatten().filter(|(along, _)| along.is_finite());
+        let points: Vec<Sphere> = places.map(|(_, p)| Sphere { center: p.as_dvec3(), radius: 0.0 }).collect();
+        Sphere::around(&points, 1 << 12)
+    }
+}

@@ -1,0 +1,189 @@
+//! Binary PLY files in pieces: vertices of a fixed stride, and faces of three corners each.
+
+use super::{
+    super::{Source, positions, stream::Found},
+    COLOR, NORMAL, POSITION, ROLES, UV, color_scale,
+    header::{self, Element, width},
+    rows::{cut, list_place, number, triangle_stride},
+};
+use crate::{Error, Result};
+use glam::{DVec3, Vec3};
+use ply_rs::ply::{Encoding, PropertyType, ScalarType};
+use std::ops::Range;
+
+/// Rows of a piece.
+const ROWS: usize = 1 << 16;
+
+/// Where everything is in a file.
+pub struct Pieces {
+    vertices: Vertices,
+    faces: Option<Faces>,
+    pub has_normals: bool,
+    pub has_colors: bool,
+    pub has_uvs: bool,
+}
+
+/// Rows that are all of one length.
+struct Rows {
+    at: usize,
+    count: usize,
+    stride: usize,
+    big: bool,
+}
+
+struct Vertices {
+    rows: Rows,
+    fields: [Option<(usize, ScalarType)>; ROLES.len()],
+    color_scale: [Option<f64>; 4],
+}
+
+struct Faces {
+    rows: Rows,
+    /// Where the number of corners is in a row.
+    length: (usize, ScalarType),
+    /// Where the first of the three indices is.
+    indices: usize,
+}
+
+impl Pieces {
+    /// Finds the rows by the header alone. None for text, polygons and strips, textures, and what the reader refuses.
+    pub fn find(source: &Source) -> Result<Option<Self>> {
+        let header = header::read(source)?;
+        let big = match header.encoding {
+            Encoding::Ascii => return Ok(None),
+            Encoding::BinaryBigEndian => true,
+            Encoding::BinaryLittleEndian => false,
+        };
+        let (mut vertices, mut faces) = (None, None);
+        let mut at = header.payload;
+        for element in &header.elements {
+            let is_face = element.name == "face";
+            let stride = if is_face { triangle_stride(element) } else { element.stride() };
+            let Some(stride) = stride.filter(|_| element.name != "tristrips") else { return Ok(None) };
+            let left = source.bytes().len() - at;
+            let size = element.count.checked_mul(stride).filter(|&size| size <= left);
+            // Some faces might have fewer corners than three, but what would they be for?
+            let Some(size) = size else { return Err(cut(source, element, left / stride)) };
+            let rows = Rows { at, count: element.count, stride, big };
+            at += size;
+            if is_face || element.name == "vertex" {
+                source.check_points(&format!("the count of element “{}”", element.name), element.count as u64)?;
+            }
+            if is_face && element.count > 0 {
+                let (None, Some(found)) = (&faces, Faces::find(element, rows)) else { return Ok(None) };
+                faces = Some(found);
+            } else if element.name == "vertex" && vertices.is_none() {
+                vertices = Some((element, rows));
+            }
+        }
+        let Some((element, rows)) = vertices.filter(|(element, _)| element.count > 0) else { return Ok(None) };
+        let columns = ROLES.map(|names| element.column(names).filter(|&c| element.columns[c].width().is_some()));
+        let has = |from: usize, number: usize| columns[from..from + number].iter().all(Option::is_some);
+        let has_uvs = has(UV, 2);
+        if !has(POSITION, 3) || (has_uvs && header.texture.is_some() && faces.is_some()) {
+            return Ok(None);
+        }
+        let field = |column: usize| {
+            let offset: Option<usize> = element.columns[..column].iter().map(|before| before.width()).sum();
+            let PropertyType::Scalar(kind) = &element.columns[column].kind else { return None };
+            Some((offset?, kind.clone()))
+        };
+        let (has_normals, has_colors) = (has(NORMAL, 3), has(COLOR, 3));
+        let color_scale = color_scale(element, &columns);
+        let vertices = Vertices { rows, fields: columns.map(|column| column.and_then(field)), color_scale };
+        Ok(Some(Self { vertices, faces, has_normals, has_colors, has_uvs }))
+    }
+
+    pub fn points(&self) -> usize {
+        self.vertices.rows.count
+    }
+
+    pub fn triangles(&self) -> usize {
+        self.faces.as_ref().map_or(0, |faces| faces.rows.count)
+    }
+
+    /// How many pieces there are of the points, and of the triangles.
+    pub fn pieces(&self) -> [usize; 2] {
+        [self.points(), self.triangles()].map(|count| count.div_ceil(ROWS))
+    }
+
+    /// The rows of a piece of the points.
+    pub fn rows(&self, piece: usize) -> Range<usize> {
+        piece * ROWS..((piece + 1) * ROWS).min(self.points())
+    }
+
+    fn value(&self, source: &Source, row: usize, role: usize) -> f64 {
+        let Vertices { rows, fields, .. } = &self.vertices;
+        let row = &source.bytes()[rows.at + row * rows.stride..];
+        fields[role].as_ref().map_or(0.0, |(offset, kind)| number(&row[*offset..], kind, rows.big))
+    }
+
+    pub fn position(&self, source: &Source, row: usize) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|axis| self.value(source, row, POSITION + axis)))
+    }
+
+    /// The error of a vertex whose position is not finite.
+    pub fn not_finite(&self, source: &Source, row: usize) -> Error {
+        let byte = self.vertices.rows.at + row * self.vertices.rows.stride;
+        let place = format!("element “vertex”, row {row}, byte {byte}");
+        positions::not_finite(source, place, self.position(source, row))
+    }
+
+    /// A vertex as the reader has it.
+    pub fn vertex(&self, source: &Source, row: usize) -> Found {
+        let value = |role: usize| self.value(source, row, role);
+        let mut found = Found { row, position: self.position(source, row), normal: Vec3::ZERO, color: [255; 4] };
+        if self.has_normals {
+            found.normal = positions::unit(Vec3::from_array([0, 1, 2].map(|axis| value(NORMAL + axis) as f32)));
+        }
+        if self.has_colors {
+            found.color = std::array::from_fn(|channel| {
+                let scale = self.vertices.color_scale[channel];
+                scale.map_or(255, |scale| (value(COLOR + channel) * scale).round() as u8)
+            });
+        }
+        found
+    }
+
+    /// The triangles of a piece.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a polygon, and for an index without a vertex.
+    pub fn triangle_piece(&self, source: &Source, piece: usize) -> Result<Vec<[u32; 3]>> {
+        let Some(faces) = &self.faces else { return Ok(Vec::new()) };
+        let Rows { at, count, stride, big } = faces.rows;
+        let vertices = self.points();
+        let triangle = |row: usize| {
+            let bytes = &source.bytes()[at + row * stride..at + (row + 1) * stride];
+            let wrong = |message: String| {
+                let place = format!("element “face”, row {row}, byte {}", at + row * stride);
+                Err(source.error(place, message))
+            };
+            let corners = number(&bytes[faces.length.0..], &faces.length.1, big);
+            if corners != 3.0 {
+                return wrong(format!("has {corners} corners; in pieces only triangles can be read"));
+            }
+            let corners = [0, 4, 8].map(|corner| {
+                let raw = [0, 1, 2, 3].map(|byte| bytes[faces.indices + corner + byte]);
+                if big { u32::from_be_bytes(raw) } else { u32::from_le_bytes(raw) }
+            });
+            match corners.iter().find(|&&index| index as usize >= vertices) {
+                Some(index) => wrong(format!("refers to vertex {index}, but there are {vertices}")),
+                None => Ok(corners),
+            }
+        };
+        (piece * ROWS..((piece + 1) * ROWS).min(count)).map(triangle).collect()
+    }
+}
+
+impl Faces {
+    /// Faces whose only list is one of indices of 32 bits.
+    fn find(element: &Element, rows: Rows) -> Option<Self> {
+        let column = element.column(&["vertex_indices", "vertex_index"])?;
+        let PropertyType::List(_, ScalarType::Int | ScalarType::UInt) = element.columns[column].kind else {
+            return None;
+        };
+        let (offset, kind) = list_place(element);
+        Some(Self { rows, length: (offset, kind.clone()), indices: offset + width(kind) })
+    }
+}

@@ -1,0 +1,295 @@
+//! Hierarchies made region by region have the leaves of those made as a whole.
+
+use glam::Vec3;
+use splatkit::{
+    Result,
+    hierarchy::{
+        self, BuildOptions, Hierarchy,
+        external::{Converted, ExternalOptions, convert},
+        file::{WriteOptions, check},
+    },
+    io::{self, Limits},
+    splat::{Splat, decode_normal},
+    surface::{Mesh, SurfelOptions},
+};
+use std::path::{Path, PathBuf};
+
+/// A folder for one test, removed at its end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("splatkit-external-{}-{name}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(&self.0).unwrap();
+        let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        std::fs::remove_dir_all(&self.0).ok();
+    }
+}
+
+/// So little memory that regions are as small as they get.
+fn options() -> ExternalOptions {
+    ExternalOptions {
+        memory: 1,
+        preset: hierarchy::Preset::Fastest,
+        block_splats: 1 << 9,
+        surfels: SurfelOptions::default(),
+    }
+}
+
+fn lossless() -> WriteOptions {
+    WriteOptions { lossless: true, ..WriteOptions::default() }
+}
+
+fn in_regions(files: &[PathBuf], out: &Path) -> Result<Converted> {
+    convert(files, &Limits::default(), out, &options(), &lossless(), &|_, _, _| ())
+}
+
+/// The splats of the finest level, in an order of their own.
+fn leaves(path: &Path) -> Vec<Splat> {
+    let report = check(path, &Limits::default());
+    assert!(report.findings.is_empty(), "{:?}", report.findings);
+    let mut leaves = Hierarchy::open(path, &Limits::default()).unwrap().leaves().unwrap().splats;
+    sort(&mut leaves);
+    leaves
+}
+
+fn sort(splats: &mut [Splat]) {
+    let key = |s: &Splat| (s.center.map(f32::to_bits), s.normal, s.factor.map(f32::to_bits));
+    splats.sort_by_key(key);
+}
+
+/// The leaves of both ways, for a file of a mesh or cloud.
+fn both_ways(folder: &Folder, name: &str) -> (Vec<Splat>, Vec<Splat>, Converted) {
+    let path = folder.path(name);
+    let mesh = io::load_mesh(&path, &Limits::default()).unwrap();
+    let set = mesh.surfels(&SurfelOptions::default()).unwrap();
+    let whole = folder.path("whole.splk");
+    let build = BuildOptions { preset: hierarchy::Preset::Fastest, ..BuildOptions::default() };
+    hierarchy::build_file(&set, &whole, &build, &lossless(), &|_, _| ()).unwrap();
+    let parts = folder.path("parts.splk");
+    let converted = in_regions(&[path], &parts).unwrap();
+    assert_eq!(converted.closed, mesh.is_closed(), "{name}");
+    assert_eq!(converted.points, mesh.positions.len() as u64, "{name}");
+    let header = |path: &Path| Hierarchy::open(path, &Limits::default()).unwrap().header().clone();
+    let (one, other) = (header(&whole), header(&parts));
+    assert_eq!((one.origin, one.has_color), (other.origin, other.has_color), "{name}");
+    assert!((one.bounds.min - other.bounds.min).length() < 0.03 * one.bounds.diagonal(), "{name}");
+    (leaves(&whole), leaves(&parts), converted)
+}
+
+/// A binary PLY file, of floats or doubles of either order.
+fn ply(mesh: &Mesh, big: bool, double: bool) -> Vec<u8> {
+    let order = if big { "big" } else { "little" };
+    let kind = if double { "double" } else { "float" };
+    let mut out = format!("ply\nformat binary_{order}_endian 1.0\nelement vertex {}\n", mesh.positions.len());
+    for axis in ["x", "y", "z"] {
+        out += &format!("property {kind} {axis}\n");
+    }
+    if !mesh.colors.is_empty() {
+        out += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+    }
+    if !mesh.triangles.is_empty() {
+        out += &format!("element face {}\nproperty list uchar int vertex_indices\n", mesh.triangles.len());
+    }
+    let mut out = (out + "end_header\n").into_bytes();
+    let ordered = |mut bytes: Vec<u8>| {
+        if big {
+            bytes.reverse();
+        }
+        bytes
+    };
+    for (index, position) in mesh.positions.iter().enumerate() {
+        for value in (mesh.origin + position.as_dvec3()).to_array() {
+            let bytes = if double { value.to_le_bytes().to_vec() } else { (value as f32).to_le_bytes().to_vec() };
+            out.extend(ordered(bytes));
+        }
+        out.extend(mesh.colors.get(index).map(|color| color[..3].to_vec()).unwrap_or_default());
+    }
+    for triangle in &mesh.triangles {
+        out.push(3);
+        triangle.iter().for_each(|index| out.extend(ordered(index.to_le_bytes().to_vec())));
+    }
+    out
+}
+
+/// A bumpy torus of a grid of vertices, in colours; `skew` moves one in ten out of the order.
+fn torus(along: u32, around: u32) -> Mesh {
+    let mut mesh = Mesh::knot(along, around);
+    mesh.normals.clear();
+    for (index, position) in mesh.positions.iter_mut().enumerate() {
+        *position += Vec3::splat(0.002) * ((index * 7919 % 101) as f32 / 101.0);
+    }
+    mesh
+}
+
+#[test]
+fn meshes_have_the_same_leaves() {
+    let folder = Folder::new("meshes");
+    // Fine enough that no edge is cut.
+    let shared = torus(1000, 50);
+    // Long edges in one place: a lid, and a needle.
+    let mut long = shared.clone();
+    let last = long.positions.len() as u32;
+    long.positions.extend([Vec3::new(5.0, 0.0, 0.0), Vec3::new(5.0, 3.0, 0.2), Vec3::new(5.0, 0.0, 3.0)]);
+    long.colors.extend([[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255]]);
+    long.triangles.extend([[last, last + 1, last + 2], [last, 100, last + 1], [0, 1, last]]);
+    // Every triangle has vertices of its own.
+    let corners: Vec<u32> = shared.triangles.iter().flatten().copied().collect();
+    let split = Mesh {
+        positions: corners.iter().map(|&corner| shared.positions[corner as usize]).collect(),
+        triangles: (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+        ..Mesh::default()
+    };
+    let mut far = shared.clone();
+    far.origin = glam::DVec3::new(4_500_000.25, 5_300_000.5, 417.125);
+    for (name, mesh, big, double) in [
+        ("shared.ply", shared, false, false),
+        ("long.ply", long, true, false),
+        ("split.ply", split, false, false),
+        ("far.ply", far, true, true),
+    ] {
+        std::fs::write(folder.path(name), ply(&mesh, big, double)).unwrap();
+        let (whole, parts, converted) = both_ways(&folder, name);
+        assert!(converted.regions > 10, "{name}: {}", converted.regions);
+        assert_eq!(whole.len(), parts.len(), "{name}");
+        assert!(whole == parts, "{name}");
+    }
+    assert!(folder.names().iter().all(|name| !name.starts_with('.')), "{:?}", folder.names());
+}
+
+#[test]
+fn clouds_have_nearly_the_same_leaves() {
+    let folder = Folder::new("clouds");
+    let mut cloud = torus(600, 60);
+    cloud.triangles.clear();
+    // Some at one place, some far from all others.
+    cloud.positions.extend([Vec3::new(9.0, 9.0, 9.0), Vec3::new(-9.0, 4.0, 0.0)]);
+    cloud.positions.extend([cloud.positions[77]; 3]);
+    cloud.colors.resize(cloud.positions.len(), [9, 8, 7, 255]);
+    std::fs::write(folder.path("cloud.ply"), ply(&cloud, false, true)).unwrap();
+    let (whole, parts, converted) = both_ways(&folder, "cloud.ply");
+    assert!(converted.regions > 20, "{}", converted.regions);
+    assert_eq!(whole.len(), parts.len());
+    let (mut other_shapes, mut other_sides) = (0, 0);
+    for (a, b) in whole.iter().zip(&parts) {
+        assert_eq!((a.center, a.color, a.strength), (b.center, b.color, b.strength));
+        let size = a.factor.iter().fold(0.0, |size: f32, part| size.max(part.abs()));
+        let is_near = a.factor.iter().zip(b.factor).all(|(a, b)| (a - b).abs() < 1e-3 * size);
+        other_shapes += u32::from(!is_near);
+        let (Some(a), Some(b)) = (decode_normal(a.normal), decode_normal(b.normal)) else { continue };
+        other_sides += u32::from(a.dot(b) < 0.0);
+    }
+    let most = whole.len() as u32 / 100;
+    assert!(other_shapes <= most && other_sides <= most, "{other_shapes} shapes and {other_sides} sides of {most}");
+}
+
+#[test]
+fn crowded_clouds_are_cut_too() {
+    let folder = Folder::new("crowded");
+    let mut cloud = Mesh { positions: vec![Vec3::ONE; 20_000], ..Mesh::default() };
+    cloud.positions.extend((0..5000).map(|i| Vec3::new((i % 50) as f32, (i / 50) as f32, 0.0) * 1e-5));
+    cloud.positions.push(Vec3::splat(100.0));
+    std::fs::write(folder.path("cloud.ply"), ply(&cloud, false, false)).unwrap();
+    let (whole, parts, converted) = both_ways(&folder, "cloud.ply");
+    assert!(converted.regions > 5);
+    assert_eq!(whole.len(), parts.len());
+    assert!(whole.iter().zip(&parts).all(|(a, b)| a.center == b.center));
+}
+
+#[test]
+fn several_files_become_one() {
+    let folder = Folder::new("several");
+    let near = torus(100, 30);
+    let mut far = near.clone();
+    far.origin = glam::DVec3::new(10.0, 20.0, 30.0);
+    std::fs::write(folder.path("a.ply"), ply(&near, false, true)).unwrap();
+    std::fs::write(folder.path("b.ply"), ply(&far, false, true)).unwrap();
+    let out = folder.path("out.splk");
+    let converted = in_regions(&[folder.path("a.ply"), folder.path("b.ply")], &out).unwrap();
+    assert_eq!((converted.points, converted.closed), (6000, near.is_closed()));
+    assert_eq!(leaves(&out).len() as u64, converted.splats);
+    let bounds = Hierarchy::open(&out, &Limits::default()).unwrap().header().bounds;
+    assert!(bounds.max.z > 29.0 && bounds.min.z < 0.0, "{bounds:?}");
+}
+
+#[test]
+fn what_is_damaged_leaves_nothing() {
+    let folder = Folder::new("damaged");
+    let mesh = torus(200, 40);
+    let whole = ply(&mesh, false, false);
+    let at = |from: usize, bytes: &[u8]| {
+        let mut damaged = whole.clone();
+        damaged[from..from + bytes.len()].copy_from_slice(bytes);
+        damaged
+    };
+    let last_face = whole.len() - 13;
+    let first_vertex = whole.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+    let polygon = at(last_face, &[4]);
+    let lost = at(last_face + 1, &u32::MAX.to_le_bytes());
+    let endless = at(first_vertex + 15 * 4000, &f32::NAN.to_le_bytes());
+    for (bytes, message) in [
+        (whole[..last_face - 5].to_vec(), "the file ends"),
+        (whole[..first_vertex + 1000].to_vec(), "the file ends"),
+        (polygon, "has 4 corners"),
+        (lost, "refers to vertex 4294967295"),
+        (endless, "is not finite"),
+    ] {
+        std::fs::write(folder.path("a.ply"), bytes).unwrap();
+        let error = in_regions(&[folder.path("a.ply")], &folder.path("out.splk")).unwrap_err().to_string();
+        assert!(error.contains(message), "{error}");
+        assert_eq!(folder.names(), ["a.ply"]);
+    }
+}
+
+#[test]
+fn points_of_surveys_keep_their_millimetres_and_colours() {
+    let folder = Folder::new("las");
+    let count = 3000u32;
+    let record = |i: u32| {
+        let mut record = vec![0; 26];
+        let place = [i % 60 * 1001, i / 60 * 1003, i % 7];
+        for (axis, value) in place.iter().enumerate() {
+            record[4 * axis..4 * axis + 4].copy_from_slice(&value.to_le_bytes());
+        }
+        record[12..14].copy_from_slice(&(i as u16).to_le_bytes());
+        // One is withheld.
+        record[15] = if i == 1234 { 0x80 } else { 0 };
+        record[20..22].copy_from_slice(&((i * 20) as u16).to_le_bytes());
+        record
+    };
+    for colored in [true, false] {
+        let mut las = vec![0; 227];
+        las[..4].copy_from_slice(b"LASF");
+        las[24..26].copy_from_slice(&[1, 2]);
+        las[94..96].copy_from_slice(&227u16.to_le_bytes());
+        las[96..100].copy_from_slice(&227u32.to_le_bytes());
+        las[104] = if colored { 2 } else { 0 };
+        las[105..107].copy_from_slice(&26u16.to_le_bytes());
+        las[107..111].copy_from_slice(&count.to_le_bytes());
+        for (at, value) in [(131, 0.001), (139, 0.001), (147, 0.001), (155, 4.5e6), (163, 5.3e6), (171, 400.0)] {
+            las[at..at + 8].copy_from_slice(&f64::to_le_bytes(value));
+        }
+        las.extend((0..count).flat_map(record));
+        std::fs::write(folder.path("a.las"), las).unwrap();
+        let (whole, parts, converted) = both_ways(&folder, "a.las");
+        assert!(converted.regions > 2 && converted.points == 2999);
+        let same = |(a, b): (&Splat, &Splat)| (a.center, a.color) == (b.center, b.color);
+        assert!(whole.len() == parts.len() && whole.iter().zip(&parts).all(same));
+    }
+}

@@ -1,0 +1,79 @@
+//! Files larger than memory, region by region.
+
+use super::{Convert, memory::Need};
+use crate::{failure::Failure, output, progress::Progress, render::milliseconds};
+use serde_json::json;
+use splatkit::{
+    Error,
+    hierarchy::{
+        BuildOptions,
+        external::{ExternalOptions, Stage, convert},
+    },
+};
+use std::time::Instant;
+
+impl Convert {
+    /// Converts what needs more than the `most` bytes that there are.
+    pub(super) fn in_regions(
+        &self,
+        extension: &str,
+        need: Need,
+        most: u64,
+        progress: &Progress,
+    ) -> Result<(), Failure> {
+        let [wanted, most_mib] = [need.bytes, most].map(|bytes| bytes >> 20);
+        if !need.in_pieces? || extension != "splk" {
+            return Err(Failure::Usage(format!(
+                "this takes about {wanted} MiB, but only {most_mib} MiB may be taken, and only binary PLY of points or \
+                 triangles, LAS and LAZ become hierarchies in less; --memory allows more"
+            )));
+        }
+        if self.dry_run {
+            if self.json {
+                return output::line(json!({"expected_memory": need.bytes, "memory": most, "in_regions": true}));
+            }
+            return output::line(format_args!(
+                "memory          about {wanted} MiB as a whole; region by region in {most_mib} MiB"
+            ));
+        }
+        let start = Instant::now();
+        let options = ExternalOptions {
+            memory: most,
+            preset: self.surface.preset(),
+            block_splats: BuildOptions::default().block_splats,
+            surfels: self.surface.surfel_options(),
+        };
+        let stages = progress.stages();
+        let watch = |stage: Stage, done: u64, total: u64| {
+            let name = match stage {
+                Stage::Reading => "Looking through the input",
+                Stage::Distributing => "Distributing to regions",
+                Stage::Building => "Building the hierarchy",
+                Stage::Writing => "Writing the file",
+            };
+            stages.set(name, done, total);
+        };
+        let write = self.surface.write_options(&self.files);
+        let done = convert(&self.files, &self.load.limits(), &self.output, &options, &write, &watch)?;
+        drop(stages);
+        progress.clear();
+        let bytes = self.output.metadata().map_err(|e| Error::file(&self.output, "read", e))?.len();
+        let per_point = bytes as f64 / done.points as f64;
+        if self.json {
+            return output::line(json!({
+                "file": self.output,
+                "points": done.points,
+                "splats": done.splats,
+                "closed": done.closed,
+                "regions": done.regions,
+                "bytes": bytes,
+                "bytes_per_point": per_point,
+                "total_ms": milliseconds(start),
+            }));
+        }
+        output::line(format_args!("points          {}", done.points))?;
+        output::line(format_args!("splats          {} in {} regions", done.splats, done.regions))?;
+        output::line(format_args!("bytes           {bytes} ({per_point:.2} a point)"))?;
+        output::line(format_args!("time            {:.2} s", milliseconds(start) / 1e3))
+    }
+}

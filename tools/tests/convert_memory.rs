@@ -1,0 +1,64 @@
+//! `splatkit convert --memory`.
+
+mod common;
+
+use common::*;
+
+/// A wavy sheet of binary triangles.
+fn sheet(side: u32) -> Vec<u8> {
+    let mut out = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        side * side,
+        (side - 1) * (side - 1) * 2
+    )
+    .into_bytes();
+    for i in 0..side * side {
+        let (x, y) = ((i % side) as f32, (i / side) as f32);
+        for value in [x, y, (0.1 * x).sin() * (0.07 * y).cos() * 5.0] {
+            out.extend(value.to_le_bytes());
+        }
+    }
+    for i in (0..side * (side - 1)).filter(|i| i % side + 1 < side) {
+        for triangle in [[i, i + 1, i + side], [i + 1, i + side + 1, i + side]] {
+            out.push(3);
+            triangle.iter().for_each(|index| out.extend(index.to_le_bytes()));
+        }
+    }
+    out
+}
+
+#[test]
+fn what_is_larger_than_the_memory_is_converted_in_regions() {
+    let folder = Folder::new("memory");
+    folder.put("a.ply", sheet(150));
+    let whole = folder.json("convert a.ply -o whole.splk --json");
+    let parts = folder.json("convert a.ply -o parts.splk --memory 8MiB --json");
+    assert!(parts["regions"].as_u64().is_some_and(|regions| regions > 1), "{parts}");
+    assert_eq!((&whole["splats"], &whole["closed"]), (&parts["splats"], &parts["closed"]));
+    folder.run("check parts.splk").ok();
+    let expected = folder.json("convert a.ply -o b.splk --memory 8MiB --dry-run --json");
+    assert_eq!(expected["in_regions"].as_bool(), Some(true));
+    let expected = folder.json("convert a.ply -o b.splk --dry-run --json");
+    assert!(expected["expected_memory"].as_u64().is_some_and(|bytes| bytes > 1 << 20));
+}
+
+#[test]
+fn what_can_only_be_read_as_a_whole_is_told() {
+    let folder = Folder::new("as_a_whole");
+    folder.put("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    folder.run("convert a.obj -o a.splk --memory 100").fails(2, &["--memory allows more"]);
+    folder.run("convert a.obj -o a.splk --memory much").fails(2, &["the units are KiB"]);
+    // Cut among its faces.
+    let whole = sheet(150);
+    folder.put("cut.ply", &whole[..whole.len() - 100]);
+    folder.run("convert cut.ply -o a.splk --memory 1MiB").fails(3, &["cut.ply", "the file ends"]);
+    let mut lost = whole;
+    let last = lost.len() - 1;
+    lost[last] = 77;
+    folder.put("lost.ply", lost);
+    folder.run("convert lost.ply -o a.splk --memory 1MiB").fails(3, &["lost.ply", "refers to vertex"]);
+    let mut names: Vec<_> = std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["a.obj", "cut.ply", "lost.ply"]);
+}
