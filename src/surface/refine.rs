@@ -58,10 +58,6 @@ impl<'a> Origin<'a> {
         Self { mesh, sources, normals: corner_normals(mesh, crease_angle_degrees) }
     }
 
-    pub fn mesh(&self) -> &'a Mesh {
-        self.mesh
-    }
-
     /// The normal at a corner of the `fine` mesh, interpolated between those of the whole triangle; of any length.
     pub fn normal(&self, fine: &Mesh, at: u32) -> Vec3 {
         let source = self.sources[at as usize / 3] as usize;
