@@ -221,11 +221,11 @@ pub fn decode(bytes: &[u8], count: usize, first_child: u32, extent: f32) -> Resu
         if is_leaf {
             bounds::leaf(&mut node, &shape, extent);
         } else {
-            let is_fine = code.sigma >= fine;
-            let center = [0, 1, 2].map(|axis| if is_fine { centers[axis][centered] } else { 0 });
-            centered += usize::from(is_fine);
+            let step = bounds::fine_step(code.sigma, fine, extent);
+            let center = [0, 1, 2].map(|axis| if step.is_some() { centers[axis][centered] } else { 0 });
+            centered += usize::from(step.is_some());
             let code = bounds::Code { center, radius: radius[inner], cone: cone[inner], size: size[inner] };
-            code.decode(&mut node, &shape, extent, is_fine).ok_or_else(fail)?;
+            code.decode(&mut node, &shape, extent, step).ok_or_else(fail)?;
             inner += 1;
             (node.first_child, node.children) = (next, u32::from(children));
             next = next.checked_add(u32::from(children)).ok_or("it has more children than can be numbered")?;

@@ -145,7 +145,8 @@ fn bound(
             let children = &nodes[first..first + node.children as usize];
             let code = shapes[at].and_then(|(sigma, shape)| {
                 let mut coded = node;
-                let code = bounds::Code::encode(&mut coded, children, &shape, extent, sigma >= fine)?;
+                let code =
+                    bounds::Code::encode(&mut coded, children, &shape, extent, bounds::fine_step(sigma, fine, extent))?;
                 node = coded;
                 Some(code)
             });

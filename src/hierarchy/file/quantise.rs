@@ -35,7 +35,7 @@ static FINENESS: LazyLock<[Fineness; 2]> = LazyLock::new(|| {
     let inner = Fineness {
         sigma: PARTS / 4,
         ratio: PARTS / 3,
-        thickness: PARTS / 2,
+        thickness: PARTS,
         strength: PARTS / 6,
         directions: Directions(17),
         position: 5.0,
@@ -93,6 +93,11 @@ pub fn logarithm(value: f64) -> f64 {
 /// The code of the largest standard deviation of a node that is no leaf.
 pub fn inner_sigma(sigma: f64) -> i32 {
     nearest(logarithm(sigma.max(f64::MIN_POSITIVE)) * f64::from(PARTS / FINENESS[0].sigma))
+}
+
+/// What such a code stands for.
+pub fn sigma_of_inner(code: i32) -> f64 {
+    power(code.saturating_mul(FINENESS[0].sigma))
 }
 
 /// To the nearest whole number; halves away from 0.
