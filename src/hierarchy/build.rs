@@ -133,9 +133,8 @@ impl Builder {
     }
 
     pub fn add(&mut self, blocks: Vec<Block>) -> Result<()> {
-        for block in blocks {
-            self.roots.push(self.writer.block(&block.nodes)?);
-        }
+        let nodes: Vec<&[Node]> = blocks.iter().map(|block| &block.nodes[..]).collect();
+        self.roots.extend(self.writer.blocks(&nodes)?);
         Ok(())
     }
 

@@ -1,31 +1,45 @@
 //! Bounds of inner nodes as whole numbers, made from below, so that they hold for what is read.
 
 use super::{
-    page::{cosine_below, joint_angle},
+    page::{cosine_below, joint_cosine},
     pages::reach,
-    quantise::{FULL_WIDTH, PARTS, Shape, power},
+    quantise::{FULL_WIDTH, PARTS, Shape, inner_sigma, logarithm, power, sigma_of_inner},
 };
 use crate::{hierarchy::Node, splat::NO_NORMAL};
 use glam::DVec3;
 use std::{f64::consts::PI, sync::LazyLock};
 
-/// Steps of a sphere's centre in the reach of the splat's own footprint.
-const CENTER_STEPS: f64 = 24.0;
-/// Steps of the radius and of the size in a doubling.
-const RADIUS_STEPS: i32 = 24;
-const SIZE_STEPS: i32 = 16;
+/// Steps of radii and of sizes in parts of a doubling.
+const RADIUS: i32 = PARTS / 12;
+const SIZE: i32 = PARTS / 16;
 /// Half-angles of cones are this far apart.
-const CONE_STEP: f64 = PI / 60.0;
+const CONE_STEP: f64 = PI / 30.0;
 /// The cone of half a turn, beyond which there is none worth telling.
-const NO_CONE: i32 = 31;
+const NO_CONE: i32 = 16;
 /// The farthest that a centre may be: beyond, no number of 32 bits tells it.
 const MOST_STEPS: f64 = (1 << 20) as f64;
-const MOST_POWER: i32 = RADIUS_STEPS * 64;
+const MOST_POWER: i32 = PARTS * 64;
+
+/// Large nodes have fine spheres, for what they lose adds up on the way to the root: those of at least this part of the
+/// root's size. The others stand around the splat's centre.
+const FINE_PART: f64 = 1.0 / 48.0;
+/// Steps of fine centres and radii in the reach of the smallest of these nodes: the same for all, however large.
+const FINE_STEPS: f64 = 6.0;
+
+/// The code of the largest standard deviation from which on nodes below a root have fine spheres.
+pub fn fine_from(root: &Node) -> i32 {
+    inner_sigma(f64::from(root.size) / FULL_WIDTH * FINE_PART)
+}
+
+/// The steps of the sphere of a node that has a fine one.
+pub fn fine_step(sigma: i32, fine: i32, extent: f32) -> Option<f64> {
+    (sigma >= fine).then(|| f64::from(extent) * sigma_of_inner(fine) / FINE_STEPS)
+}
 
 /// The bounds of an inner node.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Code {
-    /// From the splat's centre along its axes.
+    /// From the splat's centre along its axes; 0 where spheres are coarse.
     pub center: [i32; 3],
     /// How much wider than the splat's own footprint.
     pub radius: i32,
@@ -57,52 +71,63 @@ fn cones() -> &'static [f32; NO_CONE as usize + 1] {
 
 impl Code {
     /// Gives a node the bounds; `None` for codes of none.
-    pub fn decode(&self, node: &mut Node, shape: &Shape, extent: f32) -> Option<()> {
+    pub fn decode(&self, node: &mut Node, shape: &Shape, extent: f32, fine: Option<f64>) -> Option<()> {
         let largest = shape.largest();
         let own = f64::from(extent) * largest;
-        let fits = (0..=MOST_POWER).contains(&self.size) && (-MOST_POWER..=MOST_POWER).contains(&self.radius);
+        let fits = (0..=MOST_POWER / SIZE).contains(&self.size)
+            && (-MOST_POWER / RADIUS..=MOST_POWER / RADIUS).contains(&self.radius);
         node.cone = *cones().get(usize::try_from(self.cone).ok()?).filter(|_| fits)?;
-        let mut center = DVec3::from(node.splat.center.map(f64::from));
-        for (axis, steps) in shape.axes.iter().zip(self.center) {
-            center += *axis * (f64::from(steps) * own / CENTER_STEPS);
-        }
-        node.center = center.to_array().map(|value| value as f32);
-        node.radius = (own * power(self.radius * (PARTS / RADIUS_STEPS))) as f32;
-        node.size = (FULL_WIDTH * largest * power(self.size * (PARTS / SIZE_STEPS))) as f32;
+        node.center = node.splat.center;
+        node.radius = match fine {
+            None => (own * power(self.radius * RADIUS)) as f32,
+            Some(step) => {
+                let mut center = DVec3::from(node.splat.center.map(f64::from));
+                for (axis, steps) in shape.axes.iter().zip(self.center) {
+                    center += *axis * (f64::from(steps) * step);
+                }
+                node.center = center.to_array().map(|value| value as f32);
+                (f64::from(self.radius) * step) as f32
+            }
+        };
+        node.size = (FULL_WIDTH * largest * power(self.size * SIZE)) as f32;
         (node.center.iter().chain([&node.radius, &node.size]).copied().all(f32::is_finite)).then_some(())
     }
 
     /// The tightest bounds around the children that the centre of the node, nearly, can have. `None` where no code tells
     /// them.
-    pub fn encode(node: &mut Node, children: &[Node], shape: &Shape, extent: f32) -> Option<Self> {
+    pub fn encode(node: &mut Node, children: &[Node], shape: &Shape, extent: f32, fine: Option<f64>) -> Option<Self> {
         let largest = shape.largest();
         let own = f64::from(extent) * largest;
-        let away = node.center().as_dvec3() - DVec3::from(node.splat.center.map(f64::from));
-        let mut code = Self { center: [0; 3], radius: 0, cone: 0, size: 0 };
-        for (steps, axis) in code.center.iter_mut().zip(shape.axes) {
-            let exact = (away.dot(axis) * CENTER_STEPS / own).round();
-            *steps = if exact.abs() < MOST_STEPS { exact as i32 } else { return None };
+        let mut code = Self::default();
+        if let Some(step) = fine {
+            let away = node.center().as_dvec3() - DVec3::from(node.splat.center.map(f64::from));
+            for (steps, axis) in code.center.iter_mut().zip(shape.axes) {
+                let exact = (away.dot(axis) / step).round();
+                *steps = if exact.abs() < MOST_STEPS { exact as i32 } else { return None };
+            }
         }
-        let angle = children.iter().map(|child| joint_angle(node, child)).fold(0.0, f64::max);
-        code.cone = ((angle / CONE_STEP - 1e-9).ceil() as i32).min(NO_CONE);
-        code.decode(node, shape, extent)?;
-        // Estimates, then up to what really holds.
+        code.decode(node, shape, extent, fine)?;
         let center = node.center().as_dvec3();
         let radius = children.iter().map(|child| reach(center, child)).fold(0.0, f64::max) * (1.0 + 1e-12);
         let size = children.iter().map(|child| child.size).fold(0.0, f32::max);
-        code.radius = (f64::from(RADIUS_STEPS) * libm::log2(radius / own)).ceil().clamp(-4096.0, 4096.0) as i32 - 1;
-        code.size = ((f64::from(SIZE_STEPS) * libm::log2(f64::from(size) / (FULL_WIDTH * largest)))
-            .ceil()
-            .clamp(0.0, 4096.0) as i32
-            - 1)
-        .max(0);
-        let cosine = libm::cos(angle);
+        let cosine = children.iter().map(|child| joint_cosine(node, child)).fold(1.0, f64::min) - 1e-12;
+        let narrow = |cone: &f32| *cone == -1.0 || f64::from(*cone) <= cosine;
+        code.cone = cones().iter().position(narrow)? as i32;
+        // Estimates, then up to what really holds.
+        let steps = |ratio: f64, step: i32| {
+            let steps = (logarithm(ratio) * f64::from(PARTS / step)).ceil();
+            steps.clamp(-4096.0, 4096.0) as i32 - 1
+        };
+        code.radius = match fine {
+            None => steps(radius / own, RADIUS),
+            Some(step) => (radius / step).min(MOST_STEPS) as i32,
+        };
+        code.size = steps(f64::from(size) / (FULL_WIDTH * largest), SIZE).max(0);
         loop {
-            code.decode(node, shape, extent)?;
+            code.decode(node, shape, extent, fine)?;
             match () {
                 () if f64::from(node.radius) < radius => code.radius += 1,
                 () if node.size < size => code.size += 1,
-                () if node.cone > -1.0 && f64::from(node.cone) > cosine => code.cone += 1,
                 () => return Some(code),
             }
         }

@@ -1,187 +1,302 @@
-//! Symbols in about as many bits as their frequencies say: range asymmetric numeral systems (Duda 2009), one state for all
-//! columns of a page, bytes in and out.
+//! Symbols in about as many bits as their frequencies say: range asymmetric numeral systems (Duda 2009), four states that
+//! take turns, so that a processor works on several symbols at once; words of 16 bits in and out.
+
+use super::bytes::Cursor;
 
 /// Frequencies of a column add up to 2 to this.
 const SCALE: u32 = 12;
 const WHOLE: u32 = 1 << SCALE;
-/// The state lies between this and 256 times it.
-const LOWEST: u32 = 1 << 23;
-
-/// The code of the frequency that the others leave.
-const REST: u8 = 63;
+/// States lie between this and 65536 times it.
+const LOWEST: u32 = 1 << 16;
+/// States that take turns.
+const STATES: usize = 4;
 
 /// Symbols are below this.
-pub const SYMBOLS: usize = 128;
+pub const SYMBOLS: usize = 127;
 
-/// The frequency of a code: 0 to 7, then with three significant bits.
-fn frequency(code: u8) -> u32 {
-    match code {
-        0..8 => u32::from(code),
-        _ => (4 + u32::from(code & 3)) << (code / 4 - 1),
-    }
+/// The weights that a table can tell: 0, 1, and those with two significant bits.
+const WEIGHTS: u32 = 26;
+
+fn weight(code: u32) -> u32 {
+    if code < 2 { code } else { (2 + code % 2) << (code / 2 - 1) }
 }
 
-/// How often each symbol of a column comes, as the file tells it.
-#[derive(Clone)]
+/// The code of the weight nearest to a count, in parts of it.
+fn nearest(count: u32) -> u32 {
+    if count < 2 {
+        return count;
+    }
+    let power = count.ilog2();
+    // In parts of 2 to the power: from √1.5 up 1.5 is nearer, from √3 up 2 is.
+    let part = (u64::from(count) << 16) >> power;
+    (2 * power + u32::from(part >= 80_264) + u32::from(part >= 113_512)).min(WEIGHTS - 1)
+}
+
+/// How often each symbol of a column comes, in parts of [`WHOLE`].
+#[derive(Clone, Copy)]
 pub struct Table {
-    /// For each symbol up to the last that comes.
-    codes: Vec<u8>,
-    frequencies: Vec<u32>,
-    starts: Vec<u32>,
+    /// Symbols are below this.
+    length: usize,
+    frequencies: [u16; SYMBOLS],
 }
 
 impl Table {
-    /// The table for symbols with these counts.
-    pub fn of(counts: &[u32; SYMBOLS]) -> Self {
-        let total: u32 = counts.iter().sum();
-        let last = counts.iter().rposition(|&count| count > 0).unwrap_or(0);
-        let most = (0..=last).max_by_key(|&symbol| counts[symbol]).unwrap_or(0);
-        let mut codes = vec![0; last + 1];
-        let mut left = WHOLE;
-        for symbol in (0..=last).filter(|&symbol| symbol != most && counts[symbol] > 0) {
-            let wanted = f64::from(counts[symbol]) * f64::from(WHOLE) / f64::from(total);
-            let miss = |&code: &u8| (f64::from(frequency(code)) - wanted).abs();
-            let code = (1..REST).take_while(|&code| frequency(code) < WHOLE).min_by(|a, b| miss(a).total_cmp(&miss(b)));
-            codes[symbol] = code.unwrap_or(1);
-            left = left.saturating_sub(frequency(codes[symbol]));
+    /// Writes the table for symbols with these counts, all below 8192: a weight for each up to the last that comes, each as
+    /// the difference to the one before, by a code of Rice's.
+    pub fn write(counts: &[u32; SYMBOLS], length: usize, bits: &mut Bits) -> Self {
+        let mut before = 0;
+        let mut codes = [0; SYMBOLS];
+        for (code, &count) in codes.iter_mut().zip(&counts[..length]) {
+            *code = nearest(count);
+            let difference = *code as i32 - before;
+            let folded = (difference << 1 ^ difference >> 31) as u32;
+            bits.put((1 << (folded >> 1)) - 1, (folded >> 1) + 1);
+            bits.put(folded & 1, 1);
+            before = *code as i32;
         }
-        // Rounded up too much, which takes many rare symbols: from the most frequent down, each gives something back.
-        while left == 0 {
-            let widest = (0..=last).filter(|&symbol| symbol != most).max_by_key(|&symbol| codes[symbol]).unwrap_or(0);
-            codes[widest] -= 1;
-            let others = (0..=last).filter(|&symbol| symbol != most).map(|symbol| frequency(codes[symbol]));
-            left = WHOLE.saturating_sub(others.sum());
-        }
-        codes[most] = REST;
-        Self::from_codes(codes).expect("the frequencies add up")
-    }
-
-    fn from_codes(codes: Vec<u8>) -> Option<Self> {
-        let listed = codes.iter().filter(|&&code| code != REST);
-        let sum: u64 = listed.clone().map(|&code| u64::from(frequency(code))).sum();
-        let left = u64::from(WHOLE).checked_sub(sum).filter(|&left| left > 0)? as u32;
-        if listed.count() + 1 != codes.len() || codes.len() > SYMBOLS {
-            return None;
-        }
-        let frequencies: Vec<u32> =
-            codes.iter().map(|&code| if code == REST { left } else { frequency(code) }).collect();
-        let starts = frequencies.iter().scan(0, |next, &frequency| {
-            let start = *next;
-            *next += frequency;
-            Some(start)
-        });
-        Some(Self { starts: starts.collect(), codes, frequencies })
-    }
-
-    /// How many symbols, then six bits for each, lowest first.
-    pub fn write(&self, out: &mut Vec<u8>) {
-        out.push(self.codes.len() as u8);
-        let (mut held, mut count) = (0u32, 0);
-        for &code in &self.codes {
-            held |= u32::from(code) << count;
-            count += 6;
-            while count >= 8 {
-                out.push(held as u8);
-                held >>= 8;
-                count -= 8;
-            }
-        }
-        if count > 0 {
-            out.push(held as u8);
-        }
+        Self::of(&codes[..length]).expect("what was counted has frequencies")
     }
 
     /// Reads a table; `None` for what is none.
-    pub fn read(cursor: &mut super::bytes::Cursor) -> Option<Self> {
-        let length = usize::from(cursor.u8()?);
-        let bytes = cursor.take((length * 6).div_ceil(8))?;
-        let code = |symbol: usize| {
-            let at = symbol * 6;
-            let next = bytes.get(at / 8 + 1).copied().unwrap_or(0);
-            (u16::from_le_bytes([bytes[at / 8], next]) >> (at % 8) & 63) as u8
-        };
-        Self::from_codes((0..length).map(code).collect())
+    pub fn read(length: usize, bits: &mut BitReader) -> Option<Self> {
+        let mut codes = [0; SYMBOLS];
+        let mut before = 0;
+        for code in codes.get_mut(..length)? {
+            let mut folded = 0;
+            while bits.take(1)? == 1 {
+                folded += 2;
+                if folded > 2 * WEIGHTS {
+                    return None;
+                }
+            }
+            folded |= bits.take(1)?;
+            before += (folded >> 1) as i32 ^ -((folded & 1) as i32);
+            *code = u32::try_from(before).ok().filter(|&code| code < WEIGHTS)?;
+        }
+        Self::of(&codes[..length])
+    }
+
+    /// Frequencies in proportion to the weights, none less than 1; the largest takes what is left over or missing.
+    fn of(codes: &[u32]) -> Option<Self> {
+        let total: u32 = codes.iter().map(|&code| weight(code)).sum();
+        let mut frequencies = [0; SYMBOLS];
+        let (mut left, mut most) = (WHOLE as i32, 0);
+        for (symbol, &code) in codes.iter().enumerate().filter(|(_, code)| **code > 0) {
+            let frequency = (weight(code) * WHOLE / total).max(1);
+            frequencies[symbol] = frequency as u16;
+            left -= frequency as i32;
+            if code > codes[most] {
+                most = symbol;
+            }
+        }
+        let largest = i32::from(frequencies[most]) + left;
+        frequencies[most] = u16::try_from(largest).ok().filter(|&largest| total > 0 && largest > 0)?;
+        Some(Self { length: codes.len(), frequencies })
+    }
+
+    fn starts(&self) -> [u16; SYMBOLS] {
+        let mut next = 0;
+        self.frequencies.map(|frequency| {
+            next += frequency;
+            next - frequency
+        })
+    }
+
+    /// For each number below [`WHOLE`]: frequency − 1, how far from the start, and the symbol, 12, 12 and 8 bits.
+    fn slots(&self, slots: &mut Slots) {
+        let mut at = 0;
+        for (symbol, &frequency) in self.frequencies[..self.length].iter().enumerate() {
+            let head = (u32::from(frequency).wrapping_sub(1)) << 20 | symbol as u32;
+            for (step, slot) in (0..).zip(&mut slots.0[at..at + usize::from(frequency)]) {
+                *slot = head | step << 8;
+            }
+            at += usize::from(frequency);
+        }
+    }
+}
+
+/// What decoding looks up; room that columns share.
+pub struct Slots([u32; WHOLE as usize]);
+
+impl Slots {
+    pub fn new() -> Self {
+        Self([0; WHOLE as usize])
     }
 }
 
 /// Encodes columns, the last symbol first.
 pub struct Encoder {
-    state: u32,
-    /// Last byte first.
-    bytes: Vec<u8>,
+    states: [u32; STATES],
+    /// How many symbols are to come.
+    left: usize,
+    /// Last word first.
+    words: Vec<u16>,
 }
 
 impl Encoder {
-    pub fn new() -> Self {
-        Self { state: LOWEST, bytes: Vec::new() }
+    /// For `count` symbols in all.
+    pub fn new(count: usize) -> Self {
+        Self { states: [LOWEST; STATES], left: count, words: Vec::with_capacity(count / 2) }
     }
 
     /// Puts a column before those that are there.
     pub fn put(&mut self, symbols: &[u8], table: &Table) {
+        let starts = table.starts();
         for &symbol in symbols.iter().rev() {
-            let frequency = table.frequencies[usize::from(symbol)];
-            let most = ((LOWEST >> SCALE) << 8) * frequency;
-            while self.state >= most {
-                self.bytes.push(self.state as u8);
-                self.state >>= 8;
+            self.left -= 1;
+            let state = &mut self.states[self.left % STATES];
+            let frequency = u32::from(table.frequencies[usize::from(symbol)]);
+            if u64::from(*state) >= u64::from(frequency) << (32 - SCALE) {
+                self.words.push(*state as u16);
+                *state >>= 16;
             }
-            self.state =
-                ((self.state / frequency) << SCALE) + self.state % frequency + table.starts[usize::from(symbol)];
+            *state = ((*state / frequency) << SCALE) + *state % frequency + u32::from(starts[usize::from(symbol)]);
         }
     }
 
-    /// The bytes, the state first.
-    pub fn finish(mut self) -> Vec<u8> {
-        self.bytes.extend(self.state.to_be_bytes());
-        self.bytes.reverse();
-        self.bytes
+    /// The bytes, the states first.
+    pub fn finish(self, out: &mut Vec<u8>) {
+        self.states.iter().for_each(|state| out.extend(state.to_le_bytes()));
+        self.words.iter().rev().for_each(|word| out.extend(word.to_le_bytes()));
     }
 }
 
 /// Decodes what an [`Encoder`] gave, the first symbol first.
 pub struct Decoder<'a> {
-    state: u32,
-    rest: &'a [u8],
+    states: [u32; STATES],
+    /// Symbols that were taken.
+    taken: usize,
+    words: std::slice::Iter<'a, [u8; 2]>,
 }
 
 impl<'a> Decoder<'a> {
     pub fn new(bytes: &'a [u8]) -> Option<Self> {
-        let (state, rest) = bytes.split_first_chunk()?;
-        Some(Self { state: u32::from_le_bytes(*state), rest })
+        let mut cursor = Cursor::new(bytes);
+        let mut states = [0; STATES];
+        for state in &mut states {
+            *state = cursor.u32()?;
+        }
+        let (words, []) = cursor.take(cursor.remaining())?.as_chunks() else { return None };
+        Some(Self { states, taken: 0, words: words.iter() })
     }
 
-    /// The next symbols; `None` where the bytes end before.
-    pub fn take(&mut self, count: usize, table: &Table) -> Option<Vec<u8>> {
-        let mut symbols = [0u8; WHOLE as usize];
-        for (symbol, (&start, &frequency)) in table.starts.iter().zip(&table.frequencies).enumerate() {
-            symbols[start as usize..(start + frequency) as usize].fill(symbol as u8);
-        }
-        let mut out = Vec::with_capacity(count);
-        for _ in 0..count {
-            let place = self.state & (WHOLE - 1);
-            let symbol = symbols[place as usize];
-            let at = usize::from(symbol);
-            self.state = table.frequencies[at] * (self.state >> SCALE) + place - table.starts[at];
-            while self.state < LOWEST {
-                let (&next, rest) = self.rest.split_first()?;
-                self.state = self.state << 8 | u32::from(next);
-                self.rest = rest;
+    /// Gives the next symbols to `each`; `None` where the bytes end before, or where it is none.
+    pub fn take(
+        &mut self,
+        count: usize,
+        table: &Table,
+        slots: &mut Slots,
+        mut each: impl FnMut(u8) -> Option<()>,
+    ) -> Option<()> {
+        table.slots(slots);
+        // The states in the order of their turns.
+        let mut states: [u32; STATES] = std::array::from_fn(|turn| self.states[(self.taken + turn) % STATES]);
+        let mut step = |state: &mut u32| {
+            let slot = slots.0[(*state & (WHOLE - 1)) as usize];
+            *state = ((slot >> 20) + 1) * (*state >> SCALE) + (slot >> 8 & (WHOLE - 1));
+            if *state < LOWEST {
+                *state = *state << 16 | u32::from(u16::from_le_bytes(*self.words.next()?));
             }
-            out.push(symbol);
+            each(slot as u8)
+        };
+        for _ in 0..count / STATES {
+            step(&mut states[0])?;
+            step(&mut states[1])?;
+            step(&mut states[2])?;
+            step(&mut states[3])?;
         }
-        Some(out)
+        for state in &mut states[..count % STATES] {
+            step(state)?;
+        }
+        for (turn, state) in states.into_iter().enumerate() {
+            self.states[(self.taken + turn) % STATES] = state;
+        }
+        self.taken += count;
+        Some(())
     }
 
     /// Whether all is taken, and was what was put.
     pub fn is_at_end(&self) -> bool {
-        self.rest.is_empty() && self.state == LOWEST
+        self.words.len() == 0 && self.states == [LOWEST; STATES]
+    }
+}
+
+/// Bits, lowest first.
+#[derive(Default)]
+pub struct Bits {
+    bytes: Vec<u8>,
+    held: u64,
+    count: u32,
+}
+
+impl Bits {
+    /// Appends the lowest `count` bits of a number, 32 at most.
+    pub fn put(&mut self, value: u32, count: u32) {
+        self.held |= (u64::from(value) & ((1 << count) - 1)) << self.count;
+        self.count += count;
+        if self.count >= 32 {
+            self.bytes.extend((self.held as u32).to_le_bytes());
+            self.held >>= 32;
+            self.count -= 32;
+        }
+    }
+
+    pub fn finish(mut self) -> Vec<u8> {
+        self.bytes.extend(&self.held.to_le_bytes()[..self.count.div_ceil(8) as usize]);
+        self.bytes
+    }
+}
+
+#[derive(Clone)]
+pub struct BitReader<'a> {
+    rest: &'a [u8],
+    held: u64,
+    count: u32,
+}
+
+impl<'a> BitReader<'a> {
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self { rest: bytes, held: 0, count: 0 }
+    }
+
+    /// The next bits, 32 at most; `None` where they end before.
+    #[inline]
+    pub fn take(&mut self, count: u32) -> Option<u32> {
+        if self.count < count {
+            self.fill();
+            if self.count < count {
+                return None;
+            }
+        }
+        let value = self.held & ((1 << count) - 1);
+        self.held >>= count;
+        self.count -= count;
+        Some(value as u32)
+    }
+
+    fn fill(&mut self) {
+        if let Some((word, rest)) = self.rest.split_first_chunk() {
+            self.held |= u64::from(u32::from_le_bytes(*word)) << self.count;
+            self.count += 32;
+            self.rest = rest;
+        } else {
+            for byte in std::mem::take(&mut self.rest) {
+                self.held |= u64::from(*byte) << self.count;
+                self.count += 8;
+            }
+        }
+    }
+
+    /// Fewer than eight bits may be left, all 0.
+    pub fn is_at_end(&self) -> bool {
+        self.rest.is_empty() && self.count < 8 && self.held == 0
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hierarchy::{file::bytes::Cursor, testing::Random};
+    use crate::hierarchy::testing::Random;
 
     #[test]
     fn tables_add_up_and_come_back() {
@@ -191,35 +306,51 @@ mod tests {
             let last = 1 + random.below(SYMBOLS - 1);
             counts[..=last].iter_mut().for_each(|count| *count = (random.next().powi(round % 12) * 4096.0) as u32);
             counts[last] = 1;
-            let table = Table::of(&counts);
-            let mut bytes = Vec::new();
-            table.write(&mut bytes);
-            let read = Table::read(&mut Cursor::new(&bytes)).unwrap();
-            assert_eq!((&read.frequencies, read.frequencies.iter().sum::<u32>()), (&table.frequencies, WHOLE));
+            let mut bits = Bits::default();
+            let table = Table::write(&counts, last + 1, &mut bits);
+            let bytes = bits.finish();
+            let mut reader = BitReader::new(&bytes);
+            let read = Table::read(last + 1, &mut reader).unwrap();
+            assert!(reader.is_at_end());
+            assert_eq!(read.frequencies, table.frequencies);
+            assert_eq!(read.frequencies.iter().map(|&f| u32::from(f)).sum::<u32>(), WHOLE);
             assert!(counts.iter().zip(&table.frequencies).all(|(&count, &frequency)| count == 0 || frequency > 0));
+        }
+    }
+
+    #[test]
+    fn weights_are_near_what_was_counted() {
+        for count in 0..=4096 {
+            let found = weight(nearest(count));
+            assert!(count < 4 && found == count || (0.81..1.23).contains(&(f64::from(found) / f64::from(count))));
         }
     }
 
     #[test]
     fn symbols_come_back() {
         let mut random = Random(4);
-        let columns: Vec<Vec<u8>> = (0..30)
-            .map(|column| (0..column * 40).map(|_| (random.next().powi(3) * column as f64 * 4.0) as u8).collect())
+        let columns: Vec<Vec<u8>> = (1..30)
+            .map(|column| (0..column * 39).map(|_| (random.next().powi(3) * column as f64 * 4.0) as u8).collect())
             .collect();
-        let tables: Vec<Table> = columns
-            .iter()
-            .map(|column| {
-                let mut counts = [0; SYMBOLS];
-                column.iter().for_each(|&symbol| counts[usize::from(symbol)] += 1);
-                Table::of(&counts)
-            })
-            .collect();
-        let mut encoder = Encoder::new();
+        let table = |column: &Vec<u8>| {
+            let mut counts = [0; SYMBOLS];
+            column.iter().for_each(|&symbol| counts[usize::from(symbol)] += 1);
+            Table::write(&counts, SYMBOLS, &mut Bits::default())
+        };
+        let tables: Vec<Table> = columns.iter().map(table).collect();
+        let mut encoder = Encoder::new(columns.iter().map(Vec::len).sum());
         columns.iter().zip(&tables).rev().for_each(|(column, table)| encoder.put(column, table));
-        let bytes = encoder.finish();
+        let mut bytes = Vec::new();
+        encoder.finish(&mut bytes);
         let mut decoder = Decoder::new(&bytes).unwrap();
         for (column, table) in columns.iter().zip(&tables) {
-            assert_eq!(decoder.take(column.len(), table).as_ref(), Some(column));
+            let mut found = Vec::new();
+            let each = |symbol| {
+                found.push(symbol);
+                Some(())
+            };
+            decoder.take(column.len(), table, &mut Slots::new(), each).unwrap();
+            assert_eq!(found, *column);
         }
         assert!(decoder.is_at_end());
     }

@@ -4,159 +4,147 @@ use super::{
     bounds,
     bytes::{Cursor, Put},
     column::{Columns, Planes},
-    octahedron,
     quantise::{Axes, Before, Code, Shape},
 };
 use crate::{
     hierarchy::{MOST_CHILDREN, Node},
     splat::Splat,
 };
-use glam::DVec3;
 
 /// The codes of the splats of a page, and the shapes behind those of its inner nodes.
 pub struct Codes {
-    begin: Before,
-    codes: Vec<Code>,
-    pub shapes: Vec<Shape>,
+    strength: f32,
+    center: [f32; 3],
+    leaves: Group,
+    inner: Group,
+    shapes: Vec<Shape>,
+}
+
+impl Codes {
+    /// The shapes of inner nodes, each behind the code of its largest standard deviation.
+    pub fn shapes(&self) -> impl Iterator<Item = (i32, Shape)> {
+        self.inner.sigmas().iter().copied().zip(self.shapes.iter().copied())
+    }
 }
 
 /// Replaces the splats of a page by those that will be read, and gives leaves their bounds. `None` where a splat has no
 /// code; the nodes may be changed then.
 pub fn quantise(nodes: &mut [Node], extent: f32) -> Option<Codes> {
-    let normals: DVec3 = nodes.iter().filter_map(|node| octahedron::unpacked(node.splat.normal)).sum();
-    let begin = Before {
-        facing: octahedron::facing(normals),
-        strength: nodes.iter().map(|node| node.splat.strength).find(|&strength| strength > 0.0).unwrap_or(1.0),
-        center: nodes[0].splat.center,
-        normal: [0; 2],
-        color: [0; 3],
-        direction: None,
+    let strength = nodes.iter().map(|node| node.splat.strength).find(|&strength| strength > 0.0).unwrap_or(1.0);
+    let center = nodes[0].splat.center;
+    let leaves = nodes.iter().filter(|node| node.is_leaf()).count();
+    let mut out = Codes {
+        strength,
+        center,
+        leaves: Group::with_room(leaves),
+        inner: Group::with_room(nodes.len() - leaves),
+        shapes: Vec::with_capacity(nodes.len() - leaves),
     };
-    let mut before = begin;
-    let mut codes = Vec::with_capacity(nodes.len());
-    let mut shapes = Vec::new();
+    let mut before = Before::new(strength, center);
     for node in nodes {
         let (code, splat, shape) = Code::encode(&node.splat, node.is_leaf(), &mut before)?;
         node.splat = splat;
         if node.is_leaf() {
             bounds::leaf(node, &shape, extent);
+            out.leaves.push(&code);
         } else {
-            shapes.push(shape);
+            out.shapes.push(shape);
+            out.inner.push(&code);
         }
-        codes.push(code);
     }
-    Some(Codes { begin, codes, shapes })
+    Some(out)
 }
 
-/// One quantity of some codes.
-type Take = fn(&Code) -> i32;
-
-/// Those of all nodes but whose order follows: axes first, as they tell which others a node has.
-const SHAPE: [Take; 3] = [|code| code.sigma, |code| code.ratio, |code| code.thickness];
-const ANGLE: [Take; 1] = [|code| code.angle];
-const TURN: [Take; 4] = [|code| code.turn[0], |code| code.turn[1], |code| code.turn[2], |code| code.turn[3]];
-const NORMAL: [Take; 2] = [|code| code.normal[0], |code| code.normal[1]];
-const REST: [Take; 8] = [
-    |code| code.position[0],
-    |code| code.position[1],
-    |code| code.position[2],
-    |code| code.color[0],
-    |code| code.color[1],
-    |code| code.color[2],
-    |code| code.color[3],
-    |code| code.strength,
-];
-
-/// The page's bytes; `bounds` are those of its inner nodes.
-pub fn encode(nodes: &[Node], codes: &Codes, bounds: &[bounds::Code], out: &mut Vec<u8>) {
-    out.push(codes.begin.facing);
-    out.f32s(&[codes.begin.strength]);
-    out.f32s(&codes.begin.center);
-    let mut columns = Columns::default();
-    columns.push(&nodes.iter().map(|node| node.children as i32).collect::<Vec<_>>());
-    for is_leaf in [true, false] {
-        let some = nodes.iter().zip(&codes.codes).filter(|(node, _)| node.is_leaf() == is_leaf).map(|(_, code)| *code);
-        let some: Vec<Code> = some.collect();
-        let mut push = |which: &dyn Fn(&Code) -> bool, takes: &[Take]| {
-            for take in takes {
-                columns.push(&some.iter().filter(|code| which(code)).map(take).collect::<Vec<_>>());
-            }
-        };
-        push(&|_| true, &[|code| code.axes as i32]);
-        push(&|_| true, &SHAPE);
-        push(&|code| code.axes == Axes::Normal, &ANGLE);
-        push(&|code| code.axes != Axes::Normal, &TURN);
-        push(&|code| code.axes != Axes::Bare, &NORMAL);
-        push(&|_| true, &REST);
-    }
-    let mut push = |take: &dyn Fn(&bounds::Code) -> i32| columns.push(&bounds.iter().map(take).collect::<Vec<_>>());
-    (0..3).for_each(|axis| push(&|code| code.center[axis]));
-    push(&|code| code.radius);
-    push(&|code| code.cone);
-    push(&|code| code.size);
-    columns.finish(out);
-}
-
-/// The columns of leaves or of inner nodes, ready to be taken one by one.
+/// The codes of leaves or those of inner nodes, in columns.
 struct Group {
-    axes: Vec<Axes>,
-    shape: [Vec<i32>; 3],
-    angle: std::vec::IntoIter<i32>,
-    turn: [std::vec::IntoIter<i32>; 4],
-    normal: [std::vec::IntoIter<i32>; 2],
-    rest: [Vec<i32>; 8],
-    at: usize,
+    /// Those that every node has: axes, shape, position, colour, strength.
+    all: [Vec<i32>; 12],
+    /// Of nodes with the axes of their normal.
+    angle: Vec<i32>,
+    /// Of nodes with other axes.
+    turn: [Vec<i32>; 4],
+    /// Of nodes with a normal.
+    normal: [Vec<i32>; 2],
+}
+
+/// How many codes of a group were taken, of each kind.
+#[derive(Default)]
+struct Taken {
+    all: usize,
+    angle: usize,
+    turn: usize,
+    normal: usize,
 }
 
 impl Group {
-    fn read(planes: &mut Planes, count: usize) -> Result<Self, String> {
-        let axes: Option<Vec<Axes>> = planes.column(count)?.into_iter().map(Axes::of).collect();
-        let axes = axes.ok_or("the axes of a node are none")?;
-        let of = |which: &dyn Fn(Axes) -> bool| axes.iter().filter(|&&axes| which(axes)).count();
-        let [flat, normal] = [of(&|axes| axes == Axes::Normal), of(&|axes| axes != Axes::Bare)];
-        Ok(Self {
-            shape: columns(planes, count)?,
-            angle: planes.column(flat)?.into_iter(),
-            turn: columns(planes, count - flat)?.map(Vec::into_iter),
-            normal: columns(planes, normal)?.map(Vec::into_iter),
-            rest: columns(planes, count)?,
-            axes,
-            at: 0,
-        })
+    fn with_room(count: usize) -> Self {
+        let room = || Vec::with_capacity(count);
+        Self {
+            all: std::array::from_fn(|_| room()),
+            angle: room(),
+            turn: [const { Vec::new() }; 4],
+            normal: std::array::from_fn(|_| room()),
+        }
     }
 
-    fn next(&mut self) -> Option<Code> {
-        let at = self.at;
-        self.at += 1;
-        let axes = *self.axes.get(at)?;
-        let [sigma, ratio, thickness] = [0, 1, 2].map(|i| self.shape[i][at]);
-        let rest = |i: usize| self.rest[i][at];
-        let mut code = Code {
-            axes,
-            sigma,
-            ratio,
-            thickness,
-            angle: 0,
-            turn: [0; 4],
-            normal: [0; 2],
-            position: [rest(0), rest(1), rest(2)],
-            color: [rest(3), rest(4), rest(5), rest(6)],
-            strength: rest(7),
-        };
-        match axes {
-            Axes::Normal => code.angle = self.angle.next()?,
-            Axes::Own | Axes::Bare => {
-                for (part, column) in code.turn.iter_mut().zip(&mut self.turn) {
-                    *part = column.next()?;
-                }
-            }
+    fn push(&mut self, code: &Code) {
+        let Code { axes, sigma, ratio, thickness, position: [x, y, z], color: [luma, orange, green, alpha], .. } =
+            *code;
+        let all = [axes as i32, sigma, ratio, thickness, x, y, z, luma, orange, green, alpha, code.strength];
+        self.all.iter_mut().zip(all).for_each(|(column, value)| column.push(value));
+        if axes == Axes::Normal {
+            self.angle.push(code.angle);
+        } else {
+            self.turn.iter_mut().zip(code.turn).for_each(|(column, value)| column.push(value));
         }
         if axes != Axes::Bare {
-            for (part, column) in code.normal.iter_mut().zip(&mut self.normal) {
-                *part = column.next()?;
-            }
+            self.normal.iter_mut().zip(code.normal).for_each(|(column, value)| column.push(value));
         }
-        Some(code)
+    }
+
+    fn take(&self, taken: &mut Taken) -> Option<Code> {
+        let mut all = [0; 12];
+        for (value, column) in all.iter_mut().zip(&self.all) {
+            *value = *column.get(taken.all)?;
+        }
+        let [axes, sigma, ratio, thickness, x, y, z, luma, orange, green, alpha, strength] = all;
+        let axes = Axes::of(axes)?;
+        let (mut angle, mut turn, mut normal) = (0, [0; 4], [0; 2]);
+        taken.all += 1;
+        if axes == Axes::Normal {
+            angle = *self.angle.get(taken.angle)?;
+            taken.angle += 1;
+        } else {
+            for (value, column) in turn.iter_mut().zip(&self.turn) {
+                *value = *column.get(taken.turn)?;
+            }
+            taken.turn += 1;
+        }
+        if axes != Axes::Bare {
+            for (value, column) in normal.iter_mut().zip(&self.normal) {
+                *value = *column.get(taken.normal)?;
+            }
+            taken.normal += 1;
+        }
+        let (position, color) = ([x, y, z], [luma, orange, green, alpha]);
+        Some(Code { axes, sigma, ratio, thickness, angle, turn, normal, position, color, strength })
+    }
+
+    /// The codes of the largest standard deviations.
+    fn sigmas(&self) -> &[i32] {
+        &self.all[1]
+    }
+
+    fn columns(&self) -> impl Iterator<Item = &Vec<i32>> {
+        self.all.iter().chain([&self.angle]).chain(&self.turn).chain(&self.normal)
+    }
+
+    fn read(planes: &mut Planes, count: usize) -> Result<Self, String> {
+        let all: [Vec<i32>; 12] = columns(planes, count)?;
+        let of = |which: Axes| all[0].iter().filter(|&&axes| axes == which as i32).count();
+        let (flat, bare) = (of(Axes::Normal), of(Axes::Bare));
+        let [angle] = columns(planes, flat)?;
+        Ok(Self { all, angle, turn: columns(planes, count - flat)?, normal: columns(planes, count - bare)? })
     }
 }
 
@@ -168,42 +156,79 @@ fn columns<const N: usize>(planes: &mut Planes, count: usize) -> Result<[Vec<i32
     Ok(out)
 }
 
+/// The page's bytes; `bounds` are those of its inner nodes, those with a `fine` code of their largest standard deviation, or
+/// a larger one, fine.
+pub fn encode(nodes: &[Node], codes: &Codes, bounds: &[bounds::Code], fine: i32, out: &mut Vec<u8>) {
+    out.f32s(&[codes.strength]);
+    out.f32s(&codes.center);
+    out.u32(fine as u32);
+    let mut columns = Columns::default();
+    let mut values: Vec<i32> = nodes.iter().map(|node| stored_children(node.children)).collect();
+    columns.push(&values);
+    codes.leaves.columns().chain(codes.inner.columns()).for_each(|column| columns.push(column));
+    let finer = codes.inner.sigmas().iter().zip(bounds).filter(|&(&sigma, _)| sigma >= fine);
+    let finer: Vec<bounds::Code> = finer.map(|(_, code)| *code).collect();
+    let mut push = |bounds: &[bounds::Code], take: &dyn Fn(&bounds::Code) -> i32| {
+        values.clear();
+        values.extend(bounds.iter().map(take));
+        columns.push(&values);
+    };
+    (0..3).for_each(|axis| push(&finer, &|code| code.center[axis]));
+    push(bounds, &|code| code.radius);
+    push(bounds, &|code| code.cone);
+    push(bounds, &|code| code.size);
+    columns.finish(out);
+}
+
+/// Children as a column has them: the most, which many have, as a small number.
+fn stored_children(children: u32) -> i32 {
+    if children == MOST_CHILDREN as u32 { -1 } else { children as i32 }
+}
+
+fn children(stored: i32) -> Option<u8> {
+    match stored {
+        -1 => Some(MOST_CHILDREN as u8),
+        _ => u8::try_from(stored).ok().filter(|&children| usize::from(children) < MOST_CHILDREN),
+    }
+}
+
 /// The nodes of a page of `count`.
 pub fn decode(bytes: &[u8], count: usize, first_child: u32, extent: f32) -> Result<Vec<Node>, String> {
     let mut cursor = Cursor::new(bytes);
-    let mut begin = || Some((cursor.u8()?, cursor.f32()?, cursor.f32s()?));
-    let (facing, strength, center) = begin().ok_or("it ends within its beginning")?;
-    if facing >= 6 {
-        return Err(format!("it faces the unknown axis {facing}"));
-    }
-    let mut before = Before { facing, strength, center, normal: [0; 2], color: [0; 3], direction: None };
+    let mut begin = || Some((cursor.f32()?, cursor.f32s()?, cursor.u32()? as i32));
+    let (strength, center, fine) = begin().ok_or("it ends within its beginning")?;
     let mut planes = Planes::new(cursor.take(cursor.remaining()).unwrap_or(&[]))?;
-    let children = planes.column(count)?;
-    if let Some(odd) = children.iter().find(|&&children| !(0..=MOST_CHILDREN as i32).contains(&children)) {
-        return Err(format!("a node has {odd} children"));
-    }
+    let children: Option<Vec<u8>> = planes.column(count)?.into_iter().map(children).collect();
+    let children = children.ok_or("a node has too many children")?;
     let leaves = children.iter().filter(|&&children| children == 0).count();
-    let mut groups = [Group::read(&mut planes, leaves)?, Group::read(&mut planes, count - leaves)?];
-    let bounds: [Vec<i32>; 6] = columns(&mut planes, count - leaves)?;
+    let groups = [Group::read(&mut planes, leaves)?, Group::read(&mut planes, count - leaves)?];
+    let finer = groups[1].sigmas().iter().filter(|&&sigma| sigma >= fine).count();
+    let centers: [Vec<i32>; 3] = columns(&mut planes, finer)?;
+    let [radius, cone, size] = columns(&mut planes, count - leaves)?;
     planes.end()?;
+    let mut before = Before::new(strength, center);
+    let mut taken = [Taken::default(), Taken::default()];
+    let (mut inner, mut centered) = (0, 0);
     let mut next = first_child;
-    let mut inner = 0;
     let mut nodes = Vec::with_capacity(count);
     for children in children {
         let is_leaf = children == 0;
         let fail = || format!("node {} has a code that tells of none", nodes.len());
-        let code = groups[usize::from(!is_leaf)].next().ok_or_else(fail)?;
+        let group = usize::from(!is_leaf);
+        let code = groups[group].take(&mut taken[group]).ok_or_else(fail)?;
         let (splat, shape) = code.decode(is_leaf, &mut before).ok_or_else(fail)?;
         let mut node = blank(splat);
         if is_leaf {
             bounds::leaf(&mut node, &shape, extent);
         } else {
-            let [x, y, z, radius, cone, size] = [0, 1, 2, 3, 4, 5].map(|i| bounds[i][inner]);
+            let step = bounds::fine_step(code.sigma, fine, extent);
+            let center = [0, 1, 2].map(|axis| if step.is_some() { centers[axis][centered] } else { 0 });
+            centered += usize::from(step.is_some());
+            let code = bounds::Code { center, radius: radius[inner], cone: cone[inner], size: size[inner] };
+            code.decode(&mut node, &shape, extent, step).ok_or_else(fail)?;
             inner += 1;
-            let code = bounds::Code { center: [x, y, z], radius, cone, size };
-            code.decode(&mut node, &shape, extent).ok_or_else(fail)?;
-            (node.first_child, node.children) = (next, children as u32);
-            next = next.checked_add(children as u32).ok_or("it has more children than can be numbered")?;
+            (node.first_child, node.children) = (next, u32::from(children));
+            next = next.checked_add(u32::from(children)).ok_or("it has more children than can be numbered")?;
         }
         nodes.push(node);
     }

@@ -8,12 +8,13 @@ mod bounds;
 mod bytes;
 mod check;
 mod column;
+mod direction;
 mod directory;
 mod entropy;
 mod header;
 mod lossless;
 mod lossy;
-mod octahedron;
+
 mod page;
 mod pages;
 mod quantise;

@@ -2,13 +2,12 @@
 
 use super::{
     bounds, lossless, lossy,
-    pages::{Run, levels, reach, round_up},
+    pages::{Run, levels, pages, reach, round_up},
     quantise::Shape,
 };
 use crate::{hierarchy::Node, splat::decode_normal};
 use glam::Vec3;
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// The first byte of a page.
 const LOSSLESS: u8 = 0;
@@ -17,18 +16,23 @@ const LOSSY: u8 = 1;
 /// A block in pages, and its nodes as these will be read.
 pub struct Coded {
     pub nodes: Vec<Node>,
+    pub runs: Vec<Run>,
     pub pages: Vec<Vec<u8>>,
 }
 
 /// Encodes a block whose nodes are in order.
-pub fn encode(nodes: &[Node], runs: &[Run], extent: f32, is_lossless: bool) -> Coded {
-    let mut nodes = nodes.to_vec();
+pub fn encode(nodes: &[Node], extent: f32, is_lossless: bool) -> Coded {
     if is_lossless {
+        let runs = pages(nodes);
         let pages = runs.par_iter().map(|run| lossless_page(&nodes[run.nodes.clone()])).collect();
-        return Coded { nodes, pages };
+        return Coded { nodes: nodes.to_vec(), runs, pages };
     }
-    let codes = quantise(&mut nodes, runs, extent);
-    let bounds = bound(&mut nodes, &codes, extent);
+    let mut nodes = line_up(nodes);
+    let runs = pages(&nodes);
+    let levels = levels(&nodes);
+    let fine = bounds::fine_from(&nodes[0]);
+    let codes = quantise(&mut nodes, &runs, extent);
+    let bounds = bound(&mut nodes, &levels, fine, &codes, extent);
     let firsts = codes.iter().scan(0, |next, codes| {
         let first = *next;
         *next += codes.inner;
@@ -40,14 +44,14 @@ pub fn encode(nodes: &[Node], runs: &[Run], extent: f32, is_lossless: bool) -> C
         match (&page.codes, own) {
             (Some(codes), Some(own)) => {
                 let mut out = vec![LOSSY];
-                lossy::encode(&nodes[run.nodes.clone()], codes, &own, &mut out);
+                lossy::encode(&nodes[run.nodes.clone()], codes, &own, fine, &mut out);
                 out
             }
             _ => lossless_page(&nodes[run.nodes.clone()]),
         }
     };
     let pages = runs.par_iter().zip(&codes).zip(&firsts).map(page).collect();
-    Coded { nodes, pages }
+    Coded { nodes, runs, pages }
 }
 
 fn lossless_page(nodes: &[Node]) -> Vec<u8> {
@@ -66,16 +70,14 @@ struct PageCodes {
 
 /// Replaces all splats by those that will be read.
 fn quantise(nodes: &mut [Node], runs: &[Run], extent: f32) -> Vec<PageCodes> {
-    let groups: Vec<(Vec<Range<usize>>, &Run)> = runs.iter().map(|run| (siblings(nodes, run), run)).collect();
     let mut rest = nodes;
     let mut parts = Vec::with_capacity(runs.len());
-    for (groups, run) in groups {
+    for run in runs {
         let (part, behind) = rest.split_at_mut(run.nodes.len());
-        parts.push((part, groups));
+        parts.push(part);
         rest = behind;
     }
-    let page = |(part, groups): (&mut [Node], Vec<Range<usize>>)| {
-        groups.into_iter().for_each(|group| line_up(part, group));
+    let page = |part: &mut [Node]| {
         let given = part.to_vec();
         let codes = lossy::quantise(part, extent);
         if codes.is_none() {
@@ -86,52 +88,65 @@ fn quantise(nodes: &mut [Node], runs: &[Run], extent: f32) -> Vec<PageCodes> {
     parts.into_par_iter().map(page).collect()
 }
 
-/// The groups of siblings on a page, counted from its first node.
-fn siblings(nodes: &[Node], run: &Run) -> Vec<Range<usize>> {
-    let start = run.nodes.start;
-    let parents = nodes[run.parents.clone()].iter().filter(|node| !node.is_leaf());
-    let children = parents.map(|node| node.first_child as usize..(node.first_child + node.children) as usize);
-    children
-        .filter(|group| run.nodes.contains(&group.start))
-        .map(|group| group.start - start..group.end - start)
-        .collect()
-}
-
-/// Puts the leaves among siblings in an order in which each is near the one before: nothing depends on their order, and
-/// short ways take few bits.
-fn line_up(nodes: &mut [Node], group: Range<usize>) {
-    for slot in group.clone().filter(|&slot| slot > 0) {
-        if !nodes[slot].is_leaf() {
+/// The nodes with siblings in an order in which each is near the one before, from group to group: nothing depends on their
+/// order, and short ways take few bits.
+fn line_up(nodes: &[Node]) -> Vec<Node> {
+    let mut out = Vec::with_capacity(nodes.len());
+    out.push(nodes[0]);
+    let mut last = Vec3::from(nodes[0].splat.center);
+    for index in 0..nodes.len() {
+        let Node { first_child, children, .. } = out[index];
+        if children == 0 {
             continue;
         }
-        let last = Vec3::from(nodes[slot - 1].splat.center);
-        let distance = |&at: &usize| Vec3::from(nodes[at].splat.center).distance_squared(last);
-        let leaves = (slot..group.end).filter(|&at| nodes[at].is_leaf());
-        let next = leaves.min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        nodes.swap(slot, next.unwrap_or(slot));
+        let start = out.len();
+        out[index].first_child = start as u32;
+        out.extend_from_slice(&nodes[first_child as usize..(first_child + children) as usize]);
+        let mut left = &mut out[start..];
+        while !left.is_empty() {
+            let distance = |at: usize| Vec3::from(left[at].splat.center).distance_squared(last);
+            let mut next = (0, distance(0));
+            for at in 1..left.len() {
+                let away = distance(at);
+                if away < next.1 {
+                    next = (at, away);
+                }
+            }
+            left.swap(0, next.0);
+            last = Vec3::from(left[0].splat.center);
+            left = &mut left[1..];
+        }
     }
+    out
 }
 
 /// Gives all inner nodes bounds around their children as these will be read, level by level from below; `None` where only
 /// the lossless way can tell them.
-fn bound(nodes: &mut [Node], codes: &[PageCodes], extent: f32) -> Vec<Option<bounds::Code>> {
+fn bound(
+    nodes: &mut [Node],
+    levels: &[usize],
+    fine: i32,
+    codes: &[PageCodes],
+    extent: f32,
+) -> Vec<Option<bounds::Code>> {
     let inner: Vec<u32> = (0..nodes.len() as u32).filter(|&node| !nodes[node as usize].is_leaf()).collect();
     let shapes = codes.iter().flat_map(|page| match &page.codes {
-        Some(codes) => codes.shapes.iter().copied().map(Some).collect(),
+        Some(codes) => codes.shapes().map(Some).collect(),
         None => vec![None; page.inner],
     });
-    let shapes: Vec<Option<Shape>> = shapes.collect();
+    let shapes: Vec<Option<(i32, Shape)>> = shapes.collect();
     let mut out = vec![None; inner.len()];
-    for level in levels(nodes).windows(2).rev() {
+    for level in levels.windows(2).rev() {
         let place = |node: usize| inner.partition_point(|&other| (other as usize) < node);
         let some = place(level[0])..place(level[1]);
         let bounded = some.clone().into_par_iter().with_min_len(256).map(|at| {
             let mut node = nodes[inner[at] as usize];
             let first = node.first_child as usize;
             let children = &nodes[first..first + node.children as usize];
-            let code = shapes[at].and_then(|shape| {
+            let code = shapes[at].and_then(|(sigma, shape)| {
                 let mut coded = node;
-                let code = bounds::Code::encode(&mut coded, children, &shape, extent)?;
+                let code =
+                    bounds::Code::encode(&mut coded, children, &shape, extent, bounds::fine_step(sigma, fine, extent))?;
                 node = coded;
                 Some(code)
             });
@@ -196,6 +211,22 @@ fn enclose_children(node: &mut Node, children: &[Node]) {
     node.radius = children.iter().map(|child| round_up(reach(center, child))).fold(node.radius, f32::max);
     node.size = children.iter().map(|child| child.size).fold(node.size, f32::max);
     node.cone = children.iter().map(|child| cosine_below(joint_angle(node, child))).fold(node.cone, f32::min);
+}
+
+/// The cosine of [`joint_angle`].
+pub fn joint_cosine(node: &Node, child: &Node) -> f64 {
+    let normals = (decode_normal(node.splat.normal), decode_normal(child.splat.normal));
+    let (Some(own), Some(its)) = normals else { return -1.0 };
+    if child.cone <= -1.0 {
+        return -1.0;
+    }
+    let (own, its) = (own.as_dvec3(), its.as_dvec3());
+    let (dot, cross) = (own.dot(its), own.cross(its).length());
+    let length = (dot * dot + cross * cross).sqrt();
+    let (cosine, sine) = (dot / length, cross / length);
+    let cone = f64::from(child.cone).min(1.0);
+    let side = (1.0 - cone * cone).sqrt();
+    if sine * cone + cosine * side < 0.0 { -1.0 } else { cosine * cone - sine * side }
 }
 
 /// The half-angle of the cone around the normal of a node that holds a child's; π where there is none.

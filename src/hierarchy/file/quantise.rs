@@ -3,7 +3,7 @@
 //! Everything that decoding computes is made of operations that every machine rounds alike (+ − × ÷ √ on 64 bits) and of
 //! tables from `libm`, so that a file gives the same nodes everywhere.
 
-use super::octahedron;
+use super::direction::{self, Directions};
 use crate::splat::{NO_NORMAL, Splat};
 use glam::{DMat3, DQuat, DVec3};
 use std::{f64::consts::PI, sync::LazyLock};
@@ -11,19 +11,50 @@ use std::{f64::consts::PI, sync::LazyLock};
 /// The width at half height of a Gaussian, in standard deviations: 2·√(2·ln 2).
 pub const FULL_WIDTH: f64 = 2.354_820_045_030_949_3;
 
-/// Steps of the largest standard deviation in a doubling.
-const SIGMA_STEPS: i32 = 12;
-/// Steps of the ratio of the two standard deviations in the ellipse's plane in a doubling.
-const RATIO_STEPS: i32 = 6;
-/// Steps of the ratio across the plane in a doubling.
-const THICKNESS_STEPS: i32 = 4;
-/// Steps of the strength in a doubling.
-const STRENGTH_STEPS: i32 = 24;
+/// Parts of a doubling that powers are told in.
+pub const PARTS: i32 = 96;
 
-/// Steps of a leaf's position in the width of its splat, along each axis: no more than 1/64 of it is lost in all.
-const LEAF_STEPS: f64 = 56.0;
-/// The same of other nodes, which are drawn where this is less than a tenth of a pixel.
-const INNER_STEPS: f64 = 8.0;
+/// How fine the splats of leaves, or those of other nodes, are kept.
+struct Fineness {
+    /// Steps in parts of a doubling: of the largest standard deviation, of the ratios to the second and the third, and of
+    /// the strength.
+    sigma: i32,
+    ratio: i32,
+    thickness: i32,
+    strength: i32,
+    directions: Directions,
+    /// Steps of positions in the width of a splat.
+    position: f64,
+    /// The directions of an ellipse's first axis, by the cosines and sines of half a turn's part: the rounder the ellipse,
+    /// the fewer tell.
+    angles: Vec<Vec<[f64; 2]>>,
+}
+
+/// Nodes that are no leaves are drawn where they are about a pixel wide.
+static FINENESS: LazyLock<[Fineness; 2]> = LazyLock::new(|| {
+    let inner = Fineness {
+        sigma: PARTS / 4,
+        ratio: PARTS / 3,
+        thickness: PARTS,
+        strength: PARTS / 6,
+        directions: Directions(17),
+        position: 5.0,
+        angles: angles(PARTS / 3, 2.5),
+    };
+    let leaf = Fineness {
+        sigma: PARTS / 8,
+        ratio: PARTS / 6,
+        thickness: PARTS / 4,
+        strength: PARTS / 24,
+        directions: Directions(34),
+        position: 90.0,
+        angles: angles(PARTS / 6, 4.0),
+    };
+    [inner, leaf]
+});
+
+/// Where the next node is looked for, in widths of its splat: ahead, on a way that goes on as it went.
+const AHEAD: f64 = 0.25;
 
 /// Steps of a quaternion's parts, each way.
 const TURN_STEPS: i32 = 511;
@@ -31,21 +62,47 @@ const TURN_STEPS: i32 = 511;
 /// The code of a strength of 0.
 const NO_STRENGTH: i32 = i16::MIN as i32;
 
-/// The codes that may be: what is beyond makes no splat.
-const MOST_RATIO: i32 = 16 * RATIO_STEPS;
-const MOST_STRENGTH: i32 = 300 * STRENGTH_STEPS;
-const MOST_THICKNESS: i32 = 20 * THICKNESS_STEPS;
+/// The codes that may be, in parts of a doubling: what is beyond makes no splat.
+const MOST_SIGMA: i32 = 160 * PARTS;
+const MOST_RATIO: i32 = 16 * PARTS;
+const MOST_THICKNESS: i32 = 20 * PARTS;
+const MOST_STRENGTH: i32 = 300 * PARTS;
 const MOST_STEPS: f64 = (1 << 28) as f64;
 
-/// Parts of a doubling that powers are told in.
-pub const PARTS: i32 = 48;
-
-/// 2^(k/48).
+/// 2^(k/96).
 pub fn power(k: i32) -> f64 {
     static TABLE: LazyLock<[f64; PARTS as usize]> =
         LazyLock::new(|| std::array::from_fn(|part| libm::exp2(part as f64 / f64::from(PARTS))));
     let exponent = k.div_euclid(PARTS).clamp(-1022, 1023);
     TABLE[k.rem_euclid(PARTS) as usize] * f64::from_bits(((exponent + 1023) as u64) << 52)
+}
+
+/// The logarithm to the base of 2 of a positive number that is not denormal, 10⁻⁸ off at most: the series of the inverse
+/// hyperbolic tangent.
+pub fn logarithm(value: f64) -> f64 {
+    const SQRT_2: f64 = std::f64::consts::SQRT_2;
+    let bits = value.to_bits();
+    let exponent = f64::from((bits >> 52) as i32 - 1023);
+    let part = f64::from_bits(bits & ((1 << 52) - 1) | 1023 << 52);
+    let t = (part - SQRT_2) / (part + SQRT_2);
+    let square = t * t;
+    let sum = 1.0 + square * (1.0 / 3.0 + square * (1.0 / 5.0 + square * (1.0 / 7.0 + square * (1.0 / 9.0))));
+    exponent + 0.5 + t * sum * (2.0 / std::f64::consts::LN_2)
+}
+
+/// The code of the largest standard deviation of a node that is no leaf.
+pub fn inner_sigma(sigma: f64) -> i32 {
+    nearest(logarithm(sigma.max(f64::MIN_POSITIVE)) * f64::from(PARTS / FINENESS[0].sigma))
+}
+
+/// What such a code stands for.
+pub fn sigma_of_inner(code: i32) -> f64 {
+    power(code.saturating_mul(FINENESS[0].sigma))
+}
+
+/// To the nearest whole number; halves away from 0.
+fn nearest(value: f64) -> i32 {
+    (value + 0.5f64.copysign(value)) as i32
 }
 
 /// What the axes of a splat are.
@@ -78,27 +135,39 @@ pub struct Code {
     pub angle: i32,
     /// The axes as a quaternion: which part is the largest, and the others.
     pub turn: [i32; 4],
-    /// On the octahedron, less that of the node before.
+    /// Steps from the normal before.
     pub normal: [i32; 2],
-    /// Steps along the axes from the node before.
+    /// Steps from where the way goes on to: ahead, to the left and along the normal; or along the axes.
     pub position: [i32; 3],
     /// Luma and two chromas, less those of the node before; opacity.
     pub color: [i32; 4],
     pub strength: i32,
 }
 
-/// What a page says at its beginning, and the node before, from which the next one is told.
+/// What a page says at its beginning, and what is behind, from which the next node is told.
 #[derive(Debug, Clone, Copy)]
 pub struct Before {
-    /// Which way most normals of the page face ([`octahedron::facing`]).
-    pub facing: u8,
     /// The strength that others are told from.
-    pub strength: f32,
-    pub center: [f32; 3],
-    pub normal: [i32; 2],
-    pub color: [i32; 3],
-    /// Its normal, where its axes are those of it.
-    pub direction: Option<DVec3>,
+    strength: f32,
+    center: [f32; 3],
+    color: [i32; 3],
+    /// The last normal, and two directions across it.
+    normal: DVec3,
+    across: [DVec3; 2],
+    /// The way to the last node.
+    way: DVec3,
+}
+
+impl Before {
+    /// The beginning of a page.
+    pub fn new(strength: f32, center: [f32; 3]) -> Self {
+        let across = direction::across(DVec3::Z);
+        Self { strength, center, color: [0; 3], normal: DVec3::Z, across, way: DVec3::ZERO }
+    }
+
+    fn center(&self) -> DVec3 {
+        DVec3::from(self.center.map(f64::from))
+    }
 }
 
 /// The ellipsoid of a splat.
@@ -115,59 +184,38 @@ impl Shape {
         self.sigma[0].max(self.sigma[2])
     }
 
-    /// The lower triangular factor of its covariance (Cholesky).
+    /// The lower triangular factor of its covariance (Cholesky). By the adjugate: nothing is subtracted but what has to be.
     fn factor(&self) -> [f32; 6] {
-        let [a, b, c] = [0, 1, 2].map(|i| self.axes[i] * self.sigma[i]);
-        let sum = |i: usize, j: usize| a[i] * a[j] + b[i] * b[j] + c[i] * c[j];
-        let b00 = sum(0, 0).sqrt();
-        let (b10, b20) = (sum(1, 0) / b00, sum(2, 0) / b00);
-        let b11 = (sum(1, 1) - b10 * b10).max(sum(1, 1) * 1e-14).sqrt();
-        let b21 = (sum(2, 1) - b20 * b10) / b11;
-        let b22 = (sum(2, 2) - b20 * b20 - b21 * b21).max(sum(2, 2) * 1e-14).sqrt();
-        [b00, b10, b11, b20, b21, b22].map(|value| value as f32)
+        let [first, second, third] = self.sigma;
+        let [a, b, c] = [self.axes[0] * first, self.axes[1] * second, self.axes[2] * third];
+        let [d, e, f] =
+            [self.axes[0] * (second * third), self.axes[1] * (first * third), self.axes[2] * (first * second)];
+        let b00 = (a.x * a.x + b.x * b.x + c.x * c.x).sqrt();
+        let minor = (d.z * d.z + e.z * e.z + f.z * f.z).sqrt();
+        let (one, two) = (1.0 / b00, 1.0 / minor);
+        let b10 = (a.x * a.y + b.x * b.y + c.x * c.y) * one;
+        let b20 = (a.x * a.z + b.x * b.z + c.x * c.z) * one;
+        let b21 = -(d.y * d.z + e.y * e.z + f.y * f.z) * one * two;
+        [b00, b10, minor * one, b20, b21, first * second * third * two].map(|value| value as f32)
     }
 
-    /// The steps of positions along the axes.
-    fn step(&self, is_leaf: bool) -> f64 {
-        let steps = if is_leaf { LEAF_STEPS } else { INNER_STEPS };
+    /// The steps of positions.
+    fn step(&self, fineness: &Fineness) -> f64 {
         let [first, second, _] = self.sigma;
         // Along a long ellipse no coarser than across it.
-        first.min(2.0 * second) * FULL_WIDTH / steps
+        first.min(2.0 * second) * FULL_WIDTH / fineness.position
     }
 }
 
-/// How many directions the first axis of an ellipse of some ratio may have: the rounder it is, the fewer tell.
-pub fn angles(ratio: i32) -> usize {
-    table(ratio).len()
-}
-
-/// Cosines and sines of the directions.
-fn table(ratio: i32) -> &'static [[f64; 2]] {
-    static TABLES: LazyLock<Vec<Vec<[f64; 2]>>> = LazyLock::new(|| {
-        let tables = (0..=MOST_RATIO).map(|ratio| {
-            let wide = libm::exp2(f64::from(ratio) / f64::from(RATIO_STEPS));
-            let count = (8.0 * (wide - 1.0 / wide)).ceil().clamp(1.0, 256.0);
-            let direction = |k: usize| PI * k as f64 / count;
-            (0..count as usize).map(|k| [libm::cos(direction(k)), libm::sin(direction(k))]).collect()
-        });
-        tables.collect()
-    });
-    &TABLES[ratio as usize]
-}
-
-/// Two unit vectors that make a right-handed frame with a unit vector (Duff et al. 2017).
-fn across(n: DVec3) -> [DVec3; 2] {
-    let sign = if n.z < 0.0 { -1.0 } else { 1.0 };
-    let a = -1.0 / (sign + n.z);
-    let b = n.x * n.y * a;
-    [DVec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), DVec3::new(b, sign + n.y * n.y * a, -n.y)]
-}
-
-/// The axes of a normal's frame whose first points in the `angle`-th direction.
-fn axes_of_normal(normal: DVec3, ratio: i32, angle: i32) -> [DVec3; 3] {
-    let [u, v] = across(normal);
-    let [cosine, sine] = table(ratio)[angle as usize];
-    [u * cosine + v * sine, v * cosine - u * sine, normal]
+/// For each ratio of the axes of an ellipse, the directions of the first.
+fn angles(step: i32, density: f64) -> Vec<Vec<[f64; 2]>> {
+    let of = |ratio: i32| {
+        let wide = libm::exp2(f64::from(ratio * step) / f64::from(PARTS));
+        let count = (density * (wide - 1.0 / wide)).ceil().clamp(1.0, 64.0);
+        let direction = |k: usize| PI * k as f64 / count;
+        (0..count as usize).map(|k| [libm::cos(direction(k)), libm::sin(direction(k))]).collect()
+    };
+    (0..=MOST_RATIO / step).map(of).collect()
 }
 
 /// The axes of a quaternion of which the largest part is left out.
@@ -202,12 +250,47 @@ fn turn([x, y, z]: [DVec3; 3]) -> [i32; 4] {
     out
 }
 
-/// How far a smooth surface rises along the normal of a node on the way `across` it from the one before: a chord of a
-/// parabola lies across the mean of the normals at its ends.
-fn rise(before: Option<DVec3>, normal: Option<DVec3>, across: DVec3) -> f64 {
-    let (Some(before), Some(normal)) = (before, normal) else { return 0.0 };
-    let both = 1.0 + before.dot(normal);
-    if both > 0.5 { -across.dot(before) / both } else { 0.0 }
+/// Directions in which the position of a node is told, and where zero is: for nodes with the axes of their normal ahead on
+/// the way to the node before, to the left of it and along the normal.
+struct Course {
+    axes: [DVec3; 3],
+    start: f64,
+    /// How steeply the surface falls along the first two, where it is smooth: a chord of a parabola lies across the mean of
+    /// the normals at its ends.
+    fall: [f64; 2],
+}
+
+impl Course {
+    fn new(own: Axes, shape: &Shape, before: &Before, last: DVec3, fineness: &Fineness) -> Self {
+        let normal = shape.axes[2];
+        if own != Axes::Normal {
+            return Self { axes: shape.axes, start: 0.0, fall: [0.0; 2] };
+        }
+        let along = before.way - normal * before.way.dot(normal);
+        let length = along.length_squared().sqrt();
+        let (ahead, start) =
+            if length > 1e-100 { (along / length, AHEAD * fineness.position) } else { (before.across[0], 0.0) };
+        let left = normal.cross(ahead);
+        let both = 1.0 + last.dot(normal);
+        let fall = if both > 0.5 { [ahead, left].map(|side| side.dot(last) / both) } else { [0.0; 2] };
+        Self { axes: [ahead, left, normal], start, fall }
+    }
+
+    /// The place at so many steps.
+    fn place(&self, [x, y, z]: [i32; 3], step: f64) -> DVec3 {
+        let (x, y) = (step * (f64::from(x) + self.start), step * f64::from(y));
+        let z = step * f64::from(z) - (x * self.fall[0] + y * self.fall[1]);
+        self.axes[0] * x + self.axes[1] * y + self.axes[2] * z
+    }
+
+    /// The steps to a place.
+    fn steps(&self, place: DVec3, step: f64) -> Option<[i32; 3]> {
+        let whole = |steps: f64| (steps.abs() < MOST_STEPS).then_some(nearest(steps));
+        let x = whole(place.dot(self.axes[0]) / step - self.start)?;
+        let y = whole(place.dot(self.axes[1]) / step)?;
+        let fall = (f64::from(x) + self.start) * self.fall[0] + f64::from(y) * self.fall[1];
+        Some([x, y, whole(place.dot(self.axes[2]) / step + fall)?])
+    }
 }
 
 /// Luma and chromas of red, green and blue, reversibly (YCoCg-R, Malvar & Sullivan 2003).
@@ -232,61 +315,56 @@ fn color([luma, orange, green]: [i32; 3]) -> Option<u32> {
 impl Code {
     /// The splat behind a code, and its shape; `None` for codes of no splat. `before` becomes what this node leaves.
     pub fn decode(&self, is_leaf: bool, before: &mut Before) -> Option<(Splat, Shape)> {
-        let shape = self.shape(before)?;
-        Some((self.splat(&shape, is_leaf, before)?, shape))
+        let fineness = &FINENESS[usize::from(is_leaf)];
+        let last = before.normal;
+        let shape = self.shape(fineness, before)?;
+        let course = Course::new(self.axes, &shape, before, last, fineness);
+        Some((self.splat(fineness, &shape, &course, before)?, shape))
     }
 
     /// The ellipsoid, and the normal as the new one before.
-    fn shape(&self, before: &mut Before) -> Option<Shape> {
-        let is_shape = (0..=MOST_RATIO).contains(&self.ratio)
-            && (-MOST_THICKNESS..=MOST_THICKNESS).contains(&self.thickness)
-            && (-160 * SIGMA_STEPS..160 * SIGMA_STEPS).contains(&self.sigma);
+    fn shape(&self, fineness: &Fineness, before: &mut Before) -> Option<Shape> {
+        let sigma = self.sigma.checked_mul(fineness.sigma)?;
+        let ratio = self.ratio.checked_mul(fineness.ratio)?;
+        let thickness = self.thickness.checked_mul(fineness.thickness)?;
+        let is_shape = (-MOST_SIGMA..MOST_SIGMA).contains(&sigma)
+            && (0..=MOST_RATIO).contains(&ratio)
+            && (-MOST_THICKNESS..=MOST_THICKNESS).contains(&thickness);
         if !is_shape {
             return None;
         }
-        let first = self.sigma * (PARTS / SIGMA_STEPS);
-        let second = first - self.ratio * (PARTS / RATIO_STEPS);
-        let third = second - self.thickness * (PARTS / THICKNESS_STEPS);
-        let sigma = [power(first), power(second), power(third)];
         if self.axes != Axes::Bare {
-            before.normal = [0, 1].map(|i| before.normal[i].wrapping_add(self.normal[i]));
-            if !octahedron::contains(before.normal) {
-                return None;
-            }
+            before.normal = fineness.directions.decode(before.normal, before.across, self.normal)?;
+            before.across = direction::across(before.normal);
         }
         let axes = match self.axes {
-            Axes::Normal if (0..angles(self.ratio) as i32).contains(&self.angle) => {
-                axes_of_normal(octahedron::direction(before.facing, before.normal), self.ratio, self.angle)
+            Axes::Normal => {
+                let angles = &fineness.angles[self.ratio as usize];
+                let [cosine, sine] = *angles.get(usize::try_from(self.angle).ok()?)?;
+                let [u, v] = before.across;
+                [u * cosine + v * sine, v * cosine - u * sine, before.normal]
             }
-            Axes::Normal => return None,
             Axes::Own | Axes::Bare => axes_of_turn(self.turn)?,
         };
-        Some(Shape { axes, sigma })
+        Some(Shape { axes, sigma: [sigma, sigma - ratio, sigma - ratio - thickness].map(power) })
     }
 
     /// All that is left once the shape is known.
-    fn splat(&self, shape: &Shape, is_leaf: bool, before: &mut Before) -> Option<Splat> {
-        let axes = &shape.axes;
-        let normal = if self.axes == Axes::Bare { NO_NORMAL } else { octahedron::packed(before.facing, before.normal) };
-        let step = shape.step(is_leaf);
-        let [x, y, z] = self.position.map(|count| step * f64::from(count));
-        let across = axes[0] * x + axes[1] * y;
-        let direction = if self.axes == Axes::Normal { Some(axes[2]) } else { None };
-        let center = DVec3::from(before.center.map(f64::from))
-            + across
-            + axes[2] * (rise(before.direction, direction, across) + z);
-        before.center = center.to_array().map(|value| value as f32);
-        before.direction = direction;
+    fn splat(&self, fineness: &Fineness, shape: &Shape, course: &Course, before: &mut Before) -> Option<Splat> {
+        let normal = if self.axes == Axes::Bare { NO_NORMAL } else { direction::packed(before.normal) };
+        let way = course.place(self.position, shape.step(fineness));
+        before.center = (before.center() + way).to_array().map(|value| value as f32);
+        before.way = way;
         for (before, more) in before.color.iter_mut().zip(self.color) {
             *before = before.wrapping_add(more);
         }
         let alpha = u32::try_from(self.color[3]).ok().filter(|&alpha| alpha < 256)?;
         let strength = match self.strength {
             NO_STRENGTH => 0.0,
+            0 => before.strength,
             steps => {
-                (f64::from(before.strength)
-                    * power(steps.clamp(-MOST_STRENGTH, MOST_STRENGTH) * (PARTS / STRENGTH_STEPS)))
-                    as f32
+                let parts = steps.saturating_mul(fineness.strength).clamp(-MOST_STRENGTH, MOST_STRENGTH);
+                (f64::from(before.strength) * power(parts)) as f32
             }
         };
         let color = color(before.color)? | alpha << 24;
@@ -298,37 +376,30 @@ impl Code {
     /// The code of a splat, and what comes back of it. `None` for splats beyond what codes can tell: without width, of
     /// negative strength, too far from the node before.
     pub fn encode(splat: &Splat, is_leaf: bool, before: &mut Before) -> Option<(Self, Splat, Shape)> {
-        let normal = octahedron::unpacked(splat.normal);
+        let fineness = &FINENESS[usize::from(is_leaf)];
+        let normal = direction::unpacked(splat.normal);
         let (axes, ellipsoid) = ellipsoid(splat, normal, is_leaf)?;
-        let [first, second, third] = ellipsoid.sigma.map(libm::log2);
-        let round = |value: f64, steps: i32| (value * f64::from(steps)).round() as i32;
-        let sigma = round(first, SIGMA_STEPS);
-        let first = f64::from(sigma) / f64::from(SIGMA_STEPS);
-        let ratio = round(first - second, RATIO_STEPS).clamp(0, MOST_RATIO);
-        let thickness = round(second - third, THICKNESS_STEPS).clamp(-MOST_THICKNESS, MOST_THICKNESS);
-        let place = normal.map_or(before.normal, |normal| octahedron::nearest(before.facing, normal));
-        let mut angle = 0;
-        if axes == Axes::Normal {
-            let [u, v] = across(octahedron::direction(before.facing, place));
-            let count = angles(ratio) as f64;
-            let direction = libm::atan2(ellipsoid.axes[0].dot(v), ellipsoid.axes[0].dot(u)) / PI;
-            angle = (direction * count).round().rem_euclid(count) as i32;
-        }
-        let turn = if axes == Axes::Normal { [0; 4] } else { turn(ellipsoid.axes) };
+        let [first, second, third] = ellipsoid.sigma.map(logarithm);
+        let round = |value: f64, step: i32| nearest(value * f64::from(PARTS) / f64::from(step));
+        let sigma = round(first, fineness.sigma);
+        let first = f64::from(sigma * fineness.sigma) / f64::from(PARTS);
+        let ratio = round(first - second, fineness.ratio).clamp(0, MOST_RATIO / fineness.ratio);
+        let most = MOST_THICKNESS / fineness.thickness;
         let luma = luma(splat.color);
         let strength = match splat.strength {
             strength if strength < 0.0 => return None,
             0.0 => NO_STRENGTH,
-            strength => round(libm::log2(f64::from(strength) / f64::from(before.strength)), STRENGTH_STEPS),
+            strength if strength == before.strength => 0,
+            strength => round(logarithm(f64::from(strength) / f64::from(before.strength)), fineness.strength),
         };
         let mut code = Self {
             axes,
             sigma,
             ratio,
-            thickness,
-            angle,
-            turn,
-            normal: [0, 1].map(|i| place[i] - before.normal[i]),
+            thickness: round(second - third, fineness.thickness).clamp(-most, most),
+            angle: 0,
+            turn: if axes == Axes::Normal { [0; 4] } else { turn(ellipsoid.axes) },
+            normal: normal.map_or([0; 2], |it| fineness.directions.encode(before.normal, before.across, it)),
             position: [0; 3],
             color: [
                 luma[0] - before.color[0],
@@ -338,20 +409,26 @@ impl Code {
             ],
             strength,
         };
-        // Once all else is known, the steps of the position are.
-        let shape = code.shape(before)?;
-        let away = DVec3::from(splat.center.map(f64::from)) - DVec3::from(before.center.map(f64::from));
-        let step = shape.step(is_leaf);
-        let whole = |length: f64| {
-            let steps = (length / step).round();
-            (steps.abs() < MOST_STEPS).then_some(steps as i32)
-        };
-        let [x, y, z] = shape.axes;
-        let (first, second) = (whole(away.dot(x))?, whole(away.dot(y))?);
-        let across = x * (step * f64::from(first)) + y * (step * f64::from(second));
-        let direction = if axes == Axes::Normal { Some(z) } else { None };
-        code.position = [first, second, whole(away.dot(z) - rise(before.direction, direction, across))?];
-        let splat = code.splat(&shape, is_leaf, before)?;
+        let last = before.normal;
+        // The angle is told across the normal as it is read, and the position in the frame and the steps of all that.
+        let mut shape = code.shape(fineness, before)?;
+        if axes == Axes::Normal {
+            let angles = &fineness.angles[ratio as usize];
+            let [u, v] = before.across.map(|side| side.dot(ellipsoid.axes[0]));
+            let mut most = 0.0;
+            for (angle, [cosine, sine]) in (0..).zip(angles) {
+                let along = (u * cosine + v * sine).abs();
+                if along > most {
+                    (code.angle, most) = (angle, along);
+                }
+            }
+            let ([cosine, sine], [u, v]) = (angles[code.angle as usize], before.across);
+            shape.axes = [u * cosine + v * sine, v * cosine - u * sine, before.normal];
+        }
+        let course = Course::new(axes, &shape, before, last, fineness);
+        let away = DVec3::from(splat.center.map(f64::from)) - before.center();
+        code.position = course.steps(away, shape.step(fineness))?;
+        let splat = code.splat(fineness, &shape, &course, before)?;
         Some((code, splat, shape))
     }
 }
@@ -361,7 +438,7 @@ fn ellipsoid(splat: &Splat, normal: Option<DVec3>, is_leaf: bool) -> Option<(Axe
     let [b00, b10, b11, b20, b21, b22] = splat.factor.map(f64::from);
     let columns = [DVec3::new(b00, b10, b20), DVec3::new(0.0, b11, b21), DVec3::new(0.0, 0.0, b22)];
     if let Some(normal) = normal {
-        let [u, v] = across(normal);
+        let [u, v] = direction::across(normal);
         let seen = |t: DVec3| DVec3::from(columns.map(|column| column.dot(t)));
         let (x, y, z) = (seen(u), seen(v), seen(normal));
         let (xx, xy, yy, zz) = (x.length_squared(), x.dot(y), y.length_squared(), z.length_squared());

@@ -256,7 +256,7 @@ fn pages_of_noise_are_survived() {
         let nodes = &tree.blocks[0].nodes;
         let runs = pages::pages(nodes);
         for lossless in [true, false] {
-            let page = page::encode(nodes, &runs, tree.extent, lossless).pages.swap_remove(0);
+            let page = page::encode(nodes, tree.extent, lossless).pages.swap_remove(0);
             for _ in 0..3000 {
                 let mut broken = page.clone();
                 for _ in 0..1 + random.below(3) {
@@ -316,37 +316,43 @@ fn losses_keep_to_the_promises() {
     for (a, b) in before.iter().zip(&after) {
         assert_eq!((a.splat.color, a.splat.strength), (b.splat.color, b.splat.strength));
         let away = glam::Vec3::from(a.splat.center).distance(glam::Vec3::from(b.splat.center));
-        assert!(away <= b.size / 64.0, "{away} of {}", b.size);
+        assert!(away <= b.size / 100.0, "{away} of {}", b.size);
         let inflation = b.radius / a.radius;
-        assert!((0.97..1.031).contains(&inflation), "{inflation}");
-        let normals = [a, b].map(|node| octahedron::unpacked(node.splat.normal).unwrap());
+        assert!((0.95..1.05).contains(&inflation), "{inflation}");
+        let normals = [a, b].map(|node| direction::unpacked(node.splat.normal).unwrap());
         let angle = libm::acos(normals[0].dot(normals[1]).min(1.0)).to_degrees();
         (sum, most) = (sum + angle, most.max(angle));
         let ([one, two], [three, four]) =
             ([0, 1].map(|i| ellipsoid(&a.splat).0[i]), [0, 1].map(|i| ellipsoid(&b.splat).0[i]));
-        assert!((three / one - 1.0).abs() < 0.03 && (four / two - 1.0).abs() < 0.1);
+        assert!((three / one - 1.0).abs() < 0.05 && (four / two - 1.0).abs() < 0.11);
         // The ellipse as a whole: how much wider or narrower it is in any direction.
         let [own, its] = [a, b].map(|node| crate::hierarchy::testing::covariance(&node.splat));
         let along = ellipsoid(&a.splat).1;
         for axis in &along[..2] {
             let ratio = (axis.dot(its * *axis) / axis.dot(own * *axis)).sqrt();
-            assert!((0.85..1.15).contains(&ratio), "{ratio}");
+            assert!((0.82..1.2).contains(&ratio), "{ratio}");
         }
     }
+    let [root, wanted] = [&read, &tree].map(|tree| tree.blocks[0].nodes[0].radius);
+    assert!(root <= 1.05 * wanted, "the root's sphere grows by {}", root / wanted);
     assert!(sum / before.len() as f64 <= 0.67 && most <= 1.9, "normals: {} {most}", sum / before.len() as f64);
 }
 
 #[test]
-fn what_was_read_is_written_as_it_was() {
-    for splats in [surface(9, 2), surface(4_000, 3)] {
+fn what_was_read_loses_little_more() {
+    for mut splats in [surface(9, 2), surface(4_000, 3)] {
+        // A colour of its own tells each leaf.
+        splats.iter_mut().enumerate().for_each(|(index, splat)| splat.color = index as u32 | 0xff00_0000);
         let first = open(to_bytes(&tree(&splats), &options(false)).unwrap()).read_tree().unwrap();
         let again = open(to_bytes(&first, &options(false)).unwrap()).read_tree().unwrap();
         let (before, after) = (sorted_leaves(&first), sorted_leaves(&again));
         for (a, b) in before.iter().zip(&after) {
-            // Siblings may change places, and with them what positions are told from.
+            // Siblings may change places, and with them what positions and normals are told from.
             let away = glam::Vec3::from(a.splat.center).distance(glam::Vec3::from(b.splat.center));
-            assert!(away <= a.size / 64.0);
-            assert_eq!((a.size, a.splat.normal, a.splat.color), (b.size, b.splat.normal, b.splat.color));
+            assert!(away <= a.size / 100.0);
+            let normals = [a, b].map(|node| direction::unpacked(node.splat.normal).unwrap());
+            assert!(normals[0].dot(normals[1]) > libm::cos(1.9f64.to_radians()));
+            assert_eq!((a.size, a.splat.color), (b.size, b.splat.color));
         }
     }
 }
@@ -356,7 +362,7 @@ fn a_smooth_surface_takes_few_bytes() {
     let mut splats = surface(30_000, 6);
     splats.iter_mut().for_each(|splat| splat.color = 0xffff_ffff);
     let bytes = to_bytes(&tree(&splats), &options(false)).unwrap();
-    assert!(bytes.len() < 30_000 * 6, "{}", bytes.len());
+    assert!(bytes.len() < 30_000 * 53 / 10, "{}", bytes.len());
 }
 
 #[test]

@@ -4,8 +4,8 @@ use super::{
     HASH,
     directory::{Directory, Place},
     header::{Header, Stored, UpAxis},
-    page,
-    pages::{Around, Run, in_order, pages},
+    page::{self, Coded},
+    pages::{Around, Run, in_order},
     spill::{Spill, Target},
 };
 use crate::{
@@ -104,22 +104,37 @@ impl Writer {
     /// [`Error::Argument`] for nodes that are not in the order of [`Block`](crate::hierarchy::Block), or have values that
     /// are not finite; [`Error::File`] where they cannot be written.
     pub fn block(&mut self, nodes: &[Node]) -> Result<Node> {
-        let number = self.roots.len();
-        let refuse = |message: String| Error::Argument(format!("block {number} of the hierarchy: {message}"));
-        in_order(nodes).map_err(refuse)?;
-        let odd = nodes.par_iter().position_first(|node| !page::is_finite(node));
-        if let Some(node) = odd {
-            return Err(refuse(format!("node {node} has a value that is not finite")));
+        Ok(self.blocks(&[nodes])?[0])
+    }
+
+    /// As [`block`](Self::block), several blocks at once, which threads share.
+    ///
+    /// # Errors
+    /// Those of [`block`](Self::block).
+    pub fn blocks(&mut self, blocks: &[&[Node]]) -> Result<Vec<Node>> {
+        let written = self.roots.len();
+        for (number, nodes) in (written..).zip(blocks) {
+            let refuse = |message: String| Error::Argument(format!("block {number} of the hierarchy: {message}"));
+            in_order(nodes).map_err(refuse)?;
+            let odd = nodes.par_iter().position_first(|node| !page::is_finite(node));
+            if let Some(node) = odd {
+                return Err(refuse(format!("node {node} has a value that is not finite")));
+            }
         }
-        let runs = pages(nodes);
-        let coded = page::encode(nodes, &runs, self.extent, self.options.lossless);
-        let root = coded.nodes[0];
-        self.contents.add(&coded.nodes);
-        let around = arounds(&coded.nodes, &runs);
-        let places = self.push(&coded.pages)?;
-        self.directory.push_block(&runs, &around, &places);
-        self.roots.push(root);
-        Ok(root)
+        let (extent, is_lossless) = (self.extent, self.options.lossless);
+        let encode = |nodes: &&[Node]| {
+            let coded = page::encode(nodes, extent, is_lossless);
+            let around = arounds(&coded.nodes, &coded.runs);
+            (coded, around)
+        };
+        let coded: Vec<(Coded, Vec<Around>)> = blocks.par_iter().map(encode).collect();
+        for (coded, around) in coded {
+            self.contents.add(&coded.nodes);
+            let places = self.push(&coded.pages)?;
+            self.directory.push_block(&coded.runs, &around, &places);
+            self.roots.push(coded.nodes[0]);
+        }
+        Ok(self.roots[written..].to_vec())
     }
 
     /// Ends the file. One block needs nothing above it; several need the block that joins them, whose leaves take the
@@ -194,11 +209,10 @@ impl Writer {
         if let Some(node) = nodes.iter().position(|node| !page::is_finite(node)) {
             return Err(refuse(format!("node {node} has a value that is not finite")));
         }
-        let runs = pages(&nodes);
-        let coded = page::encode(&nodes, &runs, self.extent, true);
+        let coded = page::encode(&nodes, self.extent, true);
         let places = self.push(&coded.pages)?;
         let mut directory = Directory::default();
-        directory.push_block(&runs, &arounds(&nodes, &runs), &places);
+        directory.push_block(&coded.runs, &arounds(&nodes, &coded.runs), &places);
         directory.append(std::mem::take(&mut self.directory));
         directory.hang(&nodes, top.portals);
         Ok(directory)
@@ -295,8 +309,8 @@ fn all(tree: &Tree, mut writer: Writer, target: impl FnOnce() -> Result<Target>)
     let Tree { origin, bounds, closed, source_points, .. } = *tree;
     let whole = Whole { origin, bounds, closed, source_points };
     let below = &tree.blocks[usize::from(tree.is_joined())..];
-    for block in below {
-        writer.block(&block.nodes)?;
+    for blocks in below.chunks(2 * rayon::current_num_threads()) {
+        writer.blocks(&blocks.iter().map(|block| &block.nodes[..]).collect::<Vec<_>>())?;
     }
     if !tree.is_joined() {
         return writer.end(None, &whole, target);
