@@ -1,26 +1,33 @@
-use splatkit::{hierarchy::*, io, surface::SurfelOptions};
-use std::time::Instant;
-fn main() {
-    let path = std::env::args().nth(1).unwrap();
-    let mesh = io::load_mesh(path.as_ref(), &io::Limits::default()).unwrap();
-    let t = Instant::now();
-    let set = mesh.surfels(&SurfelOptions::default()).unwrap();
-    println!("surfels {} in {:?} ({} vertices)", set.splats.len(), t.elapsed(), mesh.positions.len());
+//! Times how surfels and their hierarchy are made of a mesh: cargo run --release --example hierarchy_speed -- mesh.ply
+
+use splatkit::{
+    hierarchy::{BuildOptions, Preset, Tree},
+    io,
+    surface::SurfelOptions,
+};
+use std::{error::Error, path::PathBuf, time::Instant};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let path = PathBuf::from(std::env::args().nth(1).ok_or("which mesh?")?);
+    let mesh = io::load_mesh(&path, &io::Limits::default())?;
+    let vertices = mesh.positions.len() as f64;
+    let start = Instant::now();
+    let set = mesh.surfels(&SurfelOptions::default())?;
+    let surfels = start.elapsed().as_secs_f64();
+    println!("{vertices} vertices, {} surfels: {:.0} ms", set.splats.len(), surfels * 1e3);
     for preset in [Preset::Fastest, Preset::Fast, Preset::Balanced, Preset::Slow, Preset::Best] {
-        let t = Instant::now();
-        let tree = Tree::build(&set, &BuildOptions { preset, ..Default::default() }, &|_, _| ()).unwrap();
-        let time = t.elapsed().as_secs_f64();
-        let nodes = tree.nodes().count();
-        let inner: f64 = tree.nodes().filter(|n| !n.is_leaf()).map(|n| f64::from(n.radius)).sum();
-        let root = tree.blocks[0].nodes[0];
-        println!(
-            "{preset:?}: {:.0} ms, {:.2} M/s, {} nodes ({:.3} a leaf), sum of radii {inner:.4}, root {} size {}",
-            time * 1e3,
-            set.splats.len() as f64 / time / 1e6,
-            nodes,
-            nodes as f64 / set.splats.len() as f64,
-            root.radius,
-            root.size
-        );
+        for block_splats in [1 << 13, 1 << 14, 1 << 15, 1 << 16] {
+            let start = Instant::now();
+            let options = BuildOptions { preset, block_splats, ..BuildOptions::default() };
+            let tree = Tree::build(&set, &options, &|_, _| ())?;
+            let built = start.elapsed().as_secs_f64();
+            let rate = vertices / (surfels + built) / 1e6;
+            let nodes = tree.nodes().count() as f64 / set.splats.len() as f64;
+            println!(
+                "{preset:?} {block_splats}: {:.0} ms, {nodes:.3} nodes a leaf; {rate:.2} M vertices/s in all",
+                built * 1e3
+            );
+        }
     }
+    Ok(())
 }

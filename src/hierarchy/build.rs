@@ -43,7 +43,7 @@ pub struct BuildOptions {
 
 impl Default for BuildOptions {
     fn default() -> Self {
-        Self { preset: Preset::default(), closed: false, source_points: None, block_splats: 1 << 16 }
+        Self { preset: Preset::default(), closed: false, source_points: None, block_splats: 1 << 14 }
     }
 }
 
