@@ -112,9 +112,12 @@ pub(crate) fn raise(block: &mut Block) -> Vec<u8> {
 }
 
 /// Moves the spheres of a raised block into their parents', and makes those of higher nodes smaller. The root's lies in
-/// `outer`, which holds all leaves.
+/// `outer`, or where that does not hold all leaves in one that does.
 pub(crate) fn nest(block: &mut Block, heights: &[u8], outer: Sphere) {
     let nodes = &mut block.nodes;
+    let leaves = nodes.iter().filter(|node| node.is_leaf()).map(Sphere::of);
+    let reach = leaves.map(|leaf| leaf.center.distance(outer.center) + leaf.radius).fold(0.0, f64::max);
+    let outer = Sphere { radius: outer.radius.max(reach * (1.0 + 1e-6)), ..outer };
     let mut parents = vec![0u32; nodes.len()];
     for (index, node) in (0..).zip(nodes.iter()) {
         parents[children_of(node)].fill(index);

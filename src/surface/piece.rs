@@ -62,6 +62,8 @@ pub(crate) struct MeshPieces {
     /// The length that edges are measured in, and −1 where the mesh is inside out.
     unit: f32,
     outward: f32,
+    /// Whether any edge is cut.
+    is_coarse: bool,
     /// The longest that an edge may stay.
     pub length: f32,
     pub is_closed: bool,
@@ -93,7 +95,11 @@ impl MeshPieces {
         let is_closed = triangles > 0
             && (seen.edges[0] == 0 || (seen.edges[1] == 0 && may_be_split(has_uvs || has_normals, points, triangles)));
         let outward = if seen.sums.are_inside_out(1.0) { -1.0 } else { 1.0 };
-        Ok((Self { is_split: may_be_split(has_uvs, points, triangles), unit, outward, length, is_closed }, seen))
+        let is_coarse = seen.longest > length;
+        Ok((
+            Self { is_coarse, is_split: may_be_split(has_uvs, points, triangles), unit, outward, length, is_closed },
+            seen,
+        ))
     }
 
     /// The surfels of those vertices of a part that are `owned`; all triangles at them must be in it. Where `is_long`, also
@@ -102,7 +108,7 @@ impl MeshPieces {
         part.check(options)?;
         let is_wanted = |vertex: usize| owned.get(vertex).is_none_or(|&owned| owned);
         let cut = is_long.then_some(self.length);
-        Ok(of_part(part, self.is_split, options, [self.unit, self.outward], cut, is_wanted))
+        Ok(of_part(part, self.is_split, options, [self.unit, self.outward], self.is_coarse, cut, is_wanted))
     }
 }
 

@@ -149,18 +149,22 @@ fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
 }
 
 /// The surfels of the wanted vertices of a part of a mesh, as they are in the whole: `largest` is the length that edges are
-/// measured in, `outward` is −1 where it is inside out. With `cut`, edges longer than that are cut, and the vertices that
-/// this adds are wanted too.
+/// measured in, `outward` is −1 where it is inside out. Where the whole is `coarse`, its edges are cut, and normals are
+/// interpolated everywhere; with `cut`, edges of the part longer than that are cut, and the vertices that this adds are wanted
+/// too.
 pub(super) fn of_part(
     part: &Mesh,
     is_split: bool,
     options: &SurfelOptions,
     [largest, outward]: [f32; 2],
+    is_coarse: bool,
     cut: Option<f32>,
     is_wanted: impl Fn(usize) -> bool + Sync,
 ) -> Vec<Splat> {
     let Some(length) = cut else {
-        return joined(make(part, None, is_split, options, [largest, outward], is_wanted));
+        let sources = (0..part.triangles.len() as u32).collect();
+        let origin = is_coarse.then(|| Origin::new(part, sources, options.crease_angle_degrees));
+        return joined(make(part, origin.as_ref(), is_split, options, [largest, outward], is_wanted));
     };
     // Whoever chose the length has kept to the budget.
     let fine = refine(part, length, usize::MAX >> 1);

@@ -50,7 +50,7 @@ fn what_cannot_be_converted_is_told() {
     folder.put("a.ply", PLY);
     folder.run("convert a.nrrd -o a.nrrd").fails(1, &["exists already", "--overwrite"]);
     folder.run("convert a.nrrd -o none/b.nrrd").fails(1, &["folder does not exist"]);
-    folder.run("convert a.ply -o b.nrrd").fails(2, &["a.ply", "only volumes"]);
+    folder.run("convert a.ply -o b.nrrd").fails(2, &["a.ply", "holds no volume"]);
     for output in ["b.splk", "b.ply", "b", "-"] {
         folder.run(&format!("convert a.nrrd -o {output}")).fails(2, &["only .nrrd files can be written"]);
     }
