@@ -51,8 +51,13 @@ fn what_cannot_be_converted_is_told() {
     folder.run("convert a.nrrd -o a.nrrd").fails(1, &["exists already", "--overwrite"]);
     folder.run("convert a.nrrd -o none/b.nrrd").fails(1, &["folder does not exist"]);
     folder.run("convert a.ply -o b.nrrd").fails(2, &["a.ply", "holds no volume"]);
-    for output in ["b.splk", "b.ply", "b", "-"] {
-        folder.run(&format!("convert a.nrrd -o {output}")).fails(2, &["only .nrrd files can be written"]);
+    for output in ["b.splk", "b.ply"] {
+        folder.run(&format!("convert a.nrrd -o {output}")).fails(2, &["hierarchies are made of meshes and clouds"]);
+    }
+    for output in ["b", "-"] {
+        folder
+            .run(&format!("convert a.nrrd -o {output}"))
+            .fails(2, &["only .splk, .ply and .nrrd files can be written"]);
     }
     folder.run("convert a.nrrd -o b.nrrd --lattice fcc").fails(2, &["fcc", "bcc"]);
     folder.run("convert a.nrrd").fails(2, &["--output"]);
