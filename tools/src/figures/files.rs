@@ -4,7 +4,7 @@ use super::report::{Cell, Table};
 use glam::{DVec3, Vec3};
 use splatkit::{
     hierarchy::{
-        Block, Node, Tree,
+        Node, Tree,
         file::{Hierarchy, WriteOptions, to_bytes},
     },
     io::Limits,
@@ -23,8 +23,8 @@ pub fn table() -> Table {
         format!(
             "Bytes of the file a point of the source and a splat; nodes a leaf; the error of a leaf's place in parts of the \
              spacing (the mean distance of {NEIGHBOURS} neighbours), of its normal in degrees, and the factor on its radius, each \
-             the mean and the largest (of places {SAMPLE} leaves, of which the largest hundredth is left out, and the largest); the \
-             radius of the root over that of the smallest sphere."
+             of {SAMPLE} leaves: the mean and the largest, and what 99 of 100 places keep within; the radius of the root over \
+             that of the smallest sphere."
         ),
         &[
             "model",
@@ -51,26 +51,26 @@ pub fn row(tree: &Tree) -> splatkit::Result<(Hierarchy, Vec<Cell>)> {
     let length = bytes.len() as f64;
     let hierarchy = Hierarchy::from_bytes(bytes, Path::new("memory"), &Limits::default())?;
     let read = hierarchy.read_tree()?;
+    let leaves: Vec<&Node> = tree.nodes().filter(|node| node.is_leaf()).collect();
+    let kept: Vec<&Node> = read.nodes().filter(|node| node.is_leaf()).collect();
+    let count = leaves.len() as f64;
+    let places: Vec<Vec3> = leaves.iter().map(|leaf| Vec3::from(leaf.splat.center)).collect();
+    let sample: Vec<usize> = (0..leaves.len()).step_by((leaves.len() / SAMPLE).max(1)).collect();
     let pairs: Vec<(&Node, &Node)> =
-        tree.blocks.iter().zip(&read.blocks).flat_map(|(a, b)| leaves(a, b, tree.is_joined())).collect();
-    let count = pairs.len() as f64;
-    let places: Vec<Vec3> = pairs.iter().map(|(a, _)| Vec3::from(a.splat.center)).collect();
-    let mut errors: Vec<f64> = (0..pairs.len())
-        .step_by((pairs.len() / SAMPLE).max(1))
-        .map(|index| {
-            let error = Vec3::from(pairs[index].1.splat.center).distance(places[index]);
-            f64::from(error) / spacing(&places, index)
-        })
-        .collect();
+        sample.iter().map(|&index| (leaves[index], nearest(leaves[index], &kept))).collect();
+    let error = |(&index, (_, read)): (&usize, &(&Node, &Node))| {
+        f64::from(Vec3::from(read.splat.center).distance(places[index])) / spacing(&places, index)
+    };
+    let mut errors: Vec<f64> = sample.iter().zip(&pairs).map(error).collect();
     errors.sort_by(f64::total_cmp);
     let angle = |(a, b): &(&Node, &Node)| match (decode_normal(a.splat.normal), decode_normal(b.splat.normal)) {
         (Some(a), Some(b)) => 2.0 * f64::from(a.distance(b) * 0.5).asin().to_degrees(),
         _ => 0.0,
     };
     let radius = |(a, b): &(&Node, &Node)| f64::from(b.radius / a.radius);
-    let mean = |of: &dyn Fn(&(&Node, &Node)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
+    let mean = |of: &dyn Fn(&(&Node, &Node)) -> f64| pairs.iter().map(of).sum::<f64>() / pairs.len() as f64;
     let largest = |of: &dyn Fn(&(&Node, &Node)) -> f64| pairs.iter().map(of).fold(0.0, f64::max);
-    let root = f64::from(read.blocks[0].nodes[0].radius) / smallest_sphere(&pairs);
+    let root = f64::from(read.blocks[0].nodes[0].radius) / smallest_sphere(&leaves);
     let cells = vec![
         Cell::Number(tree.source_points as f64, 0),
         Cell::Number(count, 0),
@@ -89,29 +89,22 @@ pub fn row(tree: &Tree) -> splatkit::Result<(Hierarchy, Vec<Cell>)> {
     Ok((hierarchy, cells))
 }
 
-/// The leaves of a block beside what was read of them. Writing may change the order of siblings, and nothing else.
-fn leaves<'a>(block: &'a Block, read: &'a Block, joined: bool) -> Vec<(&'a Node, &'a Node)> {
-    let mut pairs = Vec::new();
-    if joined && block.portal.is_none() {
-        return pairs;
-    }
-    for node in block.nodes.iter().filter(|node| node.children > 0) {
-        let range = node.first_child as usize..(node.first_child + node.children) as usize;
-        let mut left: Vec<&Node> = read.nodes[range.clone()].iter().filter(|node| node.is_leaf()).collect();
-        for own in block.nodes[range].iter().filter(|node| node.is_leaf()) {
-            let place = Vec3::from(own.splat.center);
-            let distance = |other: &Node| {
-                let turned = decode_normal(own.splat.normal).zip(decode_normal(other.splat.normal));
-                // Splats of one vertex share their place and differ in direction.
-                place.distance(other.splat.center.into()) + own.size * 0.1 * turned.map_or(0.0, |(a, b)| a.distance(b))
-            };
-            let nearest = (0..left.len()).min_by(|&a, &b| distance(left[a]).total_cmp(&distance(left[b])));
-            if let Some(nearest) = nearest {
-                pairs.push((own, left.swap_remove(nearest)));
+/// What was read of a leaf: writing changes the order of siblings, so the nearest is it. Splats of one vertex share their
+/// place and differ in direction.
+fn nearest<'a>(leaf: &Node, kept: &[&'a Node]) -> &'a Node {
+    let (place, normal) = (Vec3::from(leaf.splat.center), decode_normal(leaf.splat.normal));
+    let mut found = (f32::INFINITY, kept[0]);
+    for other in kept {
+        let apart = place.distance(other.splat.center.into());
+        if apart < found.0 {
+            let turned = normal.zip(decode_normal(other.splat.normal)).map_or(0.0, |(a, b)| a.distance(b));
+            let distance = apart + 0.2 * leaf.size * turned;
+            if distance < found.0 {
+                found = (distance, other);
             }
         }
     }
-    pairs
+    found.1
 }
 
 /// The mean distance of the nearest neighbours, other than those at the same place.
@@ -129,9 +122,9 @@ fn spacing(places: &[Vec3], index: usize) -> f64 {
 }
 
 /// The radius of the smallest sphere around the leaves' as they were, nearly: by many small steps.
-fn smallest_sphere(pairs: &[(&Node, &Node)]) -> f64 {
+fn smallest_sphere(leaves: &[&Node]) -> f64 {
     let spheres: Vec<(DVec3, f64)> =
-        pairs.iter().map(|(a, _)| (Vec3::from(a.center).as_dvec3(), f64::from(a.radius))).collect();
+        leaves.iter().map(|leaf| (Vec3::from(leaf.center).as_dvec3(), f64::from(leaf.radius))).collect();
     let mut center = spheres.iter().map(|sphere| sphere.0).sum::<DVec3>() / spheres.len() as f64;
     let mut best = f64::INFINITY;
     for round in 0..1000 {
