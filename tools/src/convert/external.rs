@@ -53,7 +53,7 @@ impl Convert {
             };
             stages.set(name, done, total);
         };
-        let write = self.surface.write_options(&self.files);
+        let write = self.surface.write_options(&self.files, None);
         let done = convert(&self.files, &self.load.limits(), &self.output, &options, &write, &watch)?;
         drop(stages);
         progress.clear();

@@ -64,6 +64,8 @@ enum Up {
 struct Gathered {
     set: SplatSet,
     closed: bool,
+    /// What the first input says of it.
+    up: Option<UpAxis>,
     points: u64,
     read_ms: f64,
     splats_ms: f64,
@@ -94,7 +96,8 @@ impl Convert {
         } else {
             let bar = progress.bar("Building the hierarchy", gathered.set.splats.len() as u64);
             let watch = |done: u64, _: u64| bar.set(done);
-            let (build, write) = (self.surface.build_options(&gathered), self.surface.write_options(&self.files));
+            let (build, write) =
+                (self.surface.build_options(&gathered), self.surface.write_options(&self.files, gathered.up));
             hierarchy::build_file(&gathered.set, &self.output, &build, &write, &watch)?;
         }
         progress.clear();
@@ -142,17 +145,17 @@ impl Convert {
         let input = self.load.open(path)?;
         let read_ms = milliseconds(start);
         let start = Instant::now();
-        let (set, closed, points) = match input {
+        let (set, closed, up, points) = match input {
             Input::Mesh(mesh) => {
                 progress.stage(format!("Making splats of {} points", mesh.positions.len()));
                 let closed = mesh.is_closed();
                 let set = mesh.surfels(&self.surface.surfel_options()).map_err(|e| in_file(path, e))?;
-                (set, closed, mesh.positions.len() as u64)
+                (set, closed, mesh.z_is_up.then_some(UpAxis::Z), mesh.positions.len() as u64)
             }
             Input::Hierarchy(hierarchy) => {
                 progress.stage("Reading the splats of the finest level");
                 let header = hierarchy.header();
-                (hierarchy.leaves()?, header.closed, header.source_points)
+                (hierarchy.leaves()?, header.closed, header.up, header.source_points)
             }
             Input::Volume(_) | Input::Samples(_) => {
                 let file = path.display();
@@ -161,7 +164,7 @@ impl Convert {
                 )));
             }
         };
-        Ok(Gathered { set, closed, points, read_ms, splats_ms: milliseconds(start) })
+        Ok(Gathered { set, closed, up, points, read_ms, splats_ms: milliseconds(start) })
     }
 
     /// Tells what a conversion would take, by that of a run of the splats.
@@ -172,7 +175,8 @@ impl Convert {
         let first = (splats.len() - count) / 2;
         let SplatSet { origin, payload, extent, overlap, .. } = gathered.set;
         let part = SplatSet { origin, payload, splats: splats[first..first + count].to_vec(), extent, overlap };
-        let (build, write) = (self.surface.build_options(gathered), self.surface.write_options(&self.files));
+        let (build, write) =
+            (self.surface.build_options(gathered), self.surface.write_options(&self.files, gathered.up));
         let start = Instant::now();
         let tree = hierarchy::Tree::build(&part, &build, &|_, _| ())?;
         let bytes = hierarchy::file::to_bytes(&tree, &write)?.len() as f64;
@@ -246,15 +250,17 @@ impl SurfaceFlags {
         }
     }
 
-    pub(super) fn write_options(&self, files: &[PathBuf]) -> WriteOptions {
+    /// `up` counts where no flag says otherwise.
+    pub(super) fn write_options(&self, files: &[PathBuf], up: Option<UpAxis>) -> WriteOptions {
         let name = |path: &PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
         WriteOptions {
             lossless: self.lossless,
-            up: self.up.map(|up| match up {
-                Up::X => UpAxis::X,
-                Up::Y => UpAxis::Y,
-                Up::Z => UpAxis::Z,
-            }),
+            up: match self.up {
+                Some(Up::X) => Some(UpAxis::X),
+                Some(Up::Y) => Some(UpAxis::Y),
+                Some(Up::Z) => Some(UpAxis::Z),
+                None => up,
+            },
             unit: self.unit.clone(),
             source: files.iter().filter_map(name).collect::<Vec<_>>().join(", "),
         }
