@@ -1,5 +1,5 @@
-// The bins of a pass: one per tile and group of sheets, tile by tile. Used by project (to count) and scatter (to fill),
-// so that both walk the same windows and tiles.
+// The bins of a pass: one per tile and group of sheets, tile by tile. Used by bin and
+// large, so that counting and filling walk the same windows and tiles.
 
 // The tiles and sheets of a record: first and last tile (column, then row from bit 16), then first and last sheet. The top
 // bit of the first tile marks an isotropic record.
@@ -40,7 +40,7 @@ fn walk_of(box: Box, stage: Pass) -> Walk {
 
 fn bin_of(column: u32, row: u32, window: u32, stage: Pass) -> u32 {
     let tile = (row - stage.first_row) * frame.tiles.x + column;
-    return tile * stage.groups + ((window - (stage.first_sheet - 1u)) >> frame.group_shift);
+    return tile * stage.groups + ((window - (stage.first_sheet - 1u)) >> stage.group_shift);
 }
 
 // Windows of four sheets, each starting three after the one before (see march.wgsl), from a first sheet to a last one.
@@ -67,7 +67,7 @@ fn is_large(walk: Walk) -> bool {
 // The entry of a record's window.
 fn entry_of(box: Box, record: u32, walk: Walk, window: u32, stage: Pass) -> u32 {
     let sheet = walk.first_window + 3u * window - (stage.first_sheet - 1u);
-    let in_group = sheet & ((1u << frame.group_shift) - 1u);
+    let in_group = sheet & ((1u << stage.group_shift) - 1u);
     let continued = select(0u, ENTRY_CONTINUED, window > 0u);
     let isotropic = select(0u, ENTRY_ISOTROPIC, (box.first_tile & BOX_ISOTROPIC) != 0u);
     return (in_group << ENTRY_SHEET_SHIFT) | continued | isotropic | record;

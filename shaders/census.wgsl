@@ -1,29 +1,24 @@
-// What survey counts and plan reads: per sheet and band of tile rows.
+// What survey counts and plan reads: the needs of runs by the sheet in which they start and that in which they end, in each
+// band of tile rows and in all together.
 
-const CENSUS_KINDS: u32 = 7u;
-// Entries of windows that start in the sheet.
-const WINDOW_TILES: u32 = 0u;
-// Tiles, and record words, of splats whose first (last) sheet this is.
-const FIRST_TILES: u32 = 1u;
-const LAST_TILES: u32 = 2u;
-const FIRST_WORDS: u32 = 3u;
-const LAST_WORDS: u32 = 4u;
-// Tiles, and record words, of splats that reach in from the sheets before; filled by plan.
-const OPEN_TILES: u32 = 5u;
-const OPEN_WORDS: u32 = 6u;
+// Bands of tile rows, in which a sheet can be cut that is too much for one pass.
+const BANDS: u32 = 16u;
 
-// Behind the bands of a sheet stand the sums over them.
+fn band_start(band: u32) -> u32 {
+    return band * frame.tiles.y / BANDS;
+}
+
+fn band_of(row: u32) -> u32 {
+    return ((row + 1u) * BANDS - 1u) / frame.tiles.y;
+}
+
+const CENSUS_KINDS: u32 = 4u;
+// Entries and record words of the runs that start in the sheet. Summed up by plan: in those before it.
+const STARTING: u32 = 0u;
+// Those of the runs that end in it, or in those before it.
+const ENDING: u32 = 2u;
+
+// Behind the bands of a sheet stands the whole picture.
 fn census_index(sheet: u32, band: u32) -> u32 {
     return (sheet * (BANDS + 1u) + band) * CENSUS_KINDS;
-}
-
-// What the whole frame needs; sums stop at the largest number instead of wrapping.
-struct Totals {
-    entries: u32,
-    words: u32,
-    splats: u32,
-}
-
-fn fits(totals: Totals) -> bool {
-    return totals.entries <= frame.entry_capacity && totals.words <= frame.record_capacity;
 }

@@ -15,8 +15,8 @@ struct Frame {
     step_inverse: f32,
     // Smallest view-space z that any pixel sees (perspective).
     z_near: f32,
-    // Bins: tiles times groups of 2^group_shift sheets.
-    group_shift: u32,
+    // Spans count tiles in units of 2^tile_shift.
+    tile_shift: u32,
     // Capacities of the records (in vec4) and entries of a pass.
     record_capacity: u32,
     entry_capacity: u32,
@@ -61,7 +61,7 @@ struct Isosurface {
     color: vec4<f32>,
 }
 
-// One depth pass: sheets and rows of tiles. Written by plan.wgsl.
+// One depth pass: sheets and rows of tiles. Written by plan.wgsl. Its bins are tiles times groups of sheets.
 struct Pass {
     // Sheets: first … end-1.
     first_sheet: u32,
@@ -69,12 +69,10 @@ struct Pass {
     // Rows of tiles: first … end-1.
     first_row: u32,
     end_row: u32,
-    // The same rows as bands of the picture.
-    first_band: u32,
-    end_band: u32,
-    // Groups of sheets per tile; 0 when there is no such pass.
+    // Groups of 2^group_shift sheets per tile; 0 when there is no such pass.
     groups: u32,
-    unused: u32,
+    group_shift: u32,
+    unused: vec2<u32>,
 }
 
 // One item's place in the view. Mirrors engine/uniforms.rs.
@@ -89,15 +87,15 @@ struct Source {
     covariance_b: vec4<f32>,
     // Samples along x, y and z, type of the samples (see sample_value).
     lattice: vec4<u32>,
-    // First slice of this chunk; first and last slice that its data hold, which may be neighbours'; unused.
+    // First slice of this chunk; first and last slice that its data hold, which may be neighbours'. Candidates.
     slices: vec4<u32>,
     // Radius of the footprint in standard deviations.
     extent: f32,
-    // Number of candidates (splats; voxels before selection).
+    // Splats, room for nodes, or samples of the lattice.
     count: u32,
     // First run of this chunk in the frame's list of runs.
     first_run: u32,
-    // RADIANCE, ISOTROPIC, ENDS.
+    // RADIANCE, ISOTROPIC, ENDS, NODES.
     flags: u32,
 }
 
@@ -105,6 +103,30 @@ const RADIANCE: u32 = 1u;
 const ISOTROPIC: u32 = 2u;
 // The kernel ends at its extent along the ray too.
 const ENDS: u32 = 4u;
+// Candidates are nodes of a hierarchy.
+const NODES: u32 = 8u;
+
+// Words of the record of a splat.
+fn record_words(flags: u32) -> u32 {
+    return select(4u, 1u, (flags & ISOTROPIC) != 0u);
+}
+
+// A pixel that lets less light through than this is finished.
+const OPAQUE: f32 = 0.0005;
+
+// Some drivers give each of their threads a row of a dispatch's workgroups (Mesa's software Vulkan). Where neighbours are
+// much alike, so that a row may have all the work or none, numbers are dealt out like cards to this many hands.
+const HANDS: u32 = 16u;
+
+fn dealt(number: u32, count: u32) -> u32 {
+    let each = (count + HANDS - 1u) / HANDS;
+    return (number % each) * HANDS + number / each;
+}
+
+// Numbers to deal so that all of a count come up; some are beyond it.
+fn dealt_count(count: u32) -> u32 {
+    return (count + HANDS - 1u) / HANDS * HANDS;
+}
 
 // Candidates that one invocation handles in order, so that lists come out in the same order each time.
 const RUN: u32 = 16u;

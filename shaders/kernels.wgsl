@@ -26,49 +26,94 @@ fn sections(t: vec3<f32>, base: f32) -> vec4<f32> {
     return vec4(f.x - base, f.y - f.x, f.z - f.y, 1.0 - f.z);
 }
 
-// An isotropic lattice sample: view-space centre and value. Far from the eye the shells of the sheets are flat across its
-// footprint, so along the ray it is a few numbers for all pixels.
-fn add_isotropic(entry: u32, front: u32, first_pixel: vec2<i32>) {
+// An isotropic lattice sample in the picture. Far from the eye the shells of the sheets are flat across its footprint, so
+// along the ray it is a few numbers for all pixels.
+struct Round {
+    // Its projected centre; ρ² as a quadratic form of the distance from there: xx, xy, yy.
+    at: vec2<f32>,
+    form: vec3<f32>,
+    // Sections, and the kernel on the planes between them.
+    along: vec4<f32>,
+    on_plane: vec3<f32>,
+    value: f32,
+    // Negative for a sample that is none.
+    extent2: f32,
+}
+
+fn load_isotropic(entry: u32, is_one: bool, near: vec3<f32>) -> Round {
     let record = records[entry & ENTRY_RECORD];
     let c = record.xyz;
     let inverse_sigma = frame.isotropic.y;
-    var distance = c.z;
-    var at = frame.center + frame.scale * c.xy;
     let per_pixel = inverse_sigma / frame.scale;
-    var q = vec3(1.0, 0.0, 1.0) * (per_pixel * per_pixel);
+    var sample: Round;
+    var distance = c.z;
+    sample.at = frame.center + frame.scale * c.xy;
+    sample.form = vec3(1.0, 0.0, 1.0) * (per_pixel * per_pixel);
     if PERSPECTIVE {
         distance = length(c);
         let p = c.xy / c.z;
-        at = frame.center + frame.scale * p;
+        sample.at = frame.center + frame.scale * p;
         let k = c.z * per_pixel;
-        q = vec3(1.0 + p.y * p.y, -p.x * p.y, 1.0 + p.x * p.x) * (k * k);
+        sample.form = vec3(1.0 + p.y * p.y, -p.x * p.y, 1.0 + p.x * p.x) * (k * k);
     }
-    let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
     let base = select(0.0, 1.0, (entry & ENTRY_CONTINUED) != 0u);
     let t = clamp((near - distance) * inverse_sigma, -FAR, FAR);
-    let along = sections(t, base) * (SQRT_TAU * frame.isotropic.x);
-    let on_plane = exp(-0.5 * t * t);
-    let extent2 = frame.isotropic.z;
-    let dx = f32(first_pixel.x) + 0.5 - at.x;
-    let nx = q.x * dx * dx;
-    let mixed = 2.0 * q.y * dx;
+    sample.along = sections(t, base) * (SQRT_TAU * frame.isotropic.x);
+    sample.on_plane = exp(-0.5 * t * t);
+    sample.value = record.w;
+    sample.extent2 = select(-1.0, frame.isotropic.z, is_one);
+    return sample;
+}
+
+// Isotropic samples that are added together: a pixel's sums are then read and written once for all. Two measure best on
+// software, where the sums lie in memory (docs/performance.md).
+const TOGETHER: u32 = 2u;
+
+// Adds the entries from `at` on, `count` of them, to all pixels.
+fn add_isotropic(at: u32, count: u32, front: u32, first_pixel: vec2<i32>) {
+    let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
+    var samples: array<Round, TOGETHER>;
+    for (var i = 0u; i < TOGETHER; i++) {
+        samples[i] = load_isotropic(entries[at + min(i, count - 1u)], i < count, near);
+    }
     for (var r = 0u; r < ROWS; r++) {
-        let dy = f32(first_pixel.y) + (f32(r) + 0.5 - at.y);
-        let flat2 = nx + dy * (mixed + dy * q.z);
         let cosine2 = pixels[r].cosine * pixels[r].cosine;
-        let rho2 = flat2 * cosine2;
-        let e = select(0.0, exp(-0.5 * rho2), rho2 <= extent2);
-        let v = e * record.w;
-        pixels[r].weight += along * e;
-        pixels[r].value += along * v;
-        pixels[r].face_weight += on_plane * e;
-        pixels[r].face_value += on_plane * v;
+        var weight = vec4(0.0);
+        var value = vec4(0.0);
+        var face_weight = vec3(0.0);
+        var face_value = vec3(0.0);
+        var weight_x = vec3(0.0);
+        var weight_y = vec3(0.0);
+        var value_x = vec3(0.0);
+        var value_y = vec3(0.0);
+        for (var i = 0u; i < TOGETHER; i++) {
+            let own = samples[i];
+            let d = vec2<f32>(first_pixel + vec2(0, i32(r))) + 0.5 - own.at;
+            let turned = vec2(own.form.x * d.x + own.form.y * d.y, own.form.y * d.x + own.form.z * d.y);
+            let rho2 = dot(d, turned) * cosine2;
+            let e = select(0.0, exp(-0.5 * rho2), rho2 <= own.extent2);
+            let v = e * own.value;
+            weight += own.along * e;
+            value += own.along * v;
+            face_weight += own.on_plane * e;
+            face_value += own.on_plane * v;
+            if GRADIENTS && !CENTRAL {
+                let slope = turned * cosine2;
+                weight_x += own.on_plane * (e * slope.x);
+                weight_y += own.on_plane * (e * slope.y);
+                value_x += own.on_plane * (v * slope.x);
+                value_y += own.on_plane * (v * slope.y);
+            }
+        }
+        pixels[r].weight += weight;
+        pixels[r].value += value;
+        pixels[r].face_weight += face_weight;
+        pixels[r].face_value += face_value;
         if GRADIENTS && !CENTRAL {
-            let slope = vec2(q.x * dx + q.y * dy, q.y * dx + q.z * dy) * cosine2;
-            pixels[r].weight_x += on_plane * (e * slope.x);
-            pixels[r].weight_y += on_plane * (e * slope.y);
-            pixels[r].value_x += on_plane * (v * slope.x);
-            pixels[r].value_y += on_plane * (v * slope.y);
+            pixels[r].weight_x += weight_x;
+            pixels[r].weight_y += weight_y;
+            pixels[r].value_x += value_x;
+            pixels[r].value_y += value_y;
         }
     }
 }

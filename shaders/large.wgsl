@@ -1,33 +1,19 @@
-// Large: the entries of splats that meet many bins, each spread over the invocations of a workgroup. `find` lists them after
-// project, `count` adds them to the bins' sizes, `fill` writes their entries after scatter.
+// Large: the entries of splats that meet many bins, each spread over the invocations of a workgroup. bin.wgsl lists them;
+// `count` adds them to the bins' sizes, `fill` writes their entries.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> stage: Pass;
 @group(0) @binding(2) var<storage, read> boxes: array<Box>;
-@group(0) @binding(3) var<storage, read> runs: array<u32>;
-@group(0) @binding(4) var<storage, read_write> bins: array<atomic<u32>>;
-@group(0) @binding(5) var<storage, read_write> entries: array<u32>;
-@group(0) @binding(6) var<uniform> run_count: vec4<u32>;
-// Records of large splats, and how many there are.
-@group(0) @binding(7) var<storage, read_write> large: array<u32>;
-@group(0) @binding(8) var<storage, read_write> large_count: atomic<u32>;
+@group(0) @binding(3) var<storage, read_write> bins: array<atomic<u32>>;
+@group(0) @binding(4) var<storage, read_write> entries: array<u32>;
+// Their number, then their records.
+@group(0) @binding(5) var<storage, read> large: array<u32>;
 // The workgroups of `count` and `fill`.
 @group(1) @binding(0) var<storage, read_write> workgroups: array<u32, 3>;
 
-@compute @workgroup_size(64)
-fn find(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let words = min(runs[run_count.x], frame.record_capacity);
-    for (var at = id.x; at < words; at += groups.x * 64u) {
-        let box = boxes[at];
-        if box.sheets != NO_BOX && is_large(walk_of(box, stage)) {
-            large[atomicAdd(&large_count, 1u)] = at;
-        }
-    }
-}
-
 @compute @workgroup_size(1)
 fn prepare() {
-    workgroups[0] = min(atomicLoad(&large_count), 65535u);
+    workgroups[0] = min(large[0], 65535u);
     workgroups[1] = 1u;
     workgroups[2] = 1u;
 }
@@ -46,8 +32,8 @@ fn count(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    for (var own = group.x; own < atomicLoad(&large_count); own += groups.x) {
-        let walk = walk_of(boxes[large[own]], stage);
+    for (var own = group.x; own < large[0]; own += groups.x) {
+        let walk = walk_of(boxes[large[1u + own]], stage);
         for (var i = lane; i < bin_count(walk); i += 256u) {
             atomicAdd(&bins[nth_bin(walk, i)], 1u);
         }
@@ -60,8 +46,8 @@ fn fill(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    for (var own = group.x; own < atomicLoad(&large_count); own += groups.x) {
-        let at = large[own];
+    for (var own = group.x; own < large[0]; own += groups.x) {
+        let at = large[1u + own];
         let box = boxes[at];
         let walk = walk_of(box, stage);
         let tiles = bin_count(walk) / walk.windows;

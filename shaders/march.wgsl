@@ -23,11 +23,9 @@
 // from pass to pass.
 @group(0) @binding(7) var<storage, read_write> colors: array<vec4<f32>>;
 @group(0) @binding(8) var<storage, read_write> depths: array<f32>;
-// For each tile the sheet that it goes on from; behind the tiles: whether any is unfinished, whether one can't be finished.
+// See progress.wgsl.
 @group(0) @binding(9) var<storage, read_write> progress: array<atomic<u32>>;
 
-// A pixel that lets less light through than this is finished.
-const OPAQUE: f32 = 0.0005;
 // The progress of a tile that needs no more work.
 const FINISHED: u32 = 0xffffffffu;
 // The largest value, stored for a pixel that has none, and for one where it is 0.
@@ -39,13 +37,14 @@ var<workgroup> neighbours: array<f32, 64>;
 
 @compute @workgroup_size(8, LANE_ROWS)
 fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) lane: vec3<u32>) {
-    let number = group.x + group.y * 65535u;
-    let column = number % frame.tiles.x;
-    let row = stage.first_row + number / frame.tiles.x;
-    if stage.groups == 0u || row >= stage.end_row {
+    let tile_count = atomicLoad(&progress[progress_word(LISTED)]);
+    let number = dealt(group.x + group.y * 65535u, tile_count);
+    if number >= tile_count {
         return;
     }
-    let tile = row * frame.tiles.x + column;
+    let tile = atomicLoad(&progress[listed_tile(number)]);
+    let column = tile % frame.tiles.x;
+    let row = tile / frame.tiles.x;
     let resumed = atomicLoad(&progress[tile]);
     if resumed == FINISHED {
         return;
@@ -76,7 +75,7 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     // The first window that reaches into the sheets to come.
     let origin = stage.first_sheet - 1u;
     let first_window = first_composited - min(first_composited, 3u);
-    bin += (max(first_window, origin) - origin) >> frame.group_shift;
+    bin += (max(first_window, origin) - origin) >> stage.group_shift;
     var at = 0u;
     if bin > 0u {
         at = bin_end(bin - 1u);
@@ -97,7 +96,7 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
             group_end = bin_end(bin);
         }
         let entry_sheet = entries[at] >> ENTRY_SHEET_SHIFT;
-        let sheet = origin + ((bin - tile_bins) << frame.group_shift) + entry_sheet;
+        let sheet = origin + ((bin - tile_bins) << stage.group_shift) + entry_sheet;
         if open > 0u {
             let closed = min(sheet - front, open);
             close(front, closed, lane.xy);
@@ -121,34 +120,42 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
             }
         }
         let run_end = at + min(LONGEST_RUN, end - at);
+        let stop = min(end, group_end);
         loop {
             let entry = entries[at];
+            var taken = 1u;
             if ISOTROPIC_RECORDS && (!GENERAL_RECORDS || (entry & ENTRY_ISOTROPIC) != 0u) {
-                add_isotropic(entry, front, first_pixel);
+                for (var i = 1u; i < TOGETHER; i++) {
+                    if taken == i && at + i < stop && is_alike(entries[at + i], entry) {
+                        taken++;
+                    }
+                }
+                add_isotropic(at, taken, front, first_pixel);
             } else if GENERAL_RECORDS {
                 add_general(entry, front, first_pixel);
             }
-            at++;
+            at += taken;
             entries_left -= min(entries_left, 1u);
-            if at >= group_end || (entries[at] >> ENTRY_SHEET_SHIFT) != entry_sheet {
+            if at >= stop || (entries[at] >> ENTRY_SHEET_SHIFT) != entry_sheet {
                 break;
             }
             if at >= run_end {
-                atomicStore(&progress[frame.tiles.x * frame.tiles.y + 1u], 1u);
+                atomicStore(&progress[progress_word(UNFINISHABLE)], 1u);
                 break;
             }
         }
         open = 4u;
     }
     if stopped == 0u {
-        close(front, open, lane.xy);
+        // Sheets behind the pass's last are the next pass's.
+        close(front, min(open, stage.end_sheet - front), lane.xy);
     }
     if all(lane.xy == vec2(0u)) {
         atomicStore(&progress[tile], FINISHED);
     }
     if stopped > 0u {
         atomicStore(&progress[tile], stopped);
-        atomicStore(&progress[frame.tiles.x * frame.tiles.y], 1u);
+        atomicStore(&progress[progress_word(UNFINISHED)], 1u);
     }
 
     for (var r = 0u; r < ROWS; r++) {
@@ -177,6 +184,12 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     }
 }
 
+// Whether two entries of a group are of one sheet and one kind of record.
+fn is_alike(a: u32, b: u32) -> bool {
+    let same = ((a ^ b) >> ENTRY_SHEET_SHIFT) == 0u;
+    return same && (!GENERAL_RECORDS || ((a ^ b) & ENTRY_ISOTROPIC) == 0u);
+}
+
 fn bin_end(bin: u32) -> u32 {
     return min(bins[bin], frame.entry_capacity);
 }
@@ -193,7 +206,13 @@ fn close(front: u32, count: u32, lane: vec2<u32>) {
     if SINGLE_SPLATS {
         return;
     }
-    for (var sheet = front; sheet < front + count; sheet++) {
+    if count == 0u {
+        return;
+    }
+    // The condition stands at the end: a driver that only masks what a condition leaves out (Mesa's software Vulkan) walks
+    // through a loop once more than its condition holds if that stands at the beginning.
+    var sheet = front;
+    loop {
         if CENTRAL {
             share_faces(lane);
         }
@@ -207,6 +226,10 @@ fn close(front: u32, count: u32, lane: vec2<u32>) {
         }
         if CENTRAL {
             workgroupBarrier();
+        }
+        sheet++;
+        if sheet >= front + count {
+            break;
         }
     }
 }

@@ -1,5 +1,6 @@
-// Order: sorts each bin's entries, by sheet and then by record, or single splats by sheet and then by distance. Scatter fills bins in whatever order its invocations run;
-// with sorted bins the same input adds up in the same order, and draws the same bytes, each time.
+// Order: sorts each bin's entries, by sheet and then by record, or single splats by sheet and then by distance. Bins are
+// filled in whatever order invocations run; sorted, the same input adds up in the same order, and draws the same bytes, each
+// time.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> stage: Pass;
@@ -12,8 +13,9 @@
 // The workgroups of `order_long`.
 @group(1) @binding(0) var<storage, read_write> long_arguments: array<u32, 3>;
 @group(0) @binding(6) var<storage, read> records: array<vec4<f32>>;
+@group(0) @binding(7) var<storage, read> progress: array<u32>;
 
-const SHORT: u32 = 256u;
+const SHORT: u32 = 512u;
 
 var<workgroup> shared_number: u32;
 
@@ -45,26 +47,39 @@ fn bin_end(bin: u32) -> u32 {
 }
 
 @compute @workgroup_size(64)
-fn order(@builtin(global_invocation_id) id: vec3<u32>) {
-    let bin = id.x;
-    if bin >= (stage.end_row - stage.first_row) * frame.tiles.x * stage.groups {
+fn order(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let bins = progress[progress_word(LISTED)] * stage.groups;
+    let number = dealt(group.x, (bins + 63u) / 64u) * 64u + lane;
+    if number >= bins {
         return;
     }
+    let tile = progress[listed_tile(number / stage.groups)] - stage.first_row * frame.tiles.x;
+    let bin = tile * stage.groups + number % stage.groups;
     let start = bin_start(bin);
     let end = bin_end(bin);
     if end - start > SHORT {
         long_bins[atomicAdd(&long_count, 1u)] = bin;
         return;
     }
-    // Insertion: the entries are nearly in order already.
-    for (var i = start + 1u; i < end; i++) {
-        let own = entries[i];
-        var at = i;
-        while at > start && goes_before(own, entries[at - 1u]) {
-            entries[at] = entries[at - 1u];
-            at--;
+    // Insertion over shrinking distances (Shell 1959, with Knuth's distances), which suits what is nearly in order already.
+    var gap = 1u;
+    while 3u * gap + 1u < (end - start) / 8u {
+        gap = 3u * gap + 1u;
+    }
+    loop {
+        for (var i = start + gap; i < end; i++) {
+            let own = entries[i];
+            var at = i;
+            while at >= start + gap && goes_before(own, entries[at - gap]) {
+                entries[at] = entries[at - gap];
+                at -= gap;
+            }
+            entries[at] = own;
         }
-        entries[at] = own;
+        if gap == 1u {
+            break;
+        }
+        gap /= 3u;
     }
 }
 

@@ -1,175 +1,172 @@
-// Plan: cuts the frame into depth passes, front to back, so that no pass needs more entries or records than there is room.
-// `total` adds up what measure found; `plan` writes one pass if all fits, else cuts by the survey, which `accumulate` has
-// prepared: as many sheets as fit, and where a single sheet is too much, bands of it.
+// Plan: cuts the frame into depth passes, front to back. `total` adds up what measure found, `accumulate` prepares the
+// census of survey.wgsl, and before each pass `advance` decides how far it reaches: as many sheets as fit the buffers and
+// the share of a pass; where a single sheet is too much, bands of it. So the CPU need not wait inside a frame.
+//
+// A run is counted in full by every pass that it meets, which is more than its splats need there. What fits by that count fits.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> needs: array<vec2<u32>>;
-@group(0) @binding(2) var<storage, read_write> totals: Totals;
-@group(0) @binding(3) var<storage, read_write> census: array<u32>;
-// Each pass has 256 bytes, so that it can be bound on its own.
-@group(0) @binding(4) var<storage, read_write> passes: array<PaddedPass>;
-@group(0) @binding(5) var<storage, read_write> report: Report;
-@group(0) @binding(6) var<uniform> runs: vec4<u32>;
+@group(0) @binding(1) var<storage, read> needs: array<vec4<u32>>;
+@group(0) @binding(2) var<uniform> run_count: vec4<u32>;
+@group(0) @binding(3) var<storage, read_write> state: array<u32>;
+@group(0) @binding(4) var<storage, read_write> census: array<u32>;
+@group(0) @binding(5) var<storage, read_write> stage: Pass;
+@group(0) @binding(6) var<storage, read_write> arguments: array<u32>;
+// The number of elements of `bins` that a pass uses; the rest is unused.
+@group(0) @binding(7) var<storage, read_write> bin_size: vec4<u32>;
+@group(0) @binding(8) var<storage, read> map: array<u32>;
 
-struct PaddedPass {
-    stage: Pass,
-    padding: array<vec4<u32>, 14>,
-}
+const SEGMENTS: u32 = 4096u;
 
-struct Report {
-    passes: u32,
-    // Set when even one band of one sheet is more than there is room for, or there are more passes than can be listed.
-    overflow: u32,
-    entries: u32,
-    splats: u32,
-}
+// Of the frame's entries, a pass takes this part where it may hide what lies behind it...
+const PASS_SHARE: u32 = 3u;
+// ...but not so few that another pass costs more than what is hidden.
+const LEAST_SHARE: u32 = select(0x40000u, 0x200000u, SCALAR);
 
 var<workgroup> sums: array<vec3<u32>, 256>;
 
-fn saturating_add(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
-    return a + min(b, vec2(0xffffffffu) - a);
+fn saturating_add(a: vec3<u32>, b: vec3<u32>) -> vec3<u32> {
+    return a + min(b, vec3(0xffffffffu) - a);
 }
 
 @compute @workgroup_size(256)
 fn total(@builtin(local_invocation_index) lane: u32) {
     var sum = vec3(0u);
-    for (var i = lane; i < runs.x; i += 256u) {
-        let own = vec3(needs[i].x, needs[i].y & (ONE_SPLAT - 1u), needs[i].y / ONE_SPLAT);
-        sum += min(own, vec3(0xffffffffu) - sum);
+    for (var i = lane; i < run_count.x; i += 256u) {
+        let need = needs[i].zw;
+        sum = saturating_add(sum, vec3(need.x, need.y & (ONE_SPLAT - 1u), need.y / ONE_SPLAT));
     }
     sums[lane] = sum;
     workgroupBarrier();
     if lane == 0u {
         for (var i = 1u; i < 256u; i++) {
-            sum += min(sums[i], vec3(0xffffffffu) - sum);
+            sum = saturating_add(sum, sums[i]);
         }
-        totals = Totals(sum.x, sum.y, sum.z);
+        for (var i = 0u; i < STATE_WORDS; i++) {
+            state[i] = 0u;
+        }
+        state[ENTRIES] = sum.x;
+        state[WORDS] = sum.y;
+        state[SPLATS] = sum.z;
+        state[NEXT_SHEET] = 1u;
+        state[TARGET] = select(frame.entry_capacity, max(sum.x / PASS_SHARE, LEAST_SHARE), OCCLUSION);
     }
 }
 
-// Turns the census into what passes are cut by. In every band: the tiles and record words of splats that reach into a sheet
-// from before it take the place of those that start in it. Behind the bands: the sums over them.
+// Sums over the sheets before each, band by band.
 @compute @workgroup_size(64)
-fn accumulate(@builtin(local_invocation_index) lane: u32) {
-    if !fits(totals) {
-        if lane < BANDS {
-            var open = vec2(0u);
-            for (var sheet = 0u; sheet <= frame.sheet_count; sheet++) {
-                let at = census_index(sheet, lane);
-                let starting = vec2(census[at + FIRST_TILES], census[at + FIRST_WORDS]);
-                let ending = vec2(census[at + LAST_TILES], census[at + LAST_WORDS]);
-                census[at + OPEN_TILES] = open.x;
-                census[at + OPEN_WORDS] = open.y;
-                open = open + starting - ending;
-            }
-        }
-        storageBarrier();
-        for (var sheet = lane; sheet <= frame.sheet_count; sheet += 64u) {
-            var starting = vec2(0u);
-            var open = vec2(0u);
-            for (var band = 0u; band < BANDS; band++) {
-                starting = saturating_add(starting, starting_in(sheet, band));
-                open = saturating_add(open, open_at(sheet, band));
-            }
-            let at = census_index(sheet, BANDS);
-            census[at + WINDOW_TILES] = starting.x;
-            census[at + FIRST_WORDS] = starting.y;
-            census[at + OPEN_TILES] = open.x;
-            census[at + OPEN_WORDS] = open.y;
-        }
-    }
-}
-
-// Entries and record words of the windows and splats that start in a sheet.
-fn starting_in(sheet: u32, band: u32) -> vec2<u32> {
-    let at = census_index(sheet, band);
-    return vec2(census[at + WINDOW_TILES], census[at + FIRST_WORDS]);
-}
-
-// Those of the splats that reach into it from before: each has one window there.
-fn open_at(sheet: u32, band: u32) -> vec2<u32> {
-    let at = census_index(sheet, band);
-    return vec2(census[at + OPEN_TILES], census[at + OPEN_WORDS]);
-}
-
-fn is_room(need: vec2<u32>) -> bool {
-    return need.x <= frame.entry_capacity && need.y <= frame.record_capacity;
-}
-
-fn emit(first: u32, end: u32, first_band: u32, end_band: u32) {
-    if report.passes >= MAX_PASSES {
-        report.overflow = 1u;
+fn accumulate(@builtin(local_invocation_index) band: u32) {
+    if band > BANDS {
         return;
     }
-    let groups = ((end - first + 1u) >> frame.group_shift) + 1u;
-    let first_row = band_start(first_band);
-    let end_row = band_start(end_band);
-    passes[report.passes].stage =
-        Pass(first, end, first_row, end_row, first_band, end_band, groups, 0u);
-    report.passes += 1u;
+    var before = vec4(0u);
+    for (var sheet = 0u; sheet <= frame.sheet_count + 1u; sheet++) {
+        let at = census_index(sheet, band);
+        let own = vec4(census[at], census[at + 1u], census[at + 2u], census[at + 3u]);
+        census[at] = before.x;
+        census[at + 1u] = before.y;
+        census[at + 2u] = before.z;
+        census[at + 3u] = before.w;
+        before += own;
+    }
+}
+
+// Entries and record words of the runs that meet a band in the sheets first … end-1.
+fn needed(first: u32, end: u32, band: u32) -> vec2<u32> {
+    let started = census_index(end, band) + STARTING;
+    let ended = census_index(first, band) + ENDING;
+    return vec2(census[started] - census[ended], census[started + 1u] - census[ended + 1u]);
+}
+
+fn is_room(need: vec2<u32>, target_entries: u32) -> bool {
+    return need.x <= min(target_entries, frame.entry_capacity) && need.y <= frame.record_capacity;
+}
+
+fn opaque_tiles() -> u32 {
+    return map[map_index(frame.tiles.x, frame.tiles.y)];
 }
 
 @compute @workgroup_size(1)
-fn plan() {
-    report.passes = 0u;
-    report.overflow = 0u;
-    report.entries = totals.entries;
-    report.splats = totals.splats;
-    for (var i = 0u; i < MAX_PASSES; i++) {
-        passes[i].stage.groups = 0u;
+fn advance() {
+    stage.groups = 0u;
+    bin_size.x = 0u;
+    state[TOUCHED] = max(state[TOUCHED], state[TILES]);
+    for (var i = 0u; i < 20u; i++) {
+        arguments[i] = select(1u, 0u, i % 4u == 0u);
     }
-    let end = frame.sheet_count + 1u;
-    if fits(totals) {
-        emit(1u, end, 0u, BANDS);
+    if state[DONE] + state[STALLED] + state[OVERFLOW] > 0u {
         return;
     }
-    // One walk over the sheets: the driver of a software adapter ends long loops (see docs/engine.md).
-    var first = 1u;
-    while first < end {
-        var need = open_at(first, BANDS);
-        var last = first;
-        while last < end {
-            let more = saturating_add(need, starting_in(last, BANDS));
-            if !is_room(more) {
-                break;
-            }
-            need = more;
-            last++;
-        }
+    let end = frame.sheet_count + 1u;
+    let first = state[NEXT_SHEET];
+    let tiles = frame.tiles.x * frame.tiles.y;
+    if first >= end || (OCCLUSION && opaque_tiles() == tiles) {
+        state[DONE] = 1u;
+        return;
+    }
+    if OCCLUSION && state[PASSES] > 0u && 4u * opaque_tiles() < state[TOUCHED] {
+        // Not much becomes opaque: what the map does not hide by now is better drawn at once.
+        state[TARGET] = frame.entry_capacity;
+    }
+    if state[NEXT_BAND] == 0u {
+        let last = furthest(first, end, state[TARGET]);
         if last > first {
-            emit(first, last, 0u, BANDS);
-            first = last;
-            continue;
+            state[NEXT_SHEET] = last;
+            begin(first, last, 0u, BANDS, needed(first, last, BANDS).x);
+            return;
         }
-        emit_in_bands(first);
-        first++;
     }
+    begin_bands(first);
 }
 
-// What one band of a single sheet needs.
-fn needed_in_band(sheet: u32, band: u32) -> vec2<u32> {
-    return saturating_add(open_at(sheet, band), starting_in(sheet, band));
+// The sheet before which a pass has to end.
+fn furthest(first: u32, end: u32, target_entries: u32) -> u32 {
+    // A sheet that is more than a pass's share is drawn whole where it fits.
+    var last = first;
+    if is_room(needed(first, first + 1u, BANDS), frame.entry_capacity) {
+        last++;
+    } else {
+        return first;
+    }
+    while last < end && is_room(needed(first, last + 1u, BANDS), target_entries) {
+        last++;
+    }
+    return last;
 }
 
-// A sheet that is too much for one pass, in as many bands together as fit.
-fn emit_in_bands(sheet: u32) {
-    var band = 0u;
-    while band < BANDS {
-        var need = needed_in_band(sheet, band);
-        if !is_room(need) {
-            report.overflow = 1u;
+// Of a sheet that is too much for one pass as many bands as fit together; a single band is tried whatever it needs.
+fn begin_bands(sheet: u32) {
+    let band = state[NEXT_BAND];
+    var last = band + 1u;
+    var need = needed(sheet, sheet + 1u, band);
+    while last < BANDS {
+        let more = need + needed(sheet, sheet + 1u, last);
+        if !is_room(more, frame.entry_capacity) {
+            break;
         }
-        var last = band + 1u;
-        while last < BANDS {
-            need = saturating_add(need, needed_in_band(sheet, last));
-            if !is_room(need) {
-                break;
-            }
-            last++;
-        }
-        if band_start(band) < band_start(last) {
-            emit(sheet, sheet + 1u, band, last);
-        }
-        band = last;
+        need = more;
+        last++;
     }
+    state[NEXT_BAND] = last % BANDS;
+    state[NEXT_SHEET] = sheet + last / BANDS;
+    begin(sheet, sheet + 1u, band, last, need.x);
+}
+
+fn begin(first: u32, end: u32, first_band: u32, end_band: u32, entries: u32) {
+    let first_row = band_start(first_band);
+    let end_row = band_start(end_band);
+    let tiles = (end_row - first_row) * frame.tiles.x;
+    // One group more than the sheets fill: a pass starts a sheet early, and its groups count from there. No more bins than
+    // entries are worth.
+    var shift = 0u;
+    var groups = end - first + 2u;
+    while shift < MOST_GROUP_SHIFT && (groups * tiles > MOST_BINS || groups * tiles > 2u * min(entries, 0x7fffffffu) + tiles) {
+        shift++;
+        groups = ((end - first + 1u) >> shift) + 1u;
+    }
+    stage = Pass(first, end, first_row, end_row, select(0u, groups, tiles > 0u), shift, vec2(0u));
+    state[PASSES] += 1u;
+    let bins = groups * tiles;
+    bin_size.x = bins + 1u;
+    arguments[SCAN_ARGUMENTS] = max(bins, frame.tiles.x * frame.tiles.y + 2u) / SEGMENTS + 1u;
+    arguments[TILE_ARGUMENTS] = (tiles + 63u) / 64u;
 }

@@ -1,35 +1,14 @@
-// Project: writes the records of a pass's splats, all that march needs of them, and counts their entries into bins.
-//
-// `count` and `write` stand around a prefix sum over the runs, so that records come out in the same order each time.
+// Project: writes the records of a pass's splats, all that march needs of them, and where each lies.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> planes: array<f32>;
-@group(0) @binding(2) var<storage, read> spans: array<u32>;
-@group(0) @binding(3) var<uniform> stage: Pass;
 // Record words before each run of candidates.
-@group(0) @binding(4) var<storage, read_write> runs: array<u32>;
-@group(0) @binding(5) var<storage, read_write> records: array<vec4<f32>>;
-// Where each record lies, for scatter.
-@group(0) @binding(6) var<storage, read_write> boxes: array<Box>;
-@group(0) @binding(7) var<storage, read_write> bins: array<atomic<u32>>;
-
-fn record_words() -> u32 {
-    return select(4u, 1u, (source.flags & ISOTROPIC) != 0u);
-}
-
-@compute @workgroup_size(64)
-fn count(@builtin(global_invocation_id) id: vec3<u32>) {
-    let start = id.x * RUN;
-    let candidates = candidate_count();
-    if stage.groups == 0u || start >= candidates {
-        return;
-    }
-    var words = 0u;
-    for (var i = start; i < min(start + RUN, candidates); i++) {
-        words += u32(in_pass(spans[i], stage)) * record_words();
-    }
-    runs[source.first_run + id.x] = words;
-}
+@group(0) @binding(2) var<storage, read> runs: array<u32>;
+// What cull.wgsl found to draw, see active.wgsl.
+@group(0) @binding(3) var<storage, read> drawn: array<u32>;
+@group(0) @binding(4) var<storage, read_write> records: array<vec4<f32>>;
+// Where each record lies, for bin.
+@group(0) @binding(5) var<storage, read_write> boxes: array<Box>;
 
 fn box_of(span: Span) -> Box {
     return Box(
@@ -82,23 +61,24 @@ fn write_general(at: u32, splat: Candidate) {
 }
 
 @compute @workgroup_size(64)
-fn write(@builtin(global_invocation_id) id: vec3<u32>) {
-    let start = id.x * RUN;
-    let candidates = candidate_count();
-    if stage.groups == 0u || start >= candidates {
+fn project(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= drawn[active_count(source.first_run)] {
         return;
     }
-    var at = runs[source.first_run + id.x];
-    let words = record_words();
-    for (var i = start; i < min(start + RUN, candidates); i++) {
-        if !in_pass(spans[i], stage) {
-            continue;
-        }
-        // plan.wgsl leaves room for all; this only keeps a wrong plan from writing elsewhere.
+    let own = active_run(source.first_run, id.x);
+    let run = drawn[own];
+    var mask = drawn[own + 1u];
+    var at = runs[run];
+    let start = (run - source.first_run) * RUN;
+    let words = record_words(source.flags);
+    while mask != 0u {
+        let bit = firstTrailingBit(mask);
+        mask &= mask - 1u;
+        // plan.wgsl leaves room for all but single bands, of which bin.wgsl tells that they were too much.
         if at + words > frame.record_capacity {
             return;
         }
-        let splat = candidate(i);
+        let splat = candidate(start + bit);
         if words == 1u {
             records[at] = vec4(splat.center, splat.strength);
         } else {
@@ -111,16 +91,5 @@ fn write(@builtin(global_invocation_id) id: vec3<u32>) {
             boxes[at + word].sheets = NO_BOX;
         }
         at += words;
-        let walk = walk_of(box, stage);
-        if is_large(walk) {
-            continue;
-        }
-        for (var window = 0u; window < walk.windows; window++) {
-            for (var row = walk.first_row; row < walk.end_row; row++) {
-                for (var column = walk.first_column; column <= walk.last_column; column++) {
-                    atomicAdd(&bins[bin_of(column, row, walk.first_window + 3u * window, stage)], 1u);
-                }
-            }
-        }
     }
 }

@@ -2,20 +2,21 @@
 // transfer function changes, not when the camera moves. A sample stays unless every value in the box of samples around
 // it, as far as its kernel reaches, is transparent: then no reconstructed value near it can be seen.
 //
-// Two entry points around a prefix sum keep the list in lattice order: count, then write.
+// An invocation handles a block of samples, so that neighbours in the list are neighbours in space: they meet the same tiles
+// and sheets, and hide together. Two entry points around a prefix sum keep the list in one order: count, then write.
 
 @group(0) @binding(0) var<uniform> source: Source;
 // Smallest and largest value around each sample, 8 bits each over the volume's range, two samples a word.
 @group(0) @binding(1) var<storage, read> ranges: array<u32>;
 // For each smallest level, the largest level from which on the range between them holds a visible value.
 @group(0) @binding(2) var<storage, read> first_visible: array<u32>;
-@group(0) @binding(3) var<storage, read_write> runs: array<u32>;
-// The selected samples; the element behind the last possible one is their number.
+// Selected samples of each block; then those before it.
+@group(0) @binding(3) var<storage, read_write> blocks: array<u32>;
+// The selected samples.
 @group(0) @binding(4) var<storage, read_write> selected: array<u32>;
-// The workgroups that later passes need for them.
-@group(0) @binding(5) var<storage, read_write> arguments: array<u32, 3>;
 
-const SELECT_RUN: u32 = 64u;
+// Samples of a block along each side.
+const SIDE: u32 = 4u;
 
 fn is_visible(index: u32) -> bool {
     let range = ranges[index >> 1u] >> (16u * (index & 1u));
@@ -24,38 +25,57 @@ fn is_visible(index: u32) -> bool {
     return high >= first_visible[low];
 }
 
+// First sample of a block and the one behind its last, which is before the first where there is no such block.
+struct Block {
+    first: vec3<u32>,
+    end: vec3<u32>,
+}
+
+fn block_of(id: u32) -> Block {
+    let dims = vec3(source.lattice.xy, source.count / (source.lattice.x * source.lattice.y));
+    let blocks_along = (dims + SIDE - 1u) / SIDE;
+    let row = id / blocks_along.x;
+    let first = SIDE * vec3(id % blocks_along.x, row % blocks_along.y, row / blocks_along.y);
+    return Block(first, min(first + SIDE, dims));
+}
+
+fn index_of(place: vec3<u32>) -> u32 {
+    return (place.z * source.lattice.y + place.y) * source.lattice.x + place.x;
+}
+
 @compute @workgroup_size(64)
 fn count(@builtin(global_invocation_id) id: vec3<u32>) {
-    let start = id.x * SELECT_RUN;
-    if start >= source.count {
+    let block = block_of(id.x);
+    if block.first.z >= block.end.z {
         return;
     }
     var found = 0u;
-    let end = min(start + SELECT_RUN, source.count);
-    for (var i = start; i < end; i++) {
-        found += u32(is_visible(i));
+    for (var z = block.first.z; z < block.end.z; z++) {
+        for (var y = block.first.y; y < block.end.y; y++) {
+            for (var x = block.first.x; x < block.end.x; x++) {
+                found += u32(is_visible(index_of(vec3(x, y, z))));
+            }
+        }
     }
-    runs[id.x] = found;
+    blocks[id.x] = found;
 }
 
 @compute @workgroup_size(64)
 fn write(@builtin(global_invocation_id) id: vec3<u32>) {
-    let start = id.x * SELECT_RUN;
-    if start >= source.count {
+    let block = block_of(id.x);
+    if block.first.z >= block.end.z {
         return;
     }
-    var at = runs[id.x];
-    let end = min(start + SELECT_RUN, source.count);
-    for (var i = start; i < end; i++) {
-        if is_visible(i) {
-            selected[at] = i;
-            at++;
+    var at = blocks[id.x];
+    for (var z = block.first.z; z < block.end.z; z++) {
+        for (var y = block.first.y; y < block.end.y; y++) {
+            for (var x = block.first.x; x < block.end.x; x++) {
+                let index = index_of(vec3(x, y, z));
+                if is_visible(index) {
+                    selected[at] = index;
+                    at++;
+                }
+            }
         }
-    }
-    if end == source.count {
-        selected[source.count] = at;
-        arguments[0] = (at + 64u * RUN - 1u) / (64u * RUN);
-        arguments[1] = 1u;
-        arguments[2] = 1u;
     }
 }

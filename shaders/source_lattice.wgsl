@@ -3,13 +3,13 @@
 
 @group(1) @binding(0) var<uniform> source: Source;
 @group(1) @binding(1) var<storage, read> samples: array<u32>;
-// Indices of the selected samples, and behind the last possible one how many there are.
+// Indices of the selected samples.
 @group(1) @binding(2) var<storage, read> selected: array<u32>;
 // Rectilinear: the coordinate and the unit of every sample along x, then y, then z, two samples an element.
 @group(1) @binding(3) var<uniform> places: array<vec4<f32>, 4096>;
 
 fn candidate_count() -> u32 {
-    return selected[source.count];
+    return source.slices.w;
 }
 
 // Coordinate and unit along an axis.

@@ -1,28 +1,41 @@
-// What a candidate meets of the picture, in 32 bits: enough to tell which passes need it.
+// What a candidate meets of the picture, or a run of candidates together: two corners of a box, 32 bits each.
 
-// Bands of tile rows, in which a sheet can be cut that is too much for one pass.
-const BANDS: u32 = 16u;
-
-fn band_start(band: u32) -> u32 {
-    return band * frame.tiles.y / BANDS;
+// A corner: sheet (12 bits), column and row of a tile (10 bits each, in units of 2^tile_shift tiles).
+fn pack_corner(sheet: u32, tile: vec2<u32>) -> u32 {
+    let place = tile >> vec2(frame.tile_shift);
+    return sheet | (place.x << 12u) | (place.y << 22u);
 }
 
-fn band_of(row: u32) -> u32 {
-    return ((row + 1u) * BANDS - 1u) / frame.tiles.y;
+fn sheet_of_corner(corner: u32) -> u32 {
+    return corner & 0xfffu;
 }
 
-// The sheets and bands that a candidate meets: first and last sheet (12 bits each), first and last band (4 each).
-const NO_SPAN: u32 = 0xffffffffu;
-
-fn pack_span(first_sheet: u32, last_sheet: u32, first_row: u32, last_row: u32) -> u32 {
-    return first_sheet | (last_sheet << 12u) | (band_of(first_row) << 24u) | (band_of(last_row) << 28u);
+fn tile_of_corner(corner: u32) -> vec2<u32> {
+    return vec2((corner >> 12u) & 0x3ffu, corner >> 22u);
 }
 
-fn in_pass(span: u32, stage: Pass) -> bool {
-    let first_sheet = span & 0xfffu;
-    let last_sheet = (span >> 12u) & 0xfffu;
-    let first_band = (span >> 24u) & 0xfu;
-    let last_band = span >> 28u;
-    return span != NO_SPAN && first_sheet < stage.end_sheet && last_sheet >= stage.first_sheet
-        && first_band < stage.end_band && last_band >= stage.first_band;
+// Meets nothing; joined with another span it gives that one.
+const NO_SPAN: vec2<u32> = vec2(0xffffffffu, 0u);
+
+// The span around two.
+fn join(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
+    let low = min(tile_of_corner(a.x), tile_of_corner(b.x));
+    let high = max(tile_of_corner(a.y), tile_of_corner(b.y));
+    return vec2(
+        min(sheet_of_corner(a.x), sheet_of_corner(b.x)) | (low.x << 12u) | (low.y << 22u),
+        max(sheet_of_corner(a.y), sheet_of_corner(b.y)) | (high.x << 12u) | (high.y << 22u),
+    );
+}
+
+// The tiles of a span: first column and row, and those behind the last.
+fn tiles_of(span: vec2<u32>) -> vec4<u32> {
+    let shift = vec2(frame.tile_shift);
+    let end = (tile_of_corner(span.y) + 1u) << shift;
+    return vec4(tile_of_corner(span.x) << shift, min(end, frame.tiles));
+}
+
+fn in_pass(span: vec2<u32>, stage: Pass) -> bool {
+    let tiles = tiles_of(span);
+    return sheet_of_corner(span.x) < stage.end_sheet && sheet_of_corner(span.y) >= stage.first_sheet
+        && tiles.y < stage.end_row && tiles.w > stage.first_row;
 }

@@ -67,6 +67,19 @@ impl Scene {
         self.items.iter().fold(Bounds::EMPTY, |all, item| all.union(item.bounds()))
     }
 
+    /// Whether any part can become so opaque that it hides what lies behind it: surfaces can, a field only where a line
+    /// through its box takes nearly all light.
+    pub(crate) fn can_hide(&self) -> bool {
+        const OPTICAL_DEPTH: f64 = 7.0;
+        self.items.iter().any(|item| match item {
+            Item::Radiance(_) | Item::Hierarchy(_) => true,
+            Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) => {
+                let Bounds { min, max } = item.bounds();
+                !transfer.isosurfaces.is_empty() || transfer.most_extinction() * (max - min).length() > OPTICAL_DEPTH
+            }
+        })
+    }
+
     /// Checks that the scene can be drawn with the settings, beyond [`validate`](Self::validate): clips that are some, and
     /// combinations that mean something.
     pub fn validate_settings(&self, settings: &Settings) -> Result<()> {
@@ -384,6 +397,9 @@ pub struct Settings {
     pub sheet_thickness: Option<f64>,
     /// Largest thickness of a sheet in pixels, where the scene holds explicit splats.
     pub sheet_pixels: f64,
+    /// Whether what lies behind opaque parts is left out. The picture is the same but for what less than
+    /// 0.0005 of the light shows; off, a frame's cost can be compared.
+    pub occlusion: bool,
     /// How fine hierarchies are drawn.
     pub detail: Detail,
     /// Whether nodes of hierarchies that face away from the eye are left out: a saving where the front hides them, a loss
@@ -412,6 +428,7 @@ impl Settings {
             surface_shade: Some(Shade { ambient: 0.2, diffuse: 0.75, specular: 0.15, power: 24.0 }),
             sheet_thickness: None,
             sheet_pixels: 8.0,
+            occlusion: true,
             detail: Detail::default(),
             cull_backfaces: None,
             page_memory: 1 << 30,
@@ -422,6 +439,11 @@ impl Settings {
     /// Whether samples are classified before they are added: asked for, or because whole splats are composited.
     pub fn classifies_samples(&self) -> bool {
         self.mode != Mode::Sheets || self.classification == Classification::Pre
+    }
+
+    /// Whether what is nearer may hide what is farther: not where all values count alike, or the farthest comes first.
+    pub fn hides(&self) -> bool {
+        self.optics != Optics::Maximum && self.mode != Mode::Splats(Order::BackToFront)
     }
 
     /// The light on a volume that `transfer` shows.

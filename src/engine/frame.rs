@@ -2,19 +2,23 @@
 
 use super::{
     Gpu,
+    bin::Bin,
+    clear::Clear,
+    cull::Cull,
     cut::Cut,
     large::Large,
     march::March,
     measure::Measure,
+    occlusion::{Occlusion, map_bytes},
     order::Order,
-    plan::{self, MAX_PASSES, Plan},
+    plan::{self, Plan},
     project::Project,
+    resume::Resume,
     scan::{SCAN_CAPACITY, Scan},
-    scatter::Scatter,
-    select::Select,
     shaders::Variant,
     tables::Tables,
-    uniforms::{self, Frame, PASS_BYTES, PASS_STRIDE, Report},
+    tiles::Tiles,
+    uniforms::{self, AGAIN_ARGUMENTS, ARGUMENT_BYTES, Frame, MARCH_ARGUMENTS, PASS_BYTES, SCAN_ARGUMENTS, State},
     upload::{Origin, PreparedScene, upload},
 };
 use crate::{
@@ -59,9 +63,12 @@ impl Budget {
 }
 
 /// Bins of a pass at most; groups of sheets are made so large that they suffice.
-const MOST_BINS: u32 = 1 << 21;
-/// Groups hold at most this many sheets (7 bits in an entry).
-const MOST_GROUP_SHIFT: u32 = 7;
+pub const MOST_BINS: u32 = 1 << 21;
+/// Groups hold at most 2 to this power sheets (7 bits in an entry).
+pub const MOST_GROUP_SHIFT: u32 = 7;
+/// Columns and rows of tiles that a span tells apart (10 bits each in spans.wgsl).
+const SPAN_TILES: u32 = 1 << 10;
+
 /// Which light and which sources a picture has decides what is compiled.
 pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Settings, budget: Budget) -> Variant {
     let mut variant = Variant {
@@ -80,6 +87,7 @@ pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Sett
         volume_shaded: false,
         surface_shaded: false,
         gradient_opacity: false,
+        occlusion: settings.occlusion && settings.hides() && prepared.scene.can_hide(),
         isosurfaces: 0,
         clips: 0,
         holes: 0,
@@ -150,10 +158,12 @@ pub struct Pipelines {
     measure: Measure,
     plan: Plan,
     project: Project,
-    scatter: Scatter,
+    cull: Cull,
+    bin: Bin,
     large: Large,
     order: Order,
     march: March,
+    occlusion: Option<Occlusion>,
 }
 
 impl Pipelines {
@@ -162,10 +172,12 @@ impl Pipelines {
             measure: Measure::new(gpu, variant),
             plan: Plan::new(gpu, variant),
             project: Project::new(gpu, variant),
-            scatter: Scatter::new(gpu, variant),
+            cull: Cull::new(gpu, variant),
+            bin: Bin::new(gpu, variant),
             large: Large::new(gpu, variant),
             order: Order::new(gpu, variant),
             march: March::new(gpu, variant),
+            occlusion: variant.occlusion.then(|| Occlusion::new(gpu, variant)),
         }
     }
 }
@@ -177,19 +189,21 @@ pub struct Targets {
     pub planes: wgpu::Buffer,
     pub tables: wgpu::Buffer,
     pub needs: wgpu::Buffer,
-    pub totals: wgpu::Buffer,
     pub census: wgpu::Buffer,
-    pub passes: wgpu::Buffer,
-    pub report: wgpu::Buffer,
+    pub state: wgpu::Buffer,
+    pub pass: wgpu::Buffer,
+    pub arguments: wgpu::Buffer,
+    pub bin_size: wgpu::Buffer,
+    pub map: wgpu::Buffer,
     pub run_count: wgpu::Buffer,
     pub runs: wgpu::Buffer,
+    pub active: wgpu::Buffer,
     pub records: wgpu::Buffer,
     pub boxes: wgpu::Buffer,
     pub bins: wgpu::Buffer,
     pub entries: wgpu::Buffer,
-    pub scatter_arguments: wgpu::Buffer,
+    pub bin_arguments: wgpu::Buffer,
     pub large: wgpu::Buffer,
-    pub large_count: wgpu::Buffer,
     pub large_arguments: wgpu::Buffer,
     pub long_bins: wgpu::Buffer,
     pub long_count: wgpu::Buffer,
@@ -198,44 +212,17 @@ pub struct Targets {
     pub colors: wgpu::Buffer,
     pub depths: wgpu::Buffer,
     pub run_total: u32,
-    pub bin_count: u32,
-    pub tile_count: u32,
+    pub tiles: [u32; 2],
 }
 
 impl Targets {
-    pub fn pass(&self, pass: u32) -> wgpu::BufferBinding<'_> {
-        wgpu::BufferBinding {
-            buffer: &self.passes,
-            offset: u64::from(pass) * PASS_STRIDE,
-            size: wgpu::BufferSize::new(PASS_BYTES),
-        }
-    }
-
-    /// What scatter and large bind alike to fill the bins of a pass.
-    pub fn bin_bindings(&self, pass: u32) -> [wgpu::BufferBinding<'_>; 7] {
-        [
-            self.frame.as_entire_buffer_binding(),
-            self.pass(pass),
-            self.boxes.as_entire_buffer_binding(),
-            self.runs.as_entire_buffer_binding(),
-            self.bins.as_entire_buffer_binding(),
-            self.entries.as_entire_buffer_binding(),
-            self.run_count.as_entire_buffer_binding(),
-        ]
-    }
-
-    /// Where in `progress` it stands whether any tile is unfinished, and whether one cannot be finished: a byte offset.
-    pub fn unfinished(&self) -> u64 {
-        4 * u64::from(self.tile_count)
-    }
-
     /// Bytes of GPU memory.
     pub fn bytes(&self) -> u64 {
-        let Self { frame, planes, tables, needs, totals, census, passes, report, run_count, runs, records, .. } = self;
-        let Self { boxes, bins, entries, long_bins, long_count, colors, depths, .. } = self;
-        [frame, planes, tables, needs, totals, census, passes, report, run_count, runs, records]
+        let Self { frame, planes, tables, needs, census, state, map, runs, active, records, boxes, .. } = self;
+        let Self { bins, entries, large, long_bins, progress, colors, depths, .. } = self;
+        [frame, planes, tables, needs, census, state, map, runs, active, records, boxes]
             .into_iter()
-            .chain([boxes, bins, entries, long_bins, long_count, colors, depths])
+            .chain([bins, entries, large, long_bins, progress, colors, depths])
             .map(wgpu::Buffer::size)
             .sum()
     }
@@ -291,20 +278,21 @@ pub fn targets(
     let step = variant.tile_step();
     let tiles = [width.div_ceil(step), height.div_ceil(step)];
     let tile_count = tiles[0] * tiles[1];
-    // One group more than the sheets fill: passes start a sheet early, and their groups count from there.
-    let groups = |shift: u32| ((sheets.count() as u32 + 2) >> shift) + 1;
-    let enough = |shift: &u32| u64::from(groups(*shift)) * u64::from(tile_count) <= u64::from(MOST_BINS);
-    let Some(group_shift) = (0..=MOST_GROUP_SHIFT).find(enough) else {
+    // One group more than the sheets fill: a pass starts a sheet early, and its groups count from there.
+    let groups = |shift: u32| ((sheets.count() as u64 + 2) >> shift) + 1;
+    if groups(MOST_GROUP_SHIFT) * u64::from(tile_count) > u64::from(MOST_BINS) {
         return Err(Error::Argument(format!(
             "a picture of {width}x{height} with {} sheets is too large; draw it smaller or with thicker sheets",
             sheets.count()
         )));
-    };
-    let bin_count = groups(group_shift) * tile_count;
+    }
+    // The number of entries stands behind the last bin.
+    let bin_count = (groups(0) * u64::from(tile_count)).min(u64::from(MOST_BINS)) + 1;
+    let most_tiles = tiles[0].max(tiles[1]);
 
     let mut frame = Frame::new(&prepared.scene, view, sheets, settings);
     frame.tiles = tiles;
-    frame.group_shift = group_shift;
+    frame.tile_shift = most_tiles.div_ceil(SPAN_TILES).next_power_of_two().trailing_zeros();
     frame.entry_capacity = budget.entries;
     frame.record_capacity = budget.record_words;
     let table = tables_of(prepared, &mut frame);
@@ -328,29 +316,30 @@ pub fn targets(
         planes: upload(gpu, "planes", bytemuck::cast_slice(&planes)),
         tables: upload(gpu, "tables", bytemuck::cast_slice(&table)),
         run_count: uniform("run count", bytemuck::bytes_of(&[prepared.runs, 0, 0, 0])),
-        needs: pool.take(gpu, "needs", 8 * runs),
-        totals: pool.take(gpu, "totals", 12),
+        needs: pool.take(gpu, "needs", 16 * runs),
         census: pool.take(gpu, "census", plan::census_bytes(sheets.count())),
-        passes: pool.take(gpu, "passes", PASS_STRIDE * u64::from(MAX_PASSES)),
-        report: pool.take(gpu, "report", size_of::<Report>() as u64),
+        state: pool.take(gpu, "state", size_of::<State>() as u64),
+        pass: pool.take(gpu, "pass", PASS_BYTES),
+        arguments: pool.take(gpu, "arguments", ARGUMENT_BYTES),
+        bin_size: pool.take(gpu, "bin size", 16),
+        map: pool.take(gpu, "map", map_bytes(tiles)),
         runs: pool.take(gpu, "runs", 4 * (runs + 1)),
+        active: pool.take(gpu, "active", 8 * runs),
         records: pool.take(gpu, "records", 16 * words),
         boxes: pool.take(gpu, "boxes", 12 * words),
-        bins: pool.take(gpu, "bins", 4 * u64::from(bin_count)),
+        bins: pool.take(gpu, "bins", 4 * bin_count),
         entries: pool.take(gpu, "entries", 4 * u64::from(budget.entries)),
-        scatter_arguments: pool.take(gpu, "scatter arguments", 12),
-        large: pool.take(gpu, "large", 4 * words),
-        large_count: pool.take(gpu, "large count", 4),
+        bin_arguments: pool.take(gpu, "bin arguments", 12),
+        large: pool.take(gpu, "large", 4 * (words + 1)),
         large_arguments: pool.take(gpu, "large arguments", 12),
-        long_bins: pool.take(gpu, "long bins", 4 * u64::from(bin_count)),
+        long_bins: pool.take(gpu, "long bins", 4 * bin_count),
         long_count: pool.take(gpu, "long count", 4),
         long_arguments: pool.take(gpu, "long arguments", 12),
-        progress: pool.take(gpu, "progress", 4 * (u64::from(tile_count) + 2)),
+        progress: pool.take(gpu, "progress", 4 * (2 * u64::from(tile_count) + 3)),
         colors: pool.take(gpu, "colors", 16 * pixels),
         depths: pool.take(gpu, "depths", 4 * pixels),
         run_total: prepared.runs,
-        bin_count,
-        tile_count,
+        tiles,
     })
 }
 
@@ -370,97 +359,105 @@ fn tables_of(prepared: &PreparedScene, frame: &mut Frame) -> Vec<[f32; 4]> {
 /// One step of a frame, for profiles.
 pub type Step<'a> = (&'static str, Box<dyn Fn(&mut wgpu::CommandEncoder) + 'a>);
 
-/// The steps before the first pass: selection where the transfer function changed, the cuts of hierarchies, then measure and
-/// plan.
-pub fn opening<'a>(
-    gpu: &'a Gpu,
-    select: &'a Select,
-    cut: &'a Cut,
-    scan: &'a Scan,
-    pipelines: &'a Pipelines,
-    targets: &'a Targets,
-    prepared: &'a PreparedScene,
-) -> Vec<Step<'a>> {
-    let mut steps: Vec<Step<'a>> = Vec::new();
-    for chunk in &prepared.chunks {
-        if let Origin::Nodes { slots, .. } = &chunk.origin {
-            let own = slots.chunk(&chunk.uniform, &chunk.data);
-            steps.push(("cut", Box::new(move |encoder| cut.encode(gpu, encoder, scan, &own))));
-        }
-        let Origin::Lattice { volume, selection, .. } = &chunk.origin else { continue };
-        if !selection.outdated {
-            continue;
-        }
-        let transfer = prepared.scene.items.iter().find_map(|item| match item {
-            Item::Volume(_, _, transfer) => Some(transfer),
-            _ => None,
-        });
-        if let Some(transfer) = transfer {
-            steps.push((
-                "select",
-                Box::new(move |encoder| {
-                    select.encode(gpu, encoder, scan, selection, &chunk.uniform, chunk.count, transfer, volume.range);
-                }),
-            ));
-        }
-    }
-    steps.push((
-        "measure",
-        Box::new(move |encoder| {
-            encoder.clear_buffer(&targets.needs, 0, None);
-            encoder.clear_buffer(&targets.colors, 0, None);
-            encoder.clear_buffer(&targets.depths, 0, None);
-            for chunk in &prepared.chunks {
-                pipelines.measure.encode(gpu, encoder, targets, chunk);
-            }
-        }),
-    ));
-    steps.push(("plan", Box::new(move |encoder| pipelines.plan.encode(gpu, encoder, targets, &prepared.chunks))));
-    steps
+/// What the steps of a frame work with.
+#[derive(Clone, Copy)]
+pub struct Work<'a> {
+    pub gpu: &'a Gpu,
+    pub cut: &'a Cut,
+    pub scan: &'a Scan,
+    pub clear: &'a Clear,
+    pub resume: &'a Resume,
+    pub tiles: &'a Tiles,
+    pub pipelines: &'a Pipelines,
+    pub targets: &'a Targets,
+    pub prepared: &'a PreparedScene,
 }
 
-/// The steps of one depth pass.
-pub fn depth_pass<'a>(
-    gpu: &'a Gpu,
-    scan: &'a Scan,
-    pipelines: &'a Pipelines,
-    targets: &'a Targets,
-    prepared: &'a PreparedScene,
-    pass: u32,
-) -> Vec<Step<'a>> {
-    vec![
-        (
-            "project",
+impl<'a> Work<'a> {
+    /// The steps before the first pass: the cuts of hierarchies, then measure and plan.
+    pub fn opening(self) -> Vec<Step<'a>> {
+        let Self { gpu, cut, scan, pipelines, targets, prepared, .. } = self;
+        let mut steps: Vec<Step<'a>> = Vec::new();
+        for chunk in &prepared.chunks {
+            if let Origin::Nodes { slots, .. } = &chunk.origin {
+                let own = slots.chunk(&chunk.uniform, &chunk.data);
+                steps.push(("cut", Box::new(move |encoder| cut.encode(gpu, encoder, scan, &own))));
+            }
+        }
+        steps.push((
+            "measure",
             Box::new(move |encoder| {
-                pipelines.project.encode(gpu, encoder, targets, scan, &prepared.chunks, pass);
+                for buffer in [&targets.needs, &targets.colors, &targets.depths, &targets.map] {
+                    encoder.clear_buffer(buffer, 0, None);
+                }
+                for chunk in &prepared.chunks {
+                    pipelines.measure.encode(gpu, encoder, targets, chunk);
+                }
             }),
-        ),
-        (
-            "bin",
-            Box::new(move |encoder| {
-                pipelines.scatter.encode_count(gpu, encoder, targets, pass);
-                pipelines.large.encode_count(gpu, encoder, targets, pass);
-                scan.encode(gpu, encoder, &targets.bins, targets.bin_count);
-                pipelines.scatter.encode(gpu, encoder, targets, pass);
-                pipelines.large.encode_fill(gpu, encoder, targets, pass);
-            }),
-        ),
-        ("order", Box::new(move |encoder| pipelines.order.encode(gpu, encoder, targets, pass))),
-        (
+        ));
+        steps.push(("plan", Box::new(move |encoder| pipelines.plan.encode(gpu, encoder, targets))));
+        steps
+    }
+
+    /// The steps of the next depth pass; they do nothing where the frame is done.
+    pub fn depth_pass(self) -> Vec<Step<'a>> {
+        let Self { gpu, scan, clear, resume, tiles, pipelines, targets, prepared, .. } = self;
+        let chunks = prepared.chunks.as_slice();
+        let mut steps: Vec<Step<'a>> = vec![
+            (
+                "cull",
+                Box::new(move |encoder| {
+                    pipelines.plan.encode_advance(gpu, encoder, targets);
+                    pipelines.cull.encode(gpu, encoder, targets, chunks);
+                    scan.encode(gpu, encoder, &targets.runs, targets.run_total + 1);
+                }),
+            ),
+            ("project", Box::new(move |encoder| pipelines.project.encode(gpu, encoder, targets, chunks))),
+            (
+                "bin",
+                Box::new(move |encoder| {
+                    clear.encode(gpu, encoder, targets);
+                    pipelines.bin.encode_count(gpu, encoder, targets);
+                    pipelines.large.encode_count(gpu, encoder, targets);
+                    let arguments = (&targets.arguments, SCAN_ARGUMENTS);
+                    scan.encode_indirect(gpu, encoder, &targets.bins, &targets.bin_size, arguments);
+                    pipelines.bin.encode_fill(gpu, encoder, targets);
+                    pipelines.large.encode_fill(gpu, encoder, targets);
+                    tiles.encode(gpu, encoder, targets);
+                }),
+            ),
+            ("order", Box::new(move |encoder| pipelines.order.encode(gpu, encoder, targets))),
+            (
+                "march",
+                Box::new(move |encoder| {
+                    pipelines.march.encode(gpu, encoder, targets, MARCH_ARGUMENTS);
+                    resume.encode_again(gpu, encoder, targets);
+                    pipelines.march.encode(gpu, encoder, targets, AGAIN_ARGUMENTS);
+                    resume.encode_hold(gpu, encoder, targets);
+                }),
+            ),
+        ];
+        steps.extend(self.occlusion());
+        steps
+    }
+
+    /// The steps that go on with a pass at which the frame stopped.
+    pub fn resumed(self) -> Vec<Step<'a>> {
+        let Self { gpu, resume, pipelines, targets, .. } = self;
+        let march: Step<'a> = (
             "march",
             Box::new(move |encoder| {
-                encoder.clear_buffer(&targets.progress, 0, None);
-                pipelines.march.encode(gpu, encoder, targets, pass);
+                resume.encode_resume(gpu, encoder, targets);
+                pipelines.march.encode(gpu, encoder, targets, MARCH_ARGUMENTS);
+                resume.encode_hold(gpu, encoder, targets);
             }),
-        ),
-    ]
-}
+        );
+        [march].into_iter().chain(self.occlusion()).collect()
+    }
 
-/// The step that goes on with the tiles of a pass that march has stopped.
-pub fn march_on<'a>(gpu: &'a Gpu, pipelines: &'a Pipelines, targets: &'a Targets, pass: u32) -> Step<'a> {
-    let encode = move |encoder: &mut wgpu::CommandEncoder| {
-        encoder.clear_buffer(&targets.progress, targets.unfinished(), Some(8));
-        pipelines.march.encode(gpu, encoder, targets, pass);
-    };
-    ("march", Box::new(encode))
+    fn occlusion(self) -> Option<Step<'a>> {
+        let Self { gpu, pipelines, targets, .. } = self;
+        let occlusion = pipelines.occlusion.as_ref()?;
+        Some(("occlusion", Box::new(move |encoder| occlusion.encode(gpu, encoder, targets))))
+    }
 }

@@ -166,4 +166,27 @@ impl Gpu {
             Some(fault) => Err(Error::Gpu(format!("{name}: {fault}"))),
         }
     }
+
+    /// Reads a part of a buffer back, when the device has done all before.
+    pub(super) fn read(&self, buffer: &wgpu::Buffer, offset: u64, bytes: u64) -> Result<Vec<u8>> {
+        let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("read back"),
+            size: bytes,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, bytes);
+        self.queue.submit([encoder.finish()]);
+        let (sender, receiver) = std::sync::mpsc::channel();
+        // The receiver outlives the callback: it is waited for below.
+        staging.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
+        self.wait()?;
+        match receiver.recv() {
+            Ok(Ok(())) => {}
+            _ => return Err(Error::Gpu(format!("what was drawn could not be read back from {}", self.info.name))),
+        }
+        let view = staging.get_mapped_range(..).map_err(|e| Error::Gpu(e.to_string()))?;
+        Ok(view.to_vec())
+    }
 }

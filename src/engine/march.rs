@@ -22,17 +22,19 @@ impl March {
             shaders::PIXEL,
             shaders::KERNELS,
             shaders::SHEET,
+            shaders::PROGRESS,
             shaders::MARCH,
         ];
         let bindings = [Uniform, Read, Uniform, Read, Read, Read, Read, Write, Write, Write];
         Self(Stage::new(gpu, "march", &sources, "march", &[&bindings]))
     }
 
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets, pass: u32) {
+    /// `arguments`: where in the pass's the dispatch stands.
+    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets, arguments: u64) {
         let buffers = [
             targets.frame.as_entire_buffer_binding(),
             targets.planes.as_entire_buffer_binding(),
-            targets.pass(pass),
+            targets.pass.as_entire_buffer_binding(),
             targets.records.as_entire_buffer_binding(),
             targets.bins.as_entire_buffer_binding(),
             targets.entries.as_entire_buffer_binding(),
@@ -41,6 +43,6 @@ impl March {
             targets.depths.as_entire_buffer_binding(),
             targets.progress.as_entire_buffer_binding(),
         ];
-        self.0.dispatch(encoder, &[&self.0.bind(gpu, 0, &buffers)], targets.tile_count);
+        self.0.dispatch_indirect(encoder, &[&self.0.bind(gpu, 0, &buffers)], (&targets.arguments, arguments));
     }
 }

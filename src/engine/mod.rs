@@ -16,6 +16,9 @@
 //!
 //! docs/engine.md tells the mathematics.
 
+mod bin;
+mod clear;
+mod cull;
 mod cut;
 mod frame;
 mod gpu;
@@ -23,18 +26,20 @@ mod large;
 mod march;
 mod measure;
 mod nodes;
+mod occlusion;
 mod order;
 mod pace;
 mod plan;
 mod project;
 mod renderer;
+mod resume;
 mod scan;
-mod scatter;
 mod select;
 mod shaders;
 mod source;
 mod stage;
 mod tables;
+mod tiles;
 mod uniforms;
 mod upload;
 

@@ -5,6 +5,7 @@ use super::{
     frame::Targets,
     shaders::{self, Variant},
     stage::{Binding, Stage},
+    uniforms::ORDER_ARGUMENTS,
 };
 
 /// The pass: short bins by one invocation each, long ones by a workgroup each.
@@ -19,10 +20,10 @@ impl Order {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
         use Binding::{Read, Uniform, Write};
         let constants = variant.constants();
-        let bindings = [Uniform, Uniform, Read, Write, Write, Write, Read];
+        let bindings = [Uniform, Uniform, Read, Write, Write, Write, Read, Read];
         let stage = |label, entry, arguments: &[&[Binding]]| {
             let groups = [&[bindings.as_slice()], arguments].concat();
-            Stage::new(gpu, label, &[&constants, shaders::FRAME, shaders::ORDER], entry, &groups)
+            Stage::new(gpu, label, &[&constants, shaders::FRAME, shaders::PROGRESS, shaders::ORDER], entry, &groups)
         };
         Self {
             short: stage("order", "order", &[]),
@@ -31,18 +32,20 @@ impl Order {
         }
     }
 
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets, pass: u32) {
+    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
         encoder.clear_buffer(&targets.long_count, 0, None);
         let buffers = [
             targets.frame.as_entire_buffer_binding(),
-            targets.pass(pass),
+            targets.pass.as_entire_buffer_binding(),
             targets.bins.as_entire_buffer_binding(),
             targets.entries.as_entire_buffer_binding(),
             targets.long_bins.as_entire_buffer_binding(),
             targets.long_count.as_entire_buffer_binding(),
             targets.records.as_entire_buffer_binding(),
+            targets.progress.as_entire_buffer_binding(),
         ];
-        self.short.dispatch(encoder, &[&self.short.bind(gpu, 0, &buffers)], targets.bin_count.div_ceil(64));
+        let group = self.short.bind(gpu, 0, &buffers);
+        self.short.dispatch_indirect(encoder, &[&group], (&targets.arguments, ORDER_ARGUMENTS));
         let arguments = self.count_long.bind(gpu, 1, &[targets.long_arguments.as_entire_buffer_binding()]);
         self.count_long.dispatch(encoder, &[&self.count_long.bind(gpu, 0, &buffers), &arguments], 1);
         self.long.dispatch_indirect(encoder, &[&self.long.bind(gpu, 0, &buffers)], (&targets.long_arguments, 0));

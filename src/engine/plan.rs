@@ -4,74 +4,71 @@ use super::{
     Gpu,
     frame::Targets,
     shaders::{self, Variant},
-    source::{Sources, per_source},
     stage::{Binding, Stage},
-    upload::Chunk,
 };
 
-/// The most passes of a frame.
-pub const MAX_PASSES: u32 = 256;
-/// Bytes of the census for a number of sheets: 7 counts for each of 16 bands and for their sum, also for the sheet before
+/// Bytes of the census for a number of sheets: 4 counts for each of 16 bands and for all together, also for the sheet before
 /// the first and the one behind the last.
 pub fn census_bytes(sheets: usize) -> u64 {
-    (sheets as u64 + 2) * 17 * 7 * 4
+    (sheets as u64 + 2) * 17 * 4 * 4
 }
 
-/// The passes.
+/// The passes: once a frame, and `advance` before each depth pass.
 #[derive(Debug)]
 pub struct Plan {
     total: Stage,
-    survey: Sources<Stage>,
+    survey: Stage,
     accumulate: Stage,
-    plan: Stage,
+    advance: Stage,
 }
 
 impl Plan {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
         use Binding::{Read, Uniform, Write};
         let constants = variant.constants();
-        let sources = [&constants, shaders::FRAME, shaders::SPANS, shaders::CENSUS, shaders::PLAN];
-        let bindings: &[&[Binding]] = &[&[Uniform, Read, Write, Write, Write, Write, Uniform]];
-        let survey = per_source(|source, bindings| {
-            let sources = [
-                &constants,
-                shaders::FRAME,
-                shaders::NORMAL,
-                shaders::FOOTPRINT,
-                source,
-                shaders::SPANS,
-                shaders::CENSUS,
-                shaders::BINS,
-                shaders::SURVEY,
-            ];
-            Stage::new(gpu, "survey", &sources, "survey", &[&[Uniform, Read, Read, Read, Write], bindings])
-        });
+        let shared = [&constants, shaders::FRAME, shaders::SPANS, shaders::CENSUS];
+        let plan = |label, entry| {
+            let own = [shaders::STATE, shaders::MAP, shaders::PLAN];
+            let bindings = [Uniform, Read, Uniform, Write, Write, Write, Write, Write, Read];
+            Stage::new(gpu, label, &[shared.as_slice(), &own].concat(), entry, &[&bindings])
+        };
+        let survey = [shared.as_slice(), &[shaders::SURVEY]].concat();
         Self {
-            total: Stage::new(gpu, "plan: total", &sources, "total", bindings),
-            survey,
-            accumulate: Stage::new(gpu, "plan: accumulate", &sources, "accumulate", bindings),
-            plan: Stage::new(gpu, "plan", &sources, "plan", bindings),
+            total: plan("plan: total", "total"),
+            survey: Stage::new(gpu, "survey", &survey, "survey", &[&[Uniform, Read, Uniform, Write]]),
+            accumulate: plan("plan: accumulate", "accumulate"),
+            advance: plan("plan: advance", "advance"),
         }
     }
 
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets, chunks: &[Chunk]) {
-        let buffers = [
+    fn buffers(targets: &Targets) -> [wgpu::BufferBinding<'_>; 9] {
+        [
             &targets.frame,
             &targets.needs,
-            &targets.totals,
-            &targets.census,
-            &targets.passes,
-            &targets.report,
             &targets.run_count,
+            &targets.state,
+            &targets.census,
+            &targets.pass,
+            &targets.arguments,
+            &targets.bin_size,
+            &targets.map,
         ]
-        .map(|b| b.as_entire_buffer_binding());
+        .map(|b| b.as_entire_buffer_binding())
+    }
+
+    /// Sums up what measure found.
+    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+        let buffers = Self::buffers(targets);
         self.total.dispatch(encoder, &[&self.total.bind(gpu, 0, &buffers)], 1);
         encoder.clear_buffer(&targets.census, 0, None);
-        for chunk in chunks {
-            let buffers = [&targets.frame, &targets.planes, &chunk.spans, &targets.totals, &targets.census];
-            self.survey.dispatch(gpu, encoder, chunk, &buffers.map(|b| b.as_entire_buffer_binding()));
-        }
+        let own = [&targets.frame, &targets.needs, &targets.run_count, &targets.census];
+        let survey = self.survey.bind(gpu, 0, &own.map(|b| b.as_entire_buffer_binding()));
+        self.survey.dispatch(encoder, &[&survey], targets.run_total.div_ceil(64));
         self.accumulate.dispatch(encoder, &[&self.accumulate.bind(gpu, 0, &buffers)], 1);
-        self.plan.dispatch(encoder, &[&self.plan.bind(gpu, 0, &buffers)], 1);
+    }
+
+    /// Decides how far the next pass reaches.
+    pub fn encode_advance(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+        self.advance.dispatch(encoder, &[&self.advance.bind(gpu, 0, &Self::buffers(targets))], 1);
     }
 }

@@ -2,14 +2,17 @@
 
 use super::{
     Budget, Gpu, PreparedScene,
+    clear::Clear,
     cut::{Cut, finest_within, tally_bytes},
-    frame::{self, Pipelines, Pool, Step, Targets},
+    frame::{self, Pipelines, Pool, Step, Targets, Work},
     nodes::Forest,
     pace::Pace,
+    resume::Resume,
     scan::Scan,
     select::Select,
     shaders::Variant,
-    uniforms::Report,
+    tiles::Tiles,
+    uniforms::State,
     upload::Origin,
 };
 use crate::{
@@ -30,16 +33,26 @@ pub struct Renderer {
     cut: Cut,
     pace: Pace,
     scan: Scan,
+    clear: Clear,
+    resume: Resume,
+    tiles: Tiles,
     pipelines: HashMap<Variant, Pipelines>,
     pool: Pool,
+    /// Depth passes that are submitted together.
+    passes: u32,
 }
+
+/// Passes that are submitted together at most: each takes some dozens of bind groups.
+const MOST_PASSES: u32 = 16;
 
 /// What a frame took.
 #[derive(Debug, Clone, Default)]
 pub struct FrameStats {
     /// Splats that meet the picture.
     pub splats: u64,
-    /// (splat, tile, window) triples.
+    /// Those of them that were left out because what lies before them is opaque.
+    pub hidden: u64,
+    /// (splat, tile, window) triples that were drawn.
     pub entries: u64,
     /// Depth passes.
     pub passes: u32,
@@ -69,6 +82,10 @@ impl Renderer {
             scan: Scan::new(gpu),
             pipelines: HashMap::new(),
             pool: Pool::default(),
+            clear: Clear::new(gpu),
+            resume: Resume::new(gpu),
+            tiles: Tiles::new(gpu),
+            passes: 4,
         }
     }
 
@@ -176,6 +193,7 @@ impl Renderer {
         let _span = tracing::debug_span!("frame", width = view.size[0], height = view.size[1]).entered();
         let cut_pixels = self.cut_hierarchies(prepared, view, settings, detail)?;
         let gpu = &self.gpu;
+        prepared.update_selections(gpu, &self.select, &self.scan, view)?;
         let variant = frame::variant(gpu, prepared, view, settings, self.budget);
         let sheets = prepared.scene.sheets(view, settings);
         let targets = frame::targets(gpu, &mut self.pool, prepared, &variant, view, &sheets, settings, self.budget)?;
@@ -186,34 +204,53 @@ impl Renderer {
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
         }
         let mut times = Vec::new();
-        let steps = frame::opening(gpu, &self.select, &self.cut, &self.scan, pipelines, &targets, prepared);
-        let first = frame::depth_pass(gpu, &self.scan, pipelines, &targets, prepared, 0);
-        submit(gpu, steps.into_iter().chain(first), profile.then_some(&mut times))?;
-        finish_tiles(gpu, pipelines, &targets, 0, profile.then_some(&mut times))?;
-        let report: Report = bytemuck::pod_read_unaligned(&read_buffer(gpu, &targets.report, 0, 16)?);
-        if report.overflow != 0 {
-            return Err(Error::Gpu(format!(
-                "the scene needs more room in one sheet of the picture than the budget of {} entries gives; \
-                 raise the budget",
-                self.budget.entries
-            )));
-        }
-        // One pass in flight at a time keeps the number of bind groups, and the time to the next answer, small.
-        for pass in 1..report.passes {
-            let steps = frame::depth_pass(gpu, &self.scan, pipelines, &targets, prepared, pass);
-            submit(gpu, steps, profile.then_some(&mut times))?;
-            finish_tiles(gpu, pipelines, &targets, pass, profile.then_some(&mut times))?;
-        }
-        gpu.wait()?;
-        for chunk in &mut prepared.chunks {
-            if let Origin::Lattice { selection, .. } = &mut chunk.origin {
-                selection.outdated = false;
+        let work = Work {
+            gpu,
+            cut: &self.cut,
+            scan: &self.scan,
+            clear: &self.clear,
+            resume: &self.resume,
+            tiles: &self.tiles,
+            pipelines,
+            targets: &targets,
+            prepared,
+        };
+        let mut steps = work.opening();
+        let mut state: State;
+        loop {
+            // As many passes as the last frame took; what is too many does nothing.
+            let passes = if profile { 1 } else { self.passes };
+            steps.extend((0..passes).flat_map(|_| work.depth_pass()));
+            submit(gpu, std::mem::take(&mut steps), profile.then_some(&mut times))?;
+            state = bytemuck::pod_read_unaligned(&gpu.read(&targets.state, 0, size_of::<State>() as u64)?);
+            if state.impossible != 0 {
+                return Err(Error::Gpu(format!(
+                    "more splats meet in one sheet of one tile of the picture than the driver of {} can add up; \
+                     draw the scene nearer, or on a GPU",
+                    gpu.info.name
+                )));
+            }
+            if state.overflow != 0 {
+                return Err(Error::Gpu(format!(
+                    "the scene needs more room in one sheet of the picture than the budget of {} entries gives; \
+                     raise the budget",
+                    self.budget.entries
+                )));
+            }
+            if state.stalled != 0 {
+                steps = work.resumed();
+            } else if state.done != 0 {
+                break;
             }
         }
+        drop(steps);
+        // The last pass finds that there is nothing left.
+        self.passes = (state.passes + 1).min(MOST_PASSES);
         let stats = FrameStats {
-            splats: u64::from(report.splats),
-            entries: u64::from(report.entries),
-            passes: report.passes,
+            splats: u64::from(state.splats),
+            hidden: u64::from(state.hidden),
+            entries: u64::from(state.binned),
+            passes: state.passes,
             gpu_bytes: prepared.bytes + targets.bytes(),
             cut_pixels,
             missing_pages: prepared.forests.iter().map(|forest| forest.missing as u64).sum(),
@@ -273,7 +310,7 @@ impl Renderer {
             }
         }
         gpu.queue.submit([encoder.finish()]);
-        let tally: Vec<i32> = bytemuck::pod_collect_to_vec(&read_buffer(gpu, &counters, 0, tally_bytes())?);
+        let tally: Vec<i32> = bytemuck::pod_collect_to_vec(&gpu.read(&counters, 0, tally_bytes())?);
         Ok(finest_within(&tally, most))
     }
 
@@ -281,9 +318,8 @@ impl Renderer {
     fn read(&self, targets: &Targets, view: &View, settings: &Settings, picture: &mut Picture) -> Result<()> {
         let pixels = view.size[0] as usize * view.size[1] as usize;
         let color: Vec<[f32; 4]> =
-            bytemuck::pod_collect_to_vec(&read_buffer(&self.gpu, &targets.colors, 0, 16 * pixels as u64)?);
-        let hits: Vec<f32> =
-            bytemuck::pod_collect_to_vec(&read_buffer(&self.gpu, &targets.depths, 0, 4 * pixels as u64)?);
+            bytemuck::pod_collect_to_vec(&self.gpu.read(&targets.colors, 0, 16 * pixels as u64)?);
+        let hits: Vec<f32> = bytemuck::pod_collect_to_vec(&self.gpu.read(&targets.depths, 0, 4 * pixels as u64)?);
         let width = view.size[0] as usize;
         picture.depth.extend((0..pixels).map(|i| {
             // The largest value has no place of its own.
@@ -302,6 +338,7 @@ impl FrameStats {
     /// Adds what another strip of the same picture took.
     fn add(&mut self, other: Self) {
         self.splats = self.splats.max(other.splats);
+        self.hidden = self.hidden.max(other.hidden);
         self.entries += other.entries;
         self.passes += other.passes;
         self.gpu_bytes = self.gpu_bytes.max(other.gpu_bytes);
@@ -339,52 +376,4 @@ fn submit<'a>(
     }
     gpu.queue.submit([encoder.finish()]);
     Ok(())
-}
-
-/// Goes on with the tiles of a pass until all are finished.
-fn finish_tiles(
-    gpu: &Gpu,
-    pipelines: &Pipelines,
-    targets: &Targets,
-    pass: u32,
-    mut times: Option<&mut Vec<(&'static str, f64)>>,
-) -> Result<()> {
-    loop {
-        let [unfinished, impossible]: [u32; 2] =
-            bytemuck::pod_read_unaligned(&read_buffer(gpu, &targets.progress, targets.unfinished(), 8)?);
-        if impossible != 0 {
-            return Err(Error::Gpu(format!(
-                "more splats meet in one sheet of one tile of the picture than the driver of {} can add up; \
-                 draw the scene nearer, or on a GPU",
-                gpu.info.name
-            )));
-        }
-        if unfinished == 0 {
-            return Ok(());
-        }
-        submit(gpu, [frame::march_on(gpu, pipelines, targets, pass)], times.as_deref_mut())?;
-    }
-}
-
-/// Reads a part of a buffer back.
-fn read_buffer(gpu: &Gpu, buffer: &wgpu::Buffer, offset: u64, bytes: u64) -> Result<Vec<u8>> {
-    let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("read back"),
-        size: bytes,
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, bytes);
-    gpu.queue.submit([encoder.finish()]);
-    let (sender, receiver) = std::sync::mpsc::channel();
-    // The receiver outlives the callback: it is waited for below.
-    staging.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
-    gpu.wait()?;
-    match receiver.recv() {
-        Ok(Ok(())) => {}
-        _ => return Err(Error::Gpu(format!("a picture could not be read back from {}", gpu.info.name))),
-    }
-    let view = staging.get_mapped_range(..).map_err(|e| Error::Gpu(e.to_string()))?;
-    Ok(view.to_vec())
 }

@@ -39,6 +39,22 @@ impl Scan {
         }
     }
 
+    /// Replaces numbers by the sum of those before each; `size` holds how many there are, and the indirect dispatch their
+    /// segments.
+    pub fn encode_indirect(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        numbers: &wgpu::Buffer,
+        size: &wgpu::Buffer,
+        arguments: (&wgpu::Buffer, u64),
+    ) {
+        let buffers = [size, numbers, &self.segments].map(|b| b.as_entire_buffer_binding());
+        self.sum.dispatch_indirect(encoder, &[&self.sum.bind(gpu, 0, &buffers)], arguments);
+        self.spine.dispatch(encoder, &[&self.spine.bind(gpu, 0, &buffers)], 1);
+        self.spread.dispatch_indirect(encoder, &[&self.spread.bind(gpu, 0, &buffers)], arguments);
+    }
+
     /// Replaces each of the first `count` numbers by the sum of those before it.
     pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, numbers: &wgpu::Buffer, count: u32) {
         debug_assert!(count <= SCAN_CAPACITY);

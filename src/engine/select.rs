@@ -8,43 +8,48 @@ use super::{
     stage::{Binding, Stage},
     upload::upload,
 };
-use crate::volume::{TransferFunction, reach::first_visible};
+use crate::{
+    Result,
+    volume::{TransferFunction, reach::first_visible},
+};
 use wgpu::BufferUsages as Usage;
 
-/// Samples per invocation (`SELECT_RUN` in select.wgsl).
-const SELECT_RUN: u32 = 64;
-const WORKGROUP_SAMPLES: u32 = 64 * SELECT_RUN;
+/// Samples along each side of a block (`SIDE` in select.wgsl), which an invocation handles.
+const SIDE: u32 = 4;
 
 /// The selected samples of one chunk of a lattice.
 #[derive(Debug)]
 pub struct Selection {
     ranges: wgpu::Buffer,
-    runs: wgpu::Buffer,
-    /// Indices within the chunk, in lattice order; the element behind the last possible one is their number.
+    blocks: wgpu::Buffer,
+    block_count: u32,
+    /// Indices within the chunk, block by block.
     pub selected: wgpu::Buffer,
-    /// The arguments of a dispatch over them.
-    pub arguments: wgpu::Buffer,
+    /// Their number.
+    pub count: u32,
     /// Whether the transfer function changed since the list was made.
     pub outdated: bool,
 }
 
 impl Selection {
-    /// `ranges`: smallest and largest value around each sample, quantised over the volume's range.
-    pub fn new(gpu: &Gpu, ranges: &[[u8; 2]]) -> Self {
-        let samples = ranges.len() as u64;
-        let runs = samples.div_ceil(u64::from(SELECT_RUN));
-        debug_assert!(runs <= u64::from(SCAN_CAPACITY));
+    /// `dims`: the chunk's samples along the axes. `ranges`: smallest and largest value around each, quantised over the
+    /// volume's range.
+    pub fn new(gpu: &Gpu, dims: [u32; 3], ranges: &[[u8; 2]]) -> Self {
+        let block_count = dims.map(|n| n.div_ceil(SIDE)).iter().product::<u32>();
+        debug_assert!(block_count < SCAN_CAPACITY);
+        let usage = Usage::STORAGE | Usage::COPY_SRC;
         Self {
             ranges: upload(gpu, "ranges", bytemuck::cast_slice(ranges)),
-            runs: super::buffer(gpu, "select runs", 4 * runs, Usage::STORAGE),
-            selected: super::buffer(gpu, "selected", 4 * (samples + 1), Usage::STORAGE),
-            arguments: super::buffer(gpu, "selected arguments", 12, Usage::STORAGE | Usage::INDIRECT),
+            blocks: super::buffer(gpu, "select blocks", 4 * (u64::from(block_count) + 1), usage),
+            block_count,
+            selected: super::buffer(gpu, "selected", 4, Usage::STORAGE),
+            count: 0,
             outdated: true,
         }
     }
 
     pub fn bytes(&self) -> u64 {
-        self.ranges.size() + self.runs.size() + self.selected.size()
+        self.ranges.size() + self.blocks.size() + self.selected.size()
     }
 }
 
@@ -59,35 +64,45 @@ impl Select {
     pub fn new(gpu: &Gpu) -> Self {
         use Binding::{Read, Uniform, Write};
         let sources = [shaders::FRAME, shaders::SELECT];
-        let bindings: &[&[Binding]] = &[&[Uniform, Read, Read, Write, Write, Write]];
+        let bindings: &[&[Binding]] = &[&[Uniform, Read, Read, Write, Write]];
         Self {
             count: Stage::new(gpu, "select: count", &sources, "count", bindings),
             write: Stage::new(gpu, "select: write", &sources, "write", bindings),
         }
     }
 
-    /// Encodes the making of a chunk's list. `uniform` is the chunk's source, `count` its number of samples, `range` the
-    /// volume's smallest and largest value.
-    #[expect(clippy::too_many_arguments, reason = "each is a separate thing that the pass reads")]
-    pub fn encode(
+    /// Makes a chunk's list, in a buffer of its size. `uniform` is the chunk's source, `range` the volume's smallest and
+    /// largest value.
+    pub fn update(
         &self,
         gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
         scan: &Scan,
-        selection: &Selection,
+        selection: &mut Selection,
         uniform: &wgpu::Buffer,
-        count: u32,
         transfer: &TransferFunction,
         range: [f64; 2],
-    ) {
+    ) -> Result<()> {
         let first = first_visible(transfer, range).map(u32::from);
         let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&first));
-        let buffers =
-            [uniform, &selection.ranges, &visible, &selection.runs, &selection.selected, &selection.arguments]
-                .map(|b| b.as_entire_buffer_binding());
-        let groups = count.div_ceil(WORKGROUP_SAMPLES);
-        self.count.dispatch(encoder, &[&self.count.bind(gpu, 0, &buffers)], groups);
-        scan.encode(gpu, encoder, &selection.runs, count.div_ceil(SELECT_RUN));
-        self.write.dispatch(encoder, &[&self.write.bind(gpu, 0, &buffers)], groups);
+        let bind = |stage: &Stage, selection: &Selection| {
+            let buffers = [uniform, &selection.ranges, &visible, &selection.blocks, &selection.selected];
+            stage.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()))
+        };
+        let encoder = || gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("select") });
+        let (blocks, groups) = (selection.block_count, selection.block_count.div_ceil(64));
+        let mut counting = encoder();
+        // Behind the last block stands their sum after the scan.
+        counting.clear_buffer(&selection.blocks, 0, None);
+        self.count.dispatch(&mut counting, &[&bind(&self.count, selection)], groups);
+        scan.encode(gpu, &mut counting, &selection.blocks, blocks + 1);
+        gpu.queue.submit([counting.finish()]);
+        let total = gpu.read(&selection.blocks, 4 * u64::from(blocks), 4)?;
+        selection.count = bytemuck::pod_read_unaligned(&total);
+        selection.selected = super::buffer(gpu, "selected", 4 * u64::from(selection.count), Usage::STORAGE);
+        let mut writing = encoder();
+        self.write.dispatch(&mut writing, &[&bind(&self.write, selection)], groups);
+        gpu.queue.submit([writing.finish()]);
+        selection.outdated = false;
+        Ok(())
     }
 }

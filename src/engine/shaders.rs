@@ -23,7 +23,16 @@ pub const SURVEY: &str = include_str!("../../shaders/survey.wgsl");
 pub const PLAN: &str = include_str!("../../shaders/plan.wgsl");
 pub const PROJECT: &str = include_str!("../../shaders/project.wgsl");
 pub const SCAN: &str = include_str!("../../shaders/scan.wgsl");
-pub const SCATTER: &str = include_str!("../../shaders/scatter.wgsl");
+pub const ACTIVE: &str = include_str!("../../shaders/active.wgsl");
+pub const BIN: &str = include_str!("../../shaders/bin.wgsl");
+pub const CLEAR: &str = include_str!("../../shaders/clear.wgsl");
+pub const CULL: &str = include_str!("../../shaders/cull.wgsl");
+pub const MAP: &str = include_str!("../../shaders/map.wgsl");
+pub const OCCLUSION: &str = include_str!("../../shaders/occlusion.wgsl");
+pub const RESUME: &str = include_str!("../../shaders/resume.wgsl");
+pub const PROGRESS: &str = include_str!("../../shaders/progress.wgsl");
+pub const TILES: &str = include_str!("../../shaders/tiles.wgsl");
+pub const STATE: &str = include_str!("../../shaders/state.wgsl");
 pub const LARGE: &str = include_str!("../../shaders/large.wgsl");
 pub const ORDER: &str = include_str!("../../shaders/order.wgsl");
 pub const TABLES: &str = include_str!("../../shaders/tables.wgsl");
@@ -59,6 +68,8 @@ pub struct Variant {
     /// Convex parts that the scene is cut to, and boxes that are cut out.
     pub clips: u32,
     pub holes: u32,
+    /// What lies before a splat may hide it.
+    pub occlusion: bool,
     /// Gradients from neighbouring pixels.
     pub central: bool,
     /// Pixels per invocation of march, one below the other: 1, 2, 4 or 8.
@@ -110,6 +121,7 @@ impl Variant {
             ("GRADIENT_OPACITY", self.gradient_opacity),
             ("GRADIENTS", self.gradients()),
             ("CENTRAL", self.central),
+            ("OCCLUSION", self.occlusion),
             ("WHOLE", whole),
             ("AXIS_SHEETS", self.mode == Mode::AxisSheets),
             ("SINGLE_SPLATS", single),
@@ -127,7 +139,8 @@ impl Variant {
             ("CLIPS", self.clips),
             ("HOLES", self.holes),
             ("HOLES_OR_ONE", self.holes.max(1)),
-            ("MAX_PASSES", super::plan::MAX_PASSES),
+            ("MOST_BINS", super::frame::MOST_BINS),
+            ("MOST_GROUP_SHIFT", super::frame::MOST_GROUP_SHIFT),
             ("MOST_ENTRIES", self.most_entries),
             ("LONGEST_RUN", self.most_entries.saturating_mul(4)),
             ("CLOSING_ENTRIES", closing),

@@ -36,24 +36,38 @@ impl Sources<Stage> {
         buffers: &[wgpu::BufferBinding<'_>],
     ) {
         match &chunk.origin {
-            Origin::Splats { .. } => {
-                let own = [&chunk.uniform, &chunk.data].map(|b| b.as_entire_buffer_binding());
-                let groups = [self.splats.bind(gpu, 0, buffers), self.splats.bind(gpu, 1, &own)];
-                let workgroups = chunk.count.div_ceil(WORKGROUP_CANDIDATES);
-                self.splats.dispatch(encoder, &[&groups[0], &groups[1]], workgroups);
-            }
-            Origin::Nodes { slots, .. } => {
-                let own = [&chunk.uniform, &chunk.data, &slots.selected].map(|b| b.as_entire_buffer_binding());
-                let groups = [self.nodes.bind(gpu, 0, buffers), self.nodes.bind(gpu, 1, &own)];
-                self.nodes.dispatch_indirect(encoder, &[&groups[0], &groups[1]], (&slots.arguments, 0));
-            }
-            Origin::Lattice { selection, places, .. } => {
-                let own = [&chunk.uniform, &chunk.data, &selection.selected, places];
-                let own = own.map(|b| b.as_entire_buffer_binding());
-                let groups = [self.lattice.bind(gpu, 0, buffers), self.lattice.bind(gpu, 1, &own)];
-                // The number of selected samples is known on the GPU alone.
-                self.lattice.dispatch_indirect(encoder, &[&groups[0], &groups[1]], (&selection.arguments, 0));
+            // The number of drawn nodes is known on the GPU alone.
+            Origin::Nodes { slots, .. } => self.dispatch_indirect(gpu, encoder, chunk, buffers, &slots.arguments),
+            _ => {
+                let (stage, groups) = self.bound(gpu, chunk, buffers);
+                let workgroups = chunk.candidates.div_ceil(WORKGROUP_CANDIDATES);
+                stage.dispatch(encoder, &[&groups[0], &groups[1]], workgroups);
             }
         }
+    }
+
+    /// The same over as many workgroups as a buffer says.
+    pub fn dispatch_indirect(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        chunk: &Chunk,
+        buffers: &[wgpu::BufferBinding<'_>],
+        arguments: &wgpu::Buffer,
+    ) {
+        let (stage, groups) = self.bound(gpu, chunk, buffers);
+        stage.dispatch_indirect(encoder, &[&groups[0], &groups[1]], (arguments, 0));
+    }
+
+    fn bound(&self, gpu: &Gpu, chunk: &Chunk, buffers: &[wgpu::BufferBinding<'_>]) -> (&Stage, [wgpu::BindGroup; 2]) {
+        let (stage, own) = match &chunk.origin {
+            Origin::Splats { .. } => (&self.splats, vec![&chunk.uniform, &chunk.data]),
+            Origin::Nodes { slots, .. } => (&self.nodes, vec![&chunk.uniform, &chunk.data, &slots.selected]),
+            Origin::Lattice { selection, places, .. } => {
+                (&self.lattice, vec![&chunk.uniform, &chunk.data, &selection.selected, places])
+            }
+        };
+        let own: Vec<_> = own.into_iter().map(wgpu::Buffer::as_entire_buffer_binding).collect();
+        (stage, [stage.bind(gpu, 0, buffers), stage.bind(gpu, 1, &own)])
     }
 }

@@ -23,7 +23,7 @@ pub struct Frame {
     pub ratio_log2_inverse: f32,
     pub step_inverse: f32,
     pub z_near: f32,
-    pub group_shift: u32,
+    pub tile_shift: u32,
     pub record_capacity: u32,
     pub entry_capacity: u32,
     pub field_axes: [[f32; 4]; 3],
@@ -59,25 +59,46 @@ pub struct Source {
 }
 const _: () = assert!(size_of::<Source>() == 9 * 16);
 
-/// Bytes between the passes that plan.wgsl writes: the alignment of uniform bindings.
-pub const PASS_STRIDE: u64 = 256;
 /// Bytes of `Pass` in frame.wgsl.
 pub const PASS_BYTES: u64 = 32;
 
-/// `Report` in plan.wgsl.
+/// How far a frame has come: the words of state.wgsl.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
-pub struct Report {
-    pub passes: u32,
-    pub overflow: u32,
+pub struct State {
     pub entries: u32,
+    pub words: u32,
     pub splats: u32,
+    pub passes: u32,
+    pub next_sheet: u32,
+    pub next_band: u32,
+    pub target: u32,
+    pub done: u32,
+    pub stalled: u32,
+    pub overflow: u32,
+    pub hidden: u32,
+    pub binned: u32,
+    pub impossible: u32,
+    pub tiles: u32,
+    pub touched: u32,
+    unused: u32,
+    held: [u32; 8],
 }
+const _: () = assert!(size_of::<State>() == 24 * 4);
+
+/// Byte offsets of the indirect dispatches in a pass's `arguments` (state.wgsl).
+pub const SCAN_ARGUMENTS: u64 = 0;
+pub const ORDER_ARGUMENTS: u64 = 16;
+pub const MARCH_ARGUMENTS: u64 = 32;
+pub const AGAIN_ARGUMENTS: u64 = 48;
+pub const TILE_ARGUMENTS: u64 = 64;
+pub const ARGUMENT_BYTES: u64 = 80;
 
 /// `Source::flags`.
 pub const RADIANCE: u32 = 1;
 pub const ISOTROPIC: u32 = 2;
 pub const ENDS: u32 = 4;
+pub const NODES: u32 = 8;
 
 fn wide(v: DVec3, w: f32) -> [f32; 4] {
     [v.x as f32, v.y as f32, v.z as f32, w]

@@ -3,8 +3,9 @@
 use super::{
     Gpu,
     nodes::{Forest, Growth, Slots},
-    select::Selection,
-    uniforms::Source,
+    scan::Scan,
+    select::{Select, Selection},
+    uniforms::{NODES, Source},
 };
 use crate::{
     Error, Result,
@@ -21,8 +22,8 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt};
 pub const RUN: u32 = 16;
 pub const WORKGROUP_CANDIDATES: u32 = 64 * RUN;
 
-/// Voxels of a chunk at most, so that a list of all of them, and their number, fit a binding of 128 MiB.
-const CHUNK_VOXELS: u64 = (1 << 25) - 1;
+/// Voxels of a chunk at most, so that the spans of all of them fit a binding of 128 MiB.
+const CHUNK_VOXELS: u64 = 1 << 24;
 
 /// Slices of the neighbouring chunks that a chunk's data hold, for gradients: layers of one kind of a body-centred lattice
 /// lie two apart.
@@ -61,10 +62,14 @@ pub struct Chunk {
     /// Splats (48 bytes each) or samples in their own type.
     pub data: wgpu::Buffer,
     pub uniform: wgpu::Buffer,
-    /// The sheets and bands that every candidate meets (`pack_span` in spans.wgsl).
+    /// What every candidate meets of the picture (8 bytes each, see spans.wgsl).
     pub spans: wgpu::Buffer,
-    /// Splats, or voxels before selection.
+    /// The dispatch over the runs of which a pass draws something.
+    pub active_arguments: wgpu::Buffer,
+    /// Splats, or room for nodes, or samples of the lattice.
     pub count: u32,
+    /// Those of them that may be drawn: of a lattice the selected ones.
+    pub candidates: u32,
     pub first_run: u32,
 }
 
@@ -111,6 +116,36 @@ impl PreparedScene {
         }
     }
 
+    /// Lists the samples of lattices anew whose transfer function has changed.
+    pub(super) fn update_selections(&mut self, gpu: &Gpu, select: &Select, scan: &Scan, view: &View) -> Result<()> {
+        let is_volume = |item: &&Item| matches!(item, Item::Volume(..));
+        let Some(Item::Volume(_, _, transfer)) = self.scene.items.iter().find(is_volume) else { return Ok(()) };
+        for chunk in &mut self.chunks {
+            let source = chunk.source(view, false, &self.forests);
+            let Origin::Lattice { volume, selection, .. } = &mut chunk.origin else { continue };
+            if !selection.outdated {
+                continue;
+            }
+            gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
+            self.bytes -= selection.bytes() + chunk.spans.size();
+            select.update(gpu, scan, selection, &chunk.uniform, transfer, volume.range)?;
+            chunk.candidates = selection.count;
+            chunk.spans = spans(gpu, selection.count);
+            self.bytes += selection.bytes() + chunk.spans.size();
+        }
+        self.number_runs();
+        Ok(())
+    }
+
+    /// Numbers the runs of candidates through all chunks; before each chunk's one number stays free (active.wgsl).
+    fn number_runs(&mut self) {
+        self.runs = 0;
+        for chunk in &mut self.chunks {
+            chunk.first_run = self.runs + 1;
+            self.runs += 1 + chunk.candidates.div_ceil(RUN);
+        }
+    }
+
     fn add_splats(&mut self, gpu: &Gpu, set: &Arc<SplatSet>, radiance: bool) {
         let most = (gpu.binding_size() / size_of::<Splat>() as u64) as usize;
         for splats in set.splats.chunks(most) {
@@ -139,7 +174,8 @@ impl PreparedScene {
             let held = first.saturating_sub(NEIGHBOURS)..(end + NEIGHBOURS).min(depth);
             let in_slices = |slices: std::ops::Range<usize>| slices.start * slice as usize..slices.end * slice as usize;
             let own = in_slices(first..end);
-            let selection = Selection::new(gpu, &ranges[own.clone()]);
+            let dims = [width, height, end - first].map(|n| n as u32);
+            let selection = Selection::new(gpu, dims, &ranges[own.clone()]);
             self.bytes += selection.bytes();
             let origin = Origin::Lattice {
                 volume: volume.clone(),
@@ -189,11 +225,19 @@ impl PreparedScene {
 
     fn push_chunk(&mut self, gpu: &Gpu, origin: Origin, data: wgpu::Buffer, count: u32) {
         let uniform = super::buffer(gpu, "source", size_of::<Source>() as u64, wgpu::BufferUsages::UNIFORM);
-        let spans = super::buffer(gpu, "spans", 4 * u64::from(count), wgpu::BufferUsages::STORAGE);
+        // Those of a lattice are not known yet.
+        let candidates = if matches!(origin, Origin::Lattice { .. }) { 0 } else { count };
+        let spans = spans(gpu, candidates);
         self.bytes += data.size() + spans.size();
-        self.chunks.push(Chunk { origin, data, uniform, spans, count, first_run: self.runs });
-        self.runs += count.div_ceil(RUN);
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
+        let active_arguments = super::buffer(gpu, "active arguments", 12, usage);
+        self.chunks.push(Chunk { origin, data, uniform, spans, active_arguments, count, candidates, first_run: 0 });
+        self.number_runs();
     }
+}
+
+fn spans(gpu: &Gpu, candidates: u32) -> wgpu::Buffer {
+    super::buffer(gpu, "spans", 8 * u64::from(candidates), wgpu::BufferUsages::STORAGE)
 }
 
 impl Chunk {
@@ -222,7 +266,10 @@ impl Chunk {
                 }
             }
         };
-        Source { count: self.count, first_run: self.first_run, ..source }
+        let [first, low, high, _] = source.slices;
+        let slices = [first, low, high, self.candidates];
+        let flags = source.flags | if matches!(self.origin, Origin::Nodes { .. }) { NODES } else { 0 };
+        Source { count: self.count, first_run: self.first_run, slices, flags, ..source }
     }
 }
 

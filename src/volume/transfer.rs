@@ -259,6 +259,11 @@ impl TransferFunction {
         -(1.0 - self.opacity(value).min(OPAQUE)).ln() / self.unit
     }
 
+    /// The largest extinction of any value.
+    pub fn most_extinction(&self) -> f64 {
+        self.opacity.iter().map(|&(value, _)| self.extinction(value)).fold(0.0, f64::max)
+    }
+
     /// Red, green, blue and extinction per world length at `entries` values evenly spaced over `range`, both ends
     /// included; for interpolating linearly in between. What is narrower than an entry's distance blurs.
     pub fn table(&self, range: [f64; 2], entries: usize) -> Vec<[f32; 4]> {

@@ -50,6 +50,9 @@ pub struct EngineFlags {
     /// Hierarchies: whether splats that face away are left out [default: where the surface is closed]
     #[arg(long, value_name = "BOOL")]
     cull_backfaces: Option<bool>,
+    /// Draws what lies behind opaque parts too: the same picture, for comparing times.
+    #[arg(long)]
+    no_occlusion: bool,
     /// Room of a depth pass: pairs of a splat and a tile. Pictures that need more take more passes.
     #[arg(long, value_name = "ENTRIES", value_parser = clap::value_parser!(u32).range(1..))]
     pass_entries: Option<u32>,
@@ -94,6 +97,7 @@ impl EngineFlags {
         settings.sheet_thickness = self.sheet_thickness;
         // Sheets stay as thick as they are without the extra pixels: thinner ones would part what overlaps on a surface.
         settings.sheet_pixels *= f64::from(factor);
+        settings.occlusion = !self.no_occlusion;
         settings.gradient = match self.gradient {
             Gradient::Analytic => scene::Gradient::Analytic,
             Gradient::Central => scene::Gradient::Central,

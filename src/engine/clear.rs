@@ -1,0 +1,27 @@
+//! Clear: empties the bins of a pass, as many as it has (shaders/clear.wgsl).
+
+use super::{
+    Gpu,
+    frame::Targets,
+    shaders,
+    stage::{Binding, Stage},
+    uniforms::SCAN_ARGUMENTS,
+};
+
+/// The pass.
+#[derive(Debug)]
+pub struct Clear(Stage);
+
+impl Clear {
+    pub fn new(gpu: &Gpu) -> Self {
+        use Binding::{Uniform, Write};
+        let sources = [shaders::FRAME, shaders::PROGRESS, shaders::CLEAR];
+        Self(Stage::new(gpu, "clear", &sources, "clear", &[&[Uniform, Uniform, Write, Write]]))
+    }
+
+    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+        let buffers = [&targets.frame, &targets.bin_size, &targets.bins, &targets.progress];
+        let group = self.0.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
+        self.0.dispatch_indirect(encoder, &[&group], (&targets.arguments, SCAN_ARGUMENTS));
+    }
+}
