@@ -35,6 +35,7 @@ mod shaders;
 mod source;
 mod stage;
 mod tables;
+mod timestamps;
 mod uniforms;
 mod upload;
 

@@ -22,15 +22,19 @@ use tables::Chapter;
 /// Frames that are measured of each case.
 const FRAMES: u32 = 5;
 
-/// What decides a scene, a view or a picture: the suite brings its own.
-const OTHERS: [&str; 14] = [
-    "SceneFlags",
+/// What decides a scene, a view or a picture: the suite brings its own. Groups of flags stand by their name where clap makes one,
+/// which it does not where a group holds another.
+const OTHERS: &[&str] = &[
+    "inputs",
     "LoadFlags",
-    "ShowFlags",
+    "transfer",
+    "range",
+    "opacity_unit",
+    "iso",
+    "gradient_opacity",
+    "radius_scale",
     "KernelFlags",
     "CameraFlags",
-    "MethodFlags",
-    "ClipFlags",
     "size",
     "gradient",
     "shade",
@@ -38,29 +42,43 @@ const OTHERS: [&str; 14] = [
     "sheet_thickness",
     "cut",
     "budget",
+    "frame_time",
+    "memory",
+    "cull_backfaces",
+    "pass_entries",
+    "MethodFlags",
+    "ClipFlags",
 ];
 
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Suite")]
+// Clap lets a requirement go where it conflicts with what is given; so the options conflict with scenes themselves.
 pub struct SuiteFlags {
     /// Measures a suite of cases instead of a scene: docs/performance.md tells of each.
     #[arg(long, conflicts_with_all = OTHERS)]
     pub suite: bool,
     /// A folder of the classic volumes, by name: vortex, jet, turbulent, foot, lobster, aneurism, bonsai, head, engine,
     /// unc-head, each in any format that tells its size; generated ones stand for those that are not there.
-    #[arg(long, value_name = "FOLDER", requires = "suite")]
+    #[arg(long, value_name = "FOLDER", requires = "suite", conflicts_with = "inputs")]
     data: Option<PathBuf>,
     /// Leaves out all parts but these.
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "PART,…", requires = "suite")]
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        value_name = "PART,…",
+        requires = "suite",
+        conflicts_with = "inputs"
+    )]
     only: Vec<Part>,
     /// How much is measured.
-    #[arg(long, value_enum, default_value_t = Effort::Usual, requires = "suite")]
+    #[arg(long, value_enum, default_value_t = Effort::Usual, requires = "suite", conflicts_with = "inputs")]
     effort: Effort,
     /// Draws each case so many times anew and checks that the bytes are the same; 1 checks nothing.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000), requires = "suite")]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000), requires = "suite", conflicts_with = "inputs")]
     repeat: u32,
     /// Replaces this machine's tables in the marked block of this file.
-    #[arg(long, value_name = "FILE.md", requires = "suite")]
+    #[arg(long, value_name = "FILE.md", requires = "suite", conflicts_with = "inputs")]
     write: Option<PathBuf>,
 }
 
@@ -183,7 +201,11 @@ impl SuiteFlags {
 
     fn markdown(&self, machine: &Machine, chapters: &[Chapter], counts: Counts) -> String {
         let chapters: Vec<_> = chapters.iter().map(Chapter::markdown).collect();
-        format!("{HEADING}{machine}\n\nMedians of {} frames.\n\n{}", counts.frames, chapters.join("\n"))
+        let Counts { frames, runs } = counts;
+        let repeated = if runs > 1 { format!(" *Same bytes*: in {runs} runs.") } else { String::new() };
+        let timing = machine.timing();
+        let note = format!("Medians of {frames} frames; passes timed {timing}.{repeated}");
+        format!("{HEADING}{machine}\n\n{note}\n\n{}", chapters.join("\n"))
     }
 }
 

@@ -68,20 +68,20 @@ const AXIS_ALIGNED: &str = "UNC head, axis-aligned sheets";
 const ROWS: [Row; 16] = [
     row("Vortex", "vortex", [128; 3], Semi, 479_000, 5.2).by(Phantom::MarschnerLobb, 1.0),
     row("Jet", "jet", [256; 3], Semi, 648_000, 4.0).by(Phantom::MarschnerLobb, 1.0),
-    row("Turbulent", "turbulent", [104, 129, 129], Semi, 95_000, 6.1).by(Phantom::MarschnerLobb, 1.0),
-    row("Foot, isosurface", "foot", [128; 3], Surface, 191_000, 7.2).by(Phantom::Head, 1.0),
-    row("Foot, semi", "foot", [128; 3], Semi, 184_000, 6.4).by(Phantom::Head, 1.0),
-    row("Foot, semi 2", "foot", [128; 3], Semi, 181_000, 7.6).by(Phantom::Head, 1.0),
-    row("Lobster", "lobster", [320, 320, 34], Surface, 219_000, 10.2).by(Phantom::Specimen, 1.0),
-    row("Aneurism", "aneurism", [128; 3], Surface, 17_000, 9.1).by(Phantom::Specimen, 1.0),
-    row("Bonsai", "bonsai", [256; 3], Surface, 1_300_000, 4.9).by(Phantom::Specimen, 1.0),
-    row("Bonsai, BCC", "bonsai", [181, 181, 362], Surface, 955_000, 2.5).by(Phantom::Specimen, 1.0).centred(),
-    row("CT head, semi", "head", [128; 3], Semi, 526_000, 4.9).by(Phantom::Head, 1.0),
-    row("CT head, semi, BCC", "head", [91, 91, 182], Semi, 379_000, 3.1).by(Phantom::Head, 1.0).centred(),
-    row("Engine, semi", "engine", [256, 256, 128], Semi, 1_200_000, 2.1).by(Phantom::Specimen, 1.0),
-    row("Engine, isosurface", "engine", [256, 256, 128], Surface, 1_300_000, 5.1).by(Phantom::Specimen, 1.0),
-    row("Engine, BCC", "engine", [181, 181, 182], Surface, 963_000, 5.3).by(Phantom::Specimen, 1.0).centred(),
-    row(AXIS_ALIGNED, "unc-head", [208, 256, 225], Semi, 2_955_242, 2.86).by(Phantom::Head, 1.0),
+    row("Turbulent", "turbulent", [104, 129, 129], Semi, 95_000, 6.1),
+    row("Foot, isosurface", "foot", [128; 3], Surface, 191_000, 7.2).by(Phantom::Head, 1.2),
+    row("Foot, semi", "foot", [128; 3], Semi, 184_000, 6.4).by(Phantom::Head, 1.2),
+    row("Foot, semi 2", "foot", [128; 3], Semi, 181_000, 7.6).by(Phantom::Head, 1.2),
+    row("Lobster", "lobster", [320, 320, 34], Surface, 219_000, 10.2).by(Phantom::Specimen, 1.2),
+    row("Aneurism", "aneurism", [128; 3], Surface, 17_000, 9.1).by(Phantom::Specimen, 1.2),
+    row("Bonsai", "bonsai", [256; 3], Surface, 1_300_000, 4.9),
+    row("Bonsai, BCC", "bonsai", [181, 181, 362], Surface, 955_000, 2.5).centred(),
+    row("CT head, semi", "head", [128; 3], Semi, 526_000, 4.9).by(Phantom::Head, 0.85),
+    row("CT head, semi, BCC", "head", [91, 91, 182], Semi, 379_000, 3.1).by(Phantom::Head, 0.85).centred(),
+    row("Engine, semi", "engine", [256, 256, 128], Semi, 1_200_000, 2.1),
+    row("Engine, isosurface", "engine", [256, 256, 128], Surface, 1_300_000, 5.1),
+    row("Engine, BCC", "engine", [181, 181, 182], Surface, 963_000, 5.3).centred(),
+    row(AXIS_ALIGNED, "unc-head", [208, 256, 225], Semi, 2_955_242, 2.86).by(Phantom::Head, 0.85),
 ];
 
 /// The cases of all rows; files are looked for in `data`.
@@ -202,10 +202,16 @@ mod tests {
     /// The stand-ins are compared with the table's rates, so their numbers of splats must be near.
     #[test]
     fn generated_volumes_have_about_as_many_splats() {
-        for row in ROWS {
+        let small = |row: &Row| row.dims.iter().product::<usize>() < 4 << 20;
+        for row in ROWS.into_iter().filter(small) {
             let case = row.case(Effort::Usual, None).unwrap();
             let ratio = case.effective as f64 / row.seed.splats as f64;
-            println!("{:30} {:.3} {}", row.name, ratio, case.effective);
+            assert!((0.95..1.05).contains(&ratio), "{}: {ratio}", row.name);
         }
+    }
+
+    #[test]
+    fn files_are_known_by_their_first_name() {
+        assert_eq!((stem(Path::new("a/Bonsai.vti")), stem(Path::new("head.raw.gz"))), ("bonsai".into(), "head".into()));
     }
 }

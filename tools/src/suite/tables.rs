@@ -94,7 +94,7 @@ impl Chapter {
             }
         }
         let columns: Vec<_> = std::iter::once("case").chain(names.iter().copied()).collect();
-        let mut table = Table::new("Passes.", "Milliseconds of each in one frame.", &columns);
+        let mut table = Table::new("Passes.", "Milliseconds of each in a frame.", &columns);
         for Outcome { name, result } in &self.outcomes {
             let Ok(found) = result else { continue };
             let time = |name: &&str| found.steps.iter().find(|step| step.0 == *name);
