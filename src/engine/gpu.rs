@@ -1,5 +1,6 @@
 //! The device: adapters, their limits, and the errors of both.
 
+use super::timestamps;
 use crate::{Error, Result};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -117,7 +118,7 @@ impl Gpu {
             max_buffer_size: adapter.limits().max_buffer_size,
             ..wgpu::Limits::default()
         };
-        let features = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
+        let features = adapter.features() & timestamps::FEATURES;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("splatkit"),
             required_features: features,
@@ -144,6 +145,11 @@ impl Gpu {
     /// Whether the adapter runs on the processor. Tiles are then walked by fewer, wider invocations.
     pub fn is_software(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Whether the times of [`Renderer::profile`](super::Renderer::profile) are the GPU's own.
+    pub fn has_clock(&self) -> bool {
+        self.device.features().contains(timestamps::FEATURES)
     }
 
     /// The most bytes that one storage binding holds, as a multiple of 256.

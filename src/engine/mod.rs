@@ -40,6 +40,7 @@ mod source;
 mod stage;
 mod tables;
 mod tiles;
+mod timestamps;
 mod uniforms;
 mod upload;
 

@@ -12,6 +12,7 @@ use super::{
     select::Select,
     shaders::Variant,
     tiles::Tiles,
+    timestamps::Timestamps,
     uniforms::State,
     upload::Origin,
 };
@@ -124,7 +125,7 @@ impl Renderer {
         self.draw_strips(prepared, camera, settings, false)
     }
 
-    /// As [`Self::draw`], but waits for each step and tells its time.
+    /// As [`Self::draw`], but tells the time of each step: by the GPU's clock, or by waiting for each where it has none.
     pub fn profile(
         &mut self,
         prepared: &mut PreparedScene,
@@ -353,27 +354,40 @@ impl FrameStats {
     }
 }
 
-/// Runs steps, all in one submission, or each on its own with its time.
+/// Runs steps, all in one submission. Where times are wanted, by the GPU's clock, or if it has none each step on its own.
 fn submit<'a>(
     gpu: &Gpu,
     steps: impl IntoIterator<Item = Step<'a>>,
-    mut times: Option<&mut Vec<(&'static str, f64)>>,
+    times: Option<&mut Vec<(&'static str, f64)>>,
 ) -> Result<()> {
     let new = || gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
     let mut encoder = new();
+    let Some(times) = times else {
+        steps.into_iter().for_each(|(_, encode)| encode(&mut encoder));
+        gpu.queue.submit([encoder.finish()]);
+        return Ok(());
+    };
+    let mut add = |label, own| match times.iter_mut().find(|(name, _)| *name == label) {
+        Some((_, sum)) => *sum += own,
+        None => times.push((label, own)),
+    };
+    let steps: Vec<_> = steps.into_iter().collect();
+    if let Some(clock) = Timestamps::new(gpu, steps.len()) {
+        clock.mark(&mut encoder, 0);
+        for (index, (_, encode)) in (1..).zip(&steps) {
+            encode(&mut encoder);
+            clock.mark(&mut encoder, index);
+        }
+        let own = clock.finish(gpu, encoder)?;
+        steps.iter().zip(own).for_each(|((label, _), own)| add(*label, own));
+        return Ok(());
+    }
     for (label, encode) in steps {
         encode(&mut encoder);
-        if let Some(times) = &mut times {
-            let start = Instant::now();
-            gpu.queue.submit([std::mem::replace(&mut encoder, new()).finish()]);
-            gpu.wait()?;
-            let own = start.elapsed().as_secs_f64() * 1e3;
-            match times.iter_mut().find(|(name, _)| *name == label) {
-                Some((_, sum)) => *sum += own,
-                None => times.push((label, own)),
-            }
-        }
+        let start = Instant::now();
+        gpu.queue.submit([std::mem::replace(&mut encoder, new()).finish()]);
+        gpu.wait()?;
+        add(label, start.elapsed().as_secs_f64() * 1e3);
     }
-    gpu.queue.submit([encoder.finish()]);
     Ok(())
 }

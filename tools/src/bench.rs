@@ -1,23 +1,38 @@
 //! `splatkit bench`.
 
 use crate::{
-    camera::CameraFlags, describe, engine::EngineFlags, failure::Failure, output, progress::Progress,
-    render::milliseconds, scene::SceneFlags,
+    camera::CameraFlags,
+    describe,
+    engine::EngineFlags,
+    failure::Failure,
+    output,
+    progress::Progress,
+    render::milliseconds,
+    scene::SceneFlags,
+    suite::SuiteFlags,
+    timing::{self, Times},
 };
 use clap::Args;
 use splatkit::Error;
 use std::time::Instant;
 
 /// Degrees between frames, as VTK's benchmark in the same view has.
-const STEP: f64 = 5.0;
+pub const STEP: f64 = 5.0;
+
+/// Frames that are measured of one scene.
+const FRAMES: u32 = 10;
 
 #[derive(Args, Debug)]
+// The suite brings its own scenes.
+#[command(mut_arg("inputs", |inputs| inputs.required(false).required_unless_present("suite")))]
 pub struct Bench {
     #[command(flatten)]
     scene: SceneFlags,
-    /// Frames that are measured, after a first one that is not.
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    frames: u32,
+    /// Frames that are measured, after a first one that is not [default: 10; 5 of each case of the suite]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    frames: Option<u32>,
+    #[command(flatten)]
+    suite: SuiteFlags,
     #[command(flatten)]
     camera: CameraFlags,
     #[command(flatten)]
@@ -29,7 +44,11 @@ pub struct Bench {
 
 impl Bench {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
+        if self.suite.suite {
+            return self.suite.run(&self.engine, self.frames, self.json, progress);
+        }
         self.engine.check()?;
+        let frames = self.frames.unwrap_or(FRAMES);
         let loaded = self.scene.load(progress)?;
         let settings = self.engine.settings(&loaded, 1)?;
         progress.stage("Opening the GPU");
@@ -43,7 +62,7 @@ impl Bench {
         let camera = |frame: u32| self.camera.turned(&loaded.subject, settings.size, STEP * f64::from(frame));
 
         let mut frame = |number: u32| {
-            progress.stage(format!("Frame {number} of {}", self.frames));
+            progress.stage(format!("Frame {number} of {frames}"));
             let start = Instant::now();
             let stats = renderer.draw(&mut prepared, &camera(number), &settings)?;
             Ok::<_, Error>((milliseconds(start), stats))
@@ -53,32 +72,28 @@ impl Bench {
             return Err(Error::NothingToDraw("the camera sees no splat that has opacity".into()).into());
         }
         let mut times = Vec::new();
-        for number in 1..=self.frames {
+        for number in 1..=frames {
             times.push(frame(number)?.0);
         }
         progress.stage("Measuring the passes");
         let profile = renderer.profile(&mut prepared, &camera(0), &settings)?;
         progress.clear();
 
-        times.sort_by(f64::total_cmp);
-        let middle = times.len() / 2;
-        let median = if times.len() % 2 == 1 { times[middle] } else { 0.5 * (times[middle - 1] + times[middle]) };
-        let [min, max] = [times[0], times[times.len() - 1]];
+        let Times { min, median, max } = Times::of(times);
         let [width, height] = self.engine.size;
         let culled = loaded.count.saturating_sub(stats.splats);
         if self.json {
-            let passes = profile.steps.iter().map(|(name, ms)| serde_json::json!({ "name": name, "ms": ms }));
             return output::line(serde_json::json!({
                 "scene": self.scene.name(),
                 "adapter": gpu.info.name,
                 "width": width,
                 "height": height,
-                "frames": self.frames,
+                "frames": frames,
                 "frame_ms": { "min": min, "median": median, "max": max },
                 "first_ms": first_ms,
                 "load_ms": loaded.load_ms,
                 "upload_ms": upload_ms,
-                "passes": serde_json::Value::from_iter(passes),
+                "passes": timing::steps(&profile.steps),
                 "depth_passes": stats.passes,
                 "splats": stats.splats,
                 "entries": stats.entries,
@@ -92,7 +107,7 @@ impl Bench {
         output::line(format_args!("load      {:10.1} ms", loaded.load_ms))?;
         output::line(format_args!("upload    {upload_ms:10.1} ms"))?;
         output::line(format_args!("first     {first_ms:10.1} ms"))?;
-        output::line(format_args!("frame     {median:10.1} ms  ({min:.1} to {max:.1}, {} frames)", self.frames))?;
+        output::line(format_args!("frame     {median:10.1} ms  ({min:.1} to {max:.1}, {frames} frames)"))?;
         for (name, ms) in &profile.steps {
             output::line(format_args!("  {name:<8}{ms:10.1} ms"))?;
         }

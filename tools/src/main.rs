@@ -22,9 +22,12 @@ mod output;
 mod parse;
 mod progress;
 mod render;
+mod report;
 mod scan;
 mod scene;
 mod show;
+mod suite;
+mod timing;
 
 use clap::{Parser, Subcommand};
 use progress::Progress;

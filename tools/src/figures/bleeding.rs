@@ -1,10 +1,11 @@
 //! How much of what an opaque slab hides shows through it.
 
-use super::{
-    Stage,
+use super::Stage;
+use crate::{
+    failure::Failure,
+    progress::Progress,
     report::{Cell, Table},
 };
-use crate::{failure::Failure, progress::Progress};
 use glam::DVec3;
 use splatkit::{
     math::{Camera, Kernel, Projection},

@@ -1,10 +1,12 @@
 //! Sheets against the integral along the ray that they stand for.
 
-use super::{
-    Stage,
+use super::Stage;
+use crate::{
+    failure::Failure,
+    generate,
+    progress::Progress,
     report::{Cell, Table},
 };
-use crate::{failure::Failure, generate, progress::Progress};
 use glam::DVec3;
 use splatkit::{
     compare::compare_pictures,

@@ -1,18 +1,14 @@
 //! What a cut costs and how steady it is: the splats and the time of a picture from near and far, and how much it changes
 //! while the camera goes away.
 
-use super::{
-    Stage,
-    popping::change,
-    report::{Cell, Table},
-    surfaces::Source,
-};
+use super::{Stage, popping::change, surfaces::Source};
 use crate::{
     camera::{CameraFlags, Subject},
     failure::Failure,
     load::Input,
     progress::Progress,
     render::milliseconds,
+    report::{Cell, Table},
 };
 use splatkit::{
     Error,

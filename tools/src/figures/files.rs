@@ -1,6 +1,6 @@
 //! What a hierarchy's file keeps of its splats, and in how many bytes.
 
-use super::report::{Cell, Table};
+use crate::report::{Cell, Table};
 use glam::{DVec3, Vec3};
 use splatkit::{
     hierarchy::{

@@ -3,11 +3,13 @@
 //! A cut through the field is drawn as a picture: clips leave a slice far thinner than a sample, a transfer function opaque
 //! from its first hundredth shows the slice's value as a grey, and the picture is read as 32-bit floats.
 
-use super::{
-    Stage,
+use super::Stage;
+use crate::{
+    failure::Failure,
+    generate,
+    progress::Progress,
     report::{Cell, Table},
 };
-use crate::{failure::Failure, generate, progress::Progress};
 use glam::DVec3;
 use splatkit::{
     math::{Camera, Kernel, Projection},

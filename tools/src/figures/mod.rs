@@ -6,13 +6,17 @@ mod detail;
 mod files;
 mod marschner_lobb;
 mod popping;
-mod report;
 mod ripple;
 mod surfaces;
 
-use crate::{failure::Failure, load::LoadFlags, output, parse, progress::Progress};
+use crate::{
+    failure::Failure,
+    load::LoadFlags,
+    output, parse,
+    progress::Progress,
+    report::{Block, Report, Table},
+};
 use clap::Args;
-use report::{Report, Table};
 use splatkit::{
     Error,
     engine::{AdapterChoice, Gpu, PreparedScene, Renderer},
@@ -89,7 +93,7 @@ impl Stage {
 
 impl Figures {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
-        let block = self.write.as_deref().map(report::Block::open).transpose()?;
+        let block = self.write.as_deref().map(|path| Block::open(path, "figures", "figures")).transpose()?;
         let choice = self.gpu.as_deref().map_or(AdapterChoice::Automatic, |text| text.parse().unwrap_or_default());
         let gpu = Gpu::headless(&choice)?;
         let mut stage = Stage { renderer: Renderer::new(&gpu) };

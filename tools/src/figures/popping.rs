@@ -1,11 +1,11 @@
 //! How much a picture jumps while the camera turns past the direction where axis-aligned sheets change their axis.
 
-use super::{
-    Stage,
-    bleeding::MODES,
+use super::{Stage, bleeding::MODES};
+use crate::{
+    failure::Failure,
+    progress::Progress,
     report::{Cell, Table},
 };
-use crate::{failure::Failure, progress::Progress};
 use glam::DVec3;
 use splatkit::{
     math::{Bounds, Camera, Kernel},

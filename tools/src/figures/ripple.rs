@@ -1,6 +1,6 @@
 //! How even the sum of a kernel's copies at all samples of a lattice is.
 
-use super::report::{Cell, Table};
+use crate::report::{Cell, Table};
 use glam::DVec3;
 use splatkit::math::Kernel;
 

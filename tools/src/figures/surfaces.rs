@@ -1,15 +1,13 @@
 //! Surfels against the triangles that they stand for.
 
-use super::{
-    Stage, files,
-    report::{Cell, Table},
-};
+use super::{Stage, files};
 use crate::{
     camera::{CameraFlags, Subject},
     failure::Failure,
     load::Input,
     parse,
     progress::Progress,
+    report::{Cell, Table},
 };
 use glam::DVec3;
 use splatkit::{

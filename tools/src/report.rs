@@ -5,9 +5,6 @@ use serde_json::{Map, Value, json};
 use splatkit::Error;
 use std::path::{Path, PathBuf};
 
-const START: &str = "<!-- figures: written by `splatkit figures --write` -->";
-const END: &str = "<!-- end of figures -->";
-
 pub struct Report {
     pub adapter: String,
     pub tables: Vec<Table>,
@@ -23,25 +20,29 @@ pub struct Table {
 }
 
 /// A figure.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Cell {
     /// With so many digits behind the point.
     Number(f64, usize),
+    Text(String),
     /// Not measured.
     None,
 }
 
 impl Cell {
-    fn text(self) -> String {
+    fn text(&self) -> String {
         match self {
             Self::Number(value, digits) => format!("{value:.digits$}"),
+            // A bar would begin another cell.
+            Self::Text(text) => text.replace('|', "/"),
             Self::None => "–".into(),
         }
     }
 
-    fn json(self) -> Value {
+    fn json(&self) -> Value {
         match self {
             Self::Number(value, _) => json!(value),
+            Self::Text(text) => json!(text),
             Self::None => Value::Null,
         }
     }
@@ -57,7 +58,7 @@ impl Table {
         self.rows.push((name.into(), cells));
     }
 
-    fn markdown(&self) -> String {
+    pub fn markdown(&self) -> String {
         let line = |cells: &mut dyn Iterator<Item = String>| format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "));
         let rule = |at: usize| if at == 0 { "---".to_owned() } else { "---:".to_owned() };
         let mut text = format!("**{}** {}\n\n", self.title, self.note);
@@ -92,26 +93,33 @@ impl Report {
     }
 }
 
-/// The part of a document between the marks.
+/// The part of a document between two marks.
 pub struct Block {
     path: PathBuf,
+    start: String,
+    end: String,
     before: String,
+    /// What stands between the marks now.
+    pub inside: String,
     after: String,
 }
 
 impl Block {
-    /// Finds the marks, before anything is measured.
-    pub fn open(path: &Path) -> Result<Self, Failure> {
+    /// Finds the marks, before anything is measured. They name the block, and the command that writes it.
+    pub fn open(path: &Path, name: &str, command: &str) -> Result<Self, Failure> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
-        let missing = || Error::input(path, "figures", format!("there are no lines “{START}” and “{END}”"));
-        let (before, rest) = text.split_once(START).ok_or_else(missing)?;
-        let (_, after) = rest.split_once(END).ok_or_else(missing)?;
-        Ok(Self { path: path.to_owned(), before: before.to_owned(), after: after.to_owned() })
+        let start = format!("<!-- {name}: written by `splatkit {command} --write` -->");
+        let end = format!("<!-- end of {name} -->");
+        let missing = || Error::input(path, name, format!("there are no lines “{start}” and “{end}”"));
+        let (before, rest) = text.split_once(&start).ok_or_else(missing)?;
+        let (inside, after) = rest.split_once(&end).ok_or_else(missing)?;
+        let [before, inside, after] = [before, inside.trim(), after].map(str::to_owned);
+        Ok(Self { path: path.to_owned(), start, end, before, inside, after })
     }
 
     pub fn replace(&self, text: &str) -> Result<(), Failure> {
-        let Self { path, before, after } = self;
-        output::write(path, format!("{before}{START}\n\n{text}\n{END}{after}").as_bytes())
+        let Self { path, start, end, before, after, .. } = self;
+        output::write(path, format!("{before}{start}\n\n{text}\n{end}{after}").as_bytes())
     }
 }
 

@@ -1,0 +1,111 @@
+//! The parts that run on the CPU: `cargo bench`. Inputs are generated, and so small that each part takes milliseconds.
+
+use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use glam::DVec3;
+use splatkit::{
+    hierarchy::{
+        BuildOptions, Hierarchy, Tree,
+        file::{WriteOptions, to_bytes},
+    },
+    io::{self, Endian, Limits, RawLayout, SampleType},
+    math::Kernel,
+    splat::SplatSet,
+    surface::{Mesh, SurfelOptions},
+    volume::{Volume, phantoms::Phantom, reach::neighbourhood_ranges},
+};
+use std::{
+    hint::black_box,
+    path::{Path, PathBuf},
+};
+
+/// Samples along each side of the volume.
+const SIDE: usize = 96;
+
+fn mesh() -> Mesh {
+    Mesh::knot(480, 40)
+}
+
+fn surfels() -> SplatSet {
+    mesh().surfels(&SurfelOptions::default()).expect("surfels of a knot")
+}
+
+fn volume() -> Volume {
+    Phantom::Specimen.sample_bytes([SIDE; 3]).expect("a volume")
+}
+
+/// A file that is gone with its owner.
+struct File(PathBuf);
+
+impl File {
+    fn new(name: &str) -> Self {
+        Self(std::env::temp_dir().join(format!("splatkit-bench-{}-{name}", std::process::id())))
+    }
+}
+
+impl Drop for File {
+    fn drop(&mut self) {
+        std::fs::remove_file(&self.0).ok();
+    }
+}
+
+fn reading(criterion: &mut Criterion) {
+    let limits = Limits::default();
+    let ply = File::new("knot.ply");
+    io::ply::write(&mesh(), &ply.0).expect("a mesh is written");
+    criterion.bench_function("read a binary PLY file", |bench| {
+        bench.iter(|| io::load_mesh(black_box(&ply.0), &limits).expect("a mesh"));
+    });
+    let raw = File::new("specimen.raw");
+    let values = volume();
+    let bytes: Vec<u8> = (0..values.len()).map(|index| values.value(index) as u8).collect();
+    std::fs::write(&raw.0, bytes).expect("samples are written");
+    let layout = RawLayout {
+        dims: [SIDE; 3],
+        sample_type: SampleType::U8,
+        spacing: DVec3::ONE,
+        endian: Endian::default(),
+        header: 0,
+    };
+    criterion.bench_function("read a raw volume", |bench| {
+        bench.iter(|| io::load_volume(black_box(&raw.0), &limits, Some(&layout)).expect("a volume"));
+    });
+}
+
+fn surfaces(criterion: &mut Criterion) {
+    let (mesh, set) = (mesh(), surfels());
+    criterion.bench_function("surfels of a mesh", |bench| {
+        bench.iter(|| black_box(&mesh).surfels(&SurfelOptions::default()).expect("surfels"));
+    });
+    let build = || Tree::build(black_box(&set), &BuildOptions::default(), &|_, _| ()).expect("a tree");
+    criterion.bench_function("build a tree", |bench| bench.iter(build));
+    let tree = build();
+    let encode = || to_bytes(black_box(&tree), &WriteOptions::default()).expect("a file");
+    criterion.bench_function("encode a hierarchy", |bench| bench.iter(encode));
+    let bytes = encode();
+    let decode = |bytes| {
+        let hierarchy = Hierarchy::from_bytes(bytes, Path::new("memory"), &Limits::default()).expect("a hierarchy");
+        hierarchy.read_tree().expect("a tree")
+    };
+    criterion.bench_function("decode a hierarchy", |bench| {
+        bench.iter_batched(|| bytes.clone(), decode, BatchSize::LargeInput);
+    });
+}
+
+fn volumes(criterion: &mut Criterion) {
+    let (volume, kernel) = (volume(), Kernel::default());
+    let reach = volume.lattice.reach(kernel.extent);
+    criterion.bench_function("ranges of neighbourhoods", |bench| {
+        bench.iter(|| neighbourhood_ranges(black_box(&volume), reach));
+    });
+    let sharpen = |volume: Volume| volume.sharpened(&kernel).expect("a sharp volume");
+    criterion.bench_function("sharpen a volume", |bench| {
+        bench.iter_batched(|| volume.clone(), sharpen, BatchSize::LargeInput);
+    });
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(10);
+    targets = reading, surfaces, volumes
+}
+criterion_main!(benches);

@@ -1,0 +1,136 @@
+//! A case, drawn and timed.
+
+use super::{
+    case::{Case, Plan, Seed, Series},
+    memory,
+};
+use crate::{bench::STEP, progress::Progress, render::milliseconds, timing::Times};
+use splatkit::{
+    Error, Result,
+    engine::{FrameStats, Gpu, Renderer},
+    picture::Picture,
+};
+use std::time::Instant;
+
+/// A case that was planned, and what it took, or why it was not drawn.
+pub struct Outcome {
+    pub name: String,
+    pub result: Result<Measured>,
+}
+
+pub struct Measured {
+    pub drawn: String,
+    pub size: [u32; 2],
+    pub effective: u64,
+    pub seed: Option<Seed>,
+    pub series: Option<Series>,
+    pub times: Times,
+    pub stats: FrameStats,
+    /// The peak of the process's memory from the upload on, the scene's own included.
+    pub cpu_peak: Option<u64>,
+    /// Milliseconds of each step of the first view.
+    pub steps: Vec<(&'static str, f64)>,
+    /// Whether every run drew the same bytes, where there was more than one.
+    pub same_bytes: Option<bool>,
+}
+
+/// How often things are done.
+#[derive(Debug, Clone, Copy)]
+pub struct Counts {
+    pub frames: u32,
+    pub runs: u32,
+}
+
+/// Makes the scene of a plan, draws it and lets it go.
+pub fn outcome(plan: Plan, gpu: &Gpu, counts: Counts, progress: &Progress) -> Outcome {
+    let Plan { name, make } = plan;
+    progress.stage(format!("Making {name}"));
+    let result = make().and_then(|case| {
+        progress.stage(format!("Drawing {name}"));
+        measure(case, gpu, counts)
+    });
+    Outcome { name, result }
+}
+
+fn measure(case: Case, gpu: &Gpu, counts: Counts) -> Result<Measured> {
+    memory::reset_peak();
+    // A renderer of its own: one that has drawn before keeps the largest buffers that it has needed.
+    let mut renderer = Renderer::new(gpu);
+    let mut prepared = renderer.prepare(&case.scene)?;
+    let settings = &case.settings;
+    let stats = renderer.draw(&mut prepared, &case.camera(0.0), settings)?;
+    if stats.splats == 0 {
+        return Err(Error::NothingToDraw("the camera sees no splat that has opacity".into()));
+    }
+    let mut times = Vec::new();
+    for frame in 1..=counts.frames {
+        let camera = case.camera(STEP * f64::from(frame));
+        let start = Instant::now();
+        renderer.draw(&mut prepared, &camera, settings)?;
+        times.push(milliseconds(start));
+    }
+    let steps = renderer.profile(&mut prepared, &case.camera(0.0), settings)?.steps;
+    let cpu_peak = memory::peak();
+    drop((prepared, renderer));
+    let same_bytes = if counts.runs > 1 { Some(same_bytes(&case, gpu, counts.runs)?) } else { None };
+    Ok(Measured {
+        drawn: case.drawn,
+        size: case.settings.size,
+        effective: case.effective,
+        seed: case.seed,
+        series: case.series,
+        times: Times::of(times),
+        stats,
+        cpu_peak,
+        steps,
+        same_bytes,
+    })
+}
+
+/// Draws a case anew so many times and compares the pictures, bit by bit.
+fn same_bytes(case: &Case, gpu: &Gpu, runs: u32) -> Result<bool> {
+    let draw = || {
+        let mut renderer = Renderer::new(gpu);
+        let mut prepared = renderer.prepare(&case.scene)?;
+        Ok(renderer.render(&mut prepared, &case.camera(0.0), &case.settings)?.0)
+    };
+    let first = draw()?;
+    for _ in 1..runs {
+        if !same(&first, &draw()?) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Numbers are compared by their bits: a zero of either sign, and what is no number, count too.
+fn same(a: &Picture, b: &Picture) -> bool {
+    let bits = |picture: &Picture| {
+        let numbers = picture.color.as_flattened().iter().chain(&picture.depth);
+        numbers.map(|number| number.to_bits()).collect::<Vec<_>>()
+    };
+    bits(a) == bits(b)
+}
+
+impl Measured {
+    pub fn fps(&self) -> f64 {
+        1e3 / self.times.median
+    }
+
+    /// So many of something in a frame, as a rate.
+    pub fn per_second(&self, count: u64) -> f64 {
+        count as f64 * self.fps()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_are_compared_bit_by_bit() {
+        let picture = |red: f32| Picture { width: 1, height: 1, color: vec![[red, 0.0, 0.0, 1.0]], depth: vec![1.0] };
+        assert!(same(&picture(f32::NAN), &picture(f32::NAN)));
+        assert!(!same(&picture(0.0), &picture(-0.0)) && !same(&picture(0.5), &picture(0.5 + f32::EPSILON)));
+    }
+}

@@ -1,0 +1,31 @@
+//! The largest amount of memory that the process has held, where the operating system tells it (Linux).
+
+use std::fs;
+
+/// Forgets the peak so far. Where that is not allowed, peaks include what came before.
+pub fn reset_peak() {
+    // 5 stands for the peak alone (man 5 proc).
+    fs::write("/proc/self/clear_refs", "5").ok();
+}
+
+/// The peak in bytes.
+pub fn peak() -> Option<u64> {
+    peak_of(&fs::read_to_string("/proc/self/status").ok()?)
+}
+
+fn peak_of(status: &str) -> Option<u64> {
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kibibytes << 10)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_peak_is_read() {
+        assert_eq!(peak_of("Name:\tsplatkit\nVmHWM:\t    2048 kB\nVmRSS:\t 1 kB\n"), Some(2 << 20));
+        assert_eq!(peak_of("Name:\tsplatkit\n"), None);
+    }
+}

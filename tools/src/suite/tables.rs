@@ -1,0 +1,154 @@
+//! What was measured, as Markdown and as JSON.
+
+use super::{
+    measure::{Measured, Outcome},
+    series,
+};
+use crate::{
+    report::{Cell, Table},
+    timing,
+};
+use serde_json::{Value, json};
+
+/// A part of the suite and its cases.
+pub struct Chapter {
+    pub name: &'static str,
+    pub title: &'static str,
+    pub note: &'static str,
+    pub outcomes: Vec<Outcome>,
+}
+
+/// What every case tells, and what some do: the seed's rate, and whether repeated runs agreed.
+const COLUMNS: [&str; 12] = [
+    "case",
+    "drawn",
+    "picture",
+    "effective splats",
+    "drawn splats",
+    "entries",
+    "depth passes",
+    "frame ms: median",
+    "min–max",
+    "fps",
+    "M splats/s",
+    "M entries/s",
+];
+const MEMORY: [&str; 2] = ["GPU MiB", "CPU peak MiB"];
+
+impl Chapter {
+    pub fn markdown(&self) -> String {
+        let tables = [self.cases(), self.passes()].map(|table| table.markdown());
+        let mut text = tables.join("\n");
+        for found in series::slopes(self.measured()) {
+            text += &format!("\n{found}\n");
+        }
+        for Outcome { name, result } in &self.outcomes {
+            if let Err(error) = result {
+                text += &format!("\n{name}: not drawn: {error}\n");
+            }
+        }
+        text
+    }
+
+    pub fn json(&self) -> Value {
+        let cases: Value = self.outcomes.iter().map(case_json).collect();
+        let slopes: Value = series::slopes(self.measured()).map(|found| found.json()).collect();
+        json!({ "name": self.name, "cases": cases, "slopes": slopes })
+    }
+
+    fn measured(&self) -> impl Iterator<Item = &Measured> {
+        self.outcomes.iter().filter_map(|outcome| outcome.result.as_ref().ok())
+    }
+
+    fn cases(&self) -> Table {
+        let seeded = self.measured().any(|found| found.seed.is_some());
+        let repeated = self.measured().any(|found| found.same_bytes.is_some());
+        let mut columns = COLUMNS.to_vec();
+        columns.extend(MEMORY);
+        if seeded {
+            columns.extend(["seed's splats", "seed's fps"]);
+        }
+        if repeated {
+            columns.push("same bytes");
+        }
+        let mut table = Table::new(self.title, self.note, &columns);
+        for Outcome { name, result } in &self.outcomes {
+            let Ok(found) = result else { continue };
+            let mut cells = cells(found);
+            if let Some(seed) = found.seed {
+                cells.extend([Cell::Number(seed.splats as f64, 0), Cell::Number(seed.fps, 2)]);
+            }
+            if let Some(same) = found.same_bytes {
+                cells.push(Cell::Text(if same { "yes" } else { "NO" }.into()));
+            }
+            table.row(name, cells);
+        }
+        table
+    }
+
+    fn passes(&self) -> Table {
+        let mut names: Vec<&str> = Vec::new();
+        for (name, _) in self.measured().flat_map(|found| &found.steps) {
+            if !names.contains(name) {
+                names.push(name);
+            }
+        }
+        let columns: Vec<_> = std::iter::once("case").chain(names.iter().copied()).collect();
+        let mut table = Table::new("Passes.", "Milliseconds of each in a frame.", &columns);
+        for Outcome { name, result } in &self.outcomes {
+            let Ok(found) = result else { continue };
+            let time = |name: &&str| found.steps.iter().find(|step| step.0 == *name);
+            let cell = |name| time(name).map_or(Cell::None, |step| Cell::Number(step.1, 1));
+            table.row(name, names.iter().map(cell).collect());
+        }
+        table
+    }
+}
+
+fn cells(found: &Measured) -> Vec<Cell> {
+    let Measured { drawn, size: [width, height], times, stats, .. } = found;
+    let count = |count: u64| Cell::Number(count as f64, 0);
+    let mebibytes = |bytes: u64| count(bytes >> 20);
+    vec![
+        Cell::Text(drawn.clone()),
+        Cell::Text(format!("{width}×{height}")),
+        count(found.effective),
+        count(stats.splats),
+        count(stats.entries),
+        count(u64::from(stats.passes)),
+        Cell::Number(times.median, 1),
+        Cell::Text(format!("{:.1}–{:.1}", times.min, times.max)),
+        Cell::Number(found.fps(), 2),
+        Cell::Number(found.per_second(stats.splats) / 1e6, 2),
+        Cell::Number(found.per_second(stats.entries) / 1e6, 2),
+        mebibytes(stats.gpu_bytes),
+        found.cpu_peak.map_or(Cell::None, mebibytes),
+    ]
+}
+
+fn case_json(Outcome { name, result }: &Outcome) -> Value {
+    let found = match result {
+        Ok(found) => found,
+        Err(error) => return json!({ "name": name, "error": error.to_string() }),
+    };
+    let Measured { drawn, size: [width, height], effective, times, stats, cpu_peak, steps, same_bytes, .. } = found;
+    json!({
+        "name": name,
+        "drawn": drawn,
+        "width": width,
+        "height": height,
+        "effective_splats": effective,
+        "splats": stats.splats,
+        "entries": stats.entries,
+        "depth_passes": stats.passes,
+        "frame_ms": times.json(),
+        "fps": found.fps(),
+        "splats_per_second": found.per_second(stats.splats),
+        "entries_per_second": found.per_second(stats.entries),
+        "gpu_bytes": stats.gpu_bytes,
+        "cpu_peak_bytes": cpu_peak,
+        "passes": timing::steps(steps),
+        "same_bytes": same_bytes,
+        "seed": found.seed.map(|seed| json!({ "splats": seed.splats, "fps": seed.fps })),
+    })
+}
