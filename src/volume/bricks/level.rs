@@ -29,7 +29,7 @@ impl Level {
         [brick % nx, brick / nx % ny, brick / nx / ny]
     }
 
-    /// Of samples that fill the first slices of this level.
+    /// Samples of a slice across the last axis.
     pub(super) fn slice(&self) -> usize {
         self.dims[0] * self.dims[1]
     }

@@ -1,7 +1,7 @@
 //! Volumes in levels of bricks.
 
 use super::{Convert, memory};
-use crate::{failure::Failure, load::Input, output, progress::Progress, render::milliseconds};
+use crate::{failure::Failure, load::Input, output, progress::Progress, render::milliseconds, scene::in_file};
 use serde_json::json;
 use splatkit::{
     Error,
@@ -52,12 +52,13 @@ impl Convert {
         let stages = progress.stages();
         let watch = |done, all| stages.set("Writing bricks, slice by slice", done, all);
         match &source {
-            Source::Whole(volume) => bricks::write(volume, &self.output, &options, &watch)?,
+            Source::Whole(volume) => bricks::write(volume, &self.output, &options, &watch),
             Source::Stream(stream) => {
                 let range = stream.range(&|done, all| stages.set("Looking through the input", done, all))?;
-                bricks::convert(stream, range, &self.output, &options, &watch)?;
+                bricks::convert(stream, range, &self.output, &options, &watch)
             }
         }
+        .map_err(|error| in_file(file, error))?;
         drop(stages);
         progress.clear();
         let bytes = self.output.metadata().map_err(|e| Error::file(&self.output, "read", e))?.len();
