@@ -121,7 +121,7 @@ mod tests {
 
     /// Numbers that every type can hold, as bytes.
     fn bytes(sample_type: SampleType, endian: Endian) -> Vec<u8> {
-        let text: Vec<String> = (0..3 * 4 * 19).map(|i| (i % 120).to_string()).collect();
+        let text: Vec<String> = (0..3 * 4 * 19).map(|i| (i / 2).to_string()).collect();
         let little = sample_type.parse(&text.join(" "), text.len()).unwrap();
         match endian {
             Endian::Little => little,
