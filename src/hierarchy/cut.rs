@@ -66,23 +66,8 @@ impl Cut {
     /// The cut of a hierarchy around `origin` at so many `pixels`.
     pub fn new(view: &View, origin: DVec3, pixels: f64, culls: bool) -> Self {
         let DMat3 { x_axis, y_axis, z_axis } = view.rotation;
-        let [width, height] = view.size.map(f64::from);
         // A pixel on every side for footprints' widening.
-        let ends = [
-            (DVec3::X, view.center.x + 1.0),
-            (-DVec3::X, width - view.center.x + 1.0),
-            (DVec3::Y, view.center.y + 1.0),
-            (-DVec3::Y, height - view.center.y + 1.0),
-        ];
-        let sides = ends.map(|(axis, reach)| {
-            let side = if view.perspective {
-                let normal = (axis * view.scale + DVec3::Z * reach).normalize();
-                normal.extend(0.0)
-            } else {
-                axis.extend(reach / view.scale)
-            };
-            side.as_vec4()
-        });
+        let sides = view.sides(1.0).map(|(normal, reach)| normal.extend(reach).as_vec4());
         Self {
             axes: [x_axis, y_axis, z_axis].map(|axis| axis.as_vec3()),
             origin: view.to_view(origin).as_vec3(),

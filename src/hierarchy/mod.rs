@@ -20,4 +20,5 @@ pub(crate) use cut::cone_margin;
 pub use cut::{BLEND_BAND, Cut, Detail, SHARE_UNIT};
 pub use file::{CutSphere, Hierarchy};
 pub use node::{Block, MOST_CHILDREN, Node, Tree};
+pub(crate) use validate::Findings;
 pub use validate::{Finding, Severity, validate};

@@ -15,6 +15,8 @@ pub enum Kind {
     Samples,
     /// [`Hierarchy::open`](crate::hierarchy::Hierarchy::open)
     Hierarchy,
+    /// [`Bricks::open`](crate::volume::bricks::Bricks::open)
+    Bricks,
 }
 
 /// How LAS, E57 and PCD files begin, and STL files of text.
@@ -44,6 +46,7 @@ impl Kind {
             Some("ply") => return of_ply(),
             Some("vtk") => return of_vtk(),
             Some("splk") => return Ok(Some(Self::Hierarchy)),
+            Some("splv") => return Ok(Some(Self::Bricks)),
             Some("obj" | "gltf" | "glb" | "stl" | "las" | "laz" | "e57" | "pcd") => return Ok(Some(Self::Mesh)),
             Some("xyz" | "pts" | "asc") => return Ok(Some(if with_scalar { Self::Samples } else { Self::Mesh })),
             Some("csv" | "txt") if !with_scalar && xyz::is_cloud(&source) => return Ok(Some(Self::Mesh)),
@@ -53,6 +56,9 @@ impl Kind {
         }
         if start.starts_with(b"SPLK") {
             return Ok(Some(Self::Hierarchy));
+        }
+        if start.starts_with(b"SPLV") {
+            return Ok(Some(Self::Bricks));
         }
         let text = start.trim_ascii_start();
         if text.starts_with(b"ply") {

@@ -30,6 +30,7 @@ mod stream;
 pub(crate) mod testing;
 mod text;
 mod texture;
+mod volume_stream;
 pub mod vti;
 pub mod vtk;
 mod vtk_array;
@@ -48,6 +49,7 @@ pub use sample_type::{Endian, SampleType};
 pub use source::Source;
 pub(crate) use stream::StreamPoint;
 pub use stream::{Counts, Stream};
+pub use volume_stream::VolumeStream;
 
 use crate::{Result, volume::Volume};
 use std::path::Path;

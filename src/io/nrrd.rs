@@ -3,7 +3,7 @@
 
 mod write;
 
-use super::{Endian, SampleType, Source};
+use super::{Endian, SampleType, Source, volume_stream::Plain};
 use crate::{
     Result,
     volume::{Arrangement, Lattice, Volume},
@@ -11,7 +11,7 @@ use crate::{
 use flate2::read::MultiGzDecoder;
 use glam::{DMat3, DVec3};
 use std::{borrow::Cow, collections::HashMap, sync::Arc};
-pub use write::write;
+pub use write::{write, write_bytes};
 
 /// Reads a volume of three axes with one scalar each. Positions are in the file's own space (RAS, LPS, …: nothing is
 /// turned round); without `space directions` the axes are x, y, z at the `spacings`, 1 where those are missing or NaN.
@@ -47,6 +47,25 @@ pub fn read(source: &Source) -> Result<Volume> {
     let path = source.neighbour("data file", name)?;
     let data = Source::open(&path, source.limits)?;
     header.samples(&data, data.bytes(), kind, size, lattice)
+}
+
+/// Where the samples of a file of raw encoding stand; `None` for other encodings, and where something is to be skipped or
+/// several files are named.
+pub(super) fn plain(source: &Source) -> Result<Option<Plain>> {
+    let (header, body) = Header::read(source)?;
+    let lattice = header.lattice(header.dims()?)?;
+    let sample_type = header.sample_type()?;
+    let skips = header.get(&["line skip", "lineskip", "byte skip", "byteskip"]).is_some();
+    if skips || !header.need("encoding")?.eq_ignore_ascii_case("raw") {
+        return Ok(None);
+    }
+    let endian = header.endian(sample_type)?;
+    let (path, start) = match header.get(&["data file", "datafile"]) {
+        None => (source.path.to_owned(), body),
+        Some(name) if name == "LIST" || name.starts_with("LIST ") || name.contains('%') => return Ok(None),
+        Some(name) => (source.neighbour("data file", name)?, 0),
+    };
+    Ok(Some(Plain { path, start, sample_type, endian, lattice }))
 }
 
 /// The fields of a header, names in lower case, and its keys with their values.

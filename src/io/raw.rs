@@ -1,6 +1,6 @@
 //! Raw volumes: samples with no header, or one to skip. The layout comes from the caller.
 
-use super::{Endian, SampleType, Source};
+use super::{Endian, SampleType, Source, volume_stream::Plain};
 use crate::{
     Error, Result,
     volume::{Lattice, Volume},
@@ -28,15 +28,9 @@ pub struct RawLayout {
 /// [`Error::Input`] where the file does not hold header and samples exactly, with a guess at what it does hold;
 /// [`Error::Limit`] for a layout over the limits.
 pub fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
-    let lattice = Lattice::with_spacing(layout.dims, layout.spacing);
-    lattice.validate().map_err(Error::Argument)?;
-    let samples = layout.sample_type.bytes_of(layout.dims).and_then(|bytes| bytes.checked_add(layout.header));
-    let wanted = source.check_bytes("the size of header and samples in bytes", samples.unwrap_or(u64::MAX))?;
+    let (lattice, wanted) = whole(source, layout)?;
     let bytes = source.bytes();
-    // A raw file may begin with gzip's magic number by chance: then it has the right size and no such name.
-    let named = source.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
-    let packed = bytes.starts_with(&[0x1f, 0x8b]) && (named || bytes.len() != wanted);
-    let mut unpacked: Cow<[u8]> = if packed {
+    let mut unpacked: Cow<[u8]> = if is_packed(source, wanted) {
         let unpacked = source.unpack("gzip stream", MultiGzDecoder::new(bytes), wanted);
         // gzip ends with the unpacked size, of which it keeps 32 bits.
         let claim = bytes.last_chunk().map_or(0, |&size| u64::from(u32::from_le_bytes(size)));
@@ -61,6 +55,33 @@ pub fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
     }
     let samples = layout.sample_type.decode(unpacked, layout.endian);
     Volume::new(lattice, samples).map_err(|message| source.error("samples", message))
+}
+
+/// Where the samples of a file stand that holds header and samples exactly; `None` for others, and for packed ones.
+///
+/// # Errors
+/// As of [`read`], for the layout alone.
+pub(super) fn plain(source: &Source, layout: &RawLayout) -> Result<Option<Plain>> {
+    let (lattice, wanted) = whole(source, layout)?;
+    let &RawLayout { sample_type, endian, header, .. } = layout;
+    let plain = Plain { path: source.path.to_owned(), start: header as usize, sample_type, endian, lattice };
+    Ok((source.bytes().len() == wanted && !is_packed(source, wanted)).then_some(plain))
+}
+
+/// The lattice of a layout, and the bytes of header and samples.
+fn whole(source: &Source, layout: &RawLayout) -> Result<(Lattice, usize)> {
+    let lattice = Lattice::with_spacing(layout.dims, layout.spacing);
+    lattice.validate().map_err(Error::Argument)?;
+    let samples = layout.sample_type.bytes_of(layout.dims).and_then(|bytes| bytes.checked_add(layout.header));
+    let wanted = source.check_bytes("the size of header and samples in bytes", samples.unwrap_or(u64::MAX))?;
+    Ok((lattice, wanted))
+}
+
+/// Whether a file is packed by gzip. A raw file may begin with gzip's magic number by chance: then it has the right size and
+/// no such name.
+fn is_packed(source: &Source, wanted: usize) -> bool {
+    let named = source.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+    source.bytes().starts_with(&[0x1f, 0x8b]) && (named || source.bytes().len() != wanted)
 }
 
 /// What a file of `size` bytes could be.

@@ -9,6 +9,16 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
+/// Gives the pages of a map of a file to the system.
+pub(super) fn release(map: &memmap2::Mmap) {
+    #[cfg(unix)]
+    // SAFETY: the map is of a file and read only, so what is dropped reads again as it was. Where the advice is not taken,
+    // nothing is lost.
+    unsafe { map.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) }.ok();
+    #[cfg(not(unix))]
+    let _ = map;
+}
+
 /// An opened input: its path, its bytes (mapped) and the limits that hold for it.
 pub struct Source<'a> {
     pub path: &'a Path,
@@ -50,12 +60,7 @@ impl<'a> Source<'a> {
     /// Gives the pages of the map that were read back to the system: those who go through a file larger than memory do so
     /// now and then. They are read again where they are asked for again.
     pub(super) fn release(&self) {
-        #[cfg(unix)]
-        if let Some(bytes) = &self.bytes {
-            // SAFETY: the map is of a file and read only, so what is dropped reads again as it was. Where the advice is
-            // not taken, nothing is lost.
-            unsafe { bytes.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) }.ok();
-        }
+        self.bytes.iter().for_each(release);
     }
 
     /// The map itself, for those who read from it later; `None` for an empty file. While it is held, the file must not be

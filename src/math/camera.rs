@@ -216,6 +216,25 @@ impl View {
         self.rotation * (world - self.position)
     }
 
+    /// The planes through the picture's four sides, widened by some pixels: what has view-space positions p with
+    /// n·p + d < 0 for one of these (n, d), n of unit length, is beside the picture.
+    pub fn sides(&self, pixels: f64) -> [(DVec3, f64); 4] {
+        let [width, height] = self.size.map(f64::from);
+        let ends = [
+            (DVec3::X, self.center.x + pixels),
+            (-DVec3::X, width - self.center.x + pixels),
+            (DVec3::Y, self.center.y + pixels),
+            (-DVec3::Y, height - self.center.y + pixels),
+        ];
+        ends.map(|(axis, reach)| {
+            if self.perspective {
+                ((axis * self.scale + DVec3::Z * reach).normalize(), 0.0)
+            } else {
+                (axis, reach / self.scale)
+            }
+        })
+    }
+
     /// The ray of a point of the picture: view-space origin and unit direction. Distances along rays are counted from
     /// this origin: from the eye in perspective, from the plane z = 0 in orthographic views.
     pub fn ray(&self, pixel: DVec2) -> (DVec3, DVec3) {

@@ -1,5 +1,6 @@
 //! Volumes: samples on a lattice, and the transfer functions that show them.
 
+pub mod bricks;
 mod grid;
 mod head;
 mod lattice;
@@ -10,7 +11,9 @@ pub mod reach;
 mod reconstruct;
 mod resample;
 mod samples;
+mod scalar;
 mod sharp;
+mod steps;
 mod transfer;
 
 pub use lattice::{Arrangement, Lattice};
@@ -18,4 +21,5 @@ pub use reconstruct::Reconstruction;
 pub use resample::body_centred;
 pub(crate) use samples::each_type;
 pub use samples::{Coefficients, Samples, Volume};
+pub use scalar::Scalar;
 pub use transfer::{Isosurface, Shade, TransferFunction};

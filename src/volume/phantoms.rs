@@ -74,14 +74,47 @@ impl Phantom {
     /// As there.
     pub fn sample_bytes(self, dims: [usize; 3]) -> Result<Volume, String> {
         let lattice = lattice(dims)?;
-        let values = self.fill(&lattice, |value| (value * 255.0).round() as u8);
+        let values = self.fill(&lattice, byte);
         Volume::new(lattice, Samples::U8(values))
+    }
+
+    /// The samples of [`sample_bytes`](Self::sample_bytes) slice by slice, for those who cannot hold all of them.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn byte_slices(self, dims: [usize; 3]) -> Result<ByteSlices, String> {
+        Ok(ByteSlices { phantom: self, lattice: lattice(dims)? })
     }
 
     fn fill<T: Send>(self, lattice: &Lattice, turn: impl Fn(f64) -> T + Sync) -> Vec<T> {
         let value = |index: usize| turn(self.value(lattice.sample_position(index)));
         (0..lattice.len()).into_par_iter().map(value).collect()
     }
+}
+
+/// The slices of a phantom across the last axis.
+#[derive(Debug, Clone)]
+pub struct ByteSlices {
+    phantom: Phantom,
+    lattice: Lattice,
+}
+
+impl ByteSlices {
+    /// Where the samples lie.
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    /// The samples of a slice.
+    pub fn slice(&self, k: usize) -> Vec<u8> {
+        let Lattice { dims: [nx, ny, _], .. } = self.lattice;
+        let sample = |index: usize| byte(self.phantom.value(self.lattice.sample_position(k * nx * ny + index)));
+        (0..nx * ny).into_par_iter().map(sample).collect()
+    }
+}
+
+fn byte(value: f64) -> u8 {
+    (value * 255.0).round() as u8
 }
 
 fn lattice(dims: [usize; 3]) -> Result<Lattice, String> {
@@ -172,6 +205,10 @@ mod tests {
         assert_eq!((volume.value(7), volume.range), (1.0, [0.0, 1.0]));
         assert_eq!(Phantom::Constant(0.5).sample_bytes([2, 2, 2]).unwrap().range, [128.0, 128.0]);
         assert!(Phantom::Ball.sample([0, 2, 2]).is_err());
+        let slices = Phantom::Ball.byte_slices([5, 3, 4]).unwrap();
+        let whole = Phantom::Ball.sample_bytes([5, 3, 4]).unwrap();
+        let bytes = (0..4).flat_map(|k| slices.slice(k)).collect();
+        assert_eq!((Samples::U8(bytes), slices.lattice()), (whole.samples, &whole.lattice));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! reaches, so where the transfer function is clear over their whole range, the splats between them cannot be seen, and
 //! the engine leaves them out.
 
-use super::{Samples, TransferFunction, Volume};
+use super::{TransferFunction, Volume, steps::Steps};
 use rayon::prelude::*;
 
 /// For each sample the smallest and the largest value in the box of ±`radius` samples along each axis around it (cut at the
@@ -14,7 +14,8 @@ use rayon::prelude::*;
 /// Besides the result, a thread holds 2·`radius[2]` + 3 slices.
 pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]> {
     let [nx, ny, nz] = volume.lattice.dims;
-    let steps = Steps::new(volume);
+    let steps = Steps::new(volume.samples.scalar(), volume.range);
+    let samples = volume.samples.bytes();
     let slice = nx * ny;
     let reach = |axis: usize| radius[axis].min(volume.lattice.dims[axis].saturating_sub(1));
     let (rx, ry, rz) = (reach(0), reach(1), reach(2));
@@ -32,7 +33,7 @@ pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]>
             let around = k.saturating_sub(rz)..(k + rz + 1).min(nz);
             while next < around.end {
                 for (j, out) in scratch.chunks_mut(nx).enumerate() {
-                    steps.write((next * ny + j) * nx, &mut row);
+                    steps.write(steps.from(samples, (next * ny + j) * nx), &mut row);
                     out.copy_from_slice(&row);
                     for shift in 1..=rx {
                         smaller(&mut out[..nx - shift], &row[shift..]);
@@ -84,67 +85,10 @@ fn smaller(into: &mut [[u8; 2]], other: &[[u8; 2]]) {
     }
 }
 
-/// The rounded steps of samples: how many fit below a value, and 255 minus how many cover it. Types of few values look
-/// them up.
-enum Steps<'a> {
-    Bytes(&'a [u8], Vec<[u8; 2]>),
-    Unsigned(&'a [u16], Vec<[u8; 2]>),
-    Signed(&'a [i16], Vec<[u8; 2]>),
-    Wide(&'a [i32], Scale),
-    Floats(&'a [f32], Scale),
-}
-
-#[derive(Clone, Copy)]
-struct Scale {
-    low: f64,
-    steps: f64,
-}
-
-impl Scale {
-    fn step(self, value: f64) -> [u8; 2] {
-        let step = (value - self.low) * self.steps;
-        // Casts cut to 0 … 255.
-        let below = step as u8;
-        let above = below.saturating_add(u8::from(f64::from(below) < step));
-        [below, 255 - above]
-    }
-}
-
-impl<'a> Steps<'a> {
-    fn new(volume: &'a Volume) -> Self {
-        let [low, high] = volume.range;
-        let scale = Scale { low, steps: if high > low { 255.0 / (high - low) } else { 0.0 } };
-        let table = |from: i32, to: i32| (from..=to).map(|value| scale.step(f64::from(value))).collect();
-        match &volume.samples {
-            Samples::U8(values) => Self::Bytes(values, table(0, 255)),
-            Samples::U16(values) => Self::Unsigned(values, table(0, 65_535)),
-            Samples::I16(values) => Self::Signed(values, table(-32_768, 32_767)),
-            Samples::I32(values) => Self::Wide(values, scale),
-            Samples::F32(values) => Self::Floats(values, scale),
-        }
-    }
-
-    /// The steps of a row of samples.
-    fn write(&self, start: usize, row: &mut [[u8; 2]]) {
-        fn each<T: Copy>(values: &[T], row: &mut [[u8; 2]], step: impl Fn(T) -> [u8; 2]) {
-            row.iter_mut().zip(values).for_each(|(out, &value)| *out = step(value));
-        }
-        match self {
-            Self::Bytes(values, table) => each(&values[start..], row, |v| table[usize::from(v)]),
-            Self::Unsigned(values, table) => each(&values[start..], row, |v| table[usize::from(v)]),
-            Self::Signed(values, table) => {
-                each(&values[start..], row, |v| table[(i32::from(v) + 32_768) as usize]);
-            }
-            Self::Wide(values, scale) => each(&values[start..], row, |v| scale.step(f64::from(v))),
-            Self::Floats(values, scale) => each(&values[start..], row, |v| scale.step(f64::from(v))),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::volume::Lattice;
+    use crate::volume::{Lattice, Samples};
     use glam::DVec3;
 
     /// A small generator of random bits (Marsaglia's xorshift, 2003).

@@ -1,6 +1,6 @@
 //! The values of a volume, in the type of their file.
 
-use super::{Lattice, reach::neighbourhood_ranges};
+use super::{Lattice, Scalar, reach::neighbourhood_ranges};
 use crate::math::Kernel;
 use rayon::prelude::*;
 use std::{borrow::Cow, sync::Arc};
@@ -50,27 +50,34 @@ impl Samples {
         each_type!(self, values => f64::from(values[index]))
     }
 
+    /// The type of the samples.
+    pub fn scalar(&self) -> Scalar {
+        match self {
+            Self::U8(_) => Scalar::U8,
+            Self::U16(_) => Scalar::U16,
+            Self::I16(_) => Scalar::I16,
+            Self::I32(_) => Scalar::I32,
+            Self::F32(_) => Scalar::F32,
+        }
+    }
+
     /// The name of the type, as the command spells it.
     pub fn type_name(&self) -> &'static str {
-        match self {
-            Self::U8(_) => "u8",
-            Self::U16(_) => "u16",
-            Self::I16(_) => "i16",
-            Self::I32(_) => "i32",
-            Self::F32(_) => "f32",
-        }
+        self.scalar().name()
     }
 
     /// Bytes that one sample takes.
     pub fn sample_bytes(&self) -> usize {
-        fn size<T>(_: &[T]) -> usize {
-            size_of::<T>()
-        }
-        each_type!(self, values => size(values))
+        self.scalar().bytes()
+    }
+
+    /// The samples' bytes, in the order of this machine.
+    pub fn bytes(&self) -> &[u8] {
+        each_type!(self, values => bytemuck::cast_slice(values))
     }
 
     /// Smallest and largest value, or why there is none: no samples, or some that are not finite.
-    fn range(&self) -> Result<[f64; 2], String> {
+    pub(crate) fn range(&self) -> Result<[f64; 2], String> {
         fn extremes<T: Copy + PartialOrd + Send + Sync + Into<f64>>(values: &[T], first: T) -> [f64; 2] {
             let wider = |[low, high]: [T; 2], v: T| [if v < low { v } else { low }, if v > high { v } else { high }];
             let ends = values

@@ -10,13 +10,15 @@ use clap::Args;
 use serde_json::json;
 use splatkit::{
     hierarchy::{Finding, Severity, file},
+    io::Kind,
     surface::{Mesh, SurfelOptions},
+    volume::bricks,
 };
 use std::path::PathBuf;
 
 #[derive(Args, Debug)]
 pub struct Check {
-    /// A hierarchy, whose every checksum and promise is checked; or another input, which is read and looked through.
+    /// A hierarchy or a volume in bricks, whose every checksum and promise is checked; or another input, which is read and looked through.
     file: PathBuf,
     #[command(flatten)]
     load: LoadFlags,
@@ -28,14 +30,19 @@ pub struct Check {
 impl Check {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
         progress.stage(format!("Checking {}", self.file.display()));
-        let findings = if self.load.is_hierarchy(&self.file)? {
-            file::check(&self.file, &self.load.limits()).findings
-        } else {
-            match self.load.open(&self.file)? {
-                Input::Mesh(mesh) => of_mesh(&mesh),
-                // What is wrong with these is an error on reading.
-                Input::Volume(_) | Input::Samples(_) | Input::Hierarchy(_) => Vec::new(),
+        let limits = self.load.limits();
+        let findings = match self.load.kind(&self.file)? {
+            Kind::Hierarchy => file::check(&self.file, &limits).findings,
+            Kind::Bricks => {
+                let stages = progress.stages();
+                let watch = |done, all| stages.set("Checking bricks", done, all);
+                bricks::check(&self.file, &limits, &watch).findings
             }
+            _ => match self.load.open(&self.file)? {
+                Input::Mesh(mesh) => of_mesh(&mesh),
+                // What is wrong with others is an error on reading.
+                _ => Vec::new(),
+            },
         };
         progress.clear();
         let ok = findings.iter().all(|finding| finding.severity != Severity::Error);

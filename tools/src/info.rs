@@ -8,12 +8,18 @@ use crate::{
 };
 use clap::Args;
 use serde_json::{Map, Value, json};
-use splatkit::{Error, hierarchy::Hierarchy, scattered::Points, surface::Mesh, volume::Volume};
+use splatkit::{
+    Error,
+    hierarchy::Hierarchy,
+    scattered::Points,
+    surface::Mesh,
+    volume::{Volume, bricks::Bricks},
+};
 use std::path::PathBuf;
 
 #[derive(Args, Debug)]
 pub struct Info {
-    /// A mesh, cloud or volume, or scattered samples.
+    /// A mesh, cloud, volume, hierarchy or volume in bricks, or scattered samples.
     file: PathBuf,
     #[command(flatten)]
     load: LoadFlags,
@@ -33,12 +39,13 @@ impl Info {
             Input::Volume(volume) => (volume.len(), of_volume(volume)),
             Input::Samples(points) => (points.len(), of_samples(points)),
             Input::Hierarchy(hierarchy) => (hierarchy.header().source_points as usize, of_hierarchy(hierarchy)),
+            Input::Bricks(bricks) => (bricks.header().lattice.len(), of_bricks(bricks)),
         };
         facts.insert("file".into(), json!(self.file));
         facts.insert("count".into(), json!(count));
         facts.insert("bytes".into(), json!(bytes));
         facts.insert("bytes_per_point".into(), json!(bytes as f64 / count.max(1) as f64));
-        // Only hierarchies have more.
+        // Only hierarchies and bricks have more.
         facts.entry("levels").or_insert(json!(1));
         if self.json {
             return output::line(Value::Object(facts));
@@ -59,6 +66,7 @@ impl Info {
             "splats",
             "nodes",
             "levels",
+            "bricks",
             "blocks",
             "pages",
             "closed",
@@ -107,6 +115,27 @@ fn of_volume(volume: &Volume) -> Map<String, Value> {
     facts.insert("range".into(), json!(volume.range));
     facts.insert("attributes".into(), json!(["value"]));
     facts.insert("bounds".into(), bounds(Some(volume.bounds())));
+    facts
+}
+
+fn of_bricks(bricks: &Bricks) -> Map<String, Value> {
+    let header = bricks.header();
+    let bounds_of = bricks.bounds();
+    let mut facts = Map::new();
+    facts.insert("kind".into(), json!("volume in bricks"));
+    facts.insert("dims".into(), json!(header.lattice.dims));
+    facts.insert("spacing".into(), json!(header.lattice.spacing().to_array()));
+    facts.insert("type".into(), json!(header.scalar.name()));
+    facts.insert("range".into(), json!(header.range));
+    facts.insert("levels".into(), json!(bricks.levels().len()));
+    facts.insert("bricks".into(), json!(bricks.levels().iter().map(|level| level.bricks()).sum::<usize>()));
+    for (name, text) in [("unit", &header.unit), ("source", &header.source)] {
+        if !text.is_empty() {
+            facts.insert(name.into(), json!(text));
+        }
+    }
+    facts.insert("attributes".into(), json!(["value"]));
+    facts.insert("bounds".into(), bounds(Some([bounds_of.min, bounds_of.max])));
     facts
 }
 

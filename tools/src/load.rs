@@ -6,10 +6,10 @@ use glam::DVec3;
 use splatkit::{
     Error,
     hierarchy::Hierarchy,
-    io::{self, Endian, Kind, Limits, RawLayout, SampleType},
+    io::{self, Endian, Kind, Limits, RawLayout, SampleType, VolumeStream},
     scattered::{Points, SampleOptions},
     surface::Mesh,
-    volume::Volume,
+    volume::{Volume, bricks::Bricks},
 };
 use std::{path::Path, sync::Arc};
 
@@ -19,6 +19,7 @@ pub enum Input {
     Volume(Volume),
     Samples(Points),
     Hierarchy(Arc<Hierarchy>),
+    Bricks(Arc<Bricks>),
 }
 
 /// How raw files are read, and how much any file may claim.
@@ -75,26 +76,34 @@ impl LoadFlags {
     /// Reads a file.
     pub fn open(&self, path: &Path) -> Result<Input, Failure> {
         let limits = self.limits();
-        let layout = self.dims.zip(self.sample_type).map(|(dims, sample_type)| RawLayout {
-            dims,
-            sample_type,
-            spacing: self.spacing.unwrap_or(DVec3::ONE),
-            endian: self.endian.unwrap_or_default(),
-            header: self.header.unwrap_or(0),
-        });
-        let raw = layout.as_ref().map(|_| Kind::Volume);
-        let kind = Kind::of(path, &limits, self.scalar.is_some())?.or(raw).ok_or_else(|| unknown(path))?;
-        Ok(match kind {
+        Ok(match self.kind(path)? {
             Kind::Mesh => Input::Mesh(io::load_mesh(path, &limits)?),
-            Kind::Volume => Input::Volume(io::load_volume(path, &limits, layout.as_ref())?),
+            Kind::Volume => Input::Volume(io::load_volume(path, &limits, self.layout().as_ref())?),
+            Kind::Bricks => Input::Bricks(Arc::new(Bricks::open(path, &limits)?)),
             Kind::Hierarchy => Input::Hierarchy(Arc::new(Hierarchy::open(path, &limits)?)),
             Kind::Samples => Input::Samples(io::load_samples(path, &limits, self.scalar.as_deref())?),
         })
     }
 
-    /// Whether a file is a hierarchy, sound or not.
-    pub fn is_hierarchy(&self, path: &Path) -> Result<bool, Failure> {
-        Ok(Kind::of(path, &self.limits(), false)? == Some(Kind::Hierarchy))
+    /// What a file holds, sound or not.
+    pub fn kind(&self, path: &Path) -> Result<Kind, Failure> {
+        let raw = self.layout().map(|_| Kind::Volume);
+        Ok(Kind::of(path, &self.limits(), self.scalar.is_some())?.or(raw).ok_or_else(|| unknown(path))?)
+    }
+
+    /// Opens a volume that can be read slice by slice; none where it is read as a whole.
+    pub fn stream(&self, path: &Path) -> Result<Option<VolumeStream>, Failure> {
+        Ok(VolumeStream::open(path, &self.limits(), self.layout().as_ref())?)
+    }
+
+    fn layout(&self) -> Option<RawLayout> {
+        self.dims.zip(self.sample_type).map(|(dims, sample_type)| RawLayout {
+            dims,
+            sample_type,
+            spacing: self.spacing.unwrap_or(DVec3::ONE),
+            endian: self.endian.unwrap_or_default(),
+            header: self.header.unwrap_or(0),
+        })
     }
 
     /// How scattered samples become splats.
@@ -111,7 +120,7 @@ impl LoadFlags {
 
 fn unknown(path: &Path) -> Error {
     Error::input(path, "file", "is of no kind that can be read").hint(
-        "hierarchies: .splk; meshes: .ply, .obj, .gltf, .glb, .stl; clouds: .ply, .las, .laz, .e57, .pcd, .xyz, .pts, .asc, and .csv and .txt whose \
+        "hierarchies: .splk; volumes in bricks: .splv; meshes: .ply, .obj, .gltf, .glb, .stl; clouds: .ply, .las, .laz, .e57, .pcd, .xyz, .pts, .asc, and .csv and .txt whose \
          columns are a position, a colour or a normal; volumes: .vti, .vtr, .vtk, .nrrd, .nhdr, and raw samples (also packed \
          by gzip) with --dims and --type; scattered samples: .vtu, .vtp, .vtk, .npy, .csv, .txt, .xyzv, and .ply and tables of \
          points with --scalar",

@@ -58,9 +58,9 @@ enum Task {
     Render(Box<render::Render>),
     /// Tells what is in a file.
     Info(info::Info),
-    /// Makes a hierarchy of splats from meshes and clouds; writes 3D Gaussians; writes volumes on other lattices.
+    /// Makes a hierarchy of splats from meshes and clouds; writes 3D Gaussians; writes volumes on other lattices or in bricks.
     Convert(Box<convert::Convert>),
-    /// Looks for damage in a hierarchy, or for what is odd in another input.
+    /// Looks for damage in a hierarchy or a volume in bricks, or for what is odd in another input.
     Check(check::Check),
     /// Compares two pictures.
     Compare(compare::Compare),

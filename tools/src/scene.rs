@@ -75,6 +75,10 @@ impl SceneFlags {
                     };
                     loaded.scene = loaded.scene.with_hierarchy(hierarchy);
                 }
+                Input::Bricks(_) => {
+                    let error = Error::input(path, "content", "volumes in bricks cannot be drawn yet");
+                    return Err(error.hint("draw the volume that it was made from").into());
+                }
                 Input::Volume(volume) => {
                     let transfer = show.transfer(path, volume.range, || TransferFunction::automatic(&volume))?;
                     let [min, max] = volume.bounds();

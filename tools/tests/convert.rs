@@ -57,7 +57,7 @@ fn what_cannot_be_converted_is_told() {
     for output in ["b", "-"] {
         folder
             .run(&format!("convert a.nrrd -o {output}"))
-            .fails(2, &["only .splk, .ply and .nrrd files can be written"]);
+            .fails(2, &["only .splk, .ply, .nrrd and .splv files can be written"]);
     }
     folder.run("convert a.nrrd -o b.nrrd --lattice fcc").fails(2, &["fcc", "bcc"]);
     folder.run("convert a.nrrd").fails(2, &["--output"]);

@@ -2,7 +2,7 @@
 
 use crate::{
     Error, Result,
-    volume::{Arrangement, Samples, Volume},
+    volume::{Arrangement, Lattice, Scalar, Volume},
 };
 use flate2::{Compression, write::GzEncoder};
 use glam::DVec3;
@@ -18,24 +18,46 @@ pub fn write(volume: &Volume, path: &Path) -> Result<()> {
     write_to(volume, &mut out).and_then(|()| out.flush()).map_err(|e| Error::file(path, "write", e))
 }
 
-fn write_to(volume: &Volume, out: &mut impl Write) -> std::io::Result<()> {
-    let lattice = &volume.lattice;
+/// Writes a Cartesian volume of bytes that come slice by slice, not packed, so that it can be read slice by slice too
+/// ([`VolumeStream`](crate::io::VolumeStream)). `slice` makes the samples of each slice across the last axis, in order.
+///
+/// # Errors
+/// [`Error::File`] where the file cannot be written.
+pub fn write_bytes(lattice: &Lattice, path: &Path, mut slice: impl FnMut(usize) -> Vec<u8>) -> Result<()> {
+    let file = std::fs::File::create(path).map_err(|e| Error::file(path, "create", e))?;
+    let mut out = std::io::BufWriter::new(file);
+    let mut all = || {
+        write_header(lattice, Scalar::U8, "raw", &mut out)?;
+        writeln!(out)?;
+        (0..lattice.dims[2]).try_for_each(|k| out.write_all(&slice(k)))?;
+        out.flush()
+    };
+    all().map_err(|e| Error::file(path, "write", e))
+}
+
+/// The fields that every file has.
+fn write_header(lattice: &Lattice, scalar: Scalar, encoding: &str, out: &mut impl Write) -> std::io::Result<()> {
     let [nx, ny, nz] = lattice.dims;
     let body_centred = lattice.arrangement == Arrangement::BodyCentred;
     let layer = if body_centred { 0.5 * lattice.axes.z_axis } else { lattice.axes.z_axis };
     let [i, j, k] = [lattice.axes.x_axis, lattice.axes.y_axis, layer].map(vector);
-    let (kind, bytes): (_, &[u8]) = match &volume.samples {
-        Samples::U8(values) => ("uint8", values),
-        Samples::U16(values) => ("uint16", bytemuck::cast_slice(values)),
-        Samples::I16(values) => ("int16", bytemuck::cast_slice(values)),
-        Samples::I32(values) => ("int32", bytemuck::cast_slice(values)),
-        Samples::F32(values) => ("float", bytemuck::cast_slice(values)),
+    let kind = match scalar {
+        Scalar::U8 => "uint8",
+        Scalar::U16 => "uint16",
+        Scalar::I16 => "int16",
+        Scalar::I32 => "int32",
+        Scalar::F32 => "float",
     };
     let endian = if cfg!(target_endian = "little") { "little" } else { "big" };
     writeln!(out, "NRRD0004\ntype: {kind}\ndimension: 3\nspace dimension: 3\nsizes: {nx} {ny} {nz}")?;
     writeln!(out, "space directions: {i} {j} {k}\nspace origin: {}", vector(lattice.origin))?;
-    writeln!(out, "endian: {endian}\nencoding: gzip")?;
-    if body_centred {
+    writeln!(out, "endian: {endian}\nencoding: {encoding}")
+}
+
+fn write_to(volume: &Volume, out: &mut impl Write) -> std::io::Result<()> {
+    let lattice = &volume.lattice;
+    write_header(lattice, volume.samples.scalar(), "gzip", out)?;
+    if lattice.arrangement == Arrangement::BodyCentred {
         writeln!(out, "lattice:=bcc")?;
     }
     if let Arrangement::Rectilinear(places) = &lattice.arrangement {
@@ -46,7 +68,7 @@ fn write_to(volume: &Volume, out: &mut impl Write) -> std::io::Result<()> {
     }
     writeln!(out)?;
     let mut packed = GzEncoder::new(out, Compression::default());
-    packed.write_all(bytes)?;
+    packed.write_all(volume.samples.bytes())?;
     packed.finish().map(drop)
 }
 
@@ -59,7 +81,7 @@ mod tests {
     use super::*;
     use crate::{
         io::{nrrd, testing::*},
-        volume::Lattice,
+        volume::Samples,
     };
 
     #[test]

@@ -1,5 +1,6 @@
 //! `splatkit convert`: what is written decides what is made of the inputs.
 
+mod bricks;
 mod external;
 mod memory;
 mod surface;
@@ -15,7 +16,7 @@ pub struct Convert {
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     /// The file to write. Of meshes, clouds and hierarchies: .splk, a hierarchy of splats, or .ply, the splats of the finest
-    /// level as 3D Gaussians for other viewers. Of volumes: .nrrd.
+    /// level as 3D Gaussians for other viewers. Of volumes: .nrrd, or .splv, levels of bricks that are read one by one.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     #[command(flatten)]
@@ -41,13 +42,17 @@ impl Convert {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
         let extension = self.output.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
         let extension = extension.unwrap_or_default();
-        if !["splk", "ply", "nrrd"].contains(&extension.as_str()) {
+        if !["splk", "ply", "nrrd", "splv"].contains(&extension.as_str()) {
             let file = self.output.display();
-            return Err(Failure::Usage(format!("{file}: only .splk, .ply and .nrrd files can be written")));
+            return Err(Failure::Usage(format!("{file}: only .splk, .ply, .nrrd and .splv files can be written")));
         }
         if !self.dry_run {
             output::check(&self.output, self.overwrite)?;
         }
-        if extension == "nrrd" { self.volume(progress) } else { self.surface(&extension, progress) }
+        match extension.as_str() {
+            "nrrd" => self.volume(progress),
+            "splv" => self.bricks(progress),
+            _ => self.surface(&extension, progress),
+        }
     }
 }

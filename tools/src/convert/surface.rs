@@ -36,12 +36,12 @@ pub struct SurfaceFlags {
     up: Option<Up>,
     /// The unit of lengths, for viewers of the result, such as m or mm.
     #[arg(long, value_name = "NAME", default_value = "")]
-    unit: String,
+    pub(super) unit: String,
     /// What a conversion may take, such as 8GiB. Binary PLY of points or triangles, LAS and LAZ that would take more are
-    /// converted region by region, with files of about their size beside the output meanwhile [default: three quarters of
-    /// the memory that there is]
+    /// converted region by region, with files of about their size beside the output meanwhile. Volumes that are raw, or NRRD
+    /// of raw encoding, become .splv slice by slice [default: three quarters of the memory that there is]
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
-    memory: Option<u64>,
+    pub(super) memory: Option<u64>,
 }
 
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq)]
@@ -78,7 +78,7 @@ impl Convert {
     /// Writes a hierarchy (`splk`) or 3D Gaussians (`ply`).
     pub(super) fn surface(self, extension: &str, progress: &Progress) -> Result<(), Failure> {
         if self.lattice.is_some() {
-            return Err(Failure::Usage("--lattice is for volumes".into()));
+            return Err(Failure::Usage("--lattice is for volumes written as .nrrd".into()));
         }
         let most = self.surface.memory.or_else(memory::usual).unwrap_or(u64::MAX);
         let need = memory::need(&self.files, &self.load.limits());
@@ -157,7 +157,7 @@ impl Convert {
                 let header = hierarchy.header();
                 (hierarchy.leaves()?, header.closed, header.up, header.source_points)
             }
-            Input::Volume(_) | Input::Samples(_) => {
+            Input::Volume(_) | Input::Samples(_) | Input::Bricks(_) => {
                 let file = path.display();
                 return Err(Failure::Usage(format!(
                     "{file} holds a volume or samples; hierarchies are made of meshes and clouds"

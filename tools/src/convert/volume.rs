@@ -23,7 +23,9 @@ impl Convert {
             return Err(Failure::Usage("volumes are converted one by one".into()));
         };
         if self.dry_run {
-            return Err(Failure::Usage("--dry-run is for hierarchies; a volume's size is that of its samples".into()));
+            return Err(Failure::Usage(
+                "--dry-run is for .splk and .splv; the size of others is that of their samples".into(),
+            ));
         }
         progress.stage(format!("Reading {}", file.display()));
         let Input::Volume(volume) = self.load.open(file)? else {

@@ -60,6 +60,10 @@ impl Run {
         text.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
+    pub fn stdout(&self) -> String {
+        String::from_utf8_lossy(&self.1.stdout).into_owned()
+    }
+
     /// The run must have succeeded.
     pub fn ok(self) -> Output {
         assert!(self.1.status.success(), "splatkit {}: {}", self.0, self.stderr());

@@ -1,0 +1,249 @@
+//! Which bricks a picture needs.
+
+use super::{Bricks, REACH, SIDE};
+use crate::{
+    math::View,
+    volume::{TransferFunction, reach::first_visible},
+};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// The levels and bricks of a picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// One level, or two that follow one another, finer first, each with its share in the picture. The shares sum to 1.
+    pub levels: Vec<(usize, f64)>,
+    /// Level and number of each brick, by the distance of its centre from the eye (orthographic: from its plane), nearest
+    /// first; coarse levels first among equals.
+    pub bricks: Vec<(usize, u32)>,
+    /// How coarse the picture is, a real number of levels.
+    pub lambda: f64,
+}
+
+/// A budget that is not kept is met by coarser pictures, in steps of this part of a level.
+const STEPS: f64 = 16.0;
+
+/// Chooses the levels that draw no step between samples smaller than `pixels`, and of these the bricks that meet the picture
+/// and hold something that the transfer function shows. `extent` is the kernel's, in samples of whichever level is drawn.
+///
+/// The level is a real number, λ = log₂(`pixels` / p), no less than 0 and no more than that of the coarsest level; p is how many
+/// pixels the longest step of level 0 covers at the point of the volume's box that is nearest to the eye. Between two levels
+/// both are drawn, with shares that follow λ, so that a zoom shows no pop. Where they have more than `most` bricks, λ is raised
+/// to the next sixteenth that has no more; the coarsest level, of one brick, is not refused.
+///
+/// Ranges of bricks hold as far as [`REACH`]: for wider kernels they are not looked at.
+pub fn choice(
+    bricks: &Bricks,
+    view: &View,
+    extent: f64,
+    pixels: f64,
+    transfer: &TransferFunction,
+    most: usize,
+) -> Choice {
+    let coarsest = (bricks.levels().len() - 1) as f64;
+    let first = first_visible(transfer, bricks.header().range);
+    // A level's bricks do not depend on λ: each is looked through once, when it is asked for.
+    let mut known: Vec<Option<Vec<(f64, u32)>>> = vec![None; bricks.levels().len()];
+    let mut lambda = wanted(bricks, view, pixels).min(coarsest);
+    let levels = loop {
+        let levels = shares(lambda);
+        let mut count = 0;
+        for &(level, _) in &levels {
+            count += known[level].get_or_insert_with(|| visible(bricks, level, view, extent, &first)).len();
+        }
+        if count <= most || lambda >= coarsest {
+            break levels;
+        }
+        lambda = ((lambda * STEPS).floor() + 1.0).min(coarsest * STEPS) / STEPS;
+    };
+    let mut found: Vec<(f64, usize, u32)> = Vec::new();
+    for &(level, _) in &levels {
+        found.extend(known[level].iter().flatten().map(|&(distance, brick)| (distance, level, brick)));
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)).then(a.2.cmp(&b.2)));
+    let bricks = found.into_iter().map(|(_, level, brick)| (level, brick)).collect();
+    Choice { levels, bricks, lambda }
+}
+
+/// λ before any budget.
+fn wanted(bricks: &Bricks, view: &View, pixels: f64) -> f64 {
+    let step = bricks.header().lattice.spacing().max_element();
+    let nearest = if view.perspective { view.distances(&bricks.bounds())[0] } else { 1.0 };
+    // From within, any step is too large.
+    (pixels * nearest / (step * view.scale)).log2().max(0.0)
+}
+
+/// The levels around λ and their shares.
+fn shares(lambda: f64) -> Vec<(usize, f64)> {
+    let (level, part) = (lambda.floor() as usize, lambda.fract());
+    if part > 0.0 { vec![(level, 1.0 - part), (level + 1, part)] } else { vec![(level, 1.0)] }
+}
+
+/// The bricks of a level that meet the picture and show something, with their distances.
+fn visible(bricks: &Bricks, number: usize, view: &View, extent: f64, first: &[u16; 256]) -> Vec<(f64, u32)> {
+    let level = bricks.level(number);
+    let lattice = bricks.lattice(number);
+    let sides = view.sides(1.0);
+    let far_reaching = extent > REACH as f64;
+    let shows = |[low, high]: [u8; 2]| far_reaching || u16::from(high) >= first[usize::from(low)];
+    let look = |(brick, &range): (usize, &[u8; 2])| {
+        let brick = brick as u32;
+        if !shows(range) {
+            return None;
+        }
+        let place = level.place(brick).map(|at| at * SIDE);
+        let low = DVec3::from_array(place.map(|at| at as f64)) - extent;
+        let last: [usize; 3] = std::array::from_fn(|axis| (place[axis] + SIDE).min(level.dims[axis]) - 1);
+        let high = DVec3::from_array(last.map(|at| at as f64)) + extent;
+        let corners: [DVec3; 8] = std::array::from_fn(|corner| {
+            let at = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
+            view.to_view(lattice.position(DVec3::new(at(0), at(1), at(2))))
+        });
+        let outside = |(normal, reach): &(DVec3, f64)| corners.iter().all(|corner| normal.dot(*corner) + reach < 0.0);
+        if sides.iter().any(outside) || (view.perspective && corners.iter().all(|corner| corner.z <= 0.0)) {
+            return None;
+        }
+        let center = view.to_view(lattice.position(0.5 * (low + high)));
+        Some((if view.perspective { center.length() } else { center.z }, brick))
+    };
+    bricks.ranges(number).par_iter().enumerate().filter_map(look).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        math::{Camera, Projection},
+        volume::{Lattice, Samples, Volume},
+    };
+    use std::sync::Arc;
+
+    /// 100³ samples, two units apart, that grow from 0 to 198 along x.
+    fn ramp() -> Bricks {
+        let values = (0..1_000_000usize).map(|index| (2 * (index % 100)) as u8).collect();
+        let volume = Volume::new(Lattice::with_spacing([100; 3], DVec3::splat(2.0)), Samples::U8(values)).unwrap();
+        Bricks::from_volume(Arc::new(volume)).unwrap()
+    }
+
+    fn transfer(from: f64) -> TransferFunction {
+        TransferFunction {
+            color: vec![(0.0, [1.0; 3])],
+            opacity: vec![(from, 0.0), (from + 1.0, 1.0)],
+            ..TransferFunction::default()
+        }
+    }
+
+    fn flat(height: f64) -> View {
+        let camera = Camera {
+            position: DVec3::new(99.0, 99.0, -500.0),
+            focal_point: DVec3::splat(99.0),
+            view_up: DVec3::Y,
+            projection: Projection::Orthographic { height },
+        };
+        camera.view([400, 400]).unwrap()
+    }
+
+    fn at(distance: f64) -> View {
+        let camera = Camera {
+            position: DVec3::new(99.0, 99.0, -distance),
+            focal_point: DVec3::splat(99.0),
+            view_up: DVec3::Y,
+            projection: Projection::Perspective { view_angle: 60.0 },
+        };
+        camera.view([400, 400]).unwrap()
+    }
+
+    const MANY: usize = usize::MAX;
+
+    #[test]
+    fn levels_follow_the_size_of_steps() {
+        let bricks = ramp();
+        let shows = transfer(-5.0);
+        // A step of 2 covers one pixel where 800 units fill 400 pixels.
+        for (height, pixels, lambda) in
+            [(800.0, 1.0, 0.0), (400.0, 1.0, 0.0), (800.0, 2.0, 1.0), (1600.0, 1.0, 1.0), (1e9, 1.0, 2.0)]
+        {
+            let choice = choice(&bricks, &flat(height), 2.0, pixels, &shows, MANY);
+            assert_eq!((choice.lambda, &choice.levels[..]), (lambda, &[(lambda as usize, 1.0)][..]), "{height}");
+            let count: usize = choice.levels.iter().map(|&(level, _)| bricks.level(level).bricks()).sum();
+            assert_eq!(choice.bricks.len(), count);
+        }
+        let between = choice(&bricks, &flat(800.0 * 2f64.sqrt()), 2.0, 1.0, &shows, MANY);
+        assert!((between.lambda - 0.5).abs() < 1e-12 && between.bricks.len() == 64 + 8, "{between:?}");
+        let [(0, fine), (1, coarse)] = between.levels[..] else { panic!("{between:?}") };
+        assert!((fine - 0.5).abs() < 1e-12 && (fine + coarse - 1.0).abs() < 1e-12);
+        // In perspective, at the nearest point of the box: twice as far, one level more.
+        let scale = at(1.0).scale;
+        for (distance, lambda) in
+            [(-98.0, 0.0), (0.0, 0.0), (2.0 * scale, 0.0), (4.0 * scale, 1.0), (6.0 * scale, 3f64.log2())]
+        {
+            let found = choice(&bricks, &at(distance), 2.0, 1.0, &shows, MANY).lambda;
+            assert!((found - lambda).abs() < 1e-9, "{distance}: {found}");
+        }
+    }
+
+    #[test]
+    fn a_zoom_has_no_jumps() {
+        let bricks = ramp();
+        let share = |height: f64, level: usize| {
+            let choice = choice(&bricks, &flat(height), 2.0, 1.0, &transfer(-5.0), MANY);
+            choice.levels.iter().find(|(found, _)| *found == level).map_or(0.0, |found| found.1)
+        };
+        for step in 0..400 {
+            let [before, after] = [step, step + 1].map(|step| 500.0 * 1.01f64.powi(step));
+            for level in 0..3 {
+                assert!((share(before, level) - share(after, level)).abs() < 0.02, "{before}");
+            }
+        }
+    }
+
+    #[test]
+    fn bricks_are_those_in_the_picture_that_show() {
+        let bricks = ramp();
+        // Values over 150 are at x of 75 and more; kernels and ranges reach 3 further.
+        let shown = choice(&bricks, &flat(400.0), 2.0, 1.0, &transfer(150.0), MANY);
+        let columns: Vec<usize> = shown.bricks.iter().map(|&(_, brick)| bricks.level(0).place(brick)[0]).collect();
+        assert!(columns.len() == 32 && columns.iter().all(|x| *x >= 2), "{columns:?}");
+        let wide = choice(&bricks, &flat(400.0), 3.5, 1.0, &transfer(150.0), MANY);
+        assert_eq!(wide.bricks.len(), 64);
+        assert!(choice(&bricks, &flat(400.0), 2.0, 1.0, &transfer(250.0), MANY).bricks.is_empty());
+        // A picture of the middle alone: bricks 1 and 2 along x and y.
+        let middle = choice(&bricks, &flat(10.0), 2.0, 1.0, &transfer(-5.0), MANY);
+        let places = || middle.bricks.iter().map(|&(_, brick)| bricks.level(0).place(brick));
+        assert!(middle.bricks.len() == 4 && places().all(|[x, y, _]| x == 1 && y == 1), "{middle:?}");
+        // The sample at 99.5 steps is the last of brick 1; wider kernels of brick 2 reach it.
+        let wider = choice(&bricks, &flat(10.0), 14.0, 1.0, &transfer(-5.0), MANY);
+        assert_eq!(wider.bricks.len(), 16);
+        // Behind the eye there is nothing.
+        let mut behind = at(50.0);
+        behind.rotation = glam::DMat3::from_diagonal(DVec3::new(-1.0, 1.0, -1.0)) * behind.rotation;
+        assert!(choice(&bricks, &behind, 2.0, 1.0, &transfer(-5.0), MANY).bricks.is_empty());
+    }
+
+    #[test]
+    fn near_bricks_come_first() {
+        let bricks = ramp();
+        let found = choice(&bricks, &at(3.0 * at(1.0).scale), 2.0, 1.0, &transfer(-5.0), MANY);
+        assert_eq!((found.levels.len(), found.bricks.len()), (2, 72));
+        let distance = |&(level, brick): &(usize, u32)| {
+            let size = bricks.level(level);
+            let place: [f64; 3] = size.place(brick).map(|at| (at * SIDE) as f64);
+            let last: [f64; 3] = std::array::from_fn(|axis| (place[axis] + 31.0).min(size.dims[axis] as f64 - 1.0));
+            let middle = 0.5 * (DVec3::from_array(place) + DVec3::from_array(last));
+            bricks.lattice(level).position(middle).distance(DVec3::new(99.0, 99.0, -3.0 * at(1.0).scale))
+        };
+        let distances: Vec<f64> = found.bricks.iter().map(distance).collect();
+        assert!(distances.is_sorted_by(|a, b| *a <= b + 1e-9));
+    }
+
+    #[test]
+    fn budgets_are_kept() {
+        let bricks = ramp();
+        let lambda = |most| {
+            let found = choice(&bricks, &flat(400.0), 2.0, 1.0, &transfer(-5.0), most);
+            assert!(found.bricks.len() <= most.max(1));
+            found.lambda
+        };
+        assert_eq!([72, 64, 63, 9, 8, 7, 1, 0].map(lambda), [0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0]);
+    }
+}

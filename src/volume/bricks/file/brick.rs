@@ -1,0 +1,75 @@
+//! A brick as it is kept: nothing that one value says, the rest packed where that is shorter.
+
+use super::directory::{CONSTANT, Entry, PACKED, UNIFORM};
+use crate::volume::{
+    Scalar,
+    bricks::{BRICK_BLOCKS, Brick, SIDE},
+};
+use zstd::bulk::Compressor;
+
+/// The bytes of a brick, and what the directory tells of them.
+pub fn encode(brick: &Brick, scalar: Scalar, packer: &mut Compressor) -> std::io::Result<(Entry, Vec<u8>)> {
+    let mut entry = Entry { bytes: 0, crc: 0, value: [0; 4], range: brick.range(), flags: 0 };
+    let mut samples = brick.samples.clone();
+    turn(&mut samples, scalar);
+    let first = &samples[..scalar.bytes()];
+    if samples.chunks_exact(scalar.bytes()).all(|sample| sample == first) {
+        entry.flags |= CONSTANT;
+        entry.value[..scalar.bytes()].copy_from_slice(first);
+        samples.clear();
+    }
+    if brick.blocks.iter().all(|block| *block == entry.range) {
+        entry.flags |= UNIFORM;
+    } else {
+        samples.extend_from_slice(brick.blocks.as_flattened());
+    }
+    let mut bytes = samples;
+    if !bytes.is_empty() {
+        let packed = packer.compress(&bytes)?;
+        if packed.len() < bytes.len() {
+            entry.flags |= PACKED;
+            bytes = packed;
+        }
+    }
+    entry.bytes = bytes.len() as u32;
+    entry.crc = crc32fast::hash(&bytes);
+    Ok((entry, bytes))
+}
+
+/// The brick of its bytes in the file; what is wrong where there is none.
+pub fn decode(entry: &Entry, bytes: &[u8], scalar: Scalar) -> Result<Brick, String> {
+    if crc32fast::hash(bytes) != entry.crc {
+        return Err("its checksum does not fit".into());
+    }
+    let [samples, blocks] = entry.contents(scalar);
+    let mut contents = if entry.has(PACKED) {
+        zstd::bulk::decompress(bytes, samples + blocks).map_err(|e| format!("it cannot be unpacked: {e}"))?
+    } else {
+        bytes.to_vec()
+    };
+    if contents.len() != samples + blocks {
+        return Err(format!("it has {} bytes where {} were expected", contents.len(), samples + blocks));
+    }
+    let ranges = contents.split_off(samples);
+    let mut samples = contents;
+    if entry.has(CONSTANT) {
+        samples = entry.value[..scalar.bytes()].repeat(SIDE * SIDE * SIDE);
+    }
+    turn(&mut samples, scalar);
+    if scalar == Scalar::F32
+        && let Some(odd) = samples.chunks_exact(4).position(|bytes| !scalar.value(bytes).is_finite())
+    {
+        return Err(format!("its sample {odd} is not finite"));
+    }
+    let mut blocks = Box::new([entry.range; BRICK_BLOCKS]);
+    blocks.iter_mut().zip(ranges.as_chunks::<2>().0).for_each(|(block, range)| *block = *range);
+    let brick = Brick { samples, blocks };
+    if brick.range() == entry.range { Ok(brick) } else { Err("its range is not that of its blocks".into()) }
+}
+
+/// From this machine's order of bytes to the file's, and back.
+fn turn(samples: &mut [u8], scalar: Scalar) {
+    if cfg!(target_endian = "big") {
+        samples.chunks_exact_mut(scalar.bytes()).for_each(<[u8]>::reverse);
+    }
+}

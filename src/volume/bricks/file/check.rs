@@ -1,0 +1,138 @@
+//! Looking for damage.
+
+use super::HASH;
+use crate::{
+    Error, Result,
+    hierarchy::{Finding, Findings, file::Report},
+    io::Limits,
+    volume::{
+        bricks::{Brick, Bricks, Level, SIDE, pyramid::Pyramid},
+        steps::Steps,
+    },
+};
+use rayon::prelude::*;
+use std::path::Path;
+
+/// Checks a file: header, directory, the checksum of every brick and the hash; then, where all of these hold, makes all
+/// ranges and all coarser levels again from level 0 and compares. A layer of bricks of each level is in memory at a time.
+/// `watch` is told how many bricks are done, of how many.
+///
+/// Nothing is an error: a file that cannot be opened is a finding.
+pub fn check(path: &Path, limits: &Limits, watch: &(dyn Fn(u64, u64) + Sync)) -> Report {
+    let mut findings = Findings::default();
+    match Bricks::open(path, limits) {
+        Ok(bricks) => {
+            if sums(&bricks, watch, &mut findings)
+                && let Err(error) = contents(&bricks, watch, &mut findings)
+            {
+                findings.push(finding("brick", &error));
+            }
+        }
+        Err(error) => findings.push(finding("open", &error)),
+    }
+    Report { findings: findings.finish() }
+}
+
+fn count(bricks: &Bricks) -> u64 {
+    bricks.levels().iter().map(|level| level.bricks() as u64).sum()
+}
+
+/// Whether every brick can be read, and the hash fits.
+fn sums(bricks: &Bricks, watch: &(dyn Fn(u64, u64) + Sync), findings: &mut Findings) -> bool {
+    let bytes = bricks.bytes();
+    let (text, hash) = bytes.split_at(bytes.len() - HASH);
+    let mut is_sound = *blake3::hash(text).as_bytes() == *hash;
+    if !is_sound {
+        let message = "the hash of the whole file does not fit";
+        findings.push(Finding::error("hash", format!("byte {}", text.len()), message));
+    }
+    let mut done = 0;
+    for (number, level) in bricks.levels().iter().enumerate() {
+        let layer = level.brick_dims[0] * level.brick_dims[1];
+        for first in (0..level.bricks()).step_by(layer) {
+            let layer = (first as u32..(first + layer) as u32).into_par_iter();
+            let errors: Vec<Error> = layer.clone().filter_map(|brick| bricks.read(number, brick).err()).collect();
+            is_sound &= errors.is_empty();
+            errors.iter().for_each(|error| findings.push(finding("brick", error)));
+            done += layer.len() as u64;
+            watch(done, 2 * count(bricks));
+        }
+    }
+    is_sound
+}
+
+/// Whether the file is what would be made of its level 0.
+fn contents(bricks: &Bricks, watch: &(dyn Fn(u64, u64) + Sync), findings: &mut Findings) -> Result<()> {
+    let header = bricks.header();
+    let steps = Steps::new(header.scalar, header.range);
+    let mut pyramid = Pyramid::new(header.scalar, header.lattice.dims);
+    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+    let mut done = count(bricks);
+    let finest = *bricks.level(0);
+    for layer in 0..finest.brick_dims[2] {
+        let slices = slices(bricks, &finest, layer)?;
+        let values = slices.chunks_exact(header.scalar.bytes()).map(|sample| header.scalar.value(sample));
+        range = values.fold(range, |[low, high], value| [low.min(value), high.max(value)]);
+        pyramid.push(&slices, |number, layer, slices| {
+            let [nx, ny, _] = slices.level.brick_dims;
+            let odd = |at: usize| {
+                let brick = (layer * nx * ny + at) as u32;
+                let wanted = slices.brick([at % nx, at / nx, layer], &steps);
+                let told = |what| Finding::error(what, format!("level {number}, brick {brick}"), meaning(what));
+                bricks.read(number, brick).map(|found| difference(&found, &wanted).map(told))
+            };
+            let odd: Vec<Option<Finding>> = (0..nx * ny).into_par_iter().map(odd).collect::<Result<_>>()?;
+            odd.into_iter().flatten().for_each(|finding| findings.push(finding));
+            done += (nx * ny) as u64;
+            watch(done, 2 * count(bricks));
+            Ok(())
+        })?;
+    }
+    if range != header.range {
+        let message = format!("it tells of values in {:?}, and they are in {range:?}", header.range);
+        findings.push(Finding::error("range", "header", message));
+    }
+    Ok(())
+}
+
+fn difference(found: &Brick, wanted: &Brick) -> Option<&'static str> {
+    if found.samples != wanted.samples {
+        return Some("samples");
+    }
+    (found.blocks != wanted.blocks).then_some("blocks")
+}
+
+fn meaning(code: &str) -> &'static str {
+    match code {
+        "samples" => "its samples are not the means of those below, or not continued behind the border",
+        _ => "the ranges of its blocks are not those of the samples around them",
+    }
+}
+
+/// The slices of a layer of bricks of a level.
+fn slices(bricks: &Bricks, level: &Level, layer: usize) -> Result<Vec<u8>> {
+    let size = bricks.header().scalar.bytes();
+    let ([nx, ny, nz], [across, down, _]) = (level.dims, level.brick_dims);
+    let mut out = vec![0; nx * ny * SIDE.min(nz - layer * SIDE) * size];
+    for j in 0..down {
+        let row = (0..across).into_par_iter().map(|i| bricks.read(0, ((layer * down + j) * across + i) as u32));
+        let row: Vec<Brick> = row.collect::<Result<_>>()?;
+        out.par_chunks_mut(nx * ny * size).enumerate().for_each(|(z, slice)| {
+            let lines = slice.chunks_mut(nx * size).skip(j * SIDE).take(SIDE);
+            for (y, line) in lines.enumerate() {
+                for (part, brick) in line.chunks_mut(SIDE * size).zip(&row) {
+                    let start = (z * SIDE + y) * SIDE * size;
+                    part.copy_from_slice(&brick.samples[start..start + part.len()]);
+                }
+            }
+        });
+    }
+    Ok(out)
+}
+
+fn finding(code: &'static str, error: &Error) -> Finding {
+    match error {
+        Error::Input { place, message, .. } => Finding::error(code, place.clone(), message.clone()),
+        other => Finding::error(code, "file", other.to_string()),
+    }
+}

@@ -1,0 +1,26 @@
+//! The file of a bricked volume, `.splv`: bricks, coarse levels first, behind a directory that tells how large each is and
+//! what its values range over. docs/splv.md describes it byte by byte.
+
+mod brick;
+mod check;
+mod directory;
+mod header;
+mod write;
+
+pub use check::check;
+pub use write::{WriteOptions, convert, memory_of, write};
+
+pub(super) use brick::decode;
+pub(super) use directory::{Directory, Entry};
+pub(super) use header::{Refusal, Stored};
+#[cfg(test)]
+pub(super) use write::{to_bytes, with_changes};
+
+/// How a file begins: a name, and line ends that a transfer as text would change.
+const MAGIC: [u8; 8] = *b"SPLV\r\n\x1a\n";
+
+/// The version that is written, and the newest that is read.
+pub(super) const VERSION: u32 = 1;
+
+/// Bytes of the BLAKE3 hash at the end of a file.
+pub(super) const HASH: usize = 32;

@@ -1,0 +1,206 @@
+//! Writing: slices come once, from the first to the last, and little more than a layer of bricks is held of each level.
+
+use super::{Directory, Entry, HASH, Stored, brick::encode};
+#[cfg(test)]
+use crate::volume::bricks::{Brick, Bricks};
+use crate::{
+    Error, Result,
+    hierarchy::file::{Spill, Target},
+    io::VolumeStream,
+    volume::{
+        Scalar, Volume,
+        bricks::{Header, REACH, SIDE, cut::Slices, level, pyramid::Pyramid},
+        steps::Steps,
+    },
+};
+use rayon::prelude::*;
+use std::{borrow::Cow, io::Write, ops::Range, path::Path};
+use zstd::bulk::Compressor;
+
+/// What the file says of where it comes from.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct WriteOptions {
+    /// The name of the world's unit.
+    pub unit: String,
+    /// The name of the source.
+    pub source: String,
+}
+
+/// What zstd does for the size. Higher levels take much longer for a few parts in a hundred.
+const LEVEL: i32 = 3;
+
+/// Slices that are taken at a time.
+const PIECE: usize = 8;
+
+/// Bricks that threads share before they are written.
+const BATCH: usize = 256;
+
+/// Told of how many slices are done, of how many.
+type Watch<'a> = &'a dyn Fn(u64, u64);
+
+/// About how many bytes of memory [`convert`] takes: of level 0 the slices of a layer of bricks, what reaches into them and
+/// what is being read; of each further level a quarter of the one before; and room for packing.
+pub fn memory_of(dims: [usize; 3], scalar: Scalar) -> u64 {
+    let slice = (dims[0] as u64).saturating_mul(dims[1] as u64).saturating_mul(scalar.bytes() as u64);
+    let slices = (SIDE + 2 * REACH + 4 * PIECE).min(2 * dims[2]) as u64;
+    slice.saturating_mul(slices).saturating_mul(4) / 3 + (64 << 20)
+}
+
+/// Writes a volume in memory: a temporary file beside `path` that takes its name once it is complete. `watch` is told how
+/// many slices are done, of how many.
+///
+/// # Errors
+/// [`Error::Argument`] for a lattice that is not Cartesian; [`Error::File`] where nothing can be written.
+pub fn write(volume: &Volume, path: &Path, options: &WriteOptions, watch: Watch) -> Result<()> {
+    level::refusal(&volume.lattice).map_err(Error::Argument)?;
+    let spill = || Spill::beside(path);
+    all(&header(volume, options), path, spill, || Target::at(path), |z| Ok(slices(volume, z)), watch).map(|_| ())
+}
+
+/// As [`write`](write()), from a file that is read slice by slice: in [`memory_of`] bytes, whatever its size. The range of
+/// its values is told by the caller, who went through the file for it ([`VolumeStream::range`]).
+///
+/// # Errors
+/// As of [`write`](write()).
+pub fn convert(
+    stream: &VolumeStream,
+    range: [f64; 2],
+    path: &Path,
+    options: &WriteOptions,
+    watch: Watch,
+) -> Result<()> {
+    let WriteOptions { unit, source } = options.clone();
+    level::refusal(stream.lattice()).map_err(Error::Argument)?;
+    let header = Header { lattice: stream.lattice().clone(), scalar: stream.scalar(), range, unit, source };
+    let slices = |z| Ok(Cow::Owned(stream.slices(z).bytes().to_vec()));
+    all(&header, path, || Spill::beside(path), || Target::at(path), slices, watch).map(|_| ())
+}
+
+/// The bytes of the file that [`write`](write()) would write.
+#[cfg(test)]
+pub fn to_bytes(volume: &Volume, options: &WriteOptions) -> Result<Vec<u8>> {
+    level::refusal(&volume.lattice).map_err(Error::Argument)?;
+    let memory = || Ok(Spill::Memory(Vec::new()));
+    let target = || Ok(Target::Memory(Vec::new()));
+    all(&header(volume, options), Path::new("memory"), memory, target, |z| Ok(slices(volume, z)), &|_, _| ())
+}
+
+/// The bytes of a file with bricks that a function may change, so that they are not what was promised.
+#[cfg(test)]
+pub fn with_changes(bricks: &Bricks, change: impl Fn(usize, u32, &mut Brick)) -> Vec<u8> {
+    let header = bricks.header();
+    let mut kept = Kept::new(header, Spill::Memory(Vec::new()));
+    let mut packer = Compressor::new(LEVEL).unwrap();
+    for (number, level) in bricks.levels().iter().enumerate() {
+        for brick in 0..level.bricks() as u32 {
+            let mut content = bricks.read(number, brick).unwrap();
+            change(number, brick, &mut content);
+            let (entry, bytes) = encode(&content, header.scalar, &mut packer).unwrap();
+            kept.push(number, entry, &bytes).unwrap();
+        }
+    }
+    kept.finish(header, Target::Memory(Vec::new())).unwrap().end().unwrap()
+}
+
+fn header(volume: &Volume, options: &WriteOptions) -> Header {
+    let WriteOptions { unit, source } = options.clone();
+    Header { lattice: volume.lattice.clone(), scalar: volume.samples.scalar(), range: volume.range, unit, source }
+}
+
+/// The bytes of some slices.
+fn slices(volume: &Volume, z: Range<usize>) -> Cow<'_, [u8]> {
+    let slice = volume.lattice.dims[0] * volume.lattice.dims[1] * volume.samples.sample_bytes();
+    Cow::Borrowed(&volume.samples.bytes()[z.start * slice..z.end * slice])
+}
+
+fn all<'a>(
+    header: &Header,
+    path: &Path,
+    spill: impl FnOnce() -> Result<Spill>,
+    target: impl FnOnce() -> Result<Target>,
+    slices: impl Fn(Range<usize>) -> Result<Cow<'a, [u8]>>,
+    watch: Watch,
+) -> Result<Vec<u8>> {
+    let dims = header.lattice.dims;
+    let mut coder = Coder::new(header, spill()?);
+    let mut pyramid = Pyramid::new(header.scalar, dims);
+    let fail = |e| Error::file(path, "write", e);
+    for first in (0..dims[2]).step_by(PIECE) {
+        let z = first..(first + PIECE).min(dims[2]);
+        watch(first as u64, dims[2] as u64);
+        let piece = slices(z)?;
+        pyramid.push(&piece, |level, layer, slices| coder.layer(level, layer, slices).map_err(fail))?;
+    }
+    coder.kept.finish(header, target()?).map_err(fail)?.end()
+}
+
+/// Cuts and packs bricks.
+struct Coder {
+    scalar: Scalar,
+    steps: Steps,
+    kept: Kept,
+}
+
+impl Coder {
+    fn new(header: &Header, spill: Spill) -> Self {
+        let steps = Steps::new(header.scalar, header.range);
+        Self { scalar: header.scalar, steps, kept: Kept::new(header, spill) }
+    }
+
+    fn layer(&mut self, level: usize, layer: usize, slices: &Slices) -> std::io::Result<()> {
+        let [nx, ny, _] = slices.level.brick_dims;
+        let Self { scalar, steps, kept } = self;
+        let of_place = |packer: &mut std::io::Result<Compressor>, place: usize| {
+            let packer = packer.as_mut().map_err(|e| std::io::Error::new(e.kind(), e.to_string()))?;
+            encode(&slices.brick([place % nx, place / nx, layer], steps), *scalar, packer)
+        };
+        for first in (0..nx * ny).step_by(BATCH) {
+            let batch = (first..(first + BATCH).min(nx * ny)).into_par_iter();
+            let coded: Vec<_> = batch.map_init(|| Compressor::new(LEVEL), of_place).collect();
+            for coded in coded {
+                let (entry, bytes) = coded?;
+                kept.push(level, entry, &bytes)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Bricks on their way to the file: of each level what the directory will tell of them, and where they wait.
+struct Kept {
+    spill: Spill,
+    entries: Vec<Vec<Entry>>,
+    waiting: Vec<Vec<u64>>,
+}
+
+impl Kept {
+    fn new(header: &Header, spill: Spill) -> Self {
+        let levels = level::levels(header.lattice.dims).len();
+        Self { spill, entries: vec![Vec::new(); levels], waiting: vec![Vec::new(); levels] }
+    }
+
+    fn push(&mut self, level: usize, entry: Entry, bytes: &[u8]) -> std::io::Result<()> {
+        self.waiting[level].push(self.spill.push(bytes)?);
+        self.entries[level].push(entry);
+        Ok(())
+    }
+
+    /// Puts the file together.
+    fn finish(self, header: &Header, mut out: Target) -> std::io::Result<Target> {
+        let mut stored = Stored { header: header.clone(), file_bytes: 0 };
+        let directory = Directory::new(self.entries, stored.length());
+        stored.file_bytes = directory.end() + HASH as u64;
+        let mut hash = blake3::Hasher::new();
+        let mut put = |bytes: &[u8]| {
+            hash.update(bytes);
+            out.write_all(bytes)
+        };
+        put(&stored.encode())?;
+        put(&directory.encode())?;
+        let places = self.waiting.iter().zip(&directory.levels).rev();
+        let pieces = places.flat_map(|(waiting, entries)| waiting.iter().copied().zip(entries.iter().map(|e| e.bytes)));
+        self.spill.replay(pieces, &mut put)?;
+        out.write_all(hash.finalize().as_bytes())?;
+        Ok(out)
+    }
+}

@@ -1,0 +1,259 @@
+//! Reading bricks: from a volume in memory, or from a file of which only header and directory are in memory.
+
+use super::{
+    Brick, EMPTY, Level,
+    cut::Slices,
+    file::{Directory, Refusal, Stored, VERSION, decode},
+    halve::halve,
+    level,
+};
+use crate::{
+    Error, Result,
+    io::{Limits, Source},
+    math::Bounds,
+    volume::{Lattice, Scalar, Volume, steps::Steps},
+};
+use rayon::prelude::*;
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+/// What a bricked volume is as a whole.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Header {
+    /// Of level 0; Cartesian.
+    pub lattice: Lattice,
+    pub scalar: Scalar,
+    /// The smallest and the largest value of level 0; coarser levels lie within.
+    pub range: [f64; 2],
+    /// The name of the world's unit (`"mm"`); empty where unknown.
+    pub unit: String,
+    /// The name of the file that this one was made from; empty where there is none.
+    pub source: String,
+}
+
+/// A volume in levels and bricks. Any number of threads may read from it.
+pub struct Bricks {
+    path: PathBuf,
+    header: Header,
+    levels: Vec<Level>,
+    /// Of each level the range of each brick.
+    ranges: Vec<Vec<[u8; 2]>>,
+    origin: Origin,
+}
+
+enum Origin {
+    Memory {
+        volume: Arc<Volume>,
+        /// The bytes of the samples of level 1 and on.
+        coarse: Vec<Vec<u8>>,
+        steps: Steps,
+    },
+    File {
+        bytes: Bytes,
+        directory: Directory,
+    },
+}
+
+enum Bytes {
+    Mapped(Option<memmap2::Mmap>),
+    Held(Vec<u8>),
+}
+
+impl std::fmt::Debug for Bricks {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Bricks").field("path", &self.path).field("header", &self.header).finish_non_exhaustive()
+    }
+}
+
+impl Bricks {
+    /// Takes a volume as it is: makes the coarser levels and looks through all bricks for their ranges (in parallel). Bricks
+    /// are cut when they are read. Coefficients ([`Volume::sharpened`]) are left out.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a lattice that is not Cartesian, or has more bricks than 32 bits can count.
+    pub fn from_volume(volume: Arc<Volume>) -> Result<Self> {
+        level::refusal(&volume.lattice).map_err(Error::Argument)?;
+        let scalar = volume.samples.scalar();
+        let levels = level::levels(volume.lattice.dims);
+        let mut coarse: Vec<Vec<u8>> = Vec::with_capacity(levels.len());
+        for level in &levels[..levels.len() - 1] {
+            let fine = coarse.last().map_or(volume.samples.bytes(), Vec::as_slice);
+            coarse.push(halve(scalar, fine, level.dims));
+        }
+        let steps = Steps::new(scalar, volume.range);
+        let ranges = levels.iter().enumerate().map(|(number, &level)| {
+            let slices = in_memory(&volume, &coarse, number, level);
+            let range = |brick| slices.range(level.place(brick), &steps);
+            (0..level.bricks() as u32).into_par_iter().map(range).collect()
+        });
+        let ranges = ranges.collect();
+        let header = Header {
+            lattice: volume.lattice.clone(),
+            scalar,
+            range: volume.range,
+            unit: String::new(),
+            source: String::new(),
+        };
+        let path = PathBuf::from("memory");
+        Ok(Self { path, header, levels, ranges, origin: Origin::Memory { volume, coarse, steps } })
+    }
+
+    /// Opens a file: reads and checks the header and the directory, and maps the rest.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for other files, other versions, damaged headers and directories, and files that are cut off or have
+    /// something behind their end; [`Error::Limit`] and [`Error::File`] as for every input.
+    pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
+        Self::new(path, Bytes::Mapped(Source::open(path, limits)?.into_map()))
+    }
+
+    /// Takes the bytes of a file; `name` is what errors call it.
+    ///
+    /// # Errors
+    /// [`Error::Input`] as of [`open`](Self::open).
+    pub fn from_bytes(bytes: Vec<u8>, name: &Path) -> Result<Self> {
+        Self::new(name, Bytes::Held(bytes))
+    }
+
+    fn new(path: &Path, bytes: Bytes) -> Result<Self> {
+        let all = bytes.all();
+        let stored = Stored::decode(all).map_err(|refusal| refused(path, refusal))?;
+        let present = all.len() as u64;
+        let end = stored.file_bytes;
+        if present < end {
+            return Err(incomplete(path, format!("byte {present} of {end}")));
+        }
+        if present > end {
+            return Err(damaged(path, format!("byte {end}"), format!("{} bytes stand behind the end", present - end)));
+        }
+        let directory = Directory::decode(all, &stored).map_err(|message| damaged(path, "directory", message))?;
+        let header = stored.header;
+        let levels = level::levels(header.lattice.dims);
+        let ranges = directory.levels.iter().map(|level| level.iter().map(|entry| entry.range).collect()).collect();
+        Ok(Self { path: path.to_owned(), header, levels, ranges, origin: Origin::File { bytes, directory } })
+    }
+
+    /// What the volume is as a whole.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// What errors call this volume: its file, or `memory`.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The levels, finest first; the last one is one brick.
+    pub fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+
+    /// One of the levels.
+    ///
+    /// # Panics
+    /// Where there is no such level.
+    pub fn level(&self, level: usize) -> &Level {
+        &self.levels[level]
+    }
+
+    /// Where the samples of a level lie: level l has 2^l steps of level 0 between samples, and its first one lies amid those
+    /// that it is the mean of, at (2^l − 1)/2 steps along each axis. An axis of one sample is not halved and stays as it is.
+    pub fn lattice(&self, level: usize) -> Lattice {
+        level::lattice(&self.header.lattice, level)
+    }
+
+    /// Smallest and largest world coordinates of the samples of level 0.
+    pub fn bounds(&self) -> Bounds {
+        let [min, max] = self.header.lattice.bounds();
+        Bounds { min, max }
+    }
+
+    /// For each brick of a level the range of all its blocks ([`Brick::blocks`]). A brick may be left out where
+    /// `high < first_visible[low]` ([`first_visible`](crate::volume::reach::first_visible)).
+    ///
+    /// # Panics
+    /// Where there is no such level.
+    pub fn ranges(&self, level: usize) -> &[[u8; 2]] {
+        &self.ranges[level]
+    }
+
+    /// Bytes of the samples of a brick.
+    pub fn brick_bytes(&self) -> usize {
+        super::SIDE.pow(3) * self.header.scalar.bytes()
+    }
+
+    /// Reads a brick, its checksum checked; any thread may.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where there is no such brick; [`Error::Input`] for one that is damaged.
+    pub fn read(&self, level: usize, brick: u32) -> Result<Brick> {
+        let size = self.levels.get(level).filter(|size| (brick as usize) < size.bricks());
+        let size = *size.ok_or_else(|| {
+            Error::Argument(format!("{}: there is no brick {brick} of level {level}", self.path.display()))
+        })?;
+        match &self.origin {
+            Origin::Memory { volume, coarse, steps } => {
+                Ok(in_memory(volume, coarse, level, size).brick(size.place(brick), steps))
+            }
+            Origin::File { bytes, directory } => {
+                let entry = &directory.levels[level][brick as usize];
+                let offset = directory.offsets[level][brick as usize] as usize;
+                let stored = &bytes.all()[offset..offset + entry.bytes as usize];
+                decode(entry, stored, self.header.scalar).map_err(|message| {
+                    damaged(&self.path, format!("level {level}, brick {brick} (byte {offset})"), message)
+                })
+            }
+        }
+    }
+
+    /// All bytes of a file; none of a volume in memory.
+    pub(super) fn bytes(&self) -> &[u8] {
+        match &self.origin {
+            Origin::Memory { .. } => &[],
+            Origin::File { bytes, .. } => bytes.all(),
+        }
+    }
+}
+
+impl Slices<'_> {
+    fn range(&self, place: [usize; 3], steps: &Steps) -> [u8; 2] {
+        self.blocks(place, steps).iter().fold(EMPTY, |all, &block| super::joined(all, block))
+    }
+}
+
+impl Bytes {
+    fn all(&self) -> &[u8] {
+        match self {
+            Self::Mapped(map) => map.as_deref().unwrap_or(&[]),
+            Self::Held(bytes) => bytes,
+        }
+    }
+}
+
+fn in_memory<'a>(volume: &'a Volume, coarse: &'a [Vec<u8>], number: usize, level: Level) -> Slices<'a> {
+    let samples = number.checked_sub(1).map_or(volume.samples.bytes(), |above| &coarse[above]);
+    Slices { level, scalar: volume.samples.scalar(), first: 0, samples }
+}
+
+fn refused(path: &Path, refusal: Refusal) -> Error {
+    match refusal {
+        Refusal::Incomplete => incomplete(path, "header"),
+        Refusal::Foreign => Error::input(path, "header", "is no volume in bricks")
+            .hint("give a .splv file, or convert the source to one"),
+        Refusal::Version(version) => {
+            Error::input(path, "header", format!("is of version {version}; version {VERSION} can be read"))
+                .hint("convert the source again, or use the release that wrote the file")
+        }
+        Refusal::Damaged(message) => damaged(path, "header", message),
+    }
+}
+
+fn incomplete(path: &Path, place: impl Into<String>) -> Error {
+    Error::input(path, place, "the file is incomplete: it ends before its last brick").hint("copy or convert it again")
+}
+
+fn damaged(path: &Path, place: impl Into<String>, message: impl Into<String>) -> Error {
+    Error::input(path, place, message).hint("the file is damaged: copy or convert it again")
+}

@@ -1,0 +1,52 @@
+//! The types that samples are kept in.
+
+/// The type of a volume's samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scalar {
+    U8,
+    U16,
+    I16,
+    I32,
+    F32,
+}
+
+impl Scalar {
+    pub const ALL: [Self; 5] = [Self::U8, Self::U16, Self::I16, Self::I32, Self::F32];
+
+    /// The name, as the command spells it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::U8 => "u8",
+            Self::U16 => "u16",
+            Self::I16 => "i16",
+            Self::I32 => "i32",
+            Self::F32 => "f32",
+        }
+    }
+
+    /// Bytes that one sample takes.
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::U8 => 1,
+            Self::U16 | Self::I16 => 2,
+            Self::I32 | Self::F32 => 4,
+        }
+    }
+
+    /// The value of the first sample in bytes of this machine's order; exact.
+    ///
+    /// # Panics
+    /// Where there are fewer bytes than a sample takes.
+    pub fn value(self, bytes: &[u8]) -> f64 {
+        fn first<T: bytemuck::AnyBitPattern + Into<f64>>(bytes: &[u8]) -> f64 {
+            bytemuck::pod_read_unaligned::<T>(&bytes[..size_of::<T>()]).into()
+        }
+        match self {
+            Self::U8 => first::<u8>(bytes),
+            Self::U16 => first::<u16>(bytes),
+            Self::I16 => first::<i16>(bytes),
+            Self::I32 => first::<i32>(bytes),
+            Self::F32 => first::<f32>(bytes),
+        }
+    }
+}
