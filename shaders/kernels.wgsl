@@ -16,13 +16,28 @@ fn normal_cdf(t: vec3<f32>) -> vec3<f32> {
     return select(tail, 1.0 - tail, t >= vec3(0.0));
 }
 
+// The same within 2.3e-4, without a division: an odd polynomial that reaches 0.5 level at 3.55 (least squares, weighted to even
+// errors). For surfaces alone, where an error moves optical depth from one sheet to the next, both of the same splat's colour,
+// and takes none away.
+fn near_normal_cdf(t: vec3<f32>) -> vec3<f32> {
+    let x = clamp(t, vec3(-3.55), vec3(3.55));
+    let y = x * x;
+    let p = 0.39808504 + y * (-0.064429414 + y * (0.0085235118 + y * (-0.00072436168 + y * (3.4515190e-05 - y * 6.9134990e-07))));
+    return 0.5 + x * p;
+}
+
 // Planes farther from a kernel than this, in its standard deviations, are taken as that far: nothing of it is left there, and
 // the list of planes ends in numbers that would overflow.
 const FAR: vec3<f32> = vec3(12.0);
 
 // The four sections of a window, from the distribution function at its three inner planes.
 fn sections(t: vec3<f32>, base: f32) -> vec4<f32> {
-    let f = normal_cdf(t);
+    var f: vec3<f32>;
+    if SCALAR || CLASSIFIED {
+        f = normal_cdf(t);
+    } else {
+        f = near_normal_cdf(t);
+    }
     return vec4(f.x - base, f.y - f.x, f.z - f.y, 1.0 - f.z);
 }
 

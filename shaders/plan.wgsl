@@ -17,10 +17,8 @@
 
 const SEGMENTS: u32 = 4096u;
 
-// Of the frame's entries, a pass takes this part where it may hide what lies behind it...
+// Of the frame's entries, a pass takes this part where it may hide what lies behind it, but not fewer than LEAST_SHARE.
 const PASS_SHARE: u32 = 3u;
-// ...but not so few that another pass costs more than what is hidden.
-const LEAST_SHARE: u32 = select(0x40000u, 0x200000u, SCALAR);
 
 var<workgroup> sums: array<vec3<u32>, 256>;
 
@@ -120,14 +118,14 @@ fn advance() {
 
 // The sheet before which a pass has to end.
 fn furthest(first: u32, end: u32, target_entries: u32) -> u32 {
-    // A sheet that is more than a pass's share is drawn whole where it fits.
-    var last = first;
-    if is_room(needed(first, first + 1u, BANDS), frame.entry_capacity) {
-        last++;
-    } else {
+    let least = needed(first, first + 1u, BANDS);
+    if !is_room(least, frame.entry_capacity) {
         return first;
     }
-    while last < end && is_room(needed(first, last + 1u, BANDS), target_entries) {
+    // Runs that reach through much of the scene would be counted, and visited, by one thin pass after another.
+    let most_entries = max(target_entries, 2u * min(least.x, 0x7fffffffu));
+    var last = first + 1u;
+    while last < end && is_room(needed(first, last + 1u, BANDS), most_entries) {
         last++;
     }
     return last;

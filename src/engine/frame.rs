@@ -36,6 +36,9 @@ pub struct Budget {
     pub entries: u32,
     /// Record words of a pass: an isotropic lattice sample takes one, any other splat four; 28 bytes each.
     pub record_words: u32,
+    /// Entries that a pass takes at least, where it might end earlier to see what is hidden behind it. `None`: as many as
+    /// another pass is worth.
+    pub least_share: Option<u32>,
     /// Entries of a tile that one dispatch of march adds up; a tile with more goes on in another. `None`: as many as the
     /// adapter's driver bears.
     pub tile_entries: Option<u32>,
@@ -43,7 +46,7 @@ pub struct Budget {
 
 impl Default for Budget {
     fn default() -> Self {
-        Self { entries: 1 << 24, record_words: 1 << 22, tile_entries: None }
+        Self { entries: 1 << 24, record_words: 1 << 22, least_share: None, tile_entries: None }
     }
 }
 
@@ -88,6 +91,7 @@ pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Sett
         surface_shaded: false,
         gradient_opacity: false,
         occlusion: settings.occlusion && settings.hides() && prepared.scene.can_hide(),
+        least_share: 0,
         isosurfaces: 0,
         clips: 0,
         holes: 0,
@@ -132,6 +136,8 @@ pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Sett
             variant.isotropic = flat && alike && !classified;
         }
     }
+    // Where a pass ends, march meets splats again and closes sheets twice: of a field that costs more than of a surface.
+    variant.least_share = budget.least_share.unwrap_or(if variant.scalar { 1 << 21 } else { 1 << 18 });
     variant.central = variant.gradients() && settings.gradient == Gradient::Central;
     variant
 }

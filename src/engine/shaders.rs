@@ -70,6 +70,8 @@ pub struct Variant {
     pub holes: u32,
     /// What lies before a splat may hide it.
     pub occlusion: bool,
+    /// Entries that a pass takes at least before it looks what it hides.
+    pub least_share: u32,
     /// Gradients from neighbouring pixels.
     pub central: bool,
     /// Pixels per invocation of march, one below the other: 1, 2, 4 or 8.
@@ -139,6 +141,7 @@ impl Variant {
             ("CLIPS", self.clips),
             ("HOLES", self.holes),
             ("HOLES_OR_ONE", self.holes.max(1)),
+            ("LEAST_SHARE", self.least_share),
             ("MOST_BINS", super::frame::MOST_BINS),
             ("MOST_GROUP_SHIFT", super::frame::MOST_GROUP_SHIFT),
             ("MOST_ENTRIES", self.most_entries),
