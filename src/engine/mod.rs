@@ -6,13 +6,17 @@
 //! |---|---|
 //! | `select` | which samples of a volume the transfer function can show (only when it changes) |
 //! | `cut` | which nodes of a hierarchy stand for it in this view |
-//! | `measure` | which sheets each splat meets, and how much room it will need |
+//! | `measure` | what each splat meets of the picture, and how much room it will need |
 //! | `plan` | cuts the frame into depth passes that fit the buffers |
-//! | `project` | per depth pass: the records of its splats, counted into bins |
-//! | `scan`, `scatter` | entries (splat, tile, window of four sheets) into the bins |
+//! | `cull` | per depth pass: which splats it draws, and which are hidden |
+//! | `project` | the records of these |
+//! | `clear`, `bin`, `scan` | entries (splat, tile, window of four sheets) into bins |
 //! | `large` | the same for splats that meet many bins, each spread over a workgroup |
+//! | `tiles` | which tiles have entries |
 //! | `order` | sorts each bin, for the same bytes each time |
 //! | `march` | per tile: adds up sections, closes sheets, composites front to back |
+//! | `resume` | goes on with tiles that march has stopped |
+//! | `occlusion` | which tiles have become opaque |
 //!
 //! docs/engine.md tells the mathematics.
 

@@ -96,6 +96,7 @@ impl Bench {
                 "passes": timing::steps(&profile.steps),
                 "depth_passes": stats.passes,
                 "splats": stats.splats,
+                "hidden": stats.hidden,
                 "entries": stats.entries,
                 "culled": culled,
                 "gpu_bytes": stats.gpu_bytes,
@@ -109,11 +110,12 @@ impl Bench {
         output::line(format_args!("first     {first_ms:10.1} ms"))?;
         output::line(format_args!("frame     {median:10.1} ms  ({min:.1} to {max:.1}, {frames} frames)"))?;
         for (name, ms) in &profile.steps {
-            output::line(format_args!("  {name:<8}{ms:10.1} ms"))?;
+            output::line(format_args!("  {name:<10}{ms:8.1} ms"))?;
         }
         output::line(format_args!(
-            "{} splats drawn, {culled} culled, {} entries in {} passes, {} MiB on the GPU",
-            stats.splats,
+            "{} splats drawn, {} hidden, {culled} culled, {} entries in {} passes, {} MiB on the GPU",
+            stats.splats - stats.hidden.min(stats.splats),
+            stats.hidden,
             stats.entries,
             stats.passes,
             stats.gpu_bytes >> 20

@@ -19,12 +19,13 @@ pub struct Chapter {
 }
 
 /// What every case tells, and what some do: the seed's rate, and whether repeated runs agreed.
-const COLUMNS: [&str; 12] = [
+const COLUMNS: [&str; 13] = [
     "case",
     "drawn",
     "picture",
     "effective splats",
-    "drawn splats",
+    "splats in view",
+    "hidden",
     "entries",
     "depth passes",
     "frame ms: median",
@@ -114,6 +115,7 @@ fn cells(found: &Measured) -> Vec<Cell> {
         Cell::Text(format!("{width}×{height}")),
         count(found.effective),
         count(stats.splats),
+        count(stats.hidden),
         count(stats.entries),
         count(u64::from(stats.passes)),
         Cell::Number(times.median, 1),
@@ -139,6 +141,7 @@ fn case_json(Outcome { name, result }: &Outcome) -> Value {
         "height": height,
         "effective_splats": effective,
         "splats": stats.splats,
+        "hidden": stats.hidden,
         "entries": stats.entries,
         "depth_passes": stats.passes,
         "frame_ms": times.json(),
