@@ -2,8 +2,10 @@
 // large, so that counting and filling walk the same windows and tiles.
 
 // The tiles and sheets of a record: first and last tile (column, then row from bit 16), then first and last sheet. The top
-// bit of the first tile marks an isotropic record.
+// bits of the first tile mark an isotropic record, and one of the coarser of two levels.
 const BOX_ISOTROPIC: u32 = 0x80000000u;
+const BOX_COARSE: u32 = 0x40000000u;
+const BOX_MARKS: u32 = 0xc0000000u;
 // The sheets of a word that begins no record.
 const NO_BOX: u32 = 0xffffffffu;
 
@@ -31,7 +33,7 @@ fn walk_of(box: Box, stage: Pass) -> Walk {
     return Walk(
         box.first_tile & 0xffffu,
         box.last_tile & 0xffffu,
-        max((box.first_tile & ~BOX_ISOTROPIC) >> 16u, stage.first_row),
+        max((box.first_tile & ~BOX_MARKS) >> 16u, stage.first_row),
         min((box.last_tile >> 16u) + 1u, stage.end_row),
         first,
         window_count(first, last),
@@ -70,5 +72,6 @@ fn entry_of(box: Box, record: u32, walk: Walk, window: u32, stage: Pass) -> u32 
     let in_group = sheet & ((1u << stage.group_shift) - 1u);
     let continued = select(0u, ENTRY_CONTINUED, window > 0u);
     let isotropic = select(0u, ENTRY_ISOTROPIC, (box.first_tile & BOX_ISOTROPIC) != 0u);
-    return (in_group << ENTRY_SHEET_SHIFT) | continued | isotropic | record;
+    let coarse = select(0u, ENTRY_COARSE, (box.first_tile & BOX_COARSE) != 0u);
+    return (in_group << ENTRY_SHEET_SHIFT) | continued | isotropic | coarse | record;
 }

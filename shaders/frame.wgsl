@@ -37,6 +37,8 @@ struct Frame {
     transfer: vec4<f32>,
     // The field's kernel: radius in kernel space, its inverse; one over what kernels add up to.
     kernel: vec4<f32>,
+    // Volumes in bricks: the shares of the finer and of the coarser level.
+    levels: vec4<f32>,
     // Axis-aligned sheets: their normal in view space.
     sheet_normal: vec4<f32>,
     // Columns of the turn from view space to the world's axes.
@@ -95,7 +97,7 @@ struct Source {
     count: u32,
     // First run of this chunk in the frame's list of runs.
     first_run: u32,
-    // RADIANCE, ISOTROPIC, ENDS, NODES.
+    // RADIANCE, ISOTROPIC, ENDS, NODES, COARSE.
     flags: u32,
 }
 
@@ -105,6 +107,8 @@ const ISOTROPIC: u32 = 2u;
 const ENDS: u32 = 4u;
 // Candidates are nodes of a hierarchy.
 const NODES: u32 = 8u;
+// Samples are those of the coarser of two levels.
+const COARSE: u32 = 16u;
 
 // Words of the record of a splat.
 fn record_words(flags: u32) -> u32 {
@@ -133,8 +137,10 @@ const RUN: u32 = 16u;
 // One splat, in the upper half of what a run needs.
 const ONE_SPLAT: u32 = 0x10000u;
 
-// An entry: sheet within its group (7 bits), window after the splat's first (1), isotropic record (1), record (23).
+// An entry: sheet within its group (7 bits), window after the splat's first (1), isotropic record (1), one of the coarser level
+// (1), record (22).
 const ENTRY_SHEET_SHIFT: u32 = 25u;
 const ENTRY_CONTINUED: u32 = 0x1000000u;
 const ENTRY_ISOTROPIC: u32 = 0x800000u;
-const ENTRY_RECORD: u32 = 0x7fffffu;
+const ENTRY_COARSE: u32 = 0x400000u;
+const ENTRY_RECORD: u32 = 0x3fffffu;

@@ -58,7 +58,15 @@ struct Round {
 fn load_isotropic(entry: u32, is_one: bool, near: vec3<f32>) -> Round {
     let record = records[entry & ENTRY_RECORD];
     let c = record.xyz;
-    let inverse_sigma = frame.isotropic.y;
+    var sigma = frame.isotropic.x;
+    var inverse_sigma = frame.isotropic.y;
+    var share = 1.0;
+    if TWO_LEVELS {
+        let coarse = (entry & ENTRY_COARSE) != 0u;
+        sigma *= select(1.0, 2.0, coarse);
+        inverse_sigma *= select(1.0, 0.5, coarse);
+        share = select(frame.levels.x, frame.levels.y, coarse);
+    }
     let per_pixel = inverse_sigma / frame.scale;
     var sample: Round;
     var distance = c.z;
@@ -73,8 +81,8 @@ fn load_isotropic(entry: u32, is_one: bool, near: vec3<f32>) -> Round {
     }
     let base = select(0.0, 1.0, (entry & ENTRY_CONTINUED) != 0u);
     let t = clamp((near - distance) * inverse_sigma, -FAR, FAR);
-    sample.along = sections(t, base) * (SQRT_TAU * frame.isotropic.x);
-    sample.on_plane = exp(-0.5 * t * t);
+    sample.along = sections(t, base) * (SQRT_TAU * sigma * share);
+    sample.on_plane = exp(-0.5 * t * t) * share;
     sample.value = record.w;
     sample.extent2 = select(-1.0, frame.isotropic.z, is_one);
     return sample;
@@ -182,8 +190,10 @@ fn load(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
     if RADIANCE_PAYLOAD && any(splat.normal != vec3(0.0)) {
         splat.facing = facing_weight(splat.normal, a.xyz);
     }
-    if SCALAR && SLOPES {
+    if SCALAR && WEIGHTS {
         splat.weight = d.w;
+    }
+    if SCALAR && SLOPES {
         splat.slope = d.xyz;
     }
     return splat;

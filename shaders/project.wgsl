@@ -86,6 +86,9 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
         }
         var box = box_of(locate(splat.center, splat.covariance, splat.extent));
         box.first_tile |= select(0u, BOX_ISOTROPIC, words == 1u);
+        if TWO_LEVELS {
+            box.first_tile |= select(0u, BOX_COARSE, (source.flags & COARSE) != 0u);
+        }
         boxes[at] = box;
         for (var word = 1u; word < words; word++) {
             boxes[at + word].sheets = NO_BOX;

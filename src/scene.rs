@@ -5,7 +5,10 @@ use crate::{
     hierarchy::{Detail, Hierarchy},
     math::{Bounds, Kernel, Profile, Sheets, View},
     splat::{FOOTPRINT_BLUR, Payload, STEP_BACK, SplatSet},
-    volume::{Arrangement, Lattice, Shade, TransferFunction, Volume},
+    volume::{
+        Arrangement, Lattice, Shade, TransferFunction, Volume,
+        bricks::{self, Bricks, Choice},
+    },
 };
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
@@ -21,6 +24,9 @@ pub enum Item {
     Scalar(Arc<SplatSet>, TransferFunction),
     /// Samples on a lattice, each the centre of one kernel, shown by a transfer function.
     Volume(Arc<Volume>, Kernel, TransferFunction),
+    /// A volume beyond memory, of which a picture shows the bricks that it needs ([`Settings::detail`],
+    /// [`Settings::page_memory`]).
+    Bricks(Arc<Bricks>, Kernel, TransferFunction),
 }
 
 /// The items of a picture. All are drawn together by the same sheets.
@@ -62,6 +68,13 @@ impl Scene {
         self
     }
 
+    /// Adds a volume in bricks.
+    #[must_use]
+    pub fn with_bricks(mut self, bricks: impl Into<Arc<Bricks>>, kernel: Kernel, transfer: TransferFunction) -> Self {
+        self.items.push(Item::Bricks(bricks.into(), kernel, transfer));
+        self
+    }
+
     /// The box around everything that can be seen, footprints included.
     pub fn bounds(&self) -> Bounds {
         self.items.iter().fold(Bounds::EMPTY, |all, item| all.union(item.bounds()))
@@ -73,7 +86,7 @@ impl Scene {
         const OPTICAL_DEPTH: f64 = 7.0;
         self.items.iter().any(|item| match item {
             Item::Radiance(_) | Item::Hierarchy(_) => true,
-            Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) => {
+            Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => {
                 let Bounds { min, max } = item.bounds();
                 !transfer.isosurfaces.is_empty() || transfer.most_extinction() * (max - min).length() > OPTICAL_DEPTH
             }
@@ -131,6 +144,16 @@ impl Scene {
                         }
                     }
                 }
+                Item::Bricks(_, kernel, _) => {
+                    if !matches!(kernel.profile, Profile::Gaussian(_)) {
+                        return wrong("a volume in bricks takes a Gaussian kernel".into());
+                    }
+                    if before {
+                        return wrong(
+                            "a volume in bricks is classified after interpolation, in image-aligned sheets".into(),
+                        );
+                    }
+                }
                 Item::Scalar(..) => {}
             }
             if let Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) = item
@@ -161,7 +184,7 @@ impl Scene {
                 Item::Radiance(set) => (set, Payload::Radiance),
                 Item::Scalar(set, _) => (set, Payload::Scalar),
                 Item::Hierarchy(_) => continue,
-                Item::Volume(..) => {
+                Item::Volume(..) | Item::Bricks(..) => {
                     fields += 1;
                     continue;
                 }
@@ -190,14 +213,20 @@ impl Scene {
             Item::Radiance(set) => f64::from(set.extent) + STEP_BACK,
             Item::Scalar(set, _) => f64::from(set.extent),
             Item::Hierarchy(hierarchy) => f64::from(hierarchy.header().extent) + STEP_BACK,
-            Item::Volume(..) => 0.0,
+            Item::Volume(..) | Item::Bricks(..) => 0.0,
         });
         reaches.fold(0.0, f64::max)
     }
 
     /// The sheets of a picture of this scene: 4/3 of a sample's spacing for volumes (a kernel of extent 2 meets at most four),
-    /// half of that where they are sharp, a few pixels for surfaces, the finer of both where the scene holds both.
+    /// half of that where they are sharp, a few pixels for surfaces, the finer of both where the scene holds both. Of a volume
+    /// in bricks the spacing is that of the levels drawn, between two of them in between.
     pub fn sheets(&self, view: &View, settings: &Settings) -> Sheets {
+        self.sheets_of(view, settings, self.choice(view, settings, settings.detail).as_ref())
+    }
+
+    /// The sheets where it is known which bricks are drawn.
+    pub(crate) fn sheets_of(&self, view: &View, settings: &Settings, choice: Option<&Choice>) -> Sheets {
         let bounds = self.bounds();
         if settings.mode == Mode::AxisSheets {
             return self.axis_sheets(view, settings, &bounds);
@@ -222,11 +251,40 @@ impl Scene {
                     let step = most.min(2.0 / 3.0 * kernel.extent) * volume.lattice.kernel_spacing();
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
                 }
-                Item::Volume(..) => {}
+                Item::Bricks(bricks, kernel, _) if settings.sheet_thickness.is_none() => {
+                    // It follows λ without steps, as the shares of the levels do.
+                    let level = choice.map_or(0.0, |choice| choice.lambda);
+                    let spacing = level.exp2() * bricks.header().lattice.kernel_spacing();
+                    let step = (4.0f64 / 3.0).min(2.0 / 3.0 * kernel.extent) * spacing;
+                    thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
+                }
+                Item::Volume(..) | Item::Bricks(..) => {}
                 Item::Radiance(_) | Item::Hierarchy(_) | Item::Scalar(..) => pixels = Some(settings.sheet_pixels),
             }
         }
         Sheets::new(view, [near, far], thickness, pixels)
+    }
+}
+
+/// Volumes in bricks.
+impl Scene {
+    /// Which bricks of the scene's volume a view shows, within the settings' memory; none without such a volume. A detail
+    /// that counts splats bounds the bricks by as many samples.
+    pub(crate) fn choice(&self, view: &View, settings: &Settings, detail: Detail) -> Option<Choice> {
+        let own = |item: &Item| match item {
+            Item::Bricks(bricks, kernel, transfer) => {
+                let room = settings.page_memory / bricks::slot_bytes(bricks);
+                let (pixels, most) = match detail {
+                    Detail::Pixels(pixels) => (pixels, room),
+                    Detail::Splats(splats) => (1.0, room.min(splats / bricks::SIDE.pow(3) as u64)),
+                    Detail::Milliseconds(_) => (1.0, room),
+                };
+                let most = usize::try_from(most).unwrap_or(usize::MAX).max(1);
+                Some(bricks::choice(bricks, view, kernel.extent, pixels, transfer, most))
+            }
+            _ => None,
+        };
+        self.items.iter().find_map(own)
     }
 }
 
@@ -267,6 +325,7 @@ impl Scene {
     fn lattice(&self) -> Option<&Lattice> {
         self.items.iter().find_map(|item| match item {
             Item::Volume(volume, ..) => Some(&volume.lattice),
+            Item::Bricks(bricks, ..) => Some(&bricks.header().lattice),
             _ => None,
         })
     }
@@ -289,17 +348,19 @@ impl Item {
         match self {
             Self::Radiance(set) | Self::Scalar(set, _) => set.bounds(),
             Self::Hierarchy(hierarchy) => hierarchy.bounds(),
-            Self::Volume(volume, kernel, _) => {
-                let axes = volume.lattice.axes;
-                let unit = volume.lattice.largest_unit();
-                let axes = axes * DMat3::from_diagonal(unit);
-                let reach =
-                    kernel.extent * DVec3::new(axes.row(0).length(), axes.row(1).length(), axes.row(2).length());
-                let [low, high] = volume.bounds();
-                Bounds { min: low - reach, max: high + reach }
-            }
+            Self::Volume(volume, kernel, _) => reached(&volume.lattice, kernel),
+            // What coarser levels reach beyond it lies outside of the field's box.
+            Self::Bricks(bricks, kernel, _) => reached(&bricks.header().lattice, kernel),
         }
     }
+}
+
+/// The box of what the kernels of a lattice reach.
+fn reached(lattice: &Lattice, kernel: &Kernel) -> Bounds {
+    let axes = lattice.axes * DMat3::from_diagonal(lattice.largest_unit());
+    let reach = kernel.extent * DVec3::new(axes.row(0).length(), axes.row(1).length(), axes.row(2).length());
+    let [low, high] = lattice.bounds();
+    Bounds { min: low - reach, max: high + reach }
 }
 
 /// What is composited.
@@ -400,12 +461,12 @@ pub struct Settings {
     /// Whether what lies behind opaque parts is left out. The picture is the same but for what less than
     /// 0.0005 of the light shows; off, a frame's cost can be compared.
     pub occlusion: bool,
-    /// How fine hierarchies are drawn.
+    /// How fine hierarchies and volumes in bricks are drawn: in pixels, of the latter, how large a step between samples may be.
     pub detail: Detail,
     /// Whether nodes of hierarchies that face away from the eye are left out: a saving where the front hides them, a loss
     /// where it does not. `None`: where the source was closed.
     pub cull_backfaces: Option<bool>,
-    /// GPU memory that each hierarchy's pages may take, in bytes.
+    /// GPU memory that each hierarchy's pages, or a volume's bricks, may take, in bytes.
     pub page_memory: u64,
     /// Perspective views show nothing nearer than this (world units); a thousandth of the scene where `None`.
     pub near: Option<f64>,

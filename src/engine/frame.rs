@@ -23,9 +23,9 @@ use super::{
 };
 use crate::{
     Error, Result,
-    math::{Profile, Sheets, View},
+    math::{Kernel, Profile, Sheets, View},
     scene::{Gradient, Item, Optics, Settings},
-    volume::Arrangement,
+    volume::{Arrangement, Lattice, bricks::Choice},
 };
 use wgpu::{BufferUsages as Usage, util::DeviceExt};
 
@@ -51,8 +51,8 @@ impl Default for Budget {
 }
 
 impl Budget {
-    /// Records are numbered with 23 bits in an entry.
-    const MOST_WORDS: u32 = 1 << 23;
+    /// Records are numbered with 22 bits in an entry.
+    const MOST_WORDS: u32 = 1 << 22;
 
     /// The budget within what a binding of this device holds.
     fn within(self, gpu: &Gpu) -> Self {
@@ -73,7 +73,14 @@ pub const MOST_GROUP_SHIFT: u32 = 7;
 const SPAN_TILES: u32 = 1 << 10;
 
 /// Which light and which sources a picture has decides what is compiled.
-pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Settings, budget: Budget) -> Variant {
+pub fn variant(
+    gpu: &Gpu,
+    prepared: &PreparedScene,
+    view: &View,
+    settings: &Settings,
+    budget: Budget,
+    choice: Option<&Choice>,
+) -> Variant {
     let mut variant = Variant {
         perspective: view.perspective,
         mode: settings.mode,
@@ -84,6 +91,7 @@ pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Sett
         lattice: false,
         body_centred: false,
         rectilinear: false,
+        two_levels: false,
         radiance: false,
         isotropic: false,
         table_kernel: false,
@@ -111,7 +119,7 @@ pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Sett
                 variant.surface_shaded |= is_lit && settings.surface_shade.is_some();
                 continue;
             }
-            Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) => transfer,
+            Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => transfer,
         };
         let shaded = is_lit && settings.shade_of(transfer).is_some();
         if classified {
@@ -128,12 +136,14 @@ pub fn variant(gpu: &Gpu, prepared: &PreparedScene, view: &View, settings: &Sett
             variant.body_centred = volume.lattice.arrangement == Arrangement::BodyCentred;
             variant.rectilinear = matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_));
             variant.table_kernel = !matches!(kernel.profile, Profile::Gaussian(_));
-            let spacing = volume.lattice.spacing().max_element();
-            let near = view.distances(&item.bounds())[0];
-            // The sections of a kernel shift by ρ²σ²/2|c| between its centre and radius ρσ.
-            let flat = !view.perspective || near > ISOTROPIC_DISTANCE * kernel.extent * spacing;
-            let alike = !variant.rectilinear && !variant.table_kernel && is_isotropic(volume.lattice.axes);
-            variant.isotropic = flat && alike && !classified;
+            let alike = !variant.rectilinear && !variant.table_kernel && !classified;
+            variant.isotropic = alike && are_flat(&volume.lattice, kernel, view, item);
+        }
+        if let (Item::Bricks(bricks, kernel, _), Some(choice)) = (item, choice) {
+            variant.lattice = true;
+            variant.two_levels = choice.levels.len() > 1;
+            let flat = |&(level, _): &(usize, f64)| are_flat(&bricks.lattice(level), kernel, view, item);
+            variant.isotropic = choice.levels.iter().all(flat);
         }
     }
     // Where a pass ends, march meets splats again and closes sheets twice: of a field that costs more than of a surface.
@@ -149,6 +159,14 @@ const SOFTWARE_ENTRIES: u32 = 10_000;
 /// Beyond this many footprint radii the sections of an isotropic kernel count as the same for all pixels. The error is at
 /// most a hundredth of the radius, at the footprint's rim; tests/engine_equals_reference.rs bounds the picture's.
 const ISOTROPIC_DISTANCE: f64 = 50.0;
+
+/// Whether the kernels of a lattice are round, and so far away that their sections are the same for all pixels.
+fn are_flat(lattice: &Lattice, kernel: &Kernel, view: &View, item: &Item) -> bool {
+    let near = view.distances(&item.bounds())[0];
+    // The sections of a kernel shift by ρ²σ²/2|c| between its centre and radius ρσ.
+    let reach = kernel.extent * lattice.spacing().max_element();
+    (!view.perspective || near > ISOTROPIC_DISTANCE * reach) && is_isotropic(lattice.axes)
+}
 
 /// Steps of equal length at right angles.
 fn is_isotropic(axes: glam::DMat3) -> bool {
@@ -267,6 +285,7 @@ pub fn targets(
     sheets: &Sheets,
     settings: &Settings,
     budget: Budget,
+    choice: Option<&Choice>,
 ) -> Result<Targets> {
     let [width, height] = view.size;
     let pixels = u64::from(width) * u64::from(height);
@@ -296,7 +315,7 @@ pub fn targets(
     let bin_count = (groups(0) * u64::from(tile_count)).min(u64::from(MOST_BINS)) + 1;
     let most_tiles = tiles[0].max(tiles[1]);
 
-    let mut frame = Frame::new(&prepared.scene, view, sheets, settings);
+    let mut frame = Frame::new(&prepared.scene, view, sheets, settings, choice);
     frame.tiles = tiles;
     frame.tile_shift = most_tiles.div_ceil(SPAN_TILES).next_power_of_two().trailing_zeros();
     frame.entry_capacity = budget.entries;
@@ -355,6 +374,7 @@ fn tables_of(prepared: &PreparedScene, frame: &mut Frame) -> Vec<[f32; 4]> {
         Item::Radiance(_) | Item::Hierarchy(_) => None,
         Item::Scalar(set, transfer) => Some((transfer, set.value_range(), None)),
         Item::Volume(volume, kernel, transfer) => Some((transfer, volume.range, Some(kernel))),
+        Item::Bricks(bricks, kernel, transfer) => Some((transfer, bricks.header().range, Some(kernel))),
     });
     let Some((transfer, range, kernel)) = field else { return vec![[0.0; 4]; 2] };
     let tables = Tables::new(transfer, range, kernel);

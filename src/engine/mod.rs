@@ -5,6 +5,7 @@
 //! | pass | does |
 //! |---|---|
 //! | `select` | which samples of a volume the transfer function can show (only when it changes) |
+//! | `select_bricks` | the same for a volume in bricks (only when other bricks are drawn, too) |
 //! | `cut` | which nodes of a hierarchy stand for it in this view |
 //! | `measure` | what each splat meets of the picture, and how much room it will need |
 //! | `plan` | cuts the frame into depth passes that fit the buffers |
@@ -21,6 +22,7 @@
 //! docs/engine.md tells the mathematics.
 
 mod bin;
+mod bricks;
 mod clear;
 mod cull;
 mod cut;

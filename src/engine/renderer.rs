@@ -2,6 +2,7 @@
 
 use super::{
     Budget, Gpu, PreparedScene,
+    bricks::SelectBricks,
     clear::Clear,
     cut::{Cut, finest_within, tally_bytes},
     frame::{self, Pipelines, Pool, Step, Targets, Work},
@@ -31,6 +32,7 @@ pub struct Renderer {
     gpu: Gpu,
     budget: Budget,
     select: Select,
+    select_bricks: SelectBricks,
     cut: Cut,
     pace: Pace,
     scan: Scan,
@@ -63,6 +65,13 @@ pub struct FrameStats {
     pub cut_pixels: f64,
     /// Pages of hierarchies that the view needed and that had no room; the nodes above them were drawn.
     pub missing_pages: u64,
+    /// Volumes in bricks: how coarse the picture is, a real number of levels.
+    pub lambda: f64,
+    /// Bricks that the view needed, and those of them that were read for it.
+    pub bricks: u64,
+    pub read_bricks: u64,
+    /// GPU memory of the slots that bricks lie in.
+    pub brick_bytes: u64,
     /// Milliseconds of each step, in order; only from [`Renderer::profile`].
     pub steps: Vec<(&'static str, f64)>,
 }
@@ -78,6 +87,7 @@ impl Renderer {
             gpu: gpu.clone(),
             budget,
             select: Select::new(gpu),
+            select_bricks: SelectBricks::new(gpu),
             cut: Cut::new(gpu),
             pace: Pace::default(),
             scan: Scan::new(gpu),
@@ -195,12 +205,20 @@ impl Renderer {
         let cut_pixels = self.cut_hierarchies(prepared, view, settings, detail)?;
         let gpu = &self.gpu;
         prepared.update_selections(gpu, &self.select, &self.scan, view)?;
-        let variant = frame::variant(gpu, prepared, view, settings, self.budget);
-        let sheets = prepared.scene.sheets(view, settings);
-        let targets = frame::targets(gpu, &mut self.pool, prepared, &variant, view, &sheets, settings, self.budget)?;
+        let choice = prepared.scene.choice(view, settings, detail);
+        let choice = choice.as_ref();
+        let reads = prepared.shelf.as_ref().map_or(0, |shelf| shelf.reads);
+        if let Some(choice) = choice {
+            let (select, room) = (&self.select_bricks, settings.page_memory);
+            prepared.update_bricks(gpu, select, &self.scan, view, choice, room)?;
+        }
+        let variant = frame::variant(gpu, prepared, view, settings, self.budget, choice);
+        let sheets = prepared.scene.sheets_of(view, settings, choice);
+        let pool = &mut self.pool;
+        let targets = frame::targets(gpu, pool, prepared, &variant, view, &sheets, settings, self.budget, choice)?;
         let pipelines = self.pipelines.entry(variant).or_insert_with(|| Pipelines::new(gpu, &variant));
         for chunk in prepared.chunks.iter().filter(|chunk| !matches!(chunk.origin, Origin::Nodes { .. })) {
-            let lattice = matches!(chunk.origin, Origin::Lattice { .. });
+            let lattice = matches!(chunk.origin, Origin::Lattice { .. } | Origin::Bricks { .. });
             let source = chunk.source(view, variant.isotropic && lattice, &prepared.forests);
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
         }
@@ -255,6 +273,10 @@ impl Renderer {
             gpu_bytes: prepared.bytes + targets.bytes(),
             cut_pixels,
             missing_pages: prepared.forests.iter().map(|forest| forest.missing as u64).sum(),
+            lambda: choice.map_or(0.0, |choice| choice.lambda),
+            bricks: choice.map_or(0, |choice| choice.bricks.len() as u64),
+            read_bricks: prepared.shelf.as_ref().map_or(0, |shelf| shelf.reads - reads),
+            brick_bytes: prepared.shelf.as_ref().map_or(0, |shelf| shelf.bytes()),
             steps: times,
         };
         Ok((targets, stats))
@@ -345,6 +367,10 @@ impl FrameStats {
         self.gpu_bytes = self.gpu_bytes.max(other.gpu_bytes);
         self.cut_pixels = self.cut_pixels.max(other.cut_pixels);
         self.missing_pages = self.missing_pages.max(other.missing_pages);
+        self.lambda = self.lambda.max(other.lambda);
+        self.bricks = self.bricks.max(other.bricks);
+        self.read_bricks += other.read_bricks;
+        self.brick_bytes = self.brick_bytes.max(other.brick_bytes);
         for (name, time) in other.steps {
             match self.steps.iter_mut().find(|step| step.0 == name) {
                 Some(step) => step.1 += time,

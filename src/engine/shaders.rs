@@ -11,10 +11,12 @@ pub const SPLATS: &str = include_str!("../../shaders/splats.wgsl");
 pub const SOURCE_NODES: &str = include_str!("../../shaders/source_nodes.wgsl");
 pub const SOURCE_SPLATS: &str = include_str!("../../shaders/source_splats.wgsl");
 pub const SOURCE_LATTICE: &str = include_str!("../../shaders/source_lattice.wgsl");
+pub const SOURCE_BRICKS: &str = include_str!("../../shaders/source_bricks.wgsl");
 pub const SPANS: &str = include_str!("../../shaders/spans.wgsl");
 pub const CENSUS: &str = include_str!("../../shaders/census.wgsl");
 pub const BINS: &str = include_str!("../../shaders/bins.wgsl");
 pub const SELECT: &str = include_str!("../../shaders/select.wgsl");
+pub const SELECT_BRICKS: &str = include_str!("../../shaders/select_bricks.wgsl");
 pub const NODES: &str = include_str!("../../shaders/nodes.wgsl");
 pub const CUT: &str = include_str!("../../shaders/cut.wgsl");
 pub const TALLY: &str = include_str!("../../shaders/tally.wgsl");
@@ -56,6 +58,8 @@ pub struct Variant {
     pub lattice: bool,
     pub body_centred: bool,
     pub rectilinear: bool,
+    /// Two levels of a volume in bricks are drawn together, each with its share.
+    pub two_levels: bool,
     pub radiance: bool,
     /// Lattice samples are drawn with sections that do not depend on the pixel.
     pub isotropic: bool,
@@ -113,6 +117,8 @@ impl Variant {
             ("RECTILINEAR", self.rectilinear),
             ("SAMPLES", samples),
             ("SLOPES", self.scalar && (samples || self.rectilinear)),
+            ("TWO_LEVELS", self.two_levels),
+            ("WEIGHTS", self.scalar && (samples || self.rectilinear || self.two_levels)),
             ("SAMPLE_NORMALS", self.classified && self.surface_shaded),
             ("RADIANCE_PAYLOAD", radiance),
             ("ISOTROPIC_RECORDS", self.isotropic),

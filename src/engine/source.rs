@@ -1,5 +1,6 @@
-//! Passes that read candidates come in three kinds, one per source of candidates: explicit splats
-//! (shaders/source_splats.wgsl), hierarchies (shaders/source_nodes.wgsl) and lattices (shaders/source_lattice.wgsl).
+//! Passes that read candidates come in four kinds, one per source of candidates: explicit splats
+//! (shaders/source_splats.wgsl), hierarchies (shaders/source_nodes.wgsl), lattices (shaders/source_lattice.wgsl) and volumes in
+//! bricks (shaders/source_bricks.wgsl).
 
 use super::{
     Gpu, shaders,
@@ -13,16 +14,19 @@ pub struct Sources<T> {
     splats: T,
     nodes: T,
     lattice: T,
+    bricks: T,
 }
 
 /// Makes all kinds of a stage from the source's shader and the bindings of its group.
 pub fn per_source(make: impl Fn(&str, &[Binding]) -> Stage) -> Sources<Stage> {
     use Binding::{Read, Uniform};
     let lattice = [shaders::SAMPLE, shaders::SOURCE_LATTICE].concat();
+    let bricks = [shaders::SAMPLE, shaders::SOURCE_BRICKS].concat();
     Sources {
         splats: make(&[shaders::SPLATS, shaders::SOURCE_SPLATS].concat(), &[Uniform, Read]),
         nodes: make(&[shaders::SPLATS, shaders::SOURCE_NODES].concat(), &[Uniform, Read, Read]),
         lattice: make(&lattice, &[Uniform, Read, Read, Uniform]),
+        bricks: make(&bricks, &[Uniform, Read, Read, Uniform]),
     }
 }
 
@@ -65,6 +69,9 @@ impl Sources<Stage> {
             Origin::Nodes { slots, .. } => (&self.nodes, vec![&chunk.uniform, &chunk.data, &slots.selected]),
             Origin::Lattice { selection, places, .. } => {
                 (&self.lattice, vec![&chunk.uniform, &chunk.data, &selection.selected, places])
+            }
+            Origin::Bricks { slab, .. } => {
+                (&self.bricks, vec![&chunk.uniform, &chunk.data, &slab.selected, &slab.slots])
             }
         };
         let own: Vec<_> = own.into_iter().map(wgpu::Buffer::as_entire_buffer_binding).collect();

@@ -4,7 +4,7 @@ use crate::{
     math::{Bounds, Kernel, Profile, Sheets, View},
     scene::{Clip, ClipShape, Item, Mode, Scene, Settings},
     splat::SplatSet,
-    volume::{Arrangement, Isosurface, Lattice, Shade, TransferFunction},
+    volume::{Arrangement, Isosurface, Lattice, Shade, TransferFunction, bricks::Choice},
 };
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec2, DVec3};
@@ -35,13 +35,14 @@ pub struct Frame {
     pub isotropic: [f32; 4],
     pub transfer: [f32; 4],
     pub kernel: [f32; 4],
+    pub levels: [f32; 4],
     pub sheet_normal: [f32; 4],
     pub world: [[f32; 4]; 3],
     pub clips: [[[f32; 4]; 2]; Settings::MAX_CLIPS],
     pub holes: [[[f32; 4]; 2]; Settings::MAX_CLIPS],
     pub isosurfaces: [[[f32; 4]; 2]; TransferFunction::MAX_ISOSURFACES],
 }
-const _: () = assert!(size_of::<Frame>() == 64 + (15 + 3 * 16) * 16);
+const _: () = assert!(size_of::<Frame>() == 64 + (16 + 3 * 16) * 16);
 
 /// `Source` in frame.wgsl.
 #[repr(C)]
@@ -99,6 +100,7 @@ pub const RADIANCE: u32 = 1;
 pub const ISOTROPIC: u32 = 2;
 pub const ENDS: u32 = 4;
 pub const NODES: u32 = 8;
+pub const COARSE: u32 = 16;
 
 fn wide(v: DVec3, w: f32) -> [f32; 4] {
     [v.x as f32, v.y as f32, v.z as f32, w]
@@ -162,7 +164,7 @@ fn smallest_cosine(view: &View) -> f64 {
 
 impl Frame {
     /// Everything but the tiles, the capacities and the transfer table.
-    pub fn new(scene: &Scene, view: &View, sheets: &Sheets, settings: &Settings) -> Self {
+    pub fn new(scene: &Scene, view: &View, sheets: &Sheets, settings: &Settings, choice: Option<&Choice>) -> Self {
         let mut frame = Self {
             size: view.size,
             center: [view.center.x as f32, view.center.y as f32],
@@ -174,6 +176,7 @@ impl Frame {
             step_inverse: (1.0 / sheets.step) as f32,
             z_near: (sheets.planes[0] * smallest_cosine(view)) as f32,
             surface_shade: shade(settings.surface_shade),
+            levels: [1.0, 1.0, 0.0, 0.0],
             ..Self::default()
         };
         if settings.mode == Mode::AxisSheets {
@@ -190,6 +193,16 @@ impl Frame {
                 Item::Volume(volume, kernel, transfer) => {
                     frame.set_field(view, &volume.lattice);
                     frame.set_kernel(&volume.lattice, kernel);
+                    transfer
+                }
+                Item::Bricks(bricks, kernel, transfer) => {
+                    let levels = choice.map_or(&[][..], |choice| &choice.levels);
+                    // The field fills the same box whatever is drawn.
+                    frame.set_field(view, &bricks.header().lattice);
+                    frame.set_kernel(&bricks.lattice(levels.first().map_or(0, |(level, _)| *level)), kernel);
+                    for (own, &(_, weight)) in frame.levels.iter_mut().zip(levels) {
+                        *own = weight as f32;
+                    }
                     transfer
                 }
             };

@@ -2,10 +2,11 @@
 
 use super::{
     Gpu,
+    bricks::{SelectBricks, Shelf, Slab},
     nodes::{Forest, Growth, Slots},
     scan::Scan,
     select::{Select, Selection},
-    uniforms::{NODES, Source},
+    uniforms::{COARSE, NODES, Source},
 };
 use crate::{
     Error, Result,
@@ -13,7 +14,10 @@ use crate::{
     math::{Kernel, View},
     scene::{Item, Scene},
     splat::{Splat, SplatSet},
-    volume::{Arrangement, Lattice, Samples, TransferFunction, Volume},
+    volume::{
+        Arrangement, Lattice, Samples, Scalar, TransferFunction, Volume,
+        bricks::{Bricks, Choice},
+    },
 };
 use glam::{UVec3, Vec3};
 use rayon::prelude::*;
@@ -55,6 +59,13 @@ pub enum Origin {
         /// Coordinates along the axes (`places` in source_lattice.wgsl).
         places: wgpu::Buffer,
     },
+    /// Those bricks of one level that lie in some slots.
+    Bricks {
+        bricks: Arc<Bricks>,
+        kernel: Kernel,
+        slab: Box<Slab>,
+        level: usize,
+    },
 }
 
 /// A part of an item that fits a binding.
@@ -82,6 +93,8 @@ pub struct PreparedScene {
     pub(super) chunks: Vec<Chunk>,
     /// The hierarchies, in the scene's order.
     pub(super) forests: Vec<Forest>,
+    /// The bricks at hand of the scene's volume in bricks.
+    pub(super) shelf: Option<Shelf>,
     /// Runs of candidates in all chunks.
     pub(super) runs: u32,
     /// Bytes of GPU memory that the scene holds.
@@ -92,13 +105,15 @@ impl PreparedScene {
     /// Uploads a scene. The scene's splats and samples are shared with the caller's, not copied.
     pub(super) fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
         scene.validate()?;
-        let mut prepared = Self { scene: scene.clone(), chunks: Vec::new(), forests: Vec::new(), runs: 0, bytes: 0 };
+        let mut prepared =
+            Self { scene: scene.clone(), chunks: Vec::new(), forests: Vec::new(), shelf: None, runs: 0, bytes: 0 };
         for item in &scene.items {
             match item {
                 Item::Radiance(set) => prepared.add_splats(gpu, set, true),
                 Item::Hierarchy(hierarchy) => prepared.forests.push(Forest::new(gpu, hierarchy)),
                 Item::Scalar(set, _) => prepared.add_splats(gpu, set, false),
                 Item::Volume(volume, kernel, _) => prepared.add_volume(gpu, volume, kernel.clone())?,
+                Item::Bricks(bricks, kernel, _) => prepared.shelf = Some(Shelf::new(bricks, kernel)),
             }
         }
         Ok(prepared)
@@ -107,9 +122,12 @@ impl PreparedScene {
     /// Shows the scene's volume or sample set by another transfer function. Nothing is rebuilt on the CPU.
     pub fn set_transfer(&mut self, transfer: &TransferFunction) {
         for item in &mut self.scene.items {
-            if let Item::Scalar(_, shown) | Item::Volume(_, _, shown) = item {
+            if let Item::Scalar(_, shown) | Item::Volume(_, _, shown) | Item::Bricks(_, _, shown) = item {
                 *shown = transfer.clone();
             }
+        }
+        if let Some(shelf) = &mut self.shelf {
+            shelf.outdated = true;
         }
         for chunk in &mut self.chunks {
             if let Origin::Lattice { selection, .. } = &mut chunk.origin {
@@ -135,6 +153,77 @@ impl PreparedScene {
             chunk.spans = spans(gpu, selection.count);
             self.bytes += selection.bytes() + chunk.spans.size();
         }
+        self.number_runs();
+        Ok(())
+    }
+
+    /// Brings the bricks of a choice to the GPU and lists what they show, within `room` bytes; nothing is done where neither
+    /// the bricks nor the transfer function changed.
+    pub(super) fn update_bricks(
+        &mut self,
+        gpu: &Gpu,
+        select: &SelectBricks,
+        scan: &Scan,
+        view: &View,
+        choice: &Choice,
+        room: u64,
+    ) -> Result<()> {
+        let Some(shelf) = &mut self.shelf else { return Ok(()) };
+        let Some(grown) = shelf.update(gpu, choice, room)? else { return Ok(()) };
+        let (bricks, kernel) = (shelf.bricks.clone(), shelf.kernel.clone());
+        for samples in grown {
+            // One chunk for each of two levels: they share the slots.
+            for part in 0..2 {
+                let slab = Box::new(Slab::new(gpu, &samples, part));
+                self.bytes += slab.bytes();
+                let (bricks, kernel, data) = (bricks.clone(), kernel.clone(), samples.data.clone());
+                let origin = Origin::Bricks { bricks, kernel, slab, level: 0 };
+                self.push_chunk(gpu, origin, data, samples.capacity());
+            }
+            // Counted twice.
+            self.bytes += samples.ranges.size();
+            self.bytes -= samples.data.size();
+        }
+        self.select_bricks(gpu, select, scan, view, choice)
+    }
+
+    /// Lists the samples of all slots in use that can add to the picture.
+    fn select_bricks(
+        &mut self,
+        gpu: &Gpu,
+        select: &SelectBricks,
+        scan: &Scan,
+        view: &View,
+        choice: &Choice,
+    ) -> Result<()> {
+        let is_bricks = |item: &Item| match item {
+            Item::Bricks(_, _, transfer) => Some(transfer.clone()),
+            _ => None,
+        };
+        let (Some(transfer), Some(shelf)) = (self.scene.items.iter().find_map(is_bricks), &mut self.shelf) else {
+            return Ok(());
+        };
+        let (mut own, mut before) = (Vec::new(), 0);
+        for chunk in &mut self.chunks {
+            let Origin::Bricks { slab, level, .. } = &mut chunk.origin else { continue };
+            let drawn = choice.levels.get(slab.part).map(|(level, _)| *level);
+            *level = drawn.unwrap_or(0);
+            shelf.describe(gpu, slab, drawn);
+            let source = chunk.source(view, false, &self.forests);
+            gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
+            let Origin::Bricks { slab, .. } = &mut chunk.origin else { continue };
+            before += slab.selected.size() + chunk.spans.size();
+            own.push((slab.as_mut(), &chunk.uniform));
+        }
+        select.update(gpu, scan, &mut own, shelf, &transfer)?;
+        self.bytes -= before;
+        for chunk in &mut self.chunks {
+            let Origin::Bricks { slab, .. } = &chunk.origin else { continue };
+            chunk.candidates = slab.count;
+            chunk.spans = spans(gpu, slab.count);
+            self.bytes += slab.selected.size() + chunk.spans.size();
+        }
+        shelf.outdated = false;
         self.number_runs();
         Ok(())
     }
@@ -227,8 +316,8 @@ impl PreparedScene {
 
     fn push_chunk(&mut self, gpu: &Gpu, origin: Origin, data: wgpu::Buffer, count: u32) {
         let uniform = super::buffer(gpu, "source", size_of::<Source>() as u64, wgpu::BufferUsages::UNIFORM);
-        // Those of a lattice are not known yet.
-        let candidates = if matches!(origin, Origin::Lattice { .. }) { 0 } else { count };
+        // Those of samples are not known yet.
+        let candidates = if matches!(origin, Origin::Lattice { .. } | Origin::Bricks { .. }) { 0 } else { count };
         let spans = spans(gpu, candidates);
         self.bytes += data.size() + spans.size();
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
@@ -274,6 +363,20 @@ impl Chunk {
                 Source::of_radiance(view, header.origin, header.extent)
             }
             Origin::Splats { set, radiance } => Source::of_splats(view, set, *radiance),
+            Origin::Bricks { bricks, kernel, slab, level } => {
+                let lattice = bricks.lattice(*level);
+                let [width, height, depth] = lattice.dims.map(|n| n as u32);
+                let kind = match bricks.header().scalar {
+                    Scalar::U8 => 0,
+                    Scalar::U16 => 1,
+                    Scalar::I16 => 2,
+                    Scalar::I32 => 3,
+                    Scalar::F32 => 4,
+                };
+                let source = Source::of_lattice(view, &lattice, kernel, isotropic);
+                let flags = source.flags | if slab.part == 1 { COARSE } else { 0 };
+                Source { lattice: [width, height, depth, kind], flags, ..source }
+            }
             Origin::Lattice { volume, kernel, slices: [first, low, high], .. } => {
                 let lattice = volume.drawn_lattice();
                 let [width, height, depth] = lattice.dims.map(|n| n as u32);
@@ -291,6 +394,7 @@ impl Chunk {
                 }
             }
         };
+
         let [first, low, high, _] = source.slices;
         let slices = [first, low, high, self.candidates];
         let flags = source.flags | if matches!(self.origin, Origin::Nodes { .. }) { NODES } else { 0 };

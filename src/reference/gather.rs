@@ -28,7 +28,7 @@ pub(super) fn gather<'a>(scene: &'a Scene, view: &View, before: Option<Before>) 
                 kernels.extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, None, view)))
             }
             // Its cut is a set of its own by now.
-            Item::Hierarchy(_) => {}
+            Item::Hierarchy(_) | Item::Bricks(..) => {}
             Item::Scalar(set, transfer) => {
                 let before = before.map(|before| (before, transfer));
                 kernels.extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, before, view)));

@@ -144,10 +144,22 @@ pub fn render(scene: &Scene, camera: &Camera, settings: &Settings) -> Result<Pic
     scene.validate()?;
     scene.validate_settings(settings)?;
     let view = camera.view(settings.size)?;
+    let scene = &without_bricks(scene)?;
     let flat = with_cuts(scene, &view, settings)?;
     let frame = Frame::new(scene, &flat, view, settings);
     let rows = (0..settings.size[1]).into_par_iter().map(|row| frame.row(row.into())).collect();
     Ok(picture(&frame.view, rows))
+}
+
+/// The scene with volumes in bricks as a whole, at their finest level.
+fn without_bricks(scene: &Scene) -> Result<Scene> {
+    let whole = |item: &Item| match item {
+        Item::Bricks(bricks, kernel, transfer) => {
+            Ok(Item::Volume(bricks.volume(0)?.into(), kernel.clone(), transfer.clone()))
+        }
+        other => Ok(other.clone()),
+    };
+    Ok(Scene { items: scene.items.iter().map(whole).collect::<Result<_>>()? })
 }
 
 /// The scene with the splats of hierarchies' cuts in their place.
@@ -212,7 +224,8 @@ impl<'a> Frame<'a> {
     /// `flat` is the scene with its hierarchies cut.
     fn new(scene: &Scene, flat: &'a Scene, view: View, settings: &Settings) -> Self {
         let samples = flat.items.iter().find_map(|item| match item {
-            Item::Radiance(_) | Item::Hierarchy(_) => None,
+            // Bricks are a volume by now.
+            Item::Radiance(_) | Item::Hierarchy(_) | Item::Bricks(..) => None,
             Item::Scalar(_, transfer) => Some((transfer, None)),
             Item::Volume(volume, _, transfer) => Some((transfer, Some(&volume.lattice))),
         });

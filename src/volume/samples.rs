@@ -71,6 +71,18 @@ impl Samples {
         self.scalar().bytes()
     }
 
+    /// Samples from their bytes, in the order of this machine; a part of one at the end is left out.
+    pub(crate) fn from_bytes(scalar: Scalar, bytes: &[u8]) -> Self {
+        let bytes = &bytes[..bytes.len() / scalar.bytes() * scalar.bytes()];
+        match scalar {
+            Scalar::U8 => Self::U8(bytes.to_vec()),
+            Scalar::U16 => Self::U16(bytemuck::pod_collect_to_vec(bytes)),
+            Scalar::I16 => Self::I16(bytemuck::pod_collect_to_vec(bytes)),
+            Scalar::I32 => Self::I32(bytemuck::pod_collect_to_vec(bytes)),
+            Scalar::F32 => Self::F32(bytemuck::pod_collect_to_vec(bytes)),
+        }
+    }
+
     /// The samples' bytes, in the order of this machine.
     pub fn bytes(&self) -> &[u8] {
         each_type!(self, values => bytemuck::cast_slice(values))

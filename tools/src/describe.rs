@@ -32,6 +32,11 @@ pub fn settings(scene: &Scene, settings: &Settings) -> Value {
             field["sharp"] = json!(volume.coefficients.is_some());
             Some(field)
         }
+        Item::Bricks(_, shape, transfer) => {
+            let mut field = shown(transfer);
+            field["kernel"] = kernel(shape);
+            Some(field)
+        }
         Item::Scalar(_, transfer) => Some(shown(transfer)),
         Item::Radiance(_) | Item::Hierarchy(_) => None,
     });

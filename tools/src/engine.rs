@@ -33,18 +33,20 @@ pub struct EngineFlags {
     /// sharp.
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     sheet_thickness: Option<f64>,
-    /// Hierarchies: the most pixels that a splat may be wide, but for those of the finest level; 0 draws that level
+    /// Hierarchies: the most pixels that a splat may be wide, but for those of the finest level; volumes in bricks: the most
+    /// pixels between samples, but for the finest level. 0 draws that level
     /// [default: 1]
     #[arg(long, value_name = "PIXELS", value_parser = parse::not_negative)]
     cut: Option<f64>,
-    /// Hierarchies: about the most splats of a picture, instead of --cut.
+    /// Hierarchies, volumes in bricks: about the most splats of a picture, instead of --cut.
     #[arg(long, value_name = "SPLATS", conflicts_with = "cut", value_parser = clap::value_parser!(u64).range(1..))]
     budget: Option<u64>,
-    /// Hierarchies: about the milliseconds that a frame may take, instead of --cut; frames after a view that rests are finer
+    /// Hierarchies, volumes in bricks: about the milliseconds that a frame may take, instead of --cut; frames after a view that rests are finer
     /// and finer.
     #[arg(long, value_name = "MS", conflicts_with_all = ["cut", "budget"], value_parser = parse::positive)]
     frame_time: Option<f64>,
-    /// Hierarchies: GPU memory for each one's pages, in bytes or with KiB, MiB or GiB [default: 1GiB]
+    /// Hierarchies: GPU memory for each one's pages; volumes in bricks: for the bricks, of coarser levels where it is too
+    /// little; in bytes or with KiB, MiB or GiB [default: 1GiB]
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     memory: Option<u64>,
     /// Hierarchies: whether splats that face away are left out [default: where the surface is closed]
@@ -108,7 +110,9 @@ impl EngineFlags {
         }
         if self.shade {
             let own = loaded.scene.items.iter().find_map(|item| match item {
-                Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) => transfer.shade,
+                Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => {
+                    transfer.shade
+                }
                 Item::Radiance(_) | Item::Hierarchy(_) => None,
             });
             settings.volume_shade = Some(Some(own.unwrap_or_default()));

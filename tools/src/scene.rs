@@ -10,7 +10,15 @@ use crate::{
 use clap::Args;
 use glam::DVec3;
 use splatkit::{
-    Error, hierarchy::file::UpAxis, math::Bounds, scene::Scene, surface::SurfelOptions, volume::TransferFunction,
+    Error,
+    hierarchy::file::UpAxis,
+    math::Bounds,
+    scene::Scene,
+    surface::SurfelOptions,
+    volume::{
+        TransferFunction,
+        bricks::{Bricks, Level},
+    },
 };
 use std::{
     path::{Path, PathBuf},
@@ -75,9 +83,16 @@ impl SceneFlags {
                     };
                     loaded.scene = loaded.scene.with_hierarchy(hierarchy);
                 }
-                Input::Bricks(_) => {
-                    let error = Error::input(path, "content", "volumes in bricks cannot be drawn yet");
-                    return Err(error.hint("draw the volume that it was made from").into());
+                Input::Bricks(bricks) => {
+                    if show.sharp {
+                        let error = Error::input(path, "content", "a volume in bricks cannot be sharpened");
+                        return Err(error.hint("leave out --sharp, or draw the volume that it was made from").into());
+                    }
+                    let overview = bricks.volume(overview(&bricks))?;
+                    let range = bricks.header().range;
+                    let transfer = show.transfer(path, range, || TransferFunction::automatic(&overview))?;
+                    loaded.add(bricks.bounds(), bricks.level(0).dims.iter().product());
+                    loaded.scene = loaded.scene.with_bricks(bricks, show.kernel.clone(), transfer);
                 }
                 Input::Volume(volume) => {
                     let transfer = show.transfer(path, volume.range, || TransferFunction::automatic(&volume))?;
@@ -118,6 +133,13 @@ impl Loaded {
         self.subject.bounds = self.subject.bounds.union(bounds);
         self.count += count as u64;
     }
+}
+
+/// The finest level of a volume that is quickly looked through as a whole.
+fn overview(bricks: &Bricks) -> usize {
+    const QUICK: usize = 1 << 24;
+    let is_quick = |level: &Level| level.dims.iter().product::<usize>() <= QUICK;
+    bricks.levels().iter().position(is_quick).unwrap_or(bricks.levels().len() - 1)
 }
 
 /// Names the file in errors that do not know it.

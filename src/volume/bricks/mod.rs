@@ -42,6 +42,11 @@ pub const REACH: usize = 3;
 /// The range of no samples: what lies wholly beyond the volume's border. No transfer function shows it.
 pub const EMPTY: [u8; 2] = [255, 0];
 
+/// Bytes that a brick takes when it is drawn: its samples and the ranges of its blocks.
+pub(crate) fn slot_bytes(bricks: &Bricks) -> u64 {
+    (bricks.brick_bytes() + 2 * BRICK_BLOCKS) as u64
+}
+
 /// The smaller range that holds two.
 fn joined([low, high]: [u8; 2], other: [u8; 2]) -> [u8; 2] {
     [low.min(other[0]), high.max(other[1])]

@@ -11,7 +11,7 @@ use crate::{
     Error, Result,
     io::{Limits, Source},
     math::Bounds,
-    volume::{Lattice, Scalar, Volume, steps::Steps},
+    volume::{Lattice, Samples, Scalar, Volume, steps::Steps},
 };
 use rayon::prelude::*;
 use std::{
@@ -206,6 +206,44 @@ impl Bricks {
                 })
             }
         }
+    }
+
+    /// The samples of a whole level, in memory. Its range is that of level 0.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where there is no such level; [`Error::Input`] for damaged bricks.
+    pub fn volume(&self, level: usize) -> Result<Volume> {
+        let missing = || Error::Argument(format!("{}: there is no level {level}", self.path.display()));
+        let size = *self.levels.get(level).ok_or_else(missing)?;
+        let scalar = self.header.scalar;
+        let [nx, ny, _] = size.dims;
+        let [bx, by, _] = size.brick_dims;
+        let row = nx * scalar.bytes();
+        let mut bytes = vec![0; size.slice() * size.dims[2] * scalar.bytes()];
+        // Each layer of bricks is a part of its own.
+        bytes.par_chunks_mut(super::SIDE * ny * row).enumerate().try_for_each(|(layer, slices)| {
+            for number in layer * bx * by..(layer + 1) * bx * by {
+                let brick = self.read(level, number as u32)?;
+                let [x, y, _] = size.place(number as u32).map(|at| at * super::SIDE);
+                let width = super::SIDE.min(nx - x) * scalar.bytes();
+                let rows = brick.samples.chunks(super::SIDE * scalar.bytes()).enumerate();
+                for (at, samples) in rows {
+                    let (j, k) = (y + at % super::SIDE, at / super::SIDE);
+                    let start = (k * ny + j) * row + x * scalar.bytes();
+                    if j < ny
+                        && let Some(place) = slices.get_mut(start..start + width)
+                    {
+                        place.copy_from_slice(&samples[..width]);
+                    }
+                }
+            }
+            Ok::<(), Error>(())
+        })?;
+        let samples = Samples::from_bytes(scalar, &bytes);
+        let mut volume =
+            Volume::new(self.lattice(level), samples).map_err(|message| damaged(&self.path, "samples", message))?;
+        volume.range = self.header.range;
+        Ok(volume)
     }
 
     /// All bytes of a file; none of a volume in memory.

@@ -1,0 +1,291 @@
+//! Volumes in bricks on the GPU: the bricks that a view needs, in slots, within the room that there is.
+//!
+//! Slots lie in chunks. Any slot takes a brick of any level; a picture draws one level or two, and each chunk of slots is drawn
+//! once for either ([`Slab`]). Bricks that are not at hand are read in parallel and take the slots whose bricks no view needed
+//! for longest. Which samples show something is found by blocks (shaders/select_bricks.wgsl), when other bricks are drawn or
+//! under another transfer function.
+
+use super::{
+    Gpu,
+    scan::Scan,
+    shaders,
+    stage::{Binding, Stage},
+    upload::upload,
+};
+use crate::{
+    Result,
+    math::Kernel,
+    volume::{
+        TransferFunction,
+        bricks::{BRICK_BLOCKS, Brick, Bricks, Choice, REACH, SIDE, slot_bytes},
+        reach::first_visible,
+    },
+};
+use rayon::prelude::*;
+use std::{collections::HashMap, sync::Arc};
+use wgpu::BufferUsages as Usage;
+
+/// Samples of a slot.
+const SLOT_SAMPLES: u32 = (SIDE * SIDE * SIDE) as u32;
+/// Slots of a chunk at most (`slots` in source_bricks.wgsl): the spans of all their samples fit a binding of 128 MiB.
+const MOST_SLOTS: usize = 512;
+/// Bricks read before they are sent.
+const BATCH: usize = 64;
+
+/// A brick's level and number.
+type Key = (usize, u32);
+
+/// The content of some slots.
+#[derive(Debug)]
+pub struct Slots {
+    /// The samples of each slot's brick.
+    pub data: wgpu::Buffer,
+    /// The ranges of its blocks.
+    pub ranges: wgpu::Buffer,
+    first: usize,
+    count: usize,
+}
+
+impl Slots {
+    /// Samples that they hold.
+    pub fn capacity(&self) -> u32 {
+        self.count as u32 * SLOT_SAMPLES
+    }
+}
+
+/// Some slots as one of the drawn levels sees them.
+#[derive(Debug)]
+pub struct Slab {
+    ranges: wgpu::Buffer,
+    first: usize,
+    count_slots: usize,
+    /// 0 for the finer level, 1 for the coarser.
+    pub part: usize,
+    /// Where the brick of each slot lies in the level.
+    pub slots: wgpu::Buffer,
+    /// The selected samples, block by block, and their number.
+    pub selected: wgpu::Buffer,
+    pub count: u32,
+}
+
+impl Slab {
+    pub fn new(gpu: &Gpu, slots: &Slots, part: usize) -> Self {
+        Self {
+            ranges: slots.ranges.clone(),
+            first: slots.first,
+            count_slots: slots.count,
+            part,
+            slots: super::buffer(gpu, "brick slots", 16 * MOST_SLOTS as u64, Usage::UNIFORM),
+            selected: super::buffer(gpu, "selected", 4, Usage::STORAGE),
+            count: 0,
+        }
+    }
+
+    /// Bytes of its own buffers.
+    pub fn bytes(&self) -> u64 {
+        self.slots.size() + self.selected.size()
+    }
+
+    fn blocks(&self) -> u32 {
+        (self.count_slots * BRICK_BLOCKS) as u32
+    }
+}
+
+/// The bricks of a volume that are at hand.
+#[derive(Debug)]
+pub struct Shelf {
+    pub bricks: Arc<Bricks>,
+    pub kernel: Kernel,
+    /// Whether the transfer function changed since samples were selected.
+    pub outdated: bool,
+    /// Bricks read so far.
+    pub reads: u64,
+    /// The bricks that are drawn, sorted; none where that is not certain.
+    drawn: Option<Vec<Key>>,
+    /// The brick in each slot, and the last update that needed it.
+    slots: Vec<Option<(Key, u64)>>,
+    slot_of: HashMap<Key, usize>,
+    /// Samples, ranges and first slot of each chunk, and those that the caller has not taken yet.
+    chunks: Vec<(wgpu::Buffer, wgpu::Buffer, usize)>,
+    grown: Vec<Slots>,
+    update: u64,
+}
+
+impl Shelf {
+    pub fn new(bricks: &Arc<Bricks>, kernel: &Kernel) -> Self {
+        Self {
+            bricks: bricks.clone(),
+            kernel: kernel.clone(),
+            outdated: true,
+            reads: 0,
+            drawn: None,
+            slots: Vec::new(),
+            slot_of: HashMap::new(),
+            chunks: Vec::new(),
+            grown: Vec::new(),
+            update: 0,
+        }
+    }
+
+    /// Bytes of GPU memory of all slots.
+    pub fn bytes(&self) -> u64 {
+        self.chunks.iter().map(|(data, ranges, _)| data.size() + ranges.size()).sum()
+    }
+
+    /// Brings the bricks of a choice to the GPU, within `room` bytes. Gives the slots that were added for them, or none at all
+    /// where nothing is to be done: neither the bricks nor the transfer function changed.
+    pub fn update(&mut self, gpu: &Gpu, choice: &Choice, room: u64) -> Result<Option<Vec<Slots>>> {
+        let mut needed = choice.bricks.clone();
+        needed.sort_unstable();
+        if self.drawn.as_ref() == Some(&needed) && !self.outdated {
+            return Ok(None);
+        }
+        self.drawn = None;
+        self.outdated = true;
+        self.update += 1;
+        let mut absent = Vec::new();
+        // The nearest are read first.
+        for &key in &choice.bricks {
+            match self.slot_of.get(&key) {
+                Some(&slot) => self.slots[slot] = Some((key, self.update)),
+                None => absent.push(key),
+            }
+        }
+        let most = usize::try_from(room / slot_bytes(&self.bricks)).unwrap_or(usize::MAX).max(choice.bricks.len());
+        let free = self.slots.iter().filter(|slot| slot.is_none()).count();
+        let mut wanted = absent.len().saturating_sub(free).min(most.saturating_sub(self.slots.len()));
+        while wanted > 0 {
+            wanted = wanted.saturating_sub(self.grow(gpu, wanted, most));
+        }
+        self.load(gpu, &absent)?;
+        self.drawn = Some(needed);
+        Ok(Some(std::mem::take(&mut self.grown)))
+    }
+
+    /// Adds slots for about `wanted` more bricks, so that there are no more than `most`; tells how many.
+    fn grow(&mut self, gpu: &Gpu, wanted: usize, most: usize) -> usize {
+        let bytes = self.bricks.brick_bytes();
+        let fit = usize::try_from(gpu.binding_size() / (8 * u64::from(SLOT_SAMPLES))).unwrap_or(usize::MAX);
+        // A view's neighbours need some more; a small volume has no more.
+        let all: usize = self.bricks.levels().iter().map(|level| level.bricks()).sum();
+        let room = most.min(all).saturating_sub(self.slots.len()).max(1);
+        let count = (wanted + wanted / 4 + 1).min(room).min(MOST_SLOTS).min(fit.max(1));
+        let first = self.slots.len();
+        self.slots.extend(std::iter::repeat_n(None, count));
+        let data = super::buffer(gpu, "bricks", (count * bytes) as u64, Usage::STORAGE);
+        let ranges = super::buffer(gpu, "brick ranges", (count * 2 * BRICK_BLOCKS) as u64, Usage::STORAGE);
+        self.chunks.push((data.clone(), ranges.clone(), first));
+        self.grown.push(Slots { data, ranges, first, count });
+        count
+    }
+
+    /// Reads bricks and puts them in slots that are free, or whose bricks were not needed for longest.
+    fn load(&mut self, gpu: &Gpu, absent: &[Key]) -> Result<()> {
+        let last_needed = |slot: &usize| self.slots[*slot].map_or(0, |(_, update)| update);
+        let mut places: Vec<usize> = (0..self.slots.len()).filter(|slot| last_needed(slot) < self.update).collect();
+        places.sort_by_key(last_needed);
+        let mut places = places.into_iter();
+        let bytes = self.bricks.brick_bytes();
+        for batch in absent.chunks(BATCH) {
+            let read: Vec<Brick> =
+                batch.par_iter().map(|&(level, brick)| self.bricks.read(level, brick)).collect::<Result<_>>()?;
+            for ((&key, brick), slot) in batch.iter().zip(&read).zip(&mut places) {
+                if let Some((old, _)) = self.slots[slot].replace((key, self.update)) {
+                    self.slot_of.remove(&old);
+                }
+                self.slot_of.insert(key, slot);
+                self.reads += 1;
+                let chunk = self.chunks.partition_point(|(_, _, first)| *first <= slot) - 1;
+                let (data, ranges, first) = &self.chunks[chunk];
+                let at = slot - first;
+                gpu.queue.write_buffer(data, (at * bytes) as u64, &brick.samples);
+                let own = bytemuck::cast_slice(brick.blocks.as_slice());
+                gpu.queue.write_buffer(ranges, (at * 2 * BRICK_BLOCKS) as u64, own);
+            }
+            // What is written waits in staging memory until something is submitted.
+            gpu.queue.submit([]);
+        }
+        Ok(())
+    }
+
+    /// Tells the GPU which slots hold bricks of a level that are drawn, and where they lie.
+    pub fn describe(&self, gpu: &Gpu, slab: &Slab, level: Option<usize>) {
+        let place = |slot: &Option<(Key, u64)>| match slot {
+            Some(((own, brick), update)) if Some(*own) == level && *update == self.update => {
+                let [x, y, z] = self.bricks.level(*own).place(*brick).map(|at| (at * SIDE) as u32);
+                [x, y, z, 1]
+            }
+            _ => [0; 4],
+        };
+        let places: Vec<[u32; 4]> = self.slots[slab.first..slab.first + slab.count_slots].iter().map(place).collect();
+        gpu.queue.write_buffer(&slab.slots, 0, bytemuck::cast_slice(&places));
+    }
+}
+
+/// The pass.
+#[derive(Debug)]
+pub struct SelectBricks {
+    count: Stage,
+    write: Stage,
+}
+
+impl SelectBricks {
+    pub fn new(gpu: &Gpu) -> Self {
+        use Binding::{Read, Uniform, Write};
+        let sources = [shaders::FRAME, shaders::SELECT_BRICKS];
+        let bindings: &[&[Binding]] = &[&[Uniform, Read, Read, Write, Write, Uniform]];
+        Self {
+            count: Stage::new(gpu, "select bricks: count", &sources, "count", bindings),
+            write: Stage::new(gpu, "select bricks: write", &sources, "write", bindings),
+        }
+    }
+
+    /// Makes the lists of all slabs, each with its uniform, in buffers of their sizes.
+    pub fn update(
+        &self,
+        gpu: &Gpu,
+        scan: &Scan,
+        slabs: &mut [(&mut Slab, &wgpu::Buffer)],
+        shelf: &Shelf,
+        transfer: &TransferFunction,
+    ) -> Result<()> {
+        // Where kernels reach further than ranges hold for, all samples stay.
+        let is_wide = shelf.kernel.extent > REACH as f64;
+        let first =
+            first_visible(transfer, shelf.bricks.header().range).map(|n| if is_wide { 0 } else { u32::from(n) });
+        let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&first));
+        // All slabs count in the same place, one after the other; so they count again before they write.
+        let most = slabs.iter().map(|(slab, _)| slab.blocks()).max().unwrap_or(0);
+        let blocks = super::buffer(gpu, "select blocks", 4 * (u64::from(most) + 1), Usage::STORAGE | Usage::COPY_SRC);
+        let totals = super::buffer(gpu, "select totals", 4 * slabs.len() as u64, Usage::COPY_SRC);
+        let bind = |stage: &Stage, slab: &Slab, uniform: &wgpu::Buffer| {
+            let buffers = [uniform, &slab.ranges, &visible, &blocks, &slab.selected, &slab.slots];
+            stage.bind(gpu, 0, &buffers.map(wgpu::Buffer::as_entire_buffer_binding))
+        };
+        let count = |encoder: &mut wgpu::CommandEncoder, slab: &Slab, uniform: &wgpu::Buffer| {
+            // Behind the last block stands their sum after the scan.
+            encoder.clear_buffer(&blocks, 0, None);
+            self.count.dispatch(encoder, &[&bind(&self.count, slab, uniform)], slab.blocks().div_ceil(64));
+            scan.encode(gpu, encoder, &blocks, slab.blocks() + 1);
+        };
+        let encoder = || gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("select") });
+        let mut counting = encoder();
+        for (at, (slab, uniform)) in (0..).zip(slabs.iter()) {
+            count(&mut counting, slab, uniform);
+            counting.copy_buffer_to_buffer(&blocks, 4 * u64::from(slab.blocks()), &totals, 4 * at, 4);
+        }
+        gpu.queue.submit([counting.finish()]);
+        let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&gpu.read(&totals, 0, 4 * slabs.len() as u64)?);
+        let mut writing = encoder();
+        for ((slab, uniform), own) in slabs.iter_mut().zip(counts) {
+            slab.count = own;
+            slab.selected = super::buffer(gpu, "selected", 4 * u64::from(own), Usage::STORAGE);
+            if own > 0 {
+                count(&mut writing, slab, uniform);
+                self.write.dispatch(&mut writing, &[&bind(&self.write, slab, uniform)], slab.blocks().div_ceil(64));
+            }
+        }
+        gpu.queue.submit([writing.finish()]);
+        Ok(())
+    }
+}

@@ -1,0 +1,245 @@
+//! Volumes in bricks: their pictures are those of the volume, coarser ones where the view or the budget asks for them, and
+//! no brick is read twice.
+
+use glam::DVec3;
+use splatkit::{
+    compare::compare_pictures,
+    engine::{AdapterChoice, FrameStats, Gpu, Renderer},
+    hierarchy::Detail,
+    io::Limits,
+    math::{Camera, Kernel, Projection},
+    picture::Picture,
+    reference,
+    scene::{Classification, Scene, Settings},
+    volume::{
+        Lattice, Samples, TransferFunction, Volume,
+        bricks::{self, Bricks, WriteOptions},
+    },
+};
+use std::sync::Arc;
+
+/// Round waves that reach the borders, of odd sizes: values 0 … 200.
+fn value(dims: [usize; 3], index: usize) -> f64 {
+    let at = [index % dims[0], index / dims[0] % dims[1], index / dims[0] / dims[1]];
+    let p = DVec3::from_array(std::array::from_fn(|axis| at[axis] as f64 / dims[axis] as f64 - 0.45));
+    let wave = (22.0 * p.length()).cos() + 0.4 * (17.0 * p.x).sin() * (13.0 * p.y).cos();
+    (100.0 + 90.0 * wave * (1.0 - p.length())).clamp(0.0, 200.0)
+}
+
+fn volume(dims: [usize; 3], spacing: DVec3, bytes: bool) -> Arc<Volume> {
+    let values = (0..dims.iter().product()).map(|index| value(dims, index));
+    let samples = if bytes {
+        Samples::U8(values.map(|v| v as u8).collect())
+    } else {
+        Samples::F32(values.map(|v| v as f32).collect())
+    };
+    Arc::new(Volume::new(Lattice::with_spacing(dims, spacing), samples).expect("a volume"))
+}
+
+fn transfer() -> TransferFunction {
+    TransferFunction {
+        color: vec![(0.0, [0.1, 0.2, 0.9]), (100.0, [0.9, 0.8, 0.2]), (200.0, [0.9, 0.1, 0.1])],
+        opacity: vec![(0.0, 0.0), (90.0, 0.0), (130.0, 0.06), (200.0, 0.3)],
+        unit: 1.0,
+        ..TransferFunction::default()
+    }
+}
+
+fn scene(bricks: &Arc<Bricks>) -> Scene {
+    Scene::new().with_bricks(bricks.clone(), Kernel::default(), transfer())
+}
+
+fn bricks_of(volume: &Arc<Volume>) -> Arc<Bricks> {
+    Arc::new(Bricks::from_volume(volume.clone()).expect("bricks"))
+}
+
+/// From a corner: near enough for records of their own shape, so far that samples are alike for all pixels, and flat.
+fn cameras(scene: &Scene) -> [(&'static str, Camera); 3] {
+    let bounds = scene.bounds();
+    let near = Camera::framing(&bounds, DVec3::new(1.0, -2.0, 0.7), DVec3::Z, 1.0);
+    let away = near.position - near.focal_point;
+    let mut far = near.clone();
+    far.position = near.focal_point + 30.0 * away;
+    far.projection = Projection::Perspective { view_angle: 1.0 };
+    let mut flat = near.clone();
+    flat.projection = Projection::Orthographic { height: bounds.diagonal() };
+    [("near", near), ("far", far), ("flat", flat)]
+}
+
+fn renderer() -> Renderer {
+    Renderer::new(&Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver"))
+}
+
+fn settings(pixels: f64) -> Settings {
+    Settings { detail: Detail::Pixels(pixels), ..Settings::new([96, 96]) }
+}
+
+fn draw(renderer: &mut Renderer, scene: &Scene, camera: &Camera, settings: &Settings) -> (Picture, FrameStats) {
+    let mut prepared = renderer.prepare(scene).expect("a scene");
+    renderer.render(&mut prepared, camera, settings).expect("a picture")
+}
+
+fn decibels(a: &Picture, b: &Picture) -> f64 {
+    compare_pictures(a, b).expect("pictures of one size").psnr.unwrap_or(f64::INFINITY)
+}
+
+fn assert_shows_something(picture: &Picture) {
+    let covered = picture.color.iter().filter(|color| color[3] > 0.1).count();
+    assert!(covered * 5 > picture.color.len(), "{covered} pixels");
+}
+
+#[test]
+fn the_finest_level_is_the_volume() {
+    let mut renderer = renderer();
+    for (bytes, spacing, dims) in [(true, DVec3::ONE, [75, 60, 49]), (false, DVec3::new(1.0, 1.3, 0.8), [49, 65, 33])] {
+        let volume = volume(dims, spacing, bytes);
+        let plain = Scene::new().with_volume(volume.clone(), Kernel::default(), transfer());
+        let path = std::env::temp_dir().join(format!("splatkit-bricks-{}-{bytes}.splv", std::process::id()));
+        bricks::write(&volume, &path, &WriteOptions::default(), &|_, _| ()).expect("a file");
+        let file = Arc::new(Bricks::open(&path, &Limits::default()).expect("bricks"));
+        for (name, camera) in cameras(&plain) {
+            for occlusion in [true, false] {
+                let settings = Settings { occlusion, ..settings(0.0) };
+                let (expected, _) = draw(&mut renderer, &plain, &camera, &settings);
+                assert_shows_something(&expected);
+                for (origin, bricks) in [("memory", bricks_of(&volume)), ("file", file.clone())] {
+                    let (found, stats) = draw(&mut renderer, &scene(&bricks), &camera, &settings);
+                    assert_eq!(stats.lambda, 0.0);
+                    let agreement = decibels(&found, &expected);
+                    println!("{name}, bytes: {bytes}, {origin}, occlusion: {occlusion}: {agreement:.1} dB");
+                    assert!(agreement > 100.0, "{name}, {bytes}, {origin}, {occlusion}: {agreement:.1} dB");
+                }
+            }
+        }
+        drop(file);
+        std::fs::remove_file(&path).expect("the file");
+    }
+}
+
+#[test]
+fn the_reference_draws_the_whole_volume() {
+    let volume = volume([21, 18, 35], DVec3::ONE, true);
+    let [.., (_, camera)] = cameras(&scene(&bricks_of(&volume)));
+    let settings = Settings { size: [40, 40], ..settings(0.0) };
+    let expected = reference::render(&scene(&bricks_of(&volume)), &camera, &settings).expect("a picture");
+    let (found, _) = draw(&mut renderer(), &scene(&bricks_of(&volume)), &camera, &settings);
+    let agreement = decibels(&found, &expected);
+    assert!(agreement > 50.0, "{agreement:.1} dB");
+}
+
+#[test]
+fn budgets_are_kept_by_coarser_levels() {
+    let volume = volume([100; 3], DVec3::ONE, true);
+    let bricks = bricks_of(&volume);
+    let scene = scene(&bricks);
+    let (_, camera) = &cameras(&scene)[2];
+    let mut renderer = renderer();
+    let (finest, all) = draw(&mut renderer, &scene, camera, &settings(0.0));
+    assert_eq!((all.lambda, all.bricks, all.read_bricks), (0.0, 64, 64));
+    let slot = 32 * 32 * 32 + 1024;
+    for (count, lambda) in [(64, 0.0), (20, 1.0), (8, 1.0), (1, 2.0)] {
+        let settings = Settings { page_memory: count * slot, ..settings(0.0) };
+        let (found, stats) = draw(&mut renderer, &scene, camera, &settings);
+        assert_eq!(stats.lambda, lambda, "{count}");
+        assert!(stats.brick_bytes <= count * slot, "{count}: {}", stats.brick_bytes);
+        let agreement = decibels(&found, &finest);
+        println!("{count} bricks: {agreement:.1} dB");
+        assert!(agreement > 20.0, "{count}: {agreement:.1} dB");
+    }
+    // Two views that need different bricks share the slots, and the first comes out as before.
+    let mut prepared = renderer.prepare(&scene).expect("a scene");
+    let room = Settings { page_memory: 16 * slot, ..settings(0.0) };
+    let mut corner = camera.clone();
+    corner.projection = Projection::Orthographic { height: 12.0 };
+    corner.position -= 20.0;
+    corner.focal_point -= 20.0;
+    let (first, _) = renderer.render(&mut prepared, camera, &room).expect("a picture");
+    let (_, between) = renderer.render(&mut prepared, &corner, &room).expect("a picture");
+    assert!(between.read_bricks > 0 && between.brick_bytes <= 16 * slot, "{between:?}");
+    corner.position += 40.0;
+    corner.focal_point += 40.0;
+    let (_, between) = renderer.render(&mut prepared, &corner, &room).expect("a picture");
+    assert!(between.read_bricks > 0 && between.brick_bytes <= 16 * slot, "{between:?}");
+    let (again, _) = renderer.render(&mut prepared, camera, &room).expect("a picture");
+    // Bricks lie in other slots now: sums come in another order.
+    assert!(decibels(&again, &first) > 80.0);
+}
+
+#[test]
+fn a_zoom_shows_no_pop() {
+    let volume = volume([100; 3], DVec3::ONE, true);
+    let bricks = bricks_of(&volume);
+    let scene = scene(&bricks);
+    let mut renderer = renderer();
+    let mut prepared = renderer.prepare(&scene).expect("a scene");
+    for (name, camera) in &cameras(&scene) {
+        // λ is 1 at twice the pixels that a step covers.
+        let view = camera.view([96, 96]).expect("a view");
+        let lambda = |pixels| bricks::choice(&bricks, &view, 2.0, pixels, &transfer(), usize::MAX).lambda;
+        let some = (0..).map(|power| 2f64.powi(power)).find(|pixels| lambda(*pixels) > 0.0).expect("pixels");
+        let covered = some / lambda(some).exp2();
+        const STEPS: u32 = 8;
+        let pictures: Vec<Picture> = (0..=2 * STEPS)
+            .map(|step| {
+                let wanted = f64::from(step) / f64::from(STEPS);
+                let (picture, stats) = renderer
+                    .render(&mut prepared, camera, &settings(covered * wanted.exp2() * (1.0 + 1e-12)))
+                    .expect("a picture");
+                assert!((stats.lambda - wanted).abs() < 1e-6, "{} {wanted}", stats.lambda);
+                assert_shows_something(&picture);
+                picture
+            })
+            .collect();
+        let change = |pair: &[Picture]| {
+            let squares = pair[0].color.iter().zip(&pair[1].color);
+            let sum: f64 = squares.flat_map(|(a, b)| (0..4).map(|c| f64::from(a[c] - b[c]).powi(2))).sum();
+            (sum / (4 * pair[0].color.len()) as f64).sqrt()
+        };
+        let changes: Vec<f64> = pictures.windows(2).map(change).collect();
+        let mean = changes.iter().sum::<f64>() / changes.len() as f64;
+        let most = changes.iter().copied().fold(0.0, f64::max);
+        println!("{name}: mean {mean:.5}, most {most:.5}, {changes:.5?}");
+        assert!(mean > 0.0 && most < 3.0 * mean, "{name}: {most} of {mean}");
+    }
+}
+
+#[test]
+fn bricks_are_read_once() {
+    let volume = volume([75, 60, 49], DVec3::ONE, true);
+    let scene = scene(&bricks_of(&volume));
+    let (_, camera) = &cameras(&scene)[0];
+    let mut renderer = renderer();
+    // Another transfer function lists other samples of the same bricks.
+    let mut other = transfer();
+    other.opacity = vec![(150.0, 0.0), (160.0, 1.0)];
+    let plain = Scene::new().with_volume(volume, Kernel::default(), other.clone());
+    let (expected, _) = draw(&mut renderer, &plain, camera, &settings(0.0));
+    let mut prepared = renderer.prepare(&scene).expect("a scene");
+    let mut frame =
+        |prepared: &mut _, camera: &Camera| renderer.render(prepared, camera, &settings(0.0)).expect("a picture");
+    let (first, stats) = frame(&mut prepared, camera);
+    assert_eq!((stats.bricks, stats.read_bricks), (12, 12));
+    let (second, stats) = frame(&mut prepared, camera);
+    assert_eq!((stats.bricks, stats.read_bricks), (12, 0));
+    assert_eq!(first.color, second.color);
+    let mut turned = camera.clone();
+    turned.position += DVec3::X;
+    assert_eq!(frame(&mut prepared, &turned).1.read_bricks, 0);
+    prepared.set_transfer(&other);
+    let (third, stats) = frame(&mut prepared, camera);
+    assert_eq!(stats.read_bricks, 0);
+    assert!(decibels(&third, &expected) > 60.0 && decibels(&third, &first) < 40.0);
+}
+
+#[test]
+fn what_bricks_cannot_do_is_told() {
+    let bricks = bricks_of(&volume([9; 3], DVec3::ONE, true));
+    let mut settings = settings(1.0);
+    let told = |scene: &Scene, settings: &Settings| scene.validate_settings(settings).unwrap_err().to_string();
+    let hann = Scene::new().with_bricks(bricks.clone(), Kernel::hann(2.0).expect("a kernel"), transfer());
+    assert!(told(&hann, &settings).contains("Gaussian"));
+    settings.classification = Classification::Pre;
+    assert!(told(&scene(&bricks), &settings).contains("after interpolation"));
+    let two = scene(&bricks).with_bricks(bricks, Kernel::default(), transfer());
+    assert!(two.validate().unwrap_err().to_string().contains("2"));
+}
