@@ -41,7 +41,12 @@ fn is_new(span: vec2<u32>) -> bool {
 @compute @workgroup_size(64)
 fn cull(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let count = candidate_count();
-    let number = dealt(group.x, (count + 64u * RUN - 1u) / (64u * RUN)) * 64u + lane;
+    let groups = (count + 64u * RUN - 1u) / (64u * RUN);
+    // The dispatch is large enough for all nodes at hand, drawn or not.
+    if group.x >= dealt_count(groups) {
+        return;
+    }
+    let number = dealt(group.x, groups) * 64u + lane;
     let start = number * RUN;
     if stage.groups == 0u || start >= count {
         return;
