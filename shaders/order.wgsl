@@ -15,7 +15,7 @@
 @group(0) @binding(6) var<storage, read> records: array<vec4<f32>>;
 @group(0) @binding(7) var<storage, read> progress: array<u32>;
 
-const SHORT: u32 = 512u;
+const SHORT: u32 = 2048u;
 
 var<workgroup> shared_number: u32;
 

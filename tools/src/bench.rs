@@ -97,6 +97,7 @@ impl Bench {
                 "depth_passes": stats.passes,
                 "splats": stats.splats,
                 "hidden": stats.hidden,
+                "bricks": describe::bricks(&stats),
                 "entries": stats.entries,
                 "culled": culled,
                 "gpu_bytes": stats.gpu_bytes,
@@ -119,6 +120,13 @@ impl Bench {
             stats.entries,
             stats.passes,
             stats.gpu_bytes >> 20
-        ))
+        ))?;
+        if stats.bricks > 0 {
+            let (drawn, read, level, mib) = (stats.bricks, stats.read_bricks, stats.lambda, stats.brick_bytes >> 20);
+            output::line(format_args!(
+                "{drawn} bricks drawn of level {level:.2}, {read} of them read, {mib} MiB of slots"
+            ))?;
+        }
+        Ok(())
     }
 }

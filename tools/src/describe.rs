@@ -2,10 +2,21 @@
 
 use serde_json::{Value, json};
 use splatkit::{
+    engine::FrameStats,
     math::{Kernel, Profile},
     scene::{Classification, Item, Mode, Optics, Order, Scene, Settings},
     volume::TransferFunction,
 };
+
+/// The bricks of a volume that a frame drew; null where it has none.
+pub fn bricks(stats: &FrameStats) -> Value {
+    match stats.bricks {
+        0 => Value::Null,
+        drawn => {
+            json!({ "drawn": drawn, "read": stats.read_bricks, "level": stats.lambda, "bytes": stats.brick_bytes })
+        }
+    }
+}
 
 /// The settings of a picture and, where the scene has a field, how it is shown.
 pub fn settings(scene: &Scene, settings: &Settings) -> Value {

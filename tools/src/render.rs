@@ -136,7 +136,13 @@ impl Render {
         let (stats, camera) = last;
         times.sort_by(f64::total_cmp);
         let frame_ms = times[times.len() / 2];
-        tracing::info!(splats = stats.splats, entries = stats.entries, passes = stats.passes, "drawn");
+        tracing::info!(
+            splats = stats.splats,
+            hidden = stats.hidden,
+            entries = stats.entries,
+            passes = stats.passes,
+            "drawn"
+        );
         if self.json {
             output::line(serde_json::json!({
                 "output": self.output,
@@ -145,6 +151,8 @@ impl Render {
                 "frames": frames,
                 "adapter": drawer.adapter(),
                 "splats": stats.splats,
+                "hidden": stats.hidden,
+                "bricks": describe::bricks(&stats),
                 "entries": stats.entries,
                 "passes": stats.passes,
                 "gpu_bytes": stats.gpu_bytes,

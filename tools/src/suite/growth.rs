@@ -9,9 +9,9 @@ use crate::camera::Subject;
 use glam::DVec3;
 use splatkit::{
     Error, Result,
-    math::Bounds,
-    scene::Settings,
-    volume::{TransferFunction, phantoms::Phantom},
+    math::{Bounds, Kernel},
+    scene::{Scene, Settings},
+    volume::{TransferFunction, bricks::Bricks, phantoms::Phantom},
 };
 use std::sync::Arc;
 
@@ -50,10 +50,12 @@ fn volume(side: usize, size: u32) -> Result<Case> {
     let [min, max] = volume.bounds();
     // One transfer function for all sizes: the range is the same, and opacity holds for a length.
     let shown = Phantom::Specimen.sample_bytes([64; 3]).map_err(Error::Argument)?;
+    let (kernel, transfer) = (Kernel::default(), TransferFunction::automatic(&shown));
+    let effective = case::effective(&volume, &kernel, &transfer);
     let samples = volume.len() as f64;
-    let (scene, effective) = case::volume(Arc::new(volume), TransferFunction::automatic(&shown));
+    let scene = Scene::new().with_bricks(Bricks::from_volume(Arc::new(volume))?, kernel, transfer);
     let subject = Subject { bounds: Bounds { min, max }, up: DVec3::Z };
-    let mut case = Case::new("generated: specimen", scene, subject, Settings::new([size; 2]), effective);
+    let mut case = Case::new("generated: specimen, in bricks", scene, subject, Settings::new([size; 2]), effective);
     case.series = Some(Series { name: "frame time of a volume", of: "samples", value: samples });
     Ok(case)
 }

@@ -157,9 +157,11 @@ impl Part {
                  Each is shown from the value on that leaves about as many splats.",
             ],
             Self::Surfaces => ["surfaces", "Surfaces.", "Hierarchies of surfels, with a cut of one pixel."],
-            Self::Growth => {
-                ["growth", "Growth.", "One content in ever more samples; a model that fills ever less of the picture."]
-            }
+            Self::Growth => [
+                "growth",
+                "Growth.",
+                "One content in ever more samples, in bricks of levels; a model that fills ever less of the picture.",
+            ],
             Self::Culling => ["culling", "Culling.", "The same pictures with what cannot be seen left out, and drawn."],
         }
     }
