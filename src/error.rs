@@ -31,9 +31,13 @@ pub enum Error {
     #[error("no usable GPU: {0}")]
     NoAdapter(String),
 
-    /// The device was lost or ran out of memory.
+    /// The device ran out of memory, or could not do what was asked of it. It can be used further.
     #[error("GPU: {0}")]
     Gpu(String),
+
+    /// The device is gone, with all that lay on it ([`Gpu::reopened`](crate::engine::Gpu::reopened)).
+    #[error("GPU: {0}")]
+    DeviceLost(String),
 }
 
 impl Error {

@@ -27,7 +27,7 @@ use crate::{
     scene::{Gradient, Item, Optics, Settings},
     volume::{Arrangement, Lattice, bricks::Choice},
 };
-use wgpu::{BufferUsages as Usage, util::DeviceExt};
+use wgpu::BufferUsages as Usage;
 
 /// How much room a pass has. A frame that needs more is drawn in several passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -327,13 +327,7 @@ pub fn targets(
     planes.extend(sheets.planes.iter().map(|&s| s as f32));
     planes.extend([3e38; 4]);
 
-    let uniform = |label, bytes: &[u8]| {
-        gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some(label),
-            contents: bytes,
-            usage: Usage::UNIFORM,
-        })
-    };
+    let uniform = |label, bytes: &[u8]| super::filled_buffer(gpu, label, bytes, Usage::UNIFORM);
     let words = u64::from(budget.record_words);
     let runs = u64::from(prepared.runs);
     Ok(Targets {

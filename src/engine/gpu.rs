@@ -1,8 +1,11 @@
-//! The device: adapters, their limits, and the errors of both.
+//! The device: adapters and their limits.
 
-use super::timestamps;
+use super::{fault::Condition, timestamps};
 use crate::{Error, Result};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::{sync::Arc, time::Duration};
+
+/// How long a device may take by default for what is submitted together: a large scene takes minutes on a processor.
+const PATIENCE: Duration = Duration::from_secs(600);
 
 /// A wgpu device and queue, with the adapter's description.
 #[derive(Debug, Clone)]
@@ -10,8 +13,10 @@ pub struct Gpu {
     pub device: wgpu::Device,
     pub queue: wgpu::Queue,
     pub info: Arc<wgpu::AdapterInfo>,
-    /// The first error that the device reported outside of a call, memory that ran out above all.
-    fault: Arc<Mutex<Option<String>>>,
+    pub(super) condition: Arc<Condition>,
+    pub(super) patience: Duration,
+    /// How it was found; a host's device was not.
+    choice: Option<AdapterChoice>,
 }
 
 /// Which adapter to take.
@@ -108,7 +113,28 @@ impl Gpu {
         let Some(index) = wanted.0 else {
             return Err(Error::NoAdapter(format!("there is no adapter {}; found: {}", wanted.1, names())));
         };
-        Self::open(&adapters.swap_remove(index))
+        let gpu = Self::open(&adapters.swap_remove(index))?;
+        gpu.condition.listen(&gpu.device);
+        Ok(Self { choice: Some(choice.clone()), ..gpu })
+    }
+
+    /// Opens a device as this one was opened: what to do where it was lost ([`Error::DeviceLost`]). Renderers and scenes are
+    /// prepared anew on it.
+    ///
+    /// # Errors
+    /// As of [`Self::headless`]; [`Error::Argument`] for the device of a host application, which is the host's to open.
+    pub fn reopened(&self) -> Result<Self> {
+        let Some(choice) = &self.choice else {
+            return Err(Error::Argument("the device is the host's; it has to be opened there".into()));
+        };
+        Ok(Self::headless(choice)?.with_patience(self.patience))
+    }
+
+    /// The same device, which counts as lost where what is submitted together (some depth passes of a frame) takes longer than
+    /// this. By default ten minutes.
+    #[must_use]
+    pub fn with_patience(self, patience: Duration) -> Self {
+        Self { patience, ..self }
     }
 
     fn open(adapter: &wgpu::Adapter) -> Result<Self> {
@@ -127,19 +153,13 @@ impl Gpu {
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|e| Error::NoAdapter(format!("{} cannot be opened: {e}", adapter.get_info().name)))?;
-        let gpu = Self::from_wgpu(device, queue, adapter.get_info());
-        let fault = gpu.fault.clone();
-        // Without a handler wgpu ends the program where memory runs out.
-        gpu.device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| error.to_string());
-        }));
-        Ok(gpu)
+        Ok(Self::from_wgpu(device, queue, adapter.get_info()))
     }
 
-    /// Takes the device of a host application. It must keep WebGPU's default limits, and its errors go to the host's own
-    /// handler.
+    /// Takes the device of a host application. It must keep WebGPU's default limits. What goes wrong while the engine works is
+    /// the engine's error; what the host hears of is its own.
     pub fn from_wgpu(device: wgpu::Device, queue: wgpu::Queue, info: wgpu::AdapterInfo) -> Self {
-        Self { device, queue, info: Arc::new(info), fault: Arc::default() }
+        Self { device, queue, info: Arc::new(info), condition: Arc::default(), patience: PATIENCE, choice: None }
     }
 
     /// Whether the adapter runs on the processor. Tiles are then walked by fewer, wider invocations.
@@ -156,43 +176,5 @@ impl Gpu {
     pub fn binding_size(&self) -> u64 {
         let limits = self.device.limits();
         (limits.max_storage_buffer_binding_size).min(limits.max_buffer_size) / 256 * 256
-    }
-
-    /// Waits until the device has done all that was submitted.
-    ///
-    /// # Errors
-    /// [`Error::Gpu`] where the device is lost, or reported an error since the last time.
-    pub fn wait(&self) -> Result<()> {
-        let name = &self.info.name;
-        if let Err(error) = self.device.poll(wgpu::PollType::wait_indefinitely()) {
-            return Err(Error::Gpu(format!("{name} stopped answering: {error}")));
-        }
-        match self.fault.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            None => Ok(()),
-            Some(fault) => Err(Error::Gpu(format!("{name}: {fault}"))),
-        }
-    }
-
-    /// Reads a part of a buffer back, when the device has done all before.
-    pub(super) fn read(&self, buffer: &wgpu::Buffer, offset: u64, bytes: u64) -> Result<Vec<u8>> {
-        let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("read back"),
-            size: bytes,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, bytes);
-        self.queue.submit([encoder.finish()]);
-        let (sender, receiver) = std::sync::mpsc::channel();
-        // The receiver outlives the callback: it is waited for below.
-        staging.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
-        self.wait()?;
-        match receiver.recv() {
-            Ok(Ok(())) => {}
-            _ => return Err(Error::Gpu(format!("what was drawn could not be read back from {}", self.info.name))),
-        }
-        let view = staging.get_mapped_range(..).map_err(|e| Error::Gpu(e.to_string()))?;
-        Ok(view.to_vec())
     }
 }

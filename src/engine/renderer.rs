@@ -83,7 +83,7 @@ impl Renderer {
 
     /// A renderer whose passes have a given room.
     pub fn with_budget(gpu: &Gpu, budget: Budget) -> Self {
-        Self {
+        gpu.watch_later(|| Self {
             gpu: gpu.clone(),
             budget,
             select: Select::new(gpu),
@@ -97,7 +97,12 @@ impl Renderer {
             resume: Resume::new(gpu),
             tiles: Tiles::new(gpu),
             passes: 4,
-        }
+        })
+    }
+
+    /// A renderer with the same budget on another device.
+    pub fn on(&self, gpu: &Gpu) -> Self {
+        Self::with_budget(gpu, self.budget)
     }
 
     /// Uploads a scene.
@@ -105,11 +110,25 @@ impl Renderer {
     /// # Errors
     /// A scene that [`Scene::validate`] refuses, or one that does not fit the device.
     pub fn prepare(&self, scene: &Scene) -> Result<PreparedScene> {
-        PreparedScene::new(&self.gpu, scene)
+        self.gpu.watch(|| PreparedScene::new(&self.gpu, scene))?
     }
 
     /// Draws a picture and reads it back. Pictures larger than a binding holds are drawn in strips, one below the other.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a camera or settings that make no picture of this scene; [`Error::Gpu`] where the device's memory
+    /// runs out or a driver's limits are met: a smaller picture may do; [`Error::DeviceLost`]: see [`Gpu::reopened`]; those of
+    /// reading, for scenes that are read as they are drawn.
     pub fn render(
+        &mut self,
+        prepared: &mut PreparedScene,
+        camera: &Camera,
+        settings: &Settings,
+    ) -> Result<(Picture, FrameStats)> {
+        self.guarded(prepared, |renderer, prepared| renderer.render_strips(prepared, camera, settings))
+    }
+
+    fn render_strips(
         &mut self,
         prepared: &mut PreparedScene,
         camera: &Camera,
@@ -132,7 +151,7 @@ impl Renderer {
 
     /// Draws a picture and leaves it on the GPU: a frame's time without the way back.
     pub fn draw(&mut self, prepared: &mut PreparedScene, camera: &Camera, settings: &Settings) -> Result<FrameStats> {
-        self.draw_strips(prepared, camera, settings, false)
+        self.guarded(prepared, |renderer, prepared| renderer.draw_strips(prepared, camera, settings, false))
     }
 
     /// As [`Self::draw`], but tells the time of each step: by the GPU's clock, or by waiting for each where it has none.
@@ -142,7 +161,26 @@ impl Renderer {
         camera: &Camera,
         settings: &Settings,
     ) -> Result<FrameStats> {
-        self.draw_strips(prepared, camera, settings, true)
+        self.guarded(prepared, |renderer, prepared| renderer.draw_strips(prepared, camera, settings, true))
+    }
+
+    /// Does some work with a scene. Where the device complains, what lies there is not trusted: the next picture begins anew.
+    fn guarded<T>(
+        &mut self,
+        prepared: &mut PreparedScene,
+        work: impl FnOnce(&mut Self, &mut PreparedScene) -> Result<T>,
+    ) -> Result<T> {
+        let gpu = self.gpu.clone();
+        let done = gpu.watch(|| {
+            prepared.mend(&gpu)?;
+            work(self, prepared)
+        });
+        if done.is_err() {
+            self.pool = Pool::default();
+            self.pipelines.clear();
+            prepared.broken = true;
+        }
+        done?
     }
 
     fn draw_strips(

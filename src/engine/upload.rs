@@ -22,7 +22,6 @@ use crate::{
 use glam::{UVec3, Vec3};
 use rayon::prelude::*;
 use std::{borrow::Cow, sync::Arc};
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 /// Candidates that one invocation handles (`RUN` in frame.wgsl) and those of its workgroup of 64.
 pub const RUN: u32 = 16;
@@ -99,14 +98,23 @@ pub struct PreparedScene {
     pub(super) runs: u32,
     /// Bytes of GPU memory that the scene holds.
     pub(super) bytes: u64,
+    /// What lies on the GPU cannot be trusted: something went wrong there.
+    pub(super) broken: bool,
 }
 
 impl PreparedScene {
     /// Uploads a scene. The scene's splats and samples are shared with the caller's, not copied.
     pub(super) fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
         scene.validate()?;
-        let mut prepared =
-            Self { scene: scene.clone(), chunks: Vec::new(), forests: Vec::new(), shelf: None, runs: 0, bytes: 0 };
+        let mut prepared = Self {
+            scene: scene.clone(),
+            chunks: Vec::new(),
+            forests: Vec::new(),
+            shelf: None,
+            runs: 0,
+            bytes: 0,
+            broken: false,
+        };
         for item in &scene.items {
             match item {
                 Item::Radiance(set) => prepared.add_splats(gpu, set, true),
@@ -117,6 +125,14 @@ impl PreparedScene {
             }
         }
         Ok(prepared)
+    }
+
+    /// Uploads the scene anew where it is broken.
+    pub(super) fn mend(&mut self, gpu: &Gpu) -> Result<()> {
+        if self.broken {
+            *self = Self::new(gpu, &self.scene)?;
+        }
+        Ok(())
     }
 
     /// Shows the scene's volume or sample set by another transfer function. Nothing is rebuilt on the CPU.
@@ -420,18 +436,10 @@ fn places(gpu: &Gpu, lattice: &Lattice) -> Result<wgpu::Buffer> {
             *place = [coordinates[axis][at] - coordinates[axis][0], lattice.unit(index)[axis]].map(|v| v as f32);
         }
     }
-    let usage = wgpu::BufferUsages::UNIFORM;
-    let contents = bytemuck::cast_slice(&places);
-    Ok(gpu.device.create_buffer_init(&BufferInitDescriptor { label: Some("places"), contents, usage }))
+    Ok(super::filled_buffer(gpu, "places", bytemuck::cast_slice(&places), wgpu::BufferUsages::UNIFORM))
 }
 
-/// A read-only storage buffer of some bytes, padded to whole words.
+/// A read-only storage buffer of some bytes.
 pub fn upload(gpu: &Gpu, label: &str, bytes: &[u8]) -> wgpu::Buffer {
-    let usage = wgpu::BufferUsages::STORAGE;
-    if bytes.len().is_multiple_of(4) && !bytes.is_empty() {
-        return gpu.device.create_buffer_init(&BufferInitDescriptor { label: Some(label), contents: bytes, usage });
-    }
-    let mut padded = bytes.to_vec();
-    padded.resize(bytes.len().max(1).next_multiple_of(4), 0);
-    gpu.device.create_buffer_init(&BufferInitDescriptor { label: Some(label), contents: &padded, usage })
+    super::filled_buffer(gpu, label, bytes, wgpu::BufferUsages::STORAGE)
 }

@@ -9,6 +9,10 @@ use splatkit::{
     picture::Picture,
     scene::{self, Item, Settings},
 };
+use std::time::Duration;
+
+/// Seconds that no one waits for, and that every clock can count.
+const LONGEST: f64 = 1e9;
 
 /// How pictures are drawn.
 #[derive(Args, Debug, Clone)]
@@ -20,6 +24,9 @@ pub struct EngineFlags {
     /// The adapter: its number in `splatkit gpus`, a part of its name, or `software`. By default the fastest.
     #[arg(long, value_name = "N|NAME|software")]
     gpu: Option<String>,
+    /// Seconds that the adapter may take for some passes of a picture before it counts as lost [default: 600]
+    #[arg(long, value_name = "SECONDS", value_parser = parse::positive)]
+    gpu_timeout: Option<f64>,
     /// How a volume's gradient across the picture is found.
     #[arg(long, value_enum, default_value_t = Gradient::Analytic)]
     gradient: Gradient,
@@ -76,7 +83,11 @@ impl EngineFlags {
     pub fn gpu(&self) -> splatkit::Result<Gpu> {
         // Any text is a choice: the conversion cannot fail.
         let choice = self.gpu.as_deref().map_or(AdapterChoice::Automatic, |text| text.parse().unwrap_or_default());
-        Gpu::headless(&choice)
+        let gpu = Gpu::headless(&choice)?;
+        Ok(match self.gpu_timeout {
+            None => gpu,
+            Some(seconds) => gpu.with_patience(Duration::from_secs_f64(seconds.min(LONGEST))),
+        })
     }
 
     pub fn renderer(&self, gpu: &Gpu) -> Renderer {

@@ -32,7 +32,7 @@ impl Failure {
         match self {
             Self::Output { .. } => 1,
             Self::Usage(_) | Self::Library(Error::Argument(_)) => 2,
-            Self::Library(Error::NoAdapter(_) | Error::Gpu(_)) => 4,
+            Self::Library(Error::NoAdapter(_) | Error::Gpu(_) | Error::DeviceLost(_)) => 4,
             Self::Library(Error::Input { .. } | Error::Limit { .. } | Error::File { .. } | Error::NothingToDraw(_)) => {
                 3
             }
@@ -51,6 +51,9 @@ impl Failure {
                 Some("`splatkit gpus` lists what there is; `--reference` needs no GPU")
             }
             Self::Library(Error::Gpu(_)) => Some("try a smaller --size, or another --gpu (`software` is one)"),
+            Self::Library(Error::DeviceLost(_)) => Some(
+                "the driver was reset, or took longer than --gpu-timeout; try again, or another --gpu (`software` is one)",
+            ),
             Self::Library(Error::NothingToDraw(_)) => Some(
                 "`splatkit info` tells what a file holds; --transfer, --range, --clip and the camera decide what is seen",
             ),

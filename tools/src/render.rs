@@ -12,7 +12,8 @@ use crate::{
 };
 use clap::Args;
 use splatkit::{
-    engine::{FrameStats, PreparedScene, Renderer},
+    Error,
+    engine::{FrameStats, Gpu, PreparedScene, Renderer},
     math::Camera,
     picture::Picture,
     reference,
@@ -60,7 +61,7 @@ pub struct Render {
 
 /// What draws.
 pub enum Drawer {
-    Engine { renderer: Box<Renderer>, prepared: Box<PreparedScene>, adapter: String },
+    Engine { gpu: Gpu, renderer: Box<Renderer>, prepared: Box<PreparedScene> },
     Reference,
 }
 
@@ -72,12 +73,12 @@ impl Drawer {
         progress.stage("Uploading");
         let renderer = Box::new(flags.renderer(&gpu));
         let prepared = Box::new(renderer.prepare(&loaded.scene)?);
-        Ok(Self::Engine { renderer, prepared, adapter: gpu.info.name.clone() })
+        Ok(Self::Engine { gpu, renderer, prepared })
     }
 
     pub fn adapter(&self) -> &str {
         match self {
-            Self::Engine { adapter, .. } => adapter,
+            Self::Engine { gpu, .. } => &gpu.info.name,
             Self::Reference => "reference",
         }
     }
@@ -90,7 +91,16 @@ impl Drawer {
         settings: &Settings,
     ) -> splatkit::Result<(Picture, FrameStats)> {
         match self {
-            Self::Engine { renderer, prepared, .. } => renderer.render(prepared, camera, settings),
+            Self::Engine { gpu, renderer, prepared } => match renderer.render(prepared, camera, settings) {
+                Err(Error::DeviceLost(reason)) => {
+                    tracing::warn!("{reason}; drawing again on a device opened anew");
+                    *gpu = gpu.reopened()?;
+                    **renderer = renderer.on(gpu);
+                    **prepared = renderer.prepare(&loaded.scene)?;
+                    renderer.render(prepared, camera, settings)
+                }
+                done => done,
+            },
             Self::Reference => Ok((reference::render(&loaded.scene, camera, settings)?, FrameStats::default())),
         }
     }

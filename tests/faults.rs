@@ -1,0 +1,171 @@
+//! What goes wrong with a device: it is lost, does not answer, has little room. Either the picture is the same as ever, or there
+//! is an error; a part of a picture is never given out.
+
+use glam::DVec3;
+use splatkit::{
+    Error,
+    engine::{AdapterChoice, Gpu, Renderer},
+    math::{Camera, Kernel},
+    picture::Picture,
+    scene::{Scene, Settings},
+    surface::{Mesh, SurfelOptions},
+    volume::{TransferFunction, bricks::Bricks, phantoms::Phantom},
+};
+use std::{sync::Arc, time::Duration};
+
+fn gpu() -> Gpu {
+    Gpu::headless(&AdapterChoice::Automatic).expect("an adapter")
+}
+
+/// A volume of 48³ samples, whole or in bricks, beside a knot.
+fn scene(in_bricks: bool) -> Scene {
+    let volume = Arc::new(Phantom::Specimen.sample_bytes([48; 3]).unwrap());
+    let transfer = TransferFunction::automatic(&volume);
+    let mut knot = Mesh::knot(200, 16);
+    let middle = (0.5 * (volume.bounds()[0] + volume.bounds()[1])).as_vec3();
+    knot.positions.iter_mut().for_each(|place| *place = *place * 0.5 + middle);
+    let scene = Scene::new().with_splats(knot.surfels(&SurfelOptions::default()).unwrap());
+    match in_bricks {
+        true => scene.with_bricks(Bricks::from_volume(volume).unwrap(), Kernel::default(), transfer),
+        false => scene.with_volume(volume, Kernel::default(), transfer),
+    }
+}
+
+fn view(scene: &Scene) -> (Camera, Settings) {
+    (Camera::framing(&scene.bounds(), DVec3::new(0.4, -0.3, -1.0), DVec3::Y, 1.2), Settings::new([160, 120]))
+}
+
+fn drawn(gpu: &Gpu, scene: &Scene) -> splatkit::Result<Picture> {
+    let mut renderer = Renderer::new(gpu);
+    let mut prepared = renderer.prepare(scene)?;
+    let (camera, settings) = view(scene);
+    Ok(renderer.render(&mut prepared, &camera, &settings)?.0)
+}
+
+fn same(a: &Picture, b: &Picture) -> bool {
+    let bits = |picture: &Picture| {
+        let numbers = picture.color.as_flattened().iter().chain(&picture.depth);
+        numbers.map(|number| number.to_bits()).collect::<Vec<_>>()
+    };
+    bits(a) == bits(b)
+}
+
+#[test]
+fn a_lost_device_is_an_error_and_another_draws_the_same() {
+    let (gpu, scene) = (gpu(), scene(false));
+    let before = drawn(&gpu, &scene).expect("draws");
+    let renderer = Renderer::new(&gpu);
+    let mut lost = (Renderer::new(&gpu), renderer.prepare(&scene).unwrap());
+    gpu.device.destroy();
+    let (camera, settings) = view(&scene);
+    // Whatever is asked of it from now on, and however often.
+    for _ in 0..2 {
+        let error = lost.0.render(&mut lost.1, &camera, &settings).unwrap_err();
+        assert!(matches!(error, Error::DeviceLost(_)), "{error}");
+        assert!(matches!(lost.0.draw(&mut lost.1, &camera, &settings), Err(Error::DeviceLost(_))));
+        assert!(matches!(lost.0.prepare(&scene), Err(Error::DeviceLost(_))));
+        assert!(matches!(gpu.wait(), Err(Error::DeviceLost(_))));
+    }
+    let again = drawn(&gpu.reopened().expect("opens again"), &scene).expect("draws again");
+    assert!(same(&before, &again));
+}
+
+#[test]
+fn a_device_lost_at_any_moment_gives_no_part_of_a_picture() {
+    let whole = scene(false);
+    let cut = scene(true);
+    let truth = [&whole, &cut].map(|scene| drawn(&gpu(), scene).expect("draws"));
+    let mut outcomes = [0; 2];
+    for moment in 0..16 {
+        for (scene, truth) in [&whole, &cut].into_iter().zip(&truth) {
+            let gpu = gpu();
+            let device = gpu.device.clone();
+            let killer = std::thread::spawn(move || {
+                // A picture takes some tenths of a second, the shaders' compilation among them.
+                std::thread::sleep(Duration::from_millis(35 * moment));
+                device.destroy();
+            });
+            match drawn(&gpu, scene) {
+                Ok(picture) => {
+                    assert!(same(&picture, truth), "moment {moment}: another picture");
+                    outcomes[0] += 1;
+                }
+                Err(Error::DeviceLost(_)) => outcomes[1] += 1,
+                Err(other) => panic!("moment {moment}: {other}"),
+            }
+            killer.join().unwrap();
+        }
+    }
+    assert!(outcomes[1] > 0, "never lost: {outcomes:?}");
+}
+
+#[test]
+fn a_device_that_does_not_answer_in_time_is_an_error() {
+    let scene = scene(false);
+    let gpu = gpu().with_patience(Duration::from_nanos(1));
+    let error = drawn(&gpu, &scene).unwrap_err();
+    assert!(error.to_string().contains("did not answer within"), "{error}");
+    // What is asked of it afterwards does not wait again.
+    assert!(matches!(drawn(&gpu, &scene), Err(Error::DeviceLost(_))));
+}
+
+/// What a pixel may differ by where smaller buffers cut the scene into other parts: as of tests/occlusion.rs.
+const MOST_DIFFERENCE: f32 = 0.004;
+
+fn difference(a: &Picture, b: &Picture) -> f32 {
+    let pairs = a.color.as_flattened().iter().zip(b.color.as_flattened());
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+/// A host's device with room for so many bytes a buffer.
+fn small_device(bytes: u64) -> Gpu {
+    let open = async {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+        let adapter = instance.enumerate_adapters(wgpu::Backends::all()).await.swap_remove(0);
+        let required_limits =
+            wgpu::Limits { max_buffer_size: bytes, max_storage_buffer_binding_size: bytes, ..wgpu::Limits::default() };
+        let descriptor = wgpu::DeviceDescriptor { required_limits, ..Default::default() };
+        let (device, queue) = adapter.request_device(&descriptor).await.expect("a device");
+        // A host that ends where it hears of an error: the engine's are not its.
+        device.on_uncaptured_error(Arc::new(|error| panic!("the host heard of {error}")));
+        Gpu::from_wgpu(device, queue, adapter.get_info())
+    };
+    pollster::block_on(open)
+}
+
+#[test]
+fn a_small_device_draws_the_same_or_says_why_not() {
+    let scene = scene(false);
+    let truth = drawn(&gpu(), &scene).expect("draws");
+    let mut errors = 0;
+    for shift in 16..27 {
+        match drawn(&small_device(1 << shift), &scene) {
+            Ok(picture) => {
+                let found = difference(&picture, &truth);
+                assert!(found <= MOST_DIFFERENCE, "2^{shift} bytes a buffer: another picture, by {found}");
+            }
+            Err(Error::Gpu(message)) => {
+                assert!(message.contains("buffer"), "2^{shift} bytes a buffer: {message}");
+                errors += 1;
+            }
+            Err(other) => panic!("2^{shift} bytes a buffer: {other}"),
+        }
+    }
+    assert!((1..11).contains(&errors), "{errors}");
+}
+
+#[test]
+fn what_did_not_fit_leaves_the_device_usable() {
+    let scene = scene(true);
+    let gpu = small_device(1 << 26);
+    let mut renderer = Renderer::new(&gpu);
+    let mut prepared = renderer.prepare(&scene).expect("fits");
+    let (camera, settings) = view(&scene);
+    let first = renderer.render(&mut prepared, &camera, &settings).expect("draws").0;
+    // A row of this picture alone is larger than a buffer may be.
+    let huge = Settings::new([1 << 23, 2]);
+    let error = renderer.render(&mut prepared, &camera, &huge).unwrap_err();
+    assert!(matches!(error, Error::Gpu(_) | Error::Argument(_)), "{error}");
+    let again = renderer.render(&mut prepared, &camera, &settings).expect("draws again").0;
+    assert!(same(&first, &again));
+}
