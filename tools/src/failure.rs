@@ -50,9 +50,11 @@ impl Failure {
             Self::Library(Error::NoAdapter(_)) => {
                 Some("`splatkit gpus` lists what there is; `--reference` needs no GPU")
             }
-            Self::Library(Error::Gpu(_)) => Some("try a smaller --size, or another --gpu (`software` is one)"),
+            Self::Library(Error::Gpu(_)) => {
+                Some("try a smaller --size, or another --gpu (`software` is one); --gpu-timeout waits longer")
+            }
             Self::Library(Error::DeviceLost(_)) => Some(
-                "the driver was reset, or took longer than --gpu-timeout; try again, or another --gpu (`software` is one)",
+                "the driver was reset, or its memory ran out: try again, a smaller --size, or another --gpu (`software` is one)",
             ),
             Self::Library(Error::NothingToDraw(_)) => Some(
                 "`splatkit info` tells what a file holds; --transfer, --range, --clip and the camera decide what is seen",
