@@ -29,6 +29,7 @@ pub(super) fn meshes(source: &Source, root: &json::Root) -> Result<Vec<(DMat4, u
     let mut met = vec![false; count];
     let mut meshes = Vec::new();
     while let Some((index, parent, depth)) = stack.pop() {
+        source.check_time()?;
         let place = format!("node {index}");
         let Some(node) = root.nodes.get(index) else {
             return Err(source.error(place, format!("there are {count} nodes")));
@@ -36,9 +37,7 @@ pub(super) fn meshes(source: &Source, root: &json::Root) -> Result<Vec<(DMat4, u
         if std::mem::replace(&mut met[index], true) {
             return Err(source.error(place, "is its own ancestor, or has two parents"));
         }
-        if depth > source.limits.depth {
-            return Err(source.error(place, format!("is nested deeper than the limit of {}", source.limits.depth)));
-        }
+        source.check_depth(&place, depth)?;
         let transform = parent * local(node);
         if let Some(mesh) = node.mesh {
             meshes.push((transform, mesh.value()));
