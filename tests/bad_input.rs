@@ -4,12 +4,7 @@
 mod inputs;
 
 use inputs::*;
-use splatkit::{
-    Error,
-    hierarchy::file,
-    io::Limits,
-    volume::bricks,
-};
+use splatkit::{Error, hierarchy::file, io::Limits, volume::bricks};
 use std::{
     path::Path,
     sync::{
@@ -27,7 +22,9 @@ fn count_panics() {
     ONCE.call_once(|| {
         let before = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |info| {
-            PANICS.fetch_add(1, Ordering::Relaxed);
+            // What fails here is told anyway.
+            let of_tests = info.location().is_some_and(|place| place.file().starts_with("tests"));
+            PANICS.fetch_add(usize::from(!of_tests), Ordering::Relaxed);
             before(info);
         }));
     });
@@ -64,9 +61,12 @@ fn every_cut_of_every_format_is_told() {
         folder.write(name, &bytes);
     }
     // What a model refers to may be cut as well: buffers and samples must be whole, pictures too; of materials there are less.
-    for (name, referring, may_load) in
-        [("beside.bin", "beside.gltf", false), ("beside.raw", "detached.nhdr", false), ("a.png", "a.obj", false), ("a.mtl", "a.obj", true)]
-    {
+    for (name, referring, may_load) in [
+        ("beside.bin", "beside.gltf", false),
+        ("beside.raw", "detached.nhdr", false),
+        ("a.png", "a.obj", false),
+        ("a.mtl", "a.obj", true),
+    ] {
         let bytes = std::fs::read(folder.0.join(name)).expect("a file");
         for at in 0..bytes.len() {
             folder.write(name, &bytes[..at]);
@@ -74,7 +74,9 @@ fn every_cut_of_every_format_is_told() {
             match load(&folder.0.join(referring), &limits) {
                 Err(error) => refused(&folder.0.join(referring), &error, &context),
                 // The end of a PNG says nothing that a picture needs.
-                Ok(told) => assert!(may_load || name == "a.png" && at + 16 >= bytes.len(), "{context}: loads as {told}"),
+                Ok(told) => {
+                    assert!(may_load || name == "a.png" && at + 16 >= bytes.len(), "{context}: loads as {told}")
+                }
             }
         }
         folder.write(name, &bytes);
@@ -180,13 +182,19 @@ fn worst_inputs_stay_within_their_limits() {
             let (milliseconds, taken) = (number(), number());
             let outcome = words.next().unwrap_or_default().replace(&format!("{}/", folder.0.display()), "");
             let (size, taken_mib) = (bytes.len() as f64 / 1048576.0, taken as f64 / 1048576.0);
-            println!("{name}: {size:.2} MiB, limit {} MiB: {milliseconds} ms, {taken_mib:.1} MiB: {outcome}", limit >> 20);
-            assert!(taken <= limit, "{name}: takes {taken} bytes, over the limit of {limit}: {outcome}");
+            println!(
+                "{name}: {size:.2} MiB, limit {} MiB: {milliseconds} ms, {taken_mib:.1} MiB: {outcome}",
+                limit >> 20
+            );
+            assert!(taken <= limit + PROGRAM, "{name}: takes {taken} bytes, over the limit of {limit}: {outcome}");
             worst = (worst.0.max(milliseconds), worst.1.max(taken));
         }
     }
     println!("longest {} ms, most {:.1} MiB", worst.0, worst.1 as f64 / 1048576.0);
 }
+
+/// Bytes of the program itself, its threads among it, that come into memory as it runs.
+const PROGRAM: u64 = 8 << 20;
 
 /// The most memory that this process has held, in bytes; 0 where the system does not tell.
 fn peak() -> u64 {
@@ -200,7 +208,8 @@ fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
     let mib = 1usize << 20;
     let nodes = vec![r#"{"mesh":0}"#; 100_000].join(",");
     let all: Vec<String> = (0..100_000).map(|node| node.to_string()).collect();
-    let instances = gltf_with("none", &nodes).replace(r#"{"nodes":[0]}"#, &format!(r#"{{"nodes":[{}]}}"#, all.join(",")));
+    let instances =
+        gltf_with("none", &nodes).replace(r#"{"nodes":[0]}"#, &format!(r#"{{"nodes":[{}]}}"#, all.join(",")));
     let (data, big) = ("data:;base64,", "A".repeat(mib));
     let instances = instances
         .replace("none", &format!("{data}{big}"))
@@ -229,10 +238,21 @@ fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
         ("vertices.obj", "v 0 0 0\n".repeat(mib).into()),
         ("polygon.ply", list),
         ("lines.ply", ply(&format!("element vertex {mib}\n{FLOATS}"), &"0 0 0\n".repeat(mib))),
-        ("corners.stl", format!("solid\n{}", "facet\nouter loop\nvertex 0 0 0\nvertex 0 0 0\nvertex 0 0 0\nendloop\nendfacet\n".repeat(mib / 24)).into()),
+        (
+            "corners.stl",
+            format!(
+                "solid\n{}",
+                "facet\nouter loop\nvertex 0 0 0\nvertex 0 0 0\nvertex 0 0 0\nendloop\nendfacet\n".repeat(mib / 24)
+            )
+            .into(),
+        ),
         ("numbers.pcd", pcd(&mib.to_string(), format!("DATA ascii\n{}", "1 2 3\n".repeat(mib)).as_bytes())),
         ("objects.gltf", format!(r#"{{"asset":{{"version":"2.0"}},"nodes":[{}]}}"#, vec!["{}"; mib].join(",")).into()),
-        ("numbers.gltf", format!(r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"children":[{}]}}]}}"#, vec!["9"; 2 * mib].join(",")).into()),
+        (
+            "numbers.gltf",
+            format!(r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"children":[{}]}}]}}"#, vec!["9"; 2 * mib].join(","))
+                .into(),
+        ),
         ("instances.gltf", instances.into()),
         ("bomb.nrrd", nrrd("1024 1024 200", "encoding: gzip", &gzip(&vec![0; 200 * mib]))),
         ("keys.nrrd", nrrd("1 1 1", &(0..200_000).map(|i| format!("{i}:=\n")).collect::<String>(), b"")),

@@ -106,12 +106,8 @@ impl Builder<'_> {
             [vertices, corners, triangles]
         };
         let add = |sum: [u64; 3], more: [u64; 3]| [0, 1, 2].map(|i| sum[i].saturating_add(more[i]));
-        let sizes: Vec<[u64; 3]> = self
-            .root
-            .meshes
-            .iter()
-            .map(|mesh| mesh.primitives.iter().map(of_primitive).fold([0; 3], add))
-            .collect();
+        let sizes: Vec<[u64; 3]> =
+            self.root.meshes.iter().map(|mesh| mesh.primitives.iter().map(of_primitive).fold([0; 3], add)).collect();
         let all = meshes.iter().filter_map(|(_, mesh)| sizes.get(*mesh)).copied().fold([0; 3], add);
         let [vertices, corners, triangles] = all;
         self.source.check_points("the number of vertices", vertices)?;

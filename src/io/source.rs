@@ -3,12 +3,7 @@
 
 use super::{LimitKind, Limits, budget::Budget};
 use crate::{Error, Result};
-use std::{
-    fs::File,
-    io::Read,
-    path::Path,
-    sync::Arc,
-};
+use std::{fs::File, io::Read, path::Path, sync::Arc};
 
 /// Gives the pages of a map of a file to the system.
 pub(super) fn release(map: &memmap2::Mmap) {

@@ -362,7 +362,8 @@ pub fn number<T: std::str::FromStr>(source: &Source, place: &str, text: &str) ->
 }
 
 pub fn numbers<const N: usize, T: std::str::FromStr>(source: &Source, place: &str, text: &str) -> Result<[T; N]> {
-    let numbers: Result<Vec<T>> = text.split_ascii_whitespace().take(N + 1).map(|word| number(source, place, word)).collect();
+    let numbers: Result<Vec<T>> =
+        text.split_ascii_whitespace().take(N + 1).map(|word| number(source, place, word)).collect();
     numbers?.try_into().map_err(|_| source.error(place, format!("“{text}” is not a list of {N} numbers")))
 }
 

@@ -303,7 +303,9 @@ pub fn vtk() -> String {
 
 pub fn vtu(corners: &str) -> String {
     let numbers = |name: &str, kind: &str, text: &str, components: u32| {
-        format!("<DataArray type='{kind}' Name='{name}' NumberOfComponents='{components}' format='ascii'>{text}</DataArray>")
+        format!(
+            "<DataArray type='{kind}' Name='{name}' NumberOfComponents='{components}' format='ascii'>{text}</DataArray>"
+        )
     };
     vtk_xml(
         "UnstructuredGrid",
@@ -414,15 +416,19 @@ pub fn every_format(folder: &Folder) -> Vec<(&'static str, Vec<u8>, fn(&[u8], us
         ("detached.nhdr", nrrd("2 2 1", "encoding: raw\ndata file: beside.raw", b""), but_for_spaces),
         ("ascii.vti", of_vti("", &array("format='ascii'", "1 2 3 4")).into(), never),
         ("binary.vti", of_vti("", &array("format='binary'", &base64(&counted))).into(), never),
-        ("zlib.vti", of_vti(zlib_file, &array("format='binary'", &{
-            let block = packed_block();
-            format!("{}{}", base64(&block[..16]), base64(&block[16..]))
-        })).into(), never),
         (
-            "appended.vti",
-            appended(&of_vti("", &array("format='appended' offset='0'", "")), "raw", &counted),
+            "zlib.vti",
+            of_vti(
+                zlib_file,
+                &array("format='binary'", &{
+                    let block = packed_block();
+                    format!("{}{}", base64(&block[..16]), base64(&block[16..]))
+                }),
+            )
+            .into(),
             never,
         ),
+        ("appended.vti", appended(&of_vti("", &array("format='appended' offset='0'", "")), "raw", &counted), never),
         (
             "packed.vti",
             appended(&of_vti(zlib_file, &array("format='appended' offset='0'", "")), "raw", &packed_block()),

@@ -5,14 +5,22 @@ use crate::Result;
 use ::gltf::json;
 use glam::{DMat4, DQuat, DVec3};
 
+/// A node on the way: its number, the transform of its parent, and how deep it is.
+type Step = (usize, DMat4, usize);
+
 /// The meshes of the default scene (or the first; or, without scenes, of all nodes) with the transform from their own
 /// frame to the world. A node that is met twice (a cycle, or two parents) is an error, as is nesting over the limit.
 pub(super) fn meshes(source: &Source, root: &json::Root) -> Result<Vec<(DMat4, usize)>> {
     let count = root.nodes.len();
-    let mut stack: Vec<(usize, DMat4, usize)> = Vec::new();
+    source.room::<[Step; 2]>("the nodes", count)?;
+    let mut stack: Vec<Step> = Vec::new();
     let scene = root.scene.map_or(0, |scene| scene.value());
     match root.scenes.get(scene) {
-        Some(scene) => stack.extend(scene.nodes.iter().rev().map(|node| (node.value(), DMat4::IDENTITY, 1))),
+        // Lists of nodes may name one again and again: they are longer than there are nodes.
+        Some(scene) => {
+            source.room::<[Step; 2]>("the nodes of the scene", scene.nodes.len())?;
+            stack.extend(scene.nodes.iter().rev().map(|node| (node.value(), DMat4::IDENTITY, 1)));
+        }
         None if root.scene.is_some() => {
             return Err(source.error("scene", format!("is {scene}, but there are {} scenes", root.scenes.len())));
         }
@@ -42,6 +50,7 @@ pub(super) fn meshes(source: &Source, root: &json::Root) -> Result<Vec<(DMat4, u
         if let Some(mesh) = node.mesh {
             meshes.push((transform, mesh.value()));
         }
+        source.room::<[Step; 2]>("the nodes below a node", node.children.as_ref().map_or(0, Vec::len))?;
         let children = node.children.iter().flatten().rev();
         stack.extend(children.map(|child| (child.value(), transform, depth + 1)));
     }

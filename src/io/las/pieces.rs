@@ -87,9 +87,7 @@ impl Pieces {
     fn piece(&self, source: &Source, piece: usize) -> Result<impl Iterator<Item = (usize, Point)>> {
         let first = self.firsts[piece];
         let points: Vec<Point> = match &self.packed {
-            Some((layout, chunks)) => {
-                packed::unpack(source, &self.header, layout, &chunks[piece])?
-            }
+            Some((layout, chunks)) => packed::unpack(source, &self.header, layout, &chunks[piece])?,
             None => {
                 let size = self.header.size;
                 let range: Range<usize> = first * size..(first + POINTS).min(self.header.points) * size;

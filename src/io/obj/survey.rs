@@ -105,8 +105,7 @@ impl Survey {
         survey.colors &= counts[0] > 0;
         source.check_points("the number of vertices", survey.vertices)?;
         source.check_points("the number of faces", survey.faces)?;
-        let bytes =
-            VERTEX * survey.vertices + OTHER * survey.others + FACE * survey.faces + CORNER * survey.corners;
+        let bytes = VERTEX * survey.vertices + OTHER * survey.others + FACE * survey.faces + CORNER * survey.corners;
         source.spend("the size of the mesh in bytes", bytes)?;
         Ok(survey)
     }

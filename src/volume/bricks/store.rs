@@ -136,7 +136,14 @@ impl Bricks {
         let header = stored.header;
         let levels = level::levels(header.lattice.dims);
         let ranges = directory.levels.iter().map(|level| level.iter().map(|entry| entry.range).collect()).collect();
-        Ok(Self { path: path.to_owned(), header, levels, ranges, origin: Origin::File { bytes, directory }, limits: limits.clone() })
+        Ok(Self {
+            path: path.to_owned(),
+            header,
+            levels,
+            ranges,
+            origin: Origin::File { bytes, directory },
+            limits: limits.clone(),
+        })
     }
 
     /// What the volume is as a whole.
