@@ -169,7 +169,11 @@ const OVER: &[(&str, &str, &str)] = &[
         "the size of the header in bytes together with what was read before is 5012, over the limit of 5000",
         "--limit-bytes",
     ),
-    ("info packed.gz --dims 16x16x16 --type u8 --limit-bytes 4000", "is 4096, over the limit of 4000", "--limit-bytes"),
+    (
+        "info packed.gz --dims 16x16x16 --type u8 --limit-bytes 5000",
+        "the unpacked size in bytes together with what was read before is 8207, over the limit of 5000",
+        "--limit-bytes",
+    ),
     (
         "info deep.gltf --limit-depth 2",
         "deep.gltf: node 2: the depth of nesting is 3, over the limit of 2",

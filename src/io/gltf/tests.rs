@@ -237,7 +237,7 @@ fn hostile_files_are_refused_with_a_reason() {
         ("/meshes/0/primitives/0/indices", json!(1), "unsigned integers"),
         ("/meshes/0/primitives/0/material", json!(9), "material 9"),
         ("/meshes/0/primitives/0/mode", json!(9), "mode"),
-        ("/accessors/0/count", json!(u64::MAX), "count"),
+        ("/accessors/0/count", json!(u64::MAX), "the number of vertices is 18446744073709551615"),
         ("/accessors/0/count", json!(1 << 20), "reach beyond"),
         ("/accessors/0/count", json!(3), "has 3 positions but 4"),
         ("/accessors/0/byteOffset", json!(u64::MAX), "reach beyond"),
