@@ -217,11 +217,9 @@ fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
         .replace(r#""byteLength":36"#, r#""byteLength":720000"#);
     let block = zlib(&vec![0; 200 * mib]);
     let counts: Vec<u8> = [1, 200 * mib as u32, 0, block.len() as u32].iter().flat_map(|n| n.to_le_bytes()).collect();
-    let vti = format!(
-        "<VTKFile type='ImageData' byte_order='LittleEndian' compressor='vtkZLibDataCompressor'><ImageData WholeExtent='0 1023 0 1023 0 199'>\
+    let vti = "<VTKFile type='ImageData' byte_order='LittleEndian' compressor='vtkZLibDataCompressor'><ImageData WholeExtent='0 1023 0 1023 0 199'>\
          <Piece Extent='0 1023 0 1023 0 199'><PointData><DataArray type='UInt8' Name='v' format='appended' offset='0'/></PointData></Piece>\
-         </ImageData><AppendedData encoding='raw'>_"
-    );
+         </ImageData><AppendedData encoding='raw'>_";
     let vti = [vti.as_bytes(), &counts, &block, b"</AppendedData></VTKFile>"].concat();
     let wide = format!("{}\n{}", vec!["1"; 4096].join(" "), "1\n".repeat(mib));
     let polygon = format!("{}\n", vec!["0"; 2 * mib].join(" "));

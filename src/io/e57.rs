@@ -56,7 +56,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
                 };
                 index += 1;
                 // Points without a position are kept nowhere, but take their time.
-                if index % POINTS == 0 {
+                if index.is_multiple_of(POINTS) {
                     source.check_time()?;
                 }
                 let CartesianCoordinate::Valid { x, y, z } = point.cartesian else { continue };

@@ -78,7 +78,7 @@ impl<'a> Text<'a> {
         source.room::<f64>("the numbers", numbers)?;
         let mut table = vec![0.0f64; numbers];
         table.par_chunks_mut(width).zip(&self.rows).enumerate().try_for_each(|(index, (row, &(number, line)))| {
-            if index % ROWS == 0 {
+            if index.is_multiple_of(ROWS) {
                 source.check_time()?;
             }
             let place = || format!("line {number}");

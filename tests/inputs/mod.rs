@@ -348,9 +348,12 @@ pub const TRANSFER: &str = r#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 0], [9, 
 pub const OBJ: &str = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
 pub const MTL: &str = "newmtl m\nKd 0.5 0.5 0.5\nmap_Kd a.png\n";
 
+/// The name of a file, its bytes, and whether it may load where it is cut before a byte.
+pub type Format = (&'static str, Vec<u8>, fn(&[u8], usize) -> bool);
+
 /// A file of every format: its name, its bytes, and whether it may load where it is cut before byte `at`. Text without counts
 /// or an end reads as less where it is cut; the rest must notice, or have lost nothing but its last line break.
-pub fn every_format(folder: &Folder) -> Vec<(&'static str, Vec<u8>, fn(&[u8], usize) -> bool)> {
+pub fn every_format(folder: &Folder) -> Vec<Format> {
     fn never(_: &[u8], _: usize) -> bool {
         false
     }

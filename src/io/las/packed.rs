@@ -145,7 +145,7 @@ fn unpack_here(source: &Source, header: &Header, layout: &LazVlr, chunk: &Chunk)
     let mut record = vec![0; header.size];
     let mut points = Vec::new();
     for number in 0..chunk.points {
-        if number % POINTS == 0 {
+        if number.is_multiple_of(POINTS) {
             source.check_time()?;
         }
         let unpacked = decoder.decompress_next(&mut record);

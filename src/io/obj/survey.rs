@@ -36,8 +36,8 @@ impl Survey {
         // Positions, texture coordinates and normals so far, and the largest index used of each with its line.
         let mut counts = [0i64; 3];
         let mut largest = [(0i64, 0usize); 3];
-        for (line, number) in text.lines().zip(1..) {
-            if number % LINES == 0 {
+        for (line, number) in text.lines().zip(1usize..) {
+            if number.is_multiple_of(LINES) {
                 source.check_time()?;
             }
             let place = || format!("line {number}");

@@ -84,7 +84,7 @@ impl<'a> Rows<'a> {
         let mut starts = Vec::with_capacity(most);
         let mut next = 0;
         for row in 0..element.count {
-            if row % ROWS == 0 {
+            if row.is_multiple_of(ROWS) {
                 source.check_time()?;
             }
             starts.push(next);
@@ -110,7 +110,7 @@ impl<'a> Rows<'a> {
         let mut lines = Vec::with_capacity(most);
         let mut longest = 0;
         while lines.len() < element.count {
-            if lines.len() % ROWS == 0 {
+            if lines.len().is_multiple_of(ROWS) {
                 source.check_time()?;
             }
             if *at >= bytes.len() {
