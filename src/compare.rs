@@ -5,7 +5,7 @@
 
 use crate::{
     Error, Result,
-    io::{Limits, Source},
+    io::{LimitKind, Limits, Source},
     picture::Picture,
 };
 use std::{io::Cursor, path::Path};
@@ -81,10 +81,7 @@ fn load(path: &Path, limits: &Limits) -> Result<image::RgbaImage> {
     };
     let (width, height) = reader()?.into_dimensions().map_err(broken)?;
     let texels = u64::from(width) * u64::from(height);
-    if texels > limits.texels {
-        let what = "the picture's number of pixels".into();
-        return Err(Error::Limit { file: path.to_owned(), what, found: texels, limit: limits.texels });
-    }
+    limits.check(LimitKind::Texels, path, "the picture's number of pixels", texels)?;
     let mut decoder = reader()?;
     let mut bounds = image::Limits::default();
     bounds.max_alloc = Some(limits.bytes);

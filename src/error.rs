@@ -1,6 +1,7 @@
 //! The one error type of the library. Every message names the file and the place in it, what was found and what
 //! was expected; the hint says what to do.
 
+use crate::io::LimitKind;
 use std::path::{Path, PathBuf};
 
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -13,7 +14,7 @@ pub enum Error {
 
     /// A file (or a claim in it) larger than the [`Limits`](crate::io::Limits) allow.
     #[error("{}: {what} is {found}, over the limit of {limit}", file.display())]
-    Limit { file: PathBuf, what: String, found: u64, limit: u64 },
+    Limit { file: PathBuf, what: String, kind: LimitKind, found: u64, limit: u64 },
 
     /// The operating system could not open, read or write a file.
     #[error("{}: cannot {action}: {source}", file.display())]

@@ -27,6 +27,7 @@ impl Cloud {
         if self.positions.is_empty() {
             return Err(source.error("file", "holds no points"));
         }
+        source.room::<Vec3>("the normals", self.normals.len())?;
         let (origin, positions) =
             positions::settle(source, self.positions.len(), |point| self.positions[point], place)?;
         let sensors = self

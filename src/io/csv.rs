@@ -19,7 +19,7 @@ const COVARIANCE: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
 /// [`Error::Input`](crate::Error::Input) with the line, for columns that are not these, lines of another length, what is no
 /// number, and numbers that are not finite; [`Error::Limit`](crate::Error::Limit) for more lines than points are allowed.
 pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
-    let text = Text::of(source, |_, _| false)?;
+    let text = Text::of(source, |_, _| Ok(false))?;
     let layout = match &text.names {
         Some(names) => Layout::named(source, text.first, names, scalar)?,
         None => Layout::plain(source, text.width)?,
@@ -28,6 +28,7 @@ pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
     let (count, width) = (text.len(), text.width);
     let value = |row: usize, column: usize| table[row * width + column];
     let column = |column: usize| (0..count).map(move |row| value(row, column));
+    source.spend("the size of the samples in bytes", Columns::ROW * count as u64)?;
     let columns = Columns {
         values: column(layout.value).collect(),
         radii: layout.radius.map_or(Vec::new(), |radius| column(radius).map(|radius| radius as f32).collect()),

@@ -6,12 +6,16 @@ mod tests;
 use super::{
     Source,
     cloud::{Cloud, greys},
+    growing::Growing,
     isolate::isolated,
 };
 use crate::{Result, surface::Mesh};
 use ::e57::{CartesianCoordinate, E57Reader, PointCloud, RecordDataType, RecordName};
 use glam::DVec3;
 use std::io::Cursor;
+
+/// Points that are read between two looks at the clock.
+const POINTS: u64 = 1 << 16;
 
 /// Reads all scans, each moved by its pose: points by Cartesian or spherical coordinates, and colours, or where no scan has
 /// any the intensities as greys. Points without a valid position are left out. A scanner stood at the origin of its scan,
@@ -23,23 +27,25 @@ use std::io::Cursor;
 /// their last point; [`Error::Limit`](crate::Error::Limit) for more points than the limits allow.
 pub fn read(source: &Source) -> Result<Mesh> {
     // The crate asserts and clamps by numbers of the file, which may panic.
-    isolated(source, "scans", || {
+    let cloud = isolated(source, "scans", || {
         let mut file = E57Reader::new(Cursor::new(source.bytes()))
             .map_err(|error| source.error("file", format!("is no E57 file that can be read: {error}")))?;
         let scans = file.pointclouds();
         let claimed = scans.iter().fold(0u64, |sum, scan| sum.saturating_add(scan.records));
         source.check_points("the number of points", claimed)?;
-        let mut cloud = Cloud { z_is_up: true, ..Cloud::default() };
-        let mut intensities = Vec::new();
+        let mut positions = Growing::new(source, "the positions");
+        let mut colors = Growing::new(source, "the colours");
+        let mut intensities = Growing::new(source, "the intensities");
+        let mut sensors = Vec::new();
         let mut has_colors = false;
         for (number, scan) in scans.iter().enumerate() {
             let wrong = |message: String| source.error(format!("scan {number}"), message);
             check(scan).map_err(|message| wrong(message.into()))?;
-            let start = cloud.positions.len();
+            let start = positions.len();
             let mut points = file.pointcloud_simple(scan).map_err(|error| wrong(error.to_string()))?;
             points.intensity_to_color(false);
             points.normalize_intensity(false);
-            let mut index = 0;
+            let mut index = 0u64;
             for point in points {
                 let point = match point {
                     Ok(point) => point,
@@ -49,32 +55,37 @@ pub fn read(source: &Source) -> Result<Mesh> {
                     Err(error) => return Err(wrong(format!("ends after {index} points: {error}"))),
                 };
                 index += 1;
+                // Points without a position are kept nowhere, but take their time.
+                if index.is_multiple_of(POINTS) {
+                    source.check_time()?;
+                }
                 let CartesianCoordinate::Valid { x, y, z } = point.cartesian else { continue };
                 let position = DVec3::new(x, y, z);
                 if !position.is_finite() {
                     continue;
                 }
-                cloud.positions.push(position);
+                positions.push(position)?;
                 let color = point.color.as_ref().map(|color| [color.red, color.green, color.blue]);
                 has_colors |= color.is_some();
                 // What has no colour beside points that have one is white.
                 let [r, g, b] = color.unwrap_or([1.0; 3]).map(|part| (part * 255.0).round() as u8);
-                cloud.colors.push([r, g, b, 255]);
-                intensities.push(point.intensity.unwrap_or(f32::NAN));
+                colors.push([r, g, b, 255])?;
+                intensities.push(point.intensity.unwrap_or(f32::NAN))?;
             }
             if let Some(sensor) = sensor(scan) {
-                cloud.sensors.push((sensor, start..cloud.positions.len()));
+                sensors.push((sensor, start..positions.len()));
             }
         }
-        let left_out = claimed - cloud.positions.len() as u64;
+        let left_out = claimed.saturating_sub(positions.len() as u64);
         if left_out > 0 {
             tracing::info!(points = left_out, "points without a valid position are left out");
         }
-        if !has_colors {
-            cloud.colors = greys(&intensities);
-        }
-        cloud.into_mesh(source, |point| format!("point {point}"))
-    })
+        // Once more sorted by size.
+        source.room::<f32>("the intensities", intensities.len())?;
+        let colors = if has_colors { colors.into_inner() } else { greys(&intensities) };
+        Ok(Cloud { positions: positions.into_inner(), colors, sensors, z_is_up: true, ..Cloud::default() })
+    })?;
+    cloud.into_mesh(source, |point| format!("point {point}"))
 }
 
 /// Refuses a scan whose values all take no bits: nothing would end what the crate makes of it.

@@ -13,6 +13,11 @@ pub(super) struct Columns {
     pub covariances: Vec<[f32; 6]>,
 }
 
+impl Columns {
+    /// Bytes that a row takes where it has all columns.
+    pub const ROW: u64 = 8 + 4 + 24;
+}
+
 /// Puts samples together, `count` of them. `place` names a row in an error.
 pub(super) fn gather(
     source: &Source,
@@ -30,6 +35,7 @@ pub(super) fn gather(
         return Err(source.error(place(row), message).hint("remove the sample, or write the file without it"));
     }
     let (origin, positions) = positions::settle(source, count, position, place)?;
+    source.room::<f32>("the values", columns.values.len())?;
     let values = columns.values.into_par_iter().map(|value| value as f32).collect();
     let points = Points { origin, positions, values, radii: columns.radii, covariances: columns.covariances };
     points.validate().map_err(|message| source.error("samples", message))?;

@@ -32,6 +32,7 @@ const KNOWN: [&str; 4] = ["KHR_mesh_quantization", "KHR_texture_transform", "KHR
 /// (Draco and meshopt compression among them); [`Error::Limit`](crate::Error::Limit) for counts over the limits.
 pub fn read(source: &Source) -> Result<Mesh> {
     let (text, binary) = buffers::split(source)?;
+    source.spend("the size of the scene's tree in bytes", tree_bytes(text))?;
     let root: json::Root =
         json::deserialize::from_slice(text).map_err(|error| source.error("JSON", error.to_string()))?;
     for extension in &root.extensions_required {
@@ -51,11 +52,34 @@ pub fn read(source: &Source) -> Result<Mesh> {
         material_of: HashMap::new(),
         pictures: HashMap::new(),
     };
-    for (transform, mesh) in nodes::meshes(source, &root)? {
+    let meshes = nodes::meshes(source, &root)?;
+    builder.make_room(&meshes)?;
+    for (transform, mesh) in meshes {
         builder.add_mesh(transform, mesh)?;
     }
     builder.finish()
 }
+
+/// Bytes that the tree of a JSON text may take: the largest of what objects become for each of them, and a number, with the
+/// room that lists keep in store, for each comma.
+fn tree_bytes(text: &[u8]) -> u64 {
+    let largest = [
+        size_of::<json::Node>(),
+        size_of::<json::Material>(),
+        size_of::<json::Accessor>(),
+        size_of::<json::mesh::Primitive>(),
+        size_of::<json::buffer::View>(),
+        size_of::<json::Image>(),
+        size_of::<json::animation::Channel>(),
+    ];
+    let object = largest.into_iter().max().unwrap_or_default() as u64;
+    let count = |letter: u8| text.iter().filter(|&&b| b == letter).count() as u64;
+    text.len() as u64 + 2 * object * count(b'{') + 16 * count(b',')
+}
+
+/// Bytes that a vertex may take in all lists while it is read, and the corner of a face.
+const VERTEX: u64 = 160;
+const CORNER: u64 = 40;
 
 /// The mesh as it grows.
 struct Builder<'a> {
@@ -70,12 +94,35 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
+    /// Takes what the scene will occupy from the budget. A mesh may stand at many nodes, and one accessor in many
+    /// primitives: then the scene is larger than the file by far, and its size should be known before it is built.
+    fn make_room(&self, meshes: &[(DMat4, usize)]) -> Result<()> {
+        let of_primitive = |primitive: &json::mesh::Primitive| {
+            let position = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+            let vertices = position.map_or(0, |accessor| self.buffers.claimed(accessor.value()));
+            let corners = primitive.indices.map_or(vertices, |accessor| self.buffers.claimed(accessor.value()));
+            // A corner of a strip or fan makes a triangle.
+            let triangles = if primitive.mode == Checked::Valid(Mode::Triangles) { corners / 3 } else { corners };
+            [vertices, corners, triangles]
+        };
+        let add = |sum: [u64; 3], more: [u64; 3]| [0, 1, 2].map(|i| sum[i].saturating_add(more[i]));
+        let sizes: Vec<[u64; 3]> =
+            self.root.meshes.iter().map(|mesh| mesh.primitives.iter().map(of_primitive).fold([0; 3], add)).collect();
+        let all = meshes.iter().filter_map(|(_, mesh)| sizes.get(*mesh)).copied().fold([0; 3], add);
+        let [vertices, corners, triangles] = all;
+        self.source.check_points("the number of vertices", vertices)?;
+        self.source.check_points("the number of triangles", triangles)?;
+        let bytes = vertices.saturating_mul(VERTEX).saturating_add(corners.saturating_mul(CORNER));
+        self.source.spend("the size of the scene in bytes", bytes)
+    }
+
     fn add_mesh(&mut self, transform: DMat4, index: usize) -> Result<()> {
         let root = self.root;
         let Some(mesh) = root.meshes.get(index) else {
             return Err(self.source.error(format!("mesh {index}"), format!("there are {} meshes", root.meshes.len())));
         };
         for (number, primitive) in mesh.primitives.iter().enumerate() {
+            self.source.check_time()?;
             self.add_primitive(transform, primitive, &format!("mesh {index}, primitive {number}"))?;
         }
         Ok(())
@@ -210,8 +257,6 @@ impl Builder<'_> {
             (None, None) => return Err(self.source.error(place, "has neither a URI nor a buffer view")),
         };
         self.pictures.insert(image, decoded.clone());
-        let total = self.pictures.values().map(|picture| picture.texels.len() as u64 * 4).sum();
-        self.source.check_bytes("the size of all pictures in bytes", total)?;
         Ok(decoded)
     }
 

@@ -32,6 +32,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
     if left_out > 0 {
         tracing::info!(points = left_out, "withheld points are left out");
     }
+    source.spend("the size of the points in bytes", POINT * points.len() as u64)?;
     let positions = points.par_iter().map(|point| header.position(point)).collect();
     let mut cloud = Cloud { positions, z_is_up: true, ..Cloud::default() };
     if header.color_at.is_some() {
@@ -45,6 +46,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
 
 fn plain(source: &Source, header: &Header) -> Result<Vec<Point>> {
     let data = plain_bytes(source, header)?;
+    source.room::<Point>("the points", header.points)?;
     Ok(data.par_chunks_exact(header.size).filter_map(|record| header.point(record)).collect())
 }
 
@@ -63,6 +65,9 @@ fn plain_bytes<'a>(source: &'a Source, header: &Header) -> Result<&'a [u8]> {
     }
     Ok(&data[..size as usize])
 }
+
+/// Bytes that a point takes beside that: its place, its colour of 16 bits and of 8, its intensity.
+const POINT: u64 = 24 + 6 + 4 + 4;
 
 /// What matters here of a point.
 struct Point {

@@ -3,17 +3,20 @@
 //! [`load_mesh`], [`load_volume`] and [`load_samples`] look at the name and the first bytes, and give a mesh (or cloud), a
 //! volume or scattered samples; [`Kind`] tells which of them a file needs.
 
+mod budget;
 mod cloud;
 pub mod csv;
 pub mod e57;
 mod gather;
 pub mod gltf;
+mod growing;
 mod isolate;
 mod kind;
 pub mod las;
 mod limits;
 mod load_mesh;
 mod load_samples;
+mod neighbour;
 pub mod npy;
 pub mod nrrd;
 pub mod obj;
@@ -25,7 +28,6 @@ mod sample_type;
 mod source;
 pub mod stl;
 mod stream;
-#[cfg(test)]
 #[cfg(test)]
 pub(crate) mod testing;
 mod text;
@@ -41,7 +43,7 @@ pub mod vtu;
 pub mod xyz;
 
 pub use kind::Kind;
-pub use limits::Limits;
+pub use limits::{LimitKind, Limits};
 pub use load_mesh::load_mesh;
 pub use load_samples::load_samples;
 pub use raw::RawLayout;

@@ -46,6 +46,8 @@ pub fn read(source: &Source) -> Result<Points> {
     if data.len() as u64 != size {
         return Err(source.error("data", format!("there are {} bytes where {size} were expected", data.len())));
     }
+    source.room::<f64>("the numbers", rows.saturating_mul(width))?;
+    source.spend("the size of the samples in bytes", Columns::ROW * rows as u64)?;
     let numbers = kind.doubles(data, endian);
     let row = |row: usize| &numbers[row * width..][..width];
     let columns = Columns {

@@ -36,16 +36,17 @@ pub fn read(source: &Source) -> Result<Volume> {
     let lattice = header.lattice(dims)?;
     let kind = header.sample_type()?;
     let size = source.check_bytes("the size of the samples in bytes", kind.bytes_of(dims).unwrap_or(u64::MAX))?;
+    source.spend("the size of the samples in bytes", kind.decoded_bytes(size))?;
     let Some(name) = header.get(&["data file", "datafile"]) else {
         return header.samples(source, &source.bytes()[body..], kind, size, lattice);
     };
-    if name == "LIST" || name.starts_with("LIST ") || name.contains('%') {
+    if is_list(name) || name.contains('%') {
         return Err(source
             .error("data file", format!("“{name}” names several files, which is not supported"))
             .hint("join them to one file"));
     }
     let path = source.neighbour("data file", name)?;
-    let data = Source::open(&path, source.limits)?;
+    let data = source.open_beside(&path)?;
     header.samples(&data, data.bytes(), kind, size, lattice)
 }
 
@@ -62,11 +63,14 @@ pub(super) fn plain(source: &Source) -> Result<Option<Plain>> {
     let endian = header.endian(sample_type)?;
     let (path, start) = match header.get(&["data file", "datafile"]) {
         None => (source.path.to_owned(), body),
-        Some(name) if name == "LIST" || name.starts_with("LIST ") || name.contains('%') => return Ok(None),
+        Some(name) if is_list(name) || name.contains('%') => return Ok(None),
         Some(name) => (source.neighbour("data file", name)?, 0),
     };
     Ok(Some(Plain { path, start, sample_type, endian, lattice }))
 }
+
+/// Bytes that a line of the header takes beside its text.
+const ENTRY: u64 = 256;
 
 /// The fields of a header, names in lower case, and its keys with their values.
 struct Header<'a> {
@@ -93,6 +97,7 @@ impl<'a> Header<'a> {
             if text.is_empty() {
                 break;
             }
+            source.spend("the size of the header in bytes", ENTRY + 2 * line.len() as u64)?;
             match text.split_once(':') {
                 _ if number == 0 || text.starts_with('#') => {}
                 // “key:=value”
@@ -100,7 +105,13 @@ impl<'a> Header<'a> {
                     keys.insert(key.trim().to_owned(), value[1..].trim().to_owned());
                 }
                 Some((name, value)) => {
-                    fields.insert(name.trim().to_ascii_lowercase(), value.trim().to_owned());
+                    let (name, value) = (name.trim().to_ascii_lowercase(), value.trim());
+                    let is_list = name.replace(' ', "") == "datafile" && is_list(value);
+                    fields.insert(name, value.to_owned());
+                    // The names of files follow, up to the end.
+                    if is_list {
+                        break;
+                    }
                 }
                 None => {
                     let message = "is neither a field, a key and value, a comment, nor the empty line before the data";
@@ -122,8 +133,9 @@ impl<'a> Header<'a> {
 
     /// The numbers of a field, exactly `N`.
     fn numbers<const N: usize, T: std::str::FromStr>(&self, name: &str, text: &str) -> Result<[T; N]> {
-        let numbers: Option<Vec<T>> = text.split_ascii_whitespace().map(|word| word.parse().ok()).collect();
-        let wrong = |_| self.source.error(name, format!("“{text}” is not a list of {N} numbers"));
+        let words = text.split_ascii_whitespace().take(N + 1);
+        let numbers: Option<Vec<T>> = words.map(|word| word.parse().ok()).collect();
+        let wrong = |_| self.source.error(name, format!("“{}” is not a list of {N} numbers", shown(text)));
         numbers.unwrap_or_default().try_into().map_err(wrong)
     }
 
@@ -183,6 +195,7 @@ impl<'a> Header<'a> {
         for (places, key) in places.iter_mut().zip(&keys) {
             let text = self.keys.get(key).ok_or_else(|| self.source.error("header", format!("has no key “{key}”")))?;
             let wrong = || self.source.error(key, "is not a list of numbers");
+            self.source.room::<[f64; 2]>("the positions along an axis", text.len() / 2)?;
             *places =
                 text.split_ascii_whitespace().map(|word| word.parse().map_err(|_| wrong())).collect::<Result<_>>()?;
         }
@@ -191,14 +204,14 @@ impl<'a> Header<'a> {
 
     /// Vectors written as (x,y,z), exactly `N`.
     fn vectors<const N: usize>(&self, name: &str, text: &str) -> Result<[DVec3; N]> {
-        let wrong = || self.source.error(name, format!("“{text}” is not {N} × (x,y,z)"));
+        let wrong = || self.source.error(name, format!("“{}” is not {N} × (x,y,z)", shown(text)));
         let vector = |part: &str| {
             let numbers: Option<Vec<f64>> =
-                part.trim().strip_prefix('(')?.split(',').map(|word| word.trim().parse().ok()).collect();
+                part.trim().strip_prefix('(')?.split(',').take(4).map(|word| word.trim().parse().ok()).collect();
             <[f64; 3]>::try_from(numbers?).ok().map(DVec3::from_array)
         };
         let (inside, rest) = text.rsplit_once(')').ok_or_else(wrong)?;
-        let vectors: Option<Vec<DVec3>> = inside.split(')').map(vector).collect();
+        let vectors: Option<Vec<DVec3>> = inside.split(')').take(N + 1).map(vector).collect();
         let vectors = vectors.filter(|_| rest.trim().is_empty()).ok_or_else(wrong)?;
         vectors.try_into().map_err(|_| wrong())
     }
@@ -222,7 +235,7 @@ impl<'a> Header<'a> {
             "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => SampleType::U64,
             "float" => SampleType::F32,
             "double" => SampleType::F64,
-            _ => return Err(self.source.error("type", format!("“{name}” is not a type of scalars"))),
+            _ => return Err(self.source.error("type", format!("“{}” is not a type of scalars", shown(&name)))),
         })
     }
 
@@ -279,10 +292,12 @@ impl<'a> Header<'a> {
                 (unpacked.into(), self.endian(kind)?)
             }
             "ascii" | "txt" | "text" => {
+                file.spend("the size of the numbers in bytes", size as u64)?;
                 let bytes = kind.parse(text()?, size / kind.bytes()).map_err(|message| file.error(place, message))?;
                 (bytes.into(), Endian::Little)
             }
             "hex" => {
+                file.spend("the size of the digits in bytes", data.len() as u64)?;
                 let bytes = from_hex(text()?, size).map_err(|message| file.error(place, message))?;
                 (bytes.into(), self.endian(kind)?)
             }
@@ -295,6 +310,16 @@ impl<'a> Header<'a> {
         };
         Volume::new(lattice, kind.decode(bytes, endian)).map_err(|message| file.error("samples", message))
     }
+}
+
+/// Whether a field of a data file tells that a list of them follows.
+fn is_list(name: &str) -> bool {
+    name == "LIST" || name.starts_with("LIST ")
+}
+
+/// The beginning of a text, for an error.
+fn shown(text: &str) -> String {
+    if text.chars().nth(80).is_none() { text.to_owned() } else { text.chars().take(80).chain(['…']).collect() }
 }
 
 /// Bytes of two hexadecimal digits each; white space does not count.

@@ -9,13 +9,13 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
-use super::{Source, positions};
+use super::{Source, isolate::isolated, positions};
 use crate::{
     Error, Result,
     surface::{Material, Mesh},
 };
 use glam::{DVec3, Vec2, Vec3};
-use std::{borrow::Cow, cell::RefCell, collections::HashMap};
+use std::{borrow::Cow, cell::RefCell, collections::HashMap, path::Path};
 use survey::Survey;
 
 /// Reads an OBJ file: polygons cut into triangles, with vertex colours, normals and materials. Texture coordinates are
@@ -26,7 +26,12 @@ use survey::Survey;
 /// [`Error::Input`] for malformed numbers, positions that are not finite, indices without a vertex, and references to
 /// files outside the file's folder. Missing material files and pictures are warnings.
 pub fn read(source: &Source) -> Result<Mesh> {
-    let text = join_lines(String::from_utf8_lossy(source.bytes()));
+    let text = String::from_utf8_lossy(source.bytes());
+    let is_copy = matches!(text, Cow::Owned(_));
+    let text = join_lines(text);
+    if is_copy || matches!(text, Cow::Owned(_)) {
+        source.room::<u8>("the text", 2 * text.len())?;
+    }
     let survey = Survey::of(source, &text)?;
     if survey.faces == 0 {
         return read_cloud(source, &text, &survey);
@@ -36,13 +41,15 @@ pub fn read(source: &Source) -> Result<Mesh> {
     let mut feed = survey.feed(&text);
     let options =
         tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
-    let loaded = tobj::load_obj_buf(&mut feed, &options, |path| {
+    let load = |path: &Path| {
         let loaded = library.borrow_mut().load(&path.to_string_lossy());
         loaded.map(|(materials, index_of)| (materials, index_of.into_iter().collect())).map_err(|error| {
             failure.borrow_mut().get_or_insert(error);
             tobj::LoadError::OpenFileFailed
         })
-    });
+    };
+    // tobj does arithmetic on what it reads.
+    let loaded = isolated(source, "statements", || Ok(tobj::load_obj_buf(&mut feed, &options, load)))?;
     let line = feed.line();
     if let Some(error) = failure.into_inner() {
         return Err(error);
@@ -71,6 +78,9 @@ pub fn read(source: &Source) -> Result<Mesh> {
     }
     source.check_points("the number of vertices", corners.positions.len() as u64)?;
     source.check_points("the number of triangles", corners.triangles.len() as u64)?;
+    if corners.triangles.is_empty() {
+        return Err(source.error("file", "has faces, but none of three corners or more"));
+    }
     let positions = &corners.positions;
     (mesh.origin, mesh.positions) =
         positions::settle(source, positions.len(), |i| positions[i], |i| format!("vertex {i} of the faces"))?;

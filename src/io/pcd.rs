@@ -5,12 +5,15 @@ mod lzf;
 #[cfg(test)]
 mod tests;
 
-use super::{Source, cloud::Cloud};
+use super::{Source, cloud::Cloud, growing::Growing};
 use crate::{Result, surface::Mesh};
 use glam::{DVec3, Vec3};
 use header::{Data, Field, Header};
 use rayon::prelude::*;
 use std::borrow::Cow;
+
+/// Bytes that a point takes with all that it may have, and its number.
+const POINT: u64 = 8 + 24 + 12 + 4;
 
 /// Reads a cloud: `x`, `y`, `z`, and if there are some `normal_x`, `normal_y`, `normal_z` (or `nx`, …) and `rgb` or `rgba`,
 /// whose opacity is passed over, since many writers leave it 0. Points that are not finite are how the format marks missing
@@ -35,6 +38,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
     let normal = triple([&["normal_x", "nx"], &["normal_y", "ny"], &["normal_z", "nz"]]);
     let color = find(&["rgb", "rgba"]);
     let rows = Rows::find(source, &header, count)?;
+    source.spend("the size of the points in bytes", POINT * count as u64)?;
     let three = |row: usize, fields: [&Field; 3]| DVec3::from_array(fields.map(|field| rows.number(row, field)));
     let kept: Vec<usize> = (0..count).into_par_iter().filter(|&row| three(row, position).is_finite()).collect();
     if kept.len() < count {
@@ -92,6 +96,7 @@ impl<'a> Rows<'a> {
                 if unpacked != size {
                     return Err(source.error("data", format!("unpacks to {unpacked} bytes where {size} were expected")));
                 }
+                source.room::<u8>("the unpacked points", size)?;
                 let bytes = lzf::unpack(&data[8..][..packed], size);
                 let bytes = bytes.map_err(|(at, message)| {
                     source.error(format!("byte {}", header.end + 8 + at), format!("the packed data {message}"))
@@ -103,16 +108,17 @@ impl<'a> Rows<'a> {
 
     fn of_text(source: &Source, header: &Header, data: &[u8], count: usize) -> Result<Self> {
         let width = header.fields.iter().map(|field| field.count).sum::<usize>();
-        let mut numbers = Vec::new();
+        let mut numbers = Growing::new(source, "the numbers");
         let mut found = 0;
         for (number, line) in (header.lines + 1..).zip(data.split(|&b| b == b'\n')) {
             let before = numbers.len();
             let text = String::from_utf8_lossy(line);
             for word in text.split_ascii_whitespace() {
-                numbers.push(word.parse::<f64>().map_err(|_| {
+                let value = word.parse::<f64>().map_err(|_| {
                     let shown: String = word.chars().take(40).collect();
                     source.error(format!("line {number}"), format!("“{shown}” is not a number"))
-                })?);
+                })?;
+                numbers.push(value)?;
             }
             match numbers.len() - before {
                 0 => continue,
@@ -129,7 +135,7 @@ impl<'a> Rows<'a> {
         if found < count {
             return Err(source.error("data", format!("holds {found} points where the header claims {count}")));
         }
-        Ok(Self::Text { numbers, width })
+        Ok(Self::Text { numbers: numbers.into_inner(), width })
     }
 
     fn number(&self, row: usize, field: &Field) -> f64 {

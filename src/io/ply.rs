@@ -14,7 +14,7 @@ mod table;
 mod tests;
 mod write;
 
-use super::{Source, positions, texture};
+use super::{Source, growing::Growing, positions, texture};
 use crate::{
     Result,
     surface::{Material, Mesh},
@@ -25,7 +25,7 @@ use header::{Element, width};
 pub(super) use pieces::Pieces;
 use ply_rs::ply::{PropertyType, ScalarType};
 use rayon::prelude::*;
-use rows::{List, Rows};
+use rows::Rows;
 pub use samples::{has_faces, read_samples};
 use table::Table;
 pub use write::write;
@@ -66,6 +66,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
     }
     if let Some(name) = header.texture.filter(|_| !mesh.uvs.is_empty() && !mesh.triangles.is_empty()) {
         let texture = texture::read_reference(source, "comment TextureFile", &name)?;
+        source.room::<u32>("the materials of the triangles", mesh.triangles.len())?;
         mesh.triangle_materials = vec![0; mesh.triangles.len()];
         mesh.materials = vec![Material { name, color: [1.0; 4], texture }];
     }
@@ -117,10 +118,12 @@ fn fill(
     (mesh.origin, mesh.positions) = positions::settle(source, count, position, |row| rows.place(source, element, row))?;
     let has = |from: usize, number: usize| columns[from..from + number].iter().all(Option::is_some);
     if has(NORMAL, 3) {
+        source.room::<Vec3>("the normals", count)?;
         let normal = |row| Vec3::from_array([0, 1, 2].map(|axis| value(row, NORMAL + axis) as f32));
         mesh.normals = (0..count).into_par_iter().map(|row| positions::unit(normal(row))).collect();
     }
     if has(COLOR, 3) {
+        source.room::<[u8; 4]>("the colours", count)?;
         let scale = color_scale(element, columns);
         let channel = |row, channel: usize| match scale[channel] {
             Some(scale) => (value(row, COLOR + channel) * scale).round() as u8,
@@ -129,6 +132,7 @@ fn fill(
         mesh.colors = (0..count).into_par_iter().map(|row| [0, 1, 2, 3].map(|c| channel(row, c))).collect();
     }
     if has(UV, 2) {
+        source.room::<Vec2>("the texture coordinates", count)?;
         // PLY counts v from the bottom of the picture.
         let uv = |row| Vec2::new(value(row, UV) as f32, 1.0 - value(row, UV + 1) as f32);
         mesh.uvs = (0..count).into_par_iter().map(uv).collect();
@@ -158,6 +162,10 @@ fn read_faces(source: &Source, element: &Element, rows: &Rows, vertices: usize) 
         }
         return Err(source.error("header", format!("the element “{}” has no list “vertex_indices”", element.name)));
     };
+    // Once as they are found, once in their place.
+    if let Rows::Fixed { .. } = rows {
+        source.room::<[[u32; 3]; 2]>("the triangles", element.count)?;
+    }
     if let Some(triangles) = read_triangles(element, rows, column, vertices) {
         return Ok(triangles);
     }
@@ -168,19 +176,16 @@ fn read_faces(source: &Source, element: &Element, rows: &Rows, vertices: usize) 
     let parts: Vec<Vec<[u32; 3]>> = (0..chunks)
         .into_par_iter()
         .map(|chunk| {
-            let mut triangles = Vec::new();
+            let mut triangles = Growing::new(source, "the triangles");
             for row in chunk * CHUNK..((chunk + 1) * CHUNK).min(element.count) {
                 let mut wrong = None;
                 rows.visit(source, element, row, &wanted, |at, _, list| {
                     if let Some(list) = list.filter(|_| at == column) {
-                        wrong = if strips {
-                            strip(list, vertices, &mut triangles)
-                        } else {
-                            fan(list, vertices, &mut triangles)
-                        };
+                        let cut = if strips { strip } else { fan };
+                        wrong = cut(list, vertices, &mut triangles).transpose();
                     }
                 })?;
-                if let Some(index) = wrong {
+                if let Some(index) = wrong.transpose()? {
                     return Err(source.error(
                         rows.place(source, element, row),
                         format!(
@@ -190,9 +195,10 @@ fn read_faces(source: &Source, element: &Element, rows: &Rows, vertices: usize) 
                     ));
                 }
             }
-            Ok(triangles)
+            Ok(triangles.into_inner())
         })
         .collect::<Result<_>>()?;
+    source.room::<[[u32; 3]; 2]>("the triangles", parts.iter().map(Vec::len).sum())?;
     Ok(parts.concat())
 }
 
@@ -225,26 +231,26 @@ fn vertex(value: f64, vertices: usize) -> Option<u32> {
 }
 
 /// Cuts a polygon into a fan; gives the first index that names no vertex.
-fn fan(list: &List, vertices: usize, triangles: &mut Vec<[u32; 3]>) -> Option<f64> {
+fn fan(list: &[f64], vertices: usize, triangles: &mut Growing<[u32; 3]>) -> Result<Option<f64>> {
     if let Some(&wrong) = list.iter().find(|&&value| vertex(value, vertices).is_none()) {
-        return Some(wrong);
+        return Ok(Some(wrong));
     }
     for i in 2..list.len() {
-        triangles.push([list[0] as u32, list[i - 1] as u32, list[i] as u32]);
+        triangles.push([list[0] as u32, list[i - 1] as u32, list[i] as u32])?;
     }
-    None
+    Ok(None)
 }
 
 /// Cuts strips, separated by −1, into triangles; gives the first index that names no vertex.
-fn strip(list: &List, vertices: usize, triangles: &mut Vec<[u32; 3]>) -> Option<f64> {
+fn strip(list: &[f64], vertices: usize, triangles: &mut Growing<[u32; 3]>) -> Result<Option<f64>> {
     for run in list.split(|&value| value == -1.0) {
         if let Some(&wrong) = run.iter().find(|&&value| vertex(value, vertices).is_none()) {
-            return Some(wrong);
+            return Ok(Some(wrong));
         }
         for i in 2..run.len() {
             let (a, b) = if i % 2 == 0 { (i - 2, i - 1) } else { (i - 1, i - 2) };
-            triangles.push([run[a] as u32, run[b] as u32, run[i] as u32]);
+            triangles.push([run[a] as u32, run[b] as u32, run[i] as u32])?;
         }
     }
-    None
+    Ok(None)
 }

@@ -16,6 +16,8 @@ pub(super) fn settle(
     position: impl Fn(usize) -> DVec3 + Sync,
     place: impl Fn(usize) -> String,
 ) -> Result<(DVec3, Vec<Vec3>)> {
+    source.check_time()?;
+    source.room::<Vec3>("the positions", count)?;
     let bad = (0..count).into_par_iter().find_first(|&row| !position(row).is_finite());
     if let Some(row) = bad {
         return Err(not_finite(source, place(row), position(row)));
@@ -37,7 +39,10 @@ pub(super) fn origin(source: &Source, low: DVec3, high: DVec3) -> Result<DVec3> 
     let (center, extent) = (low * 0.5 + high * 0.5, (high * 0.5 - low * 0.5).max_element());
     let origin = if center.abs().max_element() > 16.0 * extent { center.round() } else { DVec3::ZERO };
     if (low - origin).abs().max((high - origin).abs()).max_element() > LARGEST {
-        return Err(source.error("positions", format!("spread from {low} to {high}, more than 32 bits can hold")));
+        return Err(source.error(
+            "positions",
+            format!("spread from {:?} to {:?}, more than 32 bits can hold", low.to_array(), high.to_array()),
+        ));
     }
     Ok(origin)
 }

@@ -49,6 +49,7 @@ pub fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
         return Err(source.error("size", message).hint(guess(bytes.len() as u64, layout)));
     }
     let header = layout.header as usize;
+    source.spend("the size of the samples in bytes", layout.sample_type.decoded_bytes(wanted - header))?;
     match &mut unpacked {
         Cow::Borrowed(bytes) => *bytes = &bytes[header..],
         Cow::Owned(bytes) => drop(bytes.drain(..header)),

@@ -76,6 +76,16 @@ impl SampleType {
         dims.iter().try_fold(self.bytes() as u64, |product, &n| product.checked_mul(n as u64))
     }
 
+    /// Bytes that `size` bytes of samples take when they are [decoded](Self::decode), at most.
+    pub fn decoded_bytes(self, size: usize) -> u64 {
+        let size = size as u64;
+        match self {
+            Self::I8 => size.saturating_mul(2),
+            Self::U64 | Self::I64 | Self::F64 => size.div_ceil(2),
+            _ => size,
+        }
+    }
+
     /// Samples from their bytes; bytes after the last whole sample are left out.
     ///
     /// Types that [`Samples`] has no place for become the nearest one: 8-bit signed integers become 16-bit ones; unsigned

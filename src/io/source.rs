@@ -1,13 +1,9 @@
 //! The guarded opening: every format reads its bytes through a [`Source`], which maps the file, holds the limits
 //! and gives errors that name the file.
 
-use super::Limits;
+use super::{LimitKind, Limits, budget::Budget};
 use crate::{Error, Result};
-use std::{
-    fs::File,
-    io::Read,
-    path::{Component, Path, PathBuf},
-};
+use std::{fs::File, io::Read, path::Path, sync::Arc};
 
 /// Gives the pages of a map of a file to the system.
 pub(super) fn release(map: &memmap2::Mmap) {
@@ -19,29 +15,43 @@ pub(super) fn release(map: &memmap2::Mmap) {
     let _ = map;
 }
 
+/// Bytes that are unpacked between two looks at the clock.
+const PORTION: u64 = 16 << 20;
+
 /// An opened input: its path, its bytes (mapped) and the limits that hold for it.
 pub struct Source<'a> {
     pub path: &'a Path,
     pub limits: &'a Limits,
     bytes: Option<memmap2::Mmap>,
+    /// Shared by all files of a model.
+    budget: Arc<Budget>,
 }
 
 impl<'a> Source<'a> {
-    /// Opens and maps a regular file. Directories, missing files and files over the byte limit are errors.
+    /// Opens and maps a regular file. Directories, devices, missing files and files over the byte limit are errors.
     pub fn open(path: &'a Path, limits: &'a Limits) -> Result<Self> {
+        Self::open_within(path, limits, Arc::new(Budget::new()))
+    }
+
+    /// Opens a file that this one refers to, at a path from [`neighbour`](Self::neighbour): both count as one.
+    pub(super) fn open_beside<'b>(&self, path: &'b Path) -> Result<Source<'b>>
+    where
+        'a: 'b,
+    {
+        Source::open_within(path, self.limits, self.budget.clone())
+    }
+
+    fn open_within(path: &'a Path, limits: &'a Limits, budget: Arc<Budget>) -> Result<Self> {
+        // Opening a pipe would wait for its other end, and opening a device may start it: so look first.
+        let look = std::fs::metadata(path).map_err(|e| Error::file(path, "open", e))?;
+        let regular = |meta: &std::fs::Metadata| {
+            if meta.is_file() { Ok(()) } else { Err(Error::input(path, "path", "is not a regular file")) }
+        };
+        regular(&look)?;
         let file = File::open(path).map_err(|e| Error::file(path, "open", e))?;
         let meta = file.metadata().map_err(|e| Error::file(path, "read", e))?;
-        if !meta.is_file() {
-            return Err(Error::input(path, "path", "is not a regular file"));
-        }
-        if meta.len() > limits.bytes {
-            return Err(Error::Limit {
-                file: path.to_owned(),
-                what: "the file's size in bytes".into(),
-                found: meta.len(),
-                limit: limits.bytes,
-            });
-        }
+        regular(&meta)?;
+        budget.spend(limits, path, "the file's size in bytes", meta.len())?;
         // SAFETY: the map is read only and lives as long as the source. A file that another process shortens while it
         // is mapped would raise SIGBUS; the readers copy what they need and drop the map right away.
         let bytes = if meta.len() == 0 {
@@ -49,7 +59,7 @@ impl<'a> Source<'a> {
         } else {
             Some(unsafe { memmap2::Mmap::map(&file) }.map_err(|e| Error::file(path, "map", e))?)
         };
-        Ok(Self { path, limits, bytes })
+        Ok(Self { path, limits, bytes, budget })
     }
 
     /// The whole file.
@@ -76,54 +86,64 @@ impl<'a> Source<'a> {
 
     /// Checks a claimed count against [`Limits::points`].
     pub fn check_points(&self, what: &str, count: u64) -> Result<usize> {
-        self.check(what, count, self.limits.points)
+        self.check(LimitKind::Points, what, count)
     }
 
-    /// Checks a claimed number of bytes against [`Limits::bytes`].
+    /// Checks a claimed number of bytes against [`Limits::bytes`], without taking them.
     pub fn check_bytes(&self, what: &str, bytes: u64) -> Result<usize> {
-        self.check(what, bytes, self.limits.bytes)
+        self.check(LimitKind::Bytes, what, bytes)
     }
 
-    fn check(&self, what: &str, found: u64, limit: u64) -> Result<usize> {
-        match usize::try_from(found) {
-            Ok(n) if found <= limit => Ok(n),
-            _ => Err(Error::Limit { file: self.path.to_owned(), what: what.into(), found, limit }),
-        }
+    /// Checks a depth of nesting against [`Limits::depth`].
+    pub(super) fn check_depth(&self, place: &str, depth: usize) -> Result<()> {
+        self.limits.check(LimitKind::Depth, self.path, format!("{place}: the depth of nesting"), depth as u64)
+    }
+
+    /// Checks that there is still time ([`Limits::seconds`]).
+    pub(super) fn check_time(&self) -> Result<()> {
+        self.budget.check_time(self.limits, self.path)
+    }
+
+    /// Lets the time begin again, for the next pieces of a file that is read in pieces.
+    pub(super) fn restart_time(&self) {
+        self.budget.restart();
+    }
+
+    /// Takes so many bytes from what this input may occupy ([`Limits::bytes`]).
+    pub(super) fn spend(&self, what: &str, bytes: u64) -> Result<()> {
+        self.budget.spend(self.limits, self.path, what, bytes)
+    }
+
+    /// As [`spend`](Self::spend), for an array: `what` names what it holds.
+    pub(super) fn room<T>(&self, what: &str, count: usize) -> Result<()> {
+        self.spend(&format!("the size of {what} in bytes"), (count as u64).saturating_mul(size_of::<T>() as u64))
+    }
+
+    fn check(&self, kind: LimitKind, what: &str, found: u64) -> Result<usize> {
+        self.limits.check(kind, self.path, what, found)?;
+        // A 32-bit machine counts less than a limit may allow.
+        usize::try_from(found).map_err(|_| self.error(what, format!("is {found}, more than this machine can count")))
     }
 
     /// Unpacks a stream whose unpacked size is known. A stream that ends early or holds more than `expected` is an
     /// error; memory grows with what was really unpacked, so a lying size allocates nothing.
     pub fn unpack(&self, place: &str, mut stream: impl Read, expected: usize) -> Result<Vec<u8>> {
-        self.check_bytes("the unpacked size in bytes", expected as u64)?;
+        self.spend("the unpacked size in bytes", expected as u64)?;
         let mut out = Vec::new();
-        stream
-            .by_ref()
-            .take(expected as u64 + 1)
-            .read_to_end(&mut out)
-            .map_err(|e| self.error(place, format!("cannot be unpacked after {} bytes: {e}", out.len())))?;
+        loop {
+            self.check_time()?;
+            let before = out.len();
+            let most = PORTION.min(expected as u64 + 1 - before as u64);
+            let read = stream.by_ref().take(most).read_to_end(&mut out);
+            read.map_err(|e| self.error(place, format!("cannot be unpacked after {} bytes: {e}", out.len())))?;
+            if out.len() == before || out.len() > expected {
+                break;
+            }
+        }
         if out.len() != expected {
             let found = if out.len() > expected { "more".to_owned() } else { out.len().to_string() };
             return Err(self.error(place, format!("unpacks to {found} bytes where {expected} were expected")));
         }
         Ok(out)
-    }
-
-    /// The path of a file that this file refers to: relative, and inside this file's folder after links are resolved.
-    pub fn neighbour(&self, place: &str, reference: &str) -> Result<PathBuf> {
-        let relative = Path::new(reference);
-        let plain = relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-        if !plain || reference.contains("://") {
-            return Err(self
-                .error(place, format!("refers to “{reference}”, which is not a path inside the file's own folder"))
-                .hint("put the file beside the one that names it and refer to it by a relative path"));
-        }
-        let folder = self.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let target = folder.join(relative);
-        let real = target.canonicalize().map_err(|e| self.error(place, format!("refers to “{reference}”: {e}")))?;
-        let home = folder.canonicalize().map_err(|e| Error::file(folder, "resolve", e))?;
-        if !real.starts_with(&home) {
-            return Err(self.error(place, format!("refers to “{reference}”, a link that leaves the file's own folder")));
-        }
-        Ok(target)
     }
 }

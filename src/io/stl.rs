@@ -1,7 +1,7 @@
 //! STL, binary and as text. Every triangle has three vertices of its own; those at one place are made one where surfels
 //! are made. The normals of the facets say nothing that the corners do not, and are passed over.
 
-use super::{Source, positions};
+use super::{Source, growing::Growing, positions};
 use crate::{Result, surface::Mesh};
 use glam::DVec3;
 
@@ -35,6 +35,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
             let message = format!("counts {count} facets, which need {size} bytes, but the file has {}", bytes.len());
             return Err(source.error("header", message).hint("the file is cut, or another format"));
         }
+        source.room::<[DVec3; 3]>("the corners", count as usize)?;
         (of_bytes(&bytes[HEADER + 4..], count as usize), Vec::new())
     };
     if corners.is_empty() {
@@ -45,6 +46,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
         None => format!("facet {}", corner / 3),
     };
     let (origin, positions) = positions::settle(source, corners.len(), |corner| corners[corner], place)?;
+    source.room::<u32>("the triangles", positions.len())?;
     let triangles = (0..positions.len() as u32 / 3).map(|facet| [0, 1, 2].map(|corner| facet * 3 + corner)).collect();
     Ok(Mesh { origin, positions, triangles, ..Mesh::default() })
 }
@@ -61,7 +63,8 @@ fn of_bytes(facets: &[u8], count: usize) -> Vec<DVec3> {
 /// The corners of a text, and the line of each. Of the words only `facet`, `vertex` and the ends of facets and solids
 /// matter; `solid` may have any name behind it.
 fn of_text(source: &Source) -> Result<(Vec<DVec3>, Vec<usize>)> {
-    let (mut corners, mut lines) = (Vec::new(), Vec::new());
+    let mut corners = Growing::new(source, "the corners");
+    let mut lines = Growing::new(source, "the places of the corners");
     let mut in_solid = false;
     let mut start = None;
     let mut last = 1;
@@ -81,8 +84,8 @@ fn of_text(source: &Source) -> Result<(Vec<DVec3>, Vec<usize>)> {
                 let (Some(x), Some(y), Some(z)) = (next(), next(), next()) else {
                     return Err(wrong("a vertex needs three numbers".into()));
                 };
-                corners.push(DVec3::new(x, y, z));
-                lines.push(number);
+                corners.push(DVec3::new(x, y, z))?;
+                lines.push(number)?;
                 source.check_points("the number of corners", corners.len() as u64 / 3)?;
             }
             ("endfacet", Some(first)) => {
@@ -100,7 +103,7 @@ fn of_text(source: &Source) -> Result<(Vec<DVec3>, Vec<usize>)> {
     if in_solid || start.is_some() {
         return Err(source.error(format!("line {last}"), "the file ends before “endsolid”: it is cut"));
     }
-    Ok((corners, lines))
+    Ok((corners.into_inner(), lines.into_inner()))
 }
 
 #[cfg(test)]

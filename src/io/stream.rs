@@ -215,6 +215,7 @@ impl<'a> Stream<'a> {
     ) -> Result<()> {
         let batch = 2 * rayon::current_num_threads();
         for first in (0..pieces).step_by(batch) {
+            self.source.restart_time();
             let made: Vec<Result<T>> = (first..(first + batch).min(pieces)).into_par_iter().map(&make).collect();
             for made in made {
                 take(made?)?;

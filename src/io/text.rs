@@ -4,9 +4,14 @@
 //! (The csv crate takes single bytes only, not runs of spaces.) Lines that are empty or begin with `#` or `//` are passed
 //! over, but for a first one that names the columns. Numbers have points, no decimal commas.
 
-use super::Source;
-use crate::Result;
+use super::{Source, growing::Growing};
+use crate::{Error, Result};
 use rayon::prelude::*;
+
+/// No table has more columns.
+const MOST_COLUMNS: usize = 4096;
+/// Rows that are read between two looks at the clock.
+const ROWS: usize = 1 << 12;
 
 /// A table whose lines are found but whose numbers are not read yet.
 pub(super) struct Text<'a> {
@@ -23,18 +28,28 @@ pub(super) struct Text<'a> {
 
 impl<'a> Text<'a> {
     /// Finds the lines of a file. Those that `skip` tells are passed over.
-    pub fn of(source: &'a Source, skip: impl Fn(usize, &[u8]) -> bool) -> Result<Self> {
-        let mut lines: Vec<(usize, &[u8])> = Vec::new();
+    pub fn of(source: &'a Source, mut skip: impl FnMut(usize, &[u8]) -> Result<bool>) -> Result<Self> {
+        let mut lines: Growing<(usize, &[u8])> = Growing::new(source, "the places of the lines");
         for (number, line) in (1..).zip(without_mark(source.bytes()).split(|&b| b == b'\n')) {
             let line = line.trim_ascii();
-            if is_row(line, lines.is_empty()) && !skip(number, line) {
-                lines.push((number, line));
+            if is_row(line, lines.is_empty()) && !skip(number, line)? {
+                lines.push((number, line))?;
             }
         }
         source.check_points("the number of lines", lines.len() as u64)?;
         let Some(&(first, line)) = lines.first() else { return Err(source.error("file", "holds no lines of numbers")) };
+        let mut lines = lines.into_inner();
         let (separator, words) = split(line);
+        if words.len() > MOST_COLUMNS {
+            return Err(source.error(format!("line {first}"), format!("has more than {MOST_COLUMNS} columns")));
+        }
         let names = has_names(&words).then(|| words.clone());
+        if names.is_some() && !line.iter().any(|b| b.is_ascii_alphabetic() || !b.is_ascii()) {
+            let shown = String::from_utf8_lossy(line).chars().take(40).collect::<String>();
+            return Err(source
+                .error(format!("line {first}"), format!("{shown:?} is neither numbers nor names of columns"))
+                .hint("numbers have points, no decimal commas"));
+        }
         if names.is_some() {
             lines.remove(0);
         }
@@ -55,8 +70,17 @@ impl<'a> Text<'a> {
     /// anything.
     pub fn numbers(&self, source: &Source, asked: impl Fn(usize) -> bool + Sync) -> Result<Vec<f64>> {
         let width = self.width;
-        let mut table = vec![0.0f64; self.rows.len() * width];
-        table.par_chunks_mut(width).zip(&self.rows).try_for_each(|(row, &(number, line))| {
+        // Each number takes a byte at least. Where they cannot all be there, some line is too short.
+        let numbers = self.rows.len().saturating_mul(width);
+        if numbers > source.bytes().len() {
+            self.check_widths(source)?;
+        }
+        source.room::<f64>("the numbers", numbers)?;
+        let mut table = vec![0.0f64; numbers];
+        table.par_chunks_mut(width).zip(&self.rows).enumerate().try_for_each(|(index, (row, &(number, line)))| {
+            if index.is_multiple_of(ROWS) {
+                source.check_time()?;
+            }
             let place = || format!("line {number}");
             let mut count = 0;
             for word in words(line, self.separator) {
@@ -65,7 +89,8 @@ impl<'a> Text<'a> {
                     let text = text.trim_matches('"');
                     *slot = text.parse().map_err(|_| {
                         let shown: String = text.chars().take(40).collect();
-                        source.error(place(), format!("“{shown}” is not a number"))
+                        let error = source.error(place(), format!("“{shown}” is not a number"));
+                        if shown.contains(',') { error.hint("numbers have points, no decimal commas") } else { error }
                     })?;
                     if !slot.is_finite() {
                         return Err(source.error(place(), format!("number {} is {slot}", count + 1)));
@@ -73,12 +98,21 @@ impl<'a> Text<'a> {
                 }
                 count += 1;
             }
-            if count != width {
-                return Err(source.error(place(), format!("has {count} columns, but the first line has {width}")));
-            }
-            Ok(())
+            if count != width { Err(self.wrong_width(source, number, count)) } else { Ok(()) }
         })?;
         Ok(table)
+    }
+
+    fn check_widths(&self, source: &Source) -> Result<()> {
+        self.rows.iter().try_for_each(|&(number, line)| {
+            let count = words(line, self.separator).count();
+            if count != self.width { Err(self.wrong_width(source, number, count)) } else { Ok(()) }
+        })
+    }
+
+    fn wrong_width(&self, source: &Source, line: usize, count: usize) -> Error {
+        let message = format!("has {count} columns, but the first line has {}", self.width);
+        source.error(format!("line {line}"), message)
     }
 }
 
@@ -116,7 +150,8 @@ fn has_names(words: &[String]) -> bool {
 fn split(line: &[u8]) -> (Option<u8>, Vec<String>) {
     let separator = [b';', b',', b'\t'].into_iter().find(|separator| line.contains(separator));
     let name = |word: &[u8]| String::from_utf8_lossy(word).trim_matches('"').trim().to_owned();
-    (separator, words(line, separator).map(name).collect())
+    // One more than there may be tells that there are too many.
+    (separator, words(line, separator).take(MOST_COLUMNS + 1).map(name).collect())
 }
 
 /// The words of a line; a comment's sign is none.

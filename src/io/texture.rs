@@ -1,28 +1,31 @@
 //! Pictures that a mesh refers to, decoded under the limits.
 
-use super::Source;
-use crate::{Error, Result, surface::Texture};
-use std::{
-    io::Cursor,
-    path::{Component, Path, PathBuf},
-    sync::Arc,
-};
+use super::{LimitKind, Source, isolate::isolated, neighbour::is_inside};
+use crate::{Result, surface::Texture};
+use std::{io::Cursor, path::PathBuf, sync::Arc};
+
+/// Texels that a byte can stand for at most: deflate makes 1032 bytes of one, and a byte may hold 8 grey texels.
+const MOST_TEXELS: u64 = 8 * 1032;
+/// Bytes that a texel takes on the way: 16 bits a channel as the decoder gives it, 8 as a picture and as a texture.
+const TEXEL: u64 = 8 + 4 + 4;
 
 /// Decodes a PNG or JPEG picture. `place` names what refers to it.
 pub(super) fn decode(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture>> {
+    isolated(source, place, || decode_here(source, place, bytes))
+}
+
+fn decode_here(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture>> {
     let broken = |e: image::ImageError| source.error(place, format!("the picture cannot be decoded: {e}"));
     let reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| broken(e.into()))?;
     let mut decoder = reader.into_decoder().map_err(broken)?;
     let (width, height) = image::ImageDecoder::dimensions(&decoder);
     let texels = u64::from(width) * u64::from(height);
-    if texels > source.limits.texels {
-        return Err(Error::Limit {
-            file: source.path.to_owned(),
-            what: format!("{place}: the number of texels"),
-            found: texels,
-            limit: source.limits.texels,
-        });
+    source.limits.check(LimitKind::Texels, source.path, format!("{place}: the number of texels"), texels)?;
+    if texels > (bytes.len() as u64).saturating_mul(MOST_TEXELS) {
+        let message = format!("the picture claims {width} × {height} texels, more than {} bytes can hold", bytes.len());
+        return Err(source.error(place, message));
     }
+    source.spend("the size of a picture in bytes", texels * TEXEL)?;
     let mut limits = image::Limits::default();
     // Room for 16 bits a channel and the decoder's own copy.
     limits.max_alloc = Some((texels * 16).saturating_add(1 << 20));
@@ -38,19 +41,17 @@ pub(super) fn decode(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<T
 /// Reads the picture that a file refers to. `None`, with a warning, where there is no such file.
 pub(super) fn read_reference(source: &Source, place: &str, reference: &str) -> Result<Option<Arc<Texture>>> {
     let Some(path) = find(source, place, reference)? else { return Ok(None) };
-    let file = Source::open(&path, source.limits)?;
+    let file = source.open_beside(&path)?;
     decode(&file, place, file.bytes()).map(Some)
 }
 
 /// The path of a file that may be missing: `None`, with a warning, where a proper reference leads to no file.
 pub(super) fn find(source: &Source, place: &str, reference: &str) -> Result<Option<PathBuf>> {
     let reference = reference.replace('\\', "/");
-    let inside = Path::new(&reference).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
     match source.neighbour(place, &reference) {
         Ok(path) => Ok(Some(path)),
         Err(_)
-            if inside
-                && !reference.contains("://")
+            if is_inside(&reference)
                 && source.path.parent().is_some_and(|folder| !folder.join(&reference).exists()) =>
         {
             tracing::warn!("{}: {place}: “{reference}” does not exist; drawn without it", source.path.display());

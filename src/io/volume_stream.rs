@@ -60,7 +60,7 @@ impl VolumeStream {
             SampleType::F32 | SampleType::F64 => Scalar::F32,
             SampleType::U32 | SampleType::U64 | SampleType::I64 => return Ok(None),
         };
-        let map = Source::open(&plain.path, limits)?.into_map();
+        let map = if plain.path == path { source } else { source.open_beside(&plain.path)? }.into_map();
         let bytes =
             plain.sample_type.bytes_of(plain.lattice.dims).and_then(|bytes| bytes.checked_add(plain.start as u64));
         Ok(map.filter(|map| bytes.is_some_and(|bytes| bytes <= map.len() as u64)).map(|map| Self {

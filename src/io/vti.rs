@@ -21,6 +21,7 @@ pub fn read(source: &Source) -> Result<Volume> {
     let whole = whole_extent(source, &document, "ImageData")?;
     let lattice = lattice(source, &document, whole)?;
     let part = samples(source, &document, whole)?;
+    source.spend("the size of the samples in bytes", part.kind.decoded_bytes(part.bytes.len()))?;
     let samples = part.kind.decode(part.bytes, part.endian);
     Volume::new(lattice, samples).map_err(|message| source.error("samples", message))
 }
@@ -95,6 +96,8 @@ fn assemble<'a>(source: &Source, whole: Extent, parts: Vec<(Extent, Part<'a>)>) 
         return parts.pop().map(|(_, part)| part).ok_or_else(|| wrong("is missing"));
     }
     let width = kind.bytes();
+    // Bytes, and whether there are any.
+    source.spend("the size of the samples in bytes", count.saturating_mul(1 + width as u64))?;
     let mut bytes = vec![0; count as usize * width];
     let mut filled = vec![false; count as usize];
     for (extent, part) in &parts {

@@ -15,6 +15,9 @@ use crate::{
 use glam::{DMat3, DVec3};
 use parser::Parser;
 
+/// Words of a line that are looked at.
+const MOST_WORDS: usize = 16;
+
 /// A data set as the file has it.
 #[derive(Default)]
 struct DataSet<'a> {
@@ -66,6 +69,7 @@ pub fn read_volume(source: &Source) -> Result<Volume> {
             .hint("values of cells are not read; turn them into values of points"));
     }
     let (_, part) = data.points.arrays.swap_remove(0);
+    source.spend("the size of the samples in bytes", part.kind.decoded_bytes(part.bytes.len()))?;
     let samples = part.kind.decode(part.bytes, part.endian);
     let volume = if data.kind == "RECTILINEAR_GRID" {
         let found = data.places.each_ref().map(|places| places.len() as u64);
@@ -100,11 +104,11 @@ pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
     };
     if let Some(index) = wanted(&data.points) {
         count("POINT_DATA", data.cells.points.len(), &data.points)?;
-        return data.cells.samples_at_points(source, data.points.arrays[index].1.doubles());
+        return data.cells.samples_at_points(source, data.points.arrays[index].1.doubles(source)?);
     }
     if let Some(index) = wanted(&data.of_cells) {
         count("CELL_DATA", data.cells.ends.len(), &data.of_cells)?;
-        return data.cells.samples_at_centres(source, data.of_cells.arrays[index].1.doubles());
+        return data.cells.samples_at_centres(source, data.of_cells.arrays[index].1.doubles(source)?);
     }
     let arrays = data.points.arrays.iter().chain(&data.of_cells.arrays);
     let names: Vec<&str> = arrays.map(|(name, _)| name.as_str()).collect();
@@ -118,8 +122,10 @@ impl<'a> DataSet<'a> {
         // The data that attributes belong to: none, points or cells.
         let mut attributes: Option<bool> = None;
         while let Some((place, line)) = parser.line()? {
-            let words: Vec<&str> = line.split_ascii_whitespace().collect();
+            // No keyword has more words behind it.
+            let words: Vec<&str> = line.split_ascii_whitespace().take(MOST_WORDS).collect();
             let wrong = |message: String| source.error(place.clone(), message);
+            source.check_time()?;
             let keyword = words[0].to_ascii_uppercase();
             match (keyword.as_str(), &words[1..]) {
                 ("DIMENSIONS", sizes) => data.dims = parser.three(&place, sizes)?,
@@ -129,16 +135,18 @@ impl<'a> DataSet<'a> {
                 }
                 ("X_COORDINATES" | "Y_COORDINATES" | "Z_COORDINATES", [count, kind]) => {
                     let axis = usize::from(keyword.as_bytes()[0] - b'X');
-                    data.places[axis] = parser.array(&place, parser.count(&place, count)?, kind)?.doubles();
+                    data.places[axis] = parser.array(&place, parser.count(&place, count)?, kind)?.doubles(source)?;
                 }
                 ("POINTS", [count, kind]) => {
                     let count = parser.count(&place, count)?;
-                    let numbers = parser.array(&place, count.saturating_mul(3), kind)?.doubles();
+                    let numbers = parser.array(&place, count.saturating_mul(3), kind)?.doubles(source)?;
+                    source.room::<DVec3>("the points", count)?;
                     data.cells.points = numbers.chunks_exact(3).map(DVec3::from_slice).collect();
                 }
                 ("CELLS" | "VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS", [count, size]) => {
                     let (count, size) = (parser.count(&place, count)?, parser.count(&place, size)?);
                     let (corners, ends) = parser.cells(&place, count, size)?;
+                    data.cells.room(source, corners.len(), ends.len())?;
                     data.cells.add(&corners, &ends, 0).map_err(wrong)?;
                 }
                 ("CELL_TYPES", [count]) => drop(parser.array(&place, parser.count(&place, count)?, "int")?),

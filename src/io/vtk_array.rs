@@ -63,6 +63,7 @@ impl ArrayEncoding {
         let sizes_end = blocks.checked_add(3).and_then(|n| n.checked_mul(self.count_bytes() as u64));
         let sizes_end = sizes_end.filter(|&end| end <= bytes.len() as u64).ok_or_else(cut)? as usize;
         let mut rest = &bytes[sizes_end..];
+        source.room::<&[u8]>("the places of the blocks", blocks as usize)?;
         let mut packed = Vec::with_capacity(blocks as usize);
         for i in 0..blocks as usize {
             let length = head(3 + i)?;
@@ -77,9 +78,11 @@ impl ArrayEncoding {
         if present.saturating_mul(DEFLATE_RATIO) < size as u64 {
             return Err(wrong(format!("claims {size} bytes, which {present} packed ones cannot hold")));
         }
+        source.spend("the unpacked size in bytes", size as u64)?;
         let mut unpacked = vec![0; size];
         // `size` is over 0, so `block` is; with `last` at most `block` there are as many parts as blocks.
         unpacked.par_chunks_mut(block as usize).zip(packed).enumerate().try_for_each(|(i, (part, packed))| {
+            source.check_time()?;
             let mut stream = ZlibDecoder::new(packed);
             stream.read_exact(part).map_err(|e| wrong(format!("block {i} cannot be unpacked: {e}")))?;
             match stream.read(&mut [0]) {
@@ -110,6 +113,7 @@ impl ArrayEncoding {
 /// Bytes from base64 with any white space in it. The counts may be encoded apart from the data that follow them, so
 /// padding may stand inside.
 pub fn from_base64(source: &Source, place: &str, text: &[u8]) -> Result<Vec<u8>> {
+    source.spend("the size of base64 in bytes", 2 * text.len() as u64)?;
     let clean: Vec<u8> = text.iter().copied().filter(|b| !b.is_ascii_whitespace()).collect();
     let mut bytes = Vec::with_capacity(clean.len() / 4 * 3);
     let mut rest = &clean[..];

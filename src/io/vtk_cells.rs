@@ -22,6 +22,12 @@ pub(super) struct Cells {
 }
 
 impl Cells {
+    /// Takes what more cells will occupy, with the samples at their centres.
+    pub fn room(&self, source: &Source, corners: usize, cells: usize) -> Result<()> {
+        source.room::<[usize; 2]>("the corners of the cells", corners)?;
+        source.room::<(usize, [DVec3; 2], f64)>("the cells", cells)
+    }
+
     /// Adds cells by numbers as files have them: corners count from `first_point`, ends from the first of these corners.
     ///
     /// # Errors

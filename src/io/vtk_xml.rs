@@ -12,6 +12,9 @@ use quick_xml::{
 };
 use std::{borrow::Cow, collections::HashMap};
 
+/// Bytes that an element takes with the names and the places of a few attributes.
+const ELEMENT: u64 = 1024;
+
 /// First and last index along each axis, both included.
 pub type Extent = [[i64; 2]; 3];
 
@@ -25,7 +28,7 @@ pub struct Document<'a> {
     pub attributes: Attributes,
     pub pieces: Vec<Piece<'a>>,
     encoding: ArrayEncoding,
-    /// Where appended arrays begin.
+    /// Where appended arrays begin, in ascending order.
     offsets: Vec<usize>,
     appended: Option<Appended<'a>>,
 }
@@ -63,8 +66,9 @@ impl Part<'_> {
         self.bytes.len() / self.kind.bytes()
     }
 
-    pub fn doubles(&self) -> Vec<f64> {
-        self.kind.doubles(&self.bytes, self.endian)
+    pub fn doubles(&self, source: &Source) -> Result<Vec<f64>> {
+        source.room::<f64>("the numbers", self.len())?;
+        Ok(self.kind.doubles(&self.bytes, self.endian))
     }
 }
 
@@ -91,6 +95,7 @@ impl<'a> Document<'a> {
             appended,
         };
         document.walk(xml, kind)?;
+        document.offsets.sort_unstable();
         if document.pieces.is_empty() {
             return Err(source.error("XML", format!("holds no piece of {kind}")));
         }
@@ -101,12 +106,24 @@ impl<'a> Document<'a> {
         let source = self.source;
         let mut reader = Reader::from_str(xml);
         reader.config_mut().expand_empty_elements = true;
+        let mut depth = 0;
         // The section that is being read, and the array in it with how many elements inside that are open.
         let mut section: Option<Section> = None;
         let mut array: Option<(Array, usize)> = None;
         loop {
             let at = reader.buffer_position();
-            match reader.read_event().map_err(|e| source.error(format!("byte {at}"), format!("is no XML: {e}")))? {
+            let event = reader.read_event();
+            match &event {
+                Ok(Event::Start(_)) => {
+                    depth += 1;
+                    source.check_depth(&format!("byte {at}"), depth)?;
+                    source.spend("the size of the elements in bytes", ELEMENT)?;
+                    source.check_time()?;
+                }
+                Ok(Event::End(_)) => depth -= 1,
+                _ => {}
+            }
+            match event.map_err(|e| source.error(format!("byte {at}"), format!("is no XML: {e}")))? {
                 Event::Start(tag) => match (&mut array, &section) {
                     (Some((_, depth)), _) => *depth += 1,
                     (None, inside) => {
@@ -175,6 +192,7 @@ impl<'a> Document<'a> {
         let packed = match array.get("format").unwrap_or("ascii") {
             "ascii" => {
                 endian = Endian::Little;
+                source.spend("the size of the numbers in bytes", size as u64)?;
                 let bytes =
                     kind.parse(&array.text, size / kind.bytes()).map_err(|message| source.error(&place, message))?;
                 return Ok(Part { kind, endian, bytes: bytes.into() });
@@ -306,7 +324,8 @@ impl<'a> Appended<'a> {
         if !self.base64 {
             return Ok(data.into());
         }
-        let next = offsets.iter().filter(|&&other| other > offset).min().map_or(usize::MAX, |next| next - offset);
+        let next = offsets.get(offsets.partition_point(|&other| other <= offset));
+        let next = next.map_or(usize::MAX, |next| next - offset);
         Ok(from_base64(source, place, &data[..data.len().min(next)])?.into())
     }
 }
@@ -343,7 +362,8 @@ pub fn number<T: std::str::FromStr>(source: &Source, place: &str, text: &str) ->
 }
 
 pub fn numbers<const N: usize, T: std::str::FromStr>(source: &Source, place: &str, text: &str) -> Result<[T; N]> {
-    let numbers: Result<Vec<T>> = text.split_ascii_whitespace().map(|word| number(source, place, word)).collect();
+    let numbers: Result<Vec<T>> =
+        text.split_ascii_whitespace().take(N + 1).map(|word| number(source, place, word)).collect();
     numbers?.try_into().map_err(|_| source.error(place, format!("“{text}” is not a list of {N} numbers")))
 }
 

@@ -21,6 +21,7 @@ pub fn read(source: &Source) -> Result<Volume> {
     let part = vti::samples(source, &document, whole)?;
     // The samples were there, so the extent is no lie and lists along its axes are small beside them.
     let places = coordinates(source, &document, whole)?;
+    source.spend("the size of the samples in bytes", part.kind.decoded_bytes(part.bytes.len()))?;
     let samples = part.kind.decode(part.bytes, part.endian);
     volume(places, samples).map_err(|message| source.error("RectilinearGrid", message))
 }
@@ -34,7 +35,9 @@ pub(super) fn volume(places: [Vec<f64>; 3], samples: crate::volume::Samples) -> 
 
 /// The coordinates along each axis, put together from all pieces.
 fn coordinates(source: &Source, document: &Document, whole: Extent) -> Result<[Vec<f64>; 3]> {
-    let mut places = dims(source, &whole)?.map(|count| vec![f64::NAN; count]);
+    let counts = dims(source, &whole)?;
+    source.room::<f64>("the coordinates", counts.iter().sum())?;
+    let mut places = counts.map(|count| vec![f64::NAN; count]);
     for piece in &document.pieces {
         let extent = match piece.attributes.get("Extent") {
             Some(text) => extent(source, "Piece", text)?,
@@ -50,7 +53,7 @@ fn coordinates(source: &Source, document: &Document, whole: Extent) -> Result<[V
             let part = document.part(array, count as u64)?;
             // Pieces lie inside the whole: their samples were put together before.
             let first = (extent[axis][0] - whole[axis][0]) as usize;
-            places[axis][first..first + count].copy_from_slice(&part.doubles());
+            places[axis][first..first + count].copy_from_slice(&part.doubles(source)?);
         }
     }
     Ok(places)

@@ -50,7 +50,7 @@ pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
         let array = piece.section(section).array(&name);
         if count > 0 {
             let array = array.ok_or_else(|| source.error(section, format!("has no array “{name}” in every piece")))?;
-            values.extend(document.part(array, count)?.doubles());
+            values.extend(document.part(array, count)?.doubles(source)?);
         }
     }
     if of_cells { cells.samples_at_centres(source, values) } else { cells.samples_at_points(source, values) }
@@ -87,7 +87,8 @@ fn add_points(source: &Source, document: &Document, piece: &Piece, count: u64, c
         let message = format!("has {} components, but positions have 3", array.components());
         return Err(source.error(array.place(), message));
     }
-    let numbers = document.part(array, count.saturating_mul(3))?.doubles();
+    let numbers = document.part(array, count.saturating_mul(3))?.doubles(source)?;
+    source.room::<[DVec3; 2]>("the points", count as usize)?;
     cells.points.extend(numbers.chunks_exact(3).map(DVec3::from_slice));
     Ok(())
 }
@@ -101,9 +102,10 @@ fn add_cells(
     cells: &mut Cells,
 ) -> Result<()> {
     let need = |name: &str| section.array(name).ok_or_else(|| source.error("Cells", format!("hold no array “{name}”")));
-    let ends = document.part(need("offsets")?, count)?.doubles();
+    let ends = document.part(need("offsets")?, count)?.doubles(source)?;
     // The last offset is the number of corners; the cast saturates.
-    let corners = document.part(need("connectivity")?, ends.last().map_or(0, |&end| end as u64))?.doubles();
+    let corners = document.part(need("connectivity")?, ends.last().map_or(0, |&end| end as u64))?.doubles(source)?;
+    cells.room(source, corners.len(), ends.len())?;
     cells.add(&corners, &ends, first_point).map_err(|message| source.error("Cells", message))
 }
 

@@ -4,11 +4,14 @@
 use super::{
     Source,
     cloud::{Cloud, greys},
+    growing::Growing,
     text::{Text, first_words},
 };
 use crate::{Result, surface::Mesh};
 use glam::{DVec3, Vec3};
-use std::cell::RefCell;
+
+/// Bytes that a point takes with all that it may have.
+const POINT: u64 = 24 + 12 + 8;
 
 /// The names of what a point has; names are compared without regard to case.
 const POSITION: [&[&str]; 3] = [&["x"], &["y"], &["z"]];
@@ -28,15 +31,11 @@ const INTENSITY: &[&str] = &["intensity", "i", "grey", "gray", "reflectance"];
 /// number, numbers that are not finite, and fewer points than the file counts; [`Error::Limit`](crate::Error::Limit) for more
 /// lines than points are allowed.
 pub fn read(source: &Source) -> Result<Mesh> {
-    let counts = RefCell::new(Vec::new());
+    let mut counts = Growing::new(source, "the counts");
     let text = Text::of(source, |number, line| match std::str::from_utf8(line).map(str::parse::<u64>) {
-        Ok(Ok(count)) => {
-            counts.borrow_mut().push((number, count));
-            true
-        }
-        _ => false,
+        Ok(Ok(count)) => counts.push((number, count)).map(|()| true),
+        _ => Ok(false),
     })?;
-    let counts = counts.into_inner();
     let counted = counts.iter().fold(0u64, |sum, &(_, count)| sum.saturating_add(count));
     if let Some(&(line, _)) = counts.first().filter(|_| counted != text.len() as u64) {
         return Err(source
@@ -66,6 +65,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
                 .hint("name the columns in the first line"));
         }
     }
+    source.spend("the size of the points in bytes", POINT * text.len() as u64)?;
     let positions = rows().map(|row| three(row, layout.position)).collect();
     let mut cloud = Cloud { positions, z_is_up: true, ..Cloud::default() };
     if let Some(columns) = layout.normal {

@@ -80,7 +80,7 @@ impl Default for Shade {
 const OPAQUE: f64 = 0.9999;
 
 /// A transfer file of a megabyte is no transfer file.
-const FILE_LIMIT: u64 = 1 << 20;
+const MOST_BYTES: usize = 1 << 20;
 
 /// The form of the JSON.
 #[derive(Serialize, Deserialize)]
@@ -141,9 +141,13 @@ impl TransferFunction {
     ///
     /// # Errors
     /// [`Error::File`] and [`Error::Limit`] as for every input; [`Error::Input`] for what is no transfer function.
-    pub fn read(path: &Path) -> Result<Self> {
-        let limits = Limits { bytes: FILE_LIMIT, ..Limits::default() };
-        let source = Source::open(path, &limits)?;
+    pub fn read(path: &Path, limits: &Limits) -> Result<Self> {
+        let source = Source::open(path, limits)?;
+        let size = source.bytes().len();
+        if size > MOST_BYTES {
+            let message = format!("has {size} bytes, but a transfer function has {MOST_BYTES} at most");
+            return Err(source.error("transfer function", message));
+        }
         let text = std::str::from_utf8(source.bytes())
             .map_err(|e| source.error(format!("byte {}", e.valid_up_to()), "is not UTF-8 text"))?;
         Self::from_json(text).map_err(|message| {

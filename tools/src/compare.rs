@@ -1,8 +1,8 @@
 //! `splatkit compare`.
 
-use crate::{failure::Failure, output, parse};
+use crate::{failure::Failure, limits::LimitFlags, output, parse};
 use clap::Args;
-use splatkit::{Error, compare::compare_files, io::Limits};
+use splatkit::{Error, compare::compare_files};
 use std::path::PathBuf;
 
 #[derive(Args, Debug)]
@@ -14,6 +14,8 @@ pub struct Compare {
     /// Fails with exit code 5 where the PSNR, in dB, is lower.
     #[arg(long, value_name = "DECIBELS", value_parser = parse::finite, allow_hyphen_values = true)]
     threshold: Option<f64>,
+    #[command(flatten)]
+    limits: LimitFlags,
     /// Writes JSON.
     #[arg(long)]
     json: bool,
@@ -21,7 +23,7 @@ pub struct Compare {
 
 impl Compare {
     pub fn run(self) -> Result<(), Failure> {
-        let found = compare_files(&self.a, &self.b, &Limits::default()).map_err(|error| match error {
+        let found = compare_files(&self.a, &self.b, &self.limits.limits()).map_err(|error| match error {
             // Of all that can be wrong with arguments, here it can only be the sizes: the pictures differ.
             Error::Argument(message) => Failure::Comparison(message),
             other => other.into(),

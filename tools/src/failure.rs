@@ -1,5 +1,6 @@
 //! What can go wrong, the exit code of each, and how it is told.
 
+use crate::limits;
 use splatkit::Error;
 use std::{
     fmt,
@@ -44,9 +45,7 @@ impl Failure {
     fn hint(&self) -> Option<&str> {
         match self {
             Self::Library(Error::Input { hint, .. }) => hint.as_deref(),
-            Self::Library(Error::Limit { .. }) => {
-                Some("raise --limit-points or --limit-bytes if the file can be trusted")
-            }
+            Self::Library(Error::Limit { kind, .. }) => Some(limits::hint(*kind)),
             Self::Library(Error::NoAdapter(_)) => {
                 Some("`splatkit gpus` lists what there is; `--reference` needs no GPU")
             }

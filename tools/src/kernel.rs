@@ -30,10 +30,10 @@ pub struct KernelFlags {
 const NAMES: [&str; 3] = ["gaussian", "b-spline", "hann"];
 
 /// A table of this many bytes is no kernel.
-const FILE_LIMIT: u64 = 4 << 20;
+const MOST_BYTES: usize = 4 << 20;
 
 impl KernelFlags {
-    pub fn kernel(&self) -> Result<Kernel, Failure> {
+    pub fn kernel(&self, limits: &Limits) -> Result<Kernel, Failure> {
         let name = self.kernel.as_deref().unwrap_or("gaussian");
         if self.sigma.is_some() && name != "gaussian" {
             return Err(Failure::Usage(format!("--sigma is the Gaussian's; the kernel {name} has none")));
@@ -46,7 +46,7 @@ impl KernelFlags {
                 let extent = self.extent.ok_or_else(|| {
                     Failure::Usage(format!("{file}: a kernel of one's own needs --extent, where its last value lies"))
                 })?;
-                Kernel::table(read_table(Path::new(file))?, extent)?
+                Kernel::table(read_table(Path::new(file), limits)?, extent)?
             }
             _ => {
                 let names = NAMES.join(", ");
@@ -70,9 +70,13 @@ impl KernelFlags {
 }
 
 /// The numbers of a JSON array, or of lines.
-fn read_table(path: &Path) -> splatkit::Result<Vec<f64>> {
-    let limits = Limits { bytes: FILE_LIMIT, ..Limits::default() };
-    let source = Source::open(path, &limits)?;
+fn read_table(path: &Path, limits: &Limits) -> splatkit::Result<Vec<f64>> {
+    let source = Source::open(path, limits)?;
+    let size = source.bytes().len();
+    if size > MOST_BYTES {
+        let message = format!("has {size} bytes, but the table of a kernel has {MOST_BYTES} at most");
+        return Err(source.error("kernel", message));
+    }
     let text = std::str::from_utf8(source.bytes())
         .map_err(|e| source.error(format!("byte {}", e.valid_up_to()), "is not UTF-8 text"))?;
     if text.trim_start().starts_with('[') {

@@ -1,6 +1,6 @@
 //! Opening an input of any kind: by its extension, then by its first bytes.
 
-use crate::{failure::Failure, parse};
+use crate::{failure::Failure, limits::LimitFlags, parse};
 use clap::Args;
 use glam::DVec3;
 use splatkit::{
@@ -55,22 +55,13 @@ pub struct LoadFlags {
     /// Scattered samples: mean values alone, without slopes fitted to the neighbours.
     #[arg(long)]
     no_slopes: bool,
-    /// Vertices, points or faces that a file may claim.
-    #[arg(long, value_name = "COUNT")]
-    limit_points: Option<u64>,
-    /// Bytes that a file may take up, packed and unpacked.
-    #[arg(long, value_name = "BYTES")]
-    limit_bytes: Option<u64>,
+    #[command(flatten)]
+    limits: LimitFlags,
 }
 
 impl LoadFlags {
     pub fn limits(&self) -> Limits {
-        let limits = Limits::default();
-        Limits {
-            points: self.limit_points.unwrap_or(limits.points),
-            bytes: self.limit_bytes.unwrap_or(limits.bytes),
-            ..limits
-        }
+        self.limits.limits()
     }
 
     /// Reads a file.

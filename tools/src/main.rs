@@ -16,6 +16,7 @@ mod generate;
 mod gpus;
 mod info;
 mod kernel;
+mod limits;
 mod load;
 mod method;
 mod output;

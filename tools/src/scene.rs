@@ -51,7 +51,7 @@ impl SceneFlags {
     /// Reads the inputs and makes a scene of them.
     pub fn load(&self, progress: &Progress) -> Result<Loaded, Failure> {
         let start = Instant::now();
-        let show = self.show.open()?;
+        let show = self.show.open(&self.load.limits())?;
         let mut loaded = Loaded {
             scene: Scene::new(),
             subject: Subject { bounds: Bounds::EMPTY, up: DVec3::Z },

@@ -4,6 +4,7 @@ use crate::{failure::Failure, kernel::KernelFlags, parse};
 use clap::Args;
 use splatkit::{
     Error,
+    io::Limits,
     math::Kernel,
     volume::{Isosurface, TransferFunction},
 };
@@ -64,11 +65,11 @@ enum Transfer<'a> {
 }
 
 impl ShowFlags {
-    pub fn open(&self) -> Result<Show<'_>, Failure> {
+    pub fn open(&self, limits: &Limits) -> Result<Show<'_>, Failure> {
         let transfer = match &self.transfer {
             None => Transfer::Automatic,
             Some(file) if !TransferFunction::NAMES.contains(&file.as_str()) && is_file(file) => {
-                Transfer::Read(TransferFunction::read(Path::new(file))?)
+                Transfer::Read(TransferFunction::read(Path::new(file), limits)?)
             }
             Some(name) => {
                 // What is no name is told here; the range comes with the volume.
@@ -84,7 +85,7 @@ impl ShowFlags {
         if count > most {
             return Err(Failure::Usage(format!("{count} isosurfaces are more than {most}")));
         }
-        Ok(Show { flags: self, kernel: self.kernel.kernel()?, sharp: self.kernel.is_sharp(), transfer })
+        Ok(Show { flags: self, kernel: self.kernel.kernel(limits)?, sharp: self.kernel.is_sharp(), transfer })
     }
 }
 

@@ -32,6 +32,15 @@ fn folder(name: &str) -> Folder {
     folder.put("gone.csv", "x,y,z,red,green\n1,2,3,4,5\n");
     let fields = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\n";
     folder.put("many.pcd", format!("{fields}POINTS 4294967295\nDATA binary\n0123456789"));
+    folder.put("comma.xyz", "1,5 2,5 3,5\n");
+    folder.put("comma.obj", "v 1,5 2,5 3,5\nf 1 1 1\n");
+    folder.put("corner.obj", "v 0 0 0\nf 1\n");
+    folder.put("lists.json", format!("{{\"color\": {}", "[".repeat(100_000)));
+    folder.put("lists.gltf", "[".repeat(100_000));
+    folder.put(
+        "list.nhdr",
+        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 1\nencoding: raw\ndata file: LIST\n../a.raw\n",
+    );
     folder.put("none.pcd", format!("{fields}POINTS 1\nDATA ascii\nnan nan nan\n"));
     folder.put(
         "crossed.nrrd",
@@ -79,6 +88,13 @@ const WRONG: &[(&str, i32, &str)] = &[
         "many.pcd: the size of the points in bytes is 51539607540, over the limit",
     ),
     ("none.pcd", 3, "none.pcd: file: holds no points"),
+    ("comma.xyz", 3, "is neither numbers nor names of columns"),
+    ("comma.xyz", 3, "numbers have points, no decimal commas"),
+    ("comma.obj", 3, "comma.obj: line 1: “1,5” is not a number"),
+    ("corner.obj", 3, "corner.obj: file: has faces, but none of three corners or more"),
+    ("a.nrrd --transfer lists.json", 3, "lists.json: transfer function: invalid type: sequence, expected f64"),
+    ("lists.gltf", 3, "lists.gltf: JSON: invalid type: sequence"),
+    ("list.nhdr", 3, "list.nhdr: data file: “LIST” names several files, which is not supported"),
     // Kernels.
     ("a.nrrd --sigma 0", 2, "invalid value '0' for '--sigma <SAMPLES>': a number above 0 is needed"),
     ("a.nrrd --sigma 3 --extent 1", 2, "a Gaussian of sigma 3 cut at 1 samples is a block; cut it at 3 or more"),
@@ -137,6 +153,95 @@ fn each_wrong_input_has_its_message() {
         folder.run(&format!("render {arguments} -o out.png")).fails(*code, &[message]);
     }
     assert!(!folder.path("out.png").exists());
+}
+
+/// What is read under a limit that it is over: the arguments, the message, and the flag that the hint names.
+const OVER: &[(&str, &str, &str)] = &[
+    ("info a.ply --limit-points 3", "a.ply: the count of element “vertex” is 4, over the limit of 3", "--limit-points"),
+    (
+        "check a.ply --limit-points 3",
+        "a.ply: the count of element “vertex” is 4, over the limit of 3",
+        "--limit-points",
+    ),
+    ("render a.ply -o out.png --limit-bytes 99", "a.ply: the file's size in bytes is", "--limit-bytes"),
+    (
+        "info a.nrrd --limit-bytes 5000",
+        "the size of the header in bytes together with what was read before is 5012, over the limit of 5000",
+        "--limit-bytes",
+    ),
+    (
+        "info packed.gz --dims 16x16x16 --type u8 --limit-bytes 5000",
+        "the unpacked size in bytes together with what was read before is 8207, over the limit of 5000",
+        "--limit-bytes",
+    ),
+    (
+        "info deep.gltf --limit-depth 2",
+        "deep.gltf: node 2: the depth of nesting is 3, over the limit of 2",
+        "--limit-depth",
+    ),
+    ("info a.glb --limit-texels 3", "a.glb: image 0: the number of texels is 4, over the limit of 3", "--limit-texels"),
+    (
+        "info a.ply --limit-seconds 0",
+        "a.ply: the time for reading, in seconds, is 1, over the limit of 0",
+        "--limit-seconds",
+    ),
+    (
+        "info a.glb --limit-seconds 0",
+        "a.glb: the time for reading, in seconds, is 1, over the limit of 0",
+        "--limit-seconds",
+    ),
+    (
+        "info points.csv --limit-seconds 0",
+        "the time for reading, in seconds, is 1, over the limit of 0",
+        "--limit-seconds",
+    ),
+    ("info points.csv --limit-points 1", "points.csv: the number of lines is 3, over the limit of 1", "--limit-points"),
+    ("render a.nrrd -o out.png --transfer clear.json --limit-bytes 9", "over the limit of 9", "--limit-bytes"),
+    ("info a.splk --limit-points 1", "a.splk: the number of leaves is", "--limit-points"),
+    ("info a.splk --limit-bytes 99", "a.splk: the file's size in bytes is", "--limit-bytes"),
+    ("info a.splv --limit-bytes 99", "a.splv: the file's size in bytes is", "--limit-bytes"),
+    (
+        "compare a.png a.png --limit-texels 3",
+        "a.png: the picture's number of pixels is 4, over the limit of 3",
+        "--limit-texels",
+    ),
+];
+
+#[test]
+fn each_limit_names_its_flag() {
+    let folder = folder("limits");
+    folder.put("a.ply", PLY);
+    folder.put("a.glb", glb());
+    folder.put("points.csv", "x,y,z\n1,2,3\n4,5,6\n");
+    folder.put("deep.gltf", r#"{"asset":{"version":"2.0"},"nodes":[{"children":[1]},{"children":[2]},{}]}"#);
+    let picture = splatkit::picture::Picture { width: 2, height: 2, color: vec![[1.0; 4]; 4], depth: Vec::new() };
+    folder.put("a.png", picture.encode(splatkit::picture::PictureFormat::Png, None).unwrap());
+    // 4096 bytes of 7, packed by gzip: stored as they are.
+    let stored = [&[0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 3, 1, 0x00, 0x10, 0xff, 0xef][..], &[7; 4096]].concat();
+    folder.put("packed.gz", stored);
+    folder.run("convert a.ply -o a.splk").ok();
+    folder.run("convert a.nrrd -o a.splv").ok();
+    for (arguments, message, flag) in OVER {
+        folder.run(arguments).fails(3, &[message, &format!("raise {flag}")]);
+    }
+}
+
+/// What would wait, has no end or is elsewhere is refused before it is opened.
+#[cfg(unix)]
+#[test]
+fn pipes_devices_and_folders_are_refused() {
+    let folder = folder("pipes");
+    std::fs::create_dir(folder.path("folder.ply")).unwrap();
+    folder.run("info folder.ply").fails(3, &["folder.ply: path: is not a regular file"]);
+    std::os::unix::fs::symlink("/dev/zero", folder.path("zero.ply")).unwrap();
+    folder.run("info zero.ply").fails(3, &["zero.ply: path: is not a regular file"]);
+    if std::process::Command::new("mkfifo").arg(folder.path("pipe.ply")).status().is_ok_and(|status| status.success()) {
+        folder.run("info pipe.ply").fails(3, &["pipe.ply: path: is not a regular file"]);
+        folder.put("pipe.obj", "mtllib pipe.ply\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+        folder.run("info pipe.obj").fails(3, &["pipe.obj: mtllib: refers to “pipe.ply”, which is not a regular file"]);
+    }
+    folder.put("up.obj", "mtllib ../up.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    folder.run("info up.obj").fails(3, &["which leads out of the file's own folder", "put the file beside the one"]);
 }
 
 #[test]

@@ -72,6 +72,11 @@ impl Directory {
         blocks as u64 * BLOCK_BYTES as u64 + pages as u64 * PAGE_BYTES as u64 + 4
     }
 
+    /// Bytes that it takes in memory, with what is made of it.
+    pub fn memory(&self) -> u64 {
+        (self.blocks.len() * 2 * size_of::<BlockEntry>() + self.pages.len() * 2 * size_of::<PageEntry>()) as u64
+    }
+
     /// Adds a block, before it is known what portal it hangs below.
     pub fn push_block(&mut self, runs: &[Run], around: &[Around], places: &[Place]) {
         let (block, first_page) = (self.blocks.len() as u32, self.pages.len() as u32);

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     Error, Result,
     hierarchy::{Block, Node, Tree},
-    io::{Limits, Source},
+    io::{LimitKind, Limits, Source},
     math::Bounds,
 };
 use rayon::prelude::*;
@@ -71,7 +71,7 @@ pub struct Hierarchy {
     /// Which block stands in the place of a leaf of block 0.
     portals: HashMap<u32, u32>,
     families: Mutex<Families>,
-    most_bytes: u64,
+    limits: Limits,
 }
 
 impl std::fmt::Debug for Hierarchy {
@@ -132,11 +132,11 @@ impl Hierarchy {
             return Err(incomplete(path, format!("byte {present} of {file_bytes}")));
         }
         for (what, found) in [("the number of leaves", header.leaves), ("the number of points", header.source_points)] {
-            if found > limits.points {
-                return Err(Error::Limit { file: path.into(), what: what.into(), found, limit: limits.points });
-            }
+            limits.check(LimitKind::Points, path, what, found)?;
         }
-        Ok(Self::assemble(path, store, header, directory, limits.bytes))
+        let bytes = present + directory.memory();
+        limits.check(LimitKind::Bytes, path, "the size of the file and its directory in bytes", bytes)?;
+        Ok(Self::assemble(path, store, header, directory, limits.clone()))
     }
 
     /// Takes a tree as it is; nothing is encoded.
@@ -187,10 +187,10 @@ impl Hierarchy {
             unit: String::new(),
             source: String::new(),
         };
-        Ok(Self::assemble(Path::new("memory"), Store::Blocks(tree.blocks), header, directory, u64::MAX))
+        Ok(Self::assemble(Path::new("memory"), Store::Blocks(tree.blocks), header, directory, Limits::none()))
     }
 
-    fn assemble(path: &Path, store: Store, header: Header, directory: Directory, most_bytes: u64) -> Self {
+    fn assemble(path: &Path, store: Store, header: Header, directory: Directory, limits: Limits) -> Self {
         let below = directory.blocks.iter().enumerate().skip(1);
         Self {
             path: path.to_owned(),
@@ -199,7 +199,7 @@ impl Hierarchy {
             portals: below.map(|(number, block)| (block.portal, number as u32)).collect(),
             directory,
             families: Mutex::default(),
-            most_bytes,
+            limits,
         }
     }
 
@@ -288,11 +288,9 @@ impl Hierarchy {
     /// # Errors
     /// Those of [`read_page`](Self::read_page), and [`Error::Limit`] where the tree is larger than the limits allow.
     pub fn read_tree(&self) -> Result<Tree> {
-        let found = self.header.nodes.saturating_mul(size_of::<Node>() as u64);
-        if found > self.most_bytes {
-            let what = "the size of the tree in bytes".into();
-            return Err(Error::Limit { file: self.path.clone(), what, found, limit: self.most_bytes });
-        }
+        // As pages, and joined.
+        let found = self.header.nodes.saturating_mul(2 * size_of::<Node>() as u64);
+        self.limits.check(LimitKind::Bytes, &self.path, "the size of the tree in bytes", found)?;
         let blocks = (0..self.directory.blocks.len() as u32).map(|block| self.read_block(block));
         Ok(Tree {
             origin: self.header.origin,
@@ -306,6 +304,9 @@ impl Hierarchy {
 
     pub(super) fn read_block(&self, block: u32) -> Result<Block> {
         let entry = self.directory.blocks[block as usize];
+        // A page of equal nodes takes a few bytes of the file.
+        let found = u64::from(entry.nodes) * 2 * size_of::<Node>() as u64;
+        self.limits.check(LimitKind::Bytes, &self.path, format!("the size of block {block} in bytes"), found)?;
         let pages = entry.first_page..entry.first_page + entry.pages;
         let pages: Vec<Vec<Node>> = pages.into_par_iter().map(|page| self.read_nodes(page)).collect::<Result<_>>()?;
         Ok(Block { nodes: pages.concat(), portal: Some(entry.portal).filter(|&portal| portal != NO_PORTAL) })

@@ -23,6 +23,11 @@ struct Sparse<'a> {
 }
 
 impl Buffers<'_> {
+    /// What an accessor claims to hold; 0 for one that there is not.
+    pub fn claimed(&self, index: usize) -> u64 {
+        self.root.accessors.get(index).map_or(0, |accessor| accessor.count.0)
+    }
+
     /// All elements of an accessor of `N` components; normalised integers (or, with `fractions`, all integers) are
     /// scaled to 0 … 1 or −1 … 1.
     pub fn floats<const N: usize>(&self, index: usize, place: &str, fractions: bool) -> Result<Vec<[f32; N]>> {

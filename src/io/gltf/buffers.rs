@@ -63,7 +63,6 @@ pub(super) struct Buffers<'a> {
 impl<'a> Buffers<'a> {
     pub fn open(source: &'a Source<'a>, root: &'a json::Root, binary: Option<&'a [u8]>) -> Result<Self> {
         let mut bytes: Vec<Cow<[u8]>> = Vec::with_capacity(root.buffers.len());
-        let mut total = 0;
         for (index, buffer) in root.buffers.iter().enumerate() {
             let place = format!("buffer {index}");
             let data = match (&buffer.uri, binary) {
@@ -76,8 +75,6 @@ impl<'a> Buffers<'a> {
             if (data.len() as u64) < claimed && !(data.is_empty() && buffer.uri.is_none()) {
                 return Err(source.error(place, format!("claims {claimed} bytes but holds {}", data.len())));
             }
-            total += data.len() as u64;
-            source.check_bytes("the size of all buffers in bytes", total)?;
             bytes.push(data);
         }
         Ok(Self { source, root, bytes })
@@ -113,6 +110,7 @@ impl<'a> Buffers<'a> {
 /// The bytes that a URI stands for: data in the URI, or a file beside this one.
 pub(super) fn resolve(source: &Source, place: &str, uri: &str) -> Result<Vec<u8>> {
     if let Some(data) = uri.strip_prefix("data:") {
+        source.room::<u8>("a data URI", data.len())?;
         let Some((kind, data)) = data.split_once(',') else {
             return Err(source.error(place, "has a data URI without a comma"));
         };
@@ -127,7 +125,8 @@ pub(super) fn resolve(source: &Source, place: &str, uri: &str) -> Result<Vec<u8>
         return Err(source.error(place, format!("refers to “{uri}”, whose % codes are no UTF-8 text")));
     };
     let path = source.neighbour(place, &path)?;
-    let file = Source::open(&path, source.limits)?;
+    let file = source.open_beside(&path)?;
+    source.room::<u8>("a buffer", file.bytes().len())?;
     Ok(file.bytes().to_vec())
 }
 

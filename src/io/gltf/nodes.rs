@@ -5,14 +5,22 @@ use crate::Result;
 use ::gltf::json;
 use glam::{DMat4, DQuat, DVec3};
 
+/// A node on the way: its number, the transform of its parent, and how deep it is.
+type Step = (usize, DMat4, usize);
+
 /// The meshes of the default scene (or the first; or, without scenes, of all nodes) with the transform from their own
 /// frame to the world. A node that is met twice (a cycle, or two parents) is an error, as is nesting over the limit.
 pub(super) fn meshes(source: &Source, root: &json::Root) -> Result<Vec<(DMat4, usize)>> {
     let count = root.nodes.len();
-    let mut stack: Vec<(usize, DMat4, usize)> = Vec::new();
+    source.room::<[Step; 2]>("the nodes", count)?;
+    let mut stack: Vec<Step> = Vec::new();
     let scene = root.scene.map_or(0, |scene| scene.value());
     match root.scenes.get(scene) {
-        Some(scene) => stack.extend(scene.nodes.iter().rev().map(|node| (node.value(), DMat4::IDENTITY, 1))),
+        // Lists of nodes may name one again and again: they are longer than there are nodes.
+        Some(scene) => {
+            source.room::<[Step; 2]>("the nodes of the scene", scene.nodes.len())?;
+            stack.extend(scene.nodes.iter().rev().map(|node| (node.value(), DMat4::IDENTITY, 1)));
+        }
         None if root.scene.is_some() => {
             return Err(source.error("scene", format!("is {scene}, but there are {} scenes", root.scenes.len())));
         }
@@ -29,6 +37,7 @@ pub(super) fn meshes(source: &Source, root: &json::Root) -> Result<Vec<(DMat4, u
     let mut met = vec![false; count];
     let mut meshes = Vec::new();
     while let Some((index, parent, depth)) = stack.pop() {
+        source.check_time()?;
         let place = format!("node {index}");
         let Some(node) = root.nodes.get(index) else {
             return Err(source.error(place, format!("there are {count} nodes")));
@@ -36,13 +45,12 @@ pub(super) fn meshes(source: &Source, root: &json::Root) -> Result<Vec<(DMat4, u
         if std::mem::replace(&mut met[index], true) {
             return Err(source.error(place, "is its own ancestor, or has two parents"));
         }
-        if depth > source.limits.depth {
-            return Err(source.error(place, format!("is nested deeper than the limit of {}", source.limits.depth)));
-        }
+        source.check_depth(&place, depth)?;
         let transform = parent * local(node);
         if let Some(mesh) = node.mesh {
             meshes.push((transform, mesh.value()));
         }
+        source.room::<[Step; 2]>("the nodes below a node", node.children.as_ref().map_or(0, Vec::len))?;
         let children = node.children.iter().flatten().rev();
         stack.extend(children.map(|child| (child.value(), transform, depth + 1)));
     }

@@ -14,6 +14,9 @@ use laz::{
 use rayon::prelude::*;
 use std::{io::Cursor, ops::Range};
 
+/// Points that are unpacked between two looks at the clock.
+const POINTS: usize = 1 << 16;
+
 /// A chunk: where its bytes are in the file, and its points.
 pub(super) struct Chunk {
     pub number: usize,
@@ -22,18 +25,22 @@ pub(super) struct Chunk {
 }
 
 pub fn read(source: &Source, header: &Header) -> Result<Vec<Point>> {
-    // The decoder takes what it reads for true and panics at what it cannot be.
-    isolated(source, "packed points", || {
-        let layout = layout(source, header)?;
-        let chunks = chunks(source, header, &layout)?;
-        let parts: Vec<Vec<Point>> =
-            chunks.par_iter().map(|chunk| unpack(source, header, &layout, chunk)).collect::<Result<_>>()?;
-        Ok(parts.into_iter().flatten().collect())
-    })
+    let layout = layout(source, header)?;
+    let chunks = chunks(source, header, &layout)?;
+    // In chunks, and joined.
+    source.room::<[Point; 2]>("the points", header.points)?;
+    let parts: Vec<Vec<Point>> =
+        chunks.par_iter().map(|chunk| unpack(source, header, &layout, chunk)).collect::<Result<_>>()?;
+    Ok(parts.into_iter().flatten().collect())
+}
+
+/// How the points are packed, behind a wall. The decoder takes what it reads for true and panics at what it cannot be.
+pub(super) fn layout(source: &Source, header: &Header) -> Result<LazVlr> {
+    isolated(source, "record of LASzip", || find_layout(source, header))
 }
 
 /// How the points are packed: one of the file's records of variable length says it.
-pub(super) fn layout(source: &Source, header: &Header) -> Result<LazVlr> {
+fn find_layout(source: &Source, header: &Header) -> Result<LazVlr> {
     let place = "record of LASzip";
     let bytes = source.bytes();
     let (mut at, count) = header.records;
@@ -75,8 +82,12 @@ fn check(header: &Header, items: &[LazItem]) -> Result<(), String> {
     }
 }
 
-/// The chunks by the table that the file keeps of them.
+/// The chunks by the table that the file keeps of them, behind a wall.
 pub(super) fn chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<Chunk>> {
+    isolated(source, "table of chunks", || find_chunks(source, header, layout))
+}
+
+fn find_chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<Chunk>> {
     let bytes = source.bytes();
     let wrong = |message: String| source.error("table of chunks", message);
     let field = Fields { bytes, place: "the table of chunks" };
@@ -92,6 +103,7 @@ pub(super) fn chunks(source: &Source, header: &Header, layout: &LazVlr) -> Resul
     if claimed > table - header.start {
         return Err(wrong(format!("claims {claimed} chunks in {} bytes", table - header.start)));
     }
+    source.room::<[Chunk; 2]>("the table of chunks", claimed)?;
     let mut cursor = Cursor::new(bytes);
     cursor.set_position(header.start as u64);
     let entries = ChunkTable::read_from(&mut cursor, layout).map_err(|error| wrong(error.to_string()))?;
@@ -115,8 +127,12 @@ pub(super) fn chunks(source: &Source, header: &Header, layout: &LazVlr) -> Resul
     Ok(chunks)
 }
 
-/// Unpacks a chunk point by point, so that memory grows with what was really unpacked.
+/// Unpacks a chunk point by point, so that memory grows with what was really unpacked; behind a wall.
 pub(super) fn unpack(source: &Source, header: &Header, layout: &LazVlr, chunk: &Chunk) -> Result<Vec<Point>> {
+    isolated(source, &format!("chunk {}", chunk.number), || unpack_here(source, header, layout, chunk))
+}
+
+fn unpack_here(source: &Source, header: &Header, layout: &LazVlr, chunk: &Chunk) -> Result<Vec<Point>> {
     let wrong = |message: String| source.error(format!("chunk {}", chunk.number), message);
     let input = Cursor::new(&source.bytes()[chunk.bytes.clone()]);
     let mut decoder: Box<dyn RecordDecompressor<Cursor<&[u8]>>> = if header.format >= 6 {
@@ -129,6 +145,9 @@ pub(super) fn unpack(source: &Source, header: &Header, layout: &LazVlr, chunk: &
     let mut record = vec![0; header.size];
     let mut points = Vec::new();
     for number in 0..chunk.points {
+        if number.is_multiple_of(POINTS) {
+            source.check_time()?;
+        }
         let unpacked = decoder.decompress_next(&mut record);
         unpacked.map_err(|error| wrong(format!("ends after {number} of {} points: {error}", chunk.points)))?;
         points.extend(header.point(&record));

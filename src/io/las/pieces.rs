@@ -4,7 +4,6 @@ use super::{
     super::{
         Source,
         cloud::{color_of_16_bits, grey},
-        isolate::isolated,
         positions,
         stream::Found,
     },
@@ -50,11 +49,9 @@ impl Pieces {
     pub fn find(source: &Source) -> Result<Self> {
         let header = Header::read(source)?;
         let packed = if header.packed {
-            Some(isolated(source, "packed points", || {
-                let layout = packed::layout(source, &header)?;
-                let chunks = packed::chunks(source, &header, &layout)?;
-                Ok((layout, chunks))
-            })?)
+            let layout = packed::layout(source, &header)?;
+            let chunks = packed::chunks(source, &header, &layout)?;
+            Some((layout, chunks))
         } else {
             plain_bytes(source, &header)?;
             None
@@ -90,9 +87,7 @@ impl Pieces {
     fn piece(&self, source: &Source, piece: usize) -> Result<impl Iterator<Item = (usize, Point)>> {
         let first = self.firsts[piece];
         let points: Vec<Point> = match &self.packed {
-            Some((layout, chunks)) => {
-                isolated(source, "packed points", || packed::unpack(source, &self.header, layout, &chunks[piece]))?
-            }
+            Some((layout, chunks)) => packed::unpack(source, &self.header, layout, &chunks[piece])?,
             None => {
                 let size = self.header.size;
                 let range: Range<usize> = first * size..(first + POINTS).min(self.header.points) * size;
@@ -125,11 +120,13 @@ impl Pieces {
     pub fn survey(&mut self, source: &Source, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])> {
         let mut seen = Seen::nothing();
         let batch = 2 * rayon::current_num_threads();
+        source.restart_time();
         for first in (0..self.pieces()).step_by(batch) {
             let pieces = (first..(first + batch).min(self.pieces())).into_par_iter();
             let more: Vec<Seen> = pieces.map(|piece| self.look(source, piece)).collect::<Result<_>>()?;
             more.into_iter().for_each(|more| seen.join(more));
             source.release();
+            source.restart_time();
             watch(seen.points);
         }
         if let Some((point, position)) = seen.bad {

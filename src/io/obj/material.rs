@@ -11,19 +11,20 @@ use std::{
     sync::Arc,
 };
 
+/// Bytes that a material takes beside its name, here, in the lists of tobj and in the mesh.
+const MATERIAL: u64 = 1024;
+
 /// The materials of one OBJ file, and the pictures already decoded for them.
 pub(super) struct Library<'a, 'b> {
     source: &'a Source<'b>,
     pictures: HashMap<String, Option<Arc<Texture>>>,
-    /// Bytes of the pictures so far.
-    picture_bytes: u64,
     /// Libraries already read; naming one again adds nothing.
     names: HashSet<String>,
 }
 
 impl<'a, 'b> Library<'a, 'b> {
     pub fn new(source: &'a Source<'b>) -> Self {
-        Self { source, pictures: HashMap::new(), picture_bytes: 0, names: HashSet::new() }
+        Self { source, pictures: HashMap::new(), names: HashSet::new() }
     }
 
     /// Reads the library that a `mtllib` names; a missing one is a warning and holds nothing.
@@ -34,7 +35,7 @@ impl<'a, 'b> Library<'a, 'b> {
             return Ok((materials, index_of));
         }
         let Some(path) = texture::find(self.source, "mtllib", name)? else { return Ok((materials, index_of)) };
-        let file = Source::open(&path, self.source.limits)?;
+        let file = self.source.open_beside(&path)?;
         let text = String::from_utf8_lossy(file.bytes());
         for (line, number) in text.lines().zip(1..) {
             let line = line.trim();
@@ -42,6 +43,7 @@ impl<'a, 'b> Library<'a, 'b> {
             let rest = rest.trim();
             let place = || format!("line {number}");
             if word == "newmtl" {
+                self.source.spend("the size of the materials in bytes", MATERIAL + 4 * rest.len() as u64)?;
                 index_of.insert(rest.to_owned(), materials.len());
                 materials.push(tobj::Material { name: rest.to_owned(), ..Default::default() });
                 continue;
@@ -72,8 +74,6 @@ impl<'a, 'b> Library<'a, 'b> {
                 None => {
                     let place = format!("material “{}”", material.name);
                     let texture = texture::read_reference(self.source, &place, name)?;
-                    self.picture_bytes += texture.as_ref().map_or(0, |texture| texture.texels.len() as u64 * 4);
-                    self.source.check_bytes("the size of all pictures in bytes", self.picture_bytes)?;
                     self.pictures.insert(name.clone(), texture.clone());
                     texture
                 }

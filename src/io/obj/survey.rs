@@ -4,12 +4,26 @@ use super::super::Source;
 use crate::Result;
 use std::io::{BufRead, Read};
 
+/// Lines between two looks at the clock.
+const LINES: usize = 1 << 16;
+
+/// Bytes that a statement takes in all lists, those of tobj and those made of them: a vertex, a texture coordinate or normal,
+/// a face, and a corner of one, which may become a triangle and a vertex of its own.
+const VERTEX: u64 = 160;
+const OTHER: u64 = 48;
+const FACE: u64 = 160;
+const CORNER: u64 = 320;
+
 /// What holds for the whole file. tobj mistakes lines (`l`) for faces, shifts colours and normals where only some
 /// vertices have them, and does arithmetic on indices unchecked; the survey finds these cases.
 #[derive(Debug, Default)]
 pub(super) struct Survey {
     vertices: u64,
     pub faces: u64,
+    /// Corners of all faces.
+    corners: u64,
+    /// Texture coordinates and normals.
+    others: u64,
     /// All vertices have a colour.
     pub colors: bool,
     /// All corners of all faces have a normal.
@@ -22,7 +36,10 @@ impl Survey {
         // Positions, texture coordinates and normals so far, and the largest index used of each with its line.
         let mut counts = [0i64; 3];
         let mut largest = [(0i64, 0usize); 3];
-        for (line, number) in text.lines().zip(1..) {
+        for (line, number) in text.lines().zip(1usize..) {
+            if number.is_multiple_of(LINES) {
+                source.check_time()?;
+            }
             let place = || format!("line {number}");
             let mut words = line.split_whitespace();
             match words.next() {
@@ -31,9 +48,16 @@ impl Survey {
                     let mut values = 0;
                     for word in words {
                         values += 1;
-                        let first = word.trim_start_matches(['-', '+']).bytes().next().unwrap_or(b'?');
-                        if values <= 3 && matches!(first, b'n' | b'N' | b'i' | b'I') {
-                            return Err(source.error(place(), format!("the position “{word}” is not finite")));
+                        let plain = |b: u8| b.is_ascii_digit() || matches!(b, b'.' | b'+' | b'-' | b'e' | b'E');
+                        if values <= 3 && !word.bytes().all(plain) {
+                            let first = word.trim_start_matches(['-', '+']).bytes().next().unwrap_or(b'?');
+                            if matches!(first, b'n' | b'N' | b'i' | b'I') {
+                                return Err(source.error(place(), format!("the position “{word}” is not finite")));
+                            }
+                            let shown: String = word.chars().take(40).collect();
+                            return Err(source
+                                .error(place(), format!("“{shown}” is not a number"))
+                                .hint("numbers have points, no decimal commas"));
                         }
                     }
                     survey.colors &= values >= 6;
@@ -43,6 +67,7 @@ impl Survey {
                 Some("f") => {
                     survey.faces += 1;
                     for word in words {
+                        survey.corners += 1;
                         let mut has_normal = false;
                         for (kind, part) in word.split('/').enumerate() {
                             if kind > 2 || (part.is_empty() && kind == 0) {
@@ -76,9 +101,12 @@ impl Survey {
             }
         }
         survey.vertices = counts[0] as u64;
+        survey.others = (counts[1] + counts[2]) as u64;
         survey.colors &= counts[0] > 0;
         source.check_points("the number of vertices", survey.vertices)?;
         source.check_points("the number of faces", survey.faces)?;
+        let bytes = VERTEX * survey.vertices + OTHER * survey.others + FACE * survey.faces + CORNER * survey.corners;
+        source.spend("the size of the mesh in bytes", bytes)?;
         Ok(survey)
     }
 

@@ -74,13 +74,20 @@ impl NumberKind {
 /// The fields and numbers of a point that a header may claim.
 const MOST_FIELDS: usize = 1 << 16;
 
+/// No header of a real file comes near this many bytes.
+const LONGEST: usize = 1 << 20;
+
 pub fn read(source: &Source) -> Result<Header> {
     let mut words: [Vec<String>; ENTRIES.len()] = Default::default();
     let mut at = 0;
     let bytes = source.bytes();
     for number in 1.. {
         let place = || format!("line {number}");
-        let Some(length) = bytes[at..].iter().position(|&b| b == b'\n') else {
+        if at > LONGEST {
+            return Err(source.error(place(), format!("the header is longer than {LONGEST} bytes")));
+        }
+        let window = &bytes[at..bytes.len().min(at + LONGEST)];
+        let Some(length) = window.iter().position(|&b| b == b'\n') else {
             return Err(source.error(place(), "the header ends before its line “DATA”"));
         };
         let line = String::from_utf8_lossy(&bytes[at..at + length]);
@@ -140,7 +147,7 @@ fn finish(source: &Source, words: &[Vec<String>; ENTRIES.len()], end: usize, lin
             return Err(wrong(entry, &format!("does not fit the {} fields", names.len())));
         }
     }
-    let (mut offset, mut word) = (0, 0);
+    let (mut offset, mut word) = (0usize, 0usize);
     let mut fields = Vec::new();
     for (index, name) in names.iter().enumerate() {
         let kind = match words[TYPE][index].as_str() {
@@ -157,7 +164,8 @@ fn finish(source: &Source, words: &[Vec<String>; ENTRIES.len()], end: usize, lin
             _ => return Err(wrong(SIZE, "has a size that its type cannot have")),
         };
         let count = words[COUNT].get(index).map_or(Some(1), |count| count.parse::<usize>().ok());
-        let count = count.filter(|&count| word + count <= MOST_FIELDS && index < MOST_FIELDS);
+        let fits = |count: &usize| word.checked_add(*count).is_some_and(|words| words <= MOST_FIELDS);
+        let count = count.filter(|count| fits(count) && index < MOST_FIELDS);
         let count = count.ok_or_else(|| wrong(COUNT, "has what is no count of numbers"))?;
         if count > 0 {
             fields.push(Field { name: name.clone(), kind, size, count, offset, word });

@@ -101,6 +101,10 @@ pub(super) fn read(source: &Source) -> Result<Header> {
             }
             ["comment" | "obj_info", ..] => clean.push_str("comment\n"),
             ["element", name, count] => {
+                if count.parse::<usize>().is_err() {
+                    let shown: String = count.chars().take(40).collect();
+                    return Err(source.error(place(), format!("“{shown}” is no count of rows")));
+                }
                 clean.push_str(&format!("element e{} {count}\n", names.len()));
                 names.push(((*name).to_owned(), Vec::new()));
                 columns += 1;

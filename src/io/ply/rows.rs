@@ -42,8 +42,11 @@ pub(super) enum Rows<'a> {
     Text { lines: Vec<&'a [u8]> },
 }
 
+/// Rows that are found between two looks at the clock.
+const ROWS: usize = 1 << 16;
+
 /// One value list of a row.
-pub(super) type List = Vec<f64>;
+pub(super) type List = [f64];
 
 impl<'a> Rows<'a> {
     /// Finds the rows of the element at `at` and moves `at` behind them. What is allocated is bounded by the bytes
@@ -76,9 +79,14 @@ impl<'a> Rows<'a> {
                 return Ok(Rows::Fixed { data: &rest[..size], stride, big });
             }
         }
-        let mut starts = Vec::with_capacity(element.count.min(rest.len() / element.least_bytes()));
+        let most = element.count.min(rest.len() / element.least_bytes());
+        source.room::<usize>("the places of the rows", most)?;
+        let mut starts = Vec::with_capacity(most);
         let mut next = 0;
         for row in 0..element.count {
+            if row.is_multiple_of(ROWS) {
+                source.check_time()?;
+            }
             starts.push(next);
             for column in &element.columns {
                 next = end_of(rest, next, &column.kind, big).map_err(|problem| match problem {
@@ -96,8 +104,15 @@ impl<'a> Rows<'a> {
 
     fn find_lines(source: &'a Source, element: &Element, at: &mut usize) -> Result<Self> {
         let bytes = source.bytes();
-        let mut lines = Vec::with_capacity(element.count.min((bytes.len() - *at) / (2 * element.columns.len())));
+        // The last line may end with the file.
+        let most = element.count.min((bytes.len() - *at) / (2 * element.columns.len()) + 1);
+        source.room::<&[u8]>("the places of the lines", most)?;
+        let mut lines = Vec::with_capacity(most);
+        let mut longest = 0;
         while lines.len() < element.count {
+            if lines.len().is_multiple_of(ROWS) {
+                source.check_time()?;
+            }
             if *at >= bytes.len() {
                 return Err(cut(source, element, lines.len()));
             }
@@ -106,9 +121,15 @@ impl<'a> Rows<'a> {
             *at = (*at + end + 1).min(bytes.len());
             let line = rest[..end].trim_ascii();
             if !line.is_empty() {
+                longest = longest.max(line.len());
                 lines.push(line);
+                // A list of a line may be as long as it, and be read by every thread.
+                if lines.len() == lines.capacity() && lines.len() < element.count {
+                    source.room::<&[u8]>("the places of the lines", lines.len())?;
+                }
             }
         }
+        source.room::<f64>("the values of a line", longest / 2)?;
         Ok(Rows::Text { lines })
     }
 
@@ -121,7 +142,7 @@ impl<'a> Rows<'a> {
         wanted: &[bool],
         mut visit: impl FnMut(usize, f64, Option<&List>),
     ) -> Result<()> {
-        let mut list = List::new();
+        let mut list = Vec::new();
         match self {
             Rows::Fixed { data, stride, big } => {
                 let row = &data[row * stride..][..*stride];
@@ -238,7 +259,7 @@ fn walk(
     element: &Element,
     big: bool,
     wanted: &[bool],
-    list: &mut List,
+    list: &mut Vec<f64>,
     visit: &mut impl FnMut(usize, f64, Option<&List>),
 ) {
     let mut at = 0;

@@ -72,6 +72,7 @@ fn of_vertices(source: &Source, element: &Element, rows: &Rows, scalar: Option<&
     let columns: Vec<Option<usize>> = [x, y, z, value, radius].into_iter().chain(covariance).collect();
     let table = Table::read(source, element, rows, &columns)?;
     let count = element.count;
+    source.spend("the size of the samples in bytes", Columns::ROW * count as u64)?;
     let columns = Columns {
         values: (0..count).map(|row| table.value(row, 3)).collect(),
         radii: if radius.is_some() { (0..count).map(|row| table.value(row, 4) as f32).collect() } else { Vec::new() },

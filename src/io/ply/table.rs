@@ -42,8 +42,10 @@ impl<'a> Table<'a> {
                 used += 1;
             }
         }
+        source.room::<f64>("the values", element.count.saturating_mul(used))?;
         let mut values = vec![0.0; element.count * used];
         values.par_chunks_mut(CHUNK * used).enumerate().try_for_each(|(chunk, values)| {
+            source.check_time()?;
             for (row, values) in values.chunks_exact_mut(used).enumerate() {
                 rows.visit(source, element, chunk * CHUNK + row, &wanted, |column, value, _| {
                     slots_of_column[column].iter().for_each(|&slot| values[slot] = value);

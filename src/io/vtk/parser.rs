@@ -3,6 +3,9 @@
 use super::super::{Endian, SampleType, Source, vtk_xml::Part};
 use crate::{Error, Result};
 
+/// Bytes that an array of a field takes beside its name and its numbers.
+const FIELD: u64 = 256;
+
 /// A place in a file.
 pub(super) struct Parser<'a> {
     source: &'a Source<'a>,
@@ -30,7 +33,7 @@ impl<'a> Parser<'a> {
         };
         loop {
             let (place, line) = parser.line()?.ok_or_else(|| cut(&parser))?;
-            let words: Vec<&str> = line.split_ascii_whitespace().collect();
+            let words: Vec<&str> = line.split_ascii_whitespace().take(4).collect();
             match words[..] {
                 [keyword, kind] if keyword.eq_ignore_ascii_case("DATASET") => {
                     let kind = kind.to_ascii_uppercase();
@@ -143,6 +146,7 @@ impl<'a> Parser<'a> {
             })?;
             let text =
                 std::str::from_utf8(&rest[..length]).map_err(|_| wrong("is followed by what is not text".into()))?;
+            self.source.spend("the size of the numbers in bytes", (count * kind.bytes()) as u64)?;
             (kind.parse(text, count).map_err(wrong)?.into(), Endian::Little, length)
         };
         self.at += length;
@@ -156,10 +160,10 @@ impl<'a> Parser<'a> {
         if let Ok(Some((place, line))) = self.line()
             && let Some(kind) = line.strip_prefix("OFFSETS")
         {
-            let mut ends = self.array(&place, count, kind.trim())?.doubles();
+            let mut ends = self.array(&place, count, kind.trim())?.doubles(self.source)?;
             let next = self.line()?.and_then(|(place, line)| Some((place, line.strip_prefix("CONNECTIVITY")?.trim())));
             let (place, kind) = next.ok_or_else(|| self.source.error(place, "offsets without their CONNECTIVITY"))?;
-            let corners = self.array(&place, size, kind)?.doubles();
+            let corners = self.array(&place, size, kind)?.doubles(self.source)?;
             if ends.first().is_some_and(|&first| first != 0.0) {
                 return Err(self.source.error(place, format!("the first offset is {}, not 0", ends[0])));
             }
@@ -167,7 +171,8 @@ impl<'a> Parser<'a> {
             return Ok((corners, ends));
         }
         self.at = before;
-        let numbers = self.array(place, size, "int")?.doubles();
+        let numbers = self.array(place, size, "int")?.doubles(self.source)?;
+        self.source.room::<[f64; 2]>("the corners of the cells", numbers.len())?;
         let (mut corners, mut ends) = (Vec::new(), Vec::new());
         let mut rest = &numbers[..];
         for cell in 0..count {
@@ -193,10 +198,11 @@ impl<'a> Parser<'a> {
             let next = self.line()?;
             (place, line) = next.ok_or_else(|| self.source.error(place, "the file ends inside a FIELD"))?;
         }
-        let words: Vec<&str> = line.split_ascii_whitespace().collect();
+        let words: Vec<&str> = line.split_ascii_whitespace().take(5).collect();
         let [name, components, tuples, kind] = words[..] else {
             return Err(self.source.error(place, "needs a name, components, tuples and a type"));
         };
+        self.source.spend("the size of the names in bytes", FIELD + 2 * name.len() as u64)?;
         let (components, tuples) = (self.count(&place, components)?, self.count(&place, tuples)?);
         let part = self.array(&place, components.saturating_mul(tuples), kind)?;
         Ok((unescaped(name), components, part))

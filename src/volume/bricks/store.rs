@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     Error, Result,
-    io::{Limits, Source},
+    io::{LimitKind, Limits, Source},
     math::Bounds,
     volume::{Lattice, Samples, Scalar, Volume, steps::Steps},
 };
@@ -41,6 +41,7 @@ pub struct Bricks {
     /// Of each level the range of each brick.
     ranges: Vec<Vec<[u8; 2]>>,
     origin: Origin,
+    limits: Limits,
 }
 
 enum Origin {
@@ -97,7 +98,8 @@ impl Bricks {
             source: String::new(),
         };
         let path = PathBuf::from("memory");
-        Ok(Self { path, header, levels, ranges, origin: Origin::Memory { volume, coarse, steps } })
+        let origin = Origin::Memory { volume, coarse, steps };
+        Ok(Self { path, header, levels, ranges, origin, limits: Limits::none() })
     }
 
     /// Opens a file: reads and checks the header and the directory, and maps the rest.
@@ -106,7 +108,7 @@ impl Bricks {
     /// [`Error::Input`] for other files, other versions, damaged headers and directories, and files that are cut off or have
     /// something behind their end; [`Error::Limit`] and [`Error::File`] as for every input.
     pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
-        Self::new(path, Bytes::Mapped(Source::open(path, limits)?.into_map()))
+        Self::new(path, Bytes::Mapped(Source::open(path, limits)?.into_map()), limits)
     }
 
     /// Takes the bytes of a file; `name` is what errors call it.
@@ -114,10 +116,10 @@ impl Bricks {
     /// # Errors
     /// [`Error::Input`] as of [`open`](Self::open).
     pub fn from_bytes(bytes: Vec<u8>, name: &Path) -> Result<Self> {
-        Self::new(name, Bytes::Held(bytes))
+        Self::new(name, Bytes::Held(bytes), &Limits::default())
     }
 
-    fn new(path: &Path, bytes: Bytes) -> Result<Self> {
+    fn new(path: &Path, bytes: Bytes, limits: &Limits) -> Result<Self> {
         let all = bytes.all();
         let stored = Stored::decode(all).map_err(|refusal| refused(path, refusal))?;
         let present = all.len() as u64;
@@ -129,10 +131,19 @@ impl Bricks {
             return Err(damaged(path, format!("byte {end}"), format!("{} bytes stand behind the end", present - end)));
         }
         let directory = Directory::decode(all, &stored).map_err(|message| damaged(path, "directory", message))?;
+        let memory = present + directory.memory();
+        limits.check(LimitKind::Bytes, path, "the size of the file and its directory in bytes", memory)?;
         let header = stored.header;
         let levels = level::levels(header.lattice.dims);
         let ranges = directory.levels.iter().map(|level| level.iter().map(|entry| entry.range).collect()).collect();
-        Ok(Self { path: path.to_owned(), header, levels, ranges, origin: Origin::File { bytes, directory } })
+        Ok(Self {
+            path: path.to_owned(),
+            header,
+            levels,
+            ranges,
+            origin: Origin::File { bytes, directory },
+            limits: limits.clone(),
+        })
     }
 
     /// What the volume is as a whole.
@@ -211,7 +222,8 @@ impl Bricks {
     /// The samples of a whole level, in memory. Its range is that of level 0.
     ///
     /// # Errors
-    /// [`Error::Argument`] where there is no such level; [`Error::Input`] for damaged bricks.
+    /// [`Error::Argument`] where there is no such level; [`Error::Input`] for damaged bricks; [`Error::Limit`] for a level
+    /// larger than the limits allow.
     pub fn volume(&self, level: usize) -> Result<Volume> {
         let missing = || Error::Argument(format!("{}: there is no level {level}", self.path.display()));
         let size = *self.levels.get(level).ok_or_else(missing)?;
@@ -219,6 +231,8 @@ impl Bricks {
         let [nx, ny, _] = size.dims;
         let [bx, by, _] = size.brick_dims;
         let row = nx * scalar.bytes();
+        // As bytes and as samples. Bricks of one value take no bytes of the file.
+        self.check_memory(&format!("the size of level {level} in bytes"), size.dims[2], size, 2)?;
         let mut bytes = vec![0; size.slice() * size.dims[2] * scalar.bytes()];
         // Each layer of bricks is a part of its own.
         bytes.par_chunks_mut(super::SIDE * ny * row).enumerate().try_for_each(|(layer, slices)| {
@@ -244,6 +258,13 @@ impl Bricks {
             Volume::new(self.lattice(level), samples).map_err(|message| damaged(&self.path, "samples", message))?;
         volume.range = self.header.range;
         Ok(volume)
+    }
+
+    /// Refuses so many slices of a level, `times` as large as their samples, where the limits allow less.
+    pub(super) fn check_memory(&self, what: &str, slices: usize, level: Level, times: u64) -> Result<()> {
+        let slice = (level.dims[0] as u64).saturating_mul(level.dims[1] as u64);
+        let bytes = slice.saturating_mul(slices as u64).saturating_mul(self.header.scalar.bytes() as u64);
+        self.limits.check(LimitKind::Bytes, &self.path, what, bytes.saturating_mul(times))
     }
 
     /// All bytes of a file; none of a volume in memory.

@@ -69,6 +69,8 @@ fn contents(bricks: &Bricks, watch: &(dyn Fn(u64, u64) + Sync), findings: &mut F
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];
     let mut done = count(bricks);
     let finest = *bricks.level(0);
+    // The layer, those of the coarser levels, and what is left of the one before.
+    bricks.check_memory("the size of a layer of bricks in bytes", 3 * SIDE, finest, 2)?;
     for layer in 0..finest.brick_dims[2] {
         let slices = slices(bricks, &finest, layer)?;
         let values = slices.chunks_exact(header.scalar.bytes()).map(|sample| header.scalar.value(sample));

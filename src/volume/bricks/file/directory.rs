@@ -79,6 +79,12 @@ impl Directory {
         Self { levels, offsets }
     }
 
+    /// Bytes that it takes in memory: entries, places and ranges.
+    pub fn memory(&self) -> u64 {
+        let bricks = self.levels.iter().map(|level| level.len() as u64).sum::<u64>();
+        bricks * (size_of::<Entry>() + size_of::<u64>() + size_of::<[u8; 2]>()) as u64
+    }
+
     /// Where the hash begins: behind the last brick of level 0.
     pub fn end(&self) -> u64 {
         let last =

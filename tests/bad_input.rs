@@ -1,0 +1,265 @@
+//! Bad files of every format: each is refused with a message that tells what is wrong and where, none panics, none hangs, and
+//! none takes more than it may.
+
+mod inputs;
+
+use inputs::*;
+use splatkit::{Error, hierarchy::file, io::Limits, volume::bricks};
+use std::{
+    path::Path,
+    sync::{
+        Once,
+        atomic::{AtomicUsize, Ordering},
+    },
+    time::Instant,
+};
+
+/// Panics that were printed, those of decoders behind walls among them where the walls leak.
+static PANICS: AtomicUsize = AtomicUsize::new(0);
+
+fn count_panics() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let before = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |info| {
+            // What fails here is told anyway.
+            let of_tests = info.location().is_some_and(|place| place.file().starts_with("tests"));
+            PANICS.fetch_add(usize::from(!of_tests), Ordering::Relaxed);
+            before(info);
+        }));
+    });
+}
+
+/// Asserts that a file is refused in words, with its name and a place in it.
+fn refused(path: &Path, error: &Error, context: &str) {
+    match error {
+        Error::Input { file, place, message, .. } => {
+            assert!(file.starts_with(path.parent().expect("a folder")), "{context}: {file:?}");
+            assert!(!place.is_empty() && !message.is_empty(), "{context}");
+        }
+        Error::Limit { what, .. } => assert!(!what.is_empty(), "{context}"),
+        other => panic!("{context}: {other}"),
+    }
+}
+
+#[test]
+fn every_cut_of_every_format_is_told() {
+    count_panics();
+    let folder = Folder::new();
+    let limits = Limits::default();
+    for (name, bytes, may_load) in every_format(&folder) {
+        let whole = folder.write(name, &bytes);
+        let told = load(&whole, &limits).unwrap_or_else(|error| panic!("{name}: {error}"));
+        for at in 0..bytes.len() {
+            let path = folder.write(name, &bytes[..at]);
+            let context = format!("{name} ({told}) cut at {at} of {}", bytes.len());
+            match load(&path, &limits) {
+                Err(error) => refused(&path, &error, &context),
+                Ok(less) => assert!(may_load(&bytes, at), "{context}: loads as {less}"),
+            }
+        }
+        folder.write(name, &bytes);
+    }
+    // What a model refers to may be cut as well: buffers and samples must be whole, pictures too; of materials there are less.
+    for (name, referring, may_load) in [
+        ("beside.bin", "beside.gltf", false),
+        ("beside.raw", "detached.nhdr", false),
+        ("a.png", "a.obj", false),
+        ("a.mtl", "a.obj", true),
+    ] {
+        let bytes = std::fs::read(folder.0.join(name)).expect("a file");
+        for at in 0..bytes.len() {
+            folder.write(name, &bytes[..at]);
+            let context = format!("{referring} with {name} cut at {at} of {}", bytes.len());
+            match load(&folder.0.join(referring), &limits) {
+                Err(error) => refused(&folder.0.join(referring), &error, &context),
+                // The end of a PNG says nothing that a picture needs.
+                Ok(told) => {
+                    assert!(may_load || name == "a.png" && at + 16 >= bytes.len(), "{context}: loads as {told}")
+                }
+            }
+        }
+        folder.write(name, &bytes);
+    }
+    assert_eq!(PANICS.load(Ordering::Relaxed), 0);
+}
+
+#[test]
+fn every_flipped_byte_of_a_hierarchy_and_of_bricks_is_found() {
+    count_panics();
+    let folder = Folder::new();
+    let limits = Limits::default();
+    let bricks = splv(&folder);
+    for (name, bytes) in [("lossless.splk", splk(true)), ("lossy.splk", splk(false)), ("a.splv", bricks)] {
+        let check = |path: &Path| {
+            if name.ends_with("splk") { file::check(path, &limits) } else { bricks::check(path, &limits, &|_, _| ()) }
+        };
+        let path = folder.write(name, &bytes);
+        assert_eq!(check(&path).findings, [], "{name}");
+        for at in 0..bytes.len() {
+            let mut flipped = bytes.clone();
+            // All bits, or one that turns.
+            flipped[at] ^= if at % 2 == 0 { 0xff } else { 1 << (at / 2 % 8) };
+            let path = folder.write(name, &flipped);
+            assert!(!check(&path).is_sound(), "{name}: byte {at} of {} is flipped and nothing is found", bytes.len());
+            // Reading finds it too, or reads what stands in other bytes.
+            if let Err(error) = load(&path, &limits) {
+                refused(&path, &error, name);
+            }
+        }
+    }
+    assert_eq!(PANICS.load(Ordering::Relaxed), 0);
+}
+
+/// What is wrong, or unusual: the name of a file, its bytes, and what reading it gives.
+fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
+    include!("inputs/cases.rs")
+}
+
+#[test]
+fn each_bad_input_has_its_message() {
+    count_panics();
+    let folder = Folder::new();
+    every_format(&folder);
+    folder.write("self.obj", "mtllib self.obj\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    folder.write("chain.mtl", "mtllib chain.mtl\nnewmtl m\nmap_Kd ../a.png\n");
+    folder.write("beside.splv", "");
+    std::fs::create_dir_all(folder.0.join("folder")).expect("a folder");
+    let limits = Limits::default();
+    let mut wrong = Vec::new();
+    let mut slowest = (0.0, "");
+    for (name, bytes, expected) in cases() {
+        folder.write(name, &bytes);
+        let begun = Instant::now();
+        let found = folder.outcome(name, &limits);
+        let seconds = begun.elapsed().as_secs_f64();
+        if seconds > slowest.0 {
+            slowest = (seconds, name);
+        }
+        if found != expected {
+            wrong.push(format!("{name}\n  expected: {expected}\n  found:    {found}"));
+        }
+        std::fs::remove_file(folder.0.join(name)).ok();
+    }
+    println!("slowest: {} in {:.3} s, of {} cases", slowest.1, slowest.0, cases().len());
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(slowest.0 < 2.0, "{} takes {} s", slowest.1, slowest.0);
+    assert_eq!(PANICS.load(Ordering::Relaxed), 0);
+}
+
+/// What a reading takes, measured in a process of its own: this test again, told so by its environment.
+#[test]
+fn worst_inputs_stay_within_their_limits() {
+    const NAME: &str = "SPLATKIT_WORST_INPUT";
+    if let Some(path) = std::env::var_os(NAME) {
+        let bytes = std::env::var("SPLATKIT_WORST_LIMIT").ok().and_then(|text| text.parse().ok()).expect("a limit");
+        let limits = Limits { bytes, ..Limits::default() };
+        let before = peak();
+        let begun = Instant::now();
+        let outcome = load(Path::new(&path), &limits).unwrap_or_else(|error| error.to_string());
+        println!("measured {} {} {outcome}", begun.elapsed().as_millis(), peak().saturating_sub(before));
+        return;
+    }
+    if peak() == 0 {
+        return;
+    }
+    let folder = Folder::new();
+    let mut worst = (0, 0);
+    for (name, bytes) in worst_inputs() {
+        let path = folder.write(name, &bytes);
+        for limit in [24u64 << 20, 256 << 20] {
+            let run = std::process::Command::new(std::env::current_exe().expect("this test"))
+                .args(["--exact", "worst_inputs_stay_within_their_limits", "--nocapture"])
+                .env(NAME, &path)
+                .env("SPLATKIT_WORST_LIMIT", limit.to_string())
+                .output()
+                .expect("a run");
+            let text = String::from_utf8_lossy(&run.stdout).into_owned();
+            let line = text.lines().find_map(|line| line.split_once("measured ")).map(|(_, rest)| rest.to_owned());
+            let line = line.unwrap_or_else(|| panic!("{name}: {text}{}", String::from_utf8_lossy(&run.stderr)));
+            let mut words = line.splitn(3, ' ');
+            let mut number = || words.next().and_then(|word| word.parse::<u64>().ok()).expect("a number");
+            let (milliseconds, taken) = (number(), number());
+            let outcome = words.next().unwrap_or_default().replace(&format!("{}/", folder.0.display()), "");
+            let (size, taken_mib) = (bytes.len() as f64 / 1048576.0, taken as f64 / 1048576.0);
+            println!(
+                "{name}: {size:.2} MiB, limit {} MiB: {milliseconds} ms, {taken_mib:.1} MiB: {outcome}",
+                limit >> 20
+            );
+            assert!(taken <= limit + PROGRAM, "{name}: takes {taken} bytes, over the limit of {limit}: {outcome}");
+            worst = (worst.0.max(milliseconds), worst.1.max(taken));
+        }
+    }
+    println!("longest {} ms, most {:.1} MiB", worst.0, worst.1 as f64 / 1048576.0);
+}
+
+/// Bytes of the program itself, its threads among it, that come into memory as it runs.
+const PROGRAM: u64 = 8 << 20;
+
+/// The most memory that this process has held, in bytes; 0 where the system does not tell.
+fn peak() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap_or_default();
+    line.trim().trim_end_matches(" kB").parse::<u64>().unwrap_or_default() * 1024
+}
+
+/// Files that become much larger than they are.
+fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
+    let mib = 1usize << 20;
+    let nodes = vec![r#"{"mesh":0}"#; 100_000].join(",");
+    let all: Vec<String> = (0..100_000).map(|node| node.to_string()).collect();
+    let instances =
+        gltf_with("none", &nodes).replace(r#"{"nodes":[0]}"#, &format!(r#"{{"nodes":[{}]}}"#, all.join(",")));
+    let (data, big) = ("data:;base64,", "A".repeat(mib));
+    let instances = instances
+        .replace("none", &format!("{data}{big}"))
+        .replace(r#""count":3,"type":"VEC3""#, r#""count":60000,"type":"VEC3""#)
+        .replace(r#""byteLength":36"#, r#""byteLength":720000"#);
+    let block = zlib(&vec![0; 200 * mib]);
+    let counts: Vec<u8> = [1, 200 * mib as u32, 0, block.len() as u32].iter().flat_map(|n| n.to_le_bytes()).collect();
+    let vti = "<VTKFile type='ImageData' byte_order='LittleEndian' compressor='vtkZLibDataCompressor'><ImageData WholeExtent='0 1023 0 1023 0 199'>\
+         <Piece Extent='0 1023 0 1023 0 199'><PointData><DataArray type='UInt8' Name='v' format='appended' offset='0'/></PointData></Piece>\
+         </ImageData><AppendedData encoding='raw'>_";
+    let vti = [vti.as_bytes(), &counts, &block, b"</AppendedData></VTKFile>"].concat();
+    let wide = format!("{}\n{}", vec!["1"; 4096].join(" "), "1\n".repeat(mib));
+    let polygon = format!("{}\n", vec!["0"; 2 * mib].join(" "));
+    let list = ply(
+        &format!("element vertex 1\n{FLOATS}element face 1\nproperty list uint int vertex_indices\n"),
+        &format!("0 0 0\n{} {polygon}", 2 * mib),
+    );
+    vec![
+        ("lines.xyz", "1 2 3\n".repeat(mib).into()),
+        ("short.csv", "1\n".repeat(2 * mib).into()),
+        ("wide.txt", wide.into()),
+        ("faces.obj", format!("v 0 0 0\n{}", "f 1 1 1\n".repeat(mib / 2)).into()),
+        ("corners.obj", format!("v 0 0 0\nf {polygon}").replace(" 0", " 1").into()),
+        ("vertices.obj", "v 0 0 0\n".repeat(mib).into()),
+        ("polygon.ply", list),
+        ("lines.ply", ply(&format!("element vertex {mib}\n{FLOATS}"), &"0 0 0\n".repeat(mib))),
+        (
+            "corners.stl",
+            format!(
+                "solid\n{}",
+                "facet\nouter loop\nvertex 0 0 0\nvertex 0 0 0\nvertex 0 0 0\nendloop\nendfacet\n".repeat(mib / 24)
+            )
+            .into(),
+        ),
+        ("numbers.pcd", pcd(&mib.to_string(), format!("DATA ascii\n{}", "1 2 3\n".repeat(mib)).as_bytes())),
+        ("objects.gltf", format!(r#"{{"asset":{{"version":"2.0"}},"nodes":[{}]}}"#, vec!["{}"; mib].join(",")).into()),
+        (
+            "numbers.gltf",
+            format!(r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"children":[{}]}}]}}"#, vec!["9"; 2 * mib].join(","))
+                .into(),
+        ),
+        ("instances.gltf", instances.into()),
+        ("bomb.nrrd", nrrd("1024 1024 200", "encoding: gzip", &gzip(&vec![0; 200 * mib]))),
+        ("keys.nrrd", nrrd("1 1 1", &(0..200_000).map(|i| format!("{i}:=\n")).collect::<String>(), b"")),
+        ("bomb.vti", vti),
+        ("pieces.vti", vtk_xml("ImageData", "", &"<Piece/>".repeat(mib / 4)).into()),
+        ("attributes.vti", vtk_xml("ImageData", "", &"<Piece a='' b='' c='' d=''/>".repeat(mib / 8)).into()),
+        ("deep.vti", vtk_xml("ImageData", "", &"<a>".repeat(mib)).into()),
+        ("bomb.mtl.obj", "mtllib bomb.mtl\nv 0 0 0\nf 1 1 1\n".into()),
+        ("nested.gltf", "[".repeat(4 * mib).into()),
+        ("nested.json", "[".repeat(mib).into()),
+    ]
+}

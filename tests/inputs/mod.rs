@@ -1,0 +1,450 @@
+//! Small sound files of every format, and what reading one gives in a line of words.
+
+use glam::Vec3;
+use splatkit::{
+    Error, Result,
+    hierarchy::{BuildOptions, Hierarchy, Tree, file},
+    io::{self, Endian, Kind, Limits, RawLayout, SampleType},
+    surface::{Mesh, SurfelOptions},
+    volume::{TransferFunction, Volume, bricks, phantoms::Phantom},
+};
+use std::{
+    io::{Cursor, Write},
+    path::{Path, PathBuf},
+    sync::atomic::{AtomicU32, Ordering},
+};
+
+/// A folder for one test, removed at its end.
+pub struct Folder(pub PathBuf);
+
+impl Folder {
+    pub fn new() -> Self {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let number = COUNT.fetch_add(1, Ordering::Relaxed);
+        let path = std::env::temp_dir().join(format!("splatkit-inputs-{}-{number}", std::process::id()));
+        std::fs::create_dir_all(&path).expect("a folder");
+        Self(path)
+    }
+
+    pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.0.join(name);
+        // Some file systems wait for the disk when a file is cut and written again, but not for a new one.
+        std::fs::remove_file(&path).ok();
+        std::fs::write(&path, bytes).expect("a file");
+        path
+    }
+
+    /// What reading a file gives, in words; an error without the folder's name.
+    pub fn outcome(&self, name: &str, limits: &Limits) -> String {
+        match load(&self.0.join(name), limits) {
+            Ok(told) => told,
+            Err(error) => error.to_string().replace(&format!("{}/", self.0.display()), ""),
+        }
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        std::fs::remove_dir_all(&self.0).ok();
+    }
+}
+
+/// 4³ bytes without a header.
+pub const RAW: RawLayout = RawLayout {
+    dims: [4; 3],
+    sample_type: SampleType::U8,
+    spacing: glam::DVec3::ONE,
+    endian: Endian::Little,
+    header: 0,
+};
+
+fn of_volume(volume: &Volume) -> String {
+    format!("volume {:?} {:?}", volume.lattice.dims, volume.range)
+}
+
+/// Reads a file by whatever reader its name and content ask for, as a whole.
+pub fn load(path: &Path, limits: &Limits) -> Result<String> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    if extension == "json" {
+        let transfer = TransferFunction::read(path, limits)?;
+        return Ok(format!("transfer {} {}", transfer.color.len(), transfer.opacity.len()));
+    }
+    let raw = ["raw", "gz"].contains(&extension).then_some(RAW);
+    let kind = Kind::of(path, limits, false)?.or(raw.as_ref().map(|_| Kind::Volume));
+    Ok(match kind {
+        None => return Err(Error::input(path, "file", "is of no kind")),
+        Some(Kind::Mesh) => {
+            let mesh = io::load_mesh(path, limits)?;
+            let pictures = mesh.materials.iter().filter(|material| material.texture.is_some()).count();
+            format!("mesh {} {} {pictures}", mesh.positions.len(), mesh.triangles.len())
+        }
+        Some(Kind::Volume) => of_volume(&io::load_volume(path, limits, raw.as_ref())?),
+        Some(Kind::Samples) => format!("samples {}", io::load_samples(path, limits, None)?.len()),
+        Some(Kind::Hierarchy) => {
+            let tree = Hierarchy::open(path, limits)?.read_tree()?;
+            format!("hierarchy {}", tree.leaf_count())
+        }
+        Some(Kind::Bricks) => of_volume(&bricks::Bricks::open(path, limits)?.volume(0)?),
+    })
+}
+
+pub const FLOATS: &str = "property float x\nproperty float y\nproperty float z\n";
+
+/// A PLY of text with these elements and rows.
+pub fn ply(elements: &str, rows: &str) -> Vec<u8> {
+    format!("ply\nformat ascii 1.0\n{elements}end_header\n{rows}").into_bytes()
+}
+
+/// A triangle in PLY, binary.
+fn binary_ply(big: bool) -> Vec<u8> {
+    let order = if big { "big" } else { "little" };
+    let header = format!(
+        "ply\nformat binary_{order}_endian 1.0\nelement vertex 3\n{FLOATS}element face 1\nproperty list uchar int \
+         vertex_indices\nend_header\n"
+    );
+    let corners = [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let number = |n: f32| if big { n.to_be_bytes() } else { n.to_le_bytes() };
+    let index = |n: i32| if big { n.to_be_bytes() } else { n.to_le_bytes() };
+    let mut bytes = header.into_bytes();
+    bytes.extend(corners.into_iter().flat_map(number));
+    bytes.push(3);
+    bytes.extend([0, 1, 2].into_iter().flat_map(index));
+    bytes
+}
+
+pub fn png(width: u32, height: u32) -> Vec<u8> {
+    let mut out = Cursor::new(Vec::new());
+    image::RgbaImage::from_pixel(width, height, image::Rgba([9, 99, 199, 255]))
+        .write_to(&mut out, image::ImageFormat::Png)
+        .expect("a picture");
+    out.into_inner()
+}
+
+pub fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    packer.write_all(bytes).expect("bytes");
+    packer.finish().expect("bytes")
+}
+
+pub fn zlib(bytes: &[u8]) -> Vec<u8> {
+    let mut packer = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
+    packer.write_all(bytes).expect("bytes");
+    packer.finish().expect("bytes")
+}
+
+fn base64(bytes: &[u8]) -> String {
+    use base64::Engine;
+    base64::engine::general_purpose::STANDARD.encode(bytes)
+}
+
+/// A triangle whose buffer is in the text.
+pub fn gltf() -> String {
+    gltf_with(&format!("data:application/octet-stream;base64,{}", base64(&triangle_bytes())), r#"{"mesh":0}"#)
+}
+
+pub fn triangle_bytes() -> Vec<u8> {
+    let corners = [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let indices = [0u16, 1, 2];
+    corners.iter().flat_map(|v| v.to_le_bytes()).chain(indices.iter().flat_map(|v| v.to_le_bytes())).collect()
+}
+
+/// The same with a buffer elsewhere and other nodes, of which node 0 is the scene's.
+pub fn gltf_with(uri: &str, nodes: &str) -> String {
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{nodes}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}},{{"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}}],"bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":6}}],"buffers":[{{"uri":"{uri}","byteLength":42}}]}}"#
+    )
+}
+
+pub fn glb() -> Vec<u8> {
+    let mut json = gltf().into_bytes();
+    let uri = json.windows(7).position(|w| w == b"\"uri\":\"").expect("a URI");
+    let end = uri + 7 + json[uri + 7..].iter().position(|&b| b == b'"').expect("its end");
+    json.drain(uri..end + 2);
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut binary = triangle_bytes();
+    binary.resize(binary.len().next_multiple_of(4), 0);
+    let word = |v: usize| (v as u32).to_le_bytes();
+    let mut file = [b"glTF".as_slice(), &word(2), &word(28 + json.len() + binary.len())].concat();
+    file.extend([word(json.len()).as_slice(), b"JSON", &json].concat());
+    file.extend([word(binary.len()).as_slice(), b"BIN\0", &binary].concat());
+    file
+}
+
+pub fn stl() -> Vec<u8> {
+    let mut bytes = vec![b' '; 80];
+    bytes.extend(1u32.to_le_bytes());
+    bytes.extend([0f32, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|v| v.to_le_bytes()));
+    bytes.extend([0, 0]);
+    bytes
+}
+
+pub const STL_TEXT: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n\
+    endfacet\nendsolid a\n";
+
+fn las_header(format: u8, start: usize, records: u32, points: u32) -> Vec<u8> {
+    let mut header = vec![0; 227];
+    let mut put = |at: usize, bytes: &[u8]| header[at..at + bytes.len()].copy_from_slice(bytes);
+    put(0, b"LASF");
+    put(24, &[1, 2]);
+    put(94, &227u16.to_le_bytes());
+    put(96, &(start as u32).to_le_bytes());
+    put(100, &records.to_le_bytes());
+    put(104, &[format]);
+    put(105, &20u16.to_le_bytes());
+    put(107, &points.to_le_bytes());
+    (0..3).for_each(|axis| put(131 + 8 * axis, &0.01f64.to_le_bytes()));
+    header
+}
+
+fn las_points() -> Vec<[u8; 20]> {
+    let point = |i: i32| {
+        let mut point = [0; 20];
+        (0..3).for_each(|axis| point[4 * axis..][..4].copy_from_slice(&(i * (axis as i32 + 1)).to_le_bytes()));
+        point[14] = 0b1001;
+        point
+    };
+    (0..5).map(point).collect()
+}
+
+pub fn las() -> Vec<u8> {
+    [las_header(0, 227, 0, 5), las_points().concat()].concat()
+}
+
+pub fn laz() -> Vec<u8> {
+    let items = laz::LazItemRecordBuilder::default_for_point_format_id(0, 0).expect("a format");
+    let layout = laz::LazVlrBuilder::new(items).with_fixed_chunk_size(3).build();
+    let mut described = Vec::new();
+    layout.write_to(&mut described).expect("a record");
+    let mut before = vec![0; 54];
+    before[2..2 + laz::LazVlr::USER_ID.len()].copy_from_slice(laz::LazVlr::USER_ID.as_bytes());
+    before[18..20].copy_from_slice(&laz::LazVlr::RECORD_ID.to_le_bytes());
+    before[20..22].copy_from_slice(&(described.len() as u16).to_le_bytes());
+    before.extend(described);
+    let start = 227 + before.len();
+    let mut file = Cursor::new([las_header(0x80, start, 1, 5), before].concat());
+    file.set_position(start as u64);
+    let mut packer = laz::LasZipCompressor::new(&mut file, layout).expect("a compressor");
+    las_points().iter().for_each(|point| packer.compress_one(point).expect("a point"));
+    packer.done().expect("an end");
+    drop(packer);
+    file.into_inner()
+}
+
+/// Two points, and the description of them changed.
+pub fn e57(change: impl Fn(String) -> String) -> Vec<u8> {
+    use e57::{E57Writer, Record, RecordDataType, RecordName, RecordValue};
+    let mut out = Cursor::new(Vec::new());
+    let mut writer = E57Writer::new(&mut out, "file").expect("a writer");
+    let names = [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ];
+    let double = RecordDataType::Double { min: None, max: None };
+    let records = names.map(|name| Record { name, data_type: double.clone() });
+    let mut scan = writer.add_pointcloud("scan", records.to_vec()).expect("a scan");
+    for point in [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]] {
+        scan.add_point(point.map(RecordValue::Double).to_vec()).expect("a point");
+    }
+    scan.finalize().expect("an end");
+    writer.finalize_customized_xml(|xml| Ok(change(xml))).expect("an end");
+    drop(writer);
+    out.into_inner()
+}
+
+pub fn pcd(points: &str, data: &[u8]) -> Vec<u8> {
+    [format!("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS {points}\n").as_bytes(), data].concat()
+}
+
+pub fn npy(shape: &str, values: &[f32]) -> Vec<u8> {
+    let text = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}\n");
+    let mut file = b"\x93NUMPY\x01\0".to_vec();
+    file.extend((text.len() as u16).to_le_bytes());
+    file.extend(text.bytes());
+    file.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+    file
+}
+
+pub fn nrrd(sizes: &str, fields: &str, data: &[u8]) -> Vec<u8> {
+    [format!("NRRD0004\ntype: uint8\ndimension: 3\nsizes: {sizes}\n{fields}\n\n").as_bytes(), data].concat()
+}
+
+/// A VTK file of XML: `kind` around `pieces`.
+pub fn vtk_xml(kind: &str, attributes: &str, pieces: &str) -> String {
+    format!(
+        "<?xml version='1.0'?><VTKFile type='{kind}' byte_order='LittleEndian'{attributes}><{kind} WholeExtent='0 1 0 1 0 0'>\
+         {pieces}</{kind}></VTKFile>"
+    )
+}
+
+pub fn vti_piece(array: &str) -> String {
+    format!("<Piece Extent='0 1 0 1 0 0'><PointData Scalars='v'>{array}</PointData></Piece>")
+}
+
+pub fn array(attributes: &str, content: &str) -> String {
+    format!("<DataArray type='UInt8' Name='v' {attributes}>{content}</DataArray>")
+}
+
+/// Four bytes packed by zlib in one block, with their counts.
+fn packed_block() -> Vec<u8> {
+    let packed = zlib(&[1, 2, 3, 4]);
+    let mut bytes: Vec<u8> = [1, 4, 0, packed.len() as u32].iter().flat_map(|n| n.to_le_bytes()).collect();
+    bytes.extend(packed);
+    bytes
+}
+
+fn appended(xml: &str, encoding: &str, data: &[u8]) -> Vec<u8> {
+    let (before, _) = xml.split_once("</VTKFile>").expect("an end");
+    let open = format!("{before}<AppendedData encoding='{encoding}'>_");
+    [open.as_bytes(), data, b"</AppendedData></VTKFile>"].concat()
+}
+
+pub fn vtk() -> String {
+    "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 1\nORIGIN 0 0 0\nSPACING 1 1 1\n\
+     POINT_DATA 4\nSCALARS v unsigned_char 1\nLOOKUP_TABLE default\n1 2 3 4\n"
+        .into()
+}
+
+pub fn vtu(corners: &str) -> String {
+    let numbers = |name: &str, kind: &str, text: &str, components: u32| {
+        format!(
+            "<DataArray type='{kind}' Name='{name}' NumberOfComponents='{components}' format='ascii'>{text}</DataArray>"
+        )
+    };
+    vtk_xml(
+        "UnstructuredGrid",
+        "",
+        &format!(
+            "<Piece NumberOfPoints='3' NumberOfCells='1'><CellData>{}</CellData><Points>{}</Points><Cells>{}{}{}</Cells></Piece>",
+            numbers("v", "Float32", "7", 1),
+            numbers("p", "Float32", "0 0 0 1 0 0 0 1 0", 3),
+            numbers("connectivity", "Int32", corners, 1),
+            numbers("offsets", "Int32", "3", 1),
+            numbers("types", "UInt8", "5", 1)
+        ),
+    )
+}
+
+pub fn tree() -> Tree {
+    let positions = (0..9).map(|i| Vec3::new((i % 3) as f32, (i / 3) as f32, 0.0)).collect();
+    let mesh = Mesh { positions, ..Mesh::default() };
+    let splats = mesh.surfels(&SurfelOptions::default()).expect("surfels");
+    Tree::build(&splats, &BuildOptions::default(), &|_, _| ()).expect("a tree")
+}
+
+pub fn splk(lossless: bool) -> Vec<u8> {
+    let options = file::WriteOptions { lossless, unit: "m".into(), ..file::WriteOptions::default() };
+    file::to_bytes(&tree(), &options).expect("bytes")
+}
+
+/// Bricks of several levels, some of one value.
+pub fn splv(folder: &Folder) -> Vec<u8> {
+    let volume = Phantom::Specimen.sample_bytes([34, 5, 3]).expect("a volume");
+    let path = folder.0.join("made.splv");
+    let options = bricks::WriteOptions { unit: "mm".into(), ..bricks::WriteOptions::default() };
+    bricks::write(&volume, &path, &options, &|_, _| ()).expect("a file");
+    let bytes = std::fs::read(&path).expect("bytes");
+    std::fs::remove_file(&path).ok();
+    bytes
+}
+
+pub const TRANSFER: &str = r#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 0], [9, 0.5]]}"#;
+pub const OBJ: &str = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+pub const MTL: &str = "newmtl m\nKd 0.5 0.5 0.5\nmap_Kd a.png\n";
+
+/// The name of a file, its bytes, and whether it may load where it is cut before a byte.
+pub type Format = (&'static str, Vec<u8>, fn(&[u8], usize) -> bool);
+
+/// A file of every format: its name, its bytes, and whether it may load where it is cut before byte `at`. Text without counts
+/// or an end reads as less where it is cut; the rest must notice, or have lost nothing but its last line break.
+pub fn every_format(folder: &Folder) -> Vec<Format> {
+    fn never(_: &[u8], _: usize) -> bool {
+        false
+    }
+    fn anywhere(_: &[u8], _: usize) -> bool {
+        true
+    }
+    fn but_for_spaces(bytes: &[u8], at: usize) -> bool {
+        bytes[at..].iter().all(u8::is_ascii_whitespace)
+    }
+    // The last number may be cut to a shorter one.
+    fn last_number(bytes: &[u8], at: usize) -> bool {
+        bytes[at..].trim_ascii_end().iter().all(|&b| b.is_ascii_digit() || b == b'.')
+    }
+    let raw: Vec<u8> = (0..64).collect();
+    let triangle = "3 0 1 2\n";
+    let face = format!("element vertex 3\n{FLOATS}element face 1\nproperty list uchar int vertex_indices\n");
+    let floats: Vec<u8> = [1f32, 2.0, 3.0, 4.0, 5.0, 6.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+    // LZF: a run of 24 bytes as they are; fields stand one behind the other.
+    let lzf = [&[23u8][..], &floats].concat();
+    let packed = [&(lzf.len() as u32).to_le_bytes()[..], &24u32.to_le_bytes(), &lzf].concat();
+    let text = "0 0 0\n1 0 0\n0 1 0\n";
+    let of_vti = |attributes: &str, array: &str| vtk_xml("ImageData", attributes, &vti_piece(array));
+    let mut counted = 4u32.to_le_bytes().to_vec();
+    counted.extend([1, 2, 3, 4]);
+    let zlib_file = " compressor='vtkZLibDataCompressor'";
+    let places = |axis: &str| format!("<DataArray type='Float32' Name='x' format='ascii'>{axis}</DataArray>");
+    let vtr_piece = format!(
+        "<Piece Extent='0 1 0 1 0 0'><PointData Scalars='v'>{}</PointData><Coordinates>{}{}{}</Coordinates></Piece>",
+        array("format='ascii'", "1 2 3 4"),
+        places("0 1"),
+        places("0 2"),
+        places("0")
+    );
+    folder.write("beside.bin", triangle_bytes());
+    folder.write("beside.raw", [1, 2, 3, 4]);
+    folder.write("a.mtl", MTL);
+    folder.write("a.png", png(2, 2));
+    vec![
+        ("ascii.ply", ply(&face, &format!("{text}{triangle}")), last_number as fn(&[u8], usize) -> bool),
+        ("little.ply", binary_ply(false), never),
+        ("big.ply", binary_ply(true), never),
+        ("a.obj", OBJ.into(), |bytes, at| bytes[..at].ends_with(b"\n") || bytes[..at].windows(2).any(|w| w == b"f ")),
+        ("binary.stl", stl(), never),
+        ("text.stl", STL_TEXT.into(), |bytes, at| at >= bytes.len() - 3),
+        ("a.gltf", gltf().into(), never),
+        ("beside.gltf", gltf_with("beside.bin", r#"{"mesh":0}"#).into(), never),
+        ("a.glb", glb(), never),
+        ("a.las", las(), never),
+        ("a.laz", laz(), never),
+        ("a.e57", e57(|xml| xml), never),
+        ("a.xyz", text.into(), anywhere),
+        ("a.pts", format!("3\n{text}").into(), last_number),
+        ("a.csv", "x,y,z,value\n1,2,3,4\n5,6,7,85\n".into(), anywhere),
+        ("ascii.pcd", pcd("2", b"DATA ascii\n1 2 3\n4 5 6\n"), last_number),
+        ("binary.pcd", pcd("2", &[b"DATA binary\n", &floats[..]].concat()), never),
+        ("packed.pcd", pcd("2", &[b"DATA binary_compressed\n", &packed[..]].concat()), never),
+        ("a.npy", npy("(1, 4)", &[1.0, 2.0, 3.0, 4.0]), never),
+        ("raw.nrrd", nrrd("4 4 4", "encoding: raw", &raw), never),
+        ("gzip.nrrd", nrrd("4 4 4", "encoding: gzip", &gzip(&raw)), never),
+        ("ascii.nrrd", nrrd("2 2 1", "encoding: ascii", b"1 2 3 44\n"), last_number),
+        ("hex.nrrd", nrrd("2 2 1", "encoding: hex", b"01020304\n"), but_for_spaces),
+        // The name of the data may be cut to none that is there, and the empty line is not needed.
+        ("detached.nhdr", nrrd("2 2 1", "encoding: raw\ndata file: beside.raw", b""), but_for_spaces),
+        ("ascii.vti", of_vti("", &array("format='ascii'", "1 2 3 4")).into(), never),
+        ("binary.vti", of_vti("", &array("format='binary'", &base64(&counted))).into(), never),
+        (
+            "zlib.vti",
+            of_vti(
+                zlib_file,
+                &array("format='binary'", &{
+                    let block = packed_block();
+                    format!("{}{}", base64(&block[..16]), base64(&block[16..]))
+                }),
+            )
+            .into(),
+            never,
+        ),
+        ("appended.vti", appended(&of_vti("", &array("format='appended' offset='0'", "")), "raw", &counted), never),
+        (
+            "packed.vti",
+            appended(&of_vti(zlib_file, &array("format='appended' offset='0'", "")), "raw", &packed_block()),
+            never,
+        ),
+        ("a.vtr", vtk_xml("RectilinearGrid", "", &vtr_piece).into(), never),
+        ("a.vtu", vtu("0 1 2").into(), never),
+        ("a.vtk", vtk().into(), last_number),
+        ("a.raw", raw.clone(), never),
+        ("a.gz", gzip(&raw), never),
+        ("lossless.splk", splk(true), never),
+        ("lossy.splk", splk(false), never),
+        ("a.splv", splv(folder), never),
+        ("a.json", TRANSFER.into(), never),
+    ]
+}

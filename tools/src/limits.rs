@@ -1,0 +1,77 @@
+//! The flags of what reading an input may take.
+
+use clap::Args;
+use splatkit::io::{LimitKind, Limits};
+
+/// How much any file may claim, occupy and take.
+#[derive(Args, Debug, Clone, Default)]
+#[command(next_help_heading = "Limits")]
+pub struct LimitFlags {
+    /// Vertices, points or faces that a file may claim [default: 2147483648]
+    #[arg(long, value_name = "COUNT")]
+    limit_points: Option<u64>,
+    /// Bytes that an input may occupy: its files, and all that is made of them until it is read [default: 34359738368]
+    #[arg(long, value_name = "BYTES")]
+    limit_bytes: Option<u64>,
+    /// Depth to which nodes and elements may be nested [default: 64]
+    #[arg(long, value_name = "COUNT")]
+    limit_depth: Option<usize>,
+    /// Pixels that a picture may have [default: 268435456]
+    #[arg(long, value_name = "COUNT")]
+    limit_texels: Option<u64>,
+    /// Seconds that reading an input may take [default: 600]
+    #[arg(long, value_name = "SECONDS")]
+    limit_seconds: Option<u64>,
+}
+
+impl LimitFlags {
+    pub fn limits(&self) -> Limits {
+        let default = Limits::default();
+        Limits {
+            points: self.limit_points.unwrap_or(default.points),
+            bytes: self.limit_bytes.unwrap_or(default.bytes),
+            depth: self.limit_depth.unwrap_or(default.depth),
+            texels: self.limit_texels.unwrap_or(default.texels),
+            seconds: self.limit_seconds.unwrap_or(default.seconds),
+        }
+    }
+}
+
+/// What the user can do about a limit that was met.
+pub fn hint(kind: LimitKind) -> &'static str {
+    match kind {
+        LimitKind::Points => "raise --limit-points if the file can be trusted",
+        LimitKind::Bytes => "raise --limit-bytes if the file can be trusted and memory suffices",
+        LimitKind::Depth => "raise --limit-depth if the file can be trusted",
+        LimitKind::Texels => "raise --limit-texels if the file can be trusted",
+        LimitKind::Seconds => "raise --limit-seconds if the file can be trusted",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::{Args, FromArgMatches};
+
+    /// The help tells the defaults of the library, and the hints tell flags that there are.
+    #[test]
+    fn flags_are_those_of_the_library() {
+        let command = LimitFlags::augment_args(clap::Command::new("test"));
+        let default = Limits::default();
+        for (kind, name) in [
+            (LimitKind::Points, "limit-points"),
+            (LimitKind::Bytes, "limit-bytes"),
+            (LimitKind::Depth, "limit-depth"),
+            (LimitKind::Texels, "limit-texels"),
+            (LimitKind::Seconds, "limit-seconds"),
+        ] {
+            let flag = command.get_arguments().find(|flag| flag.get_long() == Some(name)).expect(name);
+            let help = flag.get_help().expect("a text").to_string();
+            assert!(help.ends_with(&format!("[default: {}]", default.of(kind))), "{help}");
+            assert!(hint(kind).contains(&format!("--{name} ")), "{}", hint(kind));
+            let matches = command.clone().get_matches_from(["test", &format!("--{name}=7")]);
+            let limits = LimitFlags::from_arg_matches(&matches).expect("flags").limits();
+            assert_eq!(limits.of(kind), 7);
+        }
+    }
+}
