@@ -131,7 +131,10 @@ impl<'a> Source<'a> {
     pub fn neighbour(&self, place: &str, reference: &str) -> Result<PathBuf> {
         if self.is_in_memory() {
             return Err(self
-                .error(place, format!("refers to “{reference}”, but was read from memory, where there are no other files"))
+                .error(
+                    place,
+                    format!("refers to “{reference}”, but was read from memory, where there are no other files"),
+                )
                 .hint("open the file by its path, beside those that it refers to"));
         }
         let relative = Path::new(reference);

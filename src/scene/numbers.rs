@@ -81,7 +81,10 @@ pub(super) fn check_settings(settings: &Settings) -> Result<()> {
         return wrong(format!("the thickness of sheets is {thickness}; a positive number is needed"));
     }
     if !positive(settings.sheet_pixels) {
-        return wrong(format!("the thickness of sheets is {} pixels; a positive number is needed", settings.sheet_pixels));
+        return wrong(format!(
+            "the thickness of sheets is {} pixels; a positive number is needed",
+            settings.sheet_pixels
+        ));
     }
     if let Some(near) = settings.near.filter(|v| !(*v >= 0.0 && v.is_finite())) {
         return wrong(format!("the nearest distance is {near}; a number from 0 on is needed"));
