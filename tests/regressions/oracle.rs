@@ -91,7 +91,6 @@ fn sound_mesh(mesh: &Mesh) {
     assert!(mesh.origin.is_finite(), "origin {}", mesh.origin);
     assert!(mesh.positions.iter().all(|p| p.is_finite()), "a position is not finite");
     assert!(mesh.normals.iter().all(|n| n.is_finite()), "a normal is not finite");
-    assert!(mesh.uvs.iter().all(|uv| uv.is_finite()), "a texture coordinate is not finite");
     assert!(fits(mesh.normals.len(), count) && fits(mesh.colors.len(), count) && fits(mesh.uvs.len(), count));
     assert!(fits(mesh.triangle_materials.len(), mesh.triangles.len()));
     assert!(mesh.triangles.iter().flatten().all(|&index| (index as usize) < count), "an index is out of range");
