@@ -1,5 +1,7 @@
 //! What is drawn and how: a scene of splat sets and volumes, and the settings of a picture.
 
+mod numbers;
+
 use crate::{
     Error, Result,
     hierarchy::{Detail, Hierarchy},
@@ -93,10 +95,12 @@ impl Scene {
         })
     }
 
-    /// Checks that the scene can be drawn with the settings, beyond [`validate`](Self::validate): clips that are some, and
+    /// Checks that the scene can be drawn with the settings, beyond [`validate`](Self::validate): numbers and clips that are
+    /// some, and
     /// combinations that mean something.
     pub fn validate_settings(&self, settings: &Settings) -> Result<()> {
         let wrong = |message: String| Err(Error::Argument(message));
+        numbers::check_settings(settings)?;
         if settings.clips.len() > Settings::MAX_CLIPS {
             return wrong(format!("{} clips are more than {}", settings.clips.len(), Settings::MAX_CLIPS));
         }
@@ -175,8 +179,9 @@ impl Scene {
         Ok(())
     }
 
-    /// Checks that the engine can draw the scene: payloads that fit their items, and one scalar field at most (the
-    /// densities of two fields under two transfer functions cannot be added in one sheet).
+    /// Checks that the engine can draw the scene: payloads that fit their items, numbers that are finite (it names the item
+    /// and the splat), and one scalar field at most (the densities of two fields under two transfer functions cannot be added
+    /// in one sheet).
     pub fn validate(&self) -> Result<()> {
         let mut fields = 0;
         for item in &self.items {
@@ -197,6 +202,9 @@ impl Scene {
                 let most = SplatSet::MAX_EXTENT;
                 return Err(Error::Argument(format!("a splat set's extent must lie in 0 … {most}, is {}", set.extent)));
             }
+        }
+        for (number, item) in self.items.iter().enumerate() {
+            numbers::check_item(&format!("item {number} of the scene"), item)?;
         }
         if fields > 1 {
             return Err(Error::Argument(format!("a picture takes one volume or sample set, the scene has {fields}")));

@@ -1,7 +1,8 @@
 //! Reading files: one module per format, all behind the same guarded opening ([`Source`]) and [`Limits`].
 //!
 //! [`load_mesh`], [`load_volume`] and [`load_samples`] look at the name and the first bytes, and give a mesh (or cloud), a
-//! volume or scattered samples; [`Kind`] tells which of them a file needs.
+//! volume or scattered samples; [`Kind`] tells which of them a file needs. [`read_mesh`], [`read_volume`] and
+//! [`read_samples`] do the same with bytes in memory ([`Source::from_bytes`]).
 
 mod budget;
 mod cloud;
@@ -44,8 +45,8 @@ pub mod xyz;
 
 pub use kind::Kind;
 pub use limits::{LimitKind, Limits};
-pub use load_mesh::load_mesh;
-pub use load_samples::load_samples;
+pub use load_mesh::{load_mesh, read_mesh};
+pub use load_samples::{load_samples, read_samples};
 pub use raw::RawLayout;
 pub use sample_type::{Endian, SampleType};
 pub use source::Source;
@@ -63,19 +64,26 @@ use std::path::Path;
 /// [`Error::Input`](crate::Error::Input) for what is no such file, [`Error::Limit`](crate::Error::Limit) and
 /// [`Error::File`](crate::Error::File) as for every input.
 pub fn load_volume(path: &Path, limits: &Limits, raw: Option<&RawLayout>) -> Result<Volume> {
-    let source = Source::open(path, limits)?;
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    read_volume(&Source::open(path, limits)?, raw)
+}
+
+/// As [`load_volume`], of what is open already, which may be in memory ([`Source::from_bytes`]).
+///
+/// # Errors
+/// Those of [`load_volume`] but for opening.
+pub fn read_volume(source: &Source, raw: Option<&RawLayout>) -> Result<Volume> {
+    let extension = source.path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let beginning = &source.bytes()[..source.bytes().len().min(1024)];
     match (extension.as_deref(), raw) {
-        (Some("vti"), _) => vti::read(&source),
-        (Some("vtr"), _) => vtr::read(&source),
-        (Some("vtk"), _) => vtk::read_volume(&source),
-        (Some("nrrd" | "nhdr"), _) => nrrd::read(&source),
-        (_, Some(layout)) => raw::read(&source, layout),
-        _ if beginning.starts_with(b"NRRD") => nrrd::read(&source),
-        _ if beginning.starts_with(b"# vtk DataFile") => vtk::read_volume(&source),
-        _ if beginning.windows(15).any(|w| w == b"RectilinearGrid") => vtr::read(&source),
-        _ if beginning.windows(8).any(|w| w == b"<VTKFile") => vti::read(&source),
+        (Some("vti"), _) => vti::read(source),
+        (Some("vtr"), _) => vtr::read(source),
+        (Some("vtk"), _) => vtk::read_volume(source),
+        (Some("nrrd" | "nhdr"), _) => nrrd::read(source),
+        (_, Some(layout)) => raw::read(source, layout),
+        _ if beginning.starts_with(b"NRRD") => nrrd::read(source),
+        _ if beginning.starts_with(b"# vtk DataFile") => vtk::read_volume(source),
+        _ if beginning.windows(15).any(|w| w == b"RectilinearGrid") => vtr::read(source),
+        _ if beginning.windows(8).any(|w| w == b"<VTKFile") => vti::read(source),
         _ => Err(source
             .error("file", "is not a volume that can be read: neither VTI, VTR, VTK nor NRRD")
             .hint("a raw file needs its dimensions and its sample type")),

@@ -18,6 +18,10 @@ impl Source<'_> {
         if let Some(reason) = refusal(reference) {
             return Err(refuse(reason));
         }
+        if self.is_in_memory() {
+            let message = format!("refers to “{reference}”, but was read from memory, where there are no other files");
+            return Err(self.error(place, message).hint("open the file by its path, beside those that it refers to"));
+        }
         let folder = self.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let target = folder.join(reference);
         let real = target.canonicalize().map_err(|e| self.error(place, format!("refers to “{reference}”: {e}")))?;

@@ -23,6 +23,8 @@ pub struct Source<'a> {
     pub path: &'a Path,
     pub limits: &'a Limits,
     bytes: Option<memmap2::Mmap>,
+    /// What is read in place of a file.
+    memory: Option<&'a [u8]>,
     /// Shared by all files of a model.
     budget: Arc<Budget>,
 }
@@ -59,12 +61,29 @@ impl<'a> Source<'a> {
         } else {
             Some(unsafe { memmap2::Mmap::map(&file) }.map_err(|e| Error::file(path, "map", e))?)
         };
-        Ok(Self { path, limits, bytes, budget })
+        Ok(Self { path, limits, bytes, memory: None, budget })
+    }
+
+    /// Takes bytes in place of a file: of a program that has them from elsewhere. `name` is what errors call them, and its
+    /// extension tells their format where that is asked for. There is no folder around them, so what they refer to is not
+    /// read: missing materials and pictures are left out with a warning, missing data are an error.
+    ///
+    /// # Errors
+    /// [`Error::Limit`] for more bytes than the limits allow.
+    pub fn from_bytes(name: &'a Path, bytes: &'a [u8], limits: &'a Limits) -> Result<Self> {
+        let budget = Arc::new(Budget::new());
+        budget.spend(limits, name, "the file's size in bytes", bytes.len() as u64)?;
+        Ok(Self { path: name, limits, bytes: None, memory: Some(bytes), budget })
+    }
+
+    /// Whether this is no file but bytes from elsewhere, which have no neighbours.
+    pub(super) fn is_in_memory(&self) -> bool {
+        self.memory.is_some()
     }
 
     /// The whole file.
     pub fn bytes(&self) -> &[u8] {
-        self.bytes.as_deref().unwrap_or(&[])
+        self.memory.or(self.bytes.as_deref()).unwrap_or(&[])
     }
 
     /// Gives the pages of the map that were read back to the system: those who go through a file larger than memory do so

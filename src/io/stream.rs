@@ -60,8 +60,15 @@ impl<'a> Stream<'a> {
     /// Those of opening the file; [`Error::Input`](crate::Error::Input) for a malformed header and for a file that ends
     /// before its last point, [`Error::Limit`](crate::Error::Limit) for more points than the limits allow.
     pub fn open(path: &'a Path, limits: &'a Limits) -> Result<Option<Self>> {
-        let source = Source::open(path, limits)?;
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+        Self::of(Source::open(path, limits)?)
+    }
+
+    /// As [`open`](Self::open), of what is open already, which may be in memory ([`Source::from_bytes`]).
+    ///
+    /// # Errors
+    /// Those of [`open`](Self::open) but for opening.
+    pub fn of(source: Source<'a>) -> Result<Option<Self>> {
+        let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
         let form = match extension.as_str() {
             "ply" => ply::Pieces::find(&source)?.map(Form::Ply),
             "las" | "laz" => Some(Form::Las(las::Pieces::find(&source)?)),

@@ -52,7 +52,8 @@ pub(super) fn find(source: &Source, place: &str, reference: &str) -> Result<Opti
         Ok(path) => Ok(Some(path)),
         Err(_)
             if is_inside(&reference)
-                && source.path.parent().is_some_and(|folder| !folder.join(&reference).exists()) =>
+                && (source.is_in_memory()
+                    || source.path.parent().is_some_and(|folder| !folder.join(&reference).exists())) =>
         {
             tracing::warn!("{}: {place}: “{reference}” does not exist; drawn without it", source.path.display());
             Ok(None)

@@ -87,6 +87,16 @@ impl Kernel {
         Ok(Self { profile, extent })
     }
 
+    /// Checks what the constructors do, of a kernel that may have been put together by hand.
+    pub(crate) fn validate(&self) -> Result<()> {
+        match &self.profile {
+            Profile::Gaussian(sigma) => Self::gaussian(*sigma, self.extent),
+            Profile::Table(values) => Self::table(values.to_vec(), self.extent),
+            profile => Self::with_extent(profile.clone(), self.extent),
+        }
+        .map(|_| ())
+    }
+
     /// The length, in sample spacings, that kernel space counts in: σ of a Gaussian, one spacing of any other.
     pub fn unit(&self) -> f64 {
         match self.profile {

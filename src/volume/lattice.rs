@@ -247,6 +247,10 @@ impl Lattice {
         if directions.determinant().abs() < 1e-6 {
             return Err("the directions of the axes lie in one plane".into());
         }
+        let [low, high] = self.bounds();
+        if !(high - low).is_finite() {
+            return Err(format!("the samples reach from {low} to {high}, farther than numbers do"));
+        }
         Ok(())
     }
 }

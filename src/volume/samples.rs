@@ -156,6 +156,20 @@ impl Volume {
         Ok(Self { lattice, samples, range, coefficients: None })
     }
 
+    /// Says in words what [`new`](Self::new) would refuse, and what has been changed since then.
+    pub(crate) fn validate(&self) -> Result<(), String> {
+        self.lattice.validate()?;
+        if self.samples.len() != self.lattice.len() {
+            return Err(format!("{} samples do not fill a lattice of {}", self.samples.len(), self.lattice.len()));
+        }
+        let [low, high] = self.samples.range()?;
+        let [stated_low, stated_high] = self.range;
+        if !(stated_low <= low && high <= stated_high && stated_low.is_finite() && stated_high.is_finite()) {
+            return Err(format!("the range is {stated_low} … {stated_high}, but values are in {low} … {high}"));
+        }
+        Ok(())
+    }
+
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.samples.len()

@@ -162,6 +162,15 @@ impl TransferFunction {
     /// # Errors
     /// In words, with the first point that is wrong.
     pub fn validate(&self) -> Result<(), String> {
+        self.validate_numbers()?;
+        if self.opacity.iter().all(|p| p.1 == 0.0) && self.isosurfaces.is_empty() {
+            return Err("a transfer function without opacity shows nothing: every opacity is 0".into());
+        }
+        Ok(())
+    }
+
+    /// As [`validate`](Self::validate), but for whether anything is shown.
+    pub(crate) fn validate_numbers(&self) -> Result<(), String> {
         check_values("color", self.color.iter().map(|p| p.0))?;
         check_values("opacity", self.opacity.iter().map(|p| p.0))?;
         let inside = |v: &f64| (0.0..=1.0).contains(v);
@@ -170,9 +179,6 @@ impl TransferFunction {
         }
         if let Some(i) = self.opacity.iter().position(|(_, opacity)| !inside(opacity)) {
             return Err(format!("opacity point {i} is {}, but opacities lie in 0 … 1", self.opacity[i].1));
-        }
-        if self.opacity.iter().all(|p| p.1 == 0.0) && self.isosurfaces.is_empty() {
-            return Err("a transfer function without opacity shows nothing: every opacity is 0".into());
         }
         if !self.gradient.is_empty() {
             check_values("gradient", self.gradient.iter().map(|p| p.0))?;
@@ -198,6 +204,10 @@ impl TransferFunction {
         if !(self.unit.is_finite() && self.unit > 0.0) {
             return Err(format!("the unit is {}, but it is a length over 0", self.unit));
         }
+        let extinction = self.most_extinction();
+        if extinction > f64::from(f32::MAX) {
+            return Err(format!("the unit of {} is so short that extinctions reach {extinction}", self.unit));
+        }
         if let Some(Shade { ambient, diffuse, specular, power }) = self.shade
             && ![ambient, diffuse, specular, power].iter().all(|v| v.is_finite() && *v >= 0.0)
         {
@@ -213,7 +223,7 @@ impl TransferFunction {
         let values = self.color.iter().map(|p| p.0).chain(self.opacity.iter().map(|p| p.0));
         let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
         let turn = |value: f64| {
-            let share = if high > low { (value - low) / (high - low) } else { 0.0 };
+            let share = if high > low { share(low, high, value) } else { 0.0 };
             mix(range[0], range[1], share)
         };
         self.color.iter_mut().for_each(|p| p.0 = turn(p.0));
@@ -311,10 +321,16 @@ fn check_values(what: &str, values: impl Iterator<Item = f64>) -> Result<(), Str
 fn segment<T: Copy + Default>(points: &[(f64, T)], value: f64) -> (T, T, f64) {
     let above = points.partition_point(|p| p.0 <= value);
     match (above.checked_sub(1).map(|below| points[below]), points.get(above)) {
-        (Some((v0, p0)), Some(&(v1, p1))) => (p0, p1, (value - v0) / (v1 - v0)),
+        (Some((v0, p0)), Some(&(v1, p1))) => (p0, p1, share(v0, v1, value)),
         (Some((_, only)), None) | (None, Some(&(_, only))) => (only, only, 0.0),
         (None, None) => (T::default(), T::default(), 0.0),
     }
+}
+
+/// How far between two numbers a third one lies, 0 … 1, also where they are farther apart than the largest number.
+fn share(low: f64, high: f64, value: f64) -> f64 {
+    let width = high - low;
+    if width.is_finite() { (value - low) / width } else { (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) }
 }
 
 fn mix(a: f64, b: f64, t: f64) -> f64 {

@@ -37,10 +37,20 @@ impl Report {
 pub fn check(path: &Path, limits: &Limits) -> Report {
     let mut findings = Findings::default();
     match Hierarchy::open(path, limits) {
-        Ok(hierarchy) => contents(&hierarchy, &mut findings),
+        Ok(hierarchy) => return hierarchy.check(),
         Err(error) => findings.push(finding("open", &error)),
     }
     Report { findings: findings.finish() }
+}
+
+impl Hierarchy {
+    /// As [`check`](check()), of a file that is open already, or of its bytes. Of a tree in memory see
+    /// [`validate`](crate::hierarchy::validate()).
+    pub fn check(&self) -> Report {
+        let mut findings = Findings::default();
+        contents(self, &mut findings);
+        Report { findings: findings.finish() }
+    }
 }
 
 fn contents(hierarchy: &Hierarchy, findings: &mut Findings) {

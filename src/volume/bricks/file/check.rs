@@ -21,16 +21,24 @@ use std::path::Path;
 pub fn check(path: &Path, limits: &Limits, watch: &(dyn Fn(u64, u64) + Sync)) -> Report {
     let mut findings = Findings::default();
     match Bricks::open(path, limits) {
-        Ok(bricks) => {
-            if sums(&bricks, watch, &mut findings)
-                && let Err(error) = contents(&bricks, watch, &mut findings)
-            {
-                findings.push(finding("brick", &error));
-            }
-        }
+        Ok(bricks) => return bricks.check(watch),
         Err(error) => findings.push(finding("open", &error)),
     }
     Report { findings: findings.finish() }
+}
+
+impl Bricks {
+    /// As [`check`](check()), of a file that is open already, or of its bytes; a volume in memory has nothing to be checked.
+    pub fn check(&self, watch: &(dyn Fn(u64, u64) + Sync)) -> Report {
+        let mut findings = Findings::default();
+        if !self.bytes().is_empty()
+            && sums(self, watch, &mut findings)
+            && let Err(error) = contents(self, watch, &mut findings)
+        {
+            findings.push(finding("brick", &error));
+        }
+        Report { findings: findings.finish() }
+    }
 }
 
 fn count(bricks: &Bricks) -> u64 {

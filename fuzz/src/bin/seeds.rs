@@ -1,0 +1,557 @@
+//! Writes the first inputs of every fuzz target to the folder that is given: small files of each format, from the library's
+//! own writers, from the writers of the formats' crates, and as text. A fuzzer that begins with these need not guess headers.
+
+use flate2::{Compression, write::GzEncoder};
+use glam::{DVec3, Vec2, Vec3};
+use splatkit::{
+    hierarchy::{
+        BuildOptions, Tree,
+        file::{WriteOptions, to_bytes},
+    },
+    io,
+    surface::Mesh,
+    volume::{Lattice, Samples, Volume, bricks},
+};
+use std::{
+    error::Error,
+    fs,
+    io::{Cursor, Write},
+    path::{Path, PathBuf},
+};
+
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
+fn main() -> Result<()> {
+    let Some(folder) = std::env::args_os().nth(1).map(PathBuf::from) else {
+        return Err("give the folder that the inputs are written to".into());
+    };
+    let mut seeds = Seeds { folder, count: 0 };
+    ply(&mut seeds)?;
+    obj(&mut seeds)?;
+    stl(&mut seeds)?;
+    gltf(&mut seeds)?;
+    las(&mut seeds)?;
+    e57(&mut seeds)?;
+    tables(&mut seeds)?;
+    pcd(&mut seeds)?;
+    npy(&mut seeds)?;
+    volumes(&mut seeds)?;
+    vtk(&mut seeds)?;
+    hierarchies(&mut seeds)?;
+    in_bricks(&mut seeds)?;
+    transfer(&mut seeds)?;
+    models(&mut seeds)?;
+    println!("{} inputs in {}", seeds.count, seeds.folder.display());
+    Ok(())
+}
+
+/// The folder with a folder for each target.
+struct Seeds {
+    folder: PathBuf,
+    count: usize,
+}
+
+impl Seeds {
+    fn put(&mut self, target: &str, bytes: impl AsRef<[u8]>) -> Result<()> {
+        let folder = self.folder.join(target);
+        fs::create_dir_all(&folder)?;
+        self.count += 1;
+        fs::write(folder.join(format!("seed-{}", self.count)), bytes)?;
+        Ok(())
+    }
+
+    /// As [`put`](Self::put), also for the target of files without a name.
+    fn known(&mut self, target: &str, bytes: impl AsRef<[u8]>) -> Result<()> {
+        self.put("any", &bytes)?;
+        self.put(target, bytes)
+    }
+
+    /// What a writer writes to a path.
+    fn written<E: Error + 'static>(&self, write: impl FnOnce(&Path) -> std::result::Result<(), E>) -> Result<Vec<u8>> {
+        fs::create_dir_all(&self.folder)?;
+        let path = self.folder.join("written.nrrd.ply.splv");
+        write(&path)?;
+        let bytes = fs::read(&path)?;
+        fs::remove_file(&path)?;
+        Ok(bytes)
+    }
+}
+
+/// A tetrahedron with all attributes that a mesh has.
+fn tetrahedron() -> Mesh {
+    let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+    Mesh {
+        normals: vec![-Vec3::ONE.normalize(), Vec3::X, Vec3::Y, Vec3::Z],
+        colors: vec![[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [9, 9, 9, 128]],
+        uvs: vec![Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::ONE],
+        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+        positions,
+        ..Mesh::default()
+    }
+}
+
+fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
+    values.into_iter().flat_map(f32::to_le_bytes).collect()
+}
+
+fn ply(seeds: &mut Seeds) -> Result<()> {
+    let plain = seeds.written(|path| io::ply::write(&tetrahedron(), path))?;
+    seeds.known("ply", plain)?;
+    let cloud = Mesh { triangles: Vec::new(), uvs: Vec::new(), ..tetrahedron() };
+    let cloud = seeds.written(|path| io::ply::write(&cloud, path))?;
+    seeds.known("ply", cloud)?;
+    let set = tetrahedron().surfels(&Default::default())?;
+    let few = splatkit::splat::SplatSet { splats: set.splats[..3].to_vec(), ..set };
+    let gaussians = seeds.written(|path| io::ply::write_gaussians(&few, path))?;
+    seeds.known("ply", gaussians)?;
+    seeds.known(
+        "ply",
+        "ply\nformat ascii 1.0\ncomment text\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+         property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float value\nelement face 2\n\
+         property list uchar int vertex_indices\nend_header\n0 0 0 1 2 3 0.5\n1 0 0 1 2 3 1.5\n1 1 0 1 2 3 2\n0 1 0 1 2 3 4\n\
+         4 0 1 2 3\n3 0 1 2\n",
+    )?;
+    seeds.known(
+        "ply",
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\nproperty double z\n\
+         property float scalar\nproperty float radius\nend_header\n0 0 0 1 0.5\n1 2 3 4 0.25\n",
+    )?;
+    let header = "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty short x\nproperty short y\nproperty short z\n\
+         element face 1\nproperty list uint8 uint32 vertex_indices\nproperty list uchar float texcoord\nend_header\n";
+    let mut turned = header.as_bytes().to_vec();
+    [0i16, 0, 0, 5, 0, 0, 0, 5, 0].iter().for_each(|v| turned.extend(v.to_be_bytes()));
+    turned.push(3);
+    [0u32, 1, 2].iter().for_each(|v| turned.extend(v.to_be_bytes()));
+    turned.push(6);
+    (0..6).for_each(|_| turned.extend(0.5f32.to_be_bytes()));
+    seeds.known("ply", turned)
+}
+
+fn picture(format: image::ImageFormat) -> Result<Vec<u8>> {
+    let mut out = Cursor::new(Vec::new());
+    let picture = image::RgbImage::from_fn(5, 4, |x, y| image::Rgb([x as u8 * 50, y as u8 * 60, 7]));
+    picture.write_to(&mut out, format)?;
+    Ok(out.into_inner())
+}
+
+fn obj(seeds: &mut Seeds) -> Result<()> {
+    let square = "mtllib input.mtl\nv 0 0 0\nv 1 0 0 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\no a\n\
+         usemtl red\nf 1/1/1 2/2/1 3/3/1\ng b\ns off\nusemtl plain\nf 1 3 4\nf -4//-1 -3//-1 -2//-1 -1//-1\nl 1 2\np 1\n";
+    seeds.put("obj", square)?;
+    seeds.put("obj", "v 1e3 -2 .5\r\nv 1 2 3 \\\r\n 4\r\nv 0 0 0\r\n# text\r\nf 1 2 3\r\n")?;
+    let materials = "newmtl red\nKd 1 0 0\nd 0.5\nmap_Kd -s 1 1 1 input.png\nnewmtl plain\nKd 0.5\nTr 0.25\nillum 2\n";
+    for format in [image::ImageFormat::Png, image::ImageFormat::Jpeg] {
+        let parts = [square.as_bytes(), b"\n#mtl\n", materials.as_bytes(), b"\n#png\n", &picture(format)?].concat();
+        seeds.put("obj", parts)?;
+    }
+    Ok(())
+}
+
+fn stl(seeds: &mut Seeds) -> Result<()> {
+    seeds.known(
+        "stl",
+        "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n",
+    )?;
+    let mut binary = vec![b' '; 80];
+    binary.extend(2u32.to_le_bytes());
+    for z in [0.0, 1.0] {
+        binary.extend(floats([0.0, 0.0, 1.0, 0.0, 0.0, z, 1.0, 0.0, z, 0.0, 1.0, z]));
+        binary.extend([0x1f, 0x80]);
+    }
+    seeds.put("stl", binary)
+}
+
+fn gltf(seeds: &mut Seeds) -> Result<()> {
+    // Positions, indices, a normal each, and texture coordinates of a triangle.
+    let mut data = floats([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    [0u16, 1, 2, 0].iter().for_each(|v| data.extend(v.to_le_bytes()));
+    data.extend(floats([0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]));
+    [0u16, 65535, 0, 0, 65535, 0].iter().for_each(|v| data.extend(v.to_le_bytes()));
+    let picture = picture(image::ImageFormat::Png)?;
+    let place = data.len();
+    data.extend(&picture);
+    data.resize(data.len().next_multiple_of(4), 0);
+    let length = data.len();
+    let size = picture.len();
+    let document = |buffer: &str| {
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],
+"nodes":[{{"children":[1],"translation":[1,2,3],"rotation":[0,0,0,1],"scale":[1,2,1]}},{{"mesh":0,"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}],
+"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"NORMAL":2,"TEXCOORD_0":3}},"indices":1,"material":0,"mode":4}}]}}],
+"materials":[{{"pbrMetallicRoughness":{{"baseColorFactor":[1,0.5,0,1],"baseColorTexture":{{"index":0,"extensions":{{"KHR_texture_transform":{{"offset":[0.5,0],"scale":[2,2],"rotation":1}}}}}}}}}}],
+"textures":[{{"source":0}}],"images":[{{"bufferView":4,"mimeType":"image/png"}}],
+"buffers":[{{"byteLength":{length}{buffer}}}],
+"bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":6}},{{"buffer":0,"byteOffset":44,"byteLength":36}},{{"buffer":0,"byteOffset":80,"byteLength":12,"byteStride":4}},{{"buffer":0,"byteOffset":{place},"byteLength":{size}}}],
+"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}},{{"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}},{{"bufferView":2,"componentType":5126,"count":3,"type":"VEC3"}},
+{{"bufferView":3,"componentType":5123,"normalized":true,"count":3,"type":"VEC2","sparse":{{"count":1,"indices":{{"bufferView":1,"componentType":5123}},"values":{{"bufferView":3}}}}}}]}}"#
+        )
+    };
+    let mut text = document("").into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let mut binary = b"glTF\x02\0\0\0".to_vec();
+    binary.extend(((28 + text.len() + data.len()) as u32).to_le_bytes());
+    for (kind, chunk) in [(b"JSON", &text), (b"BIN\0", &data)] {
+        binary.extend((chunk.len() as u32).to_le_bytes());
+        binary.extend(kind);
+        binary.extend(chunk);
+    }
+    seeds.known("gltf", binary)?;
+    seeds.known("gltf", document(&format!(",\"uri\":\"data:application/octet-stream;base64,{}\"", base64(&data))))?;
+    seeds.known(
+        "gltf",
+        r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0,1]}],"nodes":[{"children":[1]},{"children":[0],"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"accessors":[{"componentType":5126,"count":3,"type":"VEC3"}]}"#,
+    )
+}
+
+fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let group = |part: &[u8]| {
+        let bits = (0..3).fold(0usize, |bits, at| bits << 8 | usize::from(part.get(at).copied().unwrap_or(0)));
+        let letter = |at: usize| if at > part.len() { '=' } else { char::from(LETTERS[bits >> (18 - 6 * at) & 63]) };
+        (0..4).map(letter).collect::<String>()
+    };
+    bytes.chunks(3).map(group).collect()
+}
+
+/// Bytes of a point of each format.
+const RECORD: [usize; 9] = [20, 28, 26, 34, 57, 63, 30, 36, 38];
+
+fn las_header(format: u8, start: usize, records: u32, points: u32) -> Vec<u8> {
+    let (minor, size) = if format & 63 < 6 { (2, 227) } else { (4, 375) };
+    let mut header = vec![0; size];
+    let mut put = |at: usize, bytes: &[u8]| header[at..at + bytes.len()].copy_from_slice(bytes);
+    put(0, b"LASF");
+    put(24, &[1, minor]);
+    put(94, &(size as u16).to_le_bytes());
+    put(96, &(start as u32).to_le_bytes());
+    put(100, &records.to_le_bytes());
+    put(104, &[format]);
+    put(105, &(RECORD[usize::from(format & 63)] as u16).to_le_bytes());
+    if minor == 4 {
+        put(247, &u64::from(points).to_le_bytes());
+    } else {
+        put(107, &points.to_le_bytes());
+    }
+    for axis in 0..3 {
+        put(131 + 8 * axis, &0.01f64.to_le_bytes());
+        put(155 + 8 * axis, &1e5f64.to_le_bytes());
+    }
+    header
+}
+
+fn las(seeds: &mut Seeds) -> Result<()> {
+    const POINTS: u32 = 6;
+    for format in [0, 1, 3, 6, 7] {
+        let record = |number: u32| {
+            let mut record = vec![0; RECORD[usize::from(format)]];
+            for (axis, at) in [0, 4, 8].into_iter().enumerate() {
+                record[at..at + 4].copy_from_slice(&(number * 7 + axis as u32).to_le_bytes());
+            }
+            record[12] = number as u8;
+            record[14] = if format < 6 { 0b1001 } else { 0x11 };
+            if let Some(last) = record.last_mut().filter(|_| format > 1) {
+                *last = number as u8;
+            }
+            record
+        };
+        let start = las_header(format, 0, 0, 0).len();
+        let points: Vec<u8> = (0..POINTS).flat_map(record).collect();
+        seeds.known("las", [las_header(format, start, 0, POINTS), points].concat())?;
+
+        let items = laz::LazItemRecordBuilder::default_for_point_format_id(format, 0)?;
+        let builder = laz::LazVlrBuilder::new(items);
+        let layout =
+            if format < 6 { builder.with_fixed_chunk_size(4) } else { builder.with_variable_chunk_size() }.build();
+        let mut described = Vec::new();
+        layout.write_to(&mut described)?;
+        let mut before = vec![0; 54];
+        before[2..2 + laz::LazVlr::USER_ID.len()].copy_from_slice(laz::LazVlr::USER_ID.as_bytes());
+        before[18..20].copy_from_slice(&laz::LazVlr::RECORD_ID.to_le_bytes());
+        before[20..22].copy_from_slice(&(described.len() as u16).to_le_bytes());
+        before.extend(described);
+        let start = start + before.len();
+        let mut file = Cursor::new([las_header(format | 0x80, start, 1, POINTS), before].concat());
+        file.set_position(start as u64);
+        let mut packer = laz::LasZipCompressor::new(&mut file, layout)?;
+        for number in 0..POINTS {
+            packer.compress_one(&record(number))?;
+            if format >= 6 && number == 3 {
+                packer.finish_current_chunk()?;
+            }
+        }
+        packer.done()?;
+        drop(packer);
+        seeds.known("las", file.into_inner())?;
+    }
+    Ok(())
+}
+
+fn e57(seeds: &mut Seeds) -> Result<()> {
+    use e57::{E57Writer, Record, RecordDataType, RecordName, RecordValue};
+    const DOUBLE: RecordDataType = RecordDataType::Double { min: None, max: None };
+    let color = RecordDataType::Integer { min: 0, max: 255 };
+    let scaled = RecordDataType::ScaledInteger { min: -4000, max: 4000, scale: 0.01, offset: 0.0 };
+    let kinds = [
+        vec![
+            (RecordName::CartesianX, DOUBLE),
+            (RecordName::CartesianY, DOUBLE),
+            (RecordName::CartesianZ, DOUBLE),
+            (RecordName::ColorRed, color.clone()),
+            (RecordName::ColorGreen, color.clone()),
+            (RecordName::ColorBlue, color),
+        ],
+        vec![
+            (RecordName::SphericalRange, DOUBLE),
+            (RecordName::SphericalAzimuth, DOUBLE),
+            (RecordName::SphericalElevation, DOUBLE),
+            (RecordName::Intensity, RecordDataType::Single { min: None, max: None }),
+        ],
+        vec![(RecordName::CartesianX, scaled.clone()), (RecordName::CartesianY, scaled.clone()), (RecordName::CartesianZ, scaled)],
+    ];
+    for kind in kinds {
+        let mut out = Cursor::new(Vec::new());
+        let mut writer = E57Writer::new(&mut out, "file")?;
+        let records = kind.iter().map(|(name, data_type)| Record { name: name.clone(), data_type: data_type.clone() });
+        let mut scan = writer.add_pointcloud("scan", records.collect())?;
+        for point in 0..3 {
+            let value = |(_, data_type): &(RecordName, RecordDataType)| match data_type {
+                RecordDataType::Double { .. } => RecordValue::Double(f64::from(point)),
+                RecordDataType::Single { .. } => RecordValue::Single(point as f32),
+                RecordDataType::Integer { .. } => RecordValue::Integer(point.into()),
+                RecordDataType::ScaledInteger { .. } => RecordValue::ScaledInteger(point.into()),
+            };
+            scan.add_point(kind.iter().map(value).collect())?;
+        }
+        scan.finalize()?;
+        writer.finalize()?;
+        drop(writer);
+        let bytes = out.into_inner();
+        seeds.put("e57", &bytes)?;
+        seeds.known("e57_summed", bytes)?;
+    }
+    Ok(())
+}
+
+fn tables(seeds: &mut Seeds) -> Result<()> {
+    for text in [
+        "0 0 0\n1 0 0\n0 1 0\n",
+        "3\n0 0 0 -5 255 0 0\n1 0 0 17 0 255 0\n0 1 0 99 0 0 255\n",
+        "// X Y Z R G B Nx Ny Nz\n1.5;2;3;1;2;3;0;0;1\n",
+        "x,y,z\r\n1,2,3\r\n-1e3,2.5,+3\r\n",
+        "\"x\",\"y\",\"z\",\"red\",\"green\",\"blue\"\n1,2,3,4,5,6\n",
+    ] {
+        seeds.put("xyz", text)?;
+    }
+    for text in [
+        "x,y,z,value\n0,0,0,1\n1,0,0,2\n",
+        "0 0 0 1 0.5\n1 0 0 2 0.5\n",
+        "x;y;z;value;xx;xy;xz;yy;yz;zz\n0;0;0;1;1;0;0;1;0;1\n",
+        "0 0 0 1 1 0 0 1 0 1\n# text\n\n2 2 2 3 1 0.1 0 1 0 1\n",
+        "\u{feff}name\tz\ty\tx\tscalar\tradius\na\t1\t2\t3\t4\t5\n",
+    ] {
+        seeds.put("csv", text)?;
+    }
+    Ok(())
+}
+
+fn pcd(seeds: &mut Seeds) -> Result<()> {
+    let header = |data: &str| {
+        format!(
+            "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z rgb normal_x normal_y normal_z\n\
+             SIZE 4 4 4 4 4 4 4\nTYPE F F F U F F F\nCOUNT 1 1 1 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 1 2 9 1 0 0 0\n\
+             POINTS 2\nDATA {data}\n"
+        )
+        .into_bytes()
+    };
+    seeds.known("pcd", [header("ascii"), b"1 2 3 255 0 0 1\n4 5 6 7 0 1 0\n".to_vec()].concat())?;
+    let rows = floats((0..14).map(|v| v as f32));
+    seeds.known("pcd", [header("binary"), rows.clone()].concat())?;
+    let runs: Vec<u8> = rows.chunks(32).flat_map(|run| [&[run.len() as u8 - 1], run].concat()).collect();
+    let sizes = [runs.len(), rows.len()].map(|size| (size as u32).to_le_bytes()).concat();
+    seeds.known("pcd", [header("binary_compressed"), sizes, runs].concat())?;
+    // A copy of what came before, which overlaps itself.
+    let packed = [&[0, 0, 0xe0, 45, 0][..], &[0, 1]].concat();
+    let sizes = [packed.len() as u32, 56].map(u32::to_le_bytes).concat();
+    seeds.known("pcd", [header("binary_compressed"), sizes, packed].concat())
+}
+
+fn npy(seeds: &mut Seeds) -> Result<()> {
+    for (version, kind, shape, count) in [(1, "<f4", "(2, 4)", 8), (2, "<f4", "(1, 5)", 5), (1, "<f8", "(1, 4)", 4)] {
+        let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
+        let mut bytes = b"\x93NUMPY".to_vec();
+        bytes.extend([version, 0]);
+        bytes.extend(&(header.len() as u32).to_le_bytes()[..if version == 1 { 2 } else { 4 }]);
+        bytes.extend(header.bytes());
+        for value in 1..=count {
+            match kind {
+                "<f8" => bytes.extend(f64::from(value).to_le_bytes()),
+                _ => bytes.extend((value as f32).to_le_bytes()),
+            }
+        }
+        seeds.known("npy", bytes)?;
+    }
+    Ok(())
+}
+
+fn volumes(seeds: &mut Seeds) -> Result<()> {
+    let lattice = Lattice::with_spacing([3, 2, 2], DVec3::new(1.0, 2.0, 0.5));
+    let samples = Samples::U8((0..12).collect());
+    let volume = Volume::new(lattice, samples)?;
+    let written = seeds.written(|path| io::nrrd::write(&volume, path))?;
+    seeds.known("nrrd", written)?;
+    let head = "NRRD0005\n# text\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: 2 2 2\n\
+         space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\nendian: big\n";
+    seeds.known("nrrd", [head.as_bytes(), b"encoding: raw\n\n0123456789abcdef"].concat())?;
+    seeds.known("nrrd", format!("{head}encoding: hex\n\n00010203040506070809 0a0b0c0d0e0f"))?;
+    seeds.known("nrrd", format!("{head}lattice:=bcc\nencoding: ascii\n\n1 2 3 4 5 6 7 -8"))?;
+    let places = "axis positions 0:=0 1\naxis positions 1:=0 2\naxis positions 2:=0 5\n";
+    seeds.known("nrrd", format!("{head}{places}encoding: text\n\n1 2 3 4 5 6 7 8"))?;
+    seeds.known("nrrd", format!("{head}data file: a.raw\nbyte skip: 4\nencoding: raw\n\n"))?;
+    let mut packer = GzEncoder::new(Vec::new(), Compression::default());
+    packer.write_all(b"0123456789abcdef")?;
+    seeds.known("nrrd", [head.as_bytes(), b"encoding: gzip\n\n", &packer.finish()?].concat())?;
+    seeds.put("raw", [&[2, 2, 2, 0, 16, 0][..], b"01234567"].concat())?;
+    seeds.put("raw", [&[1, 2, 1, 9, 8, 3][..], b"abc\0\0\x80?\0\0\0@"].concat())?;
+    let mut packer = GzEncoder::new(Vec::new(), Compression::default());
+    packer.write_all(b"01234567")?;
+    seeds.put("raw", [&[2, 2, 2, 0, 16, 0][..], &packer.finish()?].concat())
+}
+
+fn vtk(seeds: &mut Seeds) -> Result<()> {
+    let image = "<VTKFile type=\"ImageData\" byte_order=\"LittleEndian\"><ImageData WholeExtent=\"0 2 0 1 0 0\" \
+         Origin=\"0 0 0\" Spacing=\"1 1 2\"><Piece Extent=\"0 2 0 1 0 0\"><PointData Scalars=\"s\">";
+    let end = "</PointData></Piece></ImageData></VTKFile>";
+    seeds.known("vti", format!("{image}<DataArray type=\"UInt8\" Name=\"s\" format=\"ascii\">0 1 2 3 4 5</DataArray>{end}"))?;
+    let inline = base64(&[&6u32.to_le_bytes()[..], &[0, 1, 2, 3, 4, 5]].concat());
+    seeds.known("vti", format!("{image}<DataArray type=\"UInt8\" Name=\"s\" format=\"binary\">{inline}</DataArray>{end}"))?;
+    let appended = format!(
+        "{image}<DataArray type=\"UInt8\" Name=\"s\" format=\"appended\" offset=\"0\"/></PointData></Piece></ImageData>\
+         <AppendedData encoding=\"raw\">_"
+    );
+    let data = [&6u32.to_le_bytes()[..], &[0, 1, 2, 3, 4, 5], b"</AppendedData></VTKFile>"].concat();
+    seeds.known("vti", [appended.as_bytes(), &data].concat())?;
+    let mut packer = flate2::write::ZlibEncoder::new(Vec::new(), Compression::default());
+    packer.write_all(&[0, 1, 2, 3, 4, 5])?;
+    let packed = packer.finish()?;
+    let sizes = [1, 6, 0, packed.len() as u32].map(u32::to_le_bytes).concat();
+    let packed_image = image.replace("byte_order", "compressor=\"vtkZLibDataCompressor\" byte_order");
+    seeds.known(
+        "vti",
+        format!(
+            "{packed_image}<DataArray type=\"UInt8\" Name=\"s\" format=\"binary\">{}{}</DataArray>{end}",
+            base64(&sizes),
+            base64(&packed)
+        ),
+    )?;
+    let array = |kind: &str, name: &str, parts: u32, text: &str| {
+        format!("<DataArray type='{kind}' Name='{name}' NumberOfComponents='{parts}' format='ascii'>{text}</DataArray>")
+    };
+    let places = ["0 1 5", "-1 1", "7"].map(|text| array("Float64", "p", 1, text)).concat();
+    seeds.known(
+        "vtr",
+        format!(
+            "<VTKFile type='RectilinearGrid'><RectilinearGrid WholeExtent='0 2 0 1 0 0'><Piece Extent='0 2 0 1 0 0'>\
+             <PointData Scalars='s'>{}</PointData><Coordinates>{places}</Coordinates></Piece></RectilinearGrid></VTKFile>",
+            array("UInt8", "s", 1, "0 1 2 3 4 5")
+        ),
+    )?;
+    let points = array("Float32", "points", 3, "0 0 0 2 0 0 0 2 0 0 0 2");
+    let cells = [("Int64", "connectivity", "0 1 2 3"), ("Int64", "offsets", "4"), ("UInt8", "types", "10")]
+        .map(|(kind, name, text)| array(kind, name, 1, text))
+        .concat();
+    for (point_data, cell_data) in [(array("Float32", "value", 1, "1 2 3 4"), String::new()), (String::new(), array("Int32", "c", 1, "5"))] {
+        seeds.known(
+            "vtu",
+            format!(
+                "<VTKFile type='UnstructuredGrid'><UnstructuredGrid><Piece NumberOfPoints='4' NumberOfCells='1'>\
+                 <PointData>{point_data}</PointData><CellData>{cell_data}</CellData><Points>{points}</Points>\
+                 <Cells>{cells}</Cells></Piece></UnstructuredGrid></VTKFile>"
+            ),
+        )?;
+    }
+    seeds.known(
+        "vtu",
+        format!(
+            "<VTKFile type='PolyData'><PolyData><Piece NumberOfPoints='4' NumberOfVerts='0' NumberOfPolys='1'><PointData>{}\
+             </PointData><Points>{points}</Points><Polys>{cells}</Polys></Piece></PolyData></VTKFile>",
+            array("Float32", "value", 1, "1 2 3 4")
+        ),
+    )?;
+    let head = |encoding: &str| format!("# vtk DataFile Version 3.0\ntitle\n{encoding}\n");
+    let image = "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 1\nORIGIN 10 20 30\nSPACING 0.5 1 2\nPOINT_DATA 6\n\
+         SCALARS density unsigned_char 1\nLOOKUP_TABLE default\n";
+    seeds.known("vtk", format!("{}{image}0 1 2 30 4 255\n", head("ASCII")))?;
+    seeds.known("vtk", [head("BINARY").as_bytes(), image.as_bytes(), &[0, 1, 2, 3, 4, 5]].concat())?;
+    for rest in [
+        "DATASET RECTILINEAR_GRID\nDIMENSIONS 3 2 1\nX_COORDINATES 3 double\n0 1 5\nY_COORDINATES 2 float\n-1 1\n\
+         Z_COORDINATES 1 float\n7\nPOINT_DATA 6\nFIELD FieldData 1\nf 1 6 float\n0 1 2 3 4 5.5\n",
+        "DATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 2 0 0 0 2 0 0 0 2\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n\
+         CELL_DATA 1\nSCALARS c int 1\nLOOKUP_TABLE default\n5\n",
+        "DATASET POLYDATA\nPOINTS 3 float\n0 0 0 2 0 0 0 2 0\nPOLYGONS 1 4\n3 0 1 2\nPOINT_DATA 3\nSCALARS value float\n\
+         LOOKUP_TABLE default\n1 2 3\n",
+    ] {
+        seeds.known("vtk", format!("{}{rest}", head("ASCII")))?;
+    }
+    Ok(())
+}
+
+fn hierarchies(seeds: &mut Seeds) -> Result<()> {
+    let whole = tetrahedron().surfels(&splatkit::surface::SurfelOptions { largest_spacing: 0.2, ..Default::default() })?;
+    for (count, block_splats) in [(1, 64), (7, 64), (150, 64)] {
+        let splats: Vec<_> = whole.splats.iter().copied().take(count).collect();
+        let set = splatkit::splat::SplatSet { splats, ..whole.clone() };
+        let tree = Tree::build(&set, &BuildOptions { block_splats, ..BuildOptions::default() }, &|_, _| {})?;
+        for lossless in [false, true] {
+            let options = WriteOptions { lossless, unit: "m".into(), source: "a.ply".into(), ..WriteOptions::default() };
+            let bytes = to_bytes(&tree, &options)?;
+            seeds.put("splk", &bytes)?;
+            seeds.known("splk_summed", bytes)?;
+        }
+    }
+    Ok(())
+}
+
+fn in_bricks(seeds: &mut Seeds) -> Result<()> {
+    let samples = |count: usize| -> [Samples; 4] {
+        [
+            Samples::U8((0..count).map(|i| (i % 7) as u8).collect()),
+            Samples::I16((0..count).map(|i| (i % 5) as i16 - 2).collect()),
+            Samples::U16(vec![9; count]),
+            Samples::F32((0..count).map(|i| (i % 3) as f32).collect()),
+        ]
+    };
+    for dims in [[2, 3, 4], [33, 2, 1]] {
+        for samples in samples(dims.iter().product()) {
+            let volume = Volume::new(Lattice::with_spacing(dims, DVec3::ONE), samples)?;
+            let options = bricks::WriteOptions { unit: "mm".into(), source: "a".into() };
+            let bytes = seeds.written(|path| bricks::write(&volume, path, &options, &|_, _| {}))?;
+            seeds.put("splv", &bytes)?;
+            seeds.known("splv_summed", bytes)?;
+        }
+    }
+    Ok(())
+}
+
+fn transfer(seeds: &mut Seeds) -> Result<()> {
+    for text in [
+        r#"{"color": [[0, 1, 0.5, 0], [1, 0, 0, 1]], "opacity": [[0, 0], [1, 0.5], [1, 1]]}"#,
+        r#"{"color": [[-1e3, 1, 1, 1]], "opacity": [[5, 0.1]], "unit": 2.5, "shade": {"ambient": 0.2, "diffuse": 0.7, "specular": 0.3, "power": 10}, "gradient": [[0, 0], [3, 1]], "isosurfaces": [{"value": 80, "color": [1, 1, 1], "opacity": 1}]}"#,
+    ] {
+        seeds.put("transfer", text)?;
+    }
+    Ok(())
+}
+
+/// Bytes that are taken for models whatever they are: the fuzzer finds the rest.
+fn models(seeds: &mut Seeds) -> Result<()> {
+    let mut state = 1u32;
+    for length in [40, 200, 600] {
+        let next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 24) as u8
+        };
+        let bytes: Vec<u8> = std::iter::repeat_with(next).take(length).collect();
+        seeds.put("convert_render", bytes)?;
+    }
+    Ok(())
+}

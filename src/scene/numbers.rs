@@ -1,0 +1,105 @@
+//! Numbers that make no picture: not finite, or beyond what 32 bits hold. One of them in one splat would spread, through sums
+//! and bounds, to pixels that have nothing to do with it; so a scene that holds one is refused, with its place.
+
+use super::{Item, Settings};
+use crate::{
+    Error, Result,
+    hierarchy::Detail,
+    math::Bounds,
+    splat::{Payload, Splat, SplatSet},
+    volume::Shade,
+};
+use rayon::prelude::*;
+
+/// Checks the numbers of an item; `place` tells which item it is.
+pub(super) fn check_item(place: &str, item: &Item) -> Result<()> {
+    let wrong = |message: String| Error::Argument(format!("{place}: {message}"));
+    if let Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) = item {
+        transfer.validate_numbers().map_err(|message| wrong(format!("the transfer function: {message}")))?;
+    }
+    if let Item::Volume(_, kernel, _) | Item::Bricks(_, kernel, _) = item {
+        kernel.validate().map_err(|error| wrong(error.to_string()))?;
+    }
+    match item {
+        Item::Radiance(set) | Item::Scalar(set, _) => check_set(set).map_err(wrong)?,
+        Item::Volume(volume, ..) => volume.validate().map_err(wrong)?,
+        Item::Hierarchy(_) | Item::Bricks(..) => {}
+    }
+    let Bounds { min, max } = item.bounds();
+    let holds = |v: f64| v.abs() <= f64::from(f32::MAX);
+    // Nothing at all has bounds of its own, which are not finite.
+    let is_none = matches!(item, Item::Radiance(set) | Item::Scalar(set, _) if set.splats.is_empty());
+    if !is_none && ![min, max, max - min].iter().all(|v| v.to_array().into_iter().all(holds)) {
+        return Err(wrong(format!("it reaches from {min} to {max}, beyond what 32-bit numbers hold")));
+    }
+    Ok(())
+}
+
+fn check_set(set: &SplatSet) -> Result<(), String> {
+    if !set.origin.is_finite() {
+        return Err(format!("the origin {} is not finite", set.origin));
+    }
+    if !(set.overlap > 0.0 && set.overlap.is_finite()) {
+        return Err(format!("the overlap is {}; a positive number is needed", set.overlap));
+    }
+    let first = set.splats.par_iter().position_first(|splat| fault(splat, set.payload).is_some());
+    match first.and_then(|index| Some((index, fault(&set.splats[index], set.payload)?))) {
+        Some((index, fault)) => Err(format!("splat {index}: {fault}")),
+        None => Ok(()),
+    }
+}
+
+/// What is wrong with the numbers of a splat.
+fn fault(splat: &Splat, payload: Payload) -> Option<String> {
+    let Splat { center, strength, factor, .. } = splat;
+    let not_finite = |values: &[f32]| !values.iter().all(|v| v.is_finite());
+    if not_finite(center) {
+        return Some(format!("the centre {center:?} is not finite"));
+    }
+    if not_finite(factor) {
+        return Some(format!("the factor {factor:?} is not finite"));
+    }
+    match payload {
+        Payload::Radiance if !(*strength >= 0.0 && strength.is_finite()) => {
+            Some(format!("the optical depth is {strength}, but finite and not negative it must be"))
+        }
+        Payload::Scalar if !strength.is_finite() => Some(format!("the value is {strength}")),
+        Payload::Scalar => {
+            let (weight, slope) = splat.weight_and_slope();
+            let is_sound = weight >= 0.0 && weight.is_finite() && slope.is_finite();
+            (!is_sound).then(|| format!("the weight is {weight} and the slope {slope}"))
+        }
+        Payload::Radiance => None,
+    }
+}
+
+/// Checks the numbers of the settings.
+pub(super) fn check_settings(settings: &Settings) -> Result<()> {
+    let positive = |v: f64| v > 0.0 && v.is_finite();
+    let wrong = |message: String| Err(Error::Argument(message));
+    if let Some(thickness) = settings.sheet_thickness.filter(|v| !positive(*v)) {
+        return wrong(format!("the thickness of sheets is {thickness}; a positive number is needed"));
+    }
+    if !positive(settings.sheet_pixels) {
+        return wrong(format!(
+            "the thickness of sheets is {} pixels; a positive number is needed",
+            settings.sheet_pixels
+        ));
+    }
+    if let Some(near) = settings.near.filter(|v| !(*v >= 0.0 && v.is_finite())) {
+        return wrong(format!("the nearest distance is {near}; a number from 0 on is needed"));
+    }
+    match settings.detail {
+        Detail::Pixels(value) | Detail::Milliseconds(value) if !(value >= 0.0 && value.is_finite()) => {
+            return wrong(format!("the detail is {:?}; a number from 0 on is needed", settings.detail));
+        }
+        _ => {}
+    }
+    for shade in [settings.surface_shade, settings.volume_shade.flatten()].into_iter().flatten() {
+        let Shade { ambient, diffuse, specular, power } = shade;
+        if ![ambient, diffuse, specular, power].iter().all(|v| *v >= 0.0 && v.is_finite()) {
+            return wrong(format!("the light's coefficients must be finite and not negative, found {shade:?}"));
+        }
+    }
+    Ok(())
+}

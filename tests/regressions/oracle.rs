@@ -1,0 +1,563 @@
+//! What must hold of every input, whatever its bytes: the reader gives an error or something sound, within little time and
+//! memory. The fuzz targets (`fuzz/`) and the regression tests (`tests/regressions.rs`) share these entry points, one per
+//! format, each named as its fuzz target and its folder of regressions.
+//!
+//! A function here panics where the library breaks a promise, and returns otherwise.
+
+use arbitrary::{Arbitrary, Unstructured};
+use glam::{DVec3, Vec3};
+use splatkit::{
+    Error, Result,
+    hierarchy::{
+        BuildOptions, Hierarchy, Tree,
+        file::{WriteOptions, to_bytes},
+        validate,
+    },
+    io::{self, Endian, Kind, Limits, RawLayout, SampleType, Source, Stream},
+    math::{Camera, Projection},
+    reference,
+    scattered::Points,
+    scene::{Scene, Settings},
+    surface::{Mesh, SurfelOptions},
+    volume::{TransferFunction, Volume, bricks::Bricks},
+};
+use std::path::{Path, PathBuf};
+
+/// Looks at bytes as those of one format.
+pub type Look = fn(&[u8]);
+
+/// All formats by name.
+pub const FORMATS: &[(&str, Look)] = &[
+    ("ply", ply),
+    ("obj", obj),
+    ("stl", stl),
+    ("gltf", gltf),
+    ("las", las),
+    ("e57", e57),
+    ("e57_summed", e57_summed),
+    ("xyz", xyz),
+    ("pcd", pcd),
+    ("csv", csv),
+    ("npy", npy),
+    ("nrrd", nrrd),
+    ("vti", vti),
+    ("vtr", vtr),
+    ("vtu", vtu),
+    ("vtk", vtk),
+    ("raw", raw),
+    ("any", any),
+    ("splk", splk),
+    ("splk_summed", splk_summed),
+    ("splv", splv),
+    ("splv_summed", splv_summed),
+    ("transfer", transfer),
+    ("convert_render", convert_render),
+];
+
+/// So little that whatever is slow or large within it is a bug.
+pub fn limits() -> Limits {
+    Limits { points: 1 << 16, bytes: 64 << 20, texels: 1 << 16, ..Limits::default() }
+}
+
+/// Samples of a volume that are looked at as a whole.
+const MOST_SAMPLES: usize = 1 << 20;
+
+/// Reads bytes in memory under a name.
+fn read<T>(name: &str, bytes: &[u8], read: impl Fn(&Source) -> Result<T>) -> Option<T> {
+    let limits = limits();
+    let source = Source::from_bytes(Path::new(name), bytes, &limits).expect("small enough");
+    accepted(read(&source))
+}
+
+/// What was read; of an error, that it says something.
+fn accepted<T>(result: Result<T>) -> Option<T> {
+    match result {
+        Ok(read) => Some(read),
+        Err(Error::Input { place, message, .. }) => {
+            assert!(!place.is_empty() && !message.is_empty(), "an error without words");
+            None
+        }
+        Err(error) => {
+            assert!(!error.to_string().is_empty(), "an error without words");
+            None
+        }
+    }
+}
+
+fn sound_mesh(mesh: &Mesh) {
+    let count = mesh.positions.len();
+    let fits = |length: usize, wanted: usize| length == 0 || length == wanted;
+    assert!(count as u64 <= limits().points, "{count} points");
+    assert!(mesh.origin.is_finite(), "origin {}", mesh.origin);
+    assert!(mesh.positions.iter().all(|p| p.is_finite()), "a position is not finite");
+    assert!(mesh.normals.iter().all(|n| n.is_finite()), "a normal is not finite");
+    assert!(fits(mesh.normals.len(), count) && fits(mesh.colors.len(), count) && fits(mesh.uvs.len(), count));
+    assert!(fits(mesh.triangle_materials.len(), mesh.triangles.len()));
+    assert!(mesh.triangles.iter().flatten().all(|&index| (index as usize) < count), "an index is out of range");
+    assert!(mesh.triangle_materials.iter().all(|&index| (index as usize) < mesh.materials.len()));
+    assert!(mesh.sensors.iter().all(|sensor| sensor.position.is_finite() && sensor.points.end <= count));
+    for material in &mesh.materials {
+        assert!(material.color.iter().all(|v| (0.0..=1.0).contains(v)), "the colour {:?}", material.color);
+        let whole = |t: &splatkit::surface::Texture| t.texels.len() == t.width as usize * t.height as usize;
+        assert!(material.texture.as_deref().is_none_or(whole), "a texture of another size than its texels");
+    }
+}
+
+fn sound_samples(points: &Points) {
+    points.validate().expect("what was read is sound");
+    assert!(points.bounds().iter().all(|p| p.is_finite()) && points.range().iter().all(|v| v.is_finite()));
+}
+
+fn sound_volume(volume: &Volume) {
+    volume.lattice.validate().expect("what was read is sound");
+    assert_eq!(volume.len(), volume.lattice.len());
+    assert!(volume.bounds().iter().all(|p| p.is_finite()), "bounds {:?}", volume.bounds());
+    let [low, high] = volume.range;
+    assert!(low.is_finite() && high.is_finite() && low <= high, "range {low} … {high}");
+    for index in (0..volume.len()).step_by(volume.len().div_ceil(64)) {
+        assert!((low..=high).contains(&volume.value(index)), "sample {index} lies beyond the range");
+    }
+}
+
+fn mesh(name: &str, bytes: &[u8], reader: fn(&Source) -> Result<Mesh>) -> Option<Mesh> {
+    read(name, bytes, reader).inspect(sound_mesh)
+}
+
+fn samples(name: &str, bytes: &[u8], reader: fn(&Source, Option<&str>) -> Result<Points>) {
+    for scalar in [None, Some("value")] {
+        let points = read(name, bytes, |source| reader(source, scalar));
+        points.iter().for_each(sound_samples);
+    }
+}
+
+fn volume(name: &str, bytes: &[u8], reader: fn(&Source) -> Result<Volume>) {
+    read(name, bytes, reader).iter().for_each(sound_volume);
+}
+
+/// What is read in pieces tells of as many points as what is read as a whole.
+fn stream(name: &str, bytes: &[u8], whole: Option<&Mesh>) {
+    let limits = limits();
+    let source = Source::from_bytes(Path::new(name), bytes, &limits).expect("small enough");
+    let stream = accepted(Stream::of(source)).flatten();
+    if let (Some(stream), Some(whole)) = (stream, whole) {
+        assert!(whole.positions.len() as u64 <= stream.counts().points, "{:?}", stream.counts());
+        assert!(whole.triangles.len() as u64 <= stream.counts().triangles || stream.counts().triangles == 0);
+    }
+}
+
+pub fn ply(bytes: &[u8]) {
+    let whole = mesh("input.ply", bytes, io::ply::read);
+    stream("input.ply", bytes, whole.as_ref());
+    samples("input.ply", bytes, io::read_samples);
+}
+
+/// An OBJ file; behind a line `#mtl` its materials, `input.mtl`, and behind a line `#png` their picture, `input.png`.
+pub fn obj(bytes: &[u8]) {
+    let Some((model, rest)) = cut(bytes, b"\n#mtl\n") else {
+        mesh("input.obj", bytes, io::obj::read);
+        return;
+    };
+    let folder = Folder::new();
+    let (materials, picture) = cut(rest, b"\n#png\n").unwrap_or((rest, &[]));
+    let path = folder.write("input.obj", model);
+    folder.write("input.mtl", materials);
+    if !picture.is_empty() {
+        folder.write("input.png", picture);
+    }
+    let limits = limits();
+    accepted(Source::open(&path, &limits).and_then(|source| io::obj::read(&source))).iter().for_each(sound_mesh);
+}
+
+fn cut<'a>(bytes: &'a [u8], mark: &[u8]) -> Option<(&'a [u8], &'a [u8])> {
+    let at = bytes.windows(mark.len()).position(|window| window == mark)?;
+    Some((&bytes[..at + 1], &bytes[at + mark.len()..]))
+}
+
+/// A folder that nothing but what is written here is in.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> Self {
+        let thread = format!("{:?}", std::thread::current().id());
+        let number: String = thread.chars().filter(char::is_ascii_digit).collect();
+        let path = std::env::temp_dir().join(format!("splatkit-regressions-{}-{number}", std::process::id()));
+        std::fs::create_dir_all(&path).expect("a place for temporary files");
+        Self(path)
+    }
+
+    fn write(&self, name: &str, bytes: &[u8]) -> PathBuf {
+        let path = self.0.join(name);
+        std::fs::write(&path, bytes).expect("a place for temporary files");
+        path
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        std::fs::remove_dir_all(&self.0).ok();
+    }
+}
+
+pub fn stl(bytes: &[u8]) {
+    mesh("input.stl", bytes, io::stl::read);
+}
+
+pub fn gltf(bytes: &[u8]) {
+    mesh("input.glb", bytes, io::gltf::read);
+}
+
+pub fn las(bytes: &[u8]) {
+    let whole = mesh("input.laz", bytes, io::las::read);
+    stream("input.laz", bytes, whole.as_ref());
+}
+
+pub fn e57(bytes: &[u8]) {
+    mesh("input.e57", bytes, io::e57::read);
+}
+
+/// An E57 file with the checksums of its pages made right.
+pub fn e57_summed(bytes: &[u8]) {
+    const PAGE: usize = 1024;
+    let mut bytes = bytes.to_vec();
+    for page in bytes.chunks_exact_mut(PAGE) {
+        let sum = crc32c(&page[..PAGE - 4]);
+        page[PAGE - 4..].copy_from_slice(&sum.to_be_bytes());
+    }
+    e57(&bytes);
+}
+
+/// The checksum of E57's pages: CRC-32 of Castagnoli's polynomial.
+fn crc32c(bytes: &[u8]) -> u32 {
+    let turn = |sum: u32| if sum & 1 == 1 { sum >> 1 ^ 0x82f6_3b78 } else { sum >> 1 };
+    !bytes.iter().fold(!0, |sum, &byte| (0..8).fold(sum ^ u32::from(byte), |sum, _| turn(sum)))
+}
+
+pub fn xyz(bytes: &[u8]) {
+    mesh("input.xyz", bytes, io::xyz::read);
+}
+
+pub fn pcd(bytes: &[u8]) {
+    mesh("input.pcd", bytes, io::pcd::read);
+}
+
+pub fn csv(bytes: &[u8]) {
+    samples("input.csv", bytes, io::csv::read);
+}
+
+pub fn npy(bytes: &[u8]) {
+    read("input.npy", bytes, io::npy::read).iter().for_each(sound_samples);
+}
+
+pub fn nrrd(bytes: &[u8]) {
+    volume("input.nrrd", bytes, io::nrrd::read);
+}
+
+pub fn vti(bytes: &[u8]) {
+    volume("input.vti", bytes, io::vti::read);
+}
+
+pub fn vtr(bytes: &[u8]) {
+    volume("input.vtr", bytes, io::vtr::read);
+}
+
+pub fn vtu(bytes: &[u8]) {
+    samples("input.vtu", bytes, io::vtu::read);
+}
+
+pub fn vtk(bytes: &[u8]) {
+    volume("input.vtk", bytes, io::vtk::read_volume);
+    samples("input.vtk", bytes, io::vtk::read_samples);
+}
+
+/// A raw volume: six numbers of 8 bits tell how it lies (three sizes, type, spacing, bytes to skip), then come its bytes.
+pub fn raw(bytes: &[u8]) {
+    const TYPES: [SampleType; 6] =
+        [SampleType::U8, SampleType::I16, SampleType::U16, SampleType::I32, SampleType::F32, SampleType::F64];
+    let Some((&[nx, ny, nz, kind, spacing, header], bytes)) = bytes.split_first_chunk() else { return };
+    // The largest sizes stand for sizes beyond all memory.
+    let size = |n: u8| if n == 255 { usize::MAX >> 3 } else { usize::from(n) };
+    let layout = RawLayout {
+        dims: [nx, ny, nz].map(size),
+        sample_type: TYPES[usize::from(kind >> 1) % TYPES.len()],
+        spacing: DVec3::splat(f64::from(spacing as i8) / 16.0),
+        endian: if kind & 1 == 1 { Endian::Big } else { Endian::Little },
+        header: header.into(),
+    };
+    read("input.raw", bytes, |source| io::raw::read(source, &layout)).iter().for_each(sound_volume);
+}
+
+/// A file whose name does not tell its format.
+pub fn any(bytes: &[u8]) {
+    let kind = |with_scalar| read("input", bytes, |source| Kind::of_source(source, with_scalar)).flatten();
+    for kind in [kind(false), kind(true)] {
+        match kind {
+            Some(Kind::Mesh) => read("input", bytes, io::read_mesh).iter().for_each(sound_mesh),
+            Some(Kind::Volume) => volume("input", bytes, |source| io::read_volume(source, None)),
+            Some(Kind::Samples) => samples("input", bytes, io::read_samples),
+            Some(Kind::Hierarchy) => splk(bytes),
+            Some(Kind::Bricks) => splv(bytes),
+            None => {}
+        }
+    }
+}
+
+/// A hierarchy's bytes as they are: what opens can be read or tells what is wrong, and what is found sound can be read.
+pub fn splk(bytes: &[u8]) {
+    let Some(hierarchy) = accepted(Hierarchy::from_bytes(bytes.to_vec(), Path::new("input.splk"), &limits())) else {
+        return;
+    };
+    let is_sound = hierarchy.check().is_sound();
+    let tree = accepted(hierarchy.read_tree());
+    assert!(tree.is_some() >= is_sound, "a sound file cannot be read as a whole");
+    for page in 0..hierarchy.pages().len() as u32 {
+        let nodes = accepted(hierarchy.read_page(page));
+        assert!(nodes.is_some() >= is_sound, "page {page} of a sound file cannot be read");
+        for node in nodes.iter().flat_map(|page| &page.nodes) {
+            assert!(node.splat.center.iter().chain(&node.splat.factor).all(|v| v.is_finite()));
+        }
+    }
+    if let Some(tree) = tree {
+        let view = framing(hierarchy.bounds(), true).view([8, 8]);
+        accepted(view.and_then(|view| tree.cut(&view, Default::default(), None)));
+        if is_sound {
+            let findings = validate(&tree);
+            assert!(findings.is_empty(), "a sound file has a tree with {findings:?}");
+        }
+    }
+}
+
+/// As [`splk`], with all checksums, the hash, and the places of the pages made right.
+pub fn splk_summed(bytes: &[u8]) {
+    let mut bytes = bytes.to_vec();
+    sum_hierarchy(&mut bytes);
+    splk(&bytes);
+}
+
+/// The number of 32 bits at a place.
+fn word(bytes: &[u8], at: usize) -> Option<usize> {
+    Some(u32::from_le_bytes(*bytes.get(at..)?.first_chunk()?) as usize)
+}
+
+fn put(bytes: &mut [u8], at: usize, value: &[u8]) -> Option<()> {
+    bytes.get_mut(at..at + value.len())?.copy_from_slice(value);
+    Some(())
+}
+
+/// Puts the checksum of a range behind it.
+fn sum(bytes: &mut [u8], start: usize, end: usize) -> Option<()> {
+    let sum = crc32fast::hash(bytes.get(start..end)?);
+    put(bytes, end, &sum.to_le_bytes())
+}
+
+/// Puts the hash of all at the end.
+fn hash(bytes: &mut [u8]) -> Option<()> {
+    let end = bytes.len().checked_sub(32)?;
+    let hash = *blake3::hash(&bytes[..end]).as_bytes();
+    put(bytes, end, &hash)
+}
+
+/// docs/splk.md tells what stands where.
+fn sum_hierarchy(bytes: &mut [u8]) -> Option<()> {
+    put(bytes, 0, b"SPLK\r\n\x1a\n\x01\0\0\0")?;
+    let length = bytes.len() as u64;
+    put(bytes, 16, &length.to_le_bytes())?;
+    let header_end = word(bytes, 136)?.checked_add(word(bytes, 140)?)?.checked_add(160)?;
+    let (blocks, pages) = (word(bytes, 124)?, word(bytes, 128)?);
+    let entries = header_end + 4 + 16 * blocks;
+    let directory_end = entries + 44 * pages;
+    sum(bytes, 0, header_end)?;
+    let mut at = directory_end + 4;
+    let end = bytes.len().checked_sub(32).filter(|&end| end >= at)?;
+    let mut order: Vec<(u64, usize)> = Vec::new();
+    for page in 0..pages {
+        let entry = entries + 44 * page;
+        order.push((u64::from_le_bytes(*bytes.get(entry..)?.first_chunk()?), entry));
+    }
+    order.sort_unstable();
+    for (index, &(_, entry)) in order.iter().enumerate() {
+        let rest = end - at;
+        let length = if index + 1 == pages { rest } else { word(bytes, entry + 8)?.min(rest) };
+        let crc = crc32fast::hash(&bytes[at..at + length]);
+        put(bytes, entry, &(at as u64).to_le_bytes())?;
+        put(bytes, entry + 8, &(length as u32).to_le_bytes())?;
+        put(bytes, entry + 12, &crc.to_le_bytes())?;
+        at += length;
+    }
+    sum(bytes, header_end + 4, directory_end)?;
+    hash(bytes)
+}
+
+/// A bricked volume's bytes as they are.
+pub fn splv(bytes: &[u8]) {
+    let Some(bricks) = accepted(Bricks::from_bytes(bytes.to_vec(), Path::new("input.splv"))) else { return };
+    // A few bytes may stand for bricks of one value; more than these take their time.
+    if bricks.levels().iter().map(|level| level.bricks()).sum::<usize>() > MOST_SAMPLES >> 15 {
+        return;
+    }
+    let is_sound = bricks.check(&|_, _| {}).is_sound();
+    for (number, level) in bricks.levels().iter().enumerate() {
+        for brick in 0..level.bricks() as u32 {
+            let read = accepted(bricks.read(number, brick));
+            assert!(read.is_some() >= is_sound, "a brick of a sound file cannot be read");
+        }
+        let volume = accepted(bricks.volume(number));
+        assert!(volume.is_some() >= is_sound, "a level of a sound file cannot be read");
+        if is_sound {
+            volume.iter().for_each(sound_volume);
+        }
+    }
+}
+
+/// As [`splv`], with all checksums and the hash made right, and lengths that fit.
+pub fn splv_summed(bytes: &[u8]) {
+    let mut bytes = bytes.to_vec();
+    sum_bricks(&mut bytes);
+    splv(&bytes);
+}
+
+/// docs/splv.md tells what stands where.
+fn sum_bricks(bytes: &mut [u8]) -> Option<()> {
+    put(bytes, 0, b"SPLV\r\n\x1a\n\x01\0\0\0")?;
+    let length = bytes.len() as u64;
+    put(bytes, 16, &length.to_le_bytes())?;
+    let header_end = word(bytes, 172)?.checked_add(word(bytes, 176)?)?.checked_add(192)?;
+    sum(bytes, 0, header_end)?;
+    let mut dims = [24, 32, 40].map(|at| word(bytes, at).unwrap_or(0));
+    let mut count = 0usize;
+    loop {
+        let bricks = dims.iter().try_fold(1usize, |all, n| all.checked_mul(n.div_ceil(32)))?;
+        count = count.checked_add(bricks)?;
+        if bricks <= 1 {
+            break;
+        }
+        dims = dims.map(|n| n.div_ceil(2));
+    }
+    let directory_end = count.checked_mul(16)?.checked_add(header_end + 4)?;
+    let mut at = directory_end.checked_add(4)?;
+    let end = bytes.len().checked_sub(32).filter(|&end| end >= at)?;
+    for brick in 0..count {
+        let entry = header_end + 4 + 16 * brick;
+        let rest = end - at;
+        let length = if brick + 1 == count { rest } else { word(bytes, entry)?.min(rest) };
+        let crc = crc32fast::hash(&bytes[at..at + length]);
+        put(bytes, entry, &(length as u32).to_le_bytes())?;
+        put(bytes, entry + 4, &crc.to_le_bytes())?;
+        at += length;
+    }
+    sum(bytes, header_end + 4, directory_end)?;
+    hash(bytes)
+}
+
+/// A transfer function as JSON: what loads comes back from what it is written as, and gives numbers for all values.
+pub fn transfer(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    let transfer = match TransferFunction::from_json(text) {
+        Ok(transfer) => transfer,
+        Err(message) => return assert!(!message.is_empty(), "an error without words"),
+    };
+    let again = TransferFunction::from_json(&transfer.to_json()).expect("what was written can be read");
+    assert_eq!(again, transfer);
+    let inside = |v: f64| (0.0..=1.0).contains(&v);
+    let points = transfer.color.iter().map(|p| p.0).chain(transfer.opacity.iter().map(|p| p.0));
+    for value in points.chain([0.0, 0.5, -1e30, 1e30, f64::MIN, f64::MAX]) {
+        assert!(transfer.color(value).into_iter().all(inside), "colour {:?} at {value}", transfer.color(value));
+        assert!(inside(transfer.opacity(value)), "opacity {} at {value}", transfer.opacity(value));
+        assert!(inside(transfer.gradient_factor(value.abs())), "factor at {value}");
+        assert!(transfer.extinction(value) >= 0.0, "extinction {} at {value}", transfer.extinction(value));
+    }
+    for range in [[-1.0, 1.0], [0.0, 1e30], [7.0, 7.0]] {
+        let finite = |entry: &[f32; 4]| entry.iter().all(|v| !v.is_nan());
+        assert!(transfer.table(range, 16).iter().all(finite), "a table over {range:?} has no numbers");
+        transfer.visible(range);
+        let spread = transfer.clone().spread_over(range);
+        assert!(spread.validate().is_ok(), "spread over {range:?}: {:?}", spread.validate());
+    }
+}
+
+/// A number as it is, and as programs get wrong: small, fine, of any size, or any bits.
+#[derive(Debug, Arbitrary)]
+enum Number {
+    Small(i8),
+    Fine(i16),
+    Power(bool, u8),
+    Bits(f32),
+}
+
+impl Number {
+    fn value(&self) -> f32 {
+        match *self {
+            Self::Small(n) => f32::from(n),
+            Self::Fine(n) => f32::from(n) / 256.0,
+            Self::Power(negative, exponent) => {
+                let size = 2f32.powi(i32::from(exponent) - 127);
+                if negative { -size } else { size }
+            }
+            Self::Bits(value) => value,
+        }
+    }
+}
+
+/// A tiny model and how it is drawn.
+#[derive(Debug, Arbitrary)]
+struct Model {
+    points: Vec<[Number; 3]>,
+    triangles: Vec<[u8; 3]>,
+    has_normals: bool,
+    colors: Option<[u8; 4]>,
+    radius_scale: Option<Number>,
+    is_lossless: bool,
+    is_perspective: bool,
+}
+
+/// From a tiny model to surfels, to a hierarchy, to its file and back, to a picture on the CPU.
+pub fn convert_render(bytes: &[u8]) {
+    const MOST: usize = 48;
+    let Ok(model) = Model::arbitrary(&mut Unstructured::new(bytes)) else { return };
+    let vector = |p: &[Number; 3]| Vec3::from_array(p.each_ref().map(Number::value));
+    let positions: Vec<Vec3> = model.points.iter().take(MOST).map(vector).collect();
+    let count = positions.len();
+    if count == 0 {
+        return;
+    }
+    let corner = |index: &u8| u32::from(*index) % count as u32;
+    let mesh = Mesh {
+        triangles: model.triangles.iter().take(MOST).map(|t| t.each_ref().map(corner)).collect(),
+        normals: if model.has_normals { vec![Vec3::Z; count] } else { Vec::new() },
+        colors: model.colors.map_or(Vec::new(), |color| vec![color; count]),
+        positions,
+        ..Mesh::default()
+    };
+    let usual = SurfelOptions { largest_spacing: 0.5, most_triangles: 256, ..SurfelOptions::default() };
+    let radius_scale = model.radius_scale.map_or(usual.radius_scale, |scale| scale.value());
+    let Some(set) = accepted(mesh.surfels(&SurfelOptions { radius_scale, ..usual })) else { return };
+    for splat in &set.splats {
+        let numbers = splat.center.iter().chain(&splat.factor).chain([&splat.strength]);
+        assert!(numbers.copied().all(f32::is_finite), "{splat:?} is not finite");
+    }
+    let options = BuildOptions { block_splats: 64, ..BuildOptions::default() };
+    let Some(tree) = accepted(Tree::build(&set, &options, &|_, _| {})) else { return };
+    let findings = validate(&tree);
+    assert!(findings.is_empty(), "the tree that was built: {findings:?}");
+    let options = WriteOptions { lossless: model.is_lossless, ..WriteOptions::default() };
+    let Some(written) = accepted(to_bytes(&tree, &options)) else { return };
+    let hierarchy = Hierarchy::from_bytes(written, Path::new("model.splk"), &limits()).expect("what was written");
+    let report = hierarchy.check();
+    assert!(report.is_sound(), "the file that was written: {:?}", report.findings);
+    let camera = framing(hierarchy.bounds(), model.is_perspective);
+    let scene = Scene::new().with_hierarchy(hierarchy);
+    let settings = Settings::new([8, 8]);
+    let Some(picture) = accepted(reference::render(&scene, &camera, &settings)) else { return };
+    for (color, depth) in picture.color.iter().zip(&picture.depth) {
+        assert!(color.iter().all(|v| (-1e-4..=1.0001).contains(v)), "the colour {color:?}");
+        assert!(!depth.is_nan(), "a depth is no number");
+    }
+}
+
+/// A camera that looks at the whole of a box.
+fn framing(bounds: splatkit::math::Bounds, is_perspective: bool) -> Camera {
+    let mut camera = Camera::framing(&bounds, DVec3::new(0.3, 0.2, -1.0), DVec3::Y, 1.0);
+    if !is_perspective {
+        camera.projection = Projection::Orthographic { height: bounds.diagonal().max(f64::MIN_POSITIVE) };
+    }
+    camera
+}
