@@ -36,12 +36,16 @@ impl Kind {
     /// Those of opening the file; [`Error::Input`](crate::Error::Input) for a PLY file or a legacy VTK file with a malformed
     /// header.
     pub fn of(path: &Path, limits: &Limits, with_scalar: bool) -> Result<Option<Self>> {
-        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         let source = Source::open(path, limits)?;
+        source.unless_changed(Self::of_source(&source, with_scalar))
+    }
+
+    fn of_source(source: &Source, with_scalar: bool) -> Result<Option<Self>> {
+        let extension = source.path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         let start = &source.bytes()[..source.bytes().len().min(1024)];
         let has = |word: &[u8]| start.windows(word.len()).any(|w| w == word);
-        let of_ply = || Ok(Some(if with_scalar && !ply::has_faces(&source)? { Self::Samples } else { Self::Mesh }));
-        let of_vtk = || Ok(Some(if vtk::holds_volume(&source)? { Self::Volume } else { Self::Samples }));
+        let of_ply = || Ok(Some(if with_scalar && !ply::has_faces(source)? { Self::Samples } else { Self::Mesh }));
+        let of_vtk = || Ok(Some(if vtk::holds_volume(source)? { Self::Volume } else { Self::Samples }));
         match extension.as_deref() {
             Some("ply") => return of_ply(),
             Some("vtk") => return of_vtk(),
@@ -49,7 +53,7 @@ impl Kind {
             Some("splv") => return Ok(Some(Self::Bricks)),
             Some("obj" | "gltf" | "glb" | "stl" | "las" | "laz" | "e57" | "pcd") => return Ok(Some(Self::Mesh)),
             Some("xyz" | "pts" | "asc") => return Ok(Some(if with_scalar { Self::Samples } else { Self::Mesh })),
-            Some("csv" | "txt") if !with_scalar && xyz::is_cloud(&source) => return Ok(Some(Self::Mesh)),
+            Some("csv" | "txt") if !with_scalar && xyz::is_cloud(source) => return Ok(Some(Self::Mesh)),
             Some("vti" | "vtr" | "nrrd" | "nhdr") => return Ok(Some(Self::Volume)),
             Some("vtu" | "vtp" | "csv" | "txt" | "xyzv" | "npy") => return Ok(Some(Self::Samples)),
             _ => {}

@@ -12,23 +12,28 @@ use std::path::Path;
 pub fn load_mesh(path: &Path, limits: &Limits) -> Result<Mesh> {
     let source = Source::open(path, limits)?;
     let _span = tracing::info_span!("load_mesh", file = %path.display()).entered();
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    source.unless_changed(read(&source))
+}
+
+/// As [`load_mesh`], of a file that is open.
+pub(super) fn read(source: &Source) -> Result<Mesh> {
+    let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let start = source.bytes().trim_ascii_start();
     match extension.as_str() {
-        "ply" => ply::read(&source),
-        "obj" => obj::read(&source),
-        "gltf" | "glb" => gltf::read(&source),
-        "stl" => stl::read(&source),
-        "las" | "laz" => las::read(&source),
-        "e57" => e57::read(&source),
-        "pcd" => pcd::read(&source),
-        "xyz" | "pts" | "asc" | "csv" | "txt" => xyz::read(&source),
-        _ if start.starts_with(b"ply") => ply::read(&source),
-        _ if start.starts_with(b"glTF") || start.starts_with(b"{") => gltf::read(&source),
-        _ if start.starts_with(b"LASF") => las::read(&source),
-        _ if start.starts_with(b"ASTM-E57") => e57::read(&source),
-        _ if start.starts_with(b"# .PCD") => pcd::read(&source),
-        _ if start.starts_with(b"solid ") => stl::read(&source),
+        "ply" => ply::read(source),
+        "obj" => obj::read(source),
+        "gltf" | "glb" => gltf::read(source),
+        "stl" => stl::read(source),
+        "las" | "laz" => las::read(source),
+        "e57" => e57::read(source),
+        "pcd" => pcd::read(source),
+        "xyz" | "pts" | "asc" | "csv" | "txt" => xyz::read(source),
+        _ if start.starts_with(b"ply") => ply::read(source),
+        _ if start.starts_with(b"glTF") || start.starts_with(b"{") => gltf::read(source),
+        _ if start.starts_with(b"LASF") => las::read(source),
+        _ if start.starts_with(b"ASTM-E57") => e57::read(source),
+        _ if start.starts_with(b"# .PCD") => pcd::read(source),
+        _ if start.starts_with(b"solid ") => stl::read(source),
         _ => Err(source
             .error("path", format!("“.{extension}” is no mesh format that can be read"))
             .hint(

@@ -12,18 +12,23 @@ use std::path::Path;
 pub fn load_samples(path: &Path, limits: &Limits, scalar: Option<&str>) -> Result<Points> {
     let source = Source::open(path, limits)?;
     let _span = tracing::info_span!("load_samples", file = %path.display()).entered();
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    source.unless_changed(read(&source, scalar))
+}
+
+/// As [`load_samples`], of a file that is open.
+pub(super) fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
+    let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let start = &source.bytes()[..source.bytes().len().min(1024)];
     match extension.as_str() {
-        "ply" => ply::read_samples(&source, scalar),
-        "vtu" | "vtp" => vtu::read(&source, scalar),
-        "vtk" => vtk::read_samples(&source, scalar),
-        "npy" => npy::read(&source),
-        "csv" | "txt" | "xyzv" | "xyz" | "pts" | "asc" => csv::read(&source, scalar),
-        _ if start.starts_with(b"ply") => ply::read_samples(&source, scalar),
-        _ if start.windows(8).any(|w| w == b"<VTKFile") => vtu::read(&source, scalar),
-        _ if start.starts_with(b"# vtk DataFile") => vtk::read_samples(&source, scalar),
-        _ if start.starts_with(b"\x93NUMPY") => npy::read(&source),
+        "ply" => ply::read_samples(source, scalar),
+        "vtu" | "vtp" => vtu::read(source, scalar),
+        "vtk" => vtk::read_samples(source, scalar),
+        "npy" => npy::read(source),
+        "csv" | "txt" | "xyzv" | "xyz" | "pts" | "asc" => csv::read(source, scalar),
+        _ if start.starts_with(b"ply") => ply::read_samples(source, scalar),
+        _ if start.windows(8).any(|w| w == b"<VTKFile") => vtu::read(source, scalar),
+        _ if start.starts_with(b"# vtk DataFile") => vtk::read_samples(source, scalar),
+        _ if start.starts_with(b"\x93NUMPY") => npy::read(source),
         _ => Err(source
             .error("path", format!("“.{extension}” is no format of scattered samples that can be read"))
             .hint("scattered samples are read from .ply, .vtu, .vtp, .vtk, .npy, .csv, .txt and .xyzv")),

@@ -14,6 +14,7 @@ pub mod las;
 mod limits;
 mod load_mesh;
 mod load_samples;
+mod mapping;
 pub mod npy;
 pub mod nrrd;
 pub mod obj;
@@ -26,10 +27,11 @@ mod source;
 pub mod stl;
 mod stream;
 #[cfg(test)]
-#[cfg(test)]
 pub(crate) mod testing;
 mod text;
 mod texture;
+#[cfg(all(test, any(target_os = "linux", target_os = "macos")))]
+mod vanishing;
 mod volume_stream;
 pub mod vti;
 pub mod vtk;
@@ -44,9 +46,11 @@ pub use kind::Kind;
 pub use limits::Limits;
 pub use load_mesh::load_mesh;
 pub use load_samples::load_samples;
+pub(crate) use mapping::Mapping;
 pub use raw::RawLayout;
 pub use sample_type::{Endian, SampleType};
 pub use source::Source;
+pub(crate) use source::intact;
 pub(crate) use stream::StreamPoint;
 pub use stream::{Counts, Stream};
 pub use volume_stream::VolumeStream;
@@ -62,18 +66,23 @@ use std::path::Path;
 /// [`Error::File`](crate::Error::File) as for every input.
 pub fn load_volume(path: &Path, limits: &Limits, raw: Option<&RawLayout>) -> Result<Volume> {
     let source = Source::open(path, limits)?;
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    source.unless_changed(read_volume(&source, raw))
+}
+
+/// As [`load_volume`], of a file that is open.
+fn read_volume(source: &Source, raw: Option<&RawLayout>) -> Result<Volume> {
+    let extension = source.path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let beginning = &source.bytes()[..source.bytes().len().min(1024)];
     match (extension.as_deref(), raw) {
-        (Some("vti"), _) => vti::read(&source),
-        (Some("vtr"), _) => vtr::read(&source),
-        (Some("vtk"), _) => vtk::read_volume(&source),
-        (Some("nrrd" | "nhdr"), _) => nrrd::read(&source),
-        (_, Some(layout)) => raw::read(&source, layout),
-        _ if beginning.starts_with(b"NRRD") => nrrd::read(&source),
-        _ if beginning.starts_with(b"# vtk DataFile") => vtk::read_volume(&source),
-        _ if beginning.windows(15).any(|w| w == b"RectilinearGrid") => vtr::read(&source),
-        _ if beginning.windows(8).any(|w| w == b"<VTKFile") => vti::read(&source),
+        (Some("vti"), _) => vti::read(source),
+        (Some("vtr"), _) => vtr::read(source),
+        (Some("vtk"), _) => vtk::read_volume(source),
+        (Some("nrrd" | "nhdr"), _) => nrrd::read(source),
+        (_, Some(layout)) => raw::read(source, layout),
+        _ if beginning.starts_with(b"NRRD") => nrrd::read(source),
+        _ if beginning.starts_with(b"# vtk DataFile") => vtk::read_volume(source),
+        _ if beginning.windows(15).any(|w| w == b"RectilinearGrid") => vtr::read(source),
+        _ if beginning.windows(8).any(|w| w == b"<VTKFile") => vti::read(source),
         _ => Err(source
             .error("file", "is not a volume that can be read: neither VTI, VTR, VTK nor NRRD")
             .hint("a raw file needs its dimensions and its sample type")),

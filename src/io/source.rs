@@ -1,7 +1,7 @@
 //! The guarded opening: every format reads its bytes through a [`Source`], which maps the file, holds the limits
 //! and gives errors that name the file.
 
-use super::Limits;
+use super::{Limits, mapping::Mapping};
 use crate::{Error, Result};
 use std::{
     fs::File,
@@ -9,21 +9,11 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
-/// Gives the pages of a map of a file to the system.
-pub(super) fn release(map: &memmap2::Mmap) {
-    #[cfg(unix)]
-    // SAFETY: the map is of a file and read only, so what is dropped reads again as it was. Where the advice is not taken,
-    // nothing is lost.
-    unsafe { map.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) }.ok();
-    #[cfg(not(unix))]
-    let _ = map;
-}
-
 /// An opened input: its path, its bytes (mapped) and the limits that hold for it.
 pub struct Source<'a> {
     pub path: &'a Path,
     pub limits: &'a Limits,
-    bytes: Option<memmap2::Mmap>,
+    bytes: Mapping,
 }
 
 impl<'a> Source<'a> {
@@ -42,30 +32,36 @@ impl<'a> Source<'a> {
                 limit: limits.bytes,
             });
         }
-        // SAFETY: the map is read only and lives as long as the source. A file that another process shortens while it
-        // is mapped would raise SIGBUS; the readers copy what they need and drop the map right away.
-        let bytes = if meta.len() == 0 {
-            None
-        } else {
-            Some(unsafe { memmap2::Mmap::map(&file) }.map_err(|e| Error::file(path, "map", e))?)
-        };
+        let bytes = Mapping::new(file).map_err(|e| Error::file(path, "map", e))?;
         Ok(Self { path, limits, bytes })
     }
 
     /// The whole file.
     pub fn bytes(&self) -> &[u8] {
-        self.bytes.as_deref().unwrap_or(&[])
+        &self.bytes
     }
 
-    /// Gives the pages of the map that were read back to the system: those who go through a file larger than memory do so
-    /// now and then. They are read again where they are asked for again.
+    /// An error if the file is not the one that was opened any more, so that what was read may be neither the old nor the
+    /// new. The readers of whole files ask when they are done.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with what has become of the file.
+    pub fn intact(&self) -> Result<()> {
+        intact(&self.bytes, self.path)
+    }
+
+    /// What was made of the file, or why it was not; and where the file was changed meanwhile, that alone.
+    pub(crate) fn unless_changed<T>(&self, found: Result<T>) -> Result<T> {
+        self.intact().and(found)
+    }
+
+    /// See [`Mapping::release`].
     pub(super) fn release(&self) {
-        self.bytes.iter().for_each(release);
+        self.bytes.release();
     }
 
-    /// The map itself, for those who read from it later; `None` for an empty file. While it is held, the file must not be
-    /// shortened: a new one has to take its name instead.
-    pub(crate) fn into_map(self) -> Option<memmap2::Mmap> {
+    /// The mapping itself, for those who read from it later.
+    pub(crate) fn into_mapping(self) -> Mapping {
         self.bytes
     }
 
@@ -126,4 +122,11 @@ impl<'a> Source<'a> {
         }
         Ok(target)
     }
+}
+
+/// An error if a file is not the one that was mapped any more.
+pub(crate) fn intact(mapping: &Mapping, path: &Path) -> Result<()> {
+    let Some(change) = mapping.change() else { return Ok(()) };
+    Err(Error::input(path, "file", format!("changed while it was read: {change}"))
+        .hint("try again when nothing writes to it; programs that write a new file and rename it do no harm"))
 }

@@ -39,7 +39,7 @@ pub(super) fn decode(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<T
 pub(super) fn read_reference(source: &Source, place: &str, reference: &str) -> Result<Option<Arc<Texture>>> {
     let Some(path) = find(source, place, reference)? else { return Ok(None) };
     let file = Source::open(&path, source.limits)?;
-    decode(&file, place, file.bytes()).map(Some)
+    file.unless_changed(decode(&file, place, file.bytes())).map(Some)
 }
 
 /// The path of a file that may be missing: `None`, with a warning, where a proper reference leads to no file.

@@ -144,7 +144,10 @@ impl TransferFunction {
     pub fn read(path: &Path) -> Result<Self> {
         let limits = Limits { bytes: FILE_LIMIT, ..Limits::default() };
         let source = Source::open(path, &limits)?;
-        let text = std::str::from_utf8(source.bytes())
+        // A copy: text that was checked stays what it is.
+        let bytes = source.bytes().to_vec();
+        source.intact()?;
+        let text = std::str::from_utf8(&bytes)
             .map_err(|e| source.error(format!("byte {}", e.valid_up_to()), "is not UTF-8 text"))?;
         Self::from_json(text).map_err(|message| {
             Error::input(path, "transfer function", message)

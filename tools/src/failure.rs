@@ -3,6 +3,7 @@
 use splatkit::Error;
 use std::{
     fmt,
+    io::{self, ErrorKind},
     path::{Path, PathBuf},
     process::ExitCode,
 };
@@ -30,7 +31,7 @@ impl Failure {
 
     fn code(&self) -> u8 {
         match self {
-            Self::Output { .. } => 1,
+            Self::Output { .. } | Self::Library(Error::Output { .. }) => 1,
             Self::Usage(_) | Self::Library(Error::Argument(_)) => 2,
             Self::Library(Error::NoAdapter(_) | Error::Gpu(_)) => 4,
             Self::Library(Error::Input { .. } | Error::Limit { .. } | Error::File { .. } | Error::NothingToDraw(_)) => {
@@ -44,6 +45,7 @@ impl Failure {
     fn hint(&self) -> Option<&str> {
         match self {
             Self::Library(Error::Input { hint, .. }) => hint.as_deref(),
+            Self::Library(Error::Output { source, .. }) => room(source),
             Self::Library(Error::Limit { .. }) => {
                 Some("raise --limit-points or --limit-bytes if the file can be trusted")
             }
@@ -66,6 +68,20 @@ impl Failure {
         let code = self.code();
         eprintln!("{:?}", miette::Report::new(self));
         ExitCode::from(code)
+    }
+}
+
+/// What to do where the operating system does not take a result.
+fn room(error: &io::Error) -> Option<&'static str> {
+    match error.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+            Some("make room there, or write to another disk; what was there before is as it was")
+        }
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+            Some("write to another folder, or change what the folder allows")
+        }
+        ErrorKind::NotFound => Some("make the folder first"),
+        _ => None,
     }
 }
 

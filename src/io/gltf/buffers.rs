@@ -128,7 +128,7 @@ pub(super) fn resolve(source: &Source, place: &str, uri: &str) -> Result<Vec<u8>
     };
     let path = source.neighbour(place, &path)?;
     let file = Source::open(&path, source.limits)?;
-    Ok(file.bytes().to_vec())
+    file.unless_changed(Ok(file.bytes().to_vec()))
 }
 
 /// Undoes percent codes; `None` where a % is not followed by two hexadecimal digits.
