@@ -1,6 +1,7 @@
 //! Ctrl-C, and the signals by which a system asks a process to end.
 
 use splatkit::disk;
+use std::io::Write;
 
 /// What shells give for a command that was ended by Ctrl-C.
 const INTERRUPTED: i32 = 130;
@@ -10,7 +11,8 @@ const INTERRUPTED: i32 = 130;
 pub fn answer() {
     let set = ctrlc::set_handler(|| {
         let _abandoned = disk::abandon();
-        eprintln!("interrupted: what was not finished is removed");
+        // Who reads stderr may be gone already.
+        writeln!(std::io::stderr(), "interrupted: what was not finished is removed").ok();
         std::process::exit(INTERRUPTED)
     });
     if let Err(error) = set {
