@@ -22,7 +22,7 @@ pub(crate) use step::faults;
 use std::path::Path;
 
 /// Bytes that wait in memory before they are written. Tests want many writes.
-pub(crate) const BUFFER: usize = if cfg!(test) { 1 << 12 } else { 1 << 20 };
+pub(crate) const BUFFER: usize = if cfg!(test) { 1 << 8 } else { 1 << 20 };
 
 /// The folder that a file is in.
 fn folder(path: &Path) -> &Path {
