@@ -77,7 +77,7 @@ impl Slot {
     fn end_around(&self, address: usize) -> Option<usize> {
         let version = self.version.load(SeqCst);
         let [start, length] = [&self.start, &self.length].map(|number| number.load(SeqCst));
-        let is_settled = version % 2 == 0 && self.version.load(SeqCst) == version;
+        let is_settled = version.is_multiple_of(2) && self.version.load(SeqCst) == version;
         (is_settled && address.checked_sub(start)? < length).then_some(start + length)
     }
 }
