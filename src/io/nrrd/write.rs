@@ -11,7 +11,7 @@ use std::{io::Write, path::Path};
 /// Writes a volume with its position in space; body-centred ones with the key that [`read`](super::read) knows.
 ///
 /// # Errors
-/// [`Error::Output`] where the file cannot be written.
+/// [`Error::Output`](crate::Error::Output) where the file cannot be written.
 pub fn write(volume: &Volume, path: &Path) -> Result<()> {
     disk::write_with(path, |out| write_to(volume, out))
 }
@@ -20,7 +20,7 @@ pub fn write(volume: &Volume, path: &Path) -> Result<()> {
 /// ([`VolumeStream`](crate::io::VolumeStream)). `slice` makes the samples of each slice across the last axis, in order.
 ///
 /// # Errors
-/// [`Error::Output`] where the file cannot be written.
+/// [`Error::Output`](crate::Error::Output) where the file cannot be written.
 pub fn write_bytes(lattice: &Lattice, path: &Path, mut slice: impl FnMut(usize) -> Vec<u8>) -> Result<()> {
     disk::write_with(path, |out| {
         write_header(lattice, Scalar::U8, "raw", out)?;
