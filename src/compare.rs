@@ -74,14 +74,19 @@ pub fn compare_files(a: &Path, b: &Path, limits: &Limits) -> Result<Comparison> 
 
 fn load(path: &Path, limits: &Limits) -> Result<image::RgbaImage> {
     let source = Source::open(path, limits)?;
+    source.unless_changed(decode(&source))
+}
+
+fn decode(source: &Source) -> Result<image::RgbaImage> {
     let broken = |e: image::ImageError| source.error("picture", e.to_string()).hint("pictures are PNG or JPEG files");
     let reader = || {
         let reader = image::ImageReader::new(Cursor::new(source.bytes())).with_guessed_format();
-        reader.map_err(|e| Error::file(path, "read", e))
+        reader.map_err(|e| Error::file(source.path, "read", e))
     };
     let (width, height) = reader()?.into_dimensions().map_err(broken)?;
     let texels = u64::from(width) * u64::from(height);
-    limits.check(LimitKind::Texels, path, "the picture's number of pixels", texels)?;
+    let limits = source.limits;
+    limits.check(LimitKind::Texels, source.path, "the picture's number of pixels", texels)?;
     let mut decoder = reader()?;
     let mut bounds = image::Limits::default();
     bounds.max_alloc = Some(limits.bytes);

@@ -20,6 +20,10 @@ pub enum Error {
     #[error("{}: cannot {action}: {source}", file.display())]
     File { file: PathBuf, action: &'static str, source: std::io::Error },
 
+    /// A result that the operating system did not take; what was there before is there still.
+    #[error("{}: cannot be written: {source}", file.display())]
+    Output { file: PathBuf, source: std::io::Error },
+
     /// A value given by the caller that makes no picture (a size of 0, a kernel with no width, …).
     #[error("{0}")]
     Argument(String),
@@ -50,6 +54,11 @@ impl Error {
     /// An [`Error::File`].
     pub fn file(file: &Path, action: &'static str, source: std::io::Error) -> Self {
         Self::File { file: file.to_owned(), action, source }
+    }
+
+    /// An [`Error::Output`].
+    pub fn output(file: &Path, source: std::io::Error) -> Self {
+        Self::Output { file: file.to_owned(), source }
     }
 
     /// Adds what the user can do about an [`Error::Input`]; other errors pass unchanged.

@@ -1,6 +1,6 @@
 //! A finished picture: colour, opacity and depth of every pixel.
 
-use crate::{Error, Result};
+use crate::{Error, Result, disk};
 use std::path::Path;
 
 /// A picture as a renderer leaves it. Rows from the top.
@@ -57,10 +57,10 @@ impl Picture {
     /// Writes a PNG or JPEG, chosen by the extension. JPEG has no opacity: without a background it gets black.
     ///
     /// # Errors
-    /// [`Error::Argument`] for another extension, [`Error::File`] where the file cannot be written.
+    /// [`Error::Argument`] for another extension, [`Error::Output`] where the file cannot be written.
     pub fn save(&self, path: &Path, background: Option<[f32; 3]>) -> Result<()> {
         let bytes = self.encode(PictureFormat::of(path)?, background)?;
-        std::fs::write(path, bytes).map_err(|e| Error::file(path, "write", e))
+        disk::write(path, &bytes)
     }
 
     /// The bytes of a picture file. JPEG has no opacity: without a background it gets black.

@@ -40,6 +40,7 @@ impl Stage {
         // SAFETY: the shaders are this crate's own files. Every loop in them counts towards a constant, a number of tiles,
         // sheets or entries of the frame, or the length of a list. Indices come from counts that the CPU sized the buffers
         // by, or are compared with the buffers' capacities before use (records and entries); none comes from a file.
+        #[expect(unsafe_code, reason = "shaders without the checks that untrusted ones need")]
         let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
         let layouts: Vec<_> = groups.iter().map(|bindings| layout(device, label, bindings)).collect();
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {

@@ -92,7 +92,7 @@ impl Tree {
 /// Builds the tree of a set and writes it, a few blocks at a time, so that no more of it is in memory.
 ///
 /// # Errors
-/// Those of [`Tree::build`], and [`Error::File`] where the file cannot be written; then there is none.
+/// Those of [`Tree::build`], and [`Error::Output`] where the file cannot be written; then there is none.
 pub fn build_file(
     set: &SplatSet,
     path: &Path,

@@ -44,6 +44,10 @@ impl Kind {
     /// # Errors
     /// Those of [`of`](Self::of) but for opening.
     pub fn of_source(source: &Source, with_scalar: bool) -> Result<Option<Self>> {
+        source.unless_changed(Self::find(source, with_scalar))
+    }
+
+    fn find(source: &Source, with_scalar: bool) -> Result<Option<Self>> {
         let extension = source.path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         let start = &source.bytes()[..source.bytes().len().min(1024)];
         let has = |word: &[u8]| start.windows(word.len()).any(|w| w == word);

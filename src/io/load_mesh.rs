@@ -19,6 +19,11 @@ pub fn load_mesh(path: &Path, limits: &Limits) -> Result<Mesh> {
 /// Those of [`load_mesh`] but for opening.
 pub fn read_mesh(source: &Source) -> Result<Mesh> {
     let _span = tracing::info_span!("load_mesh", file = %source.path.display()).entered();
+    source.unless_changed(read(source))
+}
+
+/// As [`read_mesh`], whatever becomes of the file meanwhile.
+pub(super) fn read(source: &Source) -> Result<Mesh> {
     let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let start = source.bytes().trim_ascii_start();
     match extension.as_str() {

@@ -19,6 +19,11 @@ pub fn load_samples(path: &Path, limits: &Limits, scalar: Option<&str>) -> Resul
 /// Those of [`load_samples`] but for opening.
 pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
     let _span = tracing::info_span!("load_samples", file = %source.path.display()).entered();
+    source.unless_changed(read(source, scalar))
+}
+
+/// As [`read_samples`], whatever becomes of the file meanwhile.
+pub(super) fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
     let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let start = &source.bytes()[..source.bytes().len().min(1024)];
     match extension.as_str() {

@@ -17,6 +17,7 @@ pub mod las;
 mod limits;
 mod load_mesh;
 mod load_samples;
+mod mapping;
 mod neighbour;
 pub mod npy;
 pub mod nrrd;
@@ -33,6 +34,8 @@ mod stream;
 pub(crate) mod testing;
 mod text;
 mod texture;
+#[cfg(all(test, any(target_os = "linux", target_os = "macos")))]
+mod vanishing;
 mod volume_stream;
 pub mod vti;
 pub mod vtk;
@@ -47,9 +50,11 @@ pub use kind::Kind;
 pub use limits::{LimitKind, Limits};
 pub use load_mesh::{load_mesh, read_mesh};
 pub use load_samples::{load_samples, read_samples};
+pub(crate) use mapping::Mapping;
 pub use raw::RawLayout;
 pub use sample_type::{Endian, SampleType};
 pub use source::Source;
+pub(crate) use source::intact;
 pub(crate) use stream::StreamPoint;
 pub use stream::{Counts, Stream};
 pub use volume_stream::VolumeStream;
@@ -72,6 +77,11 @@ pub fn load_volume(path: &Path, limits: &Limits, raw: Option<&RawLayout>) -> Res
 /// # Errors
 /// Those of [`load_volume`] but for opening.
 pub fn read_volume(source: &Source, raw: Option<&RawLayout>) -> Result<Volume> {
+    source.unless_changed(volume_of(source, raw))
+}
+
+/// As [`read_volume`], whatever becomes of the file meanwhile.
+fn volume_of(source: &Source, raw: Option<&RawLayout>) -> Result<Volume> {
     let extension = source.path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let beginning = &source.bytes()[..source.bytes().len().min(1024)];
     match (extension.as_deref(), raw) {

@@ -47,7 +47,7 @@ pub fn read(source: &Source) -> Result<Volume> {
     }
     let path = source.neighbour("data file", name)?;
     let data = source.open_beside(&path)?;
-    header.samples(&data, data.bytes(), kind, size, lattice)
+    data.unless_changed(header.samples(&data, data.bytes(), kind, size, lattice))
 }
 
 /// Where the samples of a file of raw encoding stand; `None` for other encodings, and where something is to be skipped or

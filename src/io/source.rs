@@ -1,30 +1,25 @@
 //! The guarded opening: every format reads its bytes through a [`Source`], which maps the file, holds the limits
 //! and gives errors that name the file.
 
-use super::{LimitKind, Limits, budget::Budget};
+use super::{LimitKind, Limits, budget::Budget, mapping::Mapping};
 use crate::{Error, Result};
 use std::{fs::File, io::Read, path::Path, sync::Arc};
 
-/// Gives the pages of a map of a file to the system.
-pub(super) fn release(map: &memmap2::Mmap) {
-    #[cfg(unix)]
-    // SAFETY: the map is of a file and read only, so what is dropped reads again as it was. Where the advice is not taken,
-    // nothing is lost.
-    unsafe { map.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) }.ok();
-    #[cfg(not(unix))]
-    let _ = map;
-}
-
 /// Bytes that are unpacked between two looks at the clock.
 const PORTION: u64 = 16 << 20;
+
+/// Where the bytes of an input are.
+enum Content<'a> {
+    Mapped(Mapping),
+    /// In place of a file.
+    Held(&'a [u8]),
+}
 
 /// An opened input: its path, its bytes (mapped) and the limits that hold for it.
 pub struct Source<'a> {
     pub path: &'a Path,
     pub limits: &'a Limits,
-    bytes: Option<memmap2::Mmap>,
-    /// What is read in place of a file.
-    memory: Option<&'a [u8]>,
+    content: Content<'a>,
     /// Shared by all files of a model.
     budget: Arc<Budget>,
 }
@@ -44,24 +39,13 @@ impl<'a> Source<'a> {
     }
 
     fn open_within(path: &'a Path, limits: &'a Limits, budget: Arc<Budget>) -> Result<Self> {
-        // Opening a pipe would wait for its other end, and opening a device may start it: so look first.
-        let look = std::fs::metadata(path).map_err(|e| Error::file(path, "open", e))?;
-        let regular = |meta: &std::fs::Metadata| {
-            if meta.is_file() { Ok(()) } else { Err(Error::input(path, "path", "is not a regular file")) }
-        };
-        regular(&look)?;
-        let file = File::open(path).map_err(|e| Error::file(path, "open", e))?;
-        let meta = file.metadata().map_err(|e| Error::file(path, "read", e))?;
-        regular(&meta)?;
-        budget.spend(limits, path, "the file's size in bytes", meta.len())?;
-        // SAFETY: the map is read only and lives as long as the source. A file that another process shortens while it
-        // is mapped would raise SIGBUS; the readers copy what they need and drop the map right away.
-        let bytes = if meta.len() == 0 {
-            None
-        } else {
-            Some(unsafe { memmap2::Mmap::map(&file) }.map_err(|e| Error::file(path, "map", e))?)
-        };
-        Ok(Self { path, limits, bytes, memory: None, budget })
+        let content = Content::Mapped(map_within(path, limits, &budget)?);
+        Ok(Self { path, limits, content, budget })
+    }
+
+    /// Maps a file as [`open`](Self::open) does, for those who read from it later.
+    pub(crate) fn map(path: &Path, limits: &Limits) -> Result<Mapping> {
+        map_within(path, limits, &Budget::new())
     }
 
     /// Takes bytes in place of a file: of a program that has them from elsewhere. `name` is what errors call them, and its
@@ -73,29 +57,52 @@ impl<'a> Source<'a> {
     pub fn from_bytes(name: &'a Path, bytes: &'a [u8], limits: &'a Limits) -> Result<Self> {
         let budget = Arc::new(Budget::new());
         budget.spend(limits, name, "the file's size in bytes", bytes.len() as u64)?;
-        Ok(Self { path: name, limits, bytes: None, memory: Some(bytes), budget })
+        Ok(Self { path: name, limits, content: Content::Held(bytes), budget })
     }
 
     /// Whether this is no file but bytes from elsewhere, which have no neighbours.
     pub(super) fn is_in_memory(&self) -> bool {
-        self.memory.is_some()
+        matches!(self.content, Content::Held(_))
     }
 
     /// The whole file.
     pub fn bytes(&self) -> &[u8] {
-        self.memory.or(self.bytes.as_deref()).unwrap_or(&[])
+        match &self.content {
+            Content::Mapped(mapping) => mapping,
+            Content::Held(bytes) => bytes,
+        }
     }
 
-    /// Gives the pages of the map that were read back to the system: those who go through a file larger than memory do so
-    /// now and then. They are read again where they are asked for again.
+    /// An error if the file is not the one that was opened any more, so that what was read may be neither the old nor the
+    /// new. The readers of whole files ask when they are done.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with what has become of the file.
+    pub fn intact(&self) -> Result<()> {
+        match &self.content {
+            Content::Mapped(mapping) => intact(mapping, self.path),
+            Content::Held(_) => Ok(()),
+        }
+    }
+
+    /// What was made of the file, or why it was not; and where the file was changed meanwhile, that alone.
+    pub(crate) fn unless_changed<T>(&self, found: Result<T>) -> Result<T> {
+        self.intact().and(found)
+    }
+
+    /// See [`Mapping::release`].
     pub(super) fn release(&self) {
-        self.bytes.iter().for_each(release);
+        if let Content::Mapped(mapping) = &self.content {
+            mapping.release();
+        }
     }
 
-    /// The map itself, for those who read from it later; `None` for an empty file. While it is held, the file must not be
-    /// shortened: a new one has to take its name instead.
-    pub(crate) fn into_map(self) -> Option<memmap2::Mmap> {
-        self.bytes
+    /// The mapping itself, for those who read from it later; bytes that are held have none.
+    pub(crate) fn into_mapping(self) -> Option<Mapping> {
+        match self.content {
+            Content::Mapped(mapping) => Some(mapping),
+            Content::Held(_) => None,
+        }
     }
 
     /// An input error at a place of this file (`"line 12"`, `"byte 407"`, `"header"`).
@@ -165,4 +172,25 @@ impl<'a> Source<'a> {
         }
         Ok(out)
     }
+}
+
+fn map_within(path: &Path, limits: &Limits, budget: &Budget) -> Result<Mapping> {
+    // Opening a pipe would wait for its other end, and opening a device may start it: so look first.
+    let look = std::fs::metadata(path).map_err(|e| Error::file(path, "open", e))?;
+    let regular = |meta: &std::fs::Metadata| {
+        if meta.is_file() { Ok(()) } else { Err(Error::input(path, "path", "is not a regular file")) }
+    };
+    regular(&look)?;
+    let file = File::open(path).map_err(|e| Error::file(path, "open", e))?;
+    let meta = file.metadata().map_err(|e| Error::file(path, "read", e))?;
+    regular(&meta)?;
+    budget.spend(limits, path, "the file's size in bytes", meta.len())?;
+    Mapping::new(file).map_err(|e| Error::file(path, "map", e))
+}
+
+/// An error if a file is not the one that was mapped any more.
+pub(crate) fn intact(mapping: &Mapping, path: &Path) -> Result<()> {
+    let Some(change) = mapping.change() else { return Ok(()) };
+    Err(Error::input(path, "file", format!("changed while it was read: {change}"))
+        .hint("try again when nothing writes to it; programs that write a new file and rename it do no harm"))
 }

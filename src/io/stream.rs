@@ -70,10 +70,11 @@ impl<'a> Stream<'a> {
     pub fn of(source: Source<'a>) -> Result<Option<Self>> {
         let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
         let form = match extension.as_str() {
-            "ply" => ply::Pieces::find(&source)?.map(Form::Ply),
-            "las" | "laz" => Some(Form::Las(las::Pieces::find(&source)?)),
-            _ => None,
+            "ply" => ply::Pieces::find(&source).map(|pieces| pieces.map(Form::Ply)),
+            "las" | "laz" => las::Pieces::find(&source).map(|pieces| Some(Form::Las(pieces))),
+            _ => Ok(None),
         };
+        let form = source.unless_changed(form)?;
         let (origin, bounds) = (DVec3::ZERO, [Vec3::ZERO; 2]);
         Ok(form.map(|form| Self { source, form, points: 0, origin, bounds }))
     }
@@ -91,7 +92,7 @@ impl<'a> Stream<'a> {
     /// been seen.
     pub(crate) fn settle(&mut self, watch: &dyn Fn(u64)) -> Result<()> {
         let (points, [low, high]) = match &mut self.form {
-            Form::Las(pieces) => pieces.survey(&self.source, watch)?,
+            Form::Las(pieces) => self.source.unless_changed(pieces.survey(&self.source, watch))?,
             Form::Ply(_) => self.survey_ply(watch)?,
         };
         self.points = points;
@@ -224,11 +225,14 @@ impl<'a> Stream<'a> {
         for first in (0..pieces).step_by(batch) {
             self.source.restart_time();
             let made: Vec<Result<T>> = (first..(first + batch).min(pieces)).into_par_iter().map(&make).collect();
+            // Nothing that was made of a file and half of another is taken.
+            self.source.intact()?;
             for made in made {
                 take(made?)?;
             }
             self.source.release();
         }
-        Ok(())
+        // What was taken may have looked at single points.
+        self.source.intact()
     }
 }

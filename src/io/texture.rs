@@ -42,7 +42,7 @@ fn decode_here(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture
 pub(super) fn read_reference(source: &Source, place: &str, reference: &str) -> Result<Option<Arc<Texture>>> {
     let Some(path) = find(source, place, reference)? else { return Ok(None) };
     let file = source.open_beside(&path)?;
-    decode(&file, place, file.bytes()).map(Some)
+    file.unless_changed(decode(&file, place, file.bytes())).map(Some)
 }
 
 /// The path of a file that may be missing: `None`, with a warning, where a proper reference leads to no file.

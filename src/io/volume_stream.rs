@@ -1,11 +1,10 @@
 //! The slices of a volume one after another, for those who cannot hold all of them.
 
-use super::{Endian, Limits, RawLayout, SampleType, Source, nrrd, raw, source::release};
+use super::{Endian, Limits, Mapping, RawLayout, SampleType, Source, intact, nrrd, raw};
 use crate::{
     Error, Result,
     volume::{Lattice, Samples, Scalar},
 };
-use memmap2::Mmap;
 use std::{
     ops::Range,
     path::{Path, PathBuf},
@@ -28,7 +27,7 @@ pub(super) struct Plain {
 pub struct VolumeStream {
     plain: Plain,
     scalar: Scalar,
-    map: Mmap,
+    map: Mapping,
 }
 
 /// Slices that are looked at together.
@@ -60,14 +59,13 @@ impl VolumeStream {
             SampleType::F32 | SampleType::F64 => Scalar::F32,
             SampleType::U32 | SampleType::U64 | SampleType::I64 => return Ok(None),
         };
-        let map = if plain.path == path { source } else { source.open_beside(&plain.path)? }.into_map();
+        source.intact()?;
+        let file = if plain.path == path { source } else { source.open_beside(&plain.path)? };
+        let Some(map) = file.into_mapping() else { return Ok(None) };
         let bytes =
             plain.sample_type.bytes_of(plain.lattice.dims).and_then(|bytes| bytes.checked_add(plain.start as u64));
-        Ok(map.filter(|map| bytes.is_some_and(|bytes| bytes <= map.len() as u64)).map(|map| Self {
-            plain,
-            scalar,
-            map,
-        }))
+        let is_whole = bytes.is_some_and(|bytes| bytes <= map.len() as u64) && !map.is_empty();
+        Ok(is_whole.then_some(Self { plain, scalar, map }))
     }
 
     /// Where the samples lie.
@@ -82,14 +80,17 @@ impl VolumeStream {
 
     /// The samples of some slices across the last axis.
     ///
+    /// # Errors
+    /// [`Error::Input`] where the file is not the one that was opened any more.
+    ///
     /// # Panics
     /// Where the volume does not have them.
-    pub fn slices(&self, z: Range<usize>) -> Samples {
+    pub fn slices(&self, z: Range<usize>) -> Result<Samples> {
         let Plain { start, sample_type, endian, ref lattice, .. } = self.plain;
         let slice = lattice.dims[0] * lattice.dims[1] * sample_type.bytes();
         let samples = sample_type.decode(self.map[start + z.start * slice..start + z.end * slice].into(), endian);
-        release(&self.map);
-        samples
+        self.map.release();
+        intact(&self.map, &self.plain.path).map(|()| samples)
     }
 
     /// The smallest and the largest value of all samples: goes through the file once. `watch` is told how many slices have
@@ -103,7 +104,7 @@ impl VolumeStream {
         for first in (0..count).step_by(PIECE) {
             watch(first as u64, count as u64);
             let z = first..(first + PIECE).min(count);
-            let [low, high] = self.slices(z.clone()).range().map_err(|message| {
+            let [low, high] = self.slices(z.clone())?.range().map_err(|message| {
                 let place = format!("samples of the slices {} to {}", z.start, z.end - 1);
                 Error::input(&self.plain.path, place, message)
             })?;
@@ -136,8 +137,8 @@ mod tests {
         assert_eq!((stream.lattice(), stream.scalar()), (&whole.lattice, whole.samples.scalar()));
         assert_eq!(stream.range(&|_, _| ()).unwrap(), whole.range);
         let slice = whole.lattice.dims[0] * whole.lattice.dims[1] * whole.samples.sample_bytes();
-        assert_eq!(stream.slices(3..7).bytes(), &whole.samples.bytes()[3 * slice..7 * slice]);
-        assert_eq!(stream.slices(0..19), whole.samples);
+        assert_eq!(stream.slices(3..7).unwrap().bytes(), &whole.samples.bytes()[3 * slice..7 * slice]);
+        assert_eq!(stream.slices(0..19).unwrap(), whole.samples);
     }
 
     #[test]

@@ -148,7 +148,10 @@ impl TransferFunction {
             let message = format!("has {size} bytes, but a transfer function has {MOST_BYTES} at most");
             return Err(source.error("transfer function", message));
         }
-        let text = std::str::from_utf8(source.bytes())
+        // A copy: text that was checked stays what it is.
+        let bytes = source.bytes().to_vec();
+        source.intact()?;
+        let text = std::str::from_utf8(&bytes)
             .map_err(|e| source.error(format!("byte {}", e.valid_up_to()), "is not UTF-8 text"))?;
         Self::from_json(text).map_err(|message| {
             Error::input(path, "transfer function", message)

@@ -11,7 +11,7 @@ use crate::{
 };
 use clap::{Args, Parser};
 use splatkit::{
-    Error,
+    Error, disk,
     hierarchy::{BuildOptions, build_file, file::WriteOptions},
     io,
     picture::PictureFormat,
@@ -109,7 +109,7 @@ impl Demo {
         // So large that the knot winds through the specimen.
         mesh.positions.iter_mut().for_each(|p| *p *= KNOT_SCALE);
         let specimen = Phantom::Specimen.sample([128; 3]).map_err(Error::Argument)?;
-        output::write_by(&self.folder.join(MESH), |path| io::ply::write(&mesh, path))?;
+        io::ply::write(&mesh, &self.folder.join(MESH))?;
         progress.stage("Building a hierarchy");
         let build = BuildOptions {
             closed: mesh.is_closed(),
@@ -119,8 +119,8 @@ impl Demo {
         let write = WriteOptions { source: MESH.into(), ..WriteOptions::default() };
         let splats = mesh.surfels(&SurfelOptions::default())?;
         build_file(&splats, &self.folder.join(TREE), &build, &write, &|_, _| ())?;
-        output::write_by(&self.folder.join(VOLUME), |path| io::nrrd::write(&specimen, path))?;
-        output::write(&self.folder.join(TRANSFER), SHOWN.as_bytes())
+        io::nrrd::write(&specimen, &self.folder.join(VOLUME))?;
+        Ok(disk::write(&self.folder.join(TRANSFER), SHOWN.as_bytes())?)
     }
 
     /// Draws a picture twice, the second time with everything warm.
@@ -149,7 +149,7 @@ impl Demo {
         let (later_ms, picture, stats) = draw()?;
         flags.engine.require_content(&picture)?;
         let path = self.folder.join(shot.name);
-        output::write(&path, &picture.encode(PictureFormat::Png, BACKGROUND)?)?;
+        disk::write(&path, &picture.encode(PictureFormat::Png, BACKGROUND)?)?;
         progress.clear();
         if first {
             output::line(format_args!("Drawn on {}", drawer.adapter()))?;

@@ -4,6 +4,7 @@ use crate::limits;
 use splatkit::Error;
 use std::{
     fmt,
+    io::{self, ErrorKind},
     path::{Path, PathBuf},
     process::ExitCode,
 };
@@ -31,7 +32,7 @@ impl Failure {
 
     fn code(&self) -> u8 {
         match self {
-            Self::Output { .. } => 1,
+            Self::Output { .. } | Self::Library(Error::Output { .. }) => 1,
             Self::Usage(_) | Self::Library(Error::Argument(_)) => 2,
             Self::Library(Error::NoAdapter(_) | Error::Gpu(_) | Error::DeviceLost(_)) => 4,
             Self::Library(Error::Input { .. } | Error::Limit { .. } | Error::File { .. } | Error::NothingToDraw(_)) => {
@@ -45,6 +46,7 @@ impl Failure {
     fn hint(&self) -> Option<&str> {
         match self {
             Self::Library(Error::Input { hint, .. }) => hint.as_deref(),
+            Self::Library(Error::Output { source, .. }) => room(source),
             Self::Library(Error::Limit { kind, .. }) => Some(limits::hint(*kind)),
             Self::Library(Error::NoAdapter(_)) => {
                 Some("`splatkit gpus` lists what there is; `--reference` needs no GPU")
@@ -70,6 +72,20 @@ impl Failure {
         let code = self.code();
         eprintln!("{:?}", miette::Report::new(self));
         ExitCode::from(code)
+    }
+}
+
+/// What to do where the operating system does not take a result.
+fn room(error: &io::Error) -> Option<&'static str> {
+    match error.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+            Some("make room there, or write to another disk; what was there before is as it was")
+        }
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+            Some("write to another folder, or change what the folder allows")
+        }
+        ErrorKind::NotFound => Some("make the folder first"),
+        _ => None,
     }
 }
 

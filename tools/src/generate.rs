@@ -4,7 +4,7 @@ use crate::{failure::Failure, output, parse, progress::Progress, scan};
 use clap::{Args, ValueEnum};
 use glam::{DMat3, DVec3};
 use splatkit::{
-    Error, io,
+    Error, disk, io,
     volume::{Arrangement, Lattice, Volume, phantoms::Phantom},
 };
 use std::{fmt::Write, path::PathBuf};
@@ -78,27 +78,29 @@ fn target(text: &str) -> Result<PathBuf, String> {
 impl Generate {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
         output::check(&self.output, self.overwrite)?;
+        output::try_writing(&self.output, self.from.as_slice())?;
         progress.stage(format!("Making {}", self.output.display()));
         let extension = self.output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
         match (self.what, &self.from, extension) {
             (What::Scan, Some(from), "ply") => {
                 let mesh = io::load_mesh(from, &io::Limits::default())?;
-                output::write(&self.output, &scan::ply(&scan::scan(&mesh, self.points as usize)))
+                disk::write(&self.output, &scan::ply(&scan::scan(&mesh, self.points as usize)))?;
             }
-            (What::Scan, ..) => Err(Failure::Usage("a scan is made --from a mesh and written as .ply".into())),
-            (_, _, "ply") => Err(Failure::Usage("phantoms are written as .nrrd, .vtr or .csv".into())),
+            (What::Scan, ..) => return Err(Failure::Usage("a scan is made --from a mesh and written as .ply".into())),
+            (_, _, "ply") => return Err(Failure::Usage("phantoms are written as .nrrd, .vtr or .csv".into())),
             (What::Phantom(phantom), _, "csv") => {
-                output::write(&self.output, scattered(phantom, self.points).as_bytes())
+                disk::write(&self.output, scattered(phantom, self.points).as_bytes())?;
             }
             (What::Phantom(phantom), _, "vtr") => {
-                output::write(&self.output, rectilinear(phantom, self.dims).as_bytes())
+                disk::write(&self.output, rectilinear(phantom, self.dims).as_bytes())?;
             }
-            (What::Phantom(phantom), ..) if self.sample_type == Type::U8 => self.bytes(phantom, progress),
+            (What::Phantom(phantom), ..) if self.sample_type == Type::U8 => self.bytes(phantom, progress)?,
             (What::Phantom(phantom), ..) => {
                 let volume = self.volume(phantom).map_err(Error::Argument)?;
-                output::write_by(&self.output, |path| io::nrrd::write(&volume, path))
+                io::nrrd::write(&volume, &self.output)?;
             }
         }
+        Ok(())
     }
 
     /// Writes bytes slice by slice.
@@ -110,12 +112,11 @@ impl Generate {
         }
         let slices = phantom.byte_slices(self.dims).map_err(Error::Argument)?;
         let bar = progress.bar("Making slices", self.dims[2] as u64);
-        output::write_by(&self.output, |path| {
-            io::nrrd::write_bytes(slices.lattice(), path, |k| {
-                bar.set(k as u64);
-                slices.slice(k)
-            })
-        })
+        io::nrrd::write_bytes(slices.lattice(), &self.output, |k| {
+            bar.set(k as u64);
+            slices.slice(k)
+        })?;
+        Ok(())
     }
 
     fn volume(&self, phantom: Phantom) -> Result<Volume, String> {

@@ -77,7 +77,10 @@ fn read_table(path: &Path, limits: &Limits) -> splatkit::Result<Vec<f64>> {
         let message = format!("has {size} bytes, but the table of a kernel has {MOST_BYTES} at most");
         return Err(source.error("kernel", message));
     }
-    let text = std::str::from_utf8(source.bytes())
+    // A copy: text that was checked stays what it is.
+    let bytes = source.bytes().to_vec();
+    source.intact()?;
+    let text = std::str::from_utf8(&bytes)
         .map_err(|e| source.error(format!("byte {}", e.valid_up_to()), "is not UTF-8 text"))?;
     if text.trim_start().starts_with('[') {
         return serde_json::from_str(text).map_err(|e| source.error("kernel", e.to_string()));

@@ -1,6 +1,8 @@
 //! The `splatkit` command: one file per subcommand, the flags that they share in modules of their own. All drawing is the
 //! library's.
 
+#![forbid(unsafe_code)]
+
 mod bench;
 mod camera;
 mod check;
@@ -15,6 +17,7 @@ mod figures;
 mod generate;
 mod gpus;
 mod info;
+mod interrupt;
 mod kernel;
 mod limits;
 mod load;
@@ -37,7 +40,7 @@ use std::{io::IsTerminal, process::ExitCode};
 /// Draws volumes and surfaces as elliptic splats.
 ///
 /// Exit codes: 0 done, 1 runtime or output, 2 usage, 3 bad input or nothing to draw, 4 no adapter or out of memory,
-/// 5 comparison failed.
+/// 5 comparison failed, 130 interrupted.
 #[derive(Parser)]
 #[command(name = "splatkit", version, max_term_width = 110)]
 struct Command {
@@ -80,6 +83,7 @@ enum Task {
 fn main() -> ExitCode {
     let command = Command::parse();
     start_log(&command);
+    interrupt::answer();
     let progress = Progress::new(!command.quiet);
     let result = match command.task {
         Task::Render(task) => task.run(&progress),

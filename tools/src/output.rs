@@ -1,7 +1,7 @@
 //! Where results go: files that appear whole or not at all, and stdout.
 
 use crate::failure::Failure;
-use splatkit::{Error, picture::PictureFormat};
+use splatkit::{disk, picture::PictureFormat};
 use std::{
     io::Write,
     path::{Path, PathBuf},
@@ -44,7 +44,7 @@ impl Target {
     pub fn write(&self, bytes: &[u8]) -> Result<(), Failure> {
         match self {
             Self::Stdout => stdout(bytes),
-            Self::File(path, _) => write(path, bytes),
+            Self::File(path, _) => Ok(disk::write(path, bytes)?),
         }
     }
 }
@@ -56,6 +56,9 @@ pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
     if path.is_dir() {
         return refuse("is a folder", "give the name of a file");
     }
+    if path.metadata().is_ok_and(|found| !found.is_file()) {
+        return refuse("is no file that could be replaced", "give the name of a file");
+    }
     if !overwrite && path.symlink_metadata().is_ok() {
         return refuse("exists already", "give --overwrite, or another name");
     }
@@ -65,31 +68,22 @@ pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Finds out whether a file can be written before the work is done, and that it is none of the inputs.
+pub fn try_writing(path: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
+    let real = path.canonicalize().ok();
+    if real.is_some() && inputs.iter().any(|input| input.canonicalize().ok() == real) {
+        return Err(Failure::Output {
+            file: path.to_owned(),
+            message: "is an input too".into(),
+            hint: Some("give another name"),
+        });
+    }
+    drop(disk::AtomicFile::create(path)?);
+    Ok(())
+}
+
 fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// Writes a file as a whole: what reads it sees the old one or the new one.
-pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    write_by(path, |part| std::fs::write(part, bytes).map_err(|e| Error::file(path, "write", e)))
-}
-
-/// Has a function write a file beside `path`, and renames it.
-pub fn write_by(path: &Path, write: impl FnOnce(&Path) -> splatkit::Result<()>) -> Result<(), Failure> {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(format!(".{}.part", std::process::id()));
-    let part = folder(path).join(name);
-    let written = write(&part).map_err(|error| match error {
-        Error::File { source, .. } => Failure::output(path, source),
-        other => other.into(),
-    });
-    let written = written.and_then(|()| std::fs::rename(&part, path).map_err(|e| Failure::output(path, e)));
-    if written.is_err() {
-        // The first error is the one to tell.
-        std::fs::remove_file(&part).ok();
-    }
-    written
 }
 
 /// Writes to stdout. A reader that has seen enough and closed it is no error.

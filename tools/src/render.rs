@@ -12,7 +12,7 @@ use crate::{
 };
 use clap::Args;
 use splatkit::{
-    Error,
+    Error, disk,
     engine::{FrameStats, Gpu, PreparedScene, Renderer},
     math::Camera,
     picture::Picture,
@@ -138,7 +138,7 @@ impl Render {
             progress.stage(format!("Writing {}", target.name()));
             target.write(&picture.encode(target.format(), self.background.0)?)?;
             if let Some(depth) = &self.depth {
-                output::write(depth, &picture.encode_depth()?)?;
+                disk::write(depth, &picture.encode_depth()?)?;
             }
             last = (stats, camera);
         }
@@ -191,10 +191,17 @@ impl Render {
             }
             output::check(depth, self.overwrite)?;
         }
-        match self.turntable {
-            None => Ok(vec![Target::new(&self.output, self.overwrite)?]),
-            Some(_) => (0..frames).map(|frame| Target::new(&numbered(&self.output, frame)?, self.overwrite)).collect(),
+        let names: Vec<PathBuf> = match self.turntable {
+            None => vec![self.output.clone()],
+            Some(_) => (0..frames).map(|frame| numbered(&self.output, frame)).collect::<Result<_, _>>()?,
+        };
+        let targets: Vec<Target> =
+            names.iter().map(|name| Target::new(name, self.overwrite)).collect::<Result<_, _>>()?;
+        // The frames of a turntable go where the first one goes.
+        for file in names.first().filter(|_| !stdout).into_iter().chain(&self.depth) {
+            output::try_writing(file, &[])?;
         }
+        Ok(targets)
     }
 }
 

@@ -1,8 +1,8 @@
 //! Tables of figures, as Markdown and as JSON, and the block of a document that holds them.
 
-use crate::{failure::Failure, output};
+use crate::failure::Failure;
 use serde_json::{Map, Value, json};
-use splatkit::Error;
+use splatkit::{Error, disk};
 use std::path::{Path, PathBuf};
 
 pub struct Report {
@@ -119,7 +119,7 @@ impl Block {
 
     pub fn replace(&self, text: &str) -> Result<(), Failure> {
         let Self { path, start, end, before, after, .. } = self;
-        output::write(path, format!("{before}{start}\n\n{text}\n{end}{after}").as_bytes())
+        Ok(disk::write(path, format!("{before}{start}\n\n{text}\n{end}{after}").as_bytes())?)
     }
 }
 

@@ -4,30 +4,6 @@ mod common;
 
 use common::*;
 
-/// A wavy sheet of binary triangles.
-fn sheet(side: u32) -> Vec<u8> {
-    let mut out = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
-         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
-        side * side,
-        (side - 1) * (side - 1) * 2
-    )
-    .into_bytes();
-    for i in 0..side * side {
-        let (x, y) = ((i % side) as f32, (i / side) as f32);
-        for value in [x, y, (0.1 * x).sin() * (0.07 * y).cos() * 5.0] {
-            out.extend(value.to_le_bytes());
-        }
-    }
-    for i in (0..side * (side - 1)).filter(|i| i % side + 1 < side) {
-        for triangle in [[i, i + 1, i + side], [i + 1, i + side + 1, i + side]] {
-            out.push(3);
-            triangle.iter().for_each(|index| out.extend(index.to_le_bytes()));
-        }
-    }
-    out
-}
-
 #[test]
 fn what_is_larger_than_the_memory_is_converted_in_regions() {
     let folder = Folder::new("memory");

@@ -1,7 +1,6 @@
 //! Records sorted in bins by their arrival, in a file without a name.
 
-use super::super::file::Part;
-use crate::{Error, Result};
+use crate::{Error, Result, disk::Scratch};
 use bytemuck::Pod;
 use std::{
     io::{Read, Seek, SeekFrom, Write},
@@ -13,7 +12,7 @@ const WAITING: usize = 64 << 20;
 
 /// Some bins of records. Each keeps its records in the order in which they came.
 pub struct Bins<T> {
-    part: Part,
+    file: Scratch,
     /// The file beside which this one is, for errors.
     wanted: PathBuf,
     /// Where the file ends.
@@ -27,15 +26,15 @@ pub struct Bins<T> {
 }
 
 impl<T: Pod> Bins<T> {
-    /// So many empty bins, in a file beside `wanted` that tells itself from others by `name`.
+    /// So many empty bins, in a file beside `wanted`.
     ///
     /// # Errors
-    /// [`Error::File`] where none can be made.
-    pub fn beside(wanted: &Path, name: &str, bins: usize) -> Result<Self> {
+    /// [`Error::Output`] where none can be made.
+    pub fn beside(wanted: &Path, bins: usize) -> Result<Self> {
         let most = (WAITING / bins.max(1) / size_of::<T>()).clamp(64, 1 << 16);
-        let part = Part::create(wanted, name)?.hide();
+        let file = Scratch::beside(wanted)?;
         let (waiting, runs) = (vec![Vec::new(); bins], vec![Vec::new(); bins]);
-        Ok(Self { part, wanted: wanted.to_owned(), end: 0, waiting, most, runs, counts: vec![0; bins] })
+        Ok(Self { file, wanted: wanted.to_owned(), end: 0, waiting, most, runs, counts: vec![0; bins] })
     }
 
     pub fn push(&mut self, bin: u32, record: T) -> Result<()> {
@@ -50,9 +49,9 @@ impl<T: Pod> Bins<T> {
             return Ok(());
         }
         let bytes: &[u8] = bytemuck::cast_slice(waiting);
-        let file = self.part.file();
+        let file = &mut self.file;
         let written = file.seek(SeekFrom::Start(self.end)).and_then(|_| file.write_all(bytes));
-        written.map_err(|e| Error::file(&self.wanted, "write beside", e))?;
+        written.map_err(|e| Error::output(&self.wanted, e))?;
         self.runs[bin].push((self.end, waiting.len()));
         self.end += bytes.len() as u64;
         waiting.clear();
@@ -76,11 +75,11 @@ impl<T: Pod> Bins<T> {
     /// The records of a bin.
     pub fn read(&mut self, bin: u32) -> Result<Vec<T>> {
         let mut records = vec![T::zeroed(); self.count(bin)];
-        let (file, mut next) = (self.part.file(), 0);
+        let (file, mut next) = (&mut self.file, 0);
         for &(at, count) in &self.runs[bin as usize] {
             let run = bytemuck::cast_slice_mut(&mut records[next..next + count]);
             let read = file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(run));
-            read.map_err(|e| Error::file(&self.wanted, "read what was written beside", e))?;
+            read.map_err(|e| Error::file(&self.wanted, "read what was put beside", e))?;
             next += count;
         }
         records[next..].copy_from_slice(&self.waiting[bin as usize]);

@@ -58,11 +58,11 @@ impl Distributed<'_> {
 
 impl Work<'_> {
     /// Builds all regions of an input.
-    pub fn input(&mut self, mut input: Distributed, wanted: &Path, number: usize) -> Result<()> {
+    pub fn input(&mut self, mut input: Distributed, wanted: &Path) -> Result<()> {
         let regions = input.input.regions() as u32;
         let orients = input.input.mesh.is_none() && !input.input.stream.has_normals();
         let mut sides = match orients {
-            true => Some(Bins::<Side>::beside(wanted, &format!("sides{number}"), regions as usize)?),
+            true => Some(Bins::<Side>::beside(wanted, regions as usize)?),
             false => None,
         };
         (self.watch)(Stage::Building, self.built, self.points);

@@ -41,16 +41,10 @@ struct Shares<T> {
     radius: f64,
 }
 
-/// Distributes an input to files beside `wanted`, of names that end in `number`.
-pub fn distribute<'a>(
-    input: Surveyed<'a>,
-    most: u64,
-    wanted: &Path,
-    number: usize,
-    watch: StageWatch<'_>,
-) -> Result<Distributed<'a>> {
+/// Distributes an input to files beside `wanted`.
+pub fn distribute<'a>(input: Surveyed<'a>, most: u64, wanted: &Path, watch: StageWatch<'_>) -> Result<Distributed<'a>> {
     let bins = input.regions();
-    let mut points = Bins::beside(wanted, &format!("points{number}"), bins)?;
+    let mut points = Bins::beside(wanted, bins)?;
     let mut radius = 0.0f64;
     let total = input.stream.point_count();
     let mut done = 0;
@@ -70,7 +64,7 @@ pub fn distribute<'a>(
     })?;
     let mut triangles = None;
     if input.mesh.is_some() {
-        let mut bins = Bins::beside(wanted, &format!("triangles{number}"), bins)?;
+        let mut bins = Bins::beside(wanted, bins)?;
         let total = input.stream.counts().triangles;
         let mut done = 0;
         input.stream.triangles(

@@ -87,7 +87,7 @@ pub fn memory_of_whole(counts: Counts) -> u64 {
 /// # Errors
 /// Those of [`Stream::open`] and of reading on; [`Error::Argument`] for a file that can only be read as a whole, and for
 /// options of [`Mesh::surfels`](crate::surface::Mesh::surfels) that are no positive numbers; [`Error::NothingToDraw`] where
-/// nothing is left; [`Error::File`] where something cannot be written. Then nothing is left of the file.
+/// nothing is left; [`Error::Output`] where something cannot be written. Then nothing is left of the file.
 pub fn convert(
     files: &[PathBuf],
     limits: &Limits,
@@ -99,13 +99,13 @@ pub fn convert(
     let _span = tracing::info_span!("convert").entered();
     let most = (options.memory / OF_POINT).clamp(FEWEST_POINTS, MOST_POINTS);
     let mut inputs = Vec::new();
-    for (number, file) in files.iter().enumerate() {
+    for file in files {
         let stream = Stream::open(file, limits)?.ok_or_else(|| {
             Error::Argument(format!("{}: a file of this kind can only be read as a whole", file.display()))
         })?;
         let input = survey::survey(stream, most, &options.surfels, watch)?;
         tracing::info!(file = %file.display(), regions = input.regions(), "cut in regions");
-        inputs.push(distribute::distribute(input, most, path, number, watch)?);
+        inputs.push(distribute::distribute(input, most, path, watch)?);
     }
     let Some(first) = inputs.first() else { return Err(Error::NothingToDraw("there are no files".into())) };
     let origin = first.input.stream.origin();
@@ -127,8 +127,8 @@ pub fn convert(
         splats: 0,
         watch,
     };
-    for (number, input) in inputs.into_iter().enumerate() {
-        work.input(input, path, number)?;
+    for input in inputs {
+        work.input(input, path)?;
     }
     if work.splats == 0 {
         return Err(Error::NothingToDraw("no point is left, or no triangle has an area".into()));

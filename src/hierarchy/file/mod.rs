@@ -46,7 +46,6 @@ const HASH: usize = 32;
 pub(in crate::hierarchy) use page::enclose;
 pub(in crate::hierarchy) use page::joint_angle;
 pub(in crate::hierarchy) use pages::{in_order, reach};
-pub(in crate::hierarchy) use spill::Part;
 pub(crate) use {
     bytes::{Cursor, Put},
     spill::{Spill, Target},

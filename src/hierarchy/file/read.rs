@@ -11,7 +11,7 @@ use super::{
 use crate::{
     Error, Result,
     hierarchy::{Block, Node, Tree},
-    io::{LimitKind, Limits, Source},
+    io::{LimitKind, Limits, Mapping, Source, intact},
     math::Bounds,
 };
 use rayon::prelude::*;
@@ -81,7 +81,7 @@ impl std::fmt::Debug for Hierarchy {
 }
 
 enum Store {
-    Mapped(Option<memmap2::Mmap>),
+    Mapped(Mapping),
     Bytes(Vec<u8>),
     Blocks(Vec<Block>),
 }
@@ -93,7 +93,7 @@ impl Hierarchy {
     /// [`Error::Input`] for other files, other versions, damaged headers and directories, and files that are cut off;
     /// [`Error::Limit`] and [`Error::File`] as for every input.
     pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
-        let map = Source::open(path, limits)?.into_map();
+        let map = Source::map(path, limits)?;
         Self::new(path, Store::Mapped(map), limits, false)
     }
 
@@ -103,7 +103,7 @@ impl Hierarchy {
     /// # Errors
     /// As of [`open`](Self::open), where not even the header and the directory are whole.
     pub fn open_prefix(path: &Path, limits: &Limits) -> Result<Self> {
-        let map = Source::open(path, limits)?.into_map();
+        let map = Source::map(path, limits)?;
         Self::new(path, Store::Mapped(map), limits, true)
     }
 
@@ -116,26 +116,8 @@ impl Hierarchy {
     }
 
     fn new(path: &Path, store: Store, limits: &Limits, may_be_cut: bool) -> Result<Self> {
-        let bytes = store.bytes();
-        let stored = Stored::decode(bytes).map_err(|refusal| refused(path, refusal))?;
-        let directory = Directory::decode(bytes, &stored).map_err(|trouble| match trouble {
-            Trouble::Incomplete => incomplete(path, "directory"),
-            Trouble::Damaged(message) => damaged(path, "directory", message),
-        })?;
-        let Stored { header, file_bytes, .. } = stored;
-        let present = bytes.len() as u64;
-        if present > file_bytes {
-            let message = format!("the file has {} bytes behind its end", present - file_bytes);
-            return Err(damaged(path, format!("byte {file_bytes}"), message));
-        }
-        if present < file_bytes && !may_be_cut {
-            return Err(incomplete(path, format!("byte {present} of {file_bytes}")));
-        }
-        for (what, found) in [("the number of leaves", header.leaves), ("the number of points", header.source_points)] {
-            limits.check(LimitKind::Points, path, what, found)?;
-        }
-        let bytes = present + directory.memory();
-        limits.check(LimitKind::Bytes, path, "the size of the file and its directory in bytes", bytes)?;
+        let begun = begin(path, store.bytes(), limits, may_be_cut).map_err(|error| store.why(path, error));
+        let (header, directory) = begun?;
         Ok(Self::assemble(path, store, header, directory, limits.clone()))
     }
 
@@ -343,13 +325,15 @@ impl Hierarchy {
         if end < offset.saturating_add(u64::from(length)) {
             return Err(incomplete(&self.path, place()));
         }
-        let bytes = &all[offset as usize..end as usize];
-        if crc32fast::hash(bytes) != crc {
-            return Err(damaged(&self.path, place(), "its checksum does not fit"));
+        let broken = |message: String| self.store.why(&self.path, damaged(&self.path, place(), message));
+        // A copy: what is decoded is what has the checksum, whoever writes to the file.
+        let bytes = all[offset as usize..end as usize].to_vec();
+        if crc32fast::hash(&bytes) != crc {
+            return Err(broken("its checksum does not fit".into()));
         }
         let children = self.directory.children(page);
-        let nodes = page::decode(bytes, entry.nodes as usize, entry.first_child, self.header.extent)
-            .map_err(|message| damaged(&self.path, place(), message))?;
+        let nodes =
+            page::decode(&bytes, entry.nodes as usize, entry.first_child, self.header.extent).map_err(broken)?;
         let counted: u64 = nodes.iter().map(|node| u64::from(node.children)).sum();
         if counted != u64::from(children.end - children.start) {
             let message = format!("its nodes have {counted} children where the directory tells of {}", children.len());
@@ -398,10 +382,42 @@ impl Hierarchy {
     }
 }
 
+/// What stands at the beginning of a file, checked.
+fn begin(path: &Path, bytes: &[u8], limits: &Limits, may_be_cut: bool) -> Result<(Header, Directory)> {
+    let stored = Stored::decode(bytes).map_err(|refusal| refused(path, refusal))?;
+    let directory = Directory::decode(bytes, &stored).map_err(|trouble| match trouble {
+        Trouble::Incomplete => incomplete(path, "directory"),
+        Trouble::Damaged(message) => damaged(path, "directory", message),
+    })?;
+    let Stored { header, file_bytes, .. } = stored;
+    let present = bytes.len() as u64;
+    if present > file_bytes {
+        let message = format!("the file has {} bytes behind its end", present - file_bytes);
+        return Err(damaged(path, format!("byte {file_bytes}"), message));
+    }
+    if present < file_bytes && !may_be_cut {
+        return Err(incomplete(path, format!("byte {present} of {file_bytes}")));
+    }
+    for (what, found) in [("the number of leaves", header.leaves), ("the number of points", header.source_points)] {
+        limits.check(LimitKind::Points, path, what, found)?;
+    }
+    let bytes = present + directory.memory();
+    limits.check(LimitKind::Bytes, path, "the size of the file and its directory in bytes", bytes)?;
+    Ok((header, directory))
+}
+
 impl Store {
+    /// Why there is an error: checksums and the like find what changed, but not that it did.
+    fn why(&self, path: &Path, error: Error) -> Error {
+        match self {
+            Self::Mapped(map) => intact(map, path).err().unwrap_or(error),
+            Self::Bytes(_) | Self::Blocks(_) => error,
+        }
+    }
+
     fn bytes(&self) -> &[u8] {
         match self {
-            Self::Mapped(map) => map.as_deref().unwrap_or(&[]),
+            Self::Mapped(map) => map,
             Self::Bytes(bytes) => bytes,
             Self::Blocks(_) => &[],
         }

@@ -1,92 +1,24 @@
-//! Where pages wait until the directory before them is known, and how a file appears whole or not at all.
+//! Where pages wait until the directory before them is known, and where a finished file goes.
 
-use crate::{Error, Result};
-use std::{
-    fs::File,
-    io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write},
-    path::{Path, PathBuf},
+use crate::{
+    Error, Result,
+    disk::{AtomicFile, BUFFER, Scratch},
 };
-
-/// A hidden file beside the one that is wanted, removed when dropped unless it took that one's place.
-pub struct Part {
-    path: PathBuf,
-    wanted: PathBuf,
-    file: Option<File>,
-}
-
-impl Part {
-    pub fn create(wanted: &Path, extension: &str) -> Result<Self> {
-        let mut name = std::ffi::OsString::from(".");
-        name.push(wanted.file_name().unwrap_or_default());
-        name.push(format!(".{}.{extension}", std::process::id()));
-        let path = folder(wanted).join(name);
-        let options = File::options().read(true).write(true).create(true).truncate(true).open(&path);
-        let file = options.map_err(|e| Error::file(wanted, "create", e))?;
-        Ok(Self { path, wanted: wanted.to_owned(), file: Some(file) })
-    }
-
-    /// Takes the file's name away where a system lets files live without: then nothing is left of it whatever happens.
-    pub fn hide(self) -> Self {
-        #[cfg(unix)]
-        std::fs::remove_file(&self.path).ok();
-        self
-    }
-
-    pub fn file(&mut self) -> &mut File {
-        self.file.as_mut().expect("is there until the part is dropped")
-    }
-
-    /// Gives the file its name, once all of it is on the disk.
-    pub fn rename(mut self) -> Result<()> {
-        let fail = |e| Error::file(&self.wanted, "write", e);
-        let file = self.file.take().expect("is there until the part is dropped");
-        file.sync_all().map_err(fail)?;
-        drop(file);
-        std::fs::rename(&self.path, &self.wanted).map_err(fail)?;
-        // The name, too, must survive a crash; where a folder cannot be synced, the system sees to it.
-        if let Ok(folder) = File::open(folder(&self.wanted)) {
-            folder.sync_all().ok();
-        }
-        Ok(())
-    }
-}
-
-impl Drop for Part {
-    fn drop(&mut self) {
-        // Renamed parts have nothing left to close, nor any file of that name.
-        drop(self.file.take());
-        std::fs::remove_file(&self.path).ok();
-    }
-}
-
-fn folder(path: &Path) -> &Path {
-    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
+use std::{
+    io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write},
+    path::Path,
+};
 
 /// Pages in the order in which they came.
 pub enum Spill {
     Memory(Vec<u8>),
-    Disk { part: BufWriter<PartFile>, length: u64 },
-}
-
-/// A part as something to write to.
-pub struct PartFile(Part);
-
-impl Write for PartFile {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.file().write(bytes)
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        self.0.file().flush()
-    }
+    Disk { file: BufWriter<Scratch>, length: u64 },
 }
 
 impl Spill {
     /// Beside a file that is to be.
     pub fn beside(wanted: &Path) -> Result<Self> {
-        let part = BufWriter::with_capacity(1 << 20, PartFile(Part::create(wanted, "pages")?.hide()));
-        Ok(Self::Disk { part, length: 0 })
+        Ok(Self::Disk { file: BufWriter::with_capacity(BUFFER, Scratch::beside(wanted)?), length: 0 })
     }
 
     /// Appends bytes and tells where they stand.
@@ -96,8 +28,8 @@ impl Spill {
                 all.extend_from_slice(bytes);
                 Ok((all.len() - bytes.len()) as u64)
             }
-            Self::Disk { part, length } => {
-                part.write_all(bytes)?;
+            Self::Disk { file, length } => {
+                file.write_all(bytes)?;
                 *length += bytes.len() as u64;
                 Ok(*length - bytes.len() as u64)
             }
@@ -116,9 +48,9 @@ impl Spill {
                     each(&all[offset as usize..offset as usize + length as usize])?;
                 }
             }
-            Self::Disk { part, .. } => {
-                let mut part = part.into_inner().map_err(std::io::IntoInnerError::into_error)?;
-                let mut file = BufReader::with_capacity(1 << 16, part.0.file());
+            Self::Disk { file, .. } => {
+                let file = file.into_inner().map_err(std::io::IntoInnerError::into_error)?;
+                let mut file = BufReader::with_capacity(1 << 16, file);
                 let mut at = 0;
                 let mut bytes = Vec::new();
                 file.seek(SeekFrom::Start(0))?;
@@ -139,24 +71,20 @@ impl Spill {
 /// Where a finished file goes.
 pub enum Target {
     Memory(Vec<u8>),
-    Disk(BufWriter<PartFile>),
+    Disk(BufWriter<AtomicFile>),
 }
 
 impl Target {
     pub fn at(path: &Path) -> Result<Self> {
-        Ok(Self::Disk(BufWriter::with_capacity(1 << 20, PartFile(Part::create(path, "part")?))))
+        Ok(Self::Disk(BufWriter::with_capacity(BUFFER, AtomicFile::create(path)?)))
     }
 
-    /// Ends the file: the bytes where it was written to memory, none where it has its name now.
-    pub fn end(self) -> Result<Vec<u8>> {
+    /// Ends the file that is wanted: the bytes where it was written to memory, none where it has its name now.
+    pub fn end(self, wanted: &Path) -> Result<Vec<u8>> {
         match self {
             Self::Memory(bytes) => Ok(bytes),
             Self::Disk(out) => {
-                let part = out.into_inner().map_err(|e| {
-                    let (error, out) = e.into_parts();
-                    Error::file(&out.get_ref().0.wanted, "write", error)
-                })?;
-                part.0.rename()?;
+                out.into_inner().map_err(|e| Error::output(wanted, e.into_error()))?.commit()?;
                 Ok(Vec::new())
             }
         }

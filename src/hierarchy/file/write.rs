@@ -71,7 +71,7 @@ impl Writer {
     /// Begins a file of splats whose footprints end `extent` standard deviations from their centres.
     ///
     /// # Errors
-    /// [`Error::File`] where nothing can be written beside `path`; [`Error::Argument`] for an extent that is no positive
+    /// [`Error::Output`] where nothing can be written beside `path`; [`Error::Argument`] for an extent that is no positive
     /// number.
     pub fn new(path: &Path, extent: f32, options: &WriteOptions) -> Result<Self> {
         Self::begin(Some(path.to_owned()), extent, options, || Spill::beside(path))
@@ -102,7 +102,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`Error::Argument`] for nodes that are not in the order of [`Block`](crate::hierarchy::Block), or have values that
-    /// are not finite; [`Error::File`] where they cannot be written.
+    /// are not finite; [`Error::Output`] where they cannot be written.
     pub fn block(&mut self, nodes: &[Node]) -> Result<Node> {
         Ok(self.blocks(&[nodes])?[0])
     }
@@ -141,7 +141,7 @@ impl Writer {
     /// bounds of the roots in their place, and whose other nodes grow where they must.
     ///
     /// # Errors
-    /// [`Error::Argument`] where `top` does not fit the blocks that were written; [`Error::File`] where the file cannot
+    /// [`Error::Argument`] where `top` does not fit the blocks that were written; [`Error::Output`] where the file cannot
     /// be written.
     pub fn finish(self, top: Option<Top>, whole: &Whole) -> Result<()> {
         let path = self.path.clone();
@@ -183,8 +183,9 @@ impl Writer {
             .and_then(|()| put(&directory.encode()))
             .and_then(|()| self.spill.replay(pieces, &mut put))
             .and_then(|()| out.write_all(hash.finalize().as_bytes()));
-        written.map_err(|e| Error::file(self.path.as_deref().unwrap_or(Path::new("memory")), "write", e))?;
-        out.end()
+        let wanted = self.path.as_deref().unwrap_or(Path::new("memory"));
+        written.map_err(|e| Error::output(wanted, e))?;
+        out.end(wanted)
     }
 
     /// The directory of all blocks, with the one on top written too.
@@ -221,9 +222,8 @@ impl Writer {
     fn push(&mut self, pages: &[Vec<u8>]) -> Result<Vec<Place>> {
         let mut places = Vec::with_capacity(pages.len());
         for bytes in pages {
-            let offset = self.spill.push(bytes);
-            let offset =
-                offset.map_err(|e| Error::file(self.path.as_deref().unwrap_or(Path::new("memory")), "write", e))?;
+            let wanted = self.path.as_deref().unwrap_or(Path::new("memory"));
+            let offset = self.spill.push(bytes).map_err(|e| Error::output(wanted, e))?;
             places.push(Place { offset, bytes: bytes.len() as u32, crc: crc32fast::hash(bytes) });
         }
         Ok(places)

@@ -127,7 +127,7 @@ pub(super) fn resolve(source: &Source, place: &str, uri: &str) -> Result<Vec<u8>
     let path = source.neighbour(place, &path)?;
     let file = source.open_beside(&path)?;
     source.room::<u8>("a buffer", file.bytes().len())?;
-    Ok(file.bytes().to_vec())
+    file.unless_changed(Ok(file.bytes().to_vec()))
 }
 
 /// Undoes percent codes; `None` where a % is not followed by two hexadecimal digits.

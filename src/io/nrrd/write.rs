@@ -1,7 +1,7 @@
 //! Writing NRRD: samples in their own type, packed by gzip, in the header's own file.
 
 use crate::{
-    Error, Result,
+    Result, disk,
     volume::{Arrangement, Lattice, Scalar, Volume},
 };
 use flate2::{Compression, write::GzEncoder};
@@ -11,28 +11,22 @@ use std::{io::Write, path::Path};
 /// Writes a volume with its position in space; body-centred ones with the key that [`read`](super::read) knows.
 ///
 /// # Errors
-/// [`Error::File`] where the file cannot be written.
+/// [`Error::Output`](crate::Error::Output) where the file cannot be written.
 pub fn write(volume: &Volume, path: &Path) -> Result<()> {
-    let file = std::fs::File::create(path).map_err(|e| Error::file(path, "create", e))?;
-    let mut out = std::io::BufWriter::new(file);
-    write_to(volume, &mut out).and_then(|()| out.flush()).map_err(|e| Error::file(path, "write", e))
+    disk::write_with(path, |out| write_to(volume, out))
 }
 
 /// Writes a Cartesian volume of bytes that come slice by slice, not packed, so that it can be read slice by slice too
 /// ([`VolumeStream`](crate::io::VolumeStream)). `slice` makes the samples of each slice across the last axis, in order.
 ///
 /// # Errors
-/// [`Error::File`] where the file cannot be written.
+/// [`Error::Output`](crate::Error::Output) where the file cannot be written.
 pub fn write_bytes(lattice: &Lattice, path: &Path, mut slice: impl FnMut(usize) -> Vec<u8>) -> Result<()> {
-    let file = std::fs::File::create(path).map_err(|e| Error::file(path, "create", e))?;
-    let mut out = std::io::BufWriter::new(file);
-    let mut all = || {
-        write_header(lattice, Scalar::U8, "raw", &mut out)?;
+    disk::write_with(path, |out| {
+        write_header(lattice, Scalar::U8, "raw", out)?;
         writeln!(out)?;
-        (0..lattice.dims[2]).try_for_each(|k| out.write_all(&slice(k)))?;
-        out.flush()
-    };
-    all().map_err(|e| Error::file(path, "write", e))
+        (0..lattice.dims[2]).try_for_each(|k| out.write_all(&slice(k)))
+    })
 }
 
 /// The fields that every file has.

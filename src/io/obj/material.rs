@@ -36,7 +36,8 @@ impl<'a, 'b> Library<'a, 'b> {
         }
         let Some(path) = texture::find(self.source, "mtllib", name)? else { return Ok((materials, index_of)) };
         let file = self.source.open_beside(&path)?;
-        let text = String::from_utf8_lossy(file.bytes());
+        let text = String::from_utf8_lossy(file.bytes()).into_owned();
+        file.intact()?;
         for (line, number) in text.lines().zip(1..) {
             let line = line.trim();
             let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));

@@ -3,7 +3,7 @@
 //! deviations, and a quaternion.
 
 use crate::{
-    Error, Result,
+    Error, Result, disk,
     hierarchy::Tree,
     math::eigen,
     splat::{Payload, Splat, SplatSet, decode_normal},
@@ -23,7 +23,7 @@ const PROPERTIES: [&str; 17] = [
 /// footprints are lost.
 ///
 /// # Errors
-/// [`Error::Argument`] for scalar splats, which have no colours; [`Error::File`] where the file cannot be written.
+/// [`Error::Argument`] for scalar splats, which have no colours; [`Error::Output`] where the file cannot be written.
 pub fn write_gaussians(set: &SplatSet, path: &Path) -> Result<()> {
     if set.payload != Payload::Radiance {
         return Err(Error::Argument("samples of a volume have no colours to write as Gaussians".into()));
@@ -34,16 +34,14 @@ pub fn write_gaussians(set: &SplatSet, path: &Path) -> Result<()> {
 /// Writes the leaves of a hierarchy as 3D Gaussians, as [`write_gaussians`] does.
 ///
 /// # Errors
-/// [`Error::File`] where the file cannot be written.
+/// [`Error::Output`] where the file cannot be written.
 pub fn write_gaussian_leaves(tree: &Tree, path: &Path) -> Result<()> {
     let leaves = tree.nodes().filter(|node| node.is_leaf()).map(|node| &node.splat);
     write_all(tree.leaf_count(), leaves, tree.origin, path)
 }
 
 fn write_all<'a>(count: u64, splats: impl Iterator<Item = &'a Splat>, origin: DVec3, path: &Path) -> Result<()> {
-    let file = std::fs::File::create(path).map_err(|e| Error::file(path, "create", e))?;
-    let mut out = std::io::BufWriter::new(file);
-    let write = || {
+    disk::write_with(path, |out| {
         writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {count}")?;
         PROPERTIES.iter().try_for_each(|name| writeln!(out, "property float {name}"))?;
         writeln!(out, "end_header")?;
@@ -51,9 +49,8 @@ fn write_all<'a>(count: u64, splats: impl Iterator<Item = &'a Splat>, origin: DV
             let bytes = gaussian(splat, origin).map(|value| (value as f32).to_le_bytes());
             out.write_all(bytes.as_flattened())?;
         }
-        out.flush()
-    };
-    write().map_err(|e: std::io::Error| Error::file(path, "write", e))
+        Ok(())
+    })
 }
 
 /// The numbers of one splat, in the order of [`PROPERTIES`].

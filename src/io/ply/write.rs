@@ -1,13 +1,13 @@
 //! Writing PLY: binary, little-endian, positions as floats.
 
-use crate::{Error, Result, surface::Mesh};
+use crate::{Error, Result, disk, surface::Mesh};
 use std::{io::Write, path::Path};
 
 /// Writes positions, normals, colours and triangles. Positions are written with the mesh's origin added, in 32 bits; texture
 /// coordinates and materials are not written.
 ///
 /// # Errors
-/// [`Error::File`] where the file cannot be written; [`Error::Argument`] for attributes that do not fit the positions.
+/// [`Error::Output`] where the file cannot be written; [`Error::Argument`] for attributes that do not fit the positions.
 pub fn write(mesh: &Mesh, path: &Path) -> Result<()> {
     let count = mesh.positions.len();
     for (name, length) in [("normals", mesh.normals.len()), ("colors", mesh.colors.len())] {
@@ -15,9 +15,7 @@ pub fn write(mesh: &Mesh, path: &Path) -> Result<()> {
             return Err(Error::Argument(format!("the mesh has {length} {name} where {count} are needed")));
         }
     }
-    let file = std::fs::File::create(path).map_err(|e| Error::file(path, "create", e))?;
-    let mut out = std::io::BufWriter::new(file);
-    write_to(mesh, &mut out).and_then(|()| out.flush()).map_err(|e| Error::file(path, "write", e))
+    disk::write_with(path, |out| write_to(mesh, out))
 }
 
 fn write_to(mesh: &Mesh, out: &mut impl Write) -> std::io::Result<()> {

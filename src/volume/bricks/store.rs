@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     Error, Result,
-    io::{LimitKind, Limits, Source},
+    io::{LimitKind, Limits, Mapping, Source, intact},
     math::Bounds,
     volume::{Lattice, Samples, Scalar, Volume, steps::Steps},
 };
@@ -58,7 +58,7 @@ enum Origin {
 }
 
 enum Bytes {
-    Mapped(Option<memmap2::Mmap>),
+    Mapped(Mapping),
     Held(Vec<u8>),
 }
 
@@ -108,7 +108,7 @@ impl Bricks {
     /// [`Error::Input`] for other files, other versions, damaged headers and directories, and files that are cut off or have
     /// something behind their end; [`Error::Limit`] and [`Error::File`] as for every input.
     pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
-        Self::new(path, Bytes::Mapped(Source::open(path, limits)?.into_map()), limits)
+        Self::new(path, Bytes::Mapped(Source::map(path, limits)?), limits)
     }
 
     /// Takes the bytes of a file; `name` is what errors call it.
@@ -120,19 +120,8 @@ impl Bricks {
     }
 
     fn new(path: &Path, bytes: Bytes, limits: &Limits) -> Result<Self> {
-        let all = bytes.all();
-        let stored = Stored::decode(all).map_err(|refusal| refused(path, refusal))?;
-        let present = all.len() as u64;
-        let end = stored.file_bytes;
-        if present < end {
-            return Err(incomplete(path, format!("byte {present} of {end}")));
-        }
-        if present > end {
-            return Err(damaged(path, format!("byte {end}"), format!("{} bytes stand behind the end", present - end)));
-        }
-        let directory = Directory::decode(all, &stored).map_err(|message| damaged(path, "directory", message))?;
-        let memory = present + directory.memory();
-        limits.check(LimitKind::Bytes, path, "the size of the file and its directory in bytes", memory)?;
+        let begun = begin(path, bytes.all(), limits).map_err(|error| bytes.why(path, error));
+        let (stored, directory) = begun?;
         let header = stored.header;
         let levels = level::levels(header.lattice.dims);
         let ranges = directory.levels.iter().map(|level| level.iter().map(|entry| entry.range).collect()).collect();
@@ -211,9 +200,11 @@ impl Bricks {
             Origin::File { bytes, directory } => {
                 let entry = &directory.levels[level][brick as usize];
                 let offset = directory.offsets[level][brick as usize] as usize;
-                let stored = &bytes.all()[offset..offset + entry.bytes as usize];
-                decode(entry, stored, self.header.scalar).map_err(|message| {
-                    damaged(&self.path, format!("level {level}, brick {brick} (byte {offset})"), message)
+                // A copy: what is decoded is what has the checksum, whoever writes to the file.
+                let stored = bytes.all()[offset..offset + entry.bytes as usize].to_vec();
+                decode(entry, &stored, self.header.scalar).map_err(|message| {
+                    let place = format!("level {level}, brick {brick} (byte {offset})");
+                    bytes.why(&self.path, damaged(&self.path, place, message))
                 })
             }
         }
@@ -282,10 +273,35 @@ impl Slices<'_> {
     }
 }
 
+/// What stands at the beginning of a file, checked.
+fn begin(path: &Path, all: &[u8], limits: &Limits) -> Result<(Stored, Directory)> {
+    let stored = Stored::decode(all).map_err(|refusal| refused(path, refusal))?;
+    let present = all.len() as u64;
+    let end = stored.file_bytes;
+    if present < end {
+        return Err(incomplete(path, format!("byte {present} of {end}")));
+    }
+    if present > end {
+        return Err(damaged(path, format!("byte {end}"), format!("{} bytes stand behind the end", present - end)));
+    }
+    let directory = Directory::decode(all, &stored).map_err(|message| damaged(path, "directory", message))?;
+    let memory = present + directory.memory();
+    limits.check(LimitKind::Bytes, path, "the size of the file and its directory in bytes", memory)?;
+    Ok((stored, directory))
+}
+
 impl Bytes {
+    /// Why there is an error: checksums and the like find what changed, but not that it did.
+    fn why(&self, path: &Path, error: Error) -> Error {
+        match self {
+            Self::Mapped(map) => intact(map, path).err().unwrap_or(error),
+            Self::Held(_) => error,
+        }
+    }
+
     fn all(&self) -> &[u8] {
         match self {
-            Self::Mapped(map) => map.as_deref().unwrap_or(&[]),
+            Self::Mapped(map) => map,
             Self::Held(bytes) => bytes,
         }
     }

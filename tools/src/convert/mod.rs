@@ -48,6 +48,7 @@ impl Convert {
         }
         if !self.dry_run {
             output::check(&self.output, self.overwrite)?;
+            output::try_writing(&self.output, &self.files)?;
         }
         match extension.as_str() {
             "nrrd" => self.volume(progress),

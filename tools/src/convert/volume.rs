@@ -36,7 +36,7 @@ impl Convert {
         progress.stage("Resampling");
         let volume = on_lattice(volume, self.lattice)?;
         progress.stage(format!("Writing {}", self.output.display()));
-        output::write_by(&self.output, |part| io::nrrd::write(&volume, part))?;
+        io::nrrd::write(&volume, &self.output)?;
         progress.clear();
         let (lattice, dims) = (name_of(&volume), volume.lattice.dims);
         if self.json {

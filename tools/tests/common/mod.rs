@@ -54,6 +54,10 @@ impl Drop for Folder {
 pub struct Run(String, Output);
 
 impl Run {
+    pub fn code(&self) -> Option<i32> {
+        self.1.status.code()
+    }
+
     pub fn stderr(&self) -> String {
         // Messages are wrapped where the terminal ends; their words are what matters.
         let text = String::from_utf8_lossy(&self.1.stderr).replace(['│', '╰', '├', '─', '▶'], " ");
@@ -155,6 +159,30 @@ pub fn glb() -> Vec<u8> {
     file.extend([word(json.len()).as_slice(), b"JSON", &json].concat());
     file.extend([word(binary.len()).as_slice(), b"BIN\0", &binary].concat());
     file
+}
+
+/// A wavy sheet of binary triangles.
+pub fn sheet(side: u32) -> Vec<u8> {
+    let mut out = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        side * side,
+        (side - 1) * (side - 1) * 2
+    )
+    .into_bytes();
+    for i in 0..side * side {
+        let (x, y) = ((i % side) as f32, (i / side) as f32);
+        for value in [x, y, (0.1 * x).sin() * (0.07 * y).cos() * 5.0] {
+            out.extend(value.to_le_bytes());
+        }
+    }
+    for i in (0..side * (side - 1)).filter(|i| i % side + 1 < side) {
+        for triangle in [[i, i + 1, i + side], [i + 1, i + side + 1, i + side]] {
+            out.push(3);
+            triangle.iter().for_each(|index| out.extend(index.to_le_bytes()));
+        }
+    }
+    out
 }
 
 /// Whether a file is a whole PNG of this size, by its header and its end.

@@ -50,7 +50,7 @@ pub fn memory_of(dims: [usize; 3], scalar: Scalar) -> u64 {
 /// many slices are done, of how many.
 ///
 /// # Errors
-/// [`Error::Argument`] for a lattice that is not Cartesian; [`Error::File`] where nothing can be written.
+/// [`Error::Argument`] for a lattice that is not Cartesian; [`Error::Output`] where nothing can be written.
 pub fn write(volume: &Volume, path: &Path, options: &WriteOptions, watch: Watch) -> Result<()> {
     level::refusal(&volume.lattice).map_err(Error::Argument)?;
     let spill = || Spill::beside(path);
@@ -72,7 +72,7 @@ pub fn convert(
     let WriteOptions { unit, source } = options.clone();
     level::refusal(stream.lattice()).map_err(Error::Argument)?;
     let header = Header { lattice: stream.lattice().clone(), scalar: stream.scalar(), range, unit, source };
-    let slices = |z| Ok(Cow::Owned(stream.slices(z).bytes().to_vec()));
+    let slices = |z| Ok(Cow::Owned(stream.slices(z)?.bytes().to_vec()));
     all(&header, path, || Spill::beside(path), || Target::at(path), slices, watch).map(|_| ())
 }
 
@@ -99,7 +99,7 @@ pub fn with_changes(bricks: &Bricks, change: impl Fn(usize, u32, &mut Brick)) ->
             kept.push(number, entry, &bytes).unwrap();
         }
     }
-    kept.finish(header, Target::Memory(Vec::new())).unwrap().end().unwrap()
+    kept.finish(header, Target::Memory(Vec::new())).unwrap().end(Path::new("memory")).unwrap()
 }
 
 fn header(volume: &Volume, options: &WriteOptions) -> Header {
@@ -124,14 +124,14 @@ fn all<'a>(
     let dims = header.lattice.dims;
     let mut coder = Coder::new(header, spill()?);
     let mut pyramid = Pyramid::new(header.scalar, dims);
-    let fail = |e| Error::file(path, "write", e);
+    let fail = |e| Error::output(path, e);
     for first in (0..dims[2]).step_by(PIECE) {
         let z = first..(first + PIECE).min(dims[2]);
         watch(first as u64, dims[2] as u64);
         let piece = slices(z)?;
         pyramid.push(&piece, |level, layer, slices| coder.layer(level, layer, slices).map_err(fail))?;
     }
-    coder.kept.finish(header, target()?).map_err(fail)?.end()
+    coder.kept.finish(header, target()?).map_err(fail)?.end(path)
 }
 
 /// Cuts and packs bricks.

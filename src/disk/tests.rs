@@ -1,0 +1,210 @@
+//! Every writer, stopped at each of its steps.
+
+use super::{
+    AtomicFile,
+    faults::{self, Fault},
+    step::Step,
+    write,
+};
+use crate::{
+    Error, Result,
+    hierarchy::{
+        self,
+        external::{self, ExternalOptions},
+        file,
+        testing::{surface, tree},
+    },
+    io::{Endian, Limits, RawLayout, SampleType, VolumeStream, nrrd, ply, testing::Folder},
+    picture::Picture,
+    surface::{Mesh, SurfelOptions},
+    volume::{Lattice, Volume, bricks, phantoms::Phantom},
+};
+use glam::DVec3;
+use std::{io::Write, path::Path};
+
+const OLD: &[u8] = b"what was there before";
+
+/// Names in a folder but those of the inputs, which begin with “in.”
+fn names(folder: &Folder) -> Vec<String> {
+    let entries = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
+    let mut names: Vec<_> = entries.map(|name| name.into_string().unwrap()).collect();
+    names.retain(|name| !name.starts_with("in."));
+    names.sort();
+    names
+}
+
+/// Stops a writer at each of its steps, in both ways, with a file there before and without in turn; gives how often.
+fn stop_everywhere(name: &str, writer: impl Fn(&Path) -> Result<()>) -> usize {
+    let folder = Folder::new();
+    let path = folder.path().join(name);
+    let (done, steps) = faults::with(None, || writer(&path));
+    done.unwrap();
+    let new = std::fs::read(&path).unwrap();
+    // What a power cut may leave: the content gets to the disk before the name does, and the name at last.
+    let at = |step| steps.iter().position(|&s| s == step).unwrap();
+    let last_write = steps.iter().rposition(|&step| step == Step::Write).unwrap();
+    assert!(last_write < at(Step::Sync) && at(Step::Sync) < at(Step::Rename), "{name}: {steps:?}");
+    assert!(at(Step::Rename) < at(Step::SyncFolder), "{name}: {steps:?}");
+    for (at, &step) in steps.iter().enumerate() {
+        for fault in [Fault::Full, Fault::Killed] {
+            let old = ((at % 2 == 0) == (fault == Fault::Full)).then_some(OLD);
+            match old {
+                None => std::fs::remove_file(&path).unwrap_or_default(),
+                Some(old) => std::fs::write(&path, old).unwrap(),
+            }
+            let told = format!("{name}: {fault:?}, {step:?}, step {at} of {}", steps.len());
+            let (done, _) = faults::with(Some((at, fault)), || writer(&path));
+            let found = std::fs::read(&path).ok();
+            if fault == Fault::Full {
+                match done {
+                    // Nothing is lost where the folder could not be synced.
+                    Ok(()) => assert!(step == Step::SyncFolder && found.as_ref() == Some(&new), "{told}"),
+                    Err(error) => {
+                        assert_eq!(found.as_deref(), old, "{told}");
+                        assert!(error.to_string().contains(name), "{told}: {error}");
+                        assert!(matches!(error, Error::Output { .. }) || step == Step::Read, "{told}: {error}");
+                    }
+                }
+                assert!(names(&folder).iter().all(|n| n == name), "{told}: {:?}", names(&folder));
+                continue;
+            }
+            assert!(found.as_deref() == old || found.as_ref() == Some(&new), "{told}");
+            for left in names(&folder).iter().filter(|left| *left != name) {
+                assert!(left.starts_with(&format!(".{name}.")) && left.ends_with(".splatkit-part"), "{told}: {left}");
+                let bytes = std::fs::read(folder.path().join(left)).unwrap();
+                assert!(bytes == new || !is_read(name, bytes), "{told}");
+            }
+            writer(&path).unwrap();
+            assert!(std::fs::read(&path).unwrap() == new, "{told}");
+            assert_eq!(names(&folder), [name], "{told}");
+        }
+    }
+    println!("{name}: stopped {} times", 2 * steps.len());
+    2 * steps.len()
+}
+
+/// Whether bytes are taken for a hierarchy or a volume in bricks.
+fn is_read(name: &str, bytes: Vec<u8>) -> bool {
+    let name = Path::new(name);
+    match name.extension().and_then(|extension| extension.to_str()) {
+        Some("splk") => hierarchy::Hierarchy::from_bytes(bytes, name, &Limits::default()).is_ok(),
+        Some("splv") => bricks::Bricks::from_bytes(bytes, name).is_ok(),
+        _ => false,
+    }
+}
+
+fn volume() -> Volume {
+    Phantom::named("ball").unwrap().sample([40, 3, 20]).unwrap()
+}
+
+#[test]
+fn hierarchies_are_whole_or_not_there() {
+    let tree = tree(&surface(500, 1));
+    let stops = stop_everywhere("a.splk", |path| file::write(&tree, path, &file::WriteOptions::default()));
+    assert!(stops >= 12, "{stops}");
+}
+
+#[test]
+fn hierarchies_made_in_regions_are_whole_or_not_there() {
+    let inputs = Folder::new();
+    let input = inputs.path().join("in.ply");
+    // Triangles as coarse as these would be cut in a great many.
+    ply::write(&Mesh { triangles: Vec::new(), normals: Vec::new(), ..Mesh::sphere(4) }, &input).unwrap();
+    let options = ExternalOptions {
+        memory: 1,
+        preset: hierarchy::Preset::Fastest,
+        block_splats: 1 << 9,
+        surfels: SurfelOptions::default(),
+    };
+    let stops = stop_everywhere("b.splk", |path| {
+        let write = file::WriteOptions::default();
+        let files = [input.clone()];
+        external::convert(&files, &Limits::default(), path, &options, &write, &|_, _, _| ()).map(|_| ())
+    });
+    assert!(stops >= 12, "{stops}");
+}
+
+#[test]
+fn volumes_in_bricks_are_whole_or_not_there() {
+    let volume = volume();
+    let options = bricks::WriteOptions::default();
+    let stops = stop_everywhere("a.splv", |path| bricks::write(&volume, path, &options, &|_, _| ()));
+    assert!(stops >= 12, "{stops}");
+    let inputs = Folder::new();
+    let input = inputs.write("in.raw", volume.samples.bytes());
+    let sample_type = SampleType::from_name(volume.samples.type_name()).unwrap();
+    let (dims, spacing) = (volume.lattice.dims, DVec3::ONE);
+    let layout = RawLayout { dims, sample_type, spacing, endian: Endian::Little, header: 0 };
+    let stream = VolumeStream::open(&input, &Limits::default(), Some(&layout)).unwrap().unwrap();
+    let stops = stop_everywhere("b.splv", |path| bricks::convert(&stream, volume.range, path, &options, &|_, _| ()));
+    assert!(stops >= 12, "{stops}");
+}
+
+#[test]
+fn other_files_are_whole_or_not_there() {
+    let (mesh, volume) = (Mesh::sphere(2), volume());
+    let mut set = mesh.surfels(&SurfelOptions::default()).unwrap();
+    set.splats.truncate(300);
+    let color = (0..64 * 64).map(|i| [(i * 37 % 101) as f32 / 101.0, 0.3, 0.1, 1.0]).collect();
+    let picture = Picture { width: 64, height: 64, color, depth: Vec::new() };
+    let lattice = Lattice::with_spacing([30, 3, 9], DVec3::ONE);
+    let stops = [
+        stop_everywhere("a.ply", |path| ply::write(&mesh, path)),
+        stop_everywhere("gaussians.ply", |path| ply::write_gaussians(&set, path)),
+        stop_everywhere("a.nrrd", |path| nrrd::write(&volume, path)),
+        stop_everywhere("bytes.nrrd", |path| nrrd::write_bytes(&lattice, path, |k| vec![k as u8; 90])),
+        stop_everywhere("a.png", |path| picture.save(path, None)),
+        stop_everywhere("a.jpg", |path| picture.save(path, None)),
+        stop_everywhere("report.json", |path| write(path, br#"{"adapter": "none"}"#)),
+        stop_everywhere("report.md", |path| write(path, &b"| a |\n".repeat(1000))),
+    ];
+    assert!(stops.iter().all(|&stops| stops >= 12) && stops.iter().sum::<usize>() > 300, "{stops:?}");
+}
+
+#[test]
+fn several_write_one_file_and_the_last_one_stays() {
+    let folder = Folder::new();
+    let path = folder.path().join("a.txt");
+    let mut files: Vec<AtomicFile> = (0..3).map(|_| AtomicFile::create(&path).unwrap()).collect();
+    for (number, file) in files.iter_mut().enumerate() {
+        write!(file, "{number}").unwrap();
+    }
+    // None is taken for a leftover while it is being written.
+    assert_eq!(names(&folder).len(), 3);
+    drop(files.remove(0));
+    for (file, content) in files.into_iter().zip(["1", "2"]) {
+        file.commit().unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), content);
+    }
+    assert_eq!(names(&folder), ["a.txt"]);
+}
+
+#[test]
+fn what_is_there_is_left_as_it_is() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path().join("a.png")).unwrap();
+    for (name, message) in [("a.png", "that is no file"), ("none/a.png", "a.png: cannot be written")] {
+        let error = write(&folder.path().join(name), b"new").unwrap_err();
+        assert!(matches!(error, Error::Output { .. }) && error.to_string().contains(message), "{error}");
+    }
+    assert_eq!(names(&folder), ["a.png"]);
+    // What has the name of a leftover but is none, nor a file.
+    let path = folder.path().join("b.txt");
+    std::fs::create_dir(folder.path().join(".b.txt.0.splatkit-part")).unwrap();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let other = folder.write("other", OLD);
+        symlink(&other, folder.path().join(".b.txt.1.splatkit-part")).unwrap();
+        write(&path, b"new").unwrap();
+        assert_eq!(std::fs::read(other).unwrap(), OLD);
+        // Who may read it does not change.
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o600)).unwrap();
+        write(&path, b"newer").unwrap();
+        assert_eq!(path.metadata().unwrap().permissions().mode() & 0o777, 0o600);
+    }
+    // Names that leave no room for more.
+    let long = folder.path().join(format!("{}.txt", "ö".repeat(120)));
+    write(&long, b"new").unwrap();
+    assert_eq!(std::fs::read(&long).unwrap(), b"new");
+}

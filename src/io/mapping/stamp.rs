@@ -1,0 +1,55 @@
+//! By what a file is seen to have changed.
+
+use std::{
+    fs::File,
+    io,
+    time::{Duration, SystemTime},
+};
+
+/// The length of a file, and when it was written to last; not every file system knows.
+pub struct Stamp {
+    pub length: u64,
+    written: Option<SystemTime>,
+}
+
+impl Stamp {
+    pub fn of(file: &File) -> io::Result<Self> {
+        let found = file.metadata()?;
+        Ok(Self { length: found.len(), written: found.modified().ok() })
+    }
+
+    /// In words, what is not as it was.
+    pub fn change(&self, now: &Self) -> Option<String> {
+        if now.length != self.length {
+            return Some(format!("it has {} bytes where it had {}", now.length, self.length));
+        }
+        let [before, after] = [self.written?, now.written?];
+        (!is_same(before, after)).then(|| "it was written to".into())
+    }
+}
+
+/// Whether two times may be one. File systems keep them to a second or to parts of it, and some give a time as it came until
+/// they read it again: then one of the two is the other, rounded.
+fn is_same(a: SystemTime, b: SystemTime) -> bool {
+    const STEPS: [u128; 5] = [1_000_000_000, 1_000_000, 1_000, 100, 1];
+    let [a, b] = [a, b].map(|time| time.duration_since(SystemTime::UNIX_EPOCH).unwrap_or(Duration::ZERO).as_nanos());
+    let step = STEPS.into_iter().find(|step| a % step == 0 || b % step == 0).unwrap_or(1);
+    a.abs_diff(b) < step
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_is_no_change() {
+        let at = |nanoseconds| SystemTime::UNIX_EPOCH + Duration::from_nanos(nanoseconds);
+        let exact = 1_700_000_000_123_456_789;
+        for step in [1_000_000_000, 1_000_000, 1_000, 100] {
+            let rounded = exact / step * step;
+            assert!(is_same(at(exact), at(rounded)) && is_same(at(rounded + step), at(exact)), "{step}");
+            assert!(!is_same(at(exact), at(rounded - step)), "{step}");
+        }
+        assert!(is_same(at(exact), at(exact)) && !is_same(at(exact), at(exact + 1)));
+    }
+}

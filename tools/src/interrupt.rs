@@ -1,0 +1,21 @@
+//! Ctrl-C, and the signals by which a system asks a process to end.
+
+use splatkit::disk;
+use std::io::Write;
+
+/// What shells give for a command that was ended by Ctrl-C.
+const INTERRUPTED: i32 = 130;
+
+/// From now on these leave no file that is not whole: the handler, which runs on a thread of its own, removes what is on its
+/// way and ends the process, whatever that is at.
+pub fn answer() {
+    let set = ctrlc::set_handler(|| {
+        let _abandoned = disk::abandon();
+        // Who reads stderr may be gone already.
+        writeln!(std::io::stderr(), "interrupted: what was not finished is removed").ok();
+        std::process::exit(INTERRUPTED)
+    });
+    if let Err(error) = set {
+        tracing::warn!("Ctrl-C may leave files that are not whole: {error}");
+    }
+}

@@ -1,0 +1,238 @@
+//! The command that is killed, interrupted, or finds no room, at any time: the file that it was to write is the old one, the
+//! new one or none, and what is left besides is known for what it is.
+
+#![cfg(unix)]
+
+mod common;
+
+use common::*;
+use std::{
+    path::Path,
+    process::{Child, Command, ExitStatus, Stdio},
+    time::{Duration, Instant},
+};
+
+/// What is converted, to what: as a whole, in regions, slice by slice, and to Gaussians.
+const CONVERSIONS: [[&str; 2]; 5] = [
+    ["a.ply", "a.splk"],
+    ["a.ply", "b.splk --memory 8MiB"],
+    ["a.nrrd", "a.splv"],
+    ["a.ply", "c.ply"],
+    ["a.nrrd", "d.nrrd"],
+];
+
+fn folder(name: &str) -> Folder {
+    let folder = Folder::new(name);
+    folder.put("a.ply", sheet(90));
+    let samples: Vec<u8> = (0..64usize * 64 * 64).map(|i| (i * i / 77) as u8).collect();
+    let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 64 64 64\nencoding: raw\n\n";
+    folder.put("a.nrrd", [header.as_bytes(), &samples].concat());
+    folder
+}
+
+/// What is in a folder besides the inputs and one output.
+fn left(folder: &Folder, output: &str) -> Vec<String> {
+    let entries = std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name());
+    let names = entries.map(|name| name.into_string().unwrap());
+    names.filter(|name| !["a.ply", "a.nrrd", output].contains(&&**name)).collect()
+}
+
+fn start(folder: &Folder, arguments: &str) -> Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_splatkit"));
+    command.args(arguments.split_whitespace()).current_dir(&folder.0);
+    command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+}
+
+fn signal(child: &Child, name: &str) {
+    Command::new("kill").args([&format!("-{name}"), &child.id().to_string()]).status().unwrap();
+}
+
+const OLD: &[u8] = b"what was there before";
+
+/// Stops conversions at so many moments of each, spread over the time that they take; `check` is told how each ended, what
+/// is left besides, and where.
+fn stop(
+    name: &str,
+    moments: u32,
+    stop: impl Fn(u32, &mut Child),
+    check: impl Fn(ExitStatus, &[String], &Folder, &str),
+) -> [u32; 2] {
+    let folder = folder(name);
+    let (mut stopped, mut finished) = (0, 0);
+    for [input, output] in CONVERSIONS {
+        let arguments = format!("convert {input} --overwrite -o {output}");
+        let file = output.split(' ').next().unwrap();
+        let begin = Instant::now();
+        folder.run(&arguments).ok();
+        let whole = begin.elapsed();
+        let new = std::fs::read(folder.path(file)).unwrap();
+        for moment in 0..moments {
+            let has_old = moment % 2 == 0;
+            std::fs::remove_file(folder.path(file)).unwrap();
+            if has_old {
+                folder.put(file, OLD);
+            }
+            let mut child = start(&folder, &arguments);
+            std::thread::sleep(whole * moment / moments);
+            stop(moment, &mut child);
+            let status = child.wait().unwrap();
+            let found = std::fs::read(folder.path(file)).ok();
+            let is_old = found.as_deref() == has_old.then_some(OLD);
+            assert!(is_old || found.as_ref() == Some(&new), "{output}, moment {moment}: neither old nor new");
+            finished += u32::from(!is_old);
+            stopped += u32::from(is_old);
+            check(status, &left(&folder, file), &folder, file);
+            if !folder.path(file).exists() {
+                folder.put(file, OLD);
+            }
+        }
+        folder.run(&arguments).ok();
+        assert!(std::fs::read(folder.path(file)).unwrap() == new, "{output}: not the same after all this");
+        assert_eq!(left(&folder, file), [""; 0], "{output}: nothing is left over after one that was not stopped");
+        std::fs::remove_file(folder.path(file)).unwrap();
+    }
+    println!("{name}: {stopped} stopped, {finished} finished before");
+    [stopped, finished]
+}
+
+#[test]
+fn who_is_killed_leaves_the_old_file_or_the_new_one() {
+    let kill = |_, child: &mut Child| child.kill().unwrap();
+    let [stopped, _] = stop("killed", 12, kill, |_, left, folder, file| {
+        for name in left {
+            assert!(name.starts_with(&format!(".{file}.")) && name.ends_with(".splatkit-part"), "{name}");
+            // It is not read for what it is not: a file with all its checksums, or none.
+            if file.ends_with(".splk") || file.ends_with(".splv") {
+                std::fs::copy(folder.path(name), folder.path(&format!("copy.{file}"))).unwrap();
+                let code = folder.run(&format!("check copy.{file}")).code();
+                std::fs::remove_file(folder.path(&format!("copy.{file}"))).unwrap();
+                assert!([Some(0), Some(3)].contains(&code), "{name}: {code:?}");
+            }
+        }
+    });
+    assert!(stopped > 20, "{stopped}");
+}
+
+#[test]
+fn who_is_interrupted_leaves_nothing() {
+    let interrupt = |moment: u32, child: &mut Child| signal(child, ["INT", "TERM", "INT", "HUP"][moment as usize % 4]);
+    let [stopped, _] = stop("interrupted", 12, interrupt, |status, left, _, file| {
+        // At the first moments the handler may not be there yet, nor may any file.
+        let by_signal = std::os::unix::process::ExitStatusExt::signal(&status).is_some();
+        assert!(matches!(status.code(), Some(0 | 130)) || by_signal, "{file}: {status}");
+        assert_eq!(left, [""; 0], "{file}: {status}");
+    });
+    assert!(stopped > 20, "{stopped}");
+}
+
+#[test]
+fn who_is_interrupted_while_drawing_ends_at_once() {
+    let folder = folder("drawing");
+    let arguments = "render a.nrrd -o a.png --overwrite --size 640x480";
+    let begin = Instant::now();
+    folder.run(arguments).ok();
+    let whole = begin.elapsed();
+    for moment in 0..8 {
+        std::fs::remove_file(folder.path("a.png")).ok();
+        let mut child = start(&folder, arguments);
+        std::thread::sleep(whole * moment / 8 + Duration::from_millis(30));
+        signal(&child, "INT");
+        let status = child.wait().unwrap();
+        let picture = std::fs::read(folder.path("a.png")).ok();
+        assert!(matches!(status.code(), Some(0 | 130)), "moment {moment}: {status}");
+        assert!(picture.is_none_or(|bytes| is_png(&bytes, 640, 480)), "moment {moment}");
+        assert_eq!(left(&folder, "a.png"), [""; 0]);
+    }
+}
+
+/// Runs a conversion that may write files of so many blocks of 512 bytes at most; more is an error, as on a full disk.
+fn with_room_for(folder: &Folder, blocks: u64, arguments: &str) -> (Option<i32>, String) {
+    let command = env!("CARGO_BIN_EXE_splatkit");
+    let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec '{command}' {arguments}");
+    let output = Command::new("sh").args(["-c", &script]).current_dir(&folder.0).output().unwrap();
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn who_finds_no_room_says_so() {
+    let folder = folder("full");
+    for [input, output] in CONVERSIONS {
+        let arguments = format!("convert {input} --overwrite -o {output}");
+        let file = output.split(' ').next().unwrap();
+        folder.run(&arguments).ok();
+        let blocks = folder.path(file).metadata().unwrap().len() / 512;
+        folder.put(file, OLD);
+        for room in [0, 1, blocks / 2, blocks - 1] {
+            let (code, told) = with_room_for(&folder, room, &arguments);
+            assert!(code == Some(1) && told.contains(file) && told.contains("make room"), "{output}: {code:?} {told}");
+            assert_eq!(std::fs::read(folder.path(file)).unwrap(), OLD, "{output}");
+            assert_eq!(left(&folder, file), [""; 0], "{output}");
+        }
+        std::fs::remove_file(folder.path(file)).unwrap();
+    }
+}
+
+#[test]
+fn where_nothing_can_be_written_it_is_told() {
+    let folder = folder("nowhere");
+    std::fs::create_dir(folder.path("folder.splk")).unwrap();
+    let own = format!("a.nrrd -o ../{}/a.nrrd --overwrite", folder.0.file_name().unwrap().display());
+    for (arguments, told) in [
+        ("a.ply -o none/a.splk", ["none/a.splk", "make the folder first"]),
+        ("a.ply -o folder.splk --overwrite", ["folder.splk", "is a folder"]),
+        ("a.ply -o a.ply --overwrite", ["a.ply: is an input too", "give another name"]),
+        (&own, ["is an input too", "give another name"]),
+    ] {
+        folder.run(&format!("convert {arguments}")).fails(1, &told);
+    }
+    // A folder that nobody may write to, not even the one who may do all else.
+    if cfg!(target_os = "linux") && Path::new("/sys/kernel").is_dir() {
+        for output in ["/sys/kernel/a.splk", "/sys/kernel/a.splv"] {
+            let input = if output.ends_with('k') { "a.ply" } else { "a.nrrd" };
+            folder.run(&format!("convert {input} -o {output}")).fails(1, &[output, "write to another folder"]);
+        }
+        folder.run("render a.nrrd -o /sys/kernel/a.png").fails(1, &["/sys/kernel/a.png", "write to another folder"]);
+        folder.run("generate ball -o /sys/kernel/a.nrrd").fails(1, &["/sys/kernel/a.nrrd", "another folder"]);
+    }
+    assert_eq!(left(&folder, "folder.splk"), [""; 0]);
+}
+
+#[test]
+fn inputs_that_are_cut_meanwhile_are_told() {
+    let folder = Folder::new("cut_meanwhile");
+    let mesh = sheet(300);
+    let samples = vec![7; 128 * 128 * 128];
+    let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 128 128 128\nencoding: raw\n\n";
+    let volume = [header.as_bytes(), &samples].concat();
+    let (mut told, mut codes) = (0, Vec::new());
+    for (name, bytes, output) in
+        [("in.ply", &mesh, "a.splk --memory 8MiB"), ("in.nrrd", &volume, "a.splv"), ("in.ply", &mesh, "b.splk")]
+    {
+        let arguments = format!("convert {name} --overwrite -o {output}");
+        folder.put(name, bytes);
+        let begin = Instant::now();
+        folder.run(&arguments).ok();
+        let whole = begin.elapsed();
+        for moment in 0..10 {
+            folder.put(name, bytes);
+            let mut command = Command::new(env!("CARGO_BIN_EXE_splatkit"));
+            command.args(arguments.split(' ')).current_dir(&folder.0).stdout(Stdio::null()).stderr(Stdio::piped());
+            let child = command.spawn().unwrap();
+            std::thread::sleep(whole * moment / 10 + Duration::from_millis(3));
+            let file = std::fs::File::options().write(true).open(folder.path(name)).unwrap();
+            file.set_len(bytes.len() as u64 * u64::from(moment) / 12).unwrap();
+            let output = child.wait_with_output().unwrap();
+            let text = String::from_utf8_lossy(&output.stderr).into_owned();
+            // Cut before it was opened, while it was read, or after.
+            assert!(
+                matches!(output.status.code(), Some(0 | 3)),
+                "{arguments}, moment {moment}: {} {text}",
+                output.status
+            );
+            told += u32::from(text.contains("changed while it was"));
+            codes.push(output.status.code());
+        }
+    }
+    println!("cut: {told} told of {}", codes.len());
+    assert!(told > 3, "{codes:?}");
+}
