@@ -11,7 +11,7 @@ use super::{
 use crate::{
     Error, Result,
     hierarchy::Cut,
-    math::{Kernel, View},
+    math::{Bounds, Kernel, View},
     scene::{Item, Scene},
     splat::{Splat, SplatSet},
     volume::{
@@ -99,14 +99,23 @@ pub struct PreparedScene {
     pub(super) runs: u32,
     /// Bytes of GPU memory that the scene holds.
     pub(super) bytes: u64,
+    /// The box around everything, which does not change.
+    pub(super) bounds: Bounds,
 }
 
 impl PreparedScene {
     /// Uploads a scene. The scene's splats and samples are shared with the caller's, not copied.
     pub(super) fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
         scene.validate()?;
-        let mut prepared =
-            Self { scene: scene.clone(), chunks: Vec::new(), forests: Vec::new(), shelf: None, runs: 0, bytes: 0 };
+        let mut prepared = Self {
+            scene: scene.clone(),
+            chunks: Vec::new(),
+            forests: Vec::new(),
+            shelf: None,
+            runs: 0,
+            bytes: 0,
+            bounds: scene.bounds(),
+        };
         for item in &scene.items {
             match item {
                 Item::Radiance(set) => prepared.add_splats(gpu, set, true),
