@@ -194,7 +194,7 @@ fn taken(depth: f32) -> f32 {
 }
 
 // Optical depths from here on are divided by: far below what can be seen, far above the least number.
-const LEAST_DEPTH: f32 = 1e-20;
+const LEAST_DIVISOR: f32 = 1e-20;
 
 fn pass_part(depth: f32, color: vec3<f32>, medium: ptr<function, Medium>) {
     let share = (*medium).through * taken(depth);
@@ -284,7 +284,7 @@ fn composite(r: u32, sheet: u32, own: Sheet) {
     if XRAY {
         premultiplied = vec3(depth);
     }
-    if depth > LEAST_DEPTH {
+    if depth > LEAST_DIVISOR {
         let share = before * taken(depth);
         let left = before - share;
         pixels[r].color += share / depth * premultiplied;
