@@ -58,7 +58,7 @@ fn ball() -> SplatSet {
             strength: 3.0,
             factor: [0.2, 0.0, 0.2, 0.0, 0.0, 0.2],
             color: u32::from_le_bytes([40 + 3 * i as u8, 200 - 2 * i as u8, 90, 255]),
-            normal: if i % 2 == 0 { encode_normal(normal) } else { NO_NORMAL },
+            normal: if i.is_multiple_of(2) { encode_normal(normal) } else { NO_NORMAL },
         }
     };
     let splats = (0..64).map(splat).collect();
