@@ -188,8 +188,16 @@ fn parabola(curve: vec3<f32>, u: f32) -> f32 {
     return curve.x * (1.0 - u) * (1.0 - 2.0 * u) + 4.0 * curve.y * u * (1.0 - u) + curve.z * u * (2.0 * u - 1.0);
 }
 
+// The share of light that an optical depth takes, 1 − e^−τ. Where τ is small, the difference to 1 is lost in rounding.
+fn taken(depth: f32) -> f32 {
+    return select(1.0 - exp(-depth), depth * (1.0 - 0.5 * depth), depth < 1e-3);
+}
+
+// Optical depths from here on are divided by: far below what can be seen, far above the least number.
+const LEAST_DIVISOR: f32 = 1e-20;
+
 fn pass_part(depth: f32, color: vec3<f32>, medium: ptr<function, Medium>) {
-    let share = (*medium).through * (1.0 - exp(-depth));
+    let share = (*medium).through * taken(depth);
     (*medium).color += share * color;
     (*medium).through -= share;
     (*medium).depth += depth;
@@ -276,9 +284,10 @@ fn composite(r: u32, sheet: u32, own: Sheet) {
     if XRAY {
         premultiplied = vec3(depth);
     }
-    if depth > 0.0 {
-        let left = before * exp(-depth);
-        pixels[r].color += (before - left) / depth * premultiplied;
+    if depth > LEAST_DIVISOR {
+        let share = before * taken(depth);
+        let left = before - share;
+        pixels[r].color += share / depth * premultiplied;
         // Inside the sheet, optical depth counts as evenly spread; an isosurface is where it is.
         if !has_hit && before > 0.5 && left <= 0.5 {
             pixels[r].hit = mix(planes[sheet], planes[sheet + 1u], log(2.0 * before) / depth);

@@ -122,7 +122,9 @@ impl Scene {
             }
         }
         let before = settings.classifies_samples();
-        for item in &self.items {
+        for (number, item) in self.items.iter().enumerate() {
+            // It may have been changed since the scene was looked at as a whole.
+            numbers::check_transfer(&numbers::place_of(number), item)?;
             match item {
                 Item::Radiance(_) | Item::Hierarchy(_) if settings.optics == Optics::Maximum => {
                     return wrong(
@@ -204,7 +206,7 @@ impl Scene {
             }
         }
         for (number, item) in self.items.iter().enumerate() {
-            numbers::check_item(&format!("item {number} of the scene"), item)?;
+            numbers::check_item(&numbers::place_of(number), item)?;
         }
         if fields > 1 {
             return Err(Error::Argument(format!("a picture takes one volume or sample set, the scene has {fields}")));

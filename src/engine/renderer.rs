@@ -239,6 +239,7 @@ impl Renderer {
         profile: bool,
     ) -> Result<(Targets, FrameStats)> {
         prepared.scene.validate_settings(settings)?;
+        view.validate_for(&prepared.bounds)?;
         let _span = tracing::debug_span!("frame", width = view.size[0], height = view.size[1]).entered();
         let cut_pixels = self.cut_hierarchies(prepared, view, settings, detail)?;
         let gpu = &self.gpu;

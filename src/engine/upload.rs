@@ -11,7 +11,7 @@ use super::{
 use crate::{
     Error, Result,
     hierarchy::Cut,
-    math::{Kernel, View},
+    math::{Bounds, Kernel, View},
     scene::{Item, Scene},
     splat::{Splat, SplatSet},
     volume::{
@@ -100,6 +100,8 @@ pub struct PreparedScene {
     pub(super) bytes: u64,
     /// What lies on the GPU cannot be trusted: something went wrong there.
     pub(super) broken: bool,
+    /// The box around everything, which does not change.
+    pub(super) bounds: Bounds,
 }
 
 impl PreparedScene {
@@ -114,6 +116,7 @@ impl PreparedScene {
             runs: 0,
             bytes: 0,
             broken: false,
+            bounds: scene.bounds(),
         };
         for item in &scene.items {
             match item {

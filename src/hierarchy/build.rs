@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     Error, Result,
-    splat::{Payload, SplatSet},
+    splat::{Payload, Splat, SplatSet},
 };
 use rayon::prelude::*;
 use std::{
@@ -173,6 +173,9 @@ pub(crate) fn join(roots: &[Node], preset: Preset, outer: Sphere) -> (Block, Vec
     (block, portals)
 }
 
+/// Places and shapes up to this can be merged: masses have their fourth powers, and must fit in 32 bits.
+const FARTHEST: f32 = 1e9;
+
 pub(super) fn check(set: &SplatSet) -> Result<()> {
     if set.payload != Payload::Radiance {
         return Err(Error::Argument("a hierarchy is built of splats that carry colour, not of samples".into()));
@@ -183,11 +186,17 @@ pub(super) fn check(set: &SplatSet) -> Result<()> {
     if u32::try_from(set.splats.len()).is_err() {
         return Err(Error::Argument("a set holds more splats than 32 bits can name; build it in blocks".into()));
     }
-    let is_sound = |s: &crate::splat::Splat| {
-        s.center.iter().chain(&s.factor).all(|v| v.is_finite()) && s.strength.is_finite() && s.strength >= 0.0
+    if !set.origin.is_finite() {
+        return Err(Error::Argument(format!("the origin {} of the splats is not finite", set.origin)));
+    }
+    let is_sound = |s: &Splat| {
+        let fits = |v: &f32| v.abs() <= FARTHEST;
+        s.center.iter().chain(&s.factor).all(fits) && s.strength.is_finite() && s.strength >= 0.0
     };
-    if !set.splats.par_iter().all(is_sound) {
-        return Err(Error::Argument("a splat's place, shape or strength is not finite".into()));
+    if let Some(index) = set.splats.par_iter().position_first(|splat| !is_sound(splat)) {
+        let Splat { center, strength, factor, .. } = set.splats[index];
+        let message = format!("splat {index} at {center:?}, of factor {factor:?} and optical depth {strength}");
+        return Err(Error::Argument(format!("{message}: no finite numbers, or of more than {FARTHEST:e}")));
     }
     Ok(())
 }

@@ -210,7 +210,29 @@ pub struct View {
     pub size: [u32; 2],
 }
 
+/// How far from the camera things may be, how many pixels may show a length of 1, and its inverse how few: their squares fit
+/// in 32 bits.
+const FARTHEST: f64 = 1e18;
+
 impl View {
+    /// Checks that what lies in `bounds` has places in the picture that 32-bit numbers hold.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a camera that is too far away, and one whose pixels are too large or too small.
+    pub fn validate_for(&self, bounds: &Bounds) -> Result<()> {
+        let [_, far] = bounds.distances(self.position);
+        let wrong = |message: String| Err(Error::Argument(format!("the camera {message}")));
+        // NaN is no more.
+        if far.is_nan() || far > FARTHEST {
+            return wrong(format!("is {far:e} away from the far side of the scene; {FARTHEST:e} is the most"));
+        }
+        if !(1.0 / FARTHEST..=FARTHEST).contains(&self.scale) {
+            let least = 1.0 / FARTHEST;
+            return wrong(format!("shows a length of 1 by {:e} pixels; {least:e} to {FARTHEST:e} can be", self.scale));
+        }
+        Ok(())
+    }
+
     /// View-space position of a world point.
     pub fn to_view(&self, world: DVec3) -> DVec3 {
         self.rotation * (world - self.position)

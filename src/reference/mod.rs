@@ -144,6 +144,7 @@ pub fn render(scene: &Scene, camera: &Camera, settings: &Settings) -> Result<Pic
     scene.validate()?;
     scene.validate_settings(settings)?;
     let view = camera.view(settings.size)?;
+    view.validate_for(&scene.bounds())?;
     let scene = &without_bricks(scene)?;
     let flat = with_cuts(scene, &view, settings)?;
     let frame = Frame::new(scene, &flat, view, settings);

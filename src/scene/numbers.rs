@@ -11,19 +11,55 @@ use crate::{
 };
 use rayon::prelude::*;
 
+/// Splats above this are as opaque below it, and sums of them lose what lies beside them.
+const MOST_OPTICAL_DEPTH: f32 = 1e10;
+
+/// The most values that a transfer function tells apart over the range of its data, as many as the engine tabulates.
+const VALUES: f64 = 4096.0;
+
+/// What errors call an item.
+pub(super) fn place_of(number: usize) -> String {
+    format!("item {number} of the scene")
+}
+
+/// Checks the transfer function of an item that has one.
+pub(super) fn check_transfer(place: &str, item: &Item) -> Result<()> {
+    match item {
+        Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => {
+            let wrong = |message: String| Error::Argument(format!("{place}: the transfer function: {message}"));
+            transfer.validate_numbers().map_err(wrong)
+        }
+        Item::Radiance(_) | Item::Hierarchy(_) => Ok(()),
+    }
+}
+
 /// Checks the numbers of an item; `place` tells which item it is.
 pub(super) fn check_item(place: &str, item: &Item) -> Result<()> {
     let wrong = |message: String| Error::Argument(format!("{place}: {message}"));
-    if let Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) = item {
-        transfer.validate_numbers().map_err(|message| wrong(format!("the transfer function: {message}")))?;
-    }
+    check_transfer(place, item)?;
     if let Item::Volume(_, kernel, _) | Item::Bricks(_, kernel, _) = item {
         kernel.validate().map_err(|error| wrong(error.to_string()))?;
     }
+    let field = match item {
+        Item::Scalar(set, transfer) => Some((transfer, set.value_range())),
+        Item::Volume(volume, _, transfer) => Some((transfer, volume.range)),
+        Item::Bricks(bricks, _, transfer) => Some((transfer, bricks.header().range)),
+        Item::Radiance(_) | Item::Hierarchy(_) => None,
+    };
     match item {
         Item::Radiance(set) | Item::Scalar(set, _) => check_set(set).map_err(wrong)?,
         Item::Volume(volume, ..) => volume.validate().map_err(wrong)?,
         Item::Hierarchy(_) | Item::Bricks(..) => {}
+    }
+    if let Some((transfer, [low, high])) = field {
+        // One value far off, such as that of a broken sensor, would leave all others one colour.
+        let [first, last] = transfer.span();
+        if last > first && last - first < (high - low) / VALUES {
+            return Err(wrong(format!(
+                "the transfer function changes from {first} to {last}, too close together for values from {low} to {high}: \
+                 remove values that are far off, or choose another function"
+            )));
+        }
     }
     let Bounds { min, max } = item.bounds();
     let holds = |v: f64| v.abs() <= f64::from(f32::MAX);
@@ -60,8 +96,12 @@ fn fault(splat: &Splat, payload: Payload) -> Option<String> {
         return Some(format!("the factor {factor:?} is not finite"));
     }
     match payload {
-        Payload::Radiance if !(*strength >= 0.0 && strength.is_finite()) => {
-            Some(format!("the optical depth is {strength}, but finite and not negative it must be"))
+        Payload::Radiance if !(0.0..=MOST_OPTICAL_DEPTH).contains(strength) => {
+            Some(format!("the optical depth is {strength}, but those from 0 to {MOST_OPTICAL_DEPTH:e} can be drawn"))
+        }
+        // A field's kernel needs a volume; radiance is widened to a pixel.
+        Payload::Scalar if [factor[0], factor[2], factor[5]].contains(&0.0) => {
+            Some(format!("the factor {factor:?} is that of a flat kernel"))
         }
         Payload::Scalar if !strength.is_finite() => Some(format!("the value is {strength}")),
         Payload::Scalar => {

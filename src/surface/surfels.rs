@@ -17,7 +17,7 @@ use crate::{
     Error, Result,
     splat::{Payload, Splat, SplatSet},
 };
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -123,8 +123,12 @@ impl Mesh {
         if !self.materials.iter().filter_map(|material| material.texture.as_deref()).all(whole) {
             return Err(Error::Argument("a texture's size is not that of its texels".into()));
         }
-        if !self.positions.par_iter().all(|p| p.is_finite()) {
-            return Err(Error::Argument("a position of the mesh is not finite".into()));
+        // Squares of these fit in 32 bits.
+        let fits = |p: &Vec3| p.abs().max_element() <= 1e18 && p.is_finite();
+        if let Some(vertex) = self.positions.par_iter().position_first(|p| !fits(p)) {
+            let message =
+                format!("the position {} of vertex {vertex} is not finite, or beyond 1e18", self.positions[vertex]);
+            return Err(Error::Argument(message));
         }
         Ok(())
     }

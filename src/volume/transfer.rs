@@ -79,6 +79,9 @@ impl Default for Shade {
 /// The missing 1/10,000 is far below the 1/255 steps of a displayed picture.
 const OPAQUE: f64 = 0.9999;
 
+/// Extinctions that can be drawn: sums of them fit in 32 bits, and over the longest ways they can be seen.
+const EXTINCTIONS: std::ops::RangeInclusive<f64> = 1e-25..=1e30;
+
 /// A transfer file of a megabyte is no transfer file.
 const MOST_BYTES: usize = 1 << 20;
 
@@ -208,8 +211,11 @@ impl TransferFunction {
             return Err(format!("the unit is {}, but it is a length over 0", self.unit));
         }
         let extinction = self.most_extinction();
-        if extinction > f64::from(f32::MAX) {
-            return Err(format!("the unit of {} is so short that extinctions reach {extinction}", self.unit));
+        if extinction > 0.0 && !EXTINCTIONS.contains(&extinction) {
+            return Err(format!(
+                "the unit of {} leads to an extinction of {extinction}, beyond what can be drawn",
+                self.unit
+            ));
         }
         if let Some(Shade { ambient, diffuse, specular, power }) = self.shade
             && ![ambient, diffuse, specular, power].iter().all(|v| v.is_finite() && *v >= 0.0)
@@ -223,8 +229,7 @@ impl TransferFunction {
     /// lie at one value is only moved.
     #[must_use]
     pub fn spread_over(mut self, range: [f64; 2]) -> Self {
-        let values = self.color.iter().map(|p| p.0).chain(self.opacity.iter().map(|p| p.0));
-        let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
+        let [low, high] = self.span();
         let turn = |value: f64| {
             let share = if high > low { share(low, high, value) } else { 0.0 };
             mix(range[0], range[1], share)
@@ -247,6 +252,12 @@ impl TransferFunction {
         });
         let surfaces = self.isosurfaces.iter().map(|surface| [surface.value; 2]);
         seen.into_iter().chain(surfaces).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+    }
+
+    /// The smallest and the largest value of its points.
+    pub(crate) fn span(&self) -> [f64; 2] {
+        let values = self.color.iter().map(|p| p.0).chain(self.opacity.iter().map(|p| p.0));
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
     }
 
     /// Red, green, blue of a value, 0 … 1.

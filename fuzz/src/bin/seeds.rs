@@ -306,7 +306,11 @@ fn e57(seeds: &mut Seeds) -> Result<()> {
             (RecordName::SphericalElevation, DOUBLE),
             (RecordName::Intensity, RecordDataType::Single { min: None, max: None }),
         ],
-        vec![(RecordName::CartesianX, scaled.clone()), (RecordName::CartesianY, scaled.clone()), (RecordName::CartesianZ, scaled)],
+        vec![
+            (RecordName::CartesianX, scaled.clone()),
+            (RecordName::CartesianY, scaled.clone()),
+            (RecordName::CartesianZ, scaled),
+        ],
     ];
     for kind in kinds {
         let mut out = Cursor::new(Vec::new());
@@ -421,9 +425,15 @@ fn vtk(seeds: &mut Seeds) -> Result<()> {
     let image = "<VTKFile type=\"ImageData\" byte_order=\"LittleEndian\"><ImageData WholeExtent=\"0 2 0 1 0 0\" \
          Origin=\"0 0 0\" Spacing=\"1 1 2\"><Piece Extent=\"0 2 0 1 0 0\"><PointData Scalars=\"s\">";
     let end = "</PointData></Piece></ImageData></VTKFile>";
-    seeds.known("vti", format!("{image}<DataArray type=\"UInt8\" Name=\"s\" format=\"ascii\">0 1 2 3 4 5</DataArray>{end}"))?;
+    seeds.known(
+        "vti",
+        format!("{image}<DataArray type=\"UInt8\" Name=\"s\" format=\"ascii\">0 1 2 3 4 5</DataArray>{end}"),
+    )?;
     let inline = base64(&[&6u32.to_le_bytes()[..], &[0, 1, 2, 3, 4, 5]].concat());
-    seeds.known("vti", format!("{image}<DataArray type=\"UInt8\" Name=\"s\" format=\"binary\">{inline}</DataArray>{end}"))?;
+    seeds.known(
+        "vti",
+        format!("{image}<DataArray type=\"UInt8\" Name=\"s\" format=\"binary\">{inline}</DataArray>{end}"),
+    )?;
     let appended = format!(
         "{image}<DataArray type=\"UInt8\" Name=\"s\" format=\"appended\" offset=\"0\"/></PointData></Piece></ImageData>\
          <AppendedData encoding=\"raw\">_"
@@ -459,7 +469,9 @@ fn vtk(seeds: &mut Seeds) -> Result<()> {
     let cells = [("Int64", "connectivity", "0 1 2 3"), ("Int64", "offsets", "4"), ("UInt8", "types", "10")]
         .map(|(kind, name, text)| array(kind, name, 1, text))
         .concat();
-    for (point_data, cell_data) in [(array("Float32", "value", 1, "1 2 3 4"), String::new()), (String::new(), array("Int32", "c", 1, "5"))] {
+    for (point_data, cell_data) in
+        [(array("Float32", "value", 1, "1 2 3 4"), String::new()), (String::new(), array("Int32", "c", 1, "5"))]
+    {
         seeds.known(
             "vtu",
             format!(
@@ -496,13 +508,15 @@ fn vtk(seeds: &mut Seeds) -> Result<()> {
 }
 
 fn hierarchies(seeds: &mut Seeds) -> Result<()> {
-    let whole = tetrahedron().surfels(&splatkit::surface::SurfelOptions { largest_spacing: 0.2, ..Default::default() })?;
+    let whole =
+        tetrahedron().surfels(&splatkit::surface::SurfelOptions { largest_spacing: 0.2, ..Default::default() })?;
     for (count, block_splats) in [(1, 64), (7, 64), (150, 64)] {
         let splats: Vec<_> = whole.splats.iter().copied().take(count).collect();
         let set = splatkit::splat::SplatSet { splats, ..whole.clone() };
         let tree = Tree::build(&set, &BuildOptions { block_splats, ..BuildOptions::default() }, &|_, _| {})?;
         for lossless in [false, true] {
-            let options = WriteOptions { lossless, unit: "m".into(), source: "a.ply".into(), ..WriteOptions::default() };
+            let options =
+                WriteOptions { lossless, unit: "m".into(), source: "a.ply".into(), ..WriteOptions::default() };
             let bytes = to_bytes(&tree, &options)?;
             seeds.put("splk", &bytes)?;
             seeds.known("splk_summed", bytes)?;
