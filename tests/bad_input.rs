@@ -258,7 +258,6 @@ fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
         ("pieces.vti", vtk_xml("ImageData", "", &"<Piece/>".repeat(mib / 4)).into()),
         ("attributes.vti", vtk_xml("ImageData", "", &"<Piece a='' b='' c='' d=''/>".repeat(mib / 8)).into()),
         ("deep.vti", vtk_xml("ImageData", "", &"<a>".repeat(mib)).into()),
-        ("bomb.mtl.obj", "mtllib bomb.mtl\nv 0 0 0\nf 1 1 1\n".into()),
         ("nested.gltf", "[".repeat(4 * mib).into()),
         ("nested.json", "[".repeat(mib).into()),
     ]
