@@ -118,7 +118,7 @@ fn scenes(round: u32, folder: &Path) -> Vec<(&'static str, Scene)> {
 fn settings(round: u32, name: &str) -> Settings {
     let mut settings = Settings::new([64 + varied(round, 8, 200), 64 + varied(round, 9, 200)]);
     settings.detail = Detail::Pixels(f64::from(varied(round, 10, 3)));
-    settings.occlusion = round % 3 > 0;
+    settings.occlusion = !round.is_multiple_of(3);
     match round % 5 {
         3 if name != "bricks" => settings.mode = Mode::Splats(Order::FrontToBack),
         4 => settings.optics = Optics::XRay,
