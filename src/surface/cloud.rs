@@ -108,7 +108,8 @@ impl<'a> Judged<'a> {
 
     /// The surfel of the point at a place in the order.
     fn surfel(&self, at: usize, options: &SurfelOptions) -> Splat {
-        let width = f64::from(self.spacing[at] * SPREAD * options.radius_scale);
+        // Points as near as the least numbers still have a width.
+        let width = f64::from((self.spacing[at] * SPREAD * options.radius_scale).max(f32::MIN_POSITIVE));
         // The plane of a lone point's neighbours is not its own.
         let known = !self.lone[at] || !self.free[at];
         let normal = Some(self.normals[at].as_dvec3()).filter(|normal| known && *normal != DVec3::ZERO);

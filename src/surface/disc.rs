@@ -1,5 +1,6 @@
 //! The ellipse of a surfel: fitted to a piece of surface, and widened until it reaches what it has to cover.
 
+use super::ellipse::lower;
 use glam::{Vec2, Vec3};
 
 /// The moments of triangles that share a corner, in a tangent plane with its origin there.
@@ -97,7 +98,12 @@ impl Ellipse {
         let b11 = rest.length();
         let q1 = rest / b11;
         // The volume tells the last number more exactly than what is left of a row.
-        [b00, b10, b11, r2.dot(q0), r2.dot(q1), l00 * l11 * thickness / (b00 * b11)]
+        let factor = [b00, b10, b11, r2.dot(q0), r2.dot(q1), l00 * l11 * thickness / (b00 * b11)];
+        if factor.iter().all(|v| v.is_finite()) {
+            return factor;
+        }
+        // Of a needle nothing may be left in 32 bits, and the volume of a giant is beyond them.
+        lower([u, v, w].map(Vec3::as_dvec3))
     }
 }
 

@@ -28,6 +28,8 @@ const CENTROID: f32 = 4.7;
 const CORNER: f32 = 5.0;
 /// The thickness of a surfel, in its smaller standard deviation.
 const THICKNESS: f32 = 0.12;
+/// The square of twice an area, in units, below which products of moments are lost in 32 bits: edges of less than a millionth.
+const LEAST_SQUARE: f32 = 1e-26;
 /// How high above its vertex a surfel lies, of the mean height of the triangles around a vertex.
 const SAG: f32 = 0.4;
 
@@ -134,8 +136,8 @@ impl Maker<'_> {
         let cross = a.cross(b);
         let (square, longer) = (cross.length_squared(), a.length_squared().max(b.length_squared()));
         *longest = longest.max(longer);
-        // No more than a line, at the precision of 32 bits.
-        if square <= longer * longer * 1e-12 {
+        // No more than a line, at the precision of 32 bits, or no more than a point beside the whole.
+        if square <= (longer * longer * 1e-12).max(LEAST_SQUARE) {
             return None;
         }
         let twice_area = square.sqrt();

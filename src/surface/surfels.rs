@@ -51,6 +51,9 @@ impl Default for SurfelOptions {
 /// Where footprints end, in standard deviations.
 pub(crate) const EXTENT: f32 = 3.0;
 
+/// Factors on radii that leave squares in 32 bits.
+const RADIUS_SCALES: std::ops::RangeInclusive<f32> = 1e-6..=1e6;
+
 /// Vertices of one parallel task.
 const CHUNK: usize = 1 << 12;
 
@@ -98,6 +101,11 @@ impl Mesh {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(Error::Argument(format!("{name} is {value}; a positive number is needed")));
             }
+        }
+        if !RADIUS_SCALES.contains(&options.radius_scale) {
+            let (least, most) = (RADIUS_SCALES.start(), RADIUS_SCALES.end());
+            let message = format!("radius_scale is {:e}; {least:e} to {most:e} can be", options.radius_scale);
+            return Err(Error::Argument(message));
         }
         let count = self.positions.len();
         for (name, length, wanted) in [
