@@ -41,7 +41,7 @@ fn the_suite_measures_growth() {
     assert!(slopes.len() == 2 && slopes.iter().all(|slope| slope["power"].is_number()), "{slopes:?}");
     let page = std::fs::read_to_string(folder.path("page.md")).unwrap();
     assert!(page.starts_with("a\n<!--") && page.ends_with("-->\nb\n") && page.contains("### other\n\nkept"), "{page}");
-    assert!(page.contains("| specimen, 16³ | generated: specimen |"), "{page}");
+    assert!(page.contains("| specimen, 16³ | generated: specimen, in bricks |"), "{page}");
 }
 
 #[test]

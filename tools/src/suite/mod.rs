@@ -27,6 +27,7 @@ const FRAMES: u32 = 5;
 const OTHERS: &[&str] = &[
     "inputs",
     "LoadFlags",
+    "LimitFlags",
     "transfer",
     "range",
     "opacity_unit",
