@@ -6,7 +6,11 @@ use crate::{Error, Result};
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{Arc, Mutex, OnceLock, PoisonError},
+    time::Duration,
 };
+
+/// The longest between the end of the device's work and the call that tells of it.
+const CALL_BACK: Duration = Duration::from_secs(10);
 
 /// What a device has told of itself.
 #[derive(Debug, Default)]
@@ -127,8 +131,8 @@ impl Gpu {
         // The receiver outlives the callback: it is waited for below.
         staging.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
         self.wait()?;
-        // A device that is lost may forget to call back.
-        match receiver.try_recv() {
+        // Another thread that waits for the same device may be about to call back; one that is lost may forget to.
+        match receiver.recv_timeout(self.patience.min(CALL_BACK)) {
             Ok(Ok(())) => {}
             _ => return Err(Error::DeviceLost(format!("{} did not give back what was drawn", self.info.name))),
         }
