@@ -4,7 +4,7 @@ use crate::limits;
 use splatkit::Error;
 use std::{
     fmt,
-    io::{self, ErrorKind},
+    io::{self, ErrorKind, Write},
     path::{Path, PathBuf},
     process::ExitCode,
 };
@@ -70,7 +70,8 @@ impl Failure {
     /// Tells the failure on stderr.
     pub fn report(self) -> ExitCode {
         let code = self.code();
-        eprintln!("{:?}", miette::Report::new(self));
+        // Who reads stderr may be gone already.
+        writeln!(io::stderr(), "{:?}", miette::Report::new(self)).ok();
         ExitCode::from(code)
     }
 }

@@ -300,3 +300,12 @@ fn what_is_unusual_draws() {
         .run("render a.nrrd -o none.png --size 32x24 --clip x<30% --clip x>70%")
         .fails(3, &["the camera sees no splat that has opacity in what --clip 'x<30%' --clip 'x>70%' leaves"]);
 }
+
+/// Scripts cut what a command says: its exit code stays what it is.
+#[test]
+fn errors_that_nobody_reads_keep_their_code() {
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_splatkit"));
+    let mut child = command.args(["info", "gone.ply"]).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    drop(child.stderr.take());
+    assert_eq!(child.wait().unwrap().code(), Some(3));
+}
