@@ -35,6 +35,9 @@ struct Frame {
     isotropic: vec4<f32>,
     // First value, table entries per value, last table index; entries per gradient magnitude.
     transfer: vec4<f32>,
+    // Extinction times colour, and extinction, of values before the first table entry, and behind the last one.
+    before: vec4<f32>,
+    behind: vec4<f32>,
     // The field's kernel: radius in kernel space, its inverse; one over what kernels add up to.
     kernel: vec4<f32>,
     // Volumes in bricks: the shares of the finer and of the coarser level.

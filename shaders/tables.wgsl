@@ -5,32 +5,47 @@
 // entries; the factor on the extinction by gradient magnitude; the kernel and its sections.
 @group(0) @binding(6) var<storage, read> tables: array<vec4<f32>>;
 
-// A value as a place in the tables of values.
+// A value as a place in the tables of values, also before and behind them; finite, however far.
 fn place_of(value: f32) -> f32 {
-    return clamp((value - frame.transfer.x) * frame.transfer.y, 0.0, frame.transfer.z);
+    return clamp((value - frame.transfer.x) * frame.transfer.y, -1e30, 1e30);
 }
 
 // Colour and extinction of one value.
 fn classify(value: f32) -> vec4<f32> {
-    let at = place_of(value);
+    let at = clamp(place_of(value), 0.0, frame.transfer.z);
     let low = u32(at);
     return mix(tables[low], tables[low + 1u], at - f32(low));
 }
 
 // Values nearer to each other than this many entries are taken as that far apart: their integrals' difference is lost in
-// rounding.
+// rounding. So are those that, far from the tables, are nearer than 32 bits can tell.
 const NARROW: f32 = 8.0;
+const NARROW_AFAR: f32 = 1e-6;
 
 // Means over the values between two: extinction times colour, and extinction (pre-integration after Engel, Kraus & Ertl 2001,
 // without the attenuation inside, which the parts of a sheet are thin enough for).
 fn classify_between(a: f32, b: f32) -> vec4<f32> {
-    let at = vec2(place_of(a), place_of(b));
+    let end = frame.transfer.z;
+    var at = vec2(place_of(a), place_of(b));
+    if !BEYOND {
+        at = clamp(at, vec2(0.0), vec2(end));
+    }
     let middle = 0.5 * (at.x + at.y);
     let reach = 0.5 * max(abs(at.x - at.y), NARROW);
     // To whole entries outwards, which saves half of the look-ups; the mean moves by half an entry at most.
-    let low = max(floor(middle - reach), 0.0);
-    let high = min(ceil(middle + reach), frame.transfer.z);
-    return (tables[INTEGRAL_TABLE + u32(high)] - tables[INTEGRAL_TABLE + u32(low)]) / (high - low);
+    if !BEYOND {
+        let low = max(floor(middle - reach), 0.0);
+        let high = min(ceil(middle + reach), end);
+        return (tables[INTEGRAL_TABLE + u32(high)] - tables[INTEGRAL_TABLE + u32(low)]) / (high - low);
+    }
+    let low = floor(middle - max(reach, NARROW_AFAR * abs(middle)));
+    let high = ceil(middle + max(reach, NARROW_AFAR * abs(middle)));
+    let within = tables[INTEGRAL_TABLE + u32(clamp(high, 0.0, end))] - tables[INTEGRAL_TABLE + u32(clamp(low, 0.0, end))];
+    // Beyond the tables the function keeps its value. Ratios first: what lies far beyond may be as large as numbers get.
+    let inverse = 1.0 / (high - low);
+    let before = (min(high, 0.0) - min(low, 0.0)) * inverse;
+    let behind = (max(high, end) - max(low, end)) * inverse;
+    return within * inverse + before * frame.before + behind * frame.behind;
 }
 
 // The factor on the extinction where the gradient has a magnitude.

@@ -223,6 +223,11 @@ fn thin_shells() {
 }
 
 #[test]
+fn one_value_far_off() {
+    assert_matches(methods::one_value_far_off(), 50.0);
+}
+
+#[test]
 fn post_classified() {
     assert_matches(methods::post_classified(), 50.0);
 }

@@ -16,7 +16,7 @@ use super::{
     resume::Resume,
     scan::{SCAN_CAPACITY, Scan},
     shaders::Variant,
-    tables::Tables,
+    tables::{self, Tables},
     tiles::Tiles,
     uniforms::{self, AGAIN_ARGUMENTS, ARGUMENT_BYTES, Frame, MARCH_ARGUMENTS, PASS_BYTES, SCAN_ARGUMENTS, State},
     upload::{Origin, PreparedScene, upload},
@@ -95,6 +95,7 @@ pub fn variant(
         radiance: false,
         isotropic: false,
         table_kernel: false,
+        beyond: false,
         volume_shaded: false,
         surface_shaded: false,
         gradient_opacity: false,
@@ -131,6 +132,12 @@ pub fn variant(
             variant.gradient_opacity = !transfer.gradient.is_empty() && settings.optics != Optics::Maximum;
             variant.isosurfaces = if is_lit { transfer.isosurfaces.len() as u32 } else { 0 };
         }
+        variant.beyond = match item {
+            Item::Volume(volume, ..) => tables::leaves_out(transfer, volume.range),
+            Item::Bricks(bricks, ..) => tables::leaves_out(transfer, bricks.header().range),
+            // To find their range takes longer.
+            _ => true,
+        };
         if let Item::Volume(volume, kernel, _) = item {
             variant.lattice = true;
             variant.body_centred = volume.lattice.arrangement == Arrangement::BodyCentred;
@@ -372,7 +379,7 @@ fn tables_of(prepared: &PreparedScene, frame: &mut Frame) -> Vec<[f32; 4]> {
     });
     let Some((transfer, range, kernel)) = field else { return vec![[0.0; 4]; 2] };
     let tables = Tables::new(transfer, range, kernel);
-    frame.transfer = tables.transfer;
+    (frame.transfer, frame.beyond) = (tables.transfer, tables.beyond);
     tables.entries
 }
 

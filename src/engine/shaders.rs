@@ -65,6 +65,8 @@ pub struct Variant {
     pub isotropic: bool,
     /// The field's kernel has no closed form.
     pub table_kernel: bool,
+    /// Samples may have values before or behind those that the transfer function's table holds.
+    pub beyond: bool,
     pub volume_shaded: bool,
     pub surface_shaded: bool,
     pub gradient_opacity: bool,
@@ -124,6 +126,7 @@ impl Variant {
             ("ISOTROPIC_RECORDS", self.isotropic),
             ("GENERAL_RECORDS", radiance || !self.isotropic),
             ("TABLE_KERNEL", self.table_kernel),
+            ("BEYOND", self.beyond),
             ("VOLUME_SHADED", self.volume_shaded),
             ("SURFACE_SHADED", self.surface_shaded),
             ("GRADIENT_OPACITY", self.gradient_opacity),

@@ -6,8 +6,10 @@ use crate::{
     volume::TransferFunction,
 };
 
-/// Entries of the transfer function: fine enough that a piecewise-linear function of 16-bit data keeps its corners.
+/// Entries of the transfer function, over the values between which it changes.
 const VALUES: usize = 4096;
+/// Values of a field may leave the range of its samples by this part of it, where kernels have negative parts.
+const OVERSHOOT: f64 = 0.25;
 /// Entries of the gradient's factor.
 const GRADIENTS: usize = 256;
 /// Entries of the kernel along its radius.
@@ -31,18 +33,21 @@ pub fn constants() -> String {
     )
 }
 
-/// The tables of a picture, and the scales that values are looked up by: first value, entries per value, last index, entries
-/// per gradient magnitude.
+/// The tables of a picture, and what they are looked up by.
 #[derive(Debug)]
 pub struct Tables {
     pub entries: Vec<[f32; 4]>,
+    /// First value, entries per value, last index, entries per gradient magnitude.
     pub transfer: [f32; 4],
+    /// Extinction times colour, and extinction, of all values before the first entry and of all behind the last one.
+    pub beyond: [[f32; 4]; 2],
 }
 
 impl Tables {
-    /// Of a transfer function over the values that occur. Only a kernel without closed form gets tables.
-    pub fn new(transfer: &TransferFunction, [low, high]: [f64; 2], kernel: Option<&Kernel>) -> Self {
+    /// Of a transfer function and the range of the samples. Only a kernel without closed form gets tables.
+    pub fn new(transfer: &TransferFunction, range: [f64; 2], kernel: Option<&Kernel>) -> Self {
         let last = (VALUES - 1) as f64;
+        let [low, high] = window(transfer, range);
         let mut entries = transfer.table([low, high], VALUES);
         entries.push(entries[VALUES - 1]);
         entries.extend(integrals(transfer, [low, high]));
@@ -53,10 +58,32 @@ impl Tables {
             entries.extend(radial(kernel));
             entries.extend(sections(kernel));
         }
-        let per_value = if high > low { last / (high - low) } else { 0.0 };
+        let per_value = last / (high - low);
         let per_magnitude = (GRADIENTS - 1) as f64 / most;
-        Self { entries, transfer: [low as f32, per_value as f32, last as f32, per_magnitude as f32] }
+        Self {
+            entries,
+            transfer: [low as f32, per_value as f32, last as f32, per_magnitude as f32],
+            beyond: [low, high].map(|value| shown(transfer, value).map(|v| v as f32)),
+        }
     }
+}
+
+/// Extinction times colour, and extinction.
+fn shown(transfer: &TransferFunction, value: f64) -> [f64; 4] {
+    let extinction = transfer.extinction(value);
+    let [red, green, blue] = transfer.color(value);
+    [red, green, blue, 1.0].map(|part| part * extinction)
+}
+
+/// The values that get entries: those between which the function changes, as far as a field with samples in `range` has
+/// them. So a function of a few values has its corners where they are, however wide the data's range is.
+fn window(transfer: &TransferFunction, [low, high]: [f64; 2]) -> [f64; 2] {
+    let reach = OVERSHOOT * (high - low);
+    let [first, last] = transfer.span().map(|value| value.clamp(low - reach, high + reach));
+    // A single step, or a function that does not change there. 32 bits tell so many values near one from each other.
+    let least = (first.abs() * 2f64.powi(-12)).max(f64::from(f32::MIN_POSITIVE) * VALUES as f64);
+    let lack = (least - (last - first)).max(0.0);
+    [first - lack / 2.0, last + lack / 2.0]
 }
 
 /// Running integrals of extinction times colour, and of extinction, in entries. Each step is a mean over points inside it, so
@@ -70,10 +97,8 @@ fn integrals(transfer: &TransferFunction, [low, high]: [f64; 2]) -> Vec<[f32; 4]
         for j in 0..INSIDE {
             let at = (i as f64 + (j as f64 + 0.5) / INSIDE as f64).min(last);
             let value = low + (high - low) * at / last;
-            let [red, green, blue] = transfer.color(value);
-            let extinction = transfer.extinction(value);
-            for (sum, part) in sum.iter_mut().zip([red, green, blue, 1.0]) {
-                *sum += part * extinction / INSIDE as f64;
+            for (sum, part) in sum.iter_mut().zip(shown(transfer, value)) {
+                *sum += part / INSIDE as f64;
             }
         }
         all.push(sum.map(|v| v as f32));
@@ -127,6 +152,12 @@ fn sections(kernel: &Kernel) -> Vec<[f32; 4]> {
     (0..SECTIONS).flat_map(|i| (0..SECTIONS).map(move |j| (i, j))).map(|(i, j)| corners(i, j)).collect()
 }
 
+/// Whether samples in a range have values that get no entries.
+pub fn leaves_out(transfer: &TransferFunction, range: [f64; 2]) -> bool {
+    let [low, high] = window(transfer, range);
+    range[0] < low || high < range[1]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -149,6 +180,27 @@ mod tests {
         let whole = f64::from(tables.entries[INTEGRAL_START + VALUES - 1][3]) / (VALUES - 1) as f64;
         let expected = 0.5 * transfer.extinction(0.9);
         assert!((whole / expected - 1.0).abs() < 1e-3, "{whole} {expected}");
+    }
+
+    #[test]
+    fn entries_stand_where_the_function_changes() {
+        let over = |points: &[(f64, f64)], range| {
+            let transfer = TransferFunction {
+                color: vec![(points[0].0, [1.0; 3])],
+                opacity: points.to_vec(),
+                ..TransferFunction::default()
+            };
+            window(&transfer, range)
+        };
+        // Of 16-bit data a few hundred values; of a function far wider than the data what these can have.
+        assert_eq!(over(&[(100.0, 0.0), (400.0, 1.0)], [-32768.0, 32767.0]), [100.0, 400.0]);
+        assert_eq!(over(&[(-1e6, 0.0), (1e6, 1.0)], [0.0, 100.0]), [-25.0, 125.0]);
+        // A step, at 0 too, and values that are all one.
+        for (value, range) in [(80.0, [0.0, 255.0]), (0.0, [-1.0, 1e30]), (7.0, [7.0, 7.0])] {
+            let [low, high] = over(&[(value, 0.0), (value, 1.0)], range);
+            assert!(low < value && value < high && high - low <= value * 1e-3 + 1e-30, "{low} {high}");
+            assert!(((VALUES as f64 / (high - low)) as f32).is_finite());
+        }
     }
 
     #[test]

@@ -34,6 +34,7 @@ pub struct Frame {
     pub surface_shade: [f32; 4],
     pub isotropic: [f32; 4],
     pub transfer: [f32; 4],
+    pub beyond: [[f32; 4]; 2],
     pub kernel: [f32; 4],
     pub levels: [f32; 4],
     pub sheet_normal: [f32; 4],
@@ -42,7 +43,7 @@ pub struct Frame {
     pub holes: [[[f32; 4]; 2]; Settings::MAX_CLIPS],
     pub isosurfaces: [[[f32; 4]; 2]; TransferFunction::MAX_ISOSURFACES],
 }
-const _: () = assert!(size_of::<Frame>() == 64 + (16 + 3 * 16) * 16);
+const _: () = assert!(size_of::<Frame>() == 64 + (18 + 3 * 16) * 16);
 
 /// `Source` in frame.wgsl.
 #[repr(C)]

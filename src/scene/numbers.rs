@@ -14,8 +14,9 @@ use rayon::prelude::*;
 /// Splats above this are as opaque below it, and sums of them lose what lies beside them.
 const MOST_OPTICAL_DEPTH: f32 = 1e10;
 
-/// The most values that a transfer function tells apart over the range of its data, as many as the engine tabulates.
-const VALUES: f64 = 4096.0;
+/// The most values that a transfer function tells apart over the range of its data: beside one value, sums of 32 bits lose
+/// others that are much smaller than this part of it.
+const VALUES: f64 = 1048576.0;
 
 /// What errors call an item.
 pub(super) fn place_of(number: usize) -> String {

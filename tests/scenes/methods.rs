@@ -104,6 +104,14 @@ pub fn thin_shells() -> Case {
     case("thin_shells", volume_scene(cubic(), Kernel::default(), steep()), settings())
 }
 
+/// The same where the sample of one corner is that of a broken sensor: the function stands for a small part of the range.
+pub fn one_value_far_off() -> Case {
+    let mut volume = cubic();
+    let values = (0..volume.len()).map(|i| if i == 0 { -20_000.0 } else { volume.value(i) as f32 }).collect();
+    volume = Volume::new(volume.lattice, Samples::F32(values)).expect("as many samples");
+    case("one_value_far_off", volume_scene(volume, Kernel::default(), steep()), settings())
+}
+
 pub fn post_classified() -> Case {
     let settings = Settings { classification: Classification::Post, ..settings() };
     case("post_classified", volume_scene(cubic(), Kernel::default(), steep()), settings)
