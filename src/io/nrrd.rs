@@ -1,6 +1,7 @@
 //! NRRD volumes (Teem's format, versions 1 to 5), attached and detached, after its definition at
 //! <https://teem.sourceforge.net/nrrd/format.html>.
 
+mod files;
 mod write;
 
 use super::{Endian, SampleType, Source, volume_stream::Plain};
@@ -25,7 +26,8 @@ pub use write::{write, write_bytes};
 /// (`axis positions 0:=0 1 2.5`): ascending positions of the samples along each axis, in lengths of its space direction, from
 /// the space origin.
 ///
-/// Encodings: raw, gzip, ascii and hex. `data file` may name one file inside the header's folder.
+/// Encodings: raw, gzip, ascii and hex. `data file` may name one file inside the header's folder, or several: as a list, or by
+/// a pattern with a number (`slice%03d.raw 1 90 1`).
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) with the field that is missing or wrong, for data that are cut off and for
@@ -37,17 +39,33 @@ pub fn read(source: &Source) -> Result<Volume> {
     let kind = header.sample_type()?;
     let size = source.check_bytes("the size of the samples in bytes", kind.bytes_of(dims).unwrap_or(u64::MAX))?;
     source.spend("the size of the samples in bytes", kind.decoded_bytes(size))?;
-    let Some(name) = header.get(&["data file", "datafile"]) else {
-        return header.samples(source, &source.bytes()[body..], kind, size, lattice);
+    let rest = &source.bytes()[body..];
+    let Some(field) = header.data_file() else {
+        let (bytes, endian) = header.bytes(source, rest, kind, size)?;
+        return Volume::new(lattice, kind.decode(bytes, endian)).map_err(|message| source.error("samples", message));
     };
-    if is_list(name) || name.contains('%') {
-        return Err(source
-            .error("data file", format!("“{name}” names several files, which is not supported"))
-            .hint("join them to one file"));
+    let names = files::names(source, field, rest, dims)?;
+    let part = size / names.len();
+    if let [name] = &names[..] {
+        let path = source.neighbour("data file", name)?;
+        let data = source.open_beside(&path)?;
+        let volume = header.bytes(&data, data.bytes(), kind, size).and_then(|(bytes, endian)| {
+            Volume::new(lattice, kind.decode(bytes, endian)).map_err(|message| data.error("samples", message))
+        });
+        return data.unless_changed(volume);
     }
-    let path = source.neighbour("data file", name)?;
-    let data = source.open_beside(&path)?;
-    data.unless_changed(header.samples(&data, data.bytes(), kind, size, lattice))
+    source.spend("the size of the joined samples in bytes", size as u64)?;
+    let (mut all, mut order) = (Vec::new(), Endian::Little);
+    for name in &names {
+        source.check_time()?;
+        let path = source.neighbour("data file", name)?;
+        let data = source.open_beside(&path)?;
+        let (bytes, endian) = header.bytes(&data, data.bytes(), kind, part)?;
+        all.extend_from_slice(&bytes);
+        order = endian;
+        data.intact()?;
+    }
+    Volume::new(lattice, kind.decode(all.into(), order)).map_err(|message| source.error("samples", message))
 }
 
 /// Where the samples of a file of raw encoding stand; `None` for other encodings, and where something is to be skipped or
@@ -61,9 +79,9 @@ pub(super) fn plain(source: &Source) -> Result<Option<Plain>> {
         return Ok(None);
     }
     let endian = header.endian(sample_type)?;
-    let (path, start) = match header.get(&["data file", "datafile"]) {
+    let (path, start) = match header.data_file() {
         None => (source.path.to_owned(), body),
-        Some(name) if is_list(name) || name.contains('%') => return Ok(None),
+        Some(field) if files::are_several(field) => return Ok(None),
         Some(name) => (source.neighbour("data file", name)?, 0),
     };
     Ok(Some(Plain { path, start, sample_type, endian, lattice }))
@@ -106,7 +124,7 @@ impl<'a> Header<'a> {
                 }
                 Some((name, value)) => {
                     let (name, value) = (name.trim().to_ascii_lowercase(), value.trim());
-                    let is_list = name.replace(' ', "") == "datafile" && is_list(value);
+                    let is_list = name.replace(' ', "") == "datafile" && files::is_list(value);
                     fields.insert(name, value.to_owned());
                     // The names of files follow, up to the end.
                     if is_list {
@@ -125,6 +143,11 @@ impl<'a> Header<'a> {
     /// A field by its spellings.
     fn get(&self, names: &[&str]) -> Option<&str> {
         names.iter().find_map(|&name| self.fields.get(name)).map(String::as_str)
+    }
+
+    /// What tells where the samples are; `None` where they are in this file.
+    fn data_file(&self) -> Option<&str> {
+        self.get(&["data file", "datafile"])
     }
 
     fn need(&self, name: &str) -> Result<&str> {
@@ -249,8 +272,14 @@ impl<'a> Header<'a> {
         }
     }
 
-    /// Decodes `size` bytes of samples from the data, which may be in a file of their own.
-    fn samples(&self, file: &Source, data: &[u8], kind: SampleType, size: usize, lattice: Lattice) -> Result<Volume> {
+    /// Unpacks `size` bytes of samples from the data, which may be in a file of their own; and tells their order.
+    fn bytes<'d>(
+        &self,
+        file: &Source,
+        data: &'d [u8],
+        kind: SampleType,
+        size: usize,
+    ) -> Result<(Cow<'d, [u8]>, Endian)> {
         let place = "data";
         let skip = |names: &[&str]| match self.get(names) {
             Some(text) => self.numbers::<1, i64>(names[0], text).map(|[n]| n),
@@ -275,7 +304,7 @@ impl<'a> Header<'a> {
             let bytes = after_skip()?;
             std::str::from_utf8(bytes).map_err(|e| file.error(place, format!("byte {} is not text", e.valid_up_to())))
         };
-        let (bytes, endian): (Cow<[u8]>, Endian) = match encoding.as_str() {
+        Ok(match encoding.as_str() {
             "raw" => {
                 let start = if from_end { data.len().checked_sub(size) } else { Some(skip) };
                 let found = start.and_then(|start| data.get(start..)).and_then(|rest| rest.get(..size));
@@ -307,14 +336,8 @@ impl<'a> Header<'a> {
                     .error("encoding", format!("“{encoding}” is not supported"))
                     .hint("write the file with raw or gzip encoding"));
             }
-        };
-        Volume::new(lattice, kind.decode(bytes, endian)).map_err(|message| file.error("samples", message))
+        })
     }
-}
-
-/// Whether a field of a data file tells that a list of them follows.
-fn is_list(name: &str) -> bool {
-    name == "LIST" || name.starts_with("LIST ")
 }
 
 /// The beginning of a text, for an error.
@@ -445,8 +468,8 @@ mod tests {
         for (fields, word) in [
             ("encoding: raw\ndata file: missing.raw", "missing.raw"),
             ("encoding: raw\ndata file: ../plain.raw", "own folder"),
-            ("encoding: raw\ndata file: LIST", "several files"),
-            ("encoding: raw\ndata file: slice%03d.raw 1 9 1", "several files"),
+            ("encoding: raw\ndata file: LIST", "0 files"),
+            ("encoding: raw\ndata file: slice%03d.raw 1 9 1", "9 files"),
             ("encoding: raw\nbyte skip: 99\ndata file: plain.raw", "0 bytes where 4"),
             ("encoding: raw\nbyte skip: -2\ndata file: plain.raw", "negative"),
             ("encoding: raw\nbyte skip: 9223372036854775807\ndata file: plain.raw", "0 bytes where 4"),

@@ -85,6 +85,22 @@ impl<'a> Source<'a> {
         }
     }
 
+    /// The text of a file that people write, as a copy: what was checked stays what it is. `what` names it in errors (“a
+    /// transfer function”).
+    ///
+    /// # Errors
+    /// [`Error::Input`] for more than `most` bytes, for what is not UTF-8, and for a file that changed.
+    pub fn small_text(&self, what: &str, most: usize) -> Result<String> {
+        let size = self.bytes().len();
+        if size > most {
+            return Err(self.error("file", format!("has {size} bytes, but {what} has {most} at most")));
+        }
+        let bytes = self.bytes().to_vec();
+        self.intact()?;
+        String::from_utf8(bytes)
+            .map_err(|e| self.error(format!("byte {}", e.utf8_error().valid_up_to()), "is not UTF-8 text"))
+    }
+
     /// What was made of the file, or why it was not; and where the file was changed meanwhile, that alone.
     pub(crate) fn unless_changed<T>(&self, found: Result<T>) -> Result<T> {
         self.intact().and(found)

@@ -94,7 +94,7 @@ const WRONG: &[(&str, i32, &str)] = &[
     ("corner.obj", 3, "corner.obj: file: has faces, but none of three corners or more"),
     ("a.nrrd --transfer lists.json", 3, "lists.json: transfer function: invalid type: sequence, expected f64"),
     ("lists.gltf", 3, "lists.gltf: JSON: invalid type: sequence"),
-    ("list.nhdr", 3, "list.nhdr: data file: “LIST” names several files, which is not supported"),
+    ("list.nhdr", 3, "list.nhdr: data file: refers to “../a.raw”, which leads out of the file's own folder"),
     // Kernels.
     ("a.nrrd --sigma 0", 2, "invalid value '0' for '--sigma <SAMPLES>': a number above 0 is needed"),
     ("a.nrrd --sigma 3 --extent 1", 2, "a Gaussian of sigma 3 cut at 1 samples is a block; cut it at 3 or more"),
