@@ -4,7 +4,12 @@
 mod inputs;
 
 use inputs::*;
-use splatkit::{Error, hierarchy::file, io::Limits, volume::bricks};
+use splatkit::{
+    Error,
+    hierarchy::file,
+    io::{self, Limits, RawLayout},
+    volume::bricks,
+};
 use std::{
     path::Path,
     sync::{
@@ -193,6 +198,40 @@ fn worst_inputs_stay_within_their_limits() {
     println!("longest {} ms, most {:.1} MiB", worst.0, worst.1 as f64 / 1048576.0);
 }
 
+/// Files with holes, which take no room: those that are not of Unix are filled when they are written behind their end.
+#[cfg(unix)]
+#[test]
+fn places_beyond_what_32_bits_count_are_found() {
+    use std::io::{Seek, SeekFrom, Write};
+    let folder = Folder::new();
+    let header = (4u64 << 30) + 36;
+    let samples: Vec<u8> = (0..64).collect();
+    for (name, end) in [("far.raw", 64), ("far_cut.raw", 63)] {
+        let mut file = std::fs::File::create(folder.0.join(name)).expect("a file");
+        file.seek(SeekFrom::Start(header)).and_then(|_| file.write_all(&samples[..end])).expect("room");
+    }
+    let layout = RawLayout { header, ..RAW };
+    let read = |name: &str, limits: &Limits| match io::load_volume(&folder.0.join(name), limits, Some(&layout)) {
+        Ok(volume) => format!("{:?} {}", volume.range, volume.value(63)),
+        Err(error) => error.to_string().replace(&format!("{}/", folder.0.display()), ""),
+    };
+    assert_eq!(read("far.raw", &Limits::default()), "[0.0, 63.0] 63");
+    assert_eq!(
+        read("far_cut.raw", &Limits::default()),
+        "far_cut.raw: size: holds 63 bytes after the header, but 4 × 4 × 4 samples of type u8 need 64"
+    );
+    let little = Limits { bytes: 1 << 30, ..Limits::default() };
+    assert_eq!(
+        read("far.raw", &little),
+        "far.raw: the file's size in bytes is 4294967396, over the limit of 1073741824"
+    );
+    // A header that sends its reader as far.
+    let text = String::from_utf8(nrrd("4 4 4", "encoding: raw", b"")).expect("text");
+    let skip = format!("byte skip: {header}\ndata file: far.raw");
+    folder.write("far.nhdr", text.replacen("encoding: raw", &format!("encoding: raw\n{skip}"), 1));
+    assert_eq!(folder.outcome("far.nhdr", &Limits::default()), "volume [4, 4, 4] [0.0, 63.0]");
+}
+
 /// Bytes of the program itself, its threads among it, that come into memory as it runs.
 const PROGRAM: u64 = 8 << 20;
 
@@ -260,5 +299,9 @@ fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
         ("deep.vti", vtk_xml("ImageData", "", &"<a>".repeat(mib)).into()),
         ("nested.gltf", "[".repeat(4 * mib).into()),
         ("nested.json", "[".repeat(mib).into()),
+        ("bomb.splk", crafted::page_of_zeros(1 << 30)),
+        ("equal.splk", crafted::pages_of_one_node(100)),
+        ("bomb.splv", crafted::brick_of_zeros(1 << 30)),
+        ("equal.splv", crafted::bricks_of_one_value([4096, 4096, 64])),
     ]
 }

@@ -145,18 +145,8 @@ impl TransferFunction {
     /// # Errors
     /// [`Error::File`] and [`Error::Limit`] as for every input; [`Error::Input`] for what is no transfer function.
     pub fn read(path: &Path, limits: &Limits) -> Result<Self> {
-        let source = Source::open(path, limits)?;
-        let size = source.bytes().len();
-        if size > MOST_BYTES {
-            let message = format!("has {size} bytes, but a transfer function has {MOST_BYTES} at most");
-            return Err(source.error("transfer function", message));
-        }
-        // A copy: text that was checked stays what it is.
-        let bytes = source.bytes().to_vec();
-        source.intact()?;
-        let text = std::str::from_utf8(&bytes)
-            .map_err(|e| source.error(format!("byte {}", e.valid_up_to()), "is not UTF-8 text"))?;
-        Self::from_json(text).map_err(|message| {
+        let text = Source::open(path, limits)?.small_text("a transfer function", MOST_BYTES)?;
+        Self::from_json(&text).map_err(|message| {
             Error::input(path, "transfer function", message)
                 .hint("the form is {\"color\": [[value, r, g, b], …], \"opacity\": [[value, opacity], …]}, all but values in 0 … 1")
         })

@@ -1,5 +1,7 @@
 //! Small sound files of every format, and what reading one gives in a line of words.
 
+pub mod crafted;
+
 use glam::Vec3;
 use splatkit::{
     Error, Result,

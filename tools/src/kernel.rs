@@ -72,18 +72,9 @@ impl KernelFlags {
 /// The numbers of a JSON array, or of lines.
 fn read_table(path: &Path, limits: &Limits) -> splatkit::Result<Vec<f64>> {
     let source = Source::open(path, limits)?;
-    let size = source.bytes().len();
-    if size > MOST_BYTES {
-        let message = format!("has {size} bytes, but the table of a kernel has {MOST_BYTES} at most");
-        return Err(source.error("kernel", message));
-    }
-    // A copy: text that was checked stays what it is.
-    let bytes = source.bytes().to_vec();
-    source.intact()?;
-    let text = std::str::from_utf8(&bytes)
-        .map_err(|e| source.error(format!("byte {}", e.valid_up_to()), "is not UTF-8 text"))?;
+    let text = source.small_text("the table of a kernel", MOST_BYTES)?;
     if text.trim_start().starts_with('[') {
-        return serde_json::from_str(text).map_err(|e| source.error("kernel", e.to_string()));
+        return serde_json::from_str(&text).map_err(|e| source.error("kernel", e.to_string()));
     }
     let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let number = |(at, line): (usize, &str)| {
