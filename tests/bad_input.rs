@@ -6,8 +6,8 @@ mod inputs;
 use inputs::*;
 use splatkit::{
     Error,
-    hierarchy::file,
-    io::{self, Limits, RawLayout},
+    hierarchy::{Hierarchy, file},
+    io::Limits,
     volume::bricks,
 };
 use std::{
@@ -202,6 +202,7 @@ fn worst_inputs_stay_within_their_limits() {
 #[cfg(unix)]
 #[test]
 fn places_beyond_what_32_bits_count_are_found() {
+    use splatkit::io::{RawLayout, load_volume};
     use std::io::{Seek, SeekFrom, Write};
     let folder = Folder::new();
     let header = (4u64 << 30) + 36;
@@ -211,7 +212,7 @@ fn places_beyond_what_32_bits_count_are_found() {
         file.seek(SeekFrom::Start(header)).and_then(|_| file.write_all(&samples[..end])).expect("room");
     }
     let layout = RawLayout { header, ..RAW };
-    let read = |name: &str, limits: &Limits| match io::load_volume(&folder.0.join(name), limits, Some(&layout)) {
+    let read = |name: &str, limits: &Limits| match load_volume(&folder.0.join(name), limits, Some(&layout)) {
         Ok(volume) => format!("{:?} {}", volume.range, volume.value(63)),
         Err(error) => error.to_string().replace(&format!("{}/", folder.0.display()), ""),
     };
@@ -240,6 +241,38 @@ fn peak() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap_or_default();
     line.trim().trim_end_matches(" kB").parse::<u64>().unwrap_or_default() * 1024
+}
+
+/// Pieces of the same bytes, each the whole.
+fn shared_pieces(count: usize, bytes: usize) -> Vec<u8> {
+    let extent = format!("0 {} 0 0 0 0", bytes - 1);
+    let piece = format!(
+        "<Piece Extent='{extent}'><PointData><DataArray type='UInt8' Name='v' format='appended' offset='0'/></PointData></Piece>"
+    );
+    let head = format!(
+        "<VTKFile type='ImageData' byte_order='LittleEndian'><ImageData WholeExtent='{extent}'>{}</ImageData>\
+         <AppendedData encoding='raw'>_",
+        piece.repeat(count)
+    );
+    let mut file = head.into_bytes();
+    file.extend((bytes as u32).to_le_bytes());
+    file.resize(file.len() + bytes, 7);
+    file.extend(b"</AppendedData></VTKFile>");
+    file
+}
+
+/// A hierarchy of few bytes and many nodes is under the limit in whatever way it is read.
+#[test]
+fn equal_pages_are_read_within_limits() {
+    let limits = Limits { bytes: 256 << 20, ..Limits::default() };
+    let bytes = crafted::pages_of_one_node(100);
+    let hierarchy = Hierarchy::from_bytes(bytes, Path::new("equal.splk"), &limits).expect("a directory");
+    let told = [
+        hierarchy.read_tree().map(|_| ()).expect_err("too much").to_string(),
+        hierarchy.leaves().map(|_| ()).expect_err("too much").to_string(),
+    ];
+    assert!(told.iter().all(|told| told.contains("over the limit of 268435456")), "{told:?}");
+    assert_eq!(hierarchy.read_page(0).expect("a page").nodes.len(), 4089);
 }
 
 /// Files that become much larger than they are.
@@ -272,6 +305,7 @@ fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
         ("wide.txt", wide.into()),
         ("faces.obj", format!("v 0 0 0\n{}", "f 1 1 1\n".repeat(mib / 2)).into()),
         ("corners.obj", format!("v 0 0 0\nf {polygon}").replace(" 0", " 1").into()),
+        ("numbers.obj", format!("v {polygon}").replace(" 0", " 1").into()),
         ("vertices.obj", "v 0 0 0\n".repeat(mib).into()),
         ("polygon.ply", list),
         ("lines.ply", ply(&format!("element vertex {mib}\n{FLOATS}"), &"0 0 0\n".repeat(mib))),
@@ -296,6 +330,11 @@ fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
         ("bomb.vti", vti),
         ("pieces.vti", vtk_xml("ImageData", "", &"<Piece/>".repeat(mib / 4)).into()),
         ("attributes.vti", vtk_xml("ImageData", "", &"<Piece a='' b='' c='' d=''/>".repeat(mib / 8)).into()),
+        (
+            "attribute.vti",
+            vtk_xml("ImageData", &(0..mib / 8).map(|i| format!(" a{i}=''")).collect::<String>(), "").into(),
+        ),
+        ("shared.vti", shared_pieces(20_000, mib)),
         ("deep.vti", vtk_xml("ImageData", "", &"<a>".repeat(mib)).into()),
         ("nested.gltf", "[".repeat(4 * mib).into()),
         ("nested.json", "[".repeat(mib).into()),

@@ -160,6 +160,16 @@ fn scene_of(set: SplatSet) -> Scene {
     }
 }
 
+/// Samples of which there are none have no range of values.
+#[test]
+fn no_samples_beside_a_surface_are_nothing() {
+    let none = SplatSet { splats: Vec::new(), ..samples() };
+    let mut faults = Faults::default();
+    let scene = Scene::new().with_splats(ball()).with_samples(none, transfer());
+    faults.look("no samples", &scene, &camera(), &settings());
+    faults.tell();
+}
+
 #[test]
 fn splats_that_are_not_finite_are_named() {
     for set in [ball(), samples()] {

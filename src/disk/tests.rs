@@ -191,13 +191,14 @@ fn what_is_there_is_left_as_it_is() {
     // What has the name of a leftover but is none, nor a file.
     let path = folder.path().join("b.txt");
     std::fs::create_dir(folder.path().join(".b.txt.0.splatkit-part")).unwrap();
+    let other = folder.write("other", OLD);
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(&other, folder.path().join(".b.txt.1.splatkit-part")).unwrap();
+    write(&path, b"new").unwrap();
+    assert_eq!(std::fs::read(other).unwrap(), OLD);
     #[cfg(unix)]
     {
-        use std::os::unix::fs::{PermissionsExt, symlink};
-        let other = folder.write("other", OLD);
-        symlink(&other, folder.path().join(".b.txt.1.splatkit-part")).unwrap();
-        write(&path, b"new").unwrap();
-        assert_eq!(std::fs::read(other).unwrap(), OLD);
+        use std::os::unix::fs::PermissionsExt;
         // Who may read it does not change.
         std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o600)).unwrap();
         write(&path, b"newer").unwrap();

@@ -8,6 +8,8 @@ use crate::{
 
 /// Entries of the transfer function, over the values between which it changes.
 const VALUES: usize = 4096;
+/// Entries before the first value that the function changes at, and behind the last one.
+const BESIDE: f64 = 2.0;
 /// Values of a field may leave the range of its samples by this part of it, where kernels have negative parts.
 const OVERSHOOT: f64 = 0.25;
 /// Entries of the gradient's factor.
@@ -51,7 +53,8 @@ impl Tables {
         let mut entries = transfer.table([low, high], VALUES);
         entries.push(entries[VALUES - 1]);
         entries.extend(integrals(transfer, [low, high]));
-        let most = transfer.gradient.last().map_or(1.0, |point| point.0.max(f64::MIN_POSITIVE));
+        let most =
+            transfer.gradient.last().map_or(1.0, |point| point.0.max(f64::from(f32::MIN_POSITIVE) * GRADIENTS as f64));
         let magnitude = |i: usize| most * i as f64 / (GRADIENTS - 1) as f64;
         entries.extend((0..=GRADIENTS).map(|i| [transfer.gradient_factor(magnitude(i)) as f32, 0.0, 0.0, 0.0]));
         if let Some(kernel) = kernel.filter(|kernel| !matches!(kernel.profile, Profile::Gaussian(_))) {
@@ -78,12 +81,16 @@ fn shown(transfer: &TransferFunction, value: f64) -> [f64; 4] {
 /// The values that get entries: those between which the function changes, as far as a field with samples in `range` has
 /// them. So a function of a few values has its corners where they are, however wide the data's range is.
 fn window(transfer: &TransferFunction, [low, high]: [f64; 2]) -> [f64; 2] {
+    // No samples have no range.
+    let [low, high] = if low <= high { [low, high] } else { [0.0; 2] };
     let reach = OVERSHOOT * (high - low);
     let [first, last] = transfer.span().map(|value| value.clamp(low - reach, high + reach));
     // A single step, or a function that does not change there. 32 bits tell so many values near one from each other.
     let least = (first.abs() * 2f64.powi(-12)).max(f64::from(f32::MIN_POSITIVE) * VALUES as f64);
     let lack = (least - (last - first)).max(0.0);
-    [first - lack / 2.0, last + lack / 2.0]
+    // Where it begins or ends by a step, both sides of that have entries.
+    let beside = (last - first).max(least) * BESIDE / (VALUES - 1) as f64;
+    [first - lack / 2.0 - beside, last + lack / 2.0 + beside]
 }
 
 /// Running integrals of extinction times colour, and of extinction, in entries. Each step is a mean over points inside it, so
@@ -174,11 +181,12 @@ mod tests {
 
     #[test]
     fn integrals_are_exact_across_a_jump() {
-        let transfer =
-            TransferFunction { opacity: vec![(0.0, 0.0), (0.5, 0.0), (0.5, 0.9)], ..TransferFunction::default() };
+        let opacity = vec![(0.0, 0.0), (0.5, 0.0), (0.5, 0.9), (1.0, 0.9)];
+        let transfer = TransferFunction { opacity, ..TransferFunction::default() };
         let tables = Tables::new(&transfer, [0.0, 1.0], None);
-        let whole = f64::from(tables.entries[INTEGRAL_START + VALUES - 1][3]) / (VALUES - 1) as f64;
-        let expected = 0.5 * transfer.extinction(0.9);
+        let [low, per_value, last, _] = tables.transfer.map(f64::from);
+        let whole = f64::from(tables.entries[INTEGRAL_START + VALUES - 1][3]) / per_value;
+        let expected = (low + last / per_value - 0.5) * transfer.extinction(0.9);
         assert!((whole / expected - 1.0).abs() < 1e-3, "{whole} {expected}");
     }
 
@@ -193,14 +201,38 @@ mod tests {
             window(&transfer, range)
         };
         // Of 16-bit data a few hundred values; of a function far wider than the data what these can have.
-        assert_eq!(over(&[(100.0, 0.0), (400.0, 1.0)], [-32768.0, 32767.0]), [100.0, 400.0]);
-        assert_eq!(over(&[(-1e6, 0.0), (1e6, 1.0)], [0.0, 100.0]), [-25.0, 125.0]);
+        let near = |found: [f64; 2], expected: [f64; 2]| {
+            let beside = (expected[1] - expected[0]) * 2.0 / 4095.0;
+            let is_near = found[0] < expected[0] && expected[1] < found[1];
+            assert!(is_near && found[1] - found[0] < expected[1] - expected[0] + 2.01 * beside, "{found:?}");
+        };
+        near(over(&[(100.0, 0.0), (400.0, 1.0)], [-32768.0, 32767.0]), [100.0, 400.0]);
+        near(over(&[(-1e6, 0.0), (1e6, 1.0)], [0.0, 100.0]), [-25.0, 125.0]);
+        // No samples at all.
+        assert!(over(&[(100.0, 0.0), (400.0, 1.0)], [f64::INFINITY, f64::NEG_INFINITY]).iter().all(|v| v.is_finite()));
         // A step, at 0 too, and values that are all one.
         for (value, range) in [(80.0, [0.0, 255.0]), (0.0, [-1.0, 1e30]), (7.0, [7.0, 7.0])] {
             let [low, high] = over(&[(value, 0.0), (value, 1.0)], range);
             assert!(low < value && value < high && high - low <= value * 1e-3 + 1e-30, "{low} {high}");
             assert!(((VALUES as f64 / (high - low)) as f32).is_finite());
         }
+    }
+
+    /// Steps at the first and at the last point have both their sides.
+    #[test]
+    fn values_before_and_behind_are_those_of_the_function() {
+        let with = |opacity: &[(f64, f64)]| {
+            let color = vec![(opacity[0].0, [1.0; 3])];
+            let transfer = TransferFunction { color, opacity: opacity.to_vec(), ..TransferFunction::default() };
+            let tables = Tables::new(&transfer, [0.0, 255.0], None);
+            let entries = [tables.entries[0][3], tables.entries[VALUES - 1][3]];
+            let beyond = tables.beyond.map(|shown| shown[3]);
+            assert_eq!(entries, [0.0, 255.0].map(|value| transfer.extinction(value) as f32), "{opacity:?}");
+            assert_eq!(beyond, entries, "{opacity:?}");
+        };
+        with(&[(50.0, 0.8), (50.0, 0.0), (100.0, 0.0)]);
+        with(&[(0.2, 0.0), (0.9, 0.0), (0.9, 1.0)]);
+        with(&[(80.0, 0.0), (80.0, 0.5)]);
     }
 
     #[test]

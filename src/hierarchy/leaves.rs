@@ -11,8 +11,9 @@ impl Hierarchy {
     /// The splats of the finest level, page by page: what the hierarchy was built of, as its file keeps them.
     ///
     /// # Errors
-    /// Those of [`read_page`](Self::read_page).
+    /// Those of [`read_tree`](Self::read_tree).
     pub fn leaves(&self) -> Result<SplatSet> {
+        self.check_size()?;
         let of_page = |page: u32| {
             let page = self.read_page(page)?;
             let nodes = page.nodes.iter().filter(|node| node.is_leaf() && !page.has_portals);

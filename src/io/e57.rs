@@ -1,5 +1,7 @@
 //! E57, the format of terrestrial laser scanners (ASTM E2807): all scans of a file in one cloud, by the `e57` crate.
 
+mod description;
+mod streams;
 #[cfg(test)]
 mod tests;
 
@@ -28,8 +30,11 @@ const POINTS: u64 = 1 << 16;
 pub fn read(source: &Source) -> Result<Mesh> {
     // The crate asserts and clamps by numbers of the file, which may panic.
     let cloud = isolated(source, "scans", || {
-        let mut file = E57Reader::new(Cursor::new(source.bytes()))
-            .map_err(|error| source.error("file", format!("is no E57 file that can be read: {error}")))?;
+        let unreadable =
+            |error: ::e57::Error| source.error("file", format!("is no E57 file that can be read: {error}"));
+        let xml = E57Reader::raw_xml(Cursor::new(source.bytes())).map_err(unreadable)?;
+        description::check(source, &xml)?;
+        let mut file = E57Reader::new(Cursor::new(source.bytes())).map_err(unreadable)?;
         let scans = file.pointclouds();
         let claimed = scans.iter().fold(0u64, |sum, scan| sum.saturating_add(scan.records));
         source.check_points("the number of points", claimed)?;
@@ -41,6 +46,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
         for (number, scan) in scans.iter().enumerate() {
             let wrong = |message: String| source.error(format!("scan {number}"), message);
             check(scan).map_err(|message| wrong(message.into()))?;
+            streams::check(source, scan, number, streams::MOST_WAITING)?;
             let start = positions.len();
             let mut points = file.pointcloud_simple(scan).map_err(|error| wrong(error.to_string()))?;
             points.intensity_to_color(false);
@@ -51,7 +57,10 @@ pub fn read(source: &Source) -> Result<Mesh> {
                     Ok(point) => point,
                     // What the crate says of a packet that completes no point, such as one of an index. The next call
                     // reads on, and meets the end of the file if nothing else.
-                    Err(::e57::Error::Internal { .. }) => continue,
+                    Err(::e57::Error::Internal { .. }) => {
+                        source.check_time()?;
+                        continue;
+                    }
                     Err(error) => return Err(wrong(format!("ends after {index} points: {error}"))),
                 };
                 index += 1;

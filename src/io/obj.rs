@@ -181,7 +181,7 @@ fn read_cloud(source: &Source, text: &str, survey: &Survey) -> Result<Mesh> {
         if words.next() != Some("v") {
             continue;
         }
-        let values: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
+        let values: Vec<f64> = words.take(6).map_while(|word| word.parse().ok()).collect();
         if values.len() < 3 {
             return Err(source.error(format!("line {}", number + 1), "a vertex needs three numbers"));
         }

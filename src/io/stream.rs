@@ -71,7 +71,7 @@ impl<'a> Stream<'a> {
         let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
         let form = match extension.as_str() {
             "ply" => ply::Pieces::find(&source).map(|pieces| pieces.map(Form::Ply)),
-            "las" | "laz" => las::Pieces::find(&source).map(|pieces| Some(Form::Las(pieces))),
+            "las" | "laz" => las::Pieces::find(&source).map(|pieces| pieces.map(Form::Las)),
             _ => Ok(None),
         };
         let form = source.unless_changed(form)?;

@@ -69,6 +69,10 @@ pub(super) fn samples<'a>(source: &Source, document: &'a Document, whole: Extent
     assemble(source, whole, parts)
 }
 
+/// How often a point may be there, on average: pieces of one cell have each of their points eight times, and more where they
+/// overlap. Several pieces may have the same bytes of the file.
+const MOST_TIMES: u64 = 64;
+
 /// Puts pieces together to the whole extent. Neighbouring pieces share the points between them.
 fn assemble<'a>(source: &Source, whole: Extent, parts: Vec<(Extent, Part<'a>)>) -> Result<Part<'a>> {
     let wrong = |message: &str| source.error("Piece", message);
@@ -91,6 +95,9 @@ fn assemble<'a>(source: &Source, whole: Extent, parts: Vec<(Extent, Part<'a>)>) 
     if held < count {
         return Err(wrong(&format!("holds {held} points with all others, but the whole extent has {count}")));
     }
+    if held / MOST_TIMES > count {
+        return Err(wrong(&format!("holds {held} points with all others, too many for an extent of {count}")));
+    }
     if parts.len() == 1 {
         let mut parts = parts;
         return parts.pop().map(|(_, part)| part).ok_or_else(|| wrong("is missing"));
@@ -101,6 +108,7 @@ fn assemble<'a>(source: &Source, whole: Extent, parts: Vec<(Extent, Part<'a>)>) 
     let mut bytes = vec![0; count as usize * width];
     let mut filled = vec![false; count as usize];
     for (extent, part) in &parts {
+        source.check_time()?;
         let [nx, ny, nz] = dims(source, extent)?;
         let first: [usize; 3] = std::array::from_fn(|axis| (extent[axis][0] - whole[axis][0]) as usize);
         for (row, values) in part.bytes.chunks_exact(nx * width).enumerate().take(ny * nz) {

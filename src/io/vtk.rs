@@ -137,6 +137,10 @@ impl<'a> DataSet<'a> {
                     let axis = usize::from(keyword.as_bytes()[0] - b'X');
                     data.places[axis] = parser.array(&place, parser.count(&place, count)?, kind)?.doubles(source)?;
                 }
+                // Cells that were read refer to points that were there.
+                ("POINTS", _) if !(data.cells.points.is_empty() && data.cells.corners.is_empty()) => {
+                    return Err(wrong("POINTS are given twice, or behind the cells".into()));
+                }
                 ("POINTS", [count, kind]) => {
                     let count = parser.count(&place, count)?;
                     let numbers = parser.array(&place, count.saturating_mul(3), kind)?.doubles(source)?;

@@ -346,10 +346,17 @@ fn sample_type(name: &str) -> Option<SampleType> {
     })
 }
 
+/// Attributes of one element; VTK's have a dozen.
+const MOST_ATTRIBUTES: usize = 64;
+
 fn attributes(source: &Source, at: u64, tag: &BytesStart) -> Result<Attributes> {
     let wrong = |e: String| source.error(format!("byte {at}"), format!("has a wrong attribute: {e}"));
     let mut attributes = Attributes::new();
     for attribute in tag.attributes() {
+        // Each is compared with all before it.
+        if attributes.len() == MOST_ATTRIBUTES {
+            return Err(wrong(format!("there are more than {MOST_ATTRIBUTES}")));
+        }
         let attribute = attribute.map_err(|e| wrong(e.to_string()))?;
         let value = attribute.normalized_value(XmlVersion::Implicit1_0).map_err(|e| wrong(e.to_string()))?;
         attributes.insert(attribute.key.as_ref().to_owned(), value.into_owned());

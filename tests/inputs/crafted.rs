@@ -121,9 +121,11 @@ pub fn pages_of_one_node(full: u32) -> Vec<u8> {
         page.extend([1u32 << 16; 4].iter().flat_map(|v| v.to_le_bytes()));
         page
     };
-    let inner = full * PAGE_NODES;
+    // Siblings are on one page, and the root has none.
+    let first_page = PAGE_NODES - 7;
+    let inner = first_page + (full - 1) * PAGE_NODES;
     let nodes = 1 + 8 * inner;
-    let count = nodes.div_ceil(PAGE_NODES);
+    let count = 1 + (nodes - first_page).div_ceil(PAGE_NODES);
     let mut head = splk(false)[..160].to_vec();
     head[104..112].copy_from_slice(&u64::from(nodes - inner).to_le_bytes());
     head[112..120].copy_from_slice(&u64::from(nodes).to_le_bytes());
@@ -131,10 +133,12 @@ pub fn pages_of_one_node(full: u32) -> Vec<u8> {
     head[136..144].fill(0);
     let block = [0, count, nodes, u32::MAX];
     let (mut directory, mut contents) = (Vec::new(), Vec::new());
+    let mut begin = 0;
     for number in 0..count {
         let content = page(u8::from(number < full));
-        let own = PAGE_NODES.min(nodes - number * PAGE_NODES);
-        let first_child = nodes.min(1 + 8 * PAGE_NODES * number);
+        let own = if number == 0 { first_page } else { PAGE_NODES.min(nodes - begin) };
+        let first_child = nodes.min(1 + 8 * begin);
+        begin += own;
         // In the order of the file.
         directory.extend(u64::from(number).to_le_bytes());
         directory.extend([content.len() as u32, 0, own, first_child].iter().flat_map(|v| v.to_le_bytes()));

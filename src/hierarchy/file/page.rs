@@ -5,7 +5,10 @@ use super::{
     pages::{Run, levels, pages, reach, round_up},
     quantise::Shape,
 };
-use crate::{hierarchy::Node, splat::decode_normal};
+use crate::{
+    hierarchy::{MOST_CHILDREN, Node},
+    splat::decode_normal,
+};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -176,6 +179,9 @@ pub fn decode(bytes: &[u8], count: usize, first_child: u32, extent: f32) -> Resu
     for (index, node) in nodes.iter().enumerate() {
         if !is_finite(node) {
             return Err(format!("its node {index} has a value that is not finite"));
+        }
+        if node.children as usize > MOST_CHILDREN {
+            return Err(format!("its node {index} has {} children; {MOST_CHILDREN} are the most", node.children));
         }
         let wanted = if node.is_leaf() { 0 } else { next };
         if node.first_child != wanted {

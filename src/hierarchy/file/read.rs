@@ -270,9 +270,7 @@ impl Hierarchy {
     /// # Errors
     /// Those of [`read_page`](Self::read_page), and [`Error::Limit`] where the tree is larger than the limits allow.
     pub fn read_tree(&self) -> Result<Tree> {
-        // As pages, and joined.
-        let found = self.header.nodes.saturating_mul(2 * size_of::<Node>() as u64);
-        self.limits.check(LimitKind::Bytes, &self.path, "the size of the tree in bytes", found)?;
+        self.check_size()?;
         let blocks = (0..self.directory.blocks.len() as u32).map(|block| self.read_block(block));
         Ok(Tree {
             origin: self.header.origin,
@@ -284,13 +282,22 @@ impl Hierarchy {
         })
     }
 
+    /// Refuses a tree that is larger than the limits allow: a page of equal nodes takes a few bytes of the file.
+    pub(in crate::hierarchy) fn check_size(&self) -> Result<()> {
+        // As pages, and joined.
+        let found = self.header.nodes.saturating_mul(2 * size_of::<Node>() as u64);
+        self.limits.check(LimitKind::Bytes, &self.path, "the size of the tree in bytes", found)
+    }
+
     pub(super) fn read_block(&self, block: u32) -> Result<Block> {
         let entry = self.directory.blocks[block as usize];
         // A page of equal nodes takes a few bytes of the file.
         let found = u64::from(entry.nodes) * 2 * size_of::<Node>() as u64;
         self.limits.check(LimitKind::Bytes, &self.path, format!("the size of block {block} in bytes"), found)?;
         let pages = entry.first_page..entry.first_page + entry.pages;
-        let pages: Vec<Vec<Node>> = pages.into_par_iter().map(|page| self.read_nodes(page)).collect::<Result<_>>()?;
+        // Of several damaged pages the first is told, whichever thread finds one first.
+        let pages: Vec<Result<Vec<Node>>> = pages.into_par_iter().map(|page| self.read_nodes(page)).collect();
+        let pages: Vec<Vec<Node>> = pages.into_iter().collect::<Result<_>>()?;
         Ok(Block { nodes: pages.concat(), portal: Some(entry.portal).filter(|&portal| portal != NO_PORTAL) })
     }
 

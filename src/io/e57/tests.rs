@@ -173,3 +173,46 @@ fn no_changed_description_does_harm() {
         }
     }
 }
+
+/// What a parser would compare for ever is refused before it sees it.
+#[test]
+fn descriptions_of_many_names_are_refused() {
+    let many = |what: fn(usize) -> String| {
+        let names: String = (0..2000).map(what).collect();
+        load(&file(&scans(), |xml| xml.replacen("<e57Root", &format!("<e57Root{names}"), 1))).unwrap_err().to_string()
+    };
+    let message = many(|i| format!(" xmlns:p{i}='u'"));
+    assert!(message.contains("more than 256"), "{message}");
+    let message = many(|i| format!(" a{i}='<>='"));
+    assert!(message.contains("an element has more than 256 attributes"), "{message}");
+    let nested = file(&scans(), |xml| {
+        let elements: String = (0..300).map(|i| format!("<a xmlns:q{i}='u'/>")).collect();
+        xml.replacen("</e57Root>", &format!("{elements}</e57Root>"), 1)
+    });
+    let message = load(&nested).unwrap_err().to_string();
+    assert!(message.contains("more than 256 namespaces"), "{message}");
+}
+
+/// Values of streams that are ahead of the others are kept until theirs come: that is counted by the packets' headers.
+#[test]
+fn values_that_wait_for_others_are_counted() {
+    let records =
+        [cartesian(), vec![(RecordName::RowIndex, integer(1)), (RecordName::ColumnIndex, integer(0))]].concat();
+    let point = [doubles([1.0, 2.0, 3.0]), vec![RecordValue::Integer(1), RecordValue::Integer(0)]].concat();
+    let content = file(&[(records, vec![point; 5000], None)], |xml| xml);
+    let folder = Folder::new();
+    let path = folder.write("a.e57", &content);
+    let limits = Limits::default();
+    let source = Source::open(&path, &limits).unwrap();
+    let scans = E57Reader::new(Cursor::new(source.bytes())).unwrap().pointclouds();
+    let told = |most: u64| streams::check(&source, &scans[0], 0, most).map_err(|error| error.to_string());
+    told(streams::MOST_WAITING).unwrap();
+    // A packet has some 2,500 points of 24 bytes and a bit, and of a record that takes none.
+    let message = told(1000).unwrap_err();
+    let words: Vec<&str> = message.split(' ').collect();
+    let at = words.iter().position(|word| *word == "values").unwrap();
+    let waiting: u64 = words[at - 1].parse().unwrap();
+    assert!((5 * 1000..=5 * 2731 + 8).contains(&waiting), "{message}");
+    told(5 * 2731 + 8).unwrap();
+    assert_eq!(read(&source).unwrap().positions.len(), 5000);
+}

@@ -112,8 +112,10 @@ impl Buffers<'_> {
                 if stride < size {
                     return Err(error(format!("the stride of {stride} bytes is less than an element's {size}")));
                 }
-                let needed = if count == 0 { 0 } else { (count as u64 - 1) * stride as u64 + size as u64 };
-                if offset.checked_add(needed).is_none_or(|end| end > bytes.len() as u64) {
+                let before = (count as u64).saturating_sub(1).checked_mul(stride as u64);
+                let own = if count == 0 { 0 } else { size as u64 };
+                let end = before.and_then(|before| before.checked_add(own)?.checked_add(offset));
+                if end.is_none_or(|end| end > bytes.len() as u64) {
                     let message =
                         format!("{count} elements from byte {offset} reach beyond the view's {}", bytes.len());
                     return Err(error(message));
@@ -124,7 +126,7 @@ impl Buffers<'_> {
             None if accessor.sparse.is_none() => {
                 return Err(error("has no data".into()).hint("compressed (meshopt, Draco) meshes are not read"));
             }
-            None if count as u64 * size as u64 > self.total() => {
+            None if (count as u64).saturating_mul(size as u64) > self.total() => {
                 return Err(error(format!("claims {count} elements without a buffer view to hold them")));
             }
             None => None,

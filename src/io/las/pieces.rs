@@ -17,6 +17,8 @@ use std::ops::Range;
 
 /// Points of a piece that is not packed.
 const POINTS: usize = 1 << 16;
+/// Packed points of a piece: a chunk is unpacked as a whole. Writers make chunks of some 50,000.
+const MOST_POINTS: usize = 1 << 21;
 
 pub struct Pieces {
     header: Header,
@@ -46,11 +48,15 @@ struct Seen {
 }
 
 impl Pieces {
-    pub fn find(source: &Source) -> Result<Self> {
+    /// `None` for chunks that are too large to be pieces.
+    pub fn find(source: &Source) -> Result<Option<Self>> {
         let header = Header::read(source)?;
         let packed = if header.packed {
             let layout = packed::layout(source, &header)?;
             let chunks = packed::chunks(source, &header, &layout)?;
+            if chunks.iter().any(|chunk| chunk.points > MOST_POINTS) {
+                return Ok(None);
+            }
             Some((layout, chunks))
         } else {
             plain_bytes(source, &header)?;
@@ -67,7 +73,7 @@ impl Pieces {
             }
             None => (0..header.points).step_by(POINTS).collect(),
         };
-        Ok(Self { header, packed, firsts, paint: Paint::None })
+        Ok(Some(Self { header, packed, firsts, paint: Paint::None }))
     }
 
     /// Points that the header counts, withheld ones too.

@@ -98,6 +98,7 @@ mod tests {
         Mapping::new(File::open(path).unwrap()).unwrap()
     }
 
+    #[cfg(any(target_os = "linux", target_os = "macos"))]
     fn shorten(path: &Path, length: u64) {
         File::options().write(true).open(path).unwrap().set_len(length).unwrap();
     }

@@ -164,7 +164,7 @@ mod tests {
             ("slice%02d.raw 1 4 -1", "counts no files"),
             ("slice%02d.raw 1 4 9", "there are 1 files"),
             ("slice%02d.raw 0 9223372036854775807 1", "more than there are samples"),
-            ("slice%02d.raw -9223372036854775808 9223372036854775807 1", "more than there are samples"),
+            ("slice%02d.raw -9223372036854775808 9223372036854775807 1", "counts no files"),
             ("slice%02d.raw 1 4 1 4", "does not tell 1, 2 or 3 axes"),
             ("LIST 2 2\n", "is not “LIST” with the axes"),
             ("LIST", "there are 0 files"),

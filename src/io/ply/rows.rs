@@ -253,7 +253,8 @@ fn end_of(data: &[u8], at: usize, kind: &PropertyType, big: bool) -> Result<usiz
     }
 }
 
-/// Visits a binary row whose bytes are known to be present.
+/// Visits a binary row. Its bytes were present when rows were counted: where a file changes under the reader and they are not
+/// any more, the row ends, and the reader tells of the change.
 fn walk(
     row: &[u8],
     element: &Element,
@@ -262,25 +263,29 @@ fn walk(
     list: &mut Vec<f64>,
     visit: &mut impl FnMut(usize, f64, Option<&List>),
 ) {
-    let mut at = 0;
+    let mut rest = row;
+    let mut take = |size: usize| {
+        let (part, behind) = rest.split_at_checked(size)?;
+        rest = behind;
+        Some(part)
+    };
     for (index, column) in element.columns.iter().enumerate() {
         match &column.kind {
             PropertyType::Scalar(kind) => {
+                let Some(bytes) = take(width(kind)) else { return };
                 if wanted[index] {
-                    visit(index, number(&row[at..], kind, big), None);
+                    visit(index, number(bytes, kind, big), None);
                 }
-                at += width(kind);
             }
             PropertyType::List(count, item) => {
-                let length = number(&row[at..], count, big);
-                at += width(count);
-                let size = length as usize * width(item);
+                let Some(bytes) = take(width(count)) else { return };
+                let length = number(bytes, count, big);
+                let Some(bytes) = take((length as usize).saturating_mul(width(item))) else { return };
                 if wanted[index] {
                     list.clear();
-                    list.extend(row[at..at + size].chunks_exact(width(item)).map(|bytes| number(bytes, item, big)));
+                    list.extend(bytes.chunks_exact(width(item)).map(|bytes| number(bytes, item, big)));
                     visit(index, length, Some(list));
                 }
-                at += size;
             }
         }
     }
