@@ -43,10 +43,11 @@ fn cull(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let count = candidate_count();
     let groups = (count + 64u * RUN - 1u) / (64u * RUN);
     // The dispatch is large enough for all nodes at hand, drawn or not.
-    if group.x >= dealt_count(groups) {
+    let own_group = group_number(group);
+    if own_group >= dealt_count(groups) {
         return;
     }
-    let number = dealt(group.x, groups) * 64u + lane;
+    let number = dealt(own_group, groups) * 64u + lane;
     let start = number * RUN;
     if stage.groups == 0u || start >= count {
         return;
@@ -85,7 +86,9 @@ fn cull(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
 
 @compute @workgroup_size(1)
 fn prepare() {
-    workgroups[0] = (atomicLoad(&drawn[active_count(source.first_run)]) + 63u) / 64u;
-    workgroups[1] = 1u;
+    let groups = (atomicLoad(&drawn[active_count(source.first_run)]) + 63u) / 64u;
+    let columns = min(groups, MOST_WORKGROUPS);
+    workgroups[0] = columns;
+    workgroups[1] = (groups + columns - 1u) / max(columns, 1u);
     workgroups[2] = 1u;
 }

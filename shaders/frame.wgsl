@@ -121,6 +121,18 @@ fn record_words(flags: u32) -> u32 {
 // A pixel that lets less light through than this is finished.
 const OPAQUE: f32 = 0.0005;
 
+// A row of a dispatch takes so many workgroups; more go on in further rows (Stage::dispatch in engine/stage.rs).
+const MOST_WORKGROUPS: u32 = 65535u;
+
+// The number of a workgroup, and that of an invocation in workgroups of 64.
+fn group_number(group: vec3<u32>) -> u32 {
+    return group.x + group.y * MOST_WORKGROUPS;
+}
+
+fn number_of(id: vec3<u32>) -> u32 {
+    return id.x + id.y * (64u * MOST_WORKGROUPS);
+}
+
 // Some drivers give each of their threads a row of a dispatch's workgroups (Mesa's software Vulkan). Where neighbours are
 // much alike, so that a row may have all the work or none, numbers are dealt out like cards to this many hands.
 const HANDS: u32 = 16u;

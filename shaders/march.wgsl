@@ -38,7 +38,7 @@ var<workgroup> neighbours: array<f32, 64>;
 @compute @workgroup_size(8, LANE_ROWS)
 fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) lane: vec3<u32>) {
     let tile_count = atomicLoad(&progress[progress_word(LISTED)]);
-    let number = dealt(group.x + group.y * 65535u, tile_count);
+    let number = dealt(group_number(group), tile_count);
     if number >= tile_count {
         return;
     }

@@ -13,7 +13,8 @@ fn pack_span(span: Span) -> vec2<u32> {
 
 @compute @workgroup_size(64)
 fn measure(@builtin(global_invocation_id) id: vec3<u32>) {
-    let start = id.x * RUN;
+    let number = number_of(id);
+    let start = number * RUN;
     let count = candidate_count();
     if start >= count {
         return;
@@ -34,5 +35,5 @@ fn measure(@builtin(global_invocation_id) id: vec3<u32>) {
         }
         spans[i] = packed;
     }
-    needs[source.first_run + id.x] = vec4(around, need);
+    needs[source.first_run + number] = vec4(around, need);
 }

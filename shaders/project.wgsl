@@ -62,10 +62,11 @@ fn write_general(at: u32, splat: Candidate) {
 
 @compute @workgroup_size(64)
 fn project(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= drawn[active_count(source.first_run)] {
+    let number = number_of(id);
+    if number >= drawn[active_count(source.first_run)] {
         return;
     }
-    let own = active_run(source.first_run, id.x);
+    let own = active_run(source.first_run, number);
     let run = drawn[own];
     var mask = drawn[own + 1u];
     var at = runs[run];

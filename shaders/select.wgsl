@@ -45,7 +45,8 @@ fn index_of(place: vec3<u32>) -> u32 {
 
 @compute @workgroup_size(64)
 fn count(@builtin(global_invocation_id) id: vec3<u32>) {
-    let block = block_of(id.x);
+    let number = number_of(id);
+    let block = block_of(number);
     if block.first.z >= block.end.z {
         return;
     }
@@ -57,16 +58,17 @@ fn count(@builtin(global_invocation_id) id: vec3<u32>) {
             }
         }
     }
-    blocks[id.x] = found;
+    blocks[number] = found;
 }
 
 @compute @workgroup_size(64)
 fn write(@builtin(global_invocation_id) id: vec3<u32>) {
-    let block = block_of(id.x);
+    let number = number_of(id);
+    let block = block_of(number);
     if block.first.z >= block.end.z {
         return;
     }
-    var at = blocks[id.x];
+    var at = blocks[number];
     for (var z = block.first.z; z < block.end.z; z++) {
         for (var y = block.first.y; y < block.end.y; y++) {
             for (var x = block.first.x; x < block.end.x; x++) {

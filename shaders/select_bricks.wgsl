@@ -42,20 +42,22 @@ fn block_of(id: u32) -> Block {
 
 @compute @workgroup_size(64)
 fn count(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= source.count >> 6u {
+    let number = number_of(id);
+    if number >= source.count >> 6u {
         return;
     }
-    let size = block_of(id.x).size;
-    blocks[id.x] = size.x * size.y * size.z;
+    let size = block_of(number).size;
+    blocks[number] = size.x * size.y * size.z;
 }
 
 @compute @workgroup_size(64)
 fn write(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= source.count >> 6u {
+    let number = number_of(id);
+    if number >= source.count >> 6u {
         return;
     }
-    let block = block_of(id.x);
-    var at = blocks[id.x];
+    let block = block_of(number);
+    var at = blocks[number];
     for (var z = 0u; z < block.size.z; z++) {
         for (var y = 0u; y < block.size.y; y++) {
             for (var x = 0u; x < block.size.x; x++) {

@@ -13,10 +13,11 @@ fn add(sheet: u32, band: u32, what: u32, need: vec2<u32>) {
 
 @compute @workgroup_size(64)
 fn survey(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= run_count.x {
+    let number = number_of(id);
+    if number >= run_count.x {
         return;
     }
-    let run = needs[id.x];
+    let run = needs[number];
     if run.w == 0u {
         return;
     }

@@ -25,23 +25,28 @@ const NARROW_AFAR: f32 = 1e-6;
 // Means over the values between two: extinction times colour, and extinction (pre-integration after Engel, Kraus & Ertl 2001,
 // without the attenuation inside, which the parts of a sheet are thin enough for).
 fn classify_between(a: f32, b: f32) -> vec4<f32> {
-    let end = frame.transfer.z;
-    var at = vec2(place_of(a), place_of(b));
-    if !BEYOND {
-        at = clamp(at, vec2(0.0), vec2(end));
+    if BEYOND {
+        return classify_beyond(place_of(a), place_of(b));
     }
+    let end = frame.transfer.z;
+    let at = clamp(vec2(place_of(a), place_of(b)), vec2(0.0), vec2(end));
     let middle = 0.5 * (at.x + at.y);
     let reach = 0.5 * max(abs(at.x - at.y), NARROW);
     // To whole entries outwards, which saves half of the look-ups; the mean moves by half an entry at most.
-    if !BEYOND {
-        let low = max(floor(middle - reach), 0.0);
-        let high = min(ceil(middle + reach), end);
-        return (tables[INTEGRAL_TABLE + u32(high)] - tables[INTEGRAL_TABLE + u32(low)]) / (high - low);
-    }
-    let low = floor(middle - max(reach, NARROW_AFAR * abs(middle)));
-    let high = ceil(middle + max(reach, NARROW_AFAR * abs(middle)));
+    let low = max(floor(middle - reach), 0.0);
+    let high = min(ceil(middle + reach), end);
+    return (tables[INTEGRAL_TABLE + u32(high)] - tables[INTEGRAL_TABLE + u32(low)]) / (high - low);
+}
+
+// The same of places that may lie before and behind the tables, where the function keeps its value.
+fn classify_beyond(a: f32, b: f32) -> vec4<f32> {
+    let end = frame.transfer.z;
+    let middle = 0.5 * (a + b);
+    let reach = max(0.5 * max(abs(a - b), NARROW), NARROW_AFAR * abs(middle));
+    let low = floor(middle - reach);
+    let high = ceil(middle + reach);
     let within = tables[INTEGRAL_TABLE + u32(clamp(high, 0.0, end))] - tables[INTEGRAL_TABLE + u32(clamp(low, 0.0, end))];
-    // Beyond the tables the function keeps its value. Ratios first: what lies far beyond may be as large as numbers get.
+    // Ratios first: what lies far beyond may be as large as numbers get.
     let inverse = 1.0 / (high - low);
     let before = (min(high, 0.0) - min(low, 0.0)) * inverse;
     let behind = (max(high, end) - max(low, end)) * inverse;

@@ -28,7 +28,7 @@ fn prepare() {
     // More workgroups than fit the first dimension of a dispatch go on in the second.
     let tiles = select(0u, atomicLoad(&progress[progress_word(LISTED)]), stage.groups > 0u);
     let workgroups = dealt_count(tiles);
-    let columns = min(workgroups, 65535u);
+    let columns = min(workgroups, MOST_WORKGROUPS);
     state[TILES] = tiles;
     arguments[ORDER_ARGUMENTS] = dealt_count((tiles * stage.groups + 63u) / 64u);
     arguments[MARCH_ARGUMENTS] = columns;

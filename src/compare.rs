@@ -5,10 +5,11 @@
 
 use crate::{
     Error, Result,
-    io::{LimitKind, Limits, Source},
+    io::{Limits, Source, decode_picture},
     picture::Picture,
+    surface::Texture,
 };
-use std::{io::Cursor, path::Path};
+use std::{collections::VecDeque, path::Path, sync::Arc};
 
 /// What [`compare`] and its like find.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,13 +33,6 @@ pub struct Comparison {
 /// # Errors
 /// [`Error::Argument`] where a picture has another number of bytes than its size asks for, or no pixels.
 pub fn compare(a: &[u8], b: &[u8], size: [u32; 2]) -> Result<Comparison> {
-    let premultiplied = |bytes: &[u8]| {
-        let pixels = bytes.chunks_exact(4).map(|pixel| {
-            let [r, g, b, a] = [0, 1, 2, 3].map(|channel| f64::from(pixel[channel]) / 255.0);
-            [r * a, g * a, b * a, a]
-        });
-        pixels.collect::<Vec<_>>()
-    };
     let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
     for (name, found) in [("first", a.len()), ("second", b.len())] {
         if found as u64 != bytes {
@@ -48,7 +42,11 @@ pub fn compare(a: &[u8], b: &[u8], size: [u32; 2]) -> Result<Comparison> {
             )));
         }
     }
-    compare_pixels(&premultiplied(a), &premultiplied(b), size)
+    let premultiplied = |bytes: &[u8], at: usize| {
+        let [r, g, b, a] = [0, 1, 2, 3].map(|channel| f64::from(bytes[4 * at + channel]) / 255.0);
+        [r * a, g * a, b * a, a]
+    };
+    compare_pixels(|at| premultiplied(a, at), |at| premultiplied(b, at), size)
 }
 
 /// Compares the colours and opacities of two pictures; their depths are not compared.
@@ -57,8 +55,15 @@ pub fn compare(a: &[u8], b: &[u8], size: [u32; 2]) -> Result<Comparison> {
 /// [`Error::Argument`] where the sizes differ.
 pub fn compare_pictures(a: &Picture, b: &Picture) -> Result<Comparison> {
     let size = same_size([a.width, a.height], [b.width, b.height])?;
-    let pixels = |picture: &Picture| picture.color.iter().map(|pixel| pixel.map(f64::from)).collect::<Vec<_>>();
-    compare_pixels(&pixels(a), &pixels(b), size)
+    let count = size[0] as usize * size[1] as usize;
+    for picture in [a, b] {
+        if picture.color.len() != count {
+            let [width, height] = size;
+            let found = picture.color.len();
+            return Err(Error::Argument(format!("a picture of {width}x{height} pixels cannot have {found} pixels")));
+        }
+    }
+    compare_pixels(|at| a.color[at].map(f64::from), |at| b.color[at].map(f64::from), size)
 }
 
 /// Compares two PNG or JPEG files (told apart by their content) at 8 bits a channel.
@@ -68,30 +73,13 @@ pub fn compare_pictures(a: &Picture, b: &Picture) -> Result<Comparison> {
 /// the sizes differ.
 pub fn compare_files(a: &Path, b: &Path, limits: &Limits) -> Result<Comparison> {
     let [a, b] = [load(a, limits)?, load(b, limits)?];
-    let size = same_size(a.dimensions().into(), b.dimensions().into())?;
-    compare(a.as_raw(), b.as_raw(), size)
+    let size = same_size([a.width, a.height], [b.width, b.height])?;
+    compare(a.texels.as_flattened(), b.texels.as_flattened(), size)
 }
 
-fn load(path: &Path, limits: &Limits) -> Result<image::RgbaImage> {
+fn load(path: &Path, limits: &Limits) -> Result<Arc<Texture>> {
     let source = Source::open(path, limits)?;
-    source.unless_changed(decode(&source))
-}
-
-fn decode(source: &Source) -> Result<image::RgbaImage> {
-    let broken = |e: image::ImageError| source.error("picture", e.to_string()).hint("pictures are PNG or JPEG files");
-    let reader = || {
-        let reader = image::ImageReader::new(Cursor::new(source.bytes())).with_guessed_format();
-        reader.map_err(|e| Error::file(source.path, "read", e))
-    };
-    let (width, height) = reader()?.into_dimensions().map_err(broken)?;
-    let texels = u64::from(width) * u64::from(height);
-    let limits = source.limits;
-    limits.check(LimitKind::Texels, source.path, "the picture's number of pixels", texels)?;
-    let mut decoder = reader()?;
-    let mut bounds = image::Limits::default();
-    bounds.max_alloc = Some(limits.bytes);
-    decoder.limits(bounds);
-    Ok(decoder.decode().map_err(broken)?.to_rgba8())
+    source.unless_changed(decode_picture(&source, "picture", source.bytes()))
 }
 
 fn same_size(a: [u32; 2], b: [u32; 2]) -> Result<[u32; 2]> {
@@ -102,18 +90,17 @@ fn same_size(a: [u32; 2], b: [u32; 2]) -> Result<[u32; 2]> {
     Err(Error::Argument(format!("pictures of {aw}x{ah} and {bw}x{bh} pixels cannot be compared")))
 }
 
-fn compare_pixels(a: &[[f64; 4]], b: &[[f64; 4]], size: [u32; 2]) -> Result<Comparison> {
+/// Compares what two functions tell of each pixel.
+fn compare_pixels(a: impl Fn(usize) -> [f64; 4], b: impl Fn(usize) -> [f64; 4], size: [u32; 2]) -> Result<Comparison> {
     let [width, height] = size.map(|side| side as usize);
     let count = width.saturating_mul(height);
-    if count == 0 || a.len() != count || b.len() != count {
-        let found = [a.len(), b.len()];
-        return Err(Error::Argument(format!("pictures of {width}x{height} pixels cannot have {found:?} pixels")));
+    if count == 0 {
+        return Err(Error::Argument(format!("pictures of {width}x{height} pixels have none to compare")));
     }
-    let opaque = |pixels: &[[f64; 4]]| pixels.iter().all(|pixel| pixel[3] == 1.0);
-    let channels = if opaque(a) && opaque(b) { 3 } else { 4 };
+    let channels = if (0..count).all(|at| a(at)[3] == 1.0 && b(at)[3] == 1.0) { 3 } else { 4 };
     let mut comparison = Comparison { psnr: None, ssim: 0.0, max_difference: 0.0, different_pixels: 0 };
     let mut squares = 0.0;
-    for (a, b) in a.iter().zip(b) {
+    for (a, b) in (0..count).map(|at| (a(at), b(at))) {
         let mut largest: f64 = 0.0;
         for channel in 0..channels {
             let difference = (a[channel] - b[channel]).abs();
@@ -126,45 +113,47 @@ fn compare_pixels(a: &[[f64; 4]], b: &[[f64; 4]], size: [u32; 2]) -> Result<Comp
     }
     let mean = squares / (count * channels) as f64;
     comparison.psnr = (mean > 0.0).then(|| -10.0 * mean.log10());
-    let brightness = |pixels: &[[f64; 4]]| -> Vec<f64> {
-        pixels.iter().map(|[r, g, b, _]| 0.299 * r + 0.587 * g + 0.114 * b).collect()
-    };
-    comparison.ssim = structural_similarity(&brightness(a), &brightness(b), [width, height]);
+    let brightness = |[r, g, b, _]: [f64; 4]| 0.299 * r + 0.587 * g + 0.114 * b;
+    comparison.ssim = structural_similarity(|at| [brightness(a(at)), brightness(b(at))], [width, height]);
     Ok(comparison)
 }
 
-/// The mean structural similarity of two pictures of one channel of 0 … 1.
-fn structural_similarity(a: &[f64], b: &[f64], size: [usize; 2]) -> f64 {
-    let product = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
-    let [mean_a, mean_b] = [a, b].map(|picture| windowed(picture, size));
-    let [square_a, square_b, mixed] = [(a, a), (b, b), (a, b)].map(|(a, b)| windowed(&product(a, b), size));
-    let (c1, c2) = (0.01 * 0.01, 0.03 * 0.03);
-    let similarity = |i: usize| {
-        let (a, b) = (mean_a[i], mean_b[i]);
-        let (variance_a, variance_b, covariance) = (square_a[i] - a * a, square_b[i] - b * b, mixed[i] - a * b);
-        (2.0 * a * b + c1) * (2.0 * covariance + c2) / ((a * a + b * b + c1) * (variance_a + variance_b + c2))
-    };
-    (0..mean_a.len()).map(similarity).sum::<f64>() / mean_a.len() as f64
-}
-
-/// The Gaussian averages of a picture over every window that lies inside it.
-fn windowed(picture: &[f64], [width, height]: [usize; 2]) -> Vec<f64> {
+/// The mean structural similarity of two pictures of one channel of 0 … 1, told pixel by pixel.
+fn structural_similarity(pixel: impl Fn(usize) -> [f64; 2], [width, height]: [usize; 2]) -> f64 {
     // A Gaussian over x and y is one over x after one over y.
     let [across, down] = [window(width), window(height)];
     let columns = width + 1 - across.len();
-    let rows = height + 1 - down.len();
-    let average = |window: &[f64], at: &dyn Fn(usize) -> f64| -> f64 {
-        window.iter().enumerate().map(|(i, weight)| weight * at(i)).sum()
-    };
-    let mut lines = Vec::with_capacity(columns * height);
+    let (c1, c2) = (0.01 * 0.01, 0.03 * 0.03);
+    // Of as many rows as a window is high: averages along the row of both, their squares and their product.
+    let mut rows: VecDeque<Vec<[f64; 5]>> = VecDeque::with_capacity(down.len());
+    let mut own = Vec::with_capacity(width);
+    let mut sum = 0.0;
     for y in 0..height {
-        lines.extend((0..columns).map(|x| average(&across, &|i| picture[y * width + x + i])));
+        own.clear();
+        own.extend((0..width).map(|x| {
+            let [a, b] = pixel(y * width + x);
+            [a, b, a * a, b * b, a * b]
+        }));
+        let mut row = if rows.len() == down.len() { rows.pop_front().unwrap_or_default() } else { Vec::new() };
+        row.clear();
+        row.extend((0..columns).map(|x| average(&across, own[x..].iter())));
+        rows.push_back(row);
+        if rows.len() < down.len() {
+            continue;
+        }
+        for x in 0..columns {
+            let [a, b, square_a, square_b, mixed] = average(&down, rows.iter().map(|row| &row[x]));
+            let (variance_a, variance_b, covariance) = (square_a - a * a, square_b - b * b, mixed - a * b);
+            sum +=
+                (2.0 * a * b + c1) * (2.0 * covariance + c2) / ((a * a + b * b + c1) * (variance_a + variance_b + c2));
+        }
     }
-    let mut out = Vec::with_capacity(columns * rows);
-    for y in 0..rows {
-        out.extend((0..columns).map(|x| average(&down, &|i| lines[(y + i) * columns + x])));
-    }
-    out
+    sum / (columns * (height + 1 - down.len())) as f64
+}
+
+/// The sum of some numbers times weights.
+fn average<'a>(window: &[f64], values: impl Iterator<Item = &'a [f64; 5]>) -> [f64; 5] {
+    window.iter().zip(values).fold([0.0; 5], |sum, (weight, value)| std::array::from_fn(|i| sum[i] + weight * value[i]))
 }
 
 /// The weights of a window along an axis of `length` pixels, of sum 1: 11 of them, or as many as the axis has.

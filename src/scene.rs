@@ -101,6 +101,11 @@ impl Scene {
     pub fn validate_settings(&self, settings: &Settings) -> Result<()> {
         let wrong = |message: String| Err(Error::Argument(message));
         numbers::check_settings(settings)?;
+        let [width, height] = settings.size;
+        if u64::from(width) * u64::from(height) > Settings::MAX_PIXELS {
+            let most = Settings::MAX_PIXELS;
+            return wrong(format!("a picture of {width}x{height} pixels is larger than {most} pixels"));
+        }
         if settings.clips.len() > Settings::MAX_CLIPS {
             return wrong(format!("{} clips are more than {}", settings.clips.len(), Settings::MAX_CLIPS));
         }
@@ -485,6 +490,8 @@ pub struct Settings {
 impl Settings {
     /// The most clips of one picture.
     pub const MAX_CLIPS: usize = 8;
+    /// Pixels of the largest picture: each takes 20 bytes of memory.
+    pub const MAX_PIXELS: u64 = 1 << 29;
 
     /// The defaults for a picture of `size` pixels (width, height).
     pub fn new(size: [u32; 2]) -> Self {

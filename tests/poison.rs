@@ -12,6 +12,7 @@ use splatkit::{
     scattered::{Points, SampleOptions},
     scene::{Clip, ClipShape, Scene, Settings},
     splat::{NO_NORMAL, Payload, Splat, SplatSet, encode_normal},
+    surface::{Mesh, SurfelOptions},
     volume::{Lattice, Samples, Shade, TransferFunction, Volume},
 };
 use std::sync::{Arc, OnceLock};
@@ -158,6 +159,18 @@ fn scene_of(set: SplatSet) -> Scene {
         Payload::Radiance => Scene::new().with_splats(set),
         Payload::Scalar => Scene::new().with_samples(set, transfer()),
     }
+}
+
+/// So far from the origin, an edge has no middle that is not one of its ends.
+#[test]
+fn triangles_far_from_the_origin_come_to_an_end() {
+    let mesh = Mesh {
+        positions: [(0.0, 0.0), (80.0, 0.0), (0.0, 80.0)].map(|(x, y)| Vec3::new(1e8 + x, 1e8 + y, 0.0)).to_vec(),
+        triangles: vec![[0, 1, 2]],
+        ..Mesh::default()
+    };
+    let set = mesh.surfels(&SurfelOptions::default()).expect("surfels");
+    assert!((1..1000).contains(&set.splats.len()), "{}", set.splats.len());
 }
 
 /// Samples of which there are none have no range of values.

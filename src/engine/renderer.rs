@@ -137,6 +137,7 @@ impl Renderer {
         let [width, height] = settings.size;
         let mut picture = Picture { width, height, color: Vec::new(), depth: Vec::new() };
         let mut stats = FrameStats::default();
+        prepared.scene.validate_settings(settings)?;
         let view = camera.view(settings.size)?;
         let detail = self.paced(&view, settings.detail);
         let start = Instant::now();
@@ -191,6 +192,7 @@ impl Renderer {
         profile: bool,
     ) -> Result<FrameStats> {
         let mut stats = FrameStats::default();
+        prepared.scene.validate_settings(settings)?;
         let view = camera.view(settings.size)?;
         let detail = self.paced(&view, settings.detail);
         let start = Instant::now();
@@ -238,7 +240,6 @@ impl Renderer {
         detail: Detail,
         profile: bool,
     ) -> Result<(Targets, FrameStats)> {
-        prepared.scene.validate_settings(settings)?;
         view.validate_for(&prepared.bounds)?;
         let _span = tracing::debug_span!("frame", width = view.size[0], height = view.size[1]).entered();
         let cut_pixels = self.cut_hierarchies(prepared, view, settings, detail)?;

@@ -11,6 +11,8 @@ use obvhs::{
     bvh2::Bvh2,
     ploc::{PlocBuilder, PlocSearchDistance, SortPrecision},
 };
+use rayon::prelude::*;
+use std::{borrow::Cow, collections::HashMap};
 
 /// The block above leaves that have these boxes: every node but for its sphere. `leaf` makes the leaf of a box. There is at
 /// least one; the root is one only where it is the only one. Also tells which box is behind each leaf.
@@ -18,7 +20,7 @@ pub(super) fn cluster(boxes: &[Aabb], leaf: impl Fn(u32) -> Node, preset: Preset
     if boxes.len() == 1 {
         return (Block { nodes: vec![leaf(0)], portal: None }, vec![0]);
     }
-    let pairs = pairs(boxes, preset);
+    let pairs = pairs(&apart(boxes), preset);
     let groups = groups(&pairs);
     let room = boxes.len() + boxes.len() / 4;
     let mut nodes: Vec<Node> = Vec::with_capacity(room);
@@ -74,6 +76,42 @@ pub(super) fn box_of(splat: &Splat) -> Aabb {
     let [xx, _, _, yy, _, zz] = covariance(&splat.factor);
     let (center, reach) = (Vec3::from(splat.center), 0.5 * WIDTH * (0.5 * (xx + yy + zz)).sqrt());
     Aabb::new((center - reach).into(), (center + reach).into())
+}
+
+/// Boxes of one place and size are set apart where there are many of them: a search for the nearest finds all the same there,
+/// and would join one pair in a round, so that the hierarchy became a chain. In the row that they make, halves of halves are
+/// ever nearer to each other.
+fn apart(boxes: &[Aabb]) -> Cow<'_, [Aabb]> {
+    let mut keys: Vec<u64> = boxes.par_iter().map(|own| mixed(key(own))).collect();
+    keys.sort_unstable();
+    if keys.len() <= MOST_ALIKE || !keys.windows(MOST_ALIKE + 1).any(|run| run[0] == run[MOST_ALIKE]) {
+        return Cow::Borrowed(boxes);
+    }
+    let mut found: HashMap<[u32; 6], u64> = HashMap::new();
+    let set_apart = |own: &Aabb| {
+        let before = found.entry(key(own)).or_default();
+        let place: u64 = (0..u64::BITS - before.leading_zeros()).map(|level| (*before >> level) << level).sum();
+        *before += 1;
+        let width = (own.max.x - own.min.x) / 1024.0;
+        // Far from the origin numbers of 32 bits are wider than that.
+        let step = width.max(own.max.x.abs().max(own.min.x.abs()) * 2f32.powi(-22));
+        let shift = Vec3::X * (step * place as f32);
+        Aabb::new((Vec3::from(own.min) + shift).into(), (Vec3::from(own.max) + shift).into())
+    };
+    Cow::Owned(boxes.iter().map(set_apart).collect())
+}
+
+/// So many equal boxes do no harm.
+const MOST_ALIKE: usize = 32;
+
+/// All bits of a box.
+fn key(own: &Aabb) -> [u32; 6] {
+    [own.min.x, own.min.y, own.min.z, own.max.x, own.max.y, own.max.z].map(|value| (value + 0.0).to_bits())
+}
+
+/// The bits in one number (Knuth 1973: by the golden ratio).
+fn mixed(key: [u32; 6]) -> u64 {
+    key.iter().fold(0, |sum: u64, &part| (sum.rotate_left(21) ^ u64::from(part)).wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }
 
 /// A binary hierarchy over the leaves' boxes.
@@ -139,6 +177,47 @@ fn gather(pairs: &Bvh2, closed: &[bool], at: usize, items: &mut Vec<u32>) {
             items.push(half);
         } else {
             gather(pairs, closed, half as usize, items);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::splat::NO_NORMAL;
+
+    /// Levels below the root.
+    fn depth(nodes: &[Node]) -> u32 {
+        let mut heights = vec![0; nodes.len()];
+        for (index, node) in nodes.iter().enumerate().rev().filter(|(_, node)| !node.is_leaf()) {
+            let first = node.first_child as usize;
+            heights[index] = 1 + heights[first..first + node.children as usize].iter().max().unwrap_or(&0);
+        }
+        heights[0]
+    }
+
+    #[test]
+    fn equal_splats_make_no_chain() {
+        for at in [0.0, 1e6, 1e30] {
+            let splat = Splat {
+                center: [at, 0.0, 0.0],
+                strength: 1.0,
+                factor: [1.0, 0.0, 1.0, 0.0, 0.0, 1.0],
+                color: u32::MAX,
+                normal: NO_NORMAL,
+            };
+            let leaf = |_| Node {
+                splat,
+                center: splat.center,
+                radius: 1.0,
+                size: 1.0,
+                cone: -1.0,
+                first_child: 0,
+                children: 0,
+            };
+            let (block, sources) = cluster(&vec![box_of(&splat); 8000], leaf, Preset::Balanced);
+            assert!(depth(&block.nodes) <= 16, "{} levels of 8000 at {at}", depth(&block.nodes));
+            assert_eq!(sources.len(), block.nodes.len());
         }
     }
 }

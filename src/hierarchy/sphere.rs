@@ -22,7 +22,7 @@ pub(crate) struct Sphere {
 const FEW_ROUNDS: u32 = 4;
 const MANY_ROUNDS: u32 = 16;
 /// Nodes this many levels above the leaves, and higher ones, are fitted to descendants below their children.
-const FITTED_HEIGHT: u8 = 3;
+const FITTED_HEIGHT: u32 = 3;
 /// How many levels below the children these descendants are.
 const LEVELS_BELOW: u32 = 1;
 
@@ -94,9 +94,9 @@ impl Sphere {
 }
 
 /// Gives every inner node of a block a sphere around its children's, and tells how many levels there are below each node.
-pub(crate) fn raise(block: &mut Block) -> Vec<u8> {
+pub(crate) fn raise(block: &mut Block) -> Vec<u32> {
     let nodes = &mut block.nodes;
-    let mut heights = vec![0u8; nodes.len()];
+    let mut heights = vec![0u32; nodes.len()];
     let mut around = Vec::new();
     for index in (0..nodes.len()).rev() {
         let children = children_of(&nodes[index]);
@@ -113,7 +113,7 @@ pub(crate) fn raise(block: &mut Block) -> Vec<u8> {
 
 /// Moves the spheres of a raised block into their parents', and makes those of higher nodes smaller. The root's lies in
 /// `outer`, or where that does not hold all leaves in one that does.
-pub(crate) fn nest(block: &mut Block, heights: &[u8], outer: Sphere) {
+pub(crate) fn nest(block: &mut Block, heights: &[u32], outer: Sphere) {
     let nodes = &mut block.nodes;
     let leaves = nodes.iter().filter(|node| node.is_leaf()).map(Sphere::of);
     let reach = leaves.map(|leaf| leaf.center.distance(outer.center) + leaf.radius).fold(0.0, f64::max);
@@ -140,7 +140,7 @@ pub(crate) fn nest(block: &mut Block, heights: &[u8], outer: Sphere) {
         if !outer.holds(&own) {
             descendants(nodes, index, levels, &mut around);
             // What sticks out of the outer sphere is looked at more closely; the leaves do not.
-            while levels < u32::from(heights[index]) && Sphere::reach(outer.center, &around) > outer.radius {
+            while levels < heights[index] && Sphere::reach(outer.center, &around) > outer.radius {
                 levels += 1;
                 descendants(nodes, index, levels, &mut around);
             }

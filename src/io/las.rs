@@ -8,6 +8,7 @@ mod packed;
 mod pieces;
 #[cfg(test)]
 mod tests;
+mod time;
 
 pub(super) use pieces::Pieces;
 

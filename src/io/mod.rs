@@ -57,6 +57,7 @@ pub use source::Source;
 pub(crate) use source::intact;
 pub(crate) use stream::StreamPoint;
 pub use stream::{Counts, Stream};
+pub(crate) use texture::decode as decode_picture;
 pub use volume_stream::VolumeStream;
 
 use crate::{Result, volume::Volume};

@@ -10,7 +10,7 @@ const MOST_TEXELS: u64 = 8 * 1032;
 const TEXEL: u64 = 8 + 4 + 4;
 
 /// Decodes a PNG or JPEG picture. `place` names what refers to it.
-pub(super) fn decode(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture>> {
+pub(crate) fn decode(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture>> {
     isolated(source, place, || decode_here(source, place, bytes))
 }
 

@@ -128,14 +128,17 @@ impl Camera {
 
     /// Turns the camera about the focal point around the view-up axis, in degrees (VTK's Azimuth).
     pub fn azimuth(&mut self, degrees: f64) {
-        let turn = glam::DQuat::from_axis_angle(self.view_up.normalize(), degrees.to_radians());
+        // Around no axis nothing turns; `view` tells of it.
+        let Some(axis) = self.view_up.try_normalize() else { return };
+        let turn = glam::DQuat::from_axis_angle(axis, degrees.to_radians());
         self.position = self.focal_point + turn * (self.position - self.focal_point);
     }
 
     /// Turns the camera about the focal point around the picture's horizontal axis, in degrees (VTK's Elevation).
     pub fn elevation(&mut self, degrees: f64) {
-        let forward = (self.focal_point - self.position).normalize();
-        let right = forward.cross(self.view_up).normalize();
+        let Some(forward) = (self.focal_point - self.position).try_normalize() else { return };
+        // Along the view-up axis any horizontal axis will do.
+        let right = forward.cross(self.view_up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
         let turn = glam::DQuat::from_axis_angle(right, -degrees.to_radians());
         self.position = self.focal_point + turn * (self.position - self.focal_point);
         // Past a pole the old up would point along the view; the turned one never does.

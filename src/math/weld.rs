@@ -5,14 +5,15 @@ use rayon::prelude::*;
 
 /// For each position the index of the first one that is equal to it (often itself).
 pub(crate) fn first_of_equals(positions: &[Vec3]) -> Vec<u32> {
-    let key = |index: u32| {
-        // Adding zero makes the two zeros one.
-        let p = positions[index as usize] + Vec3::ZERO;
-        (p.x.to_bits(), p.y.to_bits(), p.z.to_bits())
-    };
-    let mut order: Vec<u32> = (0..positions.len() as u32).collect();
+    // Adding zero makes the two zeros one.
+    first_of(positions.len(), |index| (positions[index as usize] + Vec3::ZERO).to_array().map(f32::to_bits))
+}
+
+/// For each of `count` things the index of the first one of the same key.
+pub(crate) fn first_of<K: Ord>(count: usize, key: impl Fn(u32) -> K + Sync) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..count as u32).collect();
     order.par_sort_unstable_by_key(|&index| (key(index), index));
-    let mut first = vec![0; positions.len()];
+    let mut first = vec![0; count];
     for equals in order.chunk_by(|&a, &b| key(a) == key(b)) {
         for &index in equals {
             first[index as usize] = equals[0];

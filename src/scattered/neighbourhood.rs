@@ -1,7 +1,7 @@
 //! What the nearest neighbours of a sample tell: how much room it has, and how the values change around it.
 
 use super::Points;
-use crate::math::{eigen, neighbours::Neighbours, weld::first_of_equals};
+use crate::math::{eigen, neighbours::Neighbours};
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -29,7 +29,7 @@ pub(super) struct Place {
 /// The places of all samples, and for each sample the index of its own. Coincident samples share a place: the tree is
 /// asked about different positions only, so that a distance is never 0 and no number of copies takes up all neighbours.
 pub(super) fn places(points: &Points, neighbours: usize) -> (Vec<Place>, Vec<u32>) {
-    let first = first_of_equals(&points.positions);
+    let first = Neighbours::first_of_equals(&points.positions);
     let mut place_of = vec![0; points.len()];
     let mut positions = Vec::new();
     let mut sums: Vec<(f64, u32)> = Vec::new();

@@ -7,7 +7,7 @@ use super::{
     paint::{pack, point_color},
 };
 use crate::{
-    math::{eigen, neighbours::Neighbours, weld::first_of_equals},
+    math::{eigen, neighbours::Neighbours},
     splat::{NO_NORMAL, Splat, encode_normal},
 };
 use glam::{DMat3, DVec3, Vec3};
@@ -77,7 +77,7 @@ struct Judged<'a> {
 
 impl<'a> Judged<'a> {
     fn new(mesh: &'a Mesh, mut known: Known) -> Self {
-        let first = first_of_equals(&mesh.positions);
+        let first = Neighbours::first_of_equals(&mesh.positions);
         let kept: Vec<u32> =
             (0..).zip(first).filter(|&(index, first)| index == first).map(|(index, _)| index).collect();
         let points: Vec<Vec3> = kept.par_iter().map(|&index| mesh.positions[index as usize]).collect();

@@ -106,9 +106,13 @@ impl Wanted<'_> {
         ((a - b) * Vec2::new(texture.width as f32, texture.height as f32)).length()
     }
 
-    /// How many times too long an edge is; up to 1 it may stay.
+    /// How many times too long an edge is; up to 1 it may stay. One that numbers of 32 bits have no middle for stays.
     fn excess(&self, mesh: &Mesh, source: usize, a: u32, b: u32) -> f32 {
-        let length = (mesh.positions[a as usize] - mesh.positions[b as usize]).length();
+        let ends = [mesh.positions[a as usize], mesh.positions[b as usize]];
+        if ends.contains(&(ends[0] * 0.5 + ends[1] * 0.5)) {
+            return 0.0;
+        }
+        let length = (ends[0] - ends[1]).length();
         let texels = self.texels(mesh, source, a, b) / (TEXELS * self.coarser);
         let finest = length / (self.length * FINEST * self.coarser).min(self.length);
         (length / self.length).max(texels.min(finest))

@@ -84,6 +84,10 @@ impl Generate {
         match (self.what, &self.from, extension) {
             (What::Scan, Some(from), "ply") => {
                 let mesh = io::load_mesh(from, &io::Limits::default())?;
+                if mesh.triangles.is_empty() {
+                    let message = format!("{} has no triangles that could be cut in more", from.display());
+                    return Err(Error::Argument(message).into());
+                }
                 disk::write(&self.output, &scan::ply(&scan::scan(&mesh, self.points as usize)))?;
             }
             (What::Scan, ..) => return Err(Failure::Usage("a scan is made --from a mesh and written as .ply".into())),
@@ -92,10 +96,13 @@ impl Generate {
                 disk::write(&self.output, scattered(phantom, self.points).as_bytes())?;
             }
             (What::Phantom(phantom), _, "vtr") => {
+                check_dims(self.dims, AS_TEXT)?;
                 disk::write(&self.output, rectilinear(phantom, self.dims).as_bytes())?;
             }
             (What::Phantom(phantom), ..) if self.sample_type == Type::U8 => self.bytes(phantom, progress)?,
             (What::Phantom(phantom), ..) => {
+                let [x, ..] = self.dims;
+                check_dims(if matches!(self.lattice, Places::Bcc) { [x; 3] } else { self.dims }, AS_NUMBERS)?;
                 let volume = self.volume(phantom).map_err(Error::Argument)?;
                 io::nrrd::write(&volume, &self.output)?;
             }
@@ -110,6 +117,9 @@ impl Generate {
                 "--type u8 is for Cartesian lattices and for phantoms with values in 0 to 1: not for bcc and head";
             return Err(Failure::Usage(message.into()));
         }
+        // A slice at a time.
+        let [x, y, z] = self.dims;
+        check_dims([x, y, z.min(1)], AS_BYTES)?;
         let slices = phantom.byte_slices(self.dims).map_err(Error::Argument)?;
         let bar = progress.bar("Making slices", self.dims[2] as u64);
         io::nrrd::write_bytes(slices.lattice(), &self.output, |k| {
@@ -124,6 +134,25 @@ impl Generate {
             Places::Cartesian => phantom.sample(self.dims),
             Places::Bcc => phantom.sample_on(body_centred(self.dims[0])),
         }
+    }
+}
+
+/// Bytes that a sample takes while it is made: with its neighbours in a slice, as a number and packed, as text.
+const AS_BYTES: u64 = 2;
+const AS_NUMBERS: u64 = 16;
+const AS_TEXT: u64 = 64;
+
+/// Refuses samples of which there are none, or more than memory may hold.
+fn check_dims(dims: [usize; 3], bytes: u64) -> Result<(), Failure> {
+    if dims.contains(&0) {
+        let [x, y, z] = dims;
+        return Err(Failure::Usage(format!("--dims: a volume of {x} × {y} × {z} samples holds none")));
+    }
+    let samples = dims.iter().try_fold(1u64, |all, &n| all.checked_mul(n as u64));
+    let most = io::Limits::default().bytes / bytes;
+    match samples.filter(|&samples| samples <= most) {
+        Some(_) => Ok(()),
+        None => Err(Failure::Usage(format!("--dims: from 1 to {most} samples can be made at once"))),
     }
 }
 

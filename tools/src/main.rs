@@ -117,6 +117,8 @@ fn start_log(command: &Command) {
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
+        // Where stderr is closed, telling of that on stderr would panic.
+        .log_internal_errors(false)
         .with_ansi(colored)
         .with_target(false)
         // A span that closes tells its time.

@@ -195,6 +195,10 @@ impl Render {
             None => vec![self.output.clone()],
             Some(_) => (0..frames).map(|frame| numbered(&self.output, frame)).collect::<Result<_, _>>()?,
         };
+        if let Some(depth) = self.depth.as_ref().filter(|depth| names.iter().any(|name| is_same(name, depth))) {
+            let message = format!("{}: the picture and its depths would be one file", depth.display());
+            return Err(Failure::Usage(message));
+        }
         let targets: Vec<Target> =
             names.iter().map(|name| Target::new(name, self.overwrite)).collect::<Result<_, _>>()?;
         // The frames of a turntable go where the first one goes.
@@ -203,6 +207,15 @@ impl Render {
         }
         Ok(targets)
     }
+}
+
+/// Whether two paths, of which the files may not be there yet, are one: by their folders and their names.
+fn is_same(a: &Path, b: &Path) -> bool {
+    let folder = |path: &Path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        folder.canonicalize().unwrap_or_else(|_| folder.to_owned())
+    };
+    a.file_name() == b.file_name() && folder(a) == folder(b)
 }
 
 /// Milliseconds since an instant.

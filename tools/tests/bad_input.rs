@@ -141,6 +141,10 @@ const WRONG: &[(&str, i32, &str)] = &[
         2,
         "the maximum of a field needs image-aligned sheets, classified after interpolation",
     ),
+    ("a.nrrd --size 4294967295x4294967295", 2, "pixels is larger than 536870912 pixels"),
+    ("a.nrrd --size 60000x60000", 2, "pixels is larger than 536870912 pixels"),
+    ("a.nrrd --depth out.png", 2, "out.png: the picture and its depths would be one file"),
+    ("a.nrrd --depth ./out.png", 2, "the picture and its depths would be one file"),
     ("a.nrrd --iso 1,2,3,4,5,6,7,8,9", 2, "9 isosurfaces are more than 8"),
     ("a.nrrd --iso 50:2", 2, "the opacity of a surface lies above 0 and up to 1"),
     ("a.nrrd --gradient-opacity 5,0:2,1", 2, "gradient point 1 is at 2, before the previous one at 5"),
@@ -153,6 +157,23 @@ fn each_wrong_input_has_its_message() {
         folder.run(&format!("render {arguments} -o out.png")).fails(*code, &[message]);
     }
     assert!(!folder.path("out.png").exists());
+}
+
+#[test]
+fn what_cannot_be_generated_is_told() {
+    let folder = Folder::new("generate");
+    folder.put("cloud.xyz", "1 2 3\n4 5 6\n7 8 10\n");
+    for (arguments, message) in [
+        ("ball -o a.nrrd --dims 18446744073709551615x1x1", "samples can be made at once"),
+        ("ball -o a.nrrd --dims 100000x100000x100000", "samples can be made at once"),
+        ("specimen -o a.nrrd --type u8 --dims 4294967295x4294967295x1", "samples can be made at once"),
+        ("ball -o a.nrrd --lattice bcc --dims 100000x1x1", "samples can be made at once"),
+        ("ball -o a.vtr --dims 1000x1000x1000", "samples can be made at once"),
+        ("scan --from cloud.xyz -o a.ply", "cloud.xyz has no triangles that could be cut in more"),
+    ] {
+        folder.run(&format!("generate {arguments}")).fails(2, &[message]);
+    }
+    assert!(["a.nrrd", "a.vtr", "a.ply"].iter().all(|name| !folder.path(name).exists()));
 }
 
 /// What is read under a limit that it is over: the arguments, the message, and the flag that the hint names.
@@ -202,7 +223,7 @@ const OVER: &[(&str, &str, &str)] = &[
     ("info a.splv --limit-bytes 99", "a.splv: the file's size in bytes is", "--limit-bytes"),
     (
         "compare a.png a.png --limit-texels 3",
-        "a.png: the picture's number of pixels is 4, over the limit of 3",
+        "a.png: picture: the number of texels is 4, over the limit of 3",
         "--limit-texels",
     ),
 ];
@@ -285,6 +306,8 @@ fn what_is_unusual_draws() {
         "a.nrrd --mode axis-sheets",
         "a.nrrd --mode splats --back-to-front",
         "a.nrrd --mip",
+        // Along the axis that points up.
+        "a.nrrd --camera-position 7.5,7.5,60 --focal-point 7.5,7.5,7.5",
         "a.nrrd --x-ray",
         "a.nrrd --clip plane:1,1,0,15 --clip y>20% --cut-out box:0,0,0:50%,50%,50%",
     ] {
@@ -308,4 +331,12 @@ fn errors_that_nobody_reads_keep_their_code() {
     let mut child = command.args(["info", "gone.ply"]).stderr(std::process::Stdio::piped()).spawn().unwrap();
     drop(child.stderr.take());
     assert_eq!(child.wait().unwrap().code(), Some(3));
+    // What it logs on the way as well.
+    let folder = folder("unread");
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_splatkit"));
+    command.args(["-vv", "convert", "a.nrrd", "-o", "a.splv"]).current_dir(folder.path(""));
+    let mut child = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
+    drop(child.stderr.take());
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert!(folder.path("a.splv").exists());
 }

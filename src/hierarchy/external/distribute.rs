@@ -5,7 +5,7 @@ use super::{
     bins::Bins,
     survey::{Surveyed, name},
 };
-use crate::{Result, io::StreamPoint};
+use crate::{Error, Result, io::StreamPoint};
 use glam::Vec3;
 use std::{collections::HashSet, path::Path};
 
@@ -56,7 +56,7 @@ pub fn distribute<'a>(input: Surveyed<'a>, most: u64, wanted: &Path, watch: Stag
         done += shares.seen;
         watch(Stage::Distributing, done, total);
         for (region, point) in shares.items {
-            if crowd.takes(&mut points, region, &point) {
+            if crowd.takes(&mut points, region, &point)? {
                 points.push(region, point)?;
             }
         }
@@ -120,6 +120,9 @@ fn triangle_shares(input: &Surveyed, found: &[[u32; 3]]) -> (Owned<[u32; 3]>, Ow
     (triangles, foreign)
 }
 
+/// How many times as many points as it should a region may have, at most.
+const MOST_TIMES: usize = 4;
+
 /// Keeps points at one place from filling a region of a cloud.
 struct Crowd {
     most: usize,
@@ -135,10 +138,21 @@ impl Crowd {
         Self { most, is_cloud: input.mesh.is_none(), places: vec![None; input.regions()] }
     }
 
-    fn takes(&mut self, points: &mut Bins<StreamPoint>, region: u32, point: &StreamPoint) -> bool {
-        if !self.is_cloud || points.count(region) < self.most {
-            return true;
+    /// Whether a region keeps a point.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where more points lie together than can be told apart from where the farthest ones are.
+    fn takes(&mut self, points: &mut Bins<StreamPoint>, region: u32, point: &StreamPoint) -> Result<bool> {
+        let held = points.count(region);
+        if held >= self.most.saturating_mul(MOST_TIMES) {
+            return Err(Error::Argument(format!(
+                "more than {held} points lie within a two-millionth of the way to the farthest ones, more than fit into \
+                 memory at once: remove points that are far off, or allow more memory"
+            )));
         }
-        self.places[region as usize].get_or_insert_default().insert(name(Vec3::from(point.position)))
+        if !self.is_cloud || held < self.most {
+            return Ok(true);
+        }
+        Ok(self.places[region as usize].get_or_insert_default().insert(name(Vec3::from(point.position))))
     }
 }

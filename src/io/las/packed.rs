@@ -1,13 +1,13 @@
 //! The chunks of points of a LAZ file. The `laz` crate unpacks each; that the chunks lie within the file, and what they may
 //! ask memory for, is checked before.
 
-use super::{Fields, Header, Point};
+use super::{Fields, Header, Point, time::Times};
 use crate::{
     Result,
     io::{Source, isolate::isolated},
 };
 use laz::{
-    LazItem, LazItemType, LazVlr,
+    DecompressionSelection, LazItem, LazItemType, LazVlr,
     laszip::ChunkTable,
     record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor},
 };
@@ -137,11 +137,21 @@ fn unpack_here(source: &Source, header: &Header, layout: &LazVlr, chunk: &Chunk)
     let input = Cursor::new(&source.bytes()[chunk.bytes.clone()]);
     let mut decoder: Box<dyn RecordDecompressor<Cursor<&[u8]>>> = if header.format >= 6 {
         check_layers(source, header, layout, chunk).map_err(wrong)?;
-        Box::new(LayeredPointRecordDecompressor::new(input))
+        let mut decoder = LayeredPointRecordDecompressor::new(input);
+        decoder.set_fields_from(layout.items()).map_err(|error| wrong(error.to_string()))?;
+        // Times have a layer of their own, which is left out: see time.rs.
+        decoder.set_selection(DecompressionSelection::all().skip_gps_time());
+        Box::new(decoder)
     } else {
-        Box::new(SequentialPointRecordDecompressor::new(input))
+        let mut decoder = SequentialPointRecordDecompressor::new(input);
+        for &item in layout.items() {
+            match (item.item_type(), item.version()) {
+                (LazItemType::GpsTime, 2) => decoder.add_field_decompressor(Times::new()),
+                _ => decoder.set_fields_from(&vec![item]).map_err(|error| wrong(error.to_string()))?,
+            }
+        }
+        Box::new(decoder)
     };
-    decoder.set_fields_from(layout.items()).map_err(|error| wrong(error.to_string()))?;
     let mut record = vec![0; header.size];
     let mut points = Vec::new();
     for number in 0..chunk.points {
