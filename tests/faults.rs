@@ -99,14 +99,67 @@ fn a_device_lost_at_any_moment_gives_no_part_of_a_picture() {
     assert!(outcomes[1] > 0, "never lost: {outcomes:?}");
 }
 
+/// Keeps the device busy: for a second or more in software, for some hundredths of one on a fast GPU. No invocation takes
+/// more steps than Mesa's software driver allows.
+fn hang(gpu: &Gpu) {
+    let source = "@group(0) @binding(0) var<storage, read_write> state: u32;
+        @compute @workgroup_size(8) fn main(@builtin(global_invocation_id) id: vec3u) {
+            var x = id.x | 1u;
+            for (var step = 0u; step < 60000u; step++) {
+                x ^= x << 13u;
+                x ^= x >> 17u;
+                x ^= x << 5u;
+            }
+            // Never, which compilers do not know.
+            if x == 0u {
+                state = x;
+            }
+        }";
+    let source = wgpu::ShaderSource::Wgsl(source.into());
+    let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
+    let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some("hang"),
+        layout: None,
+        module: &module,
+        entry_point: None,
+        compilation_options: Default::default(),
+        cache: None,
+    });
+    let usage = wgpu::BufferUsages::STORAGE;
+    let state = wgpu::BufferDescriptor { label: None, size: 4, usage, mapped_at_creation: false };
+    let state = gpu.device.create_buffer(&state);
+    let bindings = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: &[wgpu::BindGroupEntry { binding: 0, resource: state.as_entire_binding() }],
+    });
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    {
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &bindings, &[]);
+        pass.dispatch_workgroups(1 << 15, 1, 1);
+    }
+    gpu.queue.submit([encoder.finish()]);
+}
+
 #[test]
 fn a_device_that_does_not_answer_in_time_is_an_error() {
-    let scene = scene(false);
-    let gpu = gpu().with_patience(Duration::from_nanos(1));
-    let error = drawn(&gpu, &scene).unwrap_err();
+    let (gpu, scene) = (gpu(), scene(false));
+    let truth = drawn(&gpu, &scene).expect("draws");
+    let impatient = gpu.clone().with_patience(Duration::from_millis(1));
+    hang(&gpu);
+    let error = impatient.wait().expect_err("busy for longer");
     assert!(error.to_string().contains("did not answer within"), "{error}");
-    // What is asked of it afterwards does not wait again.
+    // What is asked of it afterwards does not wait again, by whomever.
+    assert!(matches!(impatient.wait(), Err(Error::DeviceLost(_))));
     assert!(matches!(drawn(&gpu, &scene), Err(Error::DeviceLost(_))));
+    // A picture that is done before it is waited for is a picture; there is none of which a part is done.
+    let impatient = gpu.reopened().expect("opens again").with_patience(Duration::from_nanos(1));
+    match drawn(&impatient, &scene) {
+        Ok(picture) => assert!(same(&picture, &truth)),
+        Err(error) => assert!(error.to_string().contains("did not answer within"), "{error}"),
+    }
 }
 
 /// What a pixel may differ by where smaller buffers cut the scene into other parts: as of tests/occlusion.rs.

@@ -87,6 +87,9 @@ impl Gpu {
     /// [`Error::DeviceLost`] where it is lost; [`Error::Gpu`] where it does not answer in time ([`Self::with_patience`]), which
     /// loses it, or reported an error since the last time.
     pub fn wait(&self) -> Result<()> {
+        if self.condition.lost.get().is_some() {
+            return self.sound();
+        }
         let poll = wgpu::PollType::Wait { submission_index: None, timeout: Some(self.patience) };
         // wgpu panics where a device is lost while it is waited for.
         match catch_unwind(AssertUnwindSafe(|| self.device.poll(poll))) {
