@@ -214,9 +214,7 @@ fn steps_overshoot_little() {
 fn radii_of_any_ratio_are_no_trouble() {
     let mut samples = random(100_000, |p| p.x);
     samples.radii = (0..100_000).map(|i| 1e-4 * 10f32.powf((i % 1001) as f32 / 250.0)).collect();
-    let start = std::time::Instant::now();
     let set = splats(&samples);
-    assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
     assert!(set.overlap.is_finite() && set.overlap > 0.0);
     let weights = || set.splats.iter().map(|splat| splat.weight_and_slope().0);
     assert!(weights().all(|weight| (9.9e-5..=6.01e4).contains(&weight)));

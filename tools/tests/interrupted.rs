@@ -64,7 +64,7 @@ fn stop(
         let file = output.split(' ').next().unwrap();
         let begin = Instant::now();
         folder.run(&arguments).ok();
-        let whole = begin.elapsed();
+        let mut whole = begin.elapsed();
         let new = std::fs::read(folder.path(file)).unwrap();
         for moment in 0..moments {
             let has_old = moment % 2 == 0;
@@ -72,15 +72,21 @@ fn stop(
             if has_old {
                 folder.put(file, OLD);
             }
+            let begin = Instant::now();
             let mut child = start(&folder, &arguments);
             std::thread::sleep(whole * moment / moments);
             stop(moment, &mut child);
             let status = child.wait().unwrap();
+            let took = begin.elapsed();
             let found = std::fs::read(folder.path(file)).ok();
             let is_old = found.as_deref() == has_old.then_some(OLD);
             assert!(is_old || found.as_ref() == Some(&new), "{output}, moment {moment}: neither old nor new");
             finished += u32::from(!is_old);
             stopped += u32::from(is_old);
+            if !is_old {
+                // Faster than the first: the machine was busy then.
+                whole = whole.min(took);
+            }
             check(status, &left(&folder, file), &folder, file);
             if !folder.path(file).exists() {
                 folder.put(file, OLD);
@@ -139,7 +145,9 @@ fn who_is_interrupted_while_drawing_ends_at_once() {
         signal(&child, "INT");
         let status = child.wait().unwrap();
         let picture = std::fs::read(folder.path("a.png")).ok();
-        assert!(matches!(status.code(), Some(0 | 130)), "moment {moment}: {status}");
+        // On a busy machine the handler may not be there yet.
+        let by_signal = std::os::unix::process::ExitStatusExt::signal(&status).is_some();
+        assert!(matches!(status.code(), Some(0 | 130)) || by_signal, "moment {moment}: {status}");
         assert!(picture.is_none_or(|bytes| is_png(&bytes, 640, 480)), "moment {moment}");
         assert_eq!(left(&folder, "a.png"), [""; 0]);
     }
@@ -212,9 +220,10 @@ fn inputs_that_are_cut_meanwhile_are_told() {
         folder.put(name, bytes);
         let begin = Instant::now();
         folder.run(&arguments).ok();
-        let whole = begin.elapsed();
+        let mut whole = begin.elapsed();
         for moment in 0..10 {
             folder.put(name, bytes);
+            let begin = Instant::now();
             let mut command = Command::new(env!("CARGO_BIN_EXE_splatkit"));
             command.args(arguments.split(' ')).current_dir(&folder.0).stdout(Stdio::null()).stderr(Stdio::piped());
             let child = command.spawn().unwrap();
@@ -222,6 +231,9 @@ fn inputs_that_are_cut_meanwhile_are_told() {
             let file = std::fs::File::options().write(true).open(folder.path(name)).unwrap();
             file.set_len(bytes.len() as u64 * u64::from(moment) / 12).unwrap();
             let output = child.wait_with_output().unwrap();
+            if output.status.success() {
+                whole = whole.min(begin.elapsed());
+            }
             let text = String::from_utf8_lossy(&output.stderr).into_owned();
             // Cut before it was opened, while it was read, or after.
             assert!(
