@@ -39,7 +39,7 @@ impl Sphere {
     }
 
     /// How far a sphere reaches from a centre.
-    fn reach(center: DVec3, spheres: &[Self]) -> f64 {
+    pub fn reach(center: DVec3, spheres: &[Self]) -> f64 {
         spheres.iter().map(|s| s.center.distance(center) + s.radius).fold(0.0, f64::max)
     }
 

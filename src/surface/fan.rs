@@ -33,6 +33,9 @@ const LEAST_SQUARE: f32 = 1e-26;
 /// How high above its vertex a surfel lies, of the mean height of the triangles around a vertex.
 const SAG: f32 = 0.4;
 
+/// Vertices whose triangles are read together. They may lie anywhere in memory: asked for one by one, each is waited for.
+const TOGETHER: usize = 64;
+
 /// A triangle as one of its vertices sees it. Lengths are in the maker's unit.
 struct Around {
     at: u32,
@@ -71,6 +74,7 @@ pub(super) struct Made {
     /// The square of the longest edge, in units.
     pub longest: f32,
     pub sums: Sums,
+    rows: Vec<[u32; 3]>,
     around: Vec<Around>,
     flat: Groups,
     smooth: Groups,
@@ -86,6 +90,7 @@ impl Made {
             splats: Vec::with_capacity(capacity),
             longest: 0.0,
             sums: Sums::default(),
+            rows: Vec::new(),
             around: Vec::new(),
             flat: Groups::new(crease.min(FLAT)),
             smooth: Groups::new(crease),
@@ -95,15 +100,34 @@ impl Made {
 }
 
 impl Maker<'_> {
-    /// Adds the surfels of a vertex.
-    pub fn vertex(&self, vertex: usize, made: &mut Made) {
-        let Made { splats, longest, sums, around, flat, smooth, normals } = made;
+    /// Adds the surfels of some vertices.
+    pub fn vertices(&self, vertices: &[usize], made: &mut Made) {
+        for few in vertices.chunks(TOGETHER) {
+            let mut rows = std::mem::take(&mut made.rows);
+            rows.clear();
+            for &vertex in few {
+                let corners = self.connected.adjacency.corners(vertex);
+                rows.extend(corners.iter().map(|&at| self.mesh.triangles[at as usize / 3]));
+            }
+            let mut rest = &rows[..];
+            for &vertex in few {
+                let (own, after) = rest.split_at(self.connected.adjacency.corners(vertex).len());
+                self.vertex(vertex, own, made);
+                rest = after;
+            }
+            made.rows = rows;
+        }
+    }
+
+    /// Adds the surfels of a vertex; `rows` are the triangles of its corners.
+    fn vertex(&self, vertex: usize, rows: &[[u32; 3]], made: &mut Made) {
+        let Made { splats, longest, sums, around, flat, smooth, normals, .. } = made;
         around.clear();
         flat.clear();
         let (mut area, mut cross) = (0.0, Vec3::ZERO);
         let per_unit = 1.0 / self.unit;
-        for &at in self.connected.adjacency.corners(vertex) {
-            if let Some(mut triangle) = self.around(at, per_unit, longest) {
+        for (&at, &row) in self.connected.adjacency.corners(vertex).iter().zip(rows) {
+            if let Some(mut triangle) = self.around(at, row, per_unit, longest) {
                 triangle.flat = flat.place(triangle.normal);
                 area += triangle.area;
                 cross += triangle.normal * triangle.area;
@@ -123,15 +147,15 @@ impl Maker<'_> {
         }
     }
 
-    /// What a corner's vertex sees; `longest` grows to the square of the longest edge there.
-    fn around(&self, at: u32, per_unit: f32, longest: &mut f32) -> Option<Around> {
+    /// What the vertex of a corner of a triangle sees; `longest` grows to the square of the longest edge there.
+    fn around(&self, at: u32, row: [u32; 3], per_unit: f32, longest: &mut f32) -> Option<Around> {
         let (triangle, corner) = (at as usize / 3, at as usize % 3);
         let turned = |[a, b, c]: [u32; 3]| match corner {
             0 => [a, b, c],
             1 => [b, c, a],
             _ => [c, a, b],
         };
-        let [here, next, last] = turned(self.mesh.triangles[triangle]).map(|v| self.mesh.positions[v as usize]);
+        let [here, next, last] = turned(row).map(|v| self.mesh.positions[v as usize]);
         let (a, b) = ((next - here) * per_unit, (last - here) * per_unit);
         let cross = a.cross(b);
         let (square, longer) = (cross.length_squared(), a.length_squared().max(b.length_squared()));

@@ -200,8 +200,9 @@ fn make(
         .into_par_iter()
         .map(|chunk| {
             let vertices = chunk * CHUNK..((chunk + 1) * CHUNK).min(mesh.positions.len());
-            let mut made = Made::new(options, CHUNK);
-            vertices.filter(|&vertex| is_wanted(vertex)).for_each(|vertex| maker.vertex(vertex, &mut made));
+            let wanted: Vec<usize> = vertices.filter(|&vertex| is_wanted(vertex)).collect();
+            let mut made = Made::new(options, wanted.len());
+            maker.vertices(&wanted, &mut made);
             made
         })
         .collect()

@@ -5,7 +5,10 @@ use super::{
     pages::reach,
     quantise::{FULL_WIDTH, PARTS, Shape, inner_sigma, logarithm, power, sigma_of_inner},
 };
-use crate::{hierarchy::Node, splat::NO_NORMAL};
+use crate::{
+    hierarchy::{Node, sphere::Sphere},
+    splat::NO_NORMAL,
+};
 use glam::DVec3;
 use std::{f64::consts::PI, sync::LazyLock};
 
@@ -100,11 +103,7 @@ impl Code {
         let own = f64::from(extent) * largest;
         let mut code = Self::default();
         if let Some(step) = fine {
-            let away = node.center().as_dvec3() - DVec3::from(node.splat.center.map(f64::from));
-            for (steps, axis) in code.center.iter_mut().zip(shape.axes) {
-                let exact = (away.dot(axis) / step).round();
-                *steps = if exact.abs() < MOST_STEPS { exact as i32 } else { return None };
-            }
+            code.center = nearest_center(node, children, shape, step)?;
         }
         code.decode(node, shape, extent, fine)?;
         let center = node.center().as_dvec3();
@@ -132,4 +131,23 @@ impl Code {
             }
         }
     }
+}
+
+/// The steps from a node's splat to a place next to its centre, the one from which its children reach least far: what rounding
+/// loses adds up to the root.
+fn nearest_center(node: &Node, children: &[Node], shape: &Shape, step: f64) -> Option<[i32; 3]> {
+    let spheres: Vec<Sphere> = children.iter().map(Sphere::of).collect();
+    let splat = DVec3::from(node.splat.center.map(f64::from));
+    let away = node.center().as_dvec3() - splat;
+    let below = shape.axes.map(|axis| (away.dot(axis) / step).floor());
+    if below.iter().any(|steps| steps.abs() >= MOST_STEPS) {
+        return None;
+    }
+    let near = (0..8).map(|corner| std::array::from_fn(|i| below[i] + f64::from(corner >> i & 1)));
+    let radius = |steps: &[f64; 3]| {
+        let center = shape.axes.iter().zip(steps).fold(splat, |sum, (axis, steps)| sum + *axis * (steps * step));
+        Sphere::reach(center, &spheres)
+    };
+    let best = near.min_by(|a, b| radius(a).total_cmp(&radius(b)))?;
+    Some(best.map(|steps| steps as i32))
 }
