@@ -70,8 +70,9 @@ fn renderer() -> Renderer {
     Renderer::new(&Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver"))
 }
 
+/// With steps between samples of so many pixels at most.
 fn settings(pixels: f64) -> Settings {
-    Settings { detail: Detail::Pixels(pixels), ..Settings::new([96, 96]) }
+    Settings { detail: Detail::Pixels(2.0 * pixels), ..Settings::new([96, 96]) }
 }
 
 fn draw(renderer: &mut Renderer, scene: &Scene, camera: &Camera, settings: &Settings) -> (Picture, FrameStats) {

@@ -35,19 +35,19 @@ impl Cut {
             Stage::new(gpu, label, &sources, entry, &[&bindings])
         };
         Self {
-            count: stage("cut: count", shaders::CUT, "count", &[Write; 3]),
-            write: stage("cut: write", shaders::CUT, "write", &[Write; 3]),
+            count: stage("cut: count", shaders::CUT, "count", &[Write; 4]),
+            write: stage("cut: write", shaders::CUT, "write", &[Write; 4]),
             tally: stage("tally", shaders::TALLY, "count", &[Write]),
         }
     }
 
     /// Encodes the making of a chunk's list.
     pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, scan: &Scan, chunk: &NodeChunk<'_>) {
-        let own = [chunk.runs, chunk.selected, chunk.arguments].map(|b| b.as_entire_buffer_binding());
+        let own = [chunk.runs, chunk.selected, chunk.arguments, chunk.found].map(|b| b.as_entire_buffer_binding());
         let buffers = [chunk.bindings().as_slice(), &own].concat();
         let groups = chunk.capacity.div_ceil(WORKGROUP_NODES);
         self.count.dispatch(encoder, &[&self.count.bind(gpu, 0, &buffers)], groups);
-        scan.encode(gpu, encoder, chunk.runs, runs_of(chunk.capacity));
+        scan.encode(gpu, encoder, chunk.runs, runs_of(chunk.capacity) + 1);
         self.write.dispatch(encoder, &[&self.write.bind(gpu, 0, &buffers)], groups);
     }
 

@@ -63,6 +63,7 @@ pub struct Slots {
     nodes: wgpu::Buffer,
     slots: wgpu::Buffer,
     runs: wgpu::Buffer,
+    found: wgpu::Buffer,
     pub selected: wgpu::Buffer,
     pub arguments: wgpu::Buffer,
     resident: wgpu::Buffer,
@@ -77,6 +78,7 @@ pub struct NodeChunk<'a> {
     pub splats: &'a wgpu::Buffer,
     pub slots: &'a Slots,
     pub runs: &'a wgpu::Buffer,
+    pub found: &'a wgpu::Buffer,
     pub selected: &'a wgpu::Buffer,
     pub arguments: &'a wgpu::Buffer,
     pub capacity: u32,
@@ -96,6 +98,7 @@ impl Slots {
             splats,
             slots: self,
             runs: &self.runs,
+            found: &self.found,
             selected: &self.selected,
             arguments: &self.arguments,
             capacity: self.count as u32 * SLOT_NODES,
@@ -247,7 +250,8 @@ impl Forest {
         let slots = Slots {
             nodes: super::buffer(gpu, "nodes", half, Usage::STORAGE),
             slots: super::buffer(gpu, "slots", 4 * count as u64, Usage::STORAGE),
-            runs: super::buffer(gpu, "cut runs", 4 * u64::from(runs_of(capacity)), Usage::STORAGE),
+            runs: super::buffer(gpu, "cut runs", 4 * (u64::from(runs_of(capacity)) + 1), Usage::STORAGE),
+            found: super::buffer(gpu, "found nodes", 4 * u64::from(capacity), Usage::STORAGE),
             selected: super::buffer(gpu, "drawn nodes", 4 * (u64::from(capacity) + 1), Usage::STORAGE),
             arguments: super::buffer(gpu, "drawn arguments", 12, Usage::STORAGE | Usage::INDIRECT),
             resident: self.resident.clone(),
@@ -256,7 +260,7 @@ impl Forest {
             count,
         };
         self.slots.extend(std::iter::repeat_n(None, count));
-        let bytes = 2 * half + slots.runs.size() + slots.selected.size();
+        let bytes = 2 * half + slots.runs.size() + slots.found.size() + slots.selected.size();
         Growth { slots, splats: super::buffer(gpu, "node splats", half, Usage::STORAGE), capacity, bytes }
     }
 

@@ -341,7 +341,7 @@ impl Renderer {
                 let finest = |forest: &Forest| forest.finest_within(view, cull, most.saturating_mul(8).max(1 << 16));
                 prepared.forests.iter().map(finest).fold(0.0, f64::max)
             }
-            Detail::Milliseconds(_) => 1.0,
+            Detail::Milliseconds(_) => Detail::PIXELS,
         };
         let cuts = |prepared: &PreparedScene, pixels| {
             prepared.forests.iter().map(|forest| forest.cut(view, pixels, cull)).collect::<Vec<_>>()

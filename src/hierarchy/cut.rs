@@ -26,9 +26,15 @@ pub enum Detail {
     Milliseconds(f64),
 }
 
+impl Detail {
+    /// The cut where none is told: finer ones draw two to four times as many splats, and come no nearer to what many rays a
+    /// pixel show (docs/hierarchy.md, section 5).
+    pub const PIXELS: f64 = 2.0;
+}
+
 impl Default for Detail {
     fn default() -> Self {
-        Self::Pixels(1.0)
+        Self::Pixels(Self::PIXELS)
     }
 }
 
@@ -173,7 +179,7 @@ impl Tree {
     /// through: this is the oracle of what the engine selects.
     ///
     /// A number of splats is kept to as by the engine, by cuts an eighth of an octave apart; a frame time is not known here,
-    /// and taken for a cut of one pixel.
+    /// and taken for the usual cut.
     pub fn cut(&self, view: &View, detail: Detail, cull_backfaces: Option<bool>) -> Result<SplatSet> {
         let culls = cull_backfaces.unwrap_or(self.closed);
         let at = |pixels: f64| self.selected(&Cut::new(view, self.origin, pixels, culls));

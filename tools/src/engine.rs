@@ -40,9 +40,9 @@ pub struct EngineFlags {
     /// sharp.
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     sheet_thickness: Option<f64>,
-    /// Hierarchies: the most pixels that a splat may be wide, but for those of the finest level; volumes in bricks: the most
-    /// pixels between samples, but for the finest level. 0 draws that level
-    /// [default: 1]
+    /// Hierarchies, volumes in bricks: the most pixels that a splat may be wide at half its height, but for those of the
+    /// finest level; a sample counts as two steps wide. 0 draws the finest level
+    /// [default: 2]
     #[arg(long, value_name = "PIXELS", value_parser = parse::not_negative)]
     cut: Option<f64>,
     /// Hierarchies, volumes in bricks: about the most splats of a picture, instead of --cut.
@@ -128,11 +128,10 @@ impl EngineFlags {
             });
             settings.volume_shade = Some(Some(own.unwrap_or_default()));
         }
-        settings.detail = match (self.cut, self.budget, self.frame_time) {
-            (Some(pixels), ..) => Detail::Pixels(pixels * f64::from(factor)),
-            (_, Some(splats), _) => Detail::Splats(splats),
-            (_, _, Some(milliseconds)) => Detail::Milliseconds(milliseconds),
-            _ => Detail::default(),
+        settings.detail = match (self.budget, self.frame_time) {
+            (Some(splats), _) => Detail::Splats(splats),
+            (_, Some(milliseconds)) => Detail::Milliseconds(milliseconds),
+            _ => Detail::Pixels(self.cut.unwrap_or(Detail::PIXELS) * f64::from(factor)),
         };
         settings.cull_backfaces = self.cull_backfaces;
         if let Some(memory) = self.memory {

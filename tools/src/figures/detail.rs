@@ -28,7 +28,7 @@ const FARTHEST: f64 = 16.0;
 /// Frames of which the middle one's time counts.
 const FRAMES: usize = 5;
 /// The cut, in pixels.
-const CUT: f64 = 1.0;
+const CUT: f64 = Detail::PIXELS;
 
 /// The hierarchy of a file, made of a mesh or cloud where it is one.
 fn hierarchy(source: &Source, input: Input) -> Result<Arc<Hierarchy>, Failure> {
@@ -60,7 +60,7 @@ pub fn tables(
     let mut cost = Table::new(
         "Cost of a cut.",
         format!(
-            "Pictures of {PIXELS}² pixels, all of the model in view, and from 4 and 16 times as far; a cut of {CUT} pixel. The \
+            "Pictures of {PIXELS}² pixels, all of the model in view, and from 4 and 16 times as far; a cut of {CUT} pixels. The \
              middle of {FRAMES} frames, after one that brought the pages."
         ),
         &["model", "splats", "drawn", "ms", "drawn, ¼ as wide", "ms", "drawn, 1/16", "ms", "GPU MiB"],
@@ -69,7 +69,7 @@ pub fn tables(
         "Zoom sweep.",
         format!(
             "{SWEEP} pictures of {SWEEP_PIXELS}² pixels while the camera goes {FARTHEST} times as far away: the largest root \
-             mean square change from one to the next, in steps of 1/255, of a cut of {CUT} pixel and of the leaves."
+             mean square change from one to the next, in steps of 1/255, of a cut of {CUT} pixels and of the leaves."
         ),
         &["model", "cut", "leaves", "ratio"],
     );
