@@ -1,51 +1,68 @@
-// Cut: the list of the nodes that are drawn, each with its share. Two entry points around a prefix sum keep the list in the
-// order of the nodes: count, which finds them, then write, which lays what each run found behind the runs before.
+// Cut: the list of the nodes that are drawn, each with its share. Two entry points around a prefix sum make it, the same every
+// time: count, in which the invocations find them, then write, which lays what each found behind what those before it did.
 
-// How many nodes each run draws, later how many the runs before do; one more than runs.
-@group(0) @binding(6) var<storage, read_write> runs: array<u32>;
+// What is known of the nodes of each run.
+@group(1) @binding(0) var<storage, read> bounds: array<Bounds>;
+// How many nodes each invocation found, later how many those before it did; one more than invocations.
+@group(1) @binding(1) var<storage, read_write> counts: array<u32>;
+// What each invocation found, in as many places as it looks at.
+@group(1) @binding(2) var<storage, read_write> found_nodes: array<u32>;
 // The drawn nodes: number in the chunk, share in the upper ten bits. The element behind the last possible one is how many.
-@group(0) @binding(7) var<storage, read_write> selected: array<u32>;
+@group(1) @binding(3) var<storage, read_write> selected: array<u32>;
 // The workgroups that later passes need for them.
-@group(0) @binding(8) var<storage, read_write> arguments: array<u32, 3>;
-// What each run found, from its first place on.
-@group(0) @binding(9) var<storage, read_write> found_nodes: array<u32>;
+@group(1) @binding(4) var<storage, read_write> arguments: array<u32, 3>;
+
+// A sphere around the parents of a run's nodes, and the largest of their sizes. Mirrors engine/nodes.rs.
+struct Bounds {
+    center: vec3<f32>,
+    radius: f32,
+    size: f32,
+}
 
 // Ten bits of share above the number of the node.
 const SHARE_SHIFT: u32 = 22u;
+// Invocations that share a run, each with every eighth node: where no parent is refined they all end at once.
+const SHARERS: u32 = 8u;
+const OWN_NODES: u32 = SELECT_RUN / SHARERS;
 
 @compute @workgroup_size(64)
 fn count(@builtin(global_invocation_id) invocation: vec3<u32>) {
     let id = invocation.x;
-    if id * SELECT_RUN >= source.count {
+    if id * OWN_NODES >= source.count {
         return;
     }
-    let run = run_of(id);
+    let nodes = run_of(id / SHARERS);
+    let parents = bounds[id / SHARERS];
+    var end = nodes.y;
+    if refinement(pixels(parents.center, parents.radius, parents.size)) == 0u {
+        end = 0u;
+    }
     var found = 0u;
-    for (var i = run.x; i < run.y; i++) {
+    for (var i = nodes.x + id % SHARERS; i < end; i += SHARERS) {
         let own = share(i);
         if own > 0u {
-            found_nodes[run.x + found] = i | (own << SHARE_SHIFT);
+            found_nodes[id * OWN_NODES + found] = i | (own << SHARE_SHIFT);
             found++;
         }
     }
-    runs[id] = found;
-    if (id + 1u) * SELECT_RUN >= source.count {
-        runs[id + 1u] = 0u;
+    counts[id] = found;
+    if (id + 1u) * OWN_NODES >= source.count {
+        counts[id + 1u] = 0u;
     }
 }
 
 @compute @workgroup_size(64)
 fn write(@builtin(global_invocation_id) invocation: vec3<u32>) {
     let id = invocation.x;
-    if id * SELECT_RUN >= source.count {
+    if id * OWN_NODES >= source.count {
         return;
     }
-    let at = runs[id];
-    let found = runs[id + 1u] - at;
+    let at = counts[id];
+    let found = counts[id + 1u] - at;
     for (var i = 0u; i < found; i++) {
-        selected[at + i] = found_nodes[id * SELECT_RUN + i];
+        selected[at + i] = found_nodes[id * OWN_NODES + i];
     }
-    if (id + 1u) * SELECT_RUN >= source.count {
+    if (id + 1u) * OWN_NODES >= source.count {
         let all = at + found;
         selected[source.count] = all;
         arguments[0] = (all + 64u * RUN - 1u) / (64u * RUN);

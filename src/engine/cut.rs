@@ -9,9 +9,13 @@ use super::{
     stage::{Binding, Stage},
 };
 
-/// Nodes per invocation (`SELECT_RUN` in nodes.wgsl).
-const SELECT_RUN: u32 = 64;
-const WORKGROUP_NODES: u32 = 64 * SELECT_RUN;
+/// Nodes of a run (`SELECT_RUN` in nodes.wgsl).
+pub const RUN_NODES: u32 = 64;
+/// Invocations that share a run (`SHARERS` in cut.wgsl).
+const SHARERS: u32 = 8;
+const OWN_NODES: u32 = RUN_NODES / SHARERS;
+/// Nodes that a workgroup of tally looks at.
+const WORKGROUP_NODES: u32 = 64 * RUN_NODES;
 
 /// Counters of a tally, eight an octave, the first for a cut of 2⁻⁸ pixels (tally.wgsl).
 const TALLY_COUNT: usize = 256;
@@ -29,26 +33,29 @@ pub struct Cut {
 impl Cut {
     pub fn new(gpu: &Gpu) -> Self {
         use Binding::{Read, Uniform, Write};
-        let stage = |label, shader, entry, own: &[Binding]| {
+        let nodes = [Uniform, Uniform, Read, Read, Read, Read];
+        let stage = |label, shader, entry, groups: &[&[Binding]]| {
             let sources = [shaders::FRAME, shaders::NORMAL, shaders::NODES, shader];
-            let bindings = [&[Uniform, Uniform, Read, Read, Read, Read], own].concat();
-            Stage::new(gpu, label, &sources, entry, &[&bindings])
+            Stage::new(gpu, label, &sources, entry, groups)
         };
         Self {
-            count: stage("cut: count", shaders::CUT, "count", &[Write; 4]),
-            write: stage("cut: write", shaders::CUT, "write", &[Write; 4]),
-            tally: stage("tally", shaders::TALLY, "count", &[Write]),
+            count: stage("cut: count", shaders::CUT, "count", &[&nodes, &[Read, Write, Write]]),
+            write: stage("cut: write", shaders::CUT, "write", &[&[Uniform], &[Read, Write, Write, Write, Write]]),
+            tally: stage("tally", shaders::TALLY, "count", &[&[nodes.as_slice(), &[Write]].concat()]),
         }
     }
 
     /// Encodes the making of a chunk's list.
     pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, scan: &Scan, chunk: &NodeChunk<'_>) {
-        let own = [chunk.runs, chunk.selected, chunk.arguments, chunk.found].map(|b| b.as_entire_buffer_binding());
-        let buffers = [chunk.bindings().as_slice(), &own].concat();
-        let groups = chunk.capacity.div_ceil(WORKGROUP_NODES);
-        self.count.dispatch(encoder, &[&self.count.bind(gpu, 0, &buffers)], groups);
-        scan.encode(gpu, encoder, chunk.runs, runs_of(chunk.capacity) + 1);
-        self.write.dispatch(encoder, &[&self.write.bind(gpu, 0, &buffers)], groups);
+        let own = [chunk.bounds, chunk.counts, chunk.found, chunk.selected, chunk.arguments];
+        let own = own.map(|b| b.as_entire_buffer_binding());
+        let nodes = chunk.bindings();
+        let groups = chunk.capacity.div_ceil(64 * OWN_NODES);
+        let bound = [self.count.bind(gpu, 0, &nodes), self.count.bind(gpu, 1, &own[..3])];
+        self.count.dispatch(encoder, &[&bound[0], &bound[1]], groups);
+        scan.encode(gpu, encoder, chunk.counts, counts_of(chunk.capacity));
+        let bound = [self.write.bind(gpu, 0, &nodes[..1]), self.write.bind(gpu, 1, &own)];
+        self.write.dispatch(encoder, &[&bound[0], &bound[1]], groups);
     }
 
     /// Encodes the counting of a chunk's nodes into `counters` ([`tally_bytes`] of them).
@@ -64,9 +71,9 @@ impl Cut {
     }
 }
 
-/// Runs of a chunk with room for so many nodes.
-pub fn runs_of(capacity: u32) -> u32 {
-    capacity.div_ceil(SELECT_RUN)
+/// Numbers that the cut of a chunk with room for so many nodes counts: one an invocation, and one behind them.
+pub fn counts_of(capacity: u32) -> u32 {
+    capacity.div_ceil(OWN_NODES) + 1
 }
 
 pub const fn tally_bytes() -> u64 {

@@ -4,7 +4,10 @@
 //! their bounds, the coarse ones first; those not at hand are read and take free slots, or the slots of pages that no
 //! recent view needed. Where there is no room for more, the nodes above them are drawn instead.
 
-use super::{Gpu, cut::runs_of};
+use super::{
+    Gpu,
+    cut::{RUN_NODES, counts_of},
+};
 use crate::{
     Result,
     hierarchy::{
@@ -14,6 +17,7 @@ use crate::{
     math::View,
 };
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
@@ -40,6 +44,19 @@ struct GpuNode {
 }
 const _: () = assert!(size_of::<GpuNode>() == size_of::<crate::splat::Splat>());
 
+/// `Bounds` in cut.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+struct GpuBounds {
+    center: [f32; 3],
+    radius: f32,
+    size: f32,
+    unused: [f32; 3],
+}
+
+/// Bytes of the bounds of a slot's runs.
+const SLOT_BOUNDS: u64 = (SLOT_NODES / RUN_NODES) as u64 * size_of::<GpuBounds>() as u64;
+
 /// Bytes that a slot takes: nodes and splats.
 const SLOT_BYTES: u64 = 2 * SLOT_NODES as u64 * size_of::<GpuNode>() as u64;
 
@@ -62,7 +79,8 @@ struct GpuCut {
 pub struct Slots {
     nodes: wgpu::Buffer,
     slots: wgpu::Buffer,
-    runs: wgpu::Buffer,
+    bounds: wgpu::Buffer,
+    counts: wgpu::Buffer,
     found: wgpu::Buffer,
     pub selected: wgpu::Buffer,
     pub arguments: wgpu::Buffer,
@@ -77,7 +95,8 @@ pub struct NodeChunk<'a> {
     pub source: &'a wgpu::Buffer,
     pub splats: &'a wgpu::Buffer,
     pub slots: &'a Slots,
-    pub runs: &'a wgpu::Buffer,
+    pub bounds: &'a wgpu::Buffer,
+    pub counts: &'a wgpu::Buffer,
     pub found: &'a wgpu::Buffer,
     pub selected: &'a wgpu::Buffer,
     pub arguments: &'a wgpu::Buffer,
@@ -97,7 +116,8 @@ impl Slots {
             source,
             splats,
             slots: self,
-            runs: &self.runs,
+            bounds: &self.bounds,
+            counts: &self.counts,
             found: &self.found,
             selected: &self.selected,
             arguments: &self.arguments,
@@ -250,7 +270,8 @@ impl Forest {
         let slots = Slots {
             nodes: super::buffer(gpu, "nodes", half, Usage::STORAGE),
             slots: super::buffer(gpu, "slots", 4 * count as u64, Usage::STORAGE),
-            runs: super::buffer(gpu, "cut runs", 4 * (u64::from(runs_of(capacity)) + 1), Usage::STORAGE),
+            bounds: super::buffer(gpu, "node bounds", count as u64 * SLOT_BOUNDS, Usage::STORAGE),
+            counts: super::buffer(gpu, "cut counts", 4 * u64::from(counts_of(capacity)), Usage::STORAGE),
             found: super::buffer(gpu, "found nodes", 4 * u64::from(capacity), Usage::STORAGE),
             selected: super::buffer(gpu, "drawn nodes", 4 * (u64::from(capacity) + 1), Usage::STORAGE),
             arguments: super::buffer(gpu, "drawn arguments", 12, Usage::STORAGE | Usage::INDIRECT),
@@ -260,7 +281,8 @@ impl Forest {
             count,
         };
         self.slots.extend(std::iter::repeat_n(None, count));
-        let bytes = 2 * half + slots.runs.size() + slots.found.size() + slots.selected.size();
+        let others = [&slots.bounds, &slots.counts, &slots.found, &slots.selected];
+        let bytes = 2 * half + others.map(wgpu::Buffer::size).iter().sum::<u64>();
         Growth { slots, splats: super::buffer(gpu, "node splats", half, Usage::STORAGE), capacity, bytes }
     }
 
@@ -290,7 +312,10 @@ impl Forest {
                 let offset = (slot as usize - slots.first_slot) as u64 * SLOT_BYTES / 2;
                 let nodes: Vec<GpuNode> = (0..content.nodes.len()).map(|index| gpu_node(content, index)).collect();
                 let own: Vec<crate::splat::Splat> = content.nodes.iter().map(|node| node.splat).collect();
+                let bounds: Vec<GpuBounds> = nodes.chunks(RUN_NODES as usize).map(parents_around).collect();
                 gpu.queue.write_buffer(&slots.nodes, offset, bytemuck::cast_slice(&nodes));
+                let offset_bounds = (slot as usize - slots.first_slot) as u64 * SLOT_BOUNDS;
+                gpu.queue.write_buffer(&slots.bounds, offset_bounds, bytemuck::cast_slice(&bounds));
                 gpu.queue.write_buffer(splats, offset, bytemuck::cast_slice(&own));
             }
             // What is written waits in staging memory until something is submitted.
@@ -328,6 +353,27 @@ fn parents_of(entry: &PageEntry) -> CutSphere {
 
 fn grown_slots(grown: &[Growth]) -> usize {
     grown.iter().map(|growth| growth.slots.count).sum()
+}
+
+/// What holds the spheres and sizes of the parents of a run of nodes, with room for rounding, so that none is refined where this
+/// is not.
+fn parents_around(nodes: &[GpuNode]) -> GpuBounds {
+    const ROOM: f32 = 1.00001;
+    if nodes.iter().any(|node| node.parent_size < 0.0) {
+        // A root is always looked at.
+        return GpuBounds { size: f32::MAX, ..GpuBounds::default() };
+    }
+    let centers = || nodes.iter().map(|node| Vec3::from(node.parent_center));
+    let low = centers().fold(Vec3::INFINITY, Vec3::min);
+    let high = centers().fold(Vec3::NEG_INFINITY, Vec3::max);
+    let center = low.midpoint(high);
+    let reach = |node: &GpuNode| Vec3::from(node.parent_center).distance(center) + node.parent_radius;
+    GpuBounds {
+        center: center.to_array(),
+        radius: nodes.iter().map(reach).fold(0.0, f32::max) * ROOM,
+        size: (nodes.iter().map(|node| node.parent_size).fold(0.0, f32::max) * ROOM).min(f32::MAX),
+        unused: [0.0; 3],
+    }
 }
 
 fn gpu_node(page: &Page, index: usize) -> GpuNode {
