@@ -79,7 +79,8 @@ pub fn compare_files(a: &Path, b: &Path, limits: &Limits) -> Result<Comparison> 
 
 fn load(path: &Path, limits: &Limits) -> Result<Arc<Texture>> {
     let source = Source::open(path, limits)?;
-    source.unless_changed(decode_picture(&source, "picture", source.bytes()))
+    let hint = |error: Error| error.hint("pictures are PNG or JPEG files");
+    source.unless_changed(decode_picture(&source, "picture", source.bytes()).map_err(hint))
 }
 
 fn same_size(a: [u32; 2], b: [u32; 2]) -> Result<[u32; 2]> {

@@ -227,6 +227,20 @@ fn crowded_clouds_are_cut_too() {
     assert!(whole.iter().zip(&parts).all(|(a, b)| a.center == b.center));
 }
 
+/// Where the whole is so large that its parts cannot be told apart, the file is told, and what helps.
+#[test]
+fn points_far_off_are_told() {
+    let folder = Folder::new("far_off");
+    let positions = (0..20_000).map(|i| Vec3::new((i % 200) as f32, (i / 200) as f32, 0.0) * 1e-7);
+    let far = [Vec3::splat(100.0), Vec3::splat(-100.0)];
+    let cloud = Mesh { positions: positions.chain(far).collect(), ..Mesh::default() };
+    std::fs::write(folder.path("cloud.ply"), ply(&cloud, false, false)).unwrap();
+    let out = folder.path("out.splk");
+    let error = in_regions(&[folder.path("cloud.ply")], &out).err().expect("no room").to_string();
+    assert!(error.contains("cloud.ply: points: more than 8192 lie within"), "{error}");
+    assert!(!out.exists());
+}
+
 #[test]
 fn several_files_become_one() {
     let folder = Folder::new("several");

@@ -123,6 +123,11 @@ impl<'a> Stream<'a> {
         Ok((pieces.points() as u64, [low, high]))
     }
 
+    /// What is wrong at a place of the file.
+    pub(crate) fn error(&self, place: &str, message: impl Into<String>) -> crate::Error {
+        self.source.error(place, message)
+    }
+
     /// World position that the points are relative to.
     pub(crate) fn origin(&self) -> DVec3 {
         self.origin

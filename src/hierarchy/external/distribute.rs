@@ -5,7 +5,10 @@ use super::{
     bins::Bins,
     survey::{Surveyed, name},
 };
-use crate::{Error, Result, io::StreamPoint};
+use crate::{
+    Result,
+    io::{Stream, StreamPoint},
+};
 use glam::Vec3;
 use std::{collections::HashSet, path::Path};
 
@@ -124,31 +127,35 @@ fn triangle_shares(input: &Surveyed, found: &[[u32; 3]]) -> (Owned<[u32; 3]>, Ow
 const MOST_TIMES: usize = 4;
 
 /// Keeps points at one place from filling a region of a cloud.
-struct Crowd {
+struct Crowd<'a> {
+    stream: &'a Stream<'a>,
     most: usize,
     is_cloud: bool,
     /// The places of regions that have more points than they may.
     places: Vec<Option<HashSet<[u32; 3]>>>,
 }
 
-impl Crowd {
-    fn new(input: &Surveyed, most: u64) -> Self {
+impl<'a> Crowd<'a> {
+    fn new(input: &'a Surveyed<'_>, most: u64) -> Self {
         // A region's neighbours may make it larger.
         let most = usize::try_from(most).unwrap_or(usize::MAX).saturating_mul(2);
-        Self { most, is_cloud: input.mesh.is_none(), places: vec![None; input.regions()] }
+        Self { stream: &input.stream, most, is_cloud: input.mesh.is_none(), places: vec![None; input.regions()] }
     }
 
     /// Whether a region keeps a point.
     ///
     /// # Errors
-    /// [`Error::Argument`] where more points lie together than can be told apart from where the farthest ones are.
+    /// [`Error::Input`](crate::Error::Input) where more points lie together than can be told apart from where the farthest ones are.
     fn takes(&mut self, points: &mut Bins<StreamPoint>, region: u32, point: &StreamPoint) -> Result<bool> {
         let held = points.count(region);
         if held >= self.most.saturating_mul(MOST_TIMES) {
-            return Err(Error::Argument(format!(
-                "more than {held} points lie within a two-millionth of the way to the farthest ones, more than fit into \
-                 memory at once: remove points that are far off, or allow more memory"
-            )));
+            let message = format!(
+                "more than {held} lie within a two-millionth of the way to the farthest ones, more than fit into memory at once"
+            );
+            return Err(self
+                .stream
+                .error("points", message)
+                .hint("remove points that are far off, or allow more memory"));
         }
         if !self.is_cloud || held < self.most {
             return Ok(true);
