@@ -90,7 +90,7 @@ pub fn row(tree: &Tree) -> splatkit::Result<(Hierarchy, Vec<Cell>)> {
 }
 
 /// What was read of a leaf: writing changes the order of siblings, so the nearest is it. Splats of one vertex share their
-/// place and differ in direction.
+/// place and differ in direction and size.
 fn nearest<'a>(leaf: &Node, kept: &[&'a Node]) -> &'a Node {
     let (place, normal) = (Vec3::from(leaf.splat.center), decode_normal(leaf.splat.normal));
     let mut found = (f32::INFINITY, kept[0]);
@@ -98,7 +98,7 @@ fn nearest<'a>(leaf: &Node, kept: &[&'a Node]) -> &'a Node {
         let apart = place.distance(other.splat.center.into());
         if apart < found.0 {
             let turned = normal.zip(decode_normal(other.splat.normal)).map_or(0.0, |(a, b)| a.distance(b));
-            let distance = apart + 0.2 * leaf.size * turned;
+            let distance = apart + 0.2 * (leaf.size * turned + (leaf.size - other.size).abs());
             if distance < found.0 {
                 found = (distance, other);
             }
