@@ -72,7 +72,7 @@ impl Cut {
 }
 
 /// Numbers that the cut of a chunk with room for so many nodes counts: one an invocation, and one behind them.
-pub fn counts_of(capacity: u32) -> u32 {
+pub const fn counts_of(capacity: u32) -> u32 {
     capacity.div_ceil(OWN_NODES) + 1
 }
 

@@ -57,8 +57,10 @@ struct GpuBounds {
 /// Bytes of the bounds of a slot's runs.
 const SLOT_BOUNDS: u64 = (SLOT_NODES / RUN_NODES) as u64 * size_of::<GpuBounds>() as u64;
 
-/// Bytes that a slot takes: nodes and splats.
-const SLOT_BYTES: u64 = 2 * SLOT_NODES as u64 * size_of::<GpuNode>() as u64;
+/// Bytes of a slot's nodes, and of their splats.
+const SLOT_HALF: u64 = SLOT_NODES as u64 * size_of::<GpuNode>() as u64;
+/// Bytes that a slot takes: these, and what the cut makes of them.
+const SLOT_BYTES: u64 = 2 * SLOT_HALF + SLOT_BOUNDS + 4 * (2 * SLOT_NODES + counts_of(SLOT_NODES)) as u64;
 
 /// `Cut` in nodes.wgsl.
 #[repr(C)]
@@ -249,8 +251,8 @@ impl Forest {
         let free = self.slots.iter().filter(|slot| slot.is_none()).count();
         let mut grown = Vec::new();
         while self.slots.len() < most && free + grown_slots(&grown) < absent.len() {
-            let wanted = (absent.len() - free - grown_slots(&grown)).min(most - self.slots.len());
-            grown.push(self.grow(gpu, wanted));
+            let wanted = absent.len() - free - grown_slots(&grown);
+            grown.push(self.grow(gpu, wanted, most - self.slots.len()));
         }
         let all: Vec<(&Slots, &wgpu::Buffer)> =
             chunks.iter().copied().chain(grown.iter().map(|g: &Growth| (&g.slots, &g.splats))).collect();
@@ -259,14 +261,14 @@ impl Forest {
         Ok(grown)
     }
 
-    /// A chunk with room for about `wanted` more pages.
-    fn grow(&mut self, gpu: &Gpu, wanted: usize) -> Growth {
-        let most = (gpu.binding_size() / (SLOT_BYTES / 2)).min(MOST_SLOTS) as usize;
+    /// A chunk with room for about `wanted` more pages, and no more than `most`.
+    fn grow(&mut self, gpu: &Gpu, wanted: usize, most: usize) -> Growth {
+        let most = most.min((gpu.binding_size() / SLOT_HALF).min(MOST_SLOTS) as usize);
         // A view's neighbours need some more; the last chunk of a small file need not be larger than it.
         let left = self.slot_of.len() - self.slots.len().min(self.slot_of.len());
         let count = (wanted + wanted / 4 + 1).min(left.max(1)).max(wanted).min(most);
         let capacity = count as u32 * SLOT_NODES;
-        let half = count as u64 * SLOT_BYTES / 2;
+        let half = count as u64 * SLOT_HALF;
         let slots = Slots {
             nodes: super::buffer(gpu, "nodes", half, Usage::STORAGE),
             slots: super::buffer(gpu, "slots", 4 * count as u64, Usage::STORAGE),
@@ -309,7 +311,7 @@ impl Forest {
                 let holder =
                     chunks.iter().find(|(s, _)| (s.first_slot..s.first_slot + s.count).contains(&(slot as usize)));
                 let Some((slots, splats)) = holder else { continue };
-                let offset = (slot as usize - slots.first_slot) as u64 * SLOT_BYTES / 2;
+                let offset = (slot as usize - slots.first_slot) as u64 * SLOT_HALF;
                 let nodes: Vec<GpuNode> = (0..content.nodes.len()).map(|index| gpu_node(content, index)).collect();
                 let own: Vec<crate::splat::Splat> = content.nodes.iter().map(|node| node.splat).collect();
                 let bounds: Vec<GpuBounds> = nodes.chunks(RUN_NODES as usize).map(parents_around).collect();
