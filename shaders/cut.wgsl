@@ -26,13 +26,10 @@ const SHARERS: u32 = 8u;
 const OWN_NODES: u32 = SELECT_RUN / SHARERS;
 
 @compute @workgroup_size(64)
-fn count(@builtin(global_invocation_id) invocation: vec3<u32>) {
+fn count(@builtin(global_invocation_id) invocation: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
     let id = invocation.x;
-    if id * OWN_NODES >= source.count {
-        return;
-    }
     let nodes = run_of(id / SHARERS);
-    let parents = bounds[id / SHARERS];
+    let parents = bounds[nodes.x / SELECT_RUN];
     var end = nodes.y;
     if refinement(pixels(parents.center, parents.radius, parents.size)) == 0u {
         end = 0u;
@@ -46,23 +43,20 @@ fn count(@builtin(global_invocation_id) invocation: vec3<u32>) {
         }
     }
     counts[id] = found;
-    if (id + 1u) * OWN_NODES >= source.count {
+    if id + 1u == 64u * workgroups.x {
         counts[id + 1u] = 0u;
     }
 }
 
 @compute @workgroup_size(64)
-fn write(@builtin(global_invocation_id) invocation: vec3<u32>) {
+fn write(@builtin(global_invocation_id) invocation: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
     let id = invocation.x;
-    if id * OWN_NODES >= source.count {
-        return;
-    }
     let at = counts[id];
     let found = counts[id + 1u] - at;
     for (var i = 0u; i < found; i++) {
         selected[at + i] = found_nodes[id * OWN_NODES + i];
     }
-    if (id + 1u) * OWN_NODES >= source.count {
+    if id + 1u == 64u * workgroups.x {
         let all = at + found;
         selected[source.count] = all;
         arguments[0] = (all + 64u * RUN - 1u) / (64u * RUN);

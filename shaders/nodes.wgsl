@@ -7,8 +7,8 @@
 @group(0) @binding(2) var<storage, read> nodes: array<Node>;
 // The nodes' splats (48 bytes each, see splat.rs).
 @group(0) @binding(3) var<storage, read> splats: array<vec4<f32>>;
-// How many nodes of each slot take part.
-@group(0) @binding(4) var<storage, read> slots: array<u32>;
+// The slots that take part, and how many of their nodes.
+@group(0) @binding(4) var<storage, read> slots: array<vec2<u32>>;
 // Which pages of the hierarchy are at hand, a bit each.
 @group(0) @binding(5) var<storage, read> resident: array<u32>;
 
@@ -44,6 +44,7 @@ const SHARE_UNIT: u32 = 1023u;
 const MOST_PIXELS: f32 = 1e9;
 const SLOT_NODES: u32 = 4096u;
 const SELECT_RUN: u32 = 64u;
+const SLOT_RUNS: u32 = SLOT_NODES / SELECT_RUN;
 
 fn to_view(place: vec3<f32>) -> vec3<f32> {
     return source.axis_x.xyz * place.x + source.axis_y.xyz * place.y + source.axis_z.xyz * place.z + source.origin.xyz;
@@ -124,10 +125,10 @@ fn share(index: u32) -> u32 {
     return above - own;
 }
 
-// The nodes that an invocation looks at: first, and behind the last.
-fn run_of(id: u32) -> vec2<u32> {
-    let start = id * SELECT_RUN;
-    let slot = start / SLOT_NODES;
-    let end = min(start + SELECT_RUN, slot * SLOT_NODES + slots[slot]);
-    return vec2(start, end);
+// The nodes of a run of the slots that take part: first, and behind the last.
+fn run_of(run: u32) -> vec2<u32> {
+    let slot = slots[run / SLOT_RUNS];
+    let first = slot.x * SLOT_NODES;
+    let start = first + run % SLOT_RUNS * SELECT_RUN;
+    return vec2(start, min(start + SELECT_RUN, first + slot.y));
 }

@@ -14,11 +14,7 @@ fn step_of(wide: f32) -> f32 {
 
 @compute @workgroup_size(64)
 fn count(@builtin(global_invocation_id) invocation: vec3<u32>) {
-    let id = invocation.x;
-    if id * SELECT_RUN >= source.count {
-        return;
-    }
-    let run = run_of(id);
+    let run = run_of(invocation.x);
     for (var i = run.x; i < run.y; i++) {
         let node = nodes[i];
         if is_hidden(i, node) {

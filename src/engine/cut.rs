@@ -3,7 +3,7 @@
 
 use super::{
     Gpu,
-    nodes::NodeChunk,
+    nodes::{NodeChunk, SLOT_NODES},
     scan::Scan,
     shaders,
     stage::{Binding, Stage},
@@ -14,8 +14,8 @@ pub const RUN_NODES: u32 = 64;
 /// Invocations that share a run (`SHARERS` in cut.wgsl).
 const SHARERS: u32 = 8;
 const OWN_NODES: u32 = RUN_NODES / SHARERS;
-/// Nodes that a workgroup of tally looks at.
-const WORKGROUP_NODES: u32 = 64 * RUN_NODES;
+// A workgroup of tally looks at the nodes of a slot, as many of cut do together.
+const _: () = assert!(SLOT_NODES == 64 * RUN_NODES && SLOT_NODES.is_multiple_of(64 * OWN_NODES));
 
 /// Counters of a tally, eight an octave, the first for a cut of 2⁻⁸ pixels (tally.wgsl).
 const TALLY_COUNT: usize = 256;
@@ -50,10 +50,11 @@ impl Cut {
         let own = [chunk.bounds, chunk.counts, chunk.found, chunk.selected, chunk.arguments];
         let own = own.map(|b| b.as_entire_buffer_binding());
         let nodes = chunk.bindings();
-        let groups = chunk.capacity.div_ceil(64 * OWN_NODES);
+        let nodes_at_hand = chunk.active * SLOT_NODES;
+        let groups = nodes_at_hand / (64 * OWN_NODES);
         let bound = [self.count.bind(gpu, 0, &nodes), self.count.bind(gpu, 1, &own[..3])];
         self.count.dispatch(encoder, &[&bound[0], &bound[1]], groups);
-        scan.encode(gpu, encoder, chunk.counts, counts_of(chunk.capacity));
+        scan.encode(gpu, encoder, chunk.counts, counts_of(nodes_at_hand));
         let bound = [self.write.bind(gpu, 0, &nodes[..1]), self.write.bind(gpu, 1, &own)];
         self.write.dispatch(encoder, &[&bound[0], &bound[1]], groups);
     }
@@ -67,11 +68,11 @@ impl Cut {
         counters: &wgpu::Buffer,
     ) {
         let buffers = [chunk.bindings().as_slice(), &[counters.as_entire_buffer_binding()]].concat();
-        self.tally.dispatch(encoder, &[&self.tally.bind(gpu, 0, &buffers)], chunk.capacity.div_ceil(WORKGROUP_NODES));
+        self.tally.dispatch(encoder, &[&self.tally.bind(gpu, 0, &buffers)], chunk.active);
     }
 }
 
-/// Numbers that the cut of a chunk with room for so many nodes counts: one an invocation, and one behind them.
+/// Numbers that the cut of so many nodes counts: one an invocation, and one behind them.
 pub const fn counts_of(capacity: u32) -> u32 {
     capacity.div_ceil(OWN_NODES) + 1
 }

@@ -19,7 +19,10 @@ use crate::{
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use rayon::prelude::*;
-use std::sync::Arc;
+use std::sync::{
+    Arc,
+    atomic::{AtomicU32, Ordering::Relaxed},
+};
 use wgpu::BufferUsages as Usage;
 
 /// Nodes of a slot (`SLOT_NODES` in nodes.wgsl): the most of a page.
@@ -90,6 +93,8 @@ pub struct Slots {
     cut: wgpu::Buffer,
     first_slot: usize,
     count: usize,
+    /// How many slots take part in the frame.
+    active: AtomicU32,
 }
 
 /// What the cut binds of a chunk.
@@ -102,7 +107,8 @@ pub struct NodeChunk<'a> {
     pub found: &'a wgpu::Buffer,
     pub selected: &'a wgpu::Buffer,
     pub arguments: &'a wgpu::Buffer,
-    pub capacity: u32,
+    /// How many slots take part.
+    pub active: u32,
 }
 
 impl NodeChunk<'_> {
@@ -123,7 +129,7 @@ impl Slots {
             found: &self.found,
             selected: &self.selected,
             arguments: &self.arguments,
-            capacity: self.count as u32 * SLOT_NODES,
+            active: self.active.load(Relaxed),
         }
     }
 }
@@ -271,7 +277,7 @@ impl Forest {
         let half = count as u64 * SLOT_HALF;
         let slots = Slots {
             nodes: super::buffer(gpu, "nodes", half, Usage::STORAGE),
-            slots: super::buffer(gpu, "slots", 4 * count as u64, Usage::STORAGE),
+            slots: super::buffer(gpu, "slots", 8 * count as u64, Usage::STORAGE),
             bounds: super::buffer(gpu, "node bounds", count as u64 * SLOT_BOUNDS, Usage::STORAGE),
             counts: super::buffer(gpu, "cut counts", 4 * u64::from(counts_of(capacity)), Usage::STORAGE),
             found: super::buffer(gpu, "found nodes", 4 * u64::from(capacity), Usage::STORAGE),
@@ -281,6 +287,7 @@ impl Forest {
             cut: self.cut.clone(),
             first_slot: self.slots.len(),
             count,
+            active: AtomicU32::new(0),
         };
         self.slots.extend(std::iter::repeat_n(None, count));
         let others = [&slots.bounds, &slots.counts, &slots.found, &slots.selected];
@@ -336,14 +343,18 @@ impl Forest {
         gpu.queue.write_buffer(&self.resident, 0, bytemuck::cast_slice(&bits));
         for (slots, _) in chunks {
             let own = &self.slots[slots.first_slot..slots.first_slot + slots.count];
-            let counts: Vec<u32> = own
-                .iter()
-                .map(|slot| match slot {
-                    Some((page, frame)) if *frame == self.frame => self.hierarchy.pages()[*page as usize].nodes,
-                    _ => 0,
-                })
-                .collect();
-            gpu.queue.write_buffer(&slots.slots, 0, bytemuck::cast_slice(&counts));
+            let nodes = |page: u32| self.hierarchy.pages()[page as usize].nodes;
+            let taking_part = (0..).zip(own).filter_map(|(number, slot)| match slot {
+                Some((page, frame)) if *frame == self.frame => Some([number, nodes(*page)]),
+                _ => None,
+            });
+            let mut active: Vec<[u32; 2]> = taking_part.collect();
+            if active.is_empty() {
+                // An empty list has to be made, too.
+                active.push([0, 0]);
+            }
+            slots.active.store(active.len() as u32, Relaxed);
+            gpu.queue.write_buffer(&slots.slots, 0, bytemuck::cast_slice(&active));
         }
     }
 }
