@@ -4,7 +4,7 @@ use crate::{
     io::{Limits, testing::*},
 };
 use laz::{LasZipCompressor, LazItemRecordBuilder, LazVlr, LazVlrBuilder};
-use std::io::Cursor;
+use std::{io::Cursor, path::Path};
 
 const SCALE: f64 = 0.001;
 const OFFSET: [f64; 3] = [4_500_000.0, 5_400_000.0, 100.0];
@@ -59,11 +59,15 @@ fn las(format: u8, records: &[Vec<u8>]) -> Vec<u8> {
 }
 
 fn laz(format: u8, records: &[Vec<u8>], points: u64) -> Vec<u8> {
+    in_chunks_of(20, format, records, points)
+}
+
+fn in_chunks_of(size: u32, format: u8, records: &[Vec<u8>], points: u64) -> Vec<u8> {
     let items = LazItemRecordBuilder::default_for_point_format_id(format, 0).unwrap();
     let builder = LazVlrBuilder::new(items);
     // As COPC has them, chunks of their own sizes.
     let layout =
-        if format < 6 { builder.with_fixed_chunk_size(20) } else { builder.with_variable_chunk_size() }.build();
+        if format < 6 { builder.with_fixed_chunk_size(size) } else { builder.with_variable_chunk_size() }.build();
     let mut described = Vec::new();
     layout.write_to(&mut described).unwrap();
     let mut before = vec![0; 54];
@@ -112,6 +116,20 @@ fn every_format_plain_and_packed() {
                 }
             }
         }
+    }
+}
+
+/// Chunks are unpacked as a whole: a file of huge ones is not read in pieces.
+#[test]
+fn huge_chunks_are_no_pieces() {
+    let most = 1 << 21;
+    for (count, streams) in [(most, true), (most + 1, false)] {
+        let records = vec![record(0, 5, 0, false); count];
+        let bytes = in_chunks_of(1 << 22, 0, &records, count as u64);
+        let limits = Limits::default();
+        let source = Source::from_bytes(Path::new("a.laz"), &bytes, &limits).unwrap();
+        assert_eq!(crate::io::Stream::of(source).unwrap().is_some(), streams);
+        assert_eq!(load(&bytes).unwrap().positions.len(), count);
     }
 }
 
