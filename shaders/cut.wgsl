@@ -12,7 +12,8 @@
 // The workgroups that later passes need for them.
 @group(1) @binding(4) var<storage, read_write> arguments: array<u32, 3>;
 
-// A sphere around the parents of a run's nodes, and the largest of their sizes. Mirrors engine/nodes.rs.
+// A sphere around the parents of a run's nodes, and the largest of their sizes; negative where one is a root. Mirrors
+// engine/nodes.rs.
 struct Bounds {
     center: vec3<f32>,
     radius: f32,
@@ -31,7 +32,9 @@ fn count(@builtin(global_invocation_id) invocation: vec3<u32>, @builtin(num_work
     let nodes = run_of(id / SHARERS);
     let parents = bounds[nodes.x / SELECT_RUN];
     var end = nodes.y;
-    if refinement(pixels(parents.center, parents.radius, parents.size)) == 0u {
+    // What rounding may add on the way to the eye.
+    let room = 1e-6 * (length(parents.center) + length(source.origin.xyz));
+    if parents.size >= 0.0 && refinement(pixels(parents.center, parents.radius + room, parents.size)) == 0u {
         end = 0u;
     }
     var found = 0u;

@@ -281,11 +281,11 @@ impl Scene {
     }
 }
 
-/// Volumes in bricks.
 /// The width of a sample's footprint at half its height, in steps between samples: that of a B-spline is 1.8, of the usual
 /// Gaussian 1.65.
 const SAMPLE_WIDTH: f64 = 2.0;
 
+/// Volumes in bricks.
 impl Scene {
     /// Which bricks of the scene's volume a view shows, within the settings' memory; none without such a volume. A detail
     /// that counts splats bounds the bricks by as many samples.
@@ -485,7 +485,7 @@ pub struct Settings {
     /// Whether nodes of hierarchies that face away from the eye are left out: a saving where the front hides them, a loss
     /// where it does not. `None`: where the source was closed.
     pub cull_backfaces: Option<bool>,
-    /// GPU memory that each hierarchy's pages, or a volume's bricks, may take, in bytes.
+    /// GPU memory that each hierarchy's pages, or a volume's bricks, may take, in bytes; without what frames make of bricks.
     pub page_memory: u64,
     /// Perspective views show nothing nearer than this (world units); a thousandth of the scene where `None`.
     pub near: Option<f64>,

@@ -148,18 +148,23 @@ fn a_device_that_does_not_answer_in_time_is_an_error() {
     let (gpu, scene) = (gpu(), scene(false));
     let truth = drawn(&gpu, &scene).expect("draws");
     let impatient = gpu.clone().with_patience(Duration::from_millis(1));
-    hang(&gpu);
-    let error = impatient.wait().expect_err("busy for longer");
+    // A fast one may be done while this thread rests.
+    let mut waits = (0..5).map(|_| {
+        hang(&gpu);
+        impatient.wait()
+    });
+    let error = waits.find_map(Result::err).expect("busy for longer");
     assert!(error.to_string().contains("did not answer within"), "{error}");
     // What is asked of it afterwards does not wait again, by whomever.
     assert!(matches!(impatient.wait(), Err(Error::DeviceLost(_))));
     assert!(matches!(drawn(&gpu, &scene), Err(Error::DeviceLost(_))));
     // A picture that is done before it is waited for is a picture; there is none of which a part is done.
-    let impatient = gpu.reopened().expect("opens again").with_patience(Duration::from_nanos(1));
-    match drawn(&impatient, &scene) {
-        Ok(picture) => assert!(same(&picture, &truth)),
-        Err(error) => assert!(error.to_string().contains("did not answer within"), "{error}"),
-    }
+    let pictures = (0..20).map(|_| {
+        let impatient = gpu.reopened().expect("opens again").with_patience(Duration::from_nanos(1));
+        drawn(&impatient, &scene).map(|picture| assert!(same(&picture, &truth)))
+    });
+    let error = pictures.filter_map(Result::err).next().expect("slower than a nanosecond, at least once");
+    assert!(error.to_string().contains("did not answer within"), "{error}");
 }
 
 /// What a pixel may differ by where smaller buffers cut the scene into other parts: as of tests/occlusion.rs.

@@ -163,7 +163,7 @@ fn the_engine_draws_the_cut_that_the_oracle_finds() {
         let memory = Hierarchy::from_tree(tree.clone()).expect("a hierarchy");
         for hierarchy in [memory, file] {
             let mut prepared = renderer.prepare(&Scene::new().with_hierarchy(hierarchy)).expect("prepared");
-            for (part, pixels) in [(1.0, 0.0), (1.0, 3.0), (0.3, 1.0), (0.3, 4.0), (2.5, 5.0)] {
+            for (part, pixels) in [(1.0, 0.0), (1.0, 3.0), (0.3, 1.0), (0.3, 4.0), (2.5, 5.0), (1.0, 1e10)] {
                 for orthographic in [false, true] {
                     let mut camera = camera(&set.bounds(), part);
                     if orthographic {

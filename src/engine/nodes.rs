@@ -62,8 +62,8 @@ const SLOT_BOUNDS: u64 = (SLOT_NODES / RUN_NODES) as u64 * size_of::<GpuBounds>(
 
 /// Bytes of a slot's nodes, and of their splats.
 const SLOT_HALF: u64 = SLOT_NODES as u64 * size_of::<GpuNode>() as u64;
-/// Bytes that a slot takes: these, and what the cut makes of them.
-const SLOT_BYTES: u64 = 2 * SLOT_HALF + SLOT_BOUNDS + 4 * (2 * SLOT_NODES + counts_of(SLOT_NODES)) as u64;
+/// Bytes that a slot takes: these, what the cut makes of them, and their spans.
+const SLOT_BYTES: u64 = 2 * SLOT_HALF + SLOT_BOUNDS + 4 * (4 * SLOT_NODES + counts_of(SLOT_NODES)) as u64;
 
 /// `Cut` in nodes.wgsl.
 #[repr(C)]
@@ -374,7 +374,7 @@ fn parents_around(nodes: &[GpuNode]) -> GpuBounds {
     const ROOM: f32 = 1.00001;
     if nodes.iter().any(|node| node.parent_size < 0.0) {
         // A root is always looked at.
-        return GpuBounds { size: f32::MAX, ..GpuBounds::default() };
+        return GpuBounds { size: -1.0, ..GpuBounds::default() };
     }
     let centers = || nodes.iter().map(|node| Vec3::from(node.parent_center));
     let low = centers().fold(Vec3::INFINITY, Vec3::min);

@@ -185,7 +185,7 @@ impl Tree {
         let at = |pixels: f64| self.selected(&Cut::new(view, self.origin, pixels, culls));
         let selected = match detail {
             Detail::Pixels(pixels) => at(pixels),
-            Detail::Milliseconds(_) => at(1.0),
+            Detail::Milliseconds(_) => at(Detail::PIXELS),
             Detail::Splats(most) => {
                 let step = |step: i32| at(f64::from(step).mul_add(0.125, -8.0).exp2());
                 let (mut fine, mut coarse) = (-1, 255);

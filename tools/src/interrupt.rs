@@ -13,7 +13,9 @@ pub fn answer() {
         let _abandoned = disk::abandon();
         // Who reads stderr may be gone already.
         writeln!(std::io::stderr(), "interrupted: what was not finished is removed").ok();
-        std::process::exit(INTERRUPTED)
+        // At once: the ordinary way out takes libraries apart while another thread may be loading or using them, as a driver's
+        // compiler, which then may run for ever.
+        signal_hook::low_level::exit(INTERRUPTED)
     });
     if let Err(error) = set {
         tracing::warn!("Ctrl-C may leave files that are not whole: {error}");

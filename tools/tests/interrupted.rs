@@ -122,9 +122,10 @@ fn who_is_killed_leaves_the_old_file_or_the_new_one() {
 #[test]
 fn who_is_interrupted_leaves_nothing() {
     let interrupt = |moment: u32, child: &mut Child| signal(child, ["INT", "TERM", "INT", "HUP"][moment as usize % 4]);
+    let sent = [2, 15, 1].map(Some);
     let [stopped, _] = stop("interrupted", 12, interrupt, |status, left, _, file| {
         // At the first moments the handler may not be there yet, nor may any file.
-        let by_signal = std::os::unix::process::ExitStatusExt::signal(&status).is_some();
+        let by_signal = sent.contains(&std::os::unix::process::ExitStatusExt::signal(&status));
         assert!(matches!(status.code(), Some(0 | 130)) || by_signal, "{file}: {status}");
         assert_eq!(left, [""; 0], "{file}: {status}");
     });
@@ -138,19 +139,22 @@ fn who_is_interrupted_while_drawing_ends_at_once() {
     let begin = Instant::now();
     folder.run(arguments).ok();
     let whole = begin.elapsed();
-    for moment in 0..8 {
+    let mut answered = 0;
+    for moment in 0..24 {
         std::fs::remove_file(folder.path("a.png")).ok();
         let mut child = start(&folder, arguments);
-        std::thread::sleep(whole * moment / 8 + Duration::from_millis(30));
+        std::thread::sleep(whole * moment / 24 + Duration::from_millis(10));
         signal(&child, "INT");
         let status = child.wait().unwrap();
         let picture = std::fs::read(folder.path("a.png")).ok();
-        // On a busy machine the handler may not be there yet.
-        let by_signal = std::os::unix::process::ExitStatusExt::signal(&status).is_some();
+        // On a busy machine the handler may not be there yet, but not every time.
+        let by_signal = std::os::unix::process::ExitStatusExt::signal(&status) == Some(2);
+        answered += u32::from(!by_signal);
         assert!(matches!(status.code(), Some(0 | 130)) || by_signal, "moment {moment}: {status}");
         assert!(picture.is_none_or(|bytes| is_png(&bytes, 640, 480)), "moment {moment}");
         assert_eq!(left(&folder, "a.png"), [""; 0]);
     }
+    assert!(answered > 0);
 }
 
 /// Runs a conversion that may write files of so many blocks of 512 bytes at most; more is an error, as on a full disk.
@@ -221,7 +225,12 @@ fn inputs_that_are_cut_meanwhile_are_told() {
         let begin = Instant::now();
         folder.run(&arguments).ok();
         let mut whole = begin.elapsed();
-        for moment in 0..10 {
+        // Ten moments, and some more where all came too early or too late.
+        let before = told;
+        for moment in (0..10).cycle().take(40) {
+            if moment == 0 && told > before + 1 {
+                break;
+            }
             folder.put(name, bytes);
             let begin = Instant::now();
             let mut command = Command::new(env!("CARGO_BIN_EXE_splatkit"));

@@ -30,7 +30,7 @@ struct Fineness {
     angles: Vec<Vec<[f64; 2]>>,
 }
 
-/// Nodes that are no leaves are drawn where they are about a pixel wide.
+/// Nodes that are no leaves are drawn where they are a pixel or two wide.
 static FINENESS: LazyLock<[Fineness; 2]> = LazyLock::new(|| {
     let inner = Fineness {
         sigma: PARTS / 4,
