@@ -29,16 +29,16 @@ const OWN_NODES: u32 = SELECT_RUN / SHARERS;
 @compute @workgroup_size(64)
 fn count(@builtin(global_invocation_id) invocation: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
     let id = invocation.x;
-    let nodes = run_of(id / SHARERS);
-    let parents = bounds[nodes.x / SELECT_RUN];
-    var end = nodes.y;
+    let run = run_of(id / SHARERS);
+    let parents = bounds[run.x / SELECT_RUN];
+    var end = run.y;
     // What rounding may add on the way to the eye.
     let room = 1e-6 * (length(parents.center) + length(source.origin.xyz));
     if parents.size >= 0.0 && refinement(pixels(parents.center, parents.radius + room, parents.size)) == 0u {
         end = 0u;
     }
     var found = 0u;
-    for (var i = nodes.x + id % SHARERS; i < end; i += SHARERS) {
+    for (var i = run.x + id % SHARERS; i < end; i += SHARERS) {
         let own = share(i);
         if own > 0u {
             found_nodes[id * OWN_NODES + found] = i | (own << SHARE_SHIFT);

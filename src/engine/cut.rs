@@ -47,15 +47,13 @@ impl Cut {
 
     /// Encodes the making of a chunk's list.
     pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, scan: &Scan, chunk: &NodeChunk<'_>) {
-        let own = [chunk.bounds, chunk.counts, chunk.found, chunk.selected, chunk.arguments];
-        let own = own.map(|b| b.as_entire_buffer_binding());
-        let nodes = chunk.bindings();
-        let nodes_at_hand = chunk.active * SLOT_NODES;
-        let groups = nodes_at_hand / (64 * OWN_NODES);
-        let bound = [self.count.bind(gpu, 0, &nodes), self.count.bind(gpu, 1, &own[..3])];
+        let (nodes, list) = (chunk.nodes(), chunk.list());
+        let at_hand = chunk.slots.active() * SLOT_NODES;
+        let groups = at_hand / (64 * OWN_NODES);
+        let bound = [self.count.bind(gpu, 0, &nodes), self.count.bind(gpu, 1, &list[..3])];
         self.count.dispatch(encoder, &[&bound[0], &bound[1]], groups);
-        scan.encode(gpu, encoder, chunk.counts, counts_of(nodes_at_hand));
-        let bound = [self.write.bind(gpu, 0, &nodes[..1]), self.write.bind(gpu, 1, &own)];
+        scan.encode(gpu, encoder, &chunk.slots.counts, counts_of(at_hand));
+        let bound = [self.write.bind(gpu, 0, &nodes[..1]), self.write.bind(gpu, 1, &list)];
         self.write.dispatch(encoder, &[&bound[0], &bound[1]], groups);
     }
 
@@ -67,14 +65,14 @@ impl Cut {
         chunk: &NodeChunk<'_>,
         counters: &wgpu::Buffer,
     ) {
-        let buffers = [chunk.bindings().as_slice(), &[counters.as_entire_buffer_binding()]].concat();
-        self.tally.dispatch(encoder, &[&self.tally.bind(gpu, 0, &buffers)], chunk.active);
+        let buffers = [chunk.nodes().as_slice(), &[counters.as_entire_buffer_binding()]].concat();
+        self.tally.dispatch(encoder, &[&self.tally.bind(gpu, 0, &buffers)], chunk.slots.active());
     }
 }
 
 /// Numbers that the cut of so many nodes counts: one an invocation, and one behind them.
-pub const fn counts_of(capacity: u32) -> u32 {
-    capacity.div_ceil(OWN_NODES) + 1
+pub const fn counts_of(nodes: u32) -> u32 {
+    nodes.div_ceil(OWN_NODES) + 1
 }
 
 pub const fn tally_bytes() -> u64 {

@@ -85,7 +85,7 @@ pub struct Slots {
     nodes: wgpu::Buffer,
     slots: wgpu::Buffer,
     bounds: wgpu::Buffer,
-    counts: wgpu::Buffer,
+    pub counts: wgpu::Buffer,
     found: wgpu::Buffer,
     pub selected: wgpu::Buffer,
     pub arguments: wgpu::Buffer,
@@ -93,44 +93,38 @@ pub struct Slots {
     cut: wgpu::Buffer,
     first_slot: usize,
     count: usize,
-    /// How many slots take part in the frame.
     active: AtomicU32,
 }
 
-/// What the cut binds of a chunk.
+/// A chunk of slots, with its splats and how they lie in the view.
 pub struct NodeChunk<'a> {
     pub source: &'a wgpu::Buffer,
     pub splats: &'a wgpu::Buffer,
     pub slots: &'a Slots,
-    pub bounds: &'a wgpu::Buffer,
-    pub counts: &'a wgpu::Buffer,
-    pub found: &'a wgpu::Buffer,
-    pub selected: &'a wgpu::Buffer,
-    pub arguments: &'a wgpu::Buffer,
-    /// How many slots take part.
-    pub active: u32,
 }
 
 impl NodeChunk<'_> {
-    pub fn bindings(&self) -> [wgpu::BufferBinding<'_>; 6] {
+    /// What nodes.wgsl binds.
+    pub fn nodes(&self) -> [wgpu::BufferBinding<'_>; 6] {
         let Slots { cut, nodes, slots, resident, .. } = self.slots;
         [self.source, cut, nodes, self.splats, slots, resident].map(|b| b.as_entire_buffer_binding())
+    }
+
+    /// What cut.wgsl binds besides.
+    pub fn list(&self) -> [wgpu::BufferBinding<'_>; 5] {
+        let Slots { bounds, counts, found, selected, arguments, .. } = self.slots;
+        [bounds, counts, found, selected, arguments].map(|b| b.as_entire_buffer_binding())
     }
 }
 
 impl Slots {
     pub fn chunk<'a>(&'a self, source: &'a wgpu::Buffer, splats: &'a wgpu::Buffer) -> NodeChunk<'a> {
-        NodeChunk {
-            source,
-            splats,
-            slots: self,
-            bounds: &self.bounds,
-            counts: &self.counts,
-            found: &self.found,
-            selected: &self.selected,
-            arguments: &self.arguments,
-            active: self.active.load(Relaxed),
-        }
+        NodeChunk { source, splats, slots: self }
+    }
+
+    /// How many slots take part in the frame.
+    pub fn active(&self) -> u32 {
+        self.active.load(Relaxed)
     }
 }
 
@@ -318,14 +312,13 @@ impl Forest {
                 let holder =
                     chunks.iter().find(|(s, _)| (s.first_slot..s.first_slot + s.count).contains(&(slot as usize)));
                 let Some((slots, splats)) = holder else { continue };
-                let offset = (slot as usize - slots.first_slot) as u64 * SLOT_HALF;
+                let place = (slot as usize - slots.first_slot) as u64;
                 let nodes: Vec<GpuNode> = (0..content.nodes.len()).map(|index| gpu_node(content, index)).collect();
                 let own: Vec<crate::splat::Splat> = content.nodes.iter().map(|node| node.splat).collect();
                 let bounds: Vec<GpuBounds> = nodes.chunks(RUN_NODES as usize).map(parents_around).collect();
-                gpu.queue.write_buffer(&slots.nodes, offset, bytemuck::cast_slice(&nodes));
-                let offset_bounds = (slot as usize - slots.first_slot) as u64 * SLOT_BOUNDS;
-                gpu.queue.write_buffer(&slots.bounds, offset_bounds, bytemuck::cast_slice(&bounds));
-                gpu.queue.write_buffer(splats, offset, bytemuck::cast_slice(&own));
+                gpu.queue.write_buffer(&slots.nodes, place * SLOT_HALF, bytemuck::cast_slice(&nodes));
+                gpu.queue.write_buffer(&slots.bounds, place * SLOT_BOUNDS, bytemuck::cast_slice(&bounds));
+                gpu.queue.write_buffer(splats, place * SLOT_HALF, bytemuck::cast_slice(&own));
             }
             // What is written waits in staging memory until something is submitted.
             gpu.queue.submit([]);
