@@ -22,7 +22,7 @@ fn prepare() {
     if words > frame.record_capacity {
         atomicStore(&state[OVERFLOW], 1u);
     }
-    workgroups[0] = min((min(words, frame.record_capacity) + 63u) / 64u, 65535u);
+    workgroups[0] = min((min(words, frame.record_capacity) + 63u) / 64u, MOST_WORKGROUPS);
     workgroups[1] = 1u;
     workgroups[2] = 1u;
     atomicStore(&large[0], 0u);

@@ -87,8 +87,8 @@ fn cull(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
 @compute @workgroup_size(1)
 fn prepare() {
     let groups = (atomicLoad(&drawn[active_count(source.first_run)]) + 63u) / 64u;
-    let columns = min(groups, MOST_WORKGROUPS);
-    workgroups[0] = columns;
-    workgroups[1] = (groups + columns - 1u) / max(columns, 1u);
+    let rows = rows_of(groups);
+    workgroups[0] = rows.x;
+    workgroups[1] = rows.y;
     workgroups[2] = 1u;
 }

@@ -121,8 +121,11 @@ fn record_words(flags: u32) -> u32 {
 // A pixel that lets less light through than this is finished.
 const OPAQUE: f32 = 0.0005;
 
-// A row of a dispatch takes so many workgroups; more go on in further rows (Stage::dispatch in engine/stage.rs).
-const MOST_WORKGROUPS: u32 = 65535u;
+// A row of a dispatch takes MOST_WORKGROUPS (engine/stage.rs); more go on in further rows: the columns and rows for so many.
+fn rows_of(workgroups: u32) -> vec2<u32> {
+    let columns = min(workgroups, MOST_WORKGROUPS);
+    return vec2(columns, (workgroups + columns - 1u) / max(columns, 1u));
+}
 
 // The number of a workgroup, and that of an invocation in workgroups of 64.
 fn group_number(group: vec3<u32>) -> u32 {

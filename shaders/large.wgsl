@@ -13,7 +13,7 @@
 
 @compute @workgroup_size(1)
 fn prepare() {
-    workgroups[0] = min(large[0], 65535u);
+    workgroups[0] = min(large[0], MOST_WORKGROUPS);
     workgroups[1] = 1u;
     workgroups[2] = 1u;
 }

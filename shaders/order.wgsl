@@ -49,7 +49,7 @@ fn bin_end(bin: u32) -> u32 {
 @compute @workgroup_size(64)
 fn order(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let bins = progress[progress_word(LISTED)] * stage.groups;
-    let number = dealt(group.x, (bins + 63u) / 64u) * 64u + lane;
+    let number = dealt(group_number(group), (bins + 63u) / 64u) * 64u + lane;
     if number >= bins {
         return;
     }
@@ -88,7 +88,7 @@ const LONG_WORKGROUPS: u32 = 4096u;
 
 @compute @workgroup_size(1)
 fn count_long() {
-    long_arguments[0] = min(atomicLoad(&long_count), LONG_WORKGROUPS);
+    long_arguments[0] = min(atomicLoad(&long_count), min(LONG_WORKGROUPS, MOST_WORKGROUPS));
     long_arguments[1] = 1u;
     long_arguments[2] = 1u;
 }

@@ -25,12 +25,12 @@ fn list(@builtin(global_invocation_id) id: vec3<u32>) {
 
 @compute @workgroup_size(1)
 fn prepare() {
-    // More workgroups than fit the first dimension of a dispatch go on in the second.
     let tiles = select(0u, atomicLoad(&progress[progress_word(LISTED)]), stage.groups > 0u);
-    let workgroups = dealt_count(tiles);
-    let columns = min(workgroups, MOST_WORKGROUPS);
+    let order = rows_of(dealt_count((tiles * stage.groups + 63u) / 64u));
+    let march = rows_of(dealt_count(tiles));
     state[TILES] = tiles;
-    arguments[ORDER_ARGUMENTS] = dealt_count((tiles * stage.groups + 63u) / 64u);
-    arguments[MARCH_ARGUMENTS] = columns;
-    arguments[MARCH_ARGUMENTS + 1u] = (workgroups + columns - 1u) / max(columns, 1u);
+    arguments[ORDER_ARGUMENTS] = order.x;
+    arguments[ORDER_ARGUMENTS + 1u] = order.y;
+    arguments[MARCH_ARGUMENTS] = march.x;
+    arguments[MARCH_ARGUMENTS + 1u] = march.y;
 }

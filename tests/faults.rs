@@ -175,13 +175,11 @@ fn difference(a: &Picture, b: &Picture) -> f32 {
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 
-/// A host's device with room for so many bytes a buffer.
-fn small_device(bytes: u64) -> Gpu {
+/// A host's device of some limits.
+fn host_device(required_limits: wgpu::Limits) -> Gpu {
     let open = async {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
         let adapter = instance.enumerate_adapters(wgpu::Backends::all()).await.swap_remove(0);
-        let required_limits =
-            wgpu::Limits { max_buffer_size: bytes, max_storage_buffer_binding_size: bytes, ..wgpu::Limits::default() };
         let descriptor = wgpu::DeviceDescriptor { required_limits, ..Default::default() };
         let (device, queue) = adapter.request_device(&descriptor).await.expect("a device");
         // A host that ends where it hears of an error: the engine's are not its.
@@ -189,6 +187,15 @@ fn small_device(bytes: u64) -> Gpu {
         Gpu::from_wgpu(device, queue, adapter.get_info())
     };
     pollster::block_on(open)
+}
+
+/// One with room for so many bytes a buffer.
+fn small_device(bytes: u64) -> Gpu {
+    host_device(wgpu::Limits {
+        max_buffer_size: bytes,
+        max_storage_buffer_binding_size: bytes,
+        ..wgpu::Limits::default()
+    })
 }
 
 #[test]
@@ -226,4 +233,17 @@ fn what_did_not_fit_leaves_the_device_usable() {
     assert!(matches!(error, Error::Gpu(_) | Error::Argument(_)), "{error}");
     let again = renderer.render(&mut prepared, &camera, &settings).expect("draws again").0;
     assert!(same(&first, &again));
+}
+
+/// Scenes of 67 million candidates need more workgroups than a row of a dispatch takes; where a row takes 16, so do these.
+#[test]
+fn dispatches_of_many_rows_draw_the_same() {
+    let usual = host_device(wgpu::Limits::default());
+    let narrow = host_device(wgpu::Limits { max_compute_workgroups_per_dimension: 16, ..wgpu::Limits::default() });
+    for (name, scene) in [("whole", scene(false)), ("in bricks", scene(true))] {
+        let pictures = [&usual, &narrow].map(|gpu| drawn(gpu, &scene).expect("draws"));
+        let covered = pictures[0].color.iter().filter(|color| color[3] > 0.5).count();
+        assert!(covered > 1000, "{name}: {covered} pixels");
+        assert!(same(&pictures[0], &pictures[1]), "{name}: another picture");
+    }
 }

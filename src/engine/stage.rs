@@ -1,10 +1,7 @@
 //! One compute pipeline with its bindings. Shaders are put together from whole files: shared declarations first, then the
-//! pass's own file, so that each shader says what it uses and nothing is generated.
+//! pass's own file, so that each shader says what it uses; what is generated are constants alone.
 
 use super::Gpu;
-
-/// Workgroups along one dimension of a dispatch, by WebGPU's default limits.
-const MOST_WORKGROUPS: u32 = 65_535;
 
 /// What a binding holds, in the order of the shader's binding numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,16 +17,18 @@ pub struct Stage {
     label: &'static str,
     pipeline: wgpu::ComputePipeline,
     layouts: Vec<wgpu::BindGroupLayout>,
+    /// Workgroups along one dimension of a dispatch, which the shaders know as `MOST_WORKGROUPS`.
+    most_workgroups: u32,
 }
 
 impl Stage {
     /// Compiles `entry` of the joined `sources`; `groups` lists the bindings of each bind group.
     pub fn new(gpu: &Gpu, label: &'static str, sources: &[&str], entry: &str, groups: &[&[Binding]]) -> Self {
         let device = &gpu.device;
-        let descriptor = wgpu::ShaderModuleDescriptor {
-            label: Some(label),
-            source: wgpu::ShaderSource::Wgsl(sources.concat().into()),
-        };
+        let most_workgroups = device.limits().max_compute_workgroups_per_dimension;
+        let source = format!("{}\nconst MOST_WORKGROUPS: u32 = {most_workgroups}u;\n", sources.concat());
+        let descriptor =
+            wgpu::ShaderModuleDescriptor { label: Some(label), source: wgpu::ShaderSource::Wgsl(source.into()) };
         // Loop counters and clamped indices keep the driver from unrolling the loops over an invocation's pixels, whose sums
         // then live in memory instead of registers: march took 5 times as long with them (Mesa 22.3 software Vulkan).
         let checks = wgpu::ShaderRuntimeChecks {
@@ -60,7 +59,7 @@ impl Stage {
             },
             cache: None,
         });
-        Self { label, pipeline, layouts }
+        Self { label, pipeline, layouts, most_workgroups }
     }
 
     /// Binds buffers (whole, or parts) to group `group`, in the order of their binding numbers.
@@ -80,9 +79,9 @@ impl Stage {
     }
 
     /// Encodes a dispatch of a fixed number of workgroups. More than fit one dimension go on in the second, so that
-    /// workgroup (x, y) is number x + 65,535·y, and a few of the last row may be too many.
+    /// workgroup (x, y) is number x + y · `MOST_WORKGROUPS`, and a few of the last row may be too many.
     pub fn dispatch(&self, encoder: &mut wgpu::CommandEncoder, groups: &[&wgpu::BindGroup], workgroups: u32) {
-        let columns = workgroups.min(MOST_WORKGROUPS);
+        let columns = workgroups.min(self.most_workgroups);
         if columns > 0 {
             self.begin(encoder, groups).dispatch_workgroups(columns, workgroups.div_ceil(columns), 1);
         }

@@ -12,11 +12,12 @@ use glam::{DVec3, Vec3};
 use splatkit::{
     Error, Result,
     hierarchy::{
-        BuildOptions, Hierarchy, Tree,
+        BuildOptions, Hierarchy, Preset, Tree,
+        external::{self, ExternalOptions},
         file::{WriteOptions, to_bytes},
         validate,
     },
-    io::{self, Endian, Kind, Limits, RawLayout, SampleType, Source, Stream},
+    io::{self, Endian, Kind, Limits, RawLayout, SampleType, Source, Stream, VolumeStream},
     math::{Camera, Projection},
     reference,
     scattered::Points,
@@ -49,6 +50,7 @@ pub const FORMATS: &[(&str, Look)] = &[
     ("vtk", vtk),
     ("raw", raw),
     ("any", any),
+    ("regions", regions),
     ("splk", splk),
     ("splk_summed", splk_summed),
     ("splv", splv),
@@ -160,15 +162,18 @@ pub fn obj(bytes: &[u8]) {
         mesh("input.obj", bytes, io::obj::read);
         return;
     };
-    let folder = Folder::new();
     let (materials, picture) = cut(rest, b"\n#png\n").unwrap_or((rest, &[]));
-    let path = folder.write("input.obj", model);
-    folder.write("input.mtl", materials);
-    if !picture.is_empty() {
-        folder.write("input.png", picture);
-    }
+    let others = [("input.mtl", materials), ("input.png", picture)];
+    mesh_beside(("input.obj", model), &others, io::obj::read);
+}
+
+/// Reads a mesh whose file refers to others beside it.
+fn mesh_beside((name, bytes): (&str, &[u8]), others: &[(&str, &[u8])], reader: fn(&Source) -> Result<Mesh>) {
+    let folder = Folder::new();
+    others.iter().for_each(|(name, bytes)| drop(folder.write(name, bytes)));
+    let path = folder.write(name, bytes);
     let limits = limits();
-    accepted(Source::open(&path, &limits).and_then(|source| io::obj::read(&source))).iter().for_each(sound_mesh);
+    accepted(Source::open(&path, &limits).and_then(|source| reader(&source))).iter().for_each(sound_mesh);
 }
 
 fn cut<'a>(bytes: &'a [u8], mark: &[u8]) -> Option<(&'a [u8], &'a [u8])> {
@@ -205,8 +210,15 @@ pub fn stl(bytes: &[u8]) {
     mesh("input.stl", bytes, io::stl::read);
 }
 
+/// A glTF file; behind a line `#bin` its buffer, `input.bin`, and behind a line `#png` its picture, `input.png`.
 pub fn gltf(bytes: &[u8]) {
-    mesh("input.glb", bytes, io::gltf::read);
+    let Some((model, rest)) = cut(bytes, b"\n#bin\n") else {
+        mesh("input.glb", bytes, io::gltf::read);
+        return;
+    };
+    let (buffer, picture) = cut(rest, b"\n#png\n").unwrap_or((rest, &[]));
+    let others = [("input.bin", buffer), ("input.png", picture)];
+    mesh_beside(("input.gltf", model), &others, io::gltf::read);
 }
 
 pub fn las(bytes: &[u8]) {
@@ -251,8 +263,32 @@ pub fn npy(bytes: &[u8]) {
     read("input.npy", bytes, io::npy::read).iter().for_each(sound_samples);
 }
 
+/// A NRRD file; behind lines `#data` the files that it may refer to: `0.raw`, `1.raw` and so on. With these it is also read
+/// slice by slice.
 pub fn nrrd(bytes: &[u8]) {
-    volume("input.nrrd", bytes, io::nrrd::read);
+    let Some((header, mut rest)) = cut(bytes, DATA) else {
+        volume("input.nrrd", bytes, io::nrrd::read);
+        return;
+    };
+    const DATA: &[u8] = b"\n#data\n";
+    let mut others = Vec::new();
+    while let Some((data, behind)) = cut(rest, DATA) {
+        others.push(data);
+        rest = behind;
+    }
+    others.push(rest);
+    let folder = Folder::new();
+    others.iter().enumerate().for_each(|(number, data)| drop(folder.write(&format!("{number}.raw"), data)));
+    let path = folder.write("input.nhdr", header);
+    let limits = limits();
+    let whole = accepted(io::load_volume(&path, &limits, None));
+    whole.iter().for_each(sound_volume);
+    let stream = accepted(VolumeStream::open(&path, &limits, None)).flatten();
+    if let (Some(whole), Some(stream)) = (whole, stream) {
+        assert_eq!((stream.lattice(), stream.scalar()), (&whole.lattice, whole.samples.scalar()));
+        let samples = stream.slices(0..whole.lattice.dims[2]).expect("what is read as a whole");
+        assert!(samples.bytes() == whole.samples.bytes(), "other samples slice by slice");
+    }
 }
 
 pub fn vti(bytes: &[u8]) {
@@ -302,6 +338,26 @@ pub fn any(bytes: &[u8]) {
             None => {}
         }
     }
+}
+
+/// A PLY file, or else a LAS or LAZ file, converted region by region: has as many points as one that is read as a whole.
+pub fn regions(bytes: &[u8]) {
+    let folder = Folder::new();
+    let path = folder.write(if bytes.starts_with(b"ply") { "input.ply" } else { "input.laz" }, bytes);
+    let made = folder.0.join("made.splk");
+    let limits = limits();
+    let options = ExternalOptions { memory: 1, preset: Preset::default(), block_splats: 64, surfels: surfel_options() };
+    let whole = accepted(io::load_mesh(&path, &limits));
+    let converted =
+        accepted(external::convert(&[path], &limits, &made, &options, &WriteOptions::default(), &|_, _, _| {}));
+    let Some(converted) = converted else { return assert!(!made.exists(), "a file beside an error") };
+    if let Some(whole) = whole {
+        assert_eq!(converted.points, whole.positions.len() as u64, "points in pieces, and as a whole");
+    }
+    let hierarchy = Hierarchy::open(&made, &limits).expect("what was written");
+    let report = hierarchy.check();
+    assert!(report.is_sound(), "the file that was written: {:?}", report.findings);
+    assert_eq!(hierarchy.leaves().expect("what was written").splats.len() as u64, converted.splats);
 }
 
 /// A hierarchy's bytes as they are: what opens can be read or tells what is wrong, and what is found sound can be read.
@@ -425,6 +481,11 @@ struct Model {
     is_perspective: bool,
 }
 
+/// Few surfels for little models.
+fn surfel_options() -> SurfelOptions {
+    SurfelOptions { largest_spacing: 0.5, most_triangles: 256, ..SurfelOptions::default() }
+}
+
 /// From a tiny model to surfels, to a hierarchy, to its file and back, to a picture on the CPU.
 pub fn convert_render(bytes: &[u8]) {
     const MOST: usize = 48;
@@ -443,7 +504,7 @@ pub fn convert_render(bytes: &[u8]) {
         positions,
         ..Mesh::default()
     };
-    let usual = SurfelOptions { largest_spacing: 0.5, most_triangles: 256, ..SurfelOptions::default() };
+    let usual = surfel_options();
     let radius_scale = model.radius_scale.map_or(usual.radius_scale, |scale| scale.value());
     let Some(set) = accepted(mesh.surfels(&SurfelOptions { radius_scale, ..usual })) else { return };
     for splat in &set.splats {

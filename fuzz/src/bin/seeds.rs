@@ -63,6 +63,9 @@ impl Seeds {
     /// As [`put`](Self::put), also for the target of files without a name.
     fn known(&mut self, target: &str, bytes: impl AsRef<[u8]>) -> Result<()> {
         self.put("any", &bytes)?;
+        if matches!(target, "ply" | "las") {
+            self.put("regions", &bytes)?;
+        }
         self.put(target, bytes)
     }
 
@@ -197,6 +200,9 @@ fn gltf(seeds: &mut Seeds) -> Result<()> {
     }
     seeds.known("gltf", binary)?;
     seeds.known("gltf", document(&format!(",\"uri\":\"data:application/octet-stream;base64,{}\"", base64(&data))))?;
+    let beside = document(",\"uri\":\"input.bin\"")
+        .replace("\"bufferView\":4,\"mimeType\":\"image/png\"", "\"uri\":\"input.png\"");
+    seeds.put("gltf", [beside.as_bytes(), b"\n#bin\n", &data, b"\n#png\n", &picture].concat())?;
     seeds.known(
         "gltf",
         r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0,1]}],"nodes":[{"children":[1]},{"children":[0],"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"accessors":[{"componentType":5126,"count":3,"type":"VEC3"}]}"#,
@@ -410,7 +416,17 @@ fn volumes(seeds: &mut Seeds) -> Result<()> {
     seeds.known("nrrd", format!("{head}lattice:=bcc\nencoding: ascii\n\n1 2 3 4 5 6 7 -8"))?;
     let places = "axis positions 0:=0 1\naxis positions 1:=0 2\naxis positions 2:=0 5\n";
     seeds.known("nrrd", format!("{head}{places}encoding: text\n\n1 2 3 4 5 6 7 8"))?;
-    seeds.known("nrrd", format!("{head}data file: a.raw\nbyte skip: 4\nencoding: raw\n\n"))?;
+    let detached = |field: &str, data: &[&str]| {
+        let data: String = data.iter().map(|data| format!("\n#data\n{data}")).collect();
+        format!("{head}encoding: raw\ndata file: {field}\n{data}")
+    };
+    seeds.put("nrrd", format!("{head}encoding: raw\n\n0123456789abcdef\n#data\n"))?;
+    seeds.put("nrrd", detached("0.raw", &["0123456789abcdef"]))?;
+    seeds.put("nrrd", detached("0.raw\nbyte skip: -1", &["text 0123456789abcdef"]))?;
+    seeds.put("nrrd", detached("%d.raw 0 1 1", &["01234567", "89abcdef"]))?;
+    seeds.put("nrrd", detached("%01u.raw 3 0 -1 1", &["0123", "4567", "89ab", "cdef"]))?;
+    seeds.put("nrrd", detached("LIST\n1.raw\n0.raw", &["89abcdef", "01234567"]))?;
+    seeds.put("nrrd", detached("LIST 3\n0.raw\n1.raw", &["01234567", "89abcdef"]))?;
     let mut packer = GzEncoder::new(Vec::new(), Compression::default());
     packer.write_all(b"0123456789abcdef")?;
     seeds.known("nrrd", [head.as_bytes(), b"encoding: gzip\n\n", &packer.finish()?].concat())?;
