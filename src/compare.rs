@@ -66,21 +66,22 @@ pub fn compare_pictures(a: &Picture, b: &Picture) -> Result<Comparison> {
     compare_pixels(|at| a.color[at].map(f64::from), |at| b.color[at].map(f64::from), size)
 }
 
-/// Compares two PNG or JPEG files (told apart by their content) at 8 bits a channel.
+/// Compares two PNG or JPEG files (told apart by their content) at 8 bits a channel. The limits hold for both together.
 ///
 /// # Errors
 /// [`Error::File`], [`Error::Input`] and [`Error::Limit`] for files that are no such pictures; [`Error::Argument`] where
 /// the sizes differ.
 pub fn compare_files(a: &Path, b: &Path, limits: &Limits) -> Result<Comparison> {
-    let [a, b] = [load(a, limits)?, load(b, limits)?];
+    let first = Source::open(a, limits)?;
+    let a = picture(&first)?;
+    let b = picture(&first.open_beside(b)?)?;
     let size = same_size([a.width, a.height], [b.width, b.height])?;
     compare(a.texels.as_flattened(), b.texels.as_flattened(), size)
 }
 
-fn load(path: &Path, limits: &Limits) -> Result<Arc<Texture>> {
-    let source = Source::open(path, limits)?;
+fn picture(source: &Source) -> Result<Arc<Texture>> {
     let hint = |error: Error| error.hint("pictures are PNG or JPEG files");
-    source.unless_changed(decode_picture(&source, "picture", source.bytes()).map_err(hint))
+    source.unless_changed(decode_picture(source, "picture", source.bytes()).map_err(hint))
 }
 
 fn same_size(a: [u32; 2], b: [u32; 2]) -> Result<[u32; 2]> {
@@ -271,6 +272,12 @@ mod tests {
         assert!(matches!(compare_files(&folder.join("none.png"), &png, &limits), Err(Error::File { .. })));
         let small = Limits { texels: 64 * 47, ..Limits::default() };
         assert!(matches!(compare_files(&png, &png, &small), Err(Error::Limit { .. })));
+        // Room for one of them, and for both: a pixel counts 16 bytes while it is decoded.
+        let of_one = std::fs::metadata(&png).unwrap().len() + 16 * 64 * 48;
+        for (bytes, fits) in [(of_one - 1, false), (2 * of_one - 1, false), (2 * of_one, true)] {
+            let found = compare_files(&png, &png, &Limits { bytes, ..limits.clone() });
+            assert!(if fits { found.is_ok() } else { matches!(found, Err(Error::Limit { .. })) }, "{bytes}: {found:?}");
+        }
         std::fs::remove_dir_all(&folder).unwrap();
     }
 }

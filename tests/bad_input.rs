@@ -349,6 +349,8 @@ fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
         ("deep.vti", vtk_xml("ImageData", "", &"<a>".repeat(mib)).into()),
         ("nested.gltf", "[".repeat(4 * mib).into()),
         ("nested.json", "[".repeat(mib).into()),
+        ("bomb.png", png(8000, 8000)),
+        ("large.png", png(2000, 2000)),
         ("bomb.splk", crafted::page_of_zeros(1 << 30)),
         ("equal.splk", crafted::pages_of_one_node(100)),
         ("bomb.splv", crafted::brick_of_zeros(1 << 30)),

@@ -30,8 +30,9 @@ impl<'a> Source<'a> {
         Self::open_within(path, limits, Arc::new(Budget::new()))
     }
 
-    /// Opens a file that this one refers to, at a path from [`neighbour`](Self::neighbour): both count as one.
-    pub(super) fn open_beside<'b>(&self, path: &'b Path) -> Result<Source<'b>>
+    /// Opens a file that this one refers to, at a path from [`neighbour`](Self::neighbour), or that is read together with it:
+    /// both count as one.
+    pub(crate) fn open_beside<'b>(&self, path: &'b Path) -> Result<Source<'b>>
     where
         'a: 'b,
     {

@@ -71,6 +71,10 @@ pub fn load(path: &Path, limits: &Limits) -> Result<String> {
         let transfer = TransferFunction::read(path, limits)?;
         return Ok(format!("transfer {} {}", transfer.color.len(), transfer.opacity.len()));
     }
+    if extension == "png" {
+        let found = splatkit::compare::compare_files(path, path, limits)?;
+        return Ok(format!("compared, {} pixels differ", found.different_pixels));
+    }
     let raw = ["raw", "gz"].contains(&extension).then_some(RAW);
     let kind = Kind::of(path, limits, false)?.or(raw.as_ref().map(|_| Kind::Volume));
     Ok(match kind {

@@ -7,7 +7,7 @@ use splatkit::{
     Error, disk, io,
     volume::{Arrangement, Lattice, Volume, phantoms::Phantom},
 };
-use std::{fmt::Write, path::PathBuf};
+use std::{io::Write, path::PathBuf};
 
 #[derive(Args, Debug)]
 pub struct Generate {
@@ -93,11 +93,11 @@ impl Generate {
             (What::Scan, ..) => return Err(Failure::Usage("a scan is made --from a mesh and written as .ply".into())),
             (_, _, "ply") => return Err(Failure::Usage("phantoms are written as .nrrd, .vtr or .csv".into())),
             (What::Phantom(phantom), _, "csv") => {
-                disk::write(&self.output, scattered(phantom, self.points).as_bytes())?;
+                disk::write_with(&self.output, |out| scattered(phantom, self.points, out))?;
             }
             (What::Phantom(phantom), _, "vtr") => {
                 check_dims(self.dims, AS_TEXT)?;
-                disk::write(&self.output, rectilinear(phantom, self.dims).as_bytes())?;
+                disk::write_with(&self.output, |out| rectilinear(phantom, self.dims, out))?;
             }
             (What::Phantom(phantom), ..) if self.sample_type == Type::U8 => self.bytes(phantom, progress)?,
             (What::Phantom(phantom), ..) => {
@@ -137,10 +137,11 @@ impl Generate {
     }
 }
 
-/// Bytes that a sample takes while it is made: with its neighbours in a slice, as a number and packed, as text.
+/// Bytes that a sample takes while it is made: with its neighbours in a slice, as a number and packed, as text, which is
+/// written at once but read as a whole.
 const AS_BYTES: u64 = 2;
 const AS_NUMBERS: u64 = 16;
-const AS_TEXT: u64 = 64;
+const AS_TEXT: u64 = 16;
 
 /// Refuses samples of which there are none, or more than memory may hold.
 fn check_dims(dims: [usize; 3], bytes: u64) -> Result<(), Failure> {
@@ -171,35 +172,38 @@ pub fn body_centred(side: usize) -> Lattice {
 }
 
 /// A grid as VTK writes it, with coordinates along each axis that are four times as dense in the middle as at the ends.
-fn rectilinear(phantom: Phantom, dims: [usize; 3]) -> String {
+fn rectilinear(phantom: Phantom, dims: [usize; 3], out: &mut impl Write) -> std::io::Result<()> {
     let place = |i: usize, count: usize| {
         let t = 2.0 * i as f64 / count.saturating_sub(1).max(1) as f64 - 1.0;
         t - 0.6 * (std::f64::consts::PI * t).sin() / std::f64::consts::PI
     };
     let places = dims.map(|count| (0..count).map(|i| place(i, count)).collect::<Vec<_>>());
-    let array = |kind: &str, name: &str, values: &mut dyn Iterator<Item = f64>| {
-        let values: Vec<_> = values.map(|value| format!("{value:.7}")).collect();
-        format!("<DataArray type=\"{kind}\" Name=\"{name}\" format=\"ascii\">{}</DataArray>\n", values.join(" "))
-    };
+    let extent = dims.map(|count| format!("0 {}", count.saturating_sub(1))).join(" ");
+    writeln!(
+        out,
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"RectilinearGrid\" version=\"0.1\" byte_order=\"LittleEndian\">\n\
+         <RectilinearGrid WholeExtent=\"{extent}\">\n<Piece Extent=\"{extent}\">\n<PointData Scalars=\"value\">"
+    )?;
     let [x, y, z] = &places;
     let points = z.iter().flat_map(|z| y.iter().flat_map(move |y| x.iter().map(move |x| DVec3::new(*x, *y, *z))));
-    let samples = array("Float32", "value", &mut points.map(|p| phantom.value(p)));
-    let axes: String = ["x", "y", "z"]
-        .iter()
-        .zip(&places)
-        .map(|(name, places)| array("Float64", name, &mut places.iter().copied()))
-        .collect();
-    let extent = dims.map(|count| format!("0 {}", count.saturating_sub(1))).join(" ");
-    format!(
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"RectilinearGrid\" version=\"0.1\" byte_order=\"LittleEndian\">\n\
-         <RectilinearGrid WholeExtent=\"{extent}\">\n<Piece Extent=\"{extent}\">\n\
-         <PointData Scalars=\"value\">\n{samples}</PointData>\n<Coordinates>\n{axes}</Coordinates>\n\
-         </Piece>\n</RectilinearGrid>\n</VTKFile>\n"
-    )
+    array("Float32", "value", points.map(|p| phantom.value(p)), out)?;
+    writeln!(out, "</PointData>\n<Coordinates>")?;
+    for (name, places) in ["x", "y", "z"].iter().zip(&places) {
+        array("Float64", name, places.iter().copied(), out)?;
+    }
+    writeln!(out, "</Coordinates>\n</Piece>\n</RectilinearGrid>\n</VTKFile>")
+}
+
+fn array(kind: &str, name: &str, values: impl Iterator<Item = f64>, out: &mut impl Write) -> std::io::Result<()> {
+    write!(out, "<DataArray type=\"{kind}\" Name=\"{name}\" format=\"ascii\">")?;
+    for (number, value) in values.enumerate() {
+        write!(out, "{}{value:.7}", if number > 0 { " " } else { "" })?;
+    }
+    writeln!(out, "</DataArray>")
 }
 
 /// Samples at random places of the cube, as a table; the same ones every time.
-fn scattered(phantom: Phantom, count: u32) -> String {
+fn scattered(phantom: Phantom, count: u32, out: &mut impl Write) -> std::io::Result<()> {
     let mut state = 0u64;
     // SplitMix64 (Steele, Lea & Flood 2014).
     let mut random = || {
@@ -208,13 +212,12 @@ fn scattered(phantom: Phantom, count: u32) -> String {
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         2.0 * ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64 - 1.0
     };
-    let mut table = String::from("x,y,z,value\n");
+    writeln!(out, "x,y,z,value")?;
     for _ in 0..count {
         let p = DVec3::new(random(), random(), random());
-        // A string takes whatever is written.
-        let _ = writeln!(table, "{:.6},{:.6},{:.6},{:.6}", p.x, p.y, p.z, phantom.value(p));
+        writeln!(out, "{:.6},{:.6},{:.6},{:.6}", p.x, p.y, p.z, phantom.value(p))?;
     }
-    table
+    Ok(())
 }
 
 #[cfg(test)]
@@ -232,16 +235,22 @@ mod tests {
         assert!(low.max_element() <= -1.0 && high.min_element() >= 1.0);
     }
 
+    fn text(write: impl FnOnce(&mut Vec<u8>) -> std::io::Result<()>) -> String {
+        let mut out = Vec::new();
+        write(&mut out).unwrap();
+        String::from_utf8(out).unwrap()
+    }
+
     #[test]
     fn rectilinear_grids_have_their_coordinates() {
-        let grid = rectilinear(Phantom::Ball, [2, 3, 1]);
+        let grid = text(|out| rectilinear(Phantom::Ball, [2, 3, 1], out));
         assert!(grid.contains("WholeExtent=\"0 1 0 2 0 0\""), "{grid}");
         assert!(grid.contains(">-1.0000000 0.0000000 1.0000000<"), "{grid}");
     }
 
     #[test]
     fn scattered_samples_are_a_table() {
-        let table = scattered(Phantom::Ball, 3);
+        let table = text(|out| scattered(Phantom::Ball, 3, out));
         assert_eq!((table.lines().count(), table.lines().next()), (4, Some("x,y,z,value")));
         assert!(table.lines().skip(1).all(|line| line.split(',').all(|part| part.parse::<f64>().is_ok())));
     }

@@ -106,14 +106,8 @@ impl Regions {
                 cut.insert(cell.start, own);
             }
         }
-        let mut regions = Self { cube, starts, coarse: Vec::new(), reach, cut, spacing: middle(typical) };
-        let region_of = |index: u64| {
-            let (start, end) = (index << BELOW_COARSE, ((index + 1) << BELOW_COARSE) - 1);
-            let region = regions.search(start);
-            if region == regions.search(end) { region } else { SEVERAL }
-        };
-        regions.coarse = (0..regions.reach.len() as u64).map(region_of).collect();
-        regions
+        let coarse = table(&starts, reach.len());
+        Self { cube, starts, coarse, reach, cut, spacing: middle(typical) }
     }
 
     /// How many regions there are, 1 at least.
@@ -161,6 +155,20 @@ impl Regions {
             }
         }
     }
+}
+
+/// The region of each of so many coarse cells, of the first keys of the regions.
+fn table(starts: &[u64], cells: usize) -> Vec<u32> {
+    // Cells that no region has as a whole are those that a region begins within.
+    let mut table = vec![SEVERAL; cells];
+    for (region, &start) in (0..).zip(starts) {
+        let first = start.div_ceil(1 << BELOW_COARSE) as usize;
+        let end = starts.get(region as usize + 1).map_or(cells, |&next| (next >> BELOW_COARSE) as usize);
+        if first < end {
+            table[first..end].fill(region);
+        }
+    }
+    table
 }
 
 /// The median of values that count so many times.
@@ -236,6 +244,11 @@ mod tests {
             let regions = regions(&places, 100);
             let counts = counts(&places, &regions);
             assert!(counts.iter().all(|&count| (1..=100).contains(&count)) && counts.len() <= 25, "{counts:?}");
+            for (index, &region) in (0u64..).zip(&regions.coarse) {
+                let [first, last] =
+                    [index << BELOW_COARSE, ((index + 1) << BELOW_COARSE) - 1].map(|key| regions.search(key));
+                assert_eq!(region, if first == last { first } else { SEVERAL }, "cell {index}");
+            }
         }
     }
 
