@@ -112,9 +112,10 @@ impl Scene {
         for clip in &settings.clips {
             match clip.shape {
                 ClipShape::HalfSpace { normal, offset } => {
-                    if !(normal.is_finite() && normal.length_squared() > 0.0 && offset.is_finite()) {
+                    if !((1e-150..=1e150).contains(&normal.length()) && offset.is_finite()) {
                         return wrong(format!(
-                            "a clip plane needs a direction and an offset, found {normal} and {offset}"
+                            "a clip plane needs a direction of a length from 1e-150 to 1e150 and a finite offset, \
+                             found {normal} and {offset}"
                         ));
                     }
                 }

@@ -1,6 +1,6 @@
 //! The one primitive: an ellipsoidal Gaussian kernel with a payload.
 
-use crate::math::Bounds;
+use crate::{Error, Result, math::Bounds};
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use half::f16;
@@ -122,6 +122,35 @@ impl SplatSet {
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
     }
 
+    /// Gives the set another origin, with all splats where they were.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] where 32 bits hold places around it less finely than a quarter of the splats' mean deviation: splats
+    /// beside each other would become one.
+    pub fn move_origin(&mut self, origin: DVec3) -> Result<()> {
+        let shift = self.origin - origin;
+        self.origin = origin;
+        if shift == DVec3::ZERO || self.splats.is_empty() {
+            return Ok(());
+        }
+        let move_one = |splat: &mut Splat| {
+            let center = (Vec3::from(splat.center).as_dvec3() + shift).as_vec3();
+            splat.center = center.to_array();
+            let size = splat.factor.iter().map(|b| f64::from(b * b)).sum::<f64>().sqrt();
+            (f64::from(center.abs().max_element()), size)
+        };
+        let both = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1 + b.1);
+        let (farthest, sizes) = self.splats.par_iter_mut().map(move_one).reduce(|| (0.0, 0.0), both);
+        let (step, size) = (farthest * f64::from(f32::EPSILON), sizes / self.splats.len() as f64);
+        if step > 0.25 * size {
+            return Err(Error::Argument(format!(
+                "splats lie up to {farthest:.0} from the first input, where 32 bits hold places in steps of {step:.3}, but \
+                 their deviation is {size:.3} in the mean; convert inputs that lie so far apart to files of their own"
+            )));
+        }
+        Ok(())
+    }
+
     /// The box around all footprints, in world coordinates.
     pub fn bounds(&self) -> Bounds {
         let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
@@ -136,5 +165,23 @@ impl SplatSet {
         let both = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
         let (low, high) = self.splats.par_iter().fold(|| none, grow).reduce(|| none, both);
         Bounds { min: self.origin + low.as_dvec3(), max: self.origin + high.as_dvec3() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_hold_while_the_origin_moves() {
+        let splat =
+            |x: f32| Splat { center: [x, 0.0, 0.0], factor: [0.01, 0.0, 0.01, 0.0, 0.0, 0.01], ..Splat::zeroed() };
+        let splats = vec![splat(0.0), splat(0.25)];
+        let mut set = SplatSet { origin: DVec3::X, payload: Payload::Radiance, splats, extent: 3.0, overlap: 1.0 };
+        set.move_origin(DVec3::new(1001.0, 0.0, 0.0)).unwrap();
+        let places: Vec<f64> = set.splats.iter().map(|s| set.origin.x + f64::from(s.center[0])).collect();
+        assert!((places[0] - 1.0).abs() < 1e-4 && (places[1] - 1.25).abs() < 1e-4, "{places:?}");
+        let error = set.move_origin(DVec3::new(4e6, 0.0, 0.0)).unwrap_err().to_string();
+        assert!(error.contains("in steps of 0.477"), "{error}");
     }
 }

@@ -57,7 +57,7 @@ impl Tree {
     /// [`Error::NothingToDraw`] for an empty set, [`Error::Argument`] for one of scalars or with places that are not finite.
     pub fn build(set: &SplatSet, options: &BuildOptions, watch: Watch<'_>) -> Result<Self> {
         let _span = tracing::info_span!("build").entered();
-        check(set)?;
+        check_splats(set)?;
         let parts = partition::blocks(&set.splats, options.block_splats.max(64));
         let outer = enclosing(&set.splats, set.extent);
         let built = AtomicU64::new(0);
@@ -101,7 +101,7 @@ pub fn build_file(
     watch: Watch<'_>,
 ) -> Result<()> {
     let _span = tracing::info_span!("build").entered();
-    check(set)?;
+    check_splats(set)?;
     let parts = partition::blocks(&set.splats, build.block_splats.max(64));
     let mut builder = Builder::new(path, set.extent, enclosing(&set.splats, set.extent), build.preset, write)?;
     let mut built = 0;
@@ -176,7 +176,12 @@ pub(crate) fn join(roots: &[Node], preset: Preset, outer: Sphere) -> (Block, Vec
 /// Places and shapes up to this can be merged: masses have their fourth powers, and must fit in 32 bits.
 const FARTHEST: f32 = 1e9;
 
-pub(super) fn check(set: &SplatSet) -> Result<()> {
+/// Whether a hierarchy can be built of splats.
+///
+/// # Errors
+/// [`Error::Argument`] for splats that are no finite numbers or of more than 32 bits can add up, and for samples;
+/// [`Error::NothingToDraw`] where there are none.
+pub fn check_splats(set: &SplatSet) -> Result<()> {
     if set.payload != Payload::Radiance {
         return Err(Error::Argument("a hierarchy is built of splats that carry colour, not of samples".into()));
     }

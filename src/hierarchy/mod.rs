@@ -15,7 +15,7 @@ mod sphere;
 pub(crate) mod testing;
 mod validate;
 
-pub use build::{BuildOptions, Preset, Watch, build_file};
+pub use build::{BuildOptions, Preset, Watch, build_file, check_splats};
 pub(crate) use cut::cone_margin;
 pub use cut::{BLEND_BAND, Cut, Detail, SHARE_UNIT};
 pub use file::{CutSphere, Hierarchy};

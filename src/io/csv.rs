@@ -120,6 +120,8 @@ mod tests {
             "# x y z v\n1 2 3 -0.5\n4 5 6 70",
             "value z y x\n-0.5 3 2 1\n70 6 5 4",
             "x,y,z,value,name\n1,2,3,-0.5,first\n4,5,6,70,second",
+            "x,y,z,value,name\n1,2,3,-0.5,\"first, of two\"\n\"4\",5,6,\"70\",second",
+            "\"x\"\t\"y\"\t\"z\"\t\"pressure, of air\"\n1\t2\t3\t-0.5\n4\t5\t6\t70",
         ] {
             assert_eq!(load(text, None).unwrap(), plain, "{text}");
         }
@@ -150,6 +152,8 @@ mod tests {
             ("1 2 3 4\n5 6 7 8 9", None, "line 2: has 5 columns"),
             ("1 2 3 4\n5 6 seven 8", None, "line 2: “seven” is not a number"),
             ("1;2;3;4\n5;6;7;8,5", None, "“8,5” is not a number"),
+            ("\"1,5\",\"2,5\",\"3,5\",\"4\"\n", None, "neither numbers nor names"),
+            ("1,2,3,4\n\"1,5\",\"2,5\",\"3,5\",\"4\"\n", None, "“1,5” is not a number"),
             ("1 2 3 4 0", None, "radius of sample 0 is 0"),
             ("1 2 3 1e39", None, "line 1: the value"),
         ] {

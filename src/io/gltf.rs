@@ -5,26 +5,29 @@
 
 mod accessor;
 mod buffers;
+mod materials;
 mod nodes;
 #[cfg(test)]
 mod tests;
 
-use super::{Source, positions, texture};
+use super::{Source, positions};
 use crate::{
     Result,
-    surface::{Material, Mesh, Texture},
+    surface::{Mesh, Texture},
 };
 use ::gltf::json::{self, mesh::Mode, mesh::Semantic, validation::Checked};
 use buffers::Buffers;
 use glam::{DMat3, DMat4, DVec3, Mat2, Vec2, Vec3};
+use materials::Alpha;
 use std::{collections::HashMap, sync::Arc};
 
-/// Extensions that a file may require: those that are read, and those that change only the looks of a material in ways
-/// that splats do not show.
+/// Extensions that a file may require: those that are read (`KHR_materials_pbrSpecularGlossiness` among them), and those
+/// that change only the looks of a material in ways that splats do not show.
 const KNOWN: [&str; 4] = ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "KHR_materials_"];
 
 /// Reads a glTF or GLB file: the triangles of the default scene in its world frame (or its points, where it has no
-/// triangles), vertex colours, base colours and textures. Skins, morph targets and animations are not applied.
+/// triangles), vertex colours, base colours and textures, with opacities as the alpha modes want them. Skins, morph targets
+/// and animations are not applied.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for malformed JSON, indices and ranges outside their target, cyclic nodes,
@@ -90,7 +93,8 @@ struct Builder<'a> {
     mesh: Mesh,
     /// Index in the mesh's materials of a file's material (`None`: the default one).
     material_of: HashMap<Option<usize>, u32>,
-    pictures: HashMap<usize, Arc<Texture>>,
+    /// Decoded images, as each alpha mode shows them.
+    pictures: HashMap<(usize, Alpha), Arc<Texture>>,
 }
 
 impl Builder<'_> {
@@ -147,6 +151,9 @@ impl Builder<'_> {
         self.positions.extend(points.iter().map(|p| transform.transform_point3(Vec3::from_array(*p).as_dvec3())));
         let count = points.len();
         drop(points);
+        let material = primitive.material.map(|index| index.value());
+        let base_color = self.base(material, place)?;
+        let mirrors = transform.determinant() < 0.0;
         let check = |what: &str, found: usize| {
             if found == count {
                 return Ok(());
@@ -157,9 +164,11 @@ impl Builder<'_> {
         if let Some(accessor) = attribute(Semantic::Normals) {
             let normals: Vec<[f32; 3]> = self.buffers.floats(accessor, place, false)?;
             check("normals", normals.len())?;
-            // The cofactors turn normals as the inverse transpose does, and exist for a flat transform too.
+            // The cofactors turn normals as the inverse transpose does, and exist for a flat transform too. They have the
+            // determinant as a factor, and with it its sign.
             let [x, y, z] = DMat3::from_mat4(transform).to_cols_array_2d().map(DVec3::from_array);
-            let turn = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
+            let sign = if mirrors { -1.0 } else { 1.0 };
+            let turn = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign;
             let turned = normals.iter().map(|n| positions::unit((turn * Vec3::from_array(*n).as_dvec3()).as_vec3()));
             self.mesh.normals.resize(base, Vec3::ZERO);
             self.mesh.normals.extend(turned);
@@ -168,19 +177,12 @@ impl Builder<'_> {
             let colors = self.buffers.colors(accessor, place)?;
             check("colours", colors.len())?;
             self.mesh.colors.resize(base, [255; 4]);
-            self.mesh.colors.extend(colors.iter().map(|&color| displayed(color).map(|v| (v * 255.0).round() as u8)));
+            self.mesh.colors.extend(colors.iter().map(|&color| {
+                let [r, g, b, a] = displayed(color).map(|v| (v * 255.0).round() as u8);
+                [r, g, b, base_color.alpha.apply(a)]
+            }));
         }
-        let material = primitive.material.map(|index| index.value());
-        let info = match material {
-            None => None,
-            Some(index) => match self.root.materials.get(index) {
-                Some(material) => material.pbr_metallic_roughness.base_color_texture.as_ref(),
-                None => {
-                    return Err(self.source.error(place, format!("refers to material {index}, which is not there")));
-                }
-            },
-        };
-        if let Some(info) = info {
+        if let Some(info) = base_color.texture {
             let shift = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
             let set = shift.and_then(|shift| shift.tex_coord).unwrap_or(info.tex_coord);
             if let Some(accessor) = attribute(Semantic::TexCoords(set)) {
@@ -202,62 +204,16 @@ impl Builder<'_> {
                 Some(index) => self.buffers.indices(index.value(), place, count)?,
                 None => (0..count as u32).collect(),
             };
-            let material = self.material(material)?;
-            let flip = transform.determinant() < 0.0;
+            let material = self.material(material, &base_color)?;
             let mesh = &mut self.mesh;
             triangles(mode, &corners, |[a, b, c]| {
                 let [a, b, c] = [a, b, c].map(|corner| corner + base as u32);
-                mesh.triangles.push(if flip { [a, c, b] } else { [a, b, c] });
+                mesh.triangles.push(if mirrors { [a, c, b] } else { [a, b, c] });
             });
             self.source.check_points("the number of triangles", self.mesh.triangles.len() as u64)?;
             self.mesh.triangle_materials.resize(self.mesh.triangles.len(), material);
         }
         Ok(())
-    }
-
-    /// The index of a material in the mesh, which gets it at its first use.
-    fn material(&mut self, index: Option<usize>) -> Result<u32> {
-        if let Some(&known) = self.material_of.get(&index) {
-            return Ok(known);
-        }
-        let mut made = Material { name: "default".into(), color: [1.0; 4], texture: None };
-        if let Some(material) = index.and_then(|index| self.root.materials.get(index)) {
-            let base = &material.pbr_metallic_roughness;
-            made.name = material.name.clone().unwrap_or_default();
-            made.color = displayed(base.base_color_factor.0);
-            if matches!(material.alpha_mode, Checked::Valid(json::material::AlphaMode::Opaque)) {
-                made.color[3] = 1.0;
-            }
-            if let Some(info) = &base.base_color_texture {
-                made.texture = Some(self.picture(info.index.value())?);
-            }
-        }
-        let id = self.mesh.materials.len() as u32;
-        self.mesh.materials.push(made);
-        self.material_of.insert(index, id);
-        Ok(id)
-    }
-
-    fn picture(&mut self, index: usize) -> Result<Arc<Texture>> {
-        let place = format!("texture {index}");
-        let Some(entry) = self.root.textures.get(index) else {
-            return Err(self.source.error(place, format!("there are {} textures", self.root.textures.len())));
-        };
-        let image = entry.source.value();
-        if let Some(known) = self.pictures.get(&image) {
-            return Ok(known.clone());
-        }
-        let place = format!("image {image}");
-        let Some(entry) = self.root.images.get(image) else {
-            return Err(self.source.error(place, format!("there are {} images", self.root.images.len())));
-        };
-        let decoded = match (&entry.uri, entry.buffer_view) {
-            (Some(uri), _) => texture::decode(self.source, &place, &buffers::resolve(self.source, &place, uri)?)?,
-            (None, Some(view)) => texture::decode(self.source, &place, self.buffers.view(view.value(), &place)?.0)?,
-            (None, None) => return Err(self.source.error(place, "has neither a URI nor a buffer view")),
-        };
-        self.pictures.insert(image, decoded.clone());
-        Ok(decoded)
     }
 
     fn finish(mut self) -> Result<Mesh> {

@@ -24,6 +24,7 @@ pub mod nrrd;
 pub mod obj;
 pub mod pcd;
 pub mod ply;
+mod polygon;
 mod positions;
 pub mod raw;
 mod sample_type;

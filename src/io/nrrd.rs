@@ -170,27 +170,35 @@ impl<'a> Header<'a> {
                 format!("is {dimension}, but a volume has 3 axes with one scalar for each sample"),
             ));
         }
+        // An axis of colours or vectors is none of space.
+        let several = ["color", "vector", "normal", "gradient", "matrix", "quaternion", "complex", "point"];
+        let kinds = self.get(&["kinds"]).unwrap_or_default().to_ascii_lowercase();
+        if let Some(kind) = kinds.split_ascii_whitespace().find(|kind| several.iter().any(|name| kind.contains(name))) {
+            let message =
+                format!("one axis holds values of the kind “{kind}”, but a volume has one scalar for each sample");
+            return Err(self
+                .source
+                .error("kinds", message)
+                .hint("write one component, or a length, to a file of its own"));
+        }
         self.numbers("sizes", self.need("sizes")?)
     }
 
     fn lattice(&self, dims: [usize; 3]) -> Result<Lattice> {
+        let along = match self.get(&["space directions"]) {
+            Some(_) => [[0.0, 1.0]; 3],
+            None => self.along_axes(dims)?,
+        };
         let axes = match self.get(&["space directions"]) {
             Some(text) => {
                 let [x, y, z] = self.vectors("space directions", text)?;
                 DMat3::from_cols(x, y, z)
             }
-            None => {
-                let [x, y, z]: [f64; 3] = match self.get(&["spacings"]) {
-                    Some(text) => self.numbers("spacings", text)?,
-                    None => [1.0; 3],
-                };
-                // NaN stands for a spacing that is not known.
-                DMat3::from_diagonal(DVec3::new(x, y, z).map(|s| if s.is_nan() { 1.0 } else { s }))
-            }
+            None => DMat3::from_diagonal(along.map(|axis| axis[1]).into()),
         };
         let origin = match self.get(&["space origin"]) {
             Some(text) => self.vectors::<1>("space origin", text)?[0],
-            None => DVec3::ZERO,
+            None => DVec3::from(along.map(|axis| axis[0])),
         };
         let lattice = match self.keys.get("lattice").map(String::as_str) {
             None => Lattice { dims, origin, axes, arrangement: self.arrangement()? },
@@ -207,6 +215,30 @@ impl<'a> Header<'a> {
         };
         lattice.validate().map_err(|message| self.source.error("header", message))?;
         Ok(lattice)
+    }
+
+    /// Where the first sample is along each axis, and how far the next, by the fields of single axes.
+    fn along_axes(&self, dims: [usize; 3]) -> Result<[[f64; 2]; 3]> {
+        // NaN stands for what is not known of an axis.
+        let numbers = |names: &[&str]| match self.get(names) {
+            Some(text) => self.numbers::<3, f64>(names[0], text),
+            None => Ok([f64::NAN; 3]),
+        };
+        let spacings = numbers(&["spacings"])?;
+        let (mins, maxs) = (numbers(&["axis mins", "axismins"])?, numbers(&["axis maxs", "axismaxs"])?);
+        // Samples stand in the middle of cells where nothing tells that they are nodes.
+        let centers = self.get(&["centers", "centerings"]).unwrap_or_default();
+        let is_node: Vec<bool> =
+            centers.split_ascii_whitespace().map(|word| word.eq_ignore_ascii_case("node")).collect();
+        Ok(std::array::from_fn(|axis| {
+            let is_node = is_node.get(axis).copied().unwrap_or(false);
+            let steps = dims[axis].saturating_sub(usize::from(is_node)).max(1) as f64;
+            let known = |spacing: &f64| !spacing.is_nan();
+            let of_ends = Some((maxs[axis] - mins[axis]) / steps).filter(known);
+            let spacing = Some(spacings[axis]).filter(known).or(of_ends).unwrap_or(1.0);
+            let first = Some(mins[axis] + if is_node { 0.0 } else { 0.5 * spacing }).filter(known);
+            [first.unwrap_or(0.0), spacing]
+        }))
     }
 
     fn arrangement(&self) -> Result<Arrangement> {
@@ -422,6 +454,15 @@ mod tests {
         assert_eq!(turned.origin, DVec3::new(10.0, 20.0, -30.5));
         assert_eq!(turned.position(DVec3::new(1.0, 1.0, 1.0)), DVec3::new(8.0, 20.5, -27.5));
         assert_eq!(lattice("spacings: 1 2.5 NaN").unwrap().spacing(), DVec3::new(1.0, 2.5, 1.0));
+        for (fields, origin, spacing) in [
+            ("axis mins: 0 1 2\naxis maxs: 4 4 20\ncenters: node node cell", [0.0, 1.0, 11.0], [4.0, 3.0, 18.0]),
+            ("axis mins: 0 NaN 2\naxis maxs: 4 4 nan", [1.0, 0.0, 2.5], [2.0, 1.0, 1.0]),
+            ("axismins: 10 0 0\nspacings: 2 3 4\ncenterings: node node node", [10.0, 0.0, 0.0], [2.0, 3.0, 4.0]),
+            ("kinds: domain space time\nspace origin: (1,2,3)\naxis mins: 9 9 9", [1.0, 2.0, 3.0], [1.0; 3]),
+        ] {
+            let found = lattice(fields).unwrap();
+            assert_eq!((found.origin, found.spacing()), (origin.into(), spacing.into()), "{fields}");
+        }
         let body_centred = lattice("lattice:=bcc\nspacings: 2 2 1").unwrap();
         assert_eq!(
             body_centred,
@@ -436,6 +477,8 @@ mod tests {
             ("space directions: (1,0) (0,1)", "space directions"),
             ("space directions: (1,0,0) (0,1,0) (1,1,0)", "one plane"),
             ("space origin: (1,0,0", "space origin"),
+            ("kinds: RGB-color domain domain", "rgb-color"),
+            ("axis mins: 0 0", "axis mins"),
             ("spacings: 1 0 1", "spacing"),
             ("spacings: 1 1", "spacings"),
             ("spacings: 1 1 inf", "finite"),

@@ -9,7 +9,7 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
-use super::{Source, isolate::isolated, positions};
+use super::{Source, isolate::isolated, polygon, positions};
 use crate::{
     Error, Result,
     surface::{Material, Mesh},
@@ -18,9 +18,9 @@ use glam::{DVec3, Vec2, Vec3};
 use std::{borrow::Cow, cell::RefCell, collections::HashMap, path::Path};
 use survey::Survey;
 
-/// Reads an OBJ file: polygons cut into triangles, with vertex colours, normals and materials. Texture coordinates are
-/// kept where a material has a picture; a vertex is split where corners differ in normal or texture coordinates. A file
-/// of vertices only is a cloud. Lines and points are passed over.
+/// Reads an OBJ file: polygons, concave ones too, cut into triangles, with vertex colours, normals and materials. Texture
+/// coordinates are kept where a material has a picture; a vertex is split where corners differ in normal or texture
+/// coordinates. A file of vertices only is a cloud. Lines and points are passed over.
 ///
 /// # Errors
 /// [`Error::Input`] for malformed numbers, positions that are not finite, indices without a vertex, and references to
@@ -39,8 +39,8 @@ pub fn read(source: &Source) -> Result<Mesh> {
     let library = RefCell::new(material::Library::new(source));
     let failure: RefCell<Option<Error>> = RefCell::new(None);
     let mut feed = survey.feed(&text);
-    let options =
-        tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
+    // tobj's triangles are fans, which cover what is outside of a concave polygon.
+    let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     let load = |path: &Path| {
         let loaded = library.borrow_mut().load(&path.to_string_lossy());
         loaded.map(|(materials, index_of)| (materials, index_of.into_iter().collect())).map_err(|error| {
@@ -64,17 +64,17 @@ pub fn read(source: &Source) -> Result<Mesh> {
         mesh.materials.push(library.finish(material)?);
     }
     let textured: Vec<bool> = mesh.materials.iter().map(|material| material.texture.is_some()).collect();
-    for model in &models {
+    for model in models {
         let id = model.mesh.material_id;
+        let with_uv = id.is_some_and(|id| textured.get(id) == Some(&true));
+        corners.add(source, model.mesh, with_uv, textured.contains(&true))?;
         if has_materials {
             let id = id.unwrap_or(mesh.materials.len());
             if id == mesh.materials.len() {
                 mesh.materials.push(neutral());
             }
-            mesh.triangle_materials.extend(std::iter::repeat_n(id as u32, model.mesh.indices.len() / 3));
+            mesh.triangle_materials.resize(corners.triangles.len(), id as u32);
         }
-        let with_uv = id.is_some_and(|id| textured.get(id) == Some(&true));
-        corners.add(&model.mesh, with_uv, textured.contains(&true));
     }
     source.check_points("the number of vertices", corners.positions.len() as u64)?;
     source.check_points("the number of triangles", corners.triangles.len() as u64)?;
@@ -116,23 +116,30 @@ struct Corners {
 
 impl Corners {
     /// Adds a model. `with_uv`: its texture coordinates matter; `any_uv`: those of some model do.
-    fn add(&mut self, mesh: &tobj::Mesh, with_uv: bool, any_uv: bool) {
-        let mut vertex_of: HashMap<(u32, u32, u32), u32> = HashMap::new();
+    fn add(&mut self, source: &Source, mut mesh: tobj::Mesh, with_uv: bool, any_uv: bool) -> Result<()> {
+        let mut corners = std::mem::take(&mut mesh.indices);
         let split = (with_uv && !mesh.texcoord_indices.is_empty()) || !mesh.normal_indices.is_empty();
-        let base = self.positions.len() as u32;
-        if !split {
+        if split {
+            self.add_split(&mesh, &mut corners, with_uv, any_uv);
+        } else {
+            let base = self.positions.len() as u32;
             self.positions.extend(mesh.positions.chunks_exact(3).map(DVec3::from_slice));
             self.colors.extend(mesh.vertex_color.chunks_exact(3).map(|c| [c[0], c[1], c[2]]));
             self.uvs.extend(std::iter::repeat_n(Vec2::ZERO, if any_uv { mesh.positions.len() / 3 } else { 0 }));
-            self.triangles.extend(mesh.indices.chunks_exact(3).map(|t| [t[0] + base, t[1] + base, t[2] + base]));
-            return;
+            corners.iter_mut().for_each(|corner| *corner += base);
         }
-        let mut triangle = [0; 3];
-        for (corner, &position) in mesh.indices.iter().enumerate() {
+        self.cut(source, &corners, &mesh.face_arities)
+    }
+
+    /// Adds the vertices that a model's corners make, and puts them in the corners' place.
+    fn add_split(&mut self, mesh: &tobj::Mesh, corners: &mut [u32], with_uv: bool, any_uv: bool) {
+        let mut vertex_of: HashMap<(u32, u32, u32), u32> = HashMap::new();
+        for (corner, index) in corners.iter_mut().enumerate() {
+            let position = *index;
             let uv = if with_uv { mesh.texcoord_indices.get(corner).copied() } else { None };
             let normal = mesh.normal_indices.get(corner).copied();
             let key = (position, uv.unwrap_or(u32::MAX), normal.unwrap_or(u32::MAX));
-            triangle[corner % 3] = *vertex_of.entry(key).or_insert_with(|| {
+            *index = *vertex_of.entry(key).or_insert_with(|| {
                 let at = position as usize * 3;
                 self.positions.push(DVec3::from_slice(&mesh.positions[at..at + 3]));
                 if let Some(color) = mesh.vertex_color.get(at..at + 3) {
@@ -151,10 +158,33 @@ impl Corners {
                 }
                 self.positions.len() as u32 - 1
             });
-            if corner % 3 == 2 {
-                self.triangles.push(triangle);
-            }
         }
+    }
+
+    /// Cuts faces into triangles, given the corners of all and how many each has; without the latter, all are triangles.
+    fn cut(&mut self, source: &Source, corners: &[u32], arities: &[u32]) -> Result<()> {
+        if arities.is_empty() {
+            self.triangles.extend_from_slice(corners.as_chunks().0);
+            return Ok(());
+        }
+        let mut rest = corners;
+        for (face, &arity) in arities.iter().enumerate() {
+            // A face of many corners may take its time.
+            if arity > 64 || face.is_multiple_of(1 << 12) {
+                source.check_time()?;
+            }
+            let (face, others) = rest.split_at(arity as usize);
+            rest = others;
+            polygon::triangles(
+                face,
+                |vertex| self.positions[vertex as usize],
+                |triangle| {
+                    self.triangles.push(triangle);
+                    Ok(())
+                },
+            )?;
+        }
+        Ok(())
     }
 }
 

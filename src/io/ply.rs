@@ -4,6 +4,7 @@
 //! columns that mean something here are decoded in parallel. Other elements and columns are passed over. A text file
 //! that ends within its very last number cannot be told from a whole one and reads as that shorter number.
 
+mod faces;
 mod gaussians;
 mod header;
 mod pieces;
@@ -14,14 +15,15 @@ mod table;
 mod tests;
 mod write;
 
-use super::{Source, growing::Growing, positions, texture};
+use super::{Source, positions, texture};
 use crate::{
     Result,
     surface::{Material, Mesh},
 };
+use faces::Faces;
 pub use gaussians::{write_gaussian_leaves, write_gaussians};
 use glam::{DVec3, Vec2, Vec3};
-use header::{Element, width};
+use header::Element;
 pub(super) use pieces::Pieces;
 use ply_rs::ply::{PropertyType, ScalarType};
 use rayon::prelude::*;
@@ -35,8 +37,9 @@ const CHUNK: usize = 1 << 14;
 
 /// Reads a PLY file.
 ///
-/// Faces of more than three corners are cut into fans, and `tristrips` into triangles. Colours are bytes, 16-bit
-/// numbers or fractions of 1.
+/// Faces of more than three corners are cut into triangles, and `tristrips` too. Texture coordinates are those of vertices, or
+/// else those that faces have for their corners (`texcoord`, with a `texnumber`). Colours are bytes, 16-bit numbers or
+/// fractions of 1; as wider types they are bytes where the largest of all tells so.
 ///
 /// # Errors
 /// A malformed header, a file that ends before its last row, positions that are not finite, and face indices without a
@@ -45,8 +48,8 @@ const CHUNK: usize = 1 << 14;
 pub fn read(source: &Source) -> Result<Mesh> {
     let header = header::read(source)?;
     let vertices = header.elements.iter().find(|element| element.name == "vertex");
-    let vertex_count = vertices.map_or(0, |element| element.count);
     let mut mesh = Mesh::default();
+    let mut faces = Vec::new();
     let mut at = header.payload;
     for element in &header.elements {
         let is_face = matches!(element.name.as_str(), "face" | "tristrips");
@@ -57,18 +60,40 @@ pub fn read(source: &Source) -> Result<Mesh> {
         if vertices.is_some_and(|vertices| std::ptr::eq(vertices, element)) {
             read_vertices(source, element, &rows, &mut mesh)?;
         } else if is_face {
-            mesh.triangles.append(&mut read_faces(source, element, &rows, vertex_count)?);
+            // Their vertices may stand behind them.
+            faces.push((element, rows));
         }
     }
-    source.check_points("the number of triangles", mesh.triangles.len() as u64)?;
+    let mut all = Faces::default();
+    for (element, rows) in faces {
+        let pictures = if mesh.uvs.is_empty() { header.textures.len() } else { 0 };
+        all.append(faces::read(source, element, &rows, &mesh.positions, pictures)?);
+    }
+    source.check_points("the number of triangles", all.triangles.len() as u64)?;
     if mesh.positions.is_empty() {
         return Err(source.error("header", "has no element “vertex” with at least one row"));
     }
-    if let Some(name) = header.texture.filter(|_| !mesh.uvs.is_empty() && !mesh.triangles.is_empty()) {
+    let of_corners = all.have_uvs();
+    all.give(source, &mut mesh)?;
+    if header.textures.is_empty() || mesh.triangles.is_empty() {
+        return Ok(mesh);
+    }
+    if mesh.uvs.is_empty() {
+        let file = source.path.display();
+        tracing::warn!(
+            "{file}: names a picture, but neither vertices nor faces have coordinates in it; drawn without it"
+        );
+        return Ok(mesh);
+    }
+    // Coordinates of vertices are those in the first picture.
+    let shown = if of_corners { header.textures.len() } else { 1 };
+    for name in header.textures.into_iter().take(shown) {
         let texture = texture::read_reference(source, "comment TextureFile", &name)?;
+        mesh.materials.push(Material { name, color: [1.0; 4], texture });
+    }
+    if !of_corners {
         source.room::<u32>("the materials of the triangles", mesh.triangles.len())?;
         mesh.triangle_materials = vec![0; mesh.triangles.len()];
-        mesh.materials = vec![Material { name, color: [1.0; 4], texture }];
     }
     Ok(mesh)
 }
@@ -124,12 +149,15 @@ fn fill(
     }
     if has(COLOR, 3) {
         source.room::<[u8; 4]>("the colours", count)?;
-        let scale = color_scale(element, columns);
-        let channel = |row, channel: usize| match scale[channel] {
-            Some(scale) => (value(row, COLOR + channel) * scale).round() as u8,
-            None => 255,
-        };
-        mesh.colors = (0..count).into_par_iter().map(|row| [0, 1, 2, 3].map(|c| channel(row, c))).collect();
+        let kinds = color_kind(element, columns);
+        let channel = |row, channel: usize| if kinds[channel].is_some() { value(row, COLOR + channel) } else { 0.0 };
+        let mut largest = [0.0; 4];
+        if kinds.iter().flatten().any(ColorKind::is_wide) {
+            let of_row = |row| [0, 1, 2, 3].map(|c| channel(row, c));
+            largest = (0..count).into_par_iter().map(of_row).reduce(|| [0.0; 4], larger);
+        }
+        let scale = color_scale(&kinds, largest);
+        mesh.colors = (0..count).into_par_iter().map(|row| color(scale, |c| channel(row, c))).collect();
     }
     if has(UV, 2) {
         source.room::<Vec2>("the texture coordinates", count)?;
@@ -140,117 +168,56 @@ fn fill(
     Ok(())
 }
 
-/// What makes a byte of each channel of colour; none for one that there is not.
-fn color_scale(element: &Element, columns: &[Option<usize>; ROLES.len()]) -> [Option<f64>; 4] {
+/// The type of a channel of colour.
+#[derive(Clone, Copy, PartialEq)]
+enum ColorKind {
+    Byte,
+    Short,
+    Fraction,
+}
+
+impl ColorKind {
+    /// Whether its type alone does not tell what the largest value means.
+    fn is_wide(&self) -> bool {
+        *self != Self::Byte
+    }
+}
+
+/// The types of a vertex's channels of colour; none for one that there is not.
+fn color_kind(element: &Element, columns: &[Option<usize>; ROLES.len()]) -> [Option<ColorKind>; 4] {
     debug_assert_eq!(COLOR + 3, ALPHA);
     [0, 1, 2, 3].map(|channel| {
         columns[COLOR + channel].map(|column| match &element.columns[column].kind {
-            PropertyType::Scalar(ScalarType::Float | ScalarType::Double) => 255.0,
-            PropertyType::Scalar(ScalarType::UShort | ScalarType::Short) => 255.0 / 65535.0,
+            PropertyType::Scalar(ScalarType::Float | ScalarType::Double) => ColorKind::Fraction,
+            PropertyType::Scalar(ScalarType::UShort | ScalarType::Short) => ColorKind::Short,
+            _ => ColorKind::Byte,
+        })
+    })
+}
+
+/// What makes a byte of each channel, by the largest values of all colours: some programs write bytes as 16-bit numbers, and
+/// some as floating point ones.
+fn color_scale(kinds: &[Option<ColorKind>; 4], largest: [f64; 4]) -> [Option<f64>; 4] {
+    // Fractions may shine a little brighter than 1.
+    const BRIGHTEST: f64 = 16.0;
+    let hue = largest[..3].iter().copied().fold(0.0, f64::max);
+    std::array::from_fn(|channel| {
+        let largest = if channel < 3 { hue } else { largest[3] };
+        kinds[channel].map(|kind| match kind {
+            ColorKind::Short if largest > 255.0 => 255.0 / 65535.0,
+            ColorKind::Fraction if largest <= BRIGHTEST => 255.0,
+            ColorKind::Fraction if largest > 255.0 => 255.0 / 65535.0,
             _ => 1.0,
         })
     })
 }
 
-fn read_faces(source: &Source, element: &Element, rows: &Rows, vertices: usize) -> Result<Vec<[u32; 3]>> {
-    let index_column = element
-        .column(&["vertex_indices", "vertex_index"])
-        .filter(|&column| matches!(element.columns[column].kind, PropertyType::List(..)));
-    let Some(column) = index_column else {
-        if element.count == 0 {
-            return Ok(Vec::new());
-        }
-        return Err(source.error("header", format!("the element “{}” has no list “vertex_indices”", element.name)));
-    };
-    // Once as they are found, once in their place.
-    if let Rows::Fixed { .. } = rows {
-        source.room::<[[u32; 3]; 2]>("the triangles", element.count)?;
-    }
-    if let Some(triangles) = read_triangles(element, rows, column, vertices) {
-        return Ok(triangles);
-    }
-    let mut wanted = vec![false; element.columns.len()];
-    wanted[column] = true;
-    let strips = element.name == "tristrips";
-    let chunks = element.count.div_ceil(CHUNK);
-    let parts: Vec<Vec<[u32; 3]>> = (0..chunks)
-        .into_par_iter()
-        .map(|chunk| {
-            let mut triangles = Growing::new(source, "the triangles");
-            for row in chunk * CHUNK..((chunk + 1) * CHUNK).min(element.count) {
-                let mut wrong = None;
-                rows.visit(source, element, row, &wanted, |at, _, list| {
-                    if let Some(list) = list.filter(|_| at == column) {
-                        let cut = if strips { strip } else { fan };
-                        wrong = cut(list, vertices, &mut triangles).transpose();
-                    }
-                })?;
-                if let Some(index) = wrong.transpose()? {
-                    return Err(source.error(
-                        rows.place(source, element, row),
-                        format!(
-                            "refers to vertex {index}, but there are {vertices} (0 … {})",
-                            vertices.saturating_sub(1)
-                        ),
-                    ));
-                }
-            }
-            Ok(triangles.into_inner())
-        })
-        .collect::<Result<_>>()?;
-    source.room::<[[u32; 3]; 2]>("the triangles", parts.iter().map(Vec::len).sum())?;
-    Ok(parts.concat())
+/// A colour of scaled channels; what there is not is full.
+fn color(scale: [Option<f64>; 4], value: impl Fn(usize) -> f64) -> [u8; 4] {
+    std::array::from_fn(|channel| scale[channel].map_or(255, |scale| (value(channel) * scale).round() as u8))
 }
 
-/// The common case: binary rows of one list of three 32-bit indices. `None` where it is another, or an index is wrong
-/// (the general way then finds the row).
-fn read_triangles(element: &Element, rows: &Rows, column: usize, vertices: usize) -> Option<Vec<[u32; 3]>> {
-    let (Rows::Fixed { data, stride, big }, PropertyType::List(count, item)) = (rows, &element.columns[column].kind)
-    else {
-        return None;
-    };
-    if !matches!(item, ScalarType::Int | ScalarType::UInt) || element.name == "tristrips" || *stride == 0 {
-        return None;
-    }
-    let offset: Option<usize> = element.columns[..column].iter().map(|before| before.width()).sum();
-    let offset = offset? + width(count);
-    let triangles: Vec<[u32; 3]> = data
-        .par_chunks_exact(*stride)
-        .map(|row| {
-            [0, 4, 8].map(|at| {
-                let bytes = [0, 1, 2, 3].map(|byte| row[offset + at + byte]);
-                if *big { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) }
-            })
-        })
-        .collect();
-    triangles.par_iter().all(|t| t.iter().all(|&index| (index as usize) < vertices)).then_some(triangles)
-}
-
-fn vertex(value: f64, vertices: usize) -> Option<u32> {
-    (value >= 0.0 && value < vertices as f64 && value.fract() == 0.0).then_some(value as u32)
-}
-
-/// Cuts a polygon into a fan; gives the first index that names no vertex.
-fn fan(list: &[f64], vertices: usize, triangles: &mut Growing<[u32; 3]>) -> Result<Option<f64>> {
-    if let Some(&wrong) = list.iter().find(|&&value| vertex(value, vertices).is_none()) {
-        return Ok(Some(wrong));
-    }
-    for i in 2..list.len() {
-        triangles.push([list[0] as u32, list[i - 1] as u32, list[i] as u32])?;
-    }
-    Ok(None)
-}
-
-/// Cuts strips, separated by −1, into triangles; gives the first index that names no vertex.
-fn strip(list: &[f64], vertices: usize, triangles: &mut Growing<[u32; 3]>) -> Result<Option<f64>> {
-    for run in list.split(|&value| value == -1.0) {
-        if let Some(&wrong) = run.iter().find(|&&value| vertex(value, vertices).is_none()) {
-            return Ok(Some(wrong));
-        }
-        for i in 2..run.len() {
-            let (a, b) = if i % 2 == 0 { (i - 2, i - 1) } else { (i - 1, i - 2) };
-            triangles.push([run[a] as u32, run[b] as u32, run[i] as u32])?;
-        }
-    }
-    Ok(None)
+/// The larger values of each channel.
+pub(super) fn larger(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+    std::array::from_fn(|channel| a[channel].max(b[channel]))
 }

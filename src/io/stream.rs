@@ -91,6 +91,12 @@ impl<'a> Stream<'a> {
     /// The first pass over all points: where they are, and what their colours are made from. `watch` is told how many have
     /// been seen.
     pub(crate) fn settle(&mut self, watch: &dyn Fn(u64)) -> Result<()> {
+        let counted = self.counts().points;
+        if counted > u64::from(u32::MAX) {
+            let message =
+                format!("counts {counted} points, but a file that is read in pieces has {} at most", u32::MAX);
+            return Err(self.source.error("header", message).hint("cut it in several files and convert them together"));
+        }
         let (points, [low, high]) = match &mut self.form {
             Form::Las(pieces) => self.source.unless_changed(pieces.survey(&self.source, watch))?,
             Form::Ply(_) => self.survey_ply(watch)?,
@@ -101,26 +107,37 @@ impl<'a> Stream<'a> {
         Ok(())
     }
 
-    fn survey_ply(&self, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])> {
+    fn survey_ply(&mut self, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])> {
         let Form::Ply(pieces) = &self.form else { return Ok((0, [DVec3::ZERO; 2])) };
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let mut brightest = [0.0; 4];
+        let asks_for_colors = pieces.asks_for_colors();
         let of_piece = |piece: usize| {
             let mut around = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+            let mut brightest = [0.0; 4];
             for row in pieces.rows(piece) {
                 let position = pieces.position(&self.source, row);
                 if !position.is_finite() {
                     return Err(pieces.not_finite(&self.source, row));
                 }
                 around = (around.0.min(position), around.1.max(position));
+                if asks_for_colors {
+                    brightest = ply::larger(brightest, pieces.channels(&self.source, row));
+                }
             }
-            Ok((around, pieces.rows(piece).end as u64))
+            Ok((around, brightest, pieces.rows(piece).end as u64))
         };
-        self.in_order(pieces.pieces()[0], of_piece, |(around, seen)| {
+        self.in_order(pieces.pieces()[0], of_piece, |(around, of_piece, seen)| {
             (low, high) = (low.min(around.0), high.max(around.1));
+            brightest = ply::larger(brightest, of_piece);
             watch(seen);
             Ok(())
         })?;
-        Ok((pieces.points() as u64, [low, high]))
+        let points = pieces.points() as u64;
+        if let Form::Ply(pieces) = &mut self.form {
+            pieces.settle_colors(brightest);
+        }
+        Ok((points, [low, high]))
     }
 
     /// What is wrong at a place of the file.

@@ -148,18 +148,24 @@ fn has_names(words: &[String]) -> bool {
 
 /// The separator that a first line tells, and its words, out of their quotes.
 fn split(line: &[u8]) -> (Option<u8>, Vec<String>) {
-    let separator = [b';', b',', b'\t'].into_iter().find(|separator| line.contains(separator));
+    let outside: Vec<&[u8]> = line.split(|&b| b == b'"').step_by(2).collect();
+    let has = |separator: &u8| outside.iter().any(|part| part.contains(separator));
+    let separator = [b';', b',', b'\t'].into_iter().find(has);
     let name = |word: &[u8]| String::from_utf8_lossy(word).trim_matches('"').trim().to_owned();
     // One more than there may be tells that there are too many.
     (separator, words(line, separator).take(MOST_COLUMNS + 1).map(name).collect())
 }
 
-/// The words of a line; a comment's sign is none.
+/// The words of a line; a comment's sign is none, and what stands between quotes is one (RFC 4180).
 fn words(line: &[u8], separator: Option<u8>) -> impl Iterator<Item = &[u8]> {
     let sign = line.iter().take_while(|&&b| matches!(b, b'#' | b'/')).count();
+    let mut quoted = false;
     line[sign..]
         .trim_ascii()
-        .split(move |&b| separator.map_or(b.is_ascii_whitespace(), |separator| b == separator))
+        .split(move |&b| {
+            quoted ^= b == b'"';
+            !quoted && separator.map_or(b.is_ascii_whitespace(), |separator| b == separator)
+        })
         .map(<[u8]>::trim_ascii)
         .filter(move |word| separator.is_some() || !word.is_empty())
 }

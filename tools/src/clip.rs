@@ -105,6 +105,10 @@ fn plane(text: &str) -> Result<Form, String> {
     if normal == DVec3::ZERO {
         return Err("a plane needs a direction that is not 0,0,0".into());
     }
+    // What is beyond has a length of 0 or ∞ once squared.
+    if !(1e-150..=1e150).contains(&normal.length()) {
+        return Err("a plane's direction needs a length from 1e-150 to 1e150; only where it points counts".into());
+    }
     Ok(Form::Plane { normal, offset })
 }
 
@@ -219,6 +223,7 @@ mod tests {
     fn wrong_shapes_are_told() {
         let message = |text: &str| Shape::parse(text).unwrap_err();
         assert!(message("plane:0,0,0,1").contains("direction"));
+        assert!(message("plane:1e200,0,0,1").contains("length") && message("plane:0,1e-200,0,1").contains("length"));
         assert!(message("plane:1,0,0").contains("plane:NX,NY,NZ,OFFSET"));
         assert!(message("plane:1,0,0,inf").contains("finite"));
         assert!(message("box:0,0,0").contains("box:X0"));

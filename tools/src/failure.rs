@@ -20,6 +20,8 @@ pub enum Failure {
     Output { file: PathBuf, message: String, hint: Option<&'static str> },
     /// A file that `check` found damaged; what is wrong has been told.
     Damaged { file: PathBuf, findings: usize },
+    /// Cases of a suite that were not measured, each told with its reason, and the file that therefore was not written.
+    Incomplete { failed: usize, kept: Option<PathBuf> },
     /// Pictures that differ by more than the user allows.
     Comparison(String),
 }
@@ -32,7 +34,7 @@ impl Failure {
 
     fn code(&self) -> u8 {
         match self {
-            Self::Output { .. } | Self::Library(Error::Output { .. }) => 1,
+            Self::Output { .. } | Self::Library(Error::Output { .. }) | Self::Incomplete { .. } => 1,
             Self::Usage(_) | Self::Library(Error::Argument(_)) => 2,
             Self::Library(Error::NoAdapter(_) | Error::Gpu(_) | Error::DeviceLost(_)) => 4,
             Self::Library(Error::Input { .. } | Error::Limit { .. } | Error::File { .. } | Error::NothingToDraw(_)) => {
@@ -51,6 +53,10 @@ impl Failure {
             Self::Library(Error::NoAdapter(_)) => {
                 Some("`splatkit gpus` lists what there is; `--reference` needs no GPU")
             }
+            // What the user calls it.
+            Self::Library(Error::Gpu(message)) if message.ends_with("raise the budget") => {
+                Some("raise --pass-entries, or draw a smaller --size")
+            }
             Self::Library(Error::Gpu(_)) => {
                 Some("try a smaller --size, or another --gpu (`software` is one); --gpu-timeout waits longer")
             }
@@ -63,6 +69,7 @@ impl Failure {
             Self::Library(Error::Argument(_)) | Self::Usage(_) => Some("`splatkit help` lists the options"),
             Self::Library(Error::File { .. }) | Self::Comparison(_) => None,
             Self::Damaged { .. } => Some("make it again from its source, or fetch it again"),
+            Self::Incomplete { .. } => Some("the tables tell the reason of each"),
             Self::Output { hint, .. } => *hint,
         }
     }
@@ -102,6 +109,10 @@ impl fmt::Display for Failure {
             Self::Library(error) => error.fmt(out),
             Self::Usage(message) | Self::Comparison(message) => out.write_str(message),
             Self::Damaged { file, findings } => write!(out, "{}: {findings} findings", file.display()),
+            Self::Incomplete { failed, kept } => {
+                write!(out, "{failed} of the suite's cases could not be drawn")?;
+                kept.iter().try_for_each(|file| write!(out, "; {} is as it was", file.display()))
+            }
             Self::Output { file, message, .. } => write!(out, "{}: {message}", file.display()),
         }
     }

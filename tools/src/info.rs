@@ -41,7 +41,7 @@ impl Info {
             Input::Hierarchy(hierarchy) => (hierarchy.header().source_points as usize, of_hierarchy(hierarchy)),
             Input::Bricks(bricks) => (bricks.header().lattice.len(), of_bricks(bricks)),
         };
-        facts.insert("file".into(), json!(self.file));
+        facts.insert("file".into(), json!(self.file.to_string_lossy()));
         facts.insert("count".into(), json!(count));
         facts.insert("bytes".into(), json!(bytes));
         facts.insert("bytes_per_point".into(), json!(bytes as f64 / count.max(1) as f64));

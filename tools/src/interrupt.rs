@@ -1,4 +1,4 @@
-//! Ctrl-C, and the signals by which a system asks a process to end.
+//! Ctrl-C, and the signals by which a system asks a process to end or ends it.
 
 use splatkit::disk;
 use std::io::Write;
@@ -20,4 +20,19 @@ pub fn answer() {
     if let Err(error) = set {
         tracing::warn!("Ctrl-C may leave files that are not whole: {error}");
     }
+    survive_large_files();
 }
+
+/// A file over the size that the user may write is an error of the write, as a full disk is, and not the process's end.
+#[cfg(unix)]
+fn survive_large_files() {
+    use signal_hook::{consts::signal::SIGXFSZ, flag};
+    use std::sync::{Arc, atomic::AtomicBool};
+    // Nobody asks the flag: that there is a handler is enough.
+    if let Err(error) = flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false))) {
+        tracing::warn!("a limit on the size of files may leave one that is not whole: {error}");
+    }
+}
+
+#[cfg(not(unix))]
+fn survive_large_files() {}

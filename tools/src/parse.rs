@@ -40,8 +40,11 @@ pub fn spacing(text: &str) -> Result<DVec3, String> {
 /// `LOW,HIGH`.
 pub fn range(text: &str) -> Result<[f64; 2], String> {
     let [low, high]: [f64; 2] = numbers(text, ',', "LOW,HIGH, such as 0,255")?;
-    let fine = low.is_finite() && high.is_finite() && low <= high;
-    if fine { Ok([low, high]) } else { Err("a range is LOW,HIGH with LOW not above HIGH".into()) }
+    if !(low.is_finite() && high.is_finite() && low <= high) {
+        return Err("a range is LOW,HIGH with LOW not above HIGH".into());
+    }
+    // Places in the range are shares of its width.
+    if (high - low).is_finite() { Ok([low, high]) } else { Err("LOW and HIGH are too far apart to subtract".into()) }
 }
 
 /// `#rrggbb`, with or without `#`; `none` keeps the picture's opacity.
@@ -163,6 +166,7 @@ mod tests {
             assert!(vector(bad).is_err(), "{bad}");
         }
         assert!(spacing("0,1,1").is_err() && range("2,1").is_err() && range("1,1").is_ok());
+        assert!(range("-1e308,1e308").unwrap_err().contains("too far apart"));
     }
 
     #[test]

@@ -155,7 +155,7 @@ impl Render {
         );
         if self.json {
             output::line(serde_json::json!({
-                "output": self.output,
+                "output": self.output.to_string_lossy(),
                 "width": self.engine.size[0],
                 "height": self.engine.size[1],
                 "frames": frames,
@@ -225,11 +225,13 @@ pub fn milliseconds(start: Instant) -> f64 {
 
 /// The name of a turntable's frame.
 fn numbered(path: &Path, frame: u32) -> Result<PathBuf, Failure> {
+    // A name that is no text has nothing to replace, but can be numbered.
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let Some(start) = name.find("{frame") else {
-        let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
-        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
-        return Ok(path.with_file_name(format!("{stem}_{frame:04}.{extension}")));
+        let mut name = path.file_stem().unwrap_or_default().to_owned();
+        name.push(format!("_{frame:04}."));
+        name.push(path.extension().unwrap_or_default());
+        return Ok(path.with_file_name(name));
     };
     let (before, rest) = name.split_at(start);
     let parts = rest.strip_prefix("{frame").and_then(|rest| rest.split_once('}'));
@@ -255,5 +257,13 @@ mod tests {
         assert_eq!(name("a/x{frame:03}y.jpg").as_deref(), Some("a/x007y.jpg"));
         assert!(name("{frame:x}.png").is_none() && name("{frames}.png").is_none() && name("{frame.png").is_none());
         assert!(name("{frame:99999}.png").is_none());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn names_that_are_no_text_are_numbered() {
+        use std::{ffi::OsStr, os::unix::ffi::OsStrExt};
+        let path = |bytes: &'static [u8]| Path::new(OsStr::from_bytes(bytes));
+        assert_eq!(numbered(path(b"a/\xff.png"), 7).unwrap(), path(b"a/\xff_0007.png"));
     }
 }

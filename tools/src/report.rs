@@ -1,8 +1,11 @@
 //! Tables of figures, as Markdown and as JSON, and the block of a document that holds them.
 
-use crate::failure::Failure;
+use crate::{failure::Failure, output};
 use serde_json::{Map, Value, json};
-use splatkit::{Error, disk};
+use splatkit::{
+    Error, disk,
+    io::{Limits, Source},
+};
 use std::path::{Path, PathBuf};
 
 pub struct Report {
@@ -93,33 +96,50 @@ impl Report {
     }
 }
 
-/// The part of a document between two marks.
+/// A file of this many bytes is no document.
+const MOST_BYTES: usize = 64 << 20;
+
+/// The part of a document between two marks. They name the block, and the command that writes it.
 pub struct Block {
     path: PathBuf,
+    name: &'static str,
     start: String,
     end: String,
-    before: String,
-    /// What stands between the marks now.
-    pub inside: String,
-    after: String,
 }
 
 impl Block {
-    /// Finds the marks, before anything is measured. They name the block, and the command that writes it.
-    pub fn open(path: &Path, name: &str, command: &str) -> Result<Self, Failure> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, "read", e))?;
+    /// Finds the marks, and whether the file can be written, before anything is measured.
+    pub fn open(path: &Path, name: &'static str, command: &str) -> Result<Self, Failure> {
         let start = format!("<!-- {name}: written by `splatkit {command} --write` -->");
         let end = format!("<!-- end of {name} -->");
-        let missing = || Error::input(path, name, format!("there are no lines “{start}” and “{end}”"));
-        let (before, rest) = text.split_once(&start).ok_or_else(missing)?;
-        let (inside, after) = rest.split_once(&end).ok_or_else(missing)?;
-        let [before, inside, after] = [before, inside.trim(), after].map(str::to_owned);
-        Ok(Self { path: path.to_owned(), start, end, before, inside, after })
+        let block = Self { path: path.to_owned(), name, start, end };
+        block.parts()?;
+        output::try_writing(path, &[])?;
+        Ok(block)
     }
 
-    pub fn replace(&self, text: &str) -> Result<(), Failure> {
-        let Self { path, start, end, before, after, .. } = self;
+    /// What stands between the marks now.
+    pub fn inside(&self) -> Result<String, Failure> {
+        let [_, inside, _] = self.parts()?;
+        Ok(inside)
+    }
+
+    /// Gives the block another text, made of its own. The file is read again: what was edited meanwhile stays.
+    pub fn replace(&self, text: impl FnOnce(&str) -> String) -> Result<(), Failure> {
+        let Self { path, start, end, .. } = self;
+        let [before, inside, after] = self.parts()?;
+        let text = text(&inside);
         Ok(disk::write(path, format!("{before}{start}\n\n{text}\n{end}{after}").as_bytes())?)
+    }
+
+    /// What stands before, between and after the marks.
+    fn parts(&self) -> Result<[String; 3], Failure> {
+        let Self { path, name, start, end } = self;
+        let text = Source::open(path, &Limits::default())?.small_text("a document", MOST_BYTES)?;
+        let missing = || Error::input(path, *name, format!("there are no lines “{start}” and “{end}”"));
+        let (before, rest) = text.split_once(start).ok_or_else(missing)?;
+        let (inside, after) = rest.split_once(end).ok_or_else(missing)?;
+        Ok([before, inside.trim(), after].map(str::to_owned))
     }
 }
 
@@ -133,5 +153,23 @@ mod tests {
         table.row("one", vec![Cell::Number(1.25, 1), Cell::None]);
         assert_eq!(table.markdown(), "**A** b.\n\n| case | x | y |\n| --- | ---: | ---: |\n| one | 1.2 | – |\n");
         assert_eq!(table.json()["rows"][0], json!({ "name": "one", "x": 1.25, "y": null }));
+    }
+
+    #[test]
+    fn what_is_edited_meanwhile_stays() {
+        let path = std::env::temp_dir().join(format!("splatkit-report-{}.md", std::process::id()));
+        let page = |before: &str, inside: &str| {
+            format!("{before}\n<!-- a: written by `splatkit b --write` -->\n\n{inside}\n<!-- end of a -->\nafter\n")
+        };
+        std::fs::write(&path, page("before", "old")).unwrap();
+        let block = Block::open(&path, "a", "b").unwrap();
+        std::fs::write(&path, page("edited", "newer")).unwrap();
+        block.replace(|inside| format!("{inside} and new")).unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), page("edited", "newer and new"));
+        // Without its marks there is no place for the tables.
+        std::fs::write(&path, "other").unwrap();
+        assert!(block.replace(str::to_owned).is_err());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "other");
+        std::fs::remove_file(path).unwrap();
     }
 }

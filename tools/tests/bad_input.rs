@@ -117,6 +117,8 @@ const WRONG: &[(&str, i32, &str)] = &[
     ("a.nrrd --clip box:1,1,1:0,2,2", 2, "the first corner of a box must lie below the second on every axis"),
     ("a.nrrd --clip box:50%,0,0:1,9,9", 2, "a clip box from [7.5, 0, 0] to [1, 9, 9] holds nothing"),
     ("a.nrrd --clip plane:0,0,0,1", 2, "a plane needs a direction that is not 0,0,0"),
+    ("a.nrrd --clip plane:1e200,0,0,1", 2, "a plane's direction needs a length from 1e-150 to 1e150"),
+    ("a.nrrd --range=-1e308,1e308", 2, "LOW and HIGH are too far apart to subtract"),
     ("a.nrrd --clip w<3", 2, "the forms are plane:NX,NY,NZ,OFFSET, box:X0,Y0,Z0:X1,Y1,Z1 and 'x<AT' or 'x>AT'"),
     (
         "a.nrrd --clip x<9 --clip x<9 --clip x<9 --clip x<9 --clip x<9 --cut-out x<1 --cut-out x<1 --cut-out x<1 --cut-out x<1",

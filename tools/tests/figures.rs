@@ -45,3 +45,47 @@ fn figures_are_measured_and_written() {
         "{found}"
     );
 }
+
+/// What cannot be measured or kept is told before a GPU is asked for: there is none of this name.
+#[test]
+fn wrong_inputs_and_outputs_of_figures_are_told_first() {
+    let folder = Folder::new("figures-first");
+    folder.put("a.obj", OBJ);
+    folder.put("a.ply", PLY);
+    folder.put("a.nrrd", nrrd("uint8", &ball()));
+    folder.put("b.obj", OBJ);
+    folder.put("b_splats.png", "kept");
+    for (arguments, code, words) in [
+        ("a.nrrd a.obj", 3, ["a.obj: file: is no volume", ""]),
+        ("a.nrrd none.nrrd", 3, ["none.nrrd", "cannot open"]),
+        ("a.nrrd --only ripple", 2, ["volumes are for the part dense", "--only"]),
+        ("--surfaces a.obj a.nrrd", 3, ["a.nrrd: file: is no mesh", ""]),
+        ("--detail a.obj a.nrrd", 3, ["a.nrrd: file: is no mesh, cloud or hierarchy", ""]),
+        ("--surfaces a.obj --pictures none", 1, ["none/a_truth.png", "make the folder first"]),
+        ("--surfaces a.obj a.ply --pictures .", 2, ["a_truth.png would be the picture of a.obj and of a.ply", ""]),
+        ("--surfaces b.obj --pictures .", 1, ["b_splats.png: exists already", "--overwrite"]),
+        ("--surfaces b.obj --pictures . --overwrite", 4, ["no usable GPU", ""]),
+        ("--surfaces b.obj --overwrite", 2, ["--pictures", ""]),
+    ] {
+        folder.run(&format!("figures --gpu none-of-this-name {arguments}")).fails(code, &words);
+    }
+    assert!(!folder.path("a_truth.png").exists());
+    assert_eq!(std::fs::read(folder.path("b_splats.png")).unwrap(), b"kept");
+}
+
+#[cfg(unix)]
+#[test]
+fn pages_that_are_no_files_are_refused() {
+    let folder = Folder::new("figures-pipe");
+    std::os::unix::fs::symlink("/dev/zero", folder.path("zero.md")).unwrap();
+    let mut pages = vec!["zero.md"];
+    let pipe = std::process::Command::new("mkfifo").arg(folder.path("pipe.md")).status();
+    if pipe.is_ok_and(|status| status.success()) {
+        pages.push("pipe.md");
+    }
+    for page in pages {
+        for command in ["figures --only ripple", "bench --suite --effort quick"] {
+            folder.run(&format!("{command} --write {page}")).fails(3, &[page, "is not a regular file"]);
+        }
+    }
+}

@@ -157,3 +157,33 @@ fn wrong_usage_is_told() {
     folder.run("render --help").ok();
     folder.run("--version").ok();
 }
+
+/// Systems on Unix take names that are no text; what is told of such a file has marks in their place.
+#[cfg(target_os = "linux")]
+#[test]
+fn names_that_are_no_text_are_told() {
+    use std::{ffi::OsStr, os::unix::ffi::OsStrExt};
+    let folder = Folder::new("no-text");
+    for (name, bytes) in
+        [(&b"\xff.ply"[..], PLY.into()), (b"\xff.nrrd", nrrd("uint8", &ball())), (b"s\xff.ply", sheet(300))]
+    {
+        std::fs::write(folder.0.join(OsStr::from_bytes(name)), bytes).unwrap();
+    }
+    for (arguments, told) in [
+        (&b"info \xff.ply"[..], "\u{fffd}.ply"),
+        (b"info \xff.ply --json", "\u{fffd}.ply"),
+        (b"convert \xff.ply -o \xff.splk --json", "\u{fffd}.splk"),
+        (b"convert s\xff.ply -o s\xff.splk --json --memory 8MiB", "s\u{fffd}.splk"),
+        (b"convert \xff.nrrd -o \xff.splv --json", "\u{fffd}.splv"),
+        (b"convert \xff.nrrd -o b\xff.nrrd --json", "b\u{fffd}.nrrd"),
+        (b"render \xff.ply -o \xff.png --reference --size 8x6 --json", "\u{fffd}.png"),
+    ] {
+        let arguments: Vec<_> = arguments.split(|byte| *byte == b' ').map(OsStr::from_bytes).collect();
+        let run = folder.run_with(&arguments);
+        assert!(run.stdout().contains(told), "{arguments:?}: {}", run.stderr());
+        run.ok();
+    }
+    let turntable = b"render \xff.ply -o t\xff.png --turntable 2 --reference --size 8x6";
+    folder.run_with(&turntable.split(|byte| *byte == b' ').map(OsStr::from_bytes).collect::<Vec<_>>()).ok();
+    assert!(folder.0.join(OsStr::from_bytes(b"t\xff_0001.png")).exists());
+}

@@ -158,6 +158,10 @@ fn adapters_are_listed_and_chosen() {
     folder.run("render a.ply -o a.png --gpu nonexistent").fails(4, &["nonexistent", "splatkit gpus"]);
     folder.run("render a.ply -o a.png --gpu 99").fails(4, &["99"]);
     folder.run(&format!("render a.ply -o a.png --gpu 0 --pass-entries 100000 {SMALL}")).ok();
+    // The budget is told by the name of its flag.
+    folder
+        .run(&format!("render a.nrrd -o b.png --pass-entries 16 {SMALL}"))
+        .fails(4, &["raise --pass-entries", "--size"]);
 }
 
 #[test]

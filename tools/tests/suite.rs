@@ -42,6 +42,25 @@ fn the_suite_measures_growth() {
     let page = std::fs::read_to_string(folder.path("page.md")).unwrap();
     assert!(page.starts_with("a\n<!--") && page.ends_with("-->\nb\n") && page.contains("### other\n\nkept"), "{page}");
     assert!(page.contains("| specimen, 16³ | generated: specimen, in bricks |"), "{page}");
+    // Another part alone would take the place of this one.
+    folder
+        .run("bench --suite --effort quick --only culling --write page.md")
+        .fails(2, &["--write would remove", "“growth”", "--only"]);
+    assert_eq!(std::fs::read_to_string(folder.path("page.md")).unwrap(), page);
+}
+
+#[test]
+fn tables_with_failed_cases_are_not_written() {
+    let folder = Folder::new("suite-lost");
+    let page = "<!-- suite: written by `splatkit bench --suite --write` -->\nold\n<!-- end of suite -->\n";
+    folder.put("page.md", page);
+    // Every case loses its device, which is opened anew for the next.
+    let run =
+        folder.run("bench --suite --effort quick --only growth --frames 1 --gpu-timeout 0.000000001 --write page.md");
+    assert_eq!(run.code(), Some(1), "{}", run.stderr());
+    assert!(run.stderr().contains("cases could not be drawn; page.md is as it was"), "{}", run.stderr());
+    assert!(run.stdout().contains("not drawn: GPU:"), "{}", run.stdout());
+    assert_eq!(std::fs::read_to_string(folder.path("page.md")).unwrap(), page);
 }
 
 #[test]
@@ -49,7 +68,9 @@ fn the_classic_table_takes_files() {
     let folder = Folder::new("suite-data");
     folder.put("aneurism.nrrd", nrrd("uint8", &ball()));
     folder.put("foot.nrrd", "no volume");
-    let found = folder.json("bench --suite --effort quick --only seed --data . --frames 1 --json");
+    let run = folder.run("bench --suite --effort quick --only seed --data . --frames 1 --json");
+    assert_eq!(run.code(), Some(1), "{}", run.stderr());
+    let found: Value = serde_json::from_str(&run.stdout()).unwrap();
     let cases = found["parts"][0]["cases"].as_array().unwrap();
     let case = |name: &str| cases.iter().find(|case| case["name"] == name).unwrap();
     assert_eq!(case("Aneurism")["drawn"], "aneurism.nrrd, 16×16×16");

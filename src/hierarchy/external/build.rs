@@ -2,7 +2,7 @@
 
 use super::{
     super::{
-        build::{Builder, block_of, check},
+        build::{Builder, block_of, check_splats},
         partition,
         sphere::Sphere,
     },
@@ -12,7 +12,7 @@ use super::{
     survey::Triangulated,
 };
 use crate::{
-    Result,
+    Error, Result,
     io::StreamPoint,
     math::Bounds,
     splat::{Payload, Splat, SplatSet, decode_normal},
@@ -74,7 +74,11 @@ impl Work<'_> {
             };
             let owned = part.owned.iter().filter(|owned| **owned).count() as u64;
             drop(part);
-            self.add(splats, input.input.stream.origin())?;
+            let stream = &input.input.stream;
+            self.add(splats, stream.origin()).map_err(|error| match error {
+                Error::Argument(message) => stream.error("content", message),
+                other => other,
+            })?;
             self.built += owned;
             (self.watch)(Stage::Building, self.built, self.points);
         }
@@ -82,19 +86,14 @@ impl Work<'_> {
     }
 
     /// Builds the blocks of some splats around the origin of their input.
-    fn add(&mut self, mut splats: Vec<Splat>, origin: DVec3) -> Result<()> {
+    fn add(&mut self, splats: Vec<Splat>, origin: DVec3) -> Result<()> {
         if splats.is_empty() {
             return Ok(());
         }
-        let shift = origin - self.origin;
-        if shift != DVec3::ZERO {
-            splats.par_iter_mut().for_each(|splat| {
-                splat.center = (Vec3::from(splat.center).as_dvec3() + shift).as_vec3().to_array();
-            });
-        }
         self.splats += splats.len() as u64;
-        let set = SplatSet { origin: self.origin, payload: Payload::Radiance, splats, extent: EXTENT, overlap: 1.0 };
-        check(&set)?;
+        let mut set = SplatSet { origin, payload: Payload::Radiance, splats, extent: EXTENT, overlap: 1.0 };
+        set.move_origin(self.origin)?;
+        check_splats(&set)?;
         self.bounds = self.bounds.union(set.bounds());
         let parts = partition::blocks(&set.splats, self.options.block_splats.max(64));
         for parts in parts.chunks(2 * rayon::current_num_threads()) {

@@ -89,9 +89,120 @@ fn a_square_with_colours() {
     assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y]);
     assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
     // Linear light becomes display values: 55/255 is about half as displayed, 0.5 about 0.735.
-    assert_eq!(mesh.colors, [[255, 0, 0, 255], [128, 128, 128, 255], [0, 0, 0, 128], [255, 255, 255, 0]]);
+    assert_eq!(mesh.colors, [[255, 0, 0, 255], [128, 128, 128, 255], [0, 0, 0, 255], [255, 255, 255, 255]]);
     let color = mesh.materials[0].color;
     assert!((color[1] - 0.735).abs() < 1e-3 && color[3] == 1.0, "{color:?}");
+}
+
+/// The square with these materials, each on a primitive of its own, and a picture of four texels with these alphas.
+fn painted(materials: &[Value], alphas: [u8; 4]) -> Mesh {
+    let picture = png(4, 1, &alphas.map(|alpha| [9, 8, 7, alpha]));
+    let mut value = changed(&[
+        ("/materials", json!(materials)),
+        ("/images", json!([{"uri": data_uri(&picture)}])),
+        ("/textures", json!([{"source": 0}])),
+    ]);
+    let primitive = value["meshes"][0]["primitives"][0].take();
+    let primitives = (0..materials.len()).map(|material| {
+        let mut primitive = primitive.clone();
+        primitive["material"] = json!(material);
+        primitive
+    });
+    value["meshes"][0]["primitives"] = primitives.collect();
+    load_json(&value).expect("loads")
+}
+
+/// A material with the picture, of a mode and with an alpha as its factor.
+fn picture_material(mode: &str, factor: f32) -> Value {
+    let base = json!({"baseColorFactor": [1, 1, 1, factor], "baseColorTexture": {"index": 0}});
+    json!({"alphaMode": mode, "pbrMetallicRoughness": base})
+}
+
+fn texel_alphas(mesh: &Mesh, material: usize) -> Vec<u8> {
+    mesh.materials[material].texture.as_ref().expect("a picture").texels.iter().map(|texel| texel[3]).collect()
+}
+
+fn vertex_alphas(mesh: &Mesh) -> Vec<u8> {
+    mesh.colors.iter().map(|color| color[3]).collect()
+}
+
+#[test]
+fn opaque_materials_ignore_every_alpha() {
+    let mut default = picture_material("", 0.25);
+    default.as_object_mut().expect("an object").remove("alphaMode");
+    for material in [default, picture_material("OPAQUE", 0.25)] {
+        let mesh = painted(&[material], [0, 1, 128, 255]);
+        assert_eq!(mesh.materials[0].color[3], 1.0);
+        assert_eq!(texel_alphas(&mesh, 0), [255; 4]);
+        assert_eq!(vertex_alphas(&mesh), [255; 4]);
+        assert_eq!(mesh.materials[0].texture.as_ref().expect("a picture").texels[0][..3], [9, 8, 7]);
+    }
+    // Without a material, the default one counts, which is opaque.
+    let mut value = square();
+    value["meshes"][0]["primitives"][0].as_object_mut().expect("an object").remove("material");
+    assert_eq!(vertex_alphas(&load_json(&value).expect("loads")), [255; 4]);
+}
+
+#[test]
+fn masks_show_all_or_nothing() {
+    let check = |factor: f32, cutoff: Option<f32>, own: f32, texels: [u8; 4], vertices: [u8; 4]| {
+        let mut material = picture_material("MASK", factor);
+        if let Some(cutoff) = cutoff {
+            material["alphaCutoff"] = json!(cutoff);
+        }
+        let mesh = painted(&[material], [0, 159, 160, 255]);
+        let found = (mesh.materials[0].color[3], texel_alphas(&mesh, 0), vertex_alphas(&mesh));
+        assert_eq!(found, (own, texels.to_vec(), vertices.to_vec()), "{factor} {cutoff:?}");
+    };
+    // The vertices have alphas of 255, 255, 128 and 0.
+    check(0.8, None, 1.0, [0, 0, 255, 255], [255, 255, 0, 0]);
+    check(1.0, None, 1.0, [0, 255, 255, 255], [255, 255, 255, 0]);
+    check(1.0, Some(1.0), 1.0, [0, 0, 0, 255], [255, 255, 0, 0]);
+    check(0.4, None, 0.0, [0; 4], [0; 4]);
+    check(1.0, Some(1.5), 0.0, [0; 4], [0; 4]);
+    check(0.0, Some(0.0), 1.0, [255; 4], [255; 4]);
+}
+
+#[test]
+fn one_picture_in_several_alpha_modes() {
+    let modes = ["OPAQUE", "BLEND", "MASK", "OPAQUE", "BLEND"];
+    let materials = modes.map(|mode| picture_material(mode, 0.75));
+    let mesh = painted(&materials, [0, 100, 200, 255]);
+    assert_eq!(mesh.triangle_materials, [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]);
+    assert_eq!(texel_alphas(&mesh, 0), [255; 4]);
+    assert_eq!(texel_alphas(&mesh, 1), [0, 100, 200, 255]);
+    assert_eq!(texel_alphas(&mesh, 2), [0, 0, 255, 255]);
+    assert_eq!([0, 1, 2].map(|i| mesh.materials[i].color[3]), [1.0, 0.75, 1.0]);
+    // The vertices of each primitive follow its own material.
+    assert_eq!(vertex_alphas(&mesh)[..8], [255, 255, 255, 255, 255, 255, 128, 0]);
+    let same = |mesh: &Mesh, a: usize, b: usize| {
+        let [a, b] = [a, b].map(|i| mesh.materials[i].texture.as_ref().expect("a picture"));
+        Arc::ptr_eq(a, b)
+    };
+    assert!(same(&mesh, 0, 3) && same(&mesh, 1, 4) && !same(&mesh, 0, 1));
+    let opaque = painted(&materials, [255; 4]);
+    assert!((1..5).all(|i| same(&opaque, 0, i)));
+}
+
+#[test]
+fn specular_glossiness_replaces_the_base_colour() {
+    let mesh = painted(
+        &[json!({
+            "alphaMode": "BLEND",
+            "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]},
+            "extensions": {"KHR_materials_pbrSpecularGlossiness": {
+                "diffuseFactor": [1, 0.5, 0, 0.25],
+                "diffuseTexture": {"index": 0,
+                    "extensions": {"KHR_texture_transform": {"offset": [0.5, 0.0], "scale": [2.0, 1.0]}}}
+            }}
+        })],
+        [255, 0, 255, 0],
+    );
+    let color = mesh.materials[0].color;
+    assert!((color[0] - 1.0).abs() < 1e-6 && (color[1] - 0.735).abs() < 1e-3, "{color:?}");
+    assert_eq!(color[2..], [0.0, 0.25]);
+    assert_eq!(texel_alphas(&mesh, 0), [255, 0, 255, 0]);
+    assert_eq!(mesh.uvs[0], Vec2::new(1.0, 0.5));
 }
 
 #[test]
@@ -147,6 +258,35 @@ fn transforms_and_mirrors() {
     let world = mesh.origin + mesh.positions[2].as_dvec3();
     assert!(world.distance(DVec3::new(8.0, -1.0, 3.0)) < 1e-6, "{world}");
     assert_eq!(mesh.triangles[0], [0, 2, 1]);
+}
+
+#[test]
+fn normals_agree_with_triangles_under_mirrors() {
+    let mut binary = square_bytes();
+    binary.extend(bytes(&[0.0, 0.0, 1.0].repeat(4)));
+    let mut value = square();
+    value["buffers"] = json!([{"byteLength": binary.len(), "uri": data_uri(&binary)}]);
+    value["bufferViews"] = json!([{"buffer": 0, "byteLength": binary.len()}]);
+    value["accessors"]
+        .as_array_mut()
+        .expect("a list")
+        .push(json!({"bufferView": 0, "byteOffset": 108, "componentType": 5126, "count": 4, "type": "VEC3"}));
+    value["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = json!(4);
+    for (scale, normal) in [
+        ([1, 1, 1], Vec3::Z),
+        ([-1, 1, 1], Vec3::Z),
+        ([1, 1, -1], Vec3::NEG_Z),
+        ([-2, -3, -4], Vec3::NEG_Z),
+        ([-1, -1, 1], Vec3::Z),
+        ([1, 1, 0], Vec3::Z),
+    ] {
+        value["nodes"] = json!([{"mesh": 0, "scale": scale}]);
+        let mesh = load_json(&value).expect("loads");
+        assert_eq!(mesh.normals, [normal; 4], "{scale:?}");
+        let [a, b, c] = mesh.triangles[0].map(|vertex| mesh.positions[vertex as usize]);
+        let facing = (b - a).cross(c - a).dot(normal);
+        assert!(facing > 0.0, "{scale:?}: {facing}");
+    }
 }
 
 #[test]

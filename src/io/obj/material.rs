@@ -58,7 +58,12 @@ impl<'a, 'b> Library<'a, 'b> {
                     _ => return Err(file.error(place(), format!("“{line}” is not a colour of three numbers"))),
                 },
                 "d" => material.dissolve = rest.split_whitespace().last().and_then(|word| word.parse().ok()),
-                "Tr" => material.dissolve = rest.parse().ok().map(|clear: f64| 1.0 - clear),
+                // Of the format itself is `d` alone. Some programs mean by `Tr` what others mean by `d`, and write 1 for what
+                // is opaque: nobody exports what cannot be seen.
+                "Tr" if material.dissolve.is_none() => {
+                    material.dissolve =
+                        rest.parse().ok().map(|clear: f64| 1.0 - clear).filter(|&opacity| opacity > 0.0);
+                }
                 "map_Kd" => material.diffuse_texture = Some(file_name(rest)).filter(|name| !name.is_empty()),
                 _ => {}
             }

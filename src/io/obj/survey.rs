@@ -7,12 +7,13 @@ use std::io::{BufRead, Read};
 /// Lines between two looks at the clock.
 const LINES: usize = 1 << 16;
 
-/// Bytes that a statement takes in all lists, those of tobj and those made of them: a vertex, a texture coordinate or normal,
-/// a face, and a corner of one, which may become a triangle and a vertex of its own.
+/// Bytes that a statement takes in all lists, those of tobj and those made of them: a vertex, a texture coordinate or
+/// normal, a face, and a corner of one, which may become a triangle and a vertex of its own, and is held while its face
+/// is cut.
 const VERTEX: u64 = 160;
 const OTHER: u64 = 48;
-const FACE: u64 = 160;
-const CORNER: u64 = 320;
+const FACE: u64 = 168;
+const CORNER: u64 = 384;
 
 /// What holds for the whole file. tobj mistakes lines (`l`) for faces, shifts colours and normals where only some
 /// vertices have them, and does arithmetic on indices unchecked; the survey finds these cases.
@@ -66,6 +67,7 @@ impl Survey {
                 Some("vn") => counts[2] += 1,
                 Some("f") => {
                     survey.faces += 1;
+                    let corners = survey.corners;
                     for word in words {
                         survey.corners += 1;
                         let mut has_normal = false;
@@ -89,6 +91,9 @@ impl Survey {
                             }
                         }
                         survey.normals &= has_normal;
+                    }
+                    if survey.corners == corners {
+                        return Err(source.error(place(), "a face has no corners"));
                     }
                 }
                 _ => {}

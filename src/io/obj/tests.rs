@@ -28,6 +28,55 @@ fn polygons_negative_indices_and_line_ends() {
 }
 
 #[test]
+fn concave_polygons_cover_themselves_only() {
+    let l = ([[2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0], [0.0, 0.0]].as_slice(), 3.0);
+    let dart = ([[0.0, 0.0], [2.0, 1.0], [0.0, 2.0], [0.5, 1.0]].as_slice(), 1.5);
+    // With a normal, vertices are split; with a triangle beside it (of no area), a model has faces of many kinds.
+    for ((outline, area), normal, beside, far) in [
+        (l, "", "", 0.0),
+        (l, "//1", "", 0.0),
+        (l, "", "f 1 2 1\n", 0.0),
+        (l, "", "", 5e6),
+        (dart, "", "", 0.0),
+        (dart, "//1", "f 1//1 2//1 1//1\n", 0.0),
+        (dart, "", "", 5e6),
+    ] {
+        for turned in [false, true] {
+            let mut text = String::from("vn 0 0 1\n");
+            outline.iter().for_each(|[x, y]| text += &format!("v {} {} 7\n", x + far, y + far));
+            let mut face: Vec<String> = (1..=outline.len()).map(|vertex| format!("{vertex}{normal}")).collect();
+            if turned {
+                face.reverse();
+            }
+            text += &format!("{beside}f {}\n{beside}", face.join(" "));
+            let mesh = load(&text).expect(&text);
+            let areas: Vec<f32> = mesh
+                .triangles
+                .iter()
+                .map(|t| t.map(|corner| mesh.positions[corner as usize]))
+                .map(|[a, b, c]| (b - a).cross(c - a).z * if turned { -0.5 } else { 0.5 })
+                .collect();
+            assert_eq!(areas.len(), outline.len() - 2 + beside.lines().count() * 2, "{text}");
+            assert!(areas.iter().all(|&area| area >= 0.0), "{text}: {areas:?}");
+            assert!((areas.iter().sum::<f32>() - area).abs() < 1e-5, "{text}: {areas:?}");
+        }
+    }
+    let error = load(format!("{SQUARE}f\n")).expect_err("a face without corners").to_string();
+    assert!(error.contains("line 6: a face has no corners"), "{error}");
+}
+
+#[test]
+fn every_triangle_of_a_polygon_has_its_material() {
+    let head = "v 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\n";
+    let folder = Folder::new();
+    folder.write("m.mtl", "newmtl a\nnewmtl b\n");
+    let obj = format!("mtllib m.mtl\n{head}usemtl a\nf 1 2 3 4 5 6\nusemtl b\nf 1 2 3\nf 1 2 3 6\n");
+    let mesh = load_mesh(&folder.write("a.obj", obj), &Limits::default()).expect("loads");
+    let names: Vec<&str> = mesh.triangle_materials.iter().map(|&m| mesh.materials[m as usize].name.as_str()).collect();
+    assert_eq!(names, ["a", "a", "a", "a", "b", "b", "b"]);
+}
+
+#[test]
 fn colors_and_clouds() {
     let cloud = "v 0 0 0 1 0.5 0\nv 1 0 0 0 0 1\n";
     let mesh = load(cloud).expect("loads");
@@ -71,6 +120,28 @@ fn materials_and_pictures() {
     assert_eq!(mesh.uvs.len(), mesh.positions.len());
     let limits = Limits { texels: 1, ..Limits::default() };
     assert!(matches!(load_mesh(&folder.path().join("a.obj"), &limits), Err(Error::Limit { found: 2, .. })));
+}
+
+/// `d` alone is of the format; `Tr` has two meanings.
+#[test]
+fn opacities_of_materials() {
+    let folder = Folder::new();
+    for (statements, opacity) in [
+        ("", 1.0),
+        ("d 0.25", 0.25),
+        ("Tr 0.25", 0.75),
+        ("Tr 1.000000", 1.0),
+        ("Tr 0", 1.0),
+        ("d 1.0\nTr 1.0", 1.0),
+        ("Tr 0.5\nd 0.25", 0.25),
+        ("d 0.25\nTr 0.25", 0.25),
+        ("d 0", 0.0),
+    ] {
+        folder.write("a.mtl", format!("newmtl m\nKd 1 1 1\n{statements}\n"));
+        let obj = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        let mesh = load_mesh(&folder.write("a.obj", obj), &Limits::default()).expect("loads");
+        assert_eq!(mesh.materials[mesh.triangle_materials[0] as usize].color[3], opacity, "{statements}");
+    }
 }
 
 #[test]

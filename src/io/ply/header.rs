@@ -18,8 +18,8 @@ const MOST_COLUMNS: usize = 4096;
 pub(super) struct Header {
     pub encoding: Encoding,
     pub elements: Vec<Element>,
-    /// The picture that a `comment TextureFile` names.
-    pub texture: Option<String>,
+    /// The pictures that lines `comment TextureFile` name.
+    pub textures: Vec<String>,
     /// Offset of the first byte after the header.
     pub payload: usize,
 }
@@ -79,7 +79,7 @@ pub(super) fn read(source: &Source) -> Result<Header> {
     let bytes = source.bytes();
     let mut clean = String::new();
     let mut names: Vec<(String, Vec<String>)> = Vec::new();
-    let mut texture = None;
+    let mut textures = Vec::new();
     let (mut at, mut number, mut columns) = (0, 0, 0);
     loop {
         number += 1;
@@ -96,7 +96,7 @@ pub(super) fn read(source: &Source) -> Result<Header> {
         match words.as_slice() {
             [] => clean.push_str("comment\n"),
             ["comment", "TextureFile", ..] => {
-                texture = line.split_once("TextureFile").map(|(_, name)| name.trim().to_owned());
+                textures.extend(line.split_once("TextureFile").map(|(_, name)| name.trim().to_owned()));
                 clean.push_str("comment\n");
             }
             ["comment" | "obj_info", ..] => clean.push_str("comment\n"),
@@ -142,5 +142,5 @@ pub(super) fn read(source: &Source) -> Result<Header> {
             .collect();
         elements.push(Element { name, count: definition.count, columns });
     }
-    Ok(Header { encoding: parsed.encoding, elements, texture, payload: at })
+    Ok(Header { encoding: parsed.encoding, elements, textures, payload: at })
 }

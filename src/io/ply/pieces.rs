@@ -2,7 +2,7 @@
 
 use super::{
     super::{Source, positions, stream::Found},
-    COLOR, NORMAL, POSITION, ROLES, UV, color_scale,
+    COLOR, ColorKind, NORMAL, POSITION, ROLES, UV, color, color_kind, color_scale,
     header::{self, Element, width},
     rows::{cut, list_place, number, triangle_stride},
 };
@@ -34,6 +34,7 @@ struct Rows {
 struct Vertices {
     rows: Rows,
     fields: [Option<(usize, ScalarType)>; ROLES.len()],
+    color_kind: [Option<ColorKind>; 4],
     color_scale: [Option<f64>; 4],
 }
 
@@ -46,7 +47,8 @@ struct Faces {
 }
 
 impl Pieces {
-    /// Finds the rows by the header alone. None for text, polygons and strips, textures, and what the reader refuses.
+    /// Finds the rows by the header and by some faces. None for text, polygons and strips, textures, and what the reader
+    /// refuses.
     pub fn find(source: &Source) -> Result<Option<Self>> {
         let header = header::read(source)?;
         let big = match header.encoding {
@@ -61,18 +63,22 @@ impl Pieces {
             let stride = if is_face { triangle_stride(element) } else { element.stride() };
             let Some(stride) = stride.filter(|_| element.name != "tristrips") else { return Ok(None) };
             let left = source.bytes().len() - at;
+            if is_face && element.count > 0 {
+                let rows = Rows { at, count: element.count.min(left / stride), stride, big };
+                let (None, Some(found)) = (&faces, Faces::find(element, rows)) else { return Ok(None) };
+                if !found.are_triangles(source) {
+                    return Ok(None);
+                }
+                faces = Some(found);
+            }
             let size = element.count.checked_mul(stride).filter(|&size| size <= left);
-            // Some faces might have fewer corners than three, but what would they be for?
             let Some(size) = size else { return Err(cut(source, element, left / stride)) };
             let rows = Rows { at, count: element.count, stride, big };
             at += size;
             if is_face || element.name == "vertex" {
                 source.check_points(&format!("the count of element “{}”", element.name), element.count as u64)?;
             }
-            if is_face && element.count > 0 {
-                let (None, Some(found)) = (&faces, Faces::find(element, rows)) else { return Ok(None) };
-                faces = Some(found);
-            } else if element.name == "vertex" && vertices.is_none() {
+            if element.name == "vertex" && vertices.is_none() {
                 vertices = Some((element, rows));
             }
         }
@@ -80,7 +86,7 @@ impl Pieces {
         let columns = ROLES.map(|names| element.column(names).filter(|&c| element.columns[c].width().is_some()));
         let has = |from: usize, number: usize| columns[from..from + number].iter().all(Option::is_some);
         let has_uvs = has(UV, 2);
-        if !has(POSITION, 3) || (has_uvs && header.texture.is_some() && faces.is_some()) {
+        if !has(POSITION, 3) || (has_uvs && !header.textures.is_empty() && faces.is_some()) {
             return Ok(None);
         }
         let field = |column: usize| {
@@ -89,9 +95,25 @@ impl Pieces {
             Some((offset?, kind.clone()))
         };
         let (has_normals, has_colors) = (has(NORMAL, 3), has(COLOR, 3));
-        let color_scale = color_scale(element, &columns);
-        let vertices = Vertices { rows, fields: columns.map(|column| column.and_then(field)), color_scale };
+        let color_kind = color_kind(element, &columns);
+        let fields = columns.map(|column| column.and_then(field));
+        let vertices = Vertices { rows, fields, color_kind, color_scale: [None; 4] };
         Ok(Some(Self { vertices, faces, has_normals, has_colors, has_uvs }))
+    }
+
+    /// Whether all colours have to be known before any of them is.
+    pub fn asks_for_colors(&self) -> bool {
+        self.has_colors && self.vertices.color_kind.iter().flatten().any(ColorKind::is_wide)
+    }
+
+    /// The values of a vertex's channels of colour; 0 for one that there is not.
+    pub fn channels(&self, source: &Source, row: usize) -> [f64; 4] {
+        std::array::from_fn(|channel| self.value(source, row, COLOR + channel))
+    }
+
+    /// Tells the largest values of all channels, without which there are no colours.
+    pub fn settle_colors(&mut self, largest: [f64; 4]) {
+        self.vertices.color_scale = color_scale(&self.vertices.color_kind, largest);
     }
 
     pub fn points(&self) -> usize {
@@ -137,10 +159,7 @@ impl Pieces {
             found.normal = positions::unit(Vec3::from_array([0, 1, 2].map(|axis| value(NORMAL + axis) as f32)));
         }
         if self.has_colors {
-            found.color = std::array::from_fn(|channel| {
-                let scale = self.vertices.color_scale[channel];
-                scale.map_or(255, |scale| (value(COLOR + channel) * scale).round() as u8)
-            });
+            found.color = color(self.vertices.color_scale, |channel| value(COLOR + channel));
         }
         found
     }
@@ -185,5 +204,17 @@ impl Faces {
         };
         let (offset, kind) = list_place(element);
         Some(Self { rows, length: (offset, kind.clone()), indices: offset + width(kind) })
+    }
+
+    /// Whether faces all over the rows have three corners: behind one that has not, no row is where it is looked for.
+    fn are_triangles(&self, source: &Source) -> bool {
+        const LOOKS: usize = 1 << 10;
+        let Rows { at, count, stride, big } = self.rows;
+        let looks = LOOKS.min(count);
+        let row = |look: usize| look as u128 * (count - 1) as u128 / looks.saturating_sub(1).max(1) as u128;
+        (0..looks).all(|look| {
+            let start = at + row(look) as usize * stride + self.length.0;
+            number(&source.bytes()[start..], &self.length.1, big) == 3.0
+        })
     }
 }

@@ -293,18 +293,17 @@ fn walk(
 
 /// Bytes of a row whose only list holds three values.
 pub(super) fn triangle_stride(element: &Element) -> Option<usize> {
-    let mut lists = 0;
-    let mut stride = 0;
-    for column in &element.columns {
-        stride += match &column.kind {
-            PropertyType::Scalar(kind) => width(kind),
-            PropertyType::List(count, item) => {
-                lists += 1;
-                width(count) + 3 * width(item)
-            }
-        };
-    }
-    (lists == 1).then_some(stride)
+    let lists = element.columns.iter().filter(|column| column.width().is_none()).count();
+    (lists == 1).then(|| place_in_row(element, element.columns.len()))
+}
+
+/// Where a column begins in rows of one length, in which a list holds three values.
+pub(super) fn place_in_row(element: &Element, column: usize) -> usize {
+    let bytes = |kind: &PropertyType| match kind {
+        PropertyType::Scalar(kind) => width(kind),
+        PropertyType::List(count, item) => width(count) + 3 * width(item),
+    };
+    element.columns[..column].iter().map(|before| bytes(&before.kind)).sum()
 }
 
 /// Offset in the row, and type of the length, of an element's first list.

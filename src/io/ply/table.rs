@@ -4,7 +4,7 @@ use super::{
     super::Source,
     CHUNK,
     header::Element,
-    rows::{Rows, number},
+    rows::{Rows, number, place_in_row},
 };
 use crate::Result;
 use ply_rs::ply::{PropertyType, ScalarType};
@@ -23,9 +23,8 @@ impl<'a> Table<'a> {
     pub fn read(source: &Source, element: &'a Element, rows: &Rows<'a>, columns: &[Option<usize>]) -> Result<Self> {
         if let Rows::Fixed { data, stride, big } = *rows {
             let field = |column: usize| {
-                let offset: Option<usize> = element.columns[..column].iter().map(|before| before.width()).sum();
                 let PropertyType::Scalar(kind) = &element.columns[column].kind else { return None };
-                Some((offset?, kind))
+                Some((place_in_row(element, column), kind))
             };
             let fields = columns.iter().map(|column| column.and_then(field)).collect();
             return Ok(Self::Binary { data, stride, big, fields });

@@ -1,8 +1,9 @@
 use super::*;
 use crate::{
     Error,
-    io::{Limits, testing::Folder},
+    io::{Limits, Stream, stream::StreamPoint, testing::Folder},
 };
+use std::path::Path;
 
 fn load(bytes: impl AsRef<[u8]>) -> Result<Mesh> {
     load_within(bytes, &Limits::default())
@@ -155,6 +156,143 @@ fn normals_colors_and_uvs() {
     assert_eq!(mesh.uvs, [Vec2::new(0.25, 0.75), Vec2::new(0.0, 1.0), Vec2::new(1.0, 0.0)]);
     let short = file.replace("float diffuse_", "ushort diffuse_").replace(" 1 0.5 0 0.2 ", " 65535 32896 0 1 ");
     assert_eq!(load(short.replace("2 -1 nan", "0 0 0")).expect("loads").colors[0], [255, 128, 0, 255]);
+}
+
+/// A binary file of columns behind or before the position, and its rows.
+fn cloud(before: &str, behind: &str, rows: &[&[(&str, f64)]]) -> Vec<u8> {
+    let mut file = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\n{before}property float x\nproperty float y\n\
+         property float z\n{behind}end_header\n",
+        rows.len()
+    )
+    .into_bytes();
+    rows.iter().copied().flatten().for_each(|&(kind, value)| put(&mut file, kind, value, false));
+    file
+}
+
+/// Points at one place, which becomes the origin.
+#[test]
+fn columns_around_a_list_of_three_are_read() {
+    let list = [("uchar", 3.0), ("float", 7.0), ("float", 8.0), ("float", 9.0)];
+    let place = [("float", 1.0), ("float", 2.0), ("float", 3.0)];
+    let colors = [("uchar", 255.0), ("uchar", 128.0), ("uchar", 64.0)];
+    let row = [list.as_slice(), &place, &colors].concat();
+    let (lists, hues) =
+        ("property list uchar float q\n", "property uchar red\nproperty uchar green\nproperty uchar blue\n");
+    let mesh = load(cloud(lists, hues, &[&row, &row])).expect("loads");
+    assert_eq!((mesh.origin, mesh.colors[1]), (DVec3::new(1.0, 2.0, 3.0), [255, 128, 64, 255]));
+    let row = [place.as_slice(), &list, &colors].concat();
+    let mesh = load(cloud("", &[lists, hues].concat(), &[&row, &row])).expect("loads");
+    assert_eq!((mesh.origin, mesh.colors[1]), (DVec3::new(1.0, 2.0, 3.0), [255, 128, 64, 255]));
+}
+
+/// The colours of a file that is read in pieces.
+fn colors_in_pieces(bytes: &[u8]) -> Vec<[u8; 4]> {
+    let limits = Limits::default();
+    let source = Source::from_bytes(Path::new("a.ply"), bytes, &limits).expect("small");
+    let mut stream = Stream::of(source).expect("opens").expect("can be read in pieces");
+    stream.settle(&|_| {}).expect("points");
+    let mut colors = Vec::new();
+    let of = |points: &[StreamPoint]| points.iter().map(|point| point.color).collect::<Vec<_>>();
+    stream
+        .points(of, |piece| {
+            colors.extend(piece);
+            Ok(())
+        })
+        .expect("points");
+    colors
+}
+
+/// Colours of wider types than bytes are what the largest of all tells, as a whole and in pieces.
+#[test]
+fn colors_of_wider_types_may_be_bytes() {
+    for (kind, values, expected) in [
+        ("ushort", [200.0, 100.0, 50.0], [200, 100, 50]),
+        ("ushort", [65535.0, 32896.0, 0.0], [255, 128, 0]),
+        ("float", [128.0, 64.0, 2.0], [128, 64, 2]),
+        ("float", [1.0, 0.5, 0.0], [255, 128, 0]),
+        ("float", [1.25, 0.5, 0.0], [255, 128, 0]),
+        ("double", [65535.0, 257.0, 0.0], [255, 1, 0]),
+        ("uchar", [200.0, 1.0, 0.0], [200, 1, 0]),
+    ] {
+        let columns = ["red", "green", "blue"].map(|name| format!("property {kind} {name}\n")).concat();
+        let row = |scale: f64| {
+            let place = [("float", scale), ("float", 0.0), ("float", 0.0)];
+            [place, values.map(|value| (kind, value * scale))].concat()
+        };
+        let file = cloud("", &columns, &[&row(0.0), &row(1.0)]);
+        let [red, green, blue] = expected;
+        let expected = [[0, 0, 0, 255], [red, green, blue, 255]];
+        assert_eq!(load(&file).expect("loads").colors, expected, "{kind} {values:?}");
+        assert_eq!(colors_in_pieces(&file), expected, "{kind} {values:?} in pieces");
+    }
+}
+
+/// Corners of one vertex may have several texture coordinates, in several pictures (MeshLab).
+#[test]
+fn texture_coordinates_of_corners() {
+    let folder = Folder::new();
+    let dot = |color| image::RgbaImage::from_pixel(1, 1, image::Rgba(color));
+    dot([255, 0, 0, 255]).save(folder.path().join("a.png")).expect("a picture");
+    dot([0, 255, 0, 255]).save(folder.path().join("b.png")).expect("a picture");
+    let file = |faces: &str| {
+        let text = format!(
+            "ply\nformat ascii 1.0\ncomment TextureFile a.png\ncomment TextureFile b.png\nelement vertex 4\n\
+             property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n\
+             property uchar blue\nelement face {}\nproperty list uchar int vertex_indices\n\
+             property list uchar float texcoord\nproperty int texnumber\nend_header\n0 0 0 1 0 0\n1 0 0 2 0 0\n\
+             1 1 0 3 0 0\n0 1 0 4 0 0\n{faces}",
+            faces.lines().count()
+        );
+        let path = folder.write("a.ply", text);
+        read(&Source::open(&path, &Limits::default())?)
+    };
+    let mesh = file("3 0 1 2 6 0 0 1 0 1 1 0\n3 0 2 3 6 0 0 0.5 1 0 1 1\n3 0 1 3 0 0\n").expect("loads");
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 4, 3], [0, 5, 6]]);
+    assert_eq!((mesh.positions[4], mesh.colors[4]), (Vec3::new(1.0, 1.0, 0.0), [3, 0, 0, 255]));
+    assert_eq!(mesh.uvs[2..5], [Vec2::new(1.0, 0.0), Vec2::new(0.0, 0.0), Vec2::new(0.5, 0.0)]);
+    assert_eq!(mesh.uvs.len(), mesh.positions.len());
+    assert_eq!(mesh.triangle_materials, [0, 1, 0]);
+    let colors: Vec<_> = mesh.materials.iter().map(|m| m.texture.as_ref().expect("a picture").texels[0]).collect();
+    assert_eq!(colors, [[255, 0, 0, 255], [0, 255, 0, 255]]);
+    let quad = file("4 0 1 2 3 8 0 0 1 0 1 1 0 1 1\n").expect("loads");
+    assert_eq!((quad.triangles.len(), quad.positions.len()), (2, 4));
+    assert_eq!((quad.uvs[3], quad.triangle_materials), (Vec2::new(0.0, 0.0), vec![1, 1]));
+    for (faces, word) in [
+        ("3 0 1 2 5 0 0 1 0 1 0\n", "has 5 texture coordinates for 3 corners"),
+        ("3 0 1 2 6 0 0 1 0 1 1 2\n", "shows picture 2"),
+    ] {
+        let message = file(faces).unwrap_err().to_string();
+        assert!(message.contains(word), "{message}");
+    }
+}
+
+/// What a concave polygon leaves out stays free.
+#[test]
+fn concave_polygons() {
+    let file = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nelement vertex 6\n\
+        property float x\nproperty float y\nproperty float z\nend_header\n6 0 1 2 3 4 5\n\
+        2 0 0\n2 1 0\n1 1 0\n1 2 0\n0 2 0\n0 0 0\n";
+    let mesh = load(file).expect("loads");
+    let area = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|index| mesh.positions[index as usize]);
+        0.5 * (b - a).cross(c - a).z
+    };
+    assert_eq!(mesh.triangles.len(), 4);
+    assert!(mesh.triangles.iter().all(|t| area(t) > 0.0));
+    assert_eq!(mesh.triangles.iter().map(area).sum::<f32>(), 3.0);
+}
+
+/// Polygons are read as a whole, wherever they stand.
+#[test]
+fn polygons_are_not_read_in_pieces() {
+    let limits = Limits::default();
+    for (quad, streams) in [(false, true), (true, false)] {
+        let file = square("binary_little_endian", "float", "uchar", "int", quad, false);
+        let source = Source::from_bytes(Path::new("a.ply"), &file, &limits).expect("small");
+        assert_eq!(Stream::of(source).expect("opens").is_some(), streams);
+        assert_eq!(load(&file).expect("loads").triangles.len(), 2);
+    }
 }
 
 #[test]

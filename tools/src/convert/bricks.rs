@@ -66,7 +66,7 @@ impl Convert {
         let [nx, ny, nz] = lattice.dims;
         if self.json {
             return output::line(json!({
-                "file": self.output,
+                "file": self.output.to_string_lossy(),
                 "dims": lattice.dims,
                 "type": scalar.name(),
                 "slice_by_slice": matches!(source, Source::Stream(_)),

@@ -61,7 +61,7 @@ impl Convert {
         let per_point = bytes as f64 / done.points as f64;
         if self.json {
             return output::line(json!({
-                "file": self.output,
+                "file": self.output.to_string_lossy(),
                 "points": done.points,
                 "splats": done.splats,
                 "closed": done.closed,

@@ -10,7 +10,7 @@ use splatkit::{
         self, BuildOptions,
         file::{UpAxis, WriteOptions},
     },
-    splat::{Splat, SplatSet},
+    splat::SplatSet,
     surface::SurfelOptions,
 };
 use std::{
@@ -106,7 +106,7 @@ impl Convert {
         let per_point = bytes as f64 / gathered.points as f64;
         if self.json {
             return output::line(json!({
-                "file": self.output,
+                "file": self.output.to_string_lossy(),
                 "points": gathered.points,
                 "splats": gathered.set.splats.len(),
                 "closed": gathered.closed,
@@ -131,6 +131,7 @@ impl Convert {
         let mut gathered: Option<Gathered> = None;
         for path in &self.files {
             let own = self.splats_of(path, progress)?;
+            hierarchy::check_splats(&own.set).map_err(|error| in_file(path, error))?;
             match &mut gathered {
                 None => gathered = Some(own),
                 Some(all) => all.join(own, path)?,
@@ -213,11 +214,9 @@ impl Gathered {
         if other.set.extent != self.set.extent {
             return Err(Error::input(path, "splats", "their footprints end elsewhere than the first input's").into());
         }
-        let shift = other.set.origin - self.set.origin;
-        self.set.splats.extend(other.set.splats.into_iter().map(|splat| {
-            let center = glam::Vec3::from(splat.center).as_dvec3() + shift;
-            Splat { center: center.as_vec3().to_array(), ..splat }
-        }));
+        let mut set = other.set;
+        set.move_origin(self.set.origin).map_err(|error| in_file(path, error))?;
+        self.set.splats.append(&mut set.splats);
         self.closed &= other.closed;
         self.points += other.points;
         self.read_ms += other.read_ms;

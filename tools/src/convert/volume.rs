@@ -41,7 +41,7 @@ impl Convert {
         let (lattice, dims) = (name_of(&volume), volume.lattice.dims);
         if self.json {
             return output::line(json!({
-                "file": self.output,
+                "file": self.output.to_string_lossy(),
                 "lattice": lattice,
                 "dims": dims,
                 "type": volume.samples.type_name(),

@@ -19,6 +19,9 @@ use splatkit::{
 /// The step of the dense integration, in samples.
 const STEP: f64 = 0.05;
 
+/// What is wrong with a file of another kind.
+pub const OTHER: &str = "is no volume";
+
 /// A volume and how it is shown.
 pub struct Case {
     name: String,

@@ -30,6 +30,9 @@ const FRAMES: usize = 5;
 /// The cut, in pixels.
 const CUT: f64 = Detail::PIXELS;
 
+/// What is wrong with a file of another kind.
+pub const OTHER: &str = "is no mesh, cloud or hierarchy";
+
 /// The hierarchy of a file, made of a mesh or cloud where it is one.
 fn hierarchy(source: &Source, input: Input) -> Result<Arc<Hierarchy>, Failure> {
     match input {
@@ -39,7 +42,7 @@ fn hierarchy(source: &Source, input: Input) -> Result<Arc<Hierarchy>, Failure> {
             let tree = Tree::build(&mesh.surfels(&SurfelOptions::default())?, &options, &|_, _| ())?;
             Ok(Arc::new(Hierarchy::from_tree(tree)?))
         }
-        _ => Err(Error::input(&source.path, "file", "is no mesh, cloud or hierarchy").into()),
+        _ => Err(Error::input(&source.path, "file", OTHER).into()),
     }
 }
 

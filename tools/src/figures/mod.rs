@@ -20,6 +20,7 @@ use clap::Args;
 use splatkit::{
     Error,
     engine::{AdapterChoice, Gpu, PreparedScene, Renderer},
+    io::Kind,
     math::Camera,
     picture::Picture,
     scene::{Scene, Settings},
@@ -38,6 +39,9 @@ pub struct Figures {
     /// Writes the pictures of surfaces to this folder.
     #[arg(long, value_name = "FOLDER", requires = "surfaces")]
     pictures: Option<PathBuf>,
+    /// Replaces pictures that are there already.
+    #[arg(long, requires = "pictures")]
+    overwrite: bool,
     /// Hierarchies, meshes and clouds of which cuts are drawn from near and far; with the axis that is up where that is not
     /// +Y. Measures these alone.
     #[arg(long, value_name = "FILE[:AXIS]", num_args = 1.., value_parser = surfaces::Source::parse, conflicts_with_all = ["files", "only"])]
@@ -94,45 +98,66 @@ impl Stage {
 impl Figures {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
         let block = self.write.as_deref().map(|path| Block::open(path, "figures", "figures")).transpose()?;
+        self.look_at_inputs()?;
+        let pictures = match &self.pictures {
+            Some(folder) => surfaces::pictures(&self.surfaces, folder, self.overwrite)?,
+            None => Vec::new(),
+        };
         let choice = self.gpu.as_deref().map_or(AdapterChoice::Automatic, |text| text.parse().unwrap_or_default());
         let gpu = Gpu::headless(&choice)?;
         let mut stage = Stage { renderer: Renderer::new(&gpu) };
         let mut report = Report { adapter: gpu.info.name.clone(), tables: Vec::new() };
-        let wanted = |part| {
-            self.surfaces.is_empty() && self.detail.is_empty() && (self.only.is_empty() || self.only.contains(&part))
-        };
-        if wanted(Part::Ripple) {
+        if self.measures(Part::Ripple) {
             report.tables.push(ripple::table()?);
         }
-        if wanted(Part::MarschnerLobb) {
+        if self.measures(Part::MarschnerLobb) {
             report.tables.push(marschner_lobb::table(&mut stage, progress)?);
         }
-        if wanted(Part::Bleeding) {
+        if self.measures(Part::Bleeding) {
             report.tables.push(bleeding::table(&mut stage, progress)?);
         }
-        if wanted(Part::Popping) {
+        if self.measures(Part::Popping) {
             report.tables.push(popping::table(&mut stage, progress)?);
         }
-        if wanted(Part::Dense) {
+        if self.measures(Part::Dense) {
             report.tables.push(self.dense(&mut stage, progress)?);
         }
         if !self.surfaces.is_empty() {
             let open = |path: &Path| self.load.open(path);
-            let pictures = self.pictures.as_deref();
-            report.tables.extend(surfaces::tables(&mut stage, &self.surfaces, open, pictures, progress)?);
+            report.tables.extend(surfaces::tables(&mut stage, &self.surfaces, open, &pictures, progress)?);
         }
         if !self.detail.is_empty() {
             let open = |path: &Path| self.load.open(path);
             report.tables.extend(detail::tables(&mut stage, &self.detail, open, progress)?);
         }
         progress.clear();
-        if let Some(block) = block {
-            block.replace(&report.markdown())?;
-        }
+        let text = report.markdown();
+        // Where the file is not written after all, nothing has to be measured again.
         if self.json {
-            return output::line(report.json());
+            output::line(report.json())?;
+        } else {
+            output::line(text.trim_end())?;
         }
-        output::line(report.markdown().trim_end())
+        block.map_or(Ok(()), |block| block.replace(|_| text))
+    }
+
+    fn measures(&self, part: Part) -> bool {
+        self.surfaces.is_empty() && self.detail.is_empty() && (self.only.is_empty() || self.only.contains(&part))
+    }
+
+    /// Refuses files that nothing could be measured with, before the first of them is.
+    fn look_at_inputs(&self) -> Result<(), Failure> {
+        if !self.files.is_empty() && !self.measures(Part::Dense) {
+            return Err(Failure::Usage("volumes are for the part dense, which --only leaves out".into()));
+        }
+        let look = |path: &Path, kinds: &[Kind], message: &str| match kinds.contains(&self.load.kind(path)?) {
+            true => Ok(()),
+            false => Err(Failure::from(Error::input(path, "file", message))),
+        };
+        self.files.iter().try_for_each(|file| look(file, &[Kind::Volume], dense::OTHER))?;
+        self.surfaces.iter().try_for_each(|source| look(&source.path, &[Kind::Mesh], surfaces::OTHER))?;
+        let kinds = [Kind::Mesh, Kind::Hierarchy];
+        self.detail.iter().try_for_each(|source| look(&source.path, &kinds, detail::OTHER))
     }
 
     fn dense(&self, stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {
@@ -144,7 +169,7 @@ impl Figures {
                     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
                     cases.push(dense::Case::automatic(name, volume));
                 }
-                _ => return Err(Error::input(file, "file", "is no volume").into()),
+                _ => return Err(Error::input(file, "file", dense::OTHER).into()),
             }
         }
         dense::table(stage, &cases, self.size, progress)

@@ -5,7 +5,7 @@ use crate::{
     camera::{CameraFlags, Subject},
     failure::Failure,
     load::Input,
-    parse,
+    output, parse,
     progress::Progress,
     report::{Cell, Table},
 };
@@ -30,6 +30,9 @@ const RAYS: u32 = 4;
 const BESIDE: usize = 2;
 /// A step in depth between neighbouring pixels that is an outline, in pixels.
 const STEP: f64 = 8.0;
+
+/// What is wrong with a file of another kind.
+pub const OTHER: &str = "is no mesh";
 
 /// A mesh file, and the axis that is up in its picture.
 #[derive(Debug, Clone)]
@@ -195,11 +198,31 @@ fn nearest(at: usize, size: [usize; 2], covered: impl Fn(usize) -> bool) -> f64 
     64.0
 }
 
+/// The files of each source's truth and splats in a folder; none of them may be in the way, nor be one with another.
+pub fn pictures(sources: &[Source], folder: &Path, overwrite: bool) -> Result<Vec<[PathBuf; 2]>, Failure> {
+    let files_of =
+        |source: &Source| ["truth", "splats"].map(|what| folder.join(format!("{}_{what}.png", source.name())));
+    let files: Vec<_> = sources.iter().map(files_of).collect();
+    for (at, own) in files.iter().enumerate() {
+        if let Some(first) = files[..at].iter().position(|other| other == own) {
+            let [first, second] = [first, at].map(|at| sources[at].path.display());
+            let picture = own[0].display();
+            return Err(Failure::Usage(format!(
+                "{picture} would be the picture of {first} and of {second}: rename one, or measure them one by one"
+            )));
+        }
+        own.iter().try_for_each(|file| output::check(file, overwrite))?;
+        output::try_writing(&own[0], &[])?;
+    }
+    Ok(files)
+}
+
+/// `keep` names the pictures of each source, where they are kept.
 pub fn tables(
     stage: &mut Stage,
     sources: &[Source],
     open: impl Fn(&Path) -> Result<Input, Failure>,
-    keep: Option<&Path>,
+    keep: &[[PathBuf; 2]],
     progress: &Progress,
 ) -> Result<[Table; 2], Failure> {
     let mut sizes = files::table();
@@ -227,10 +250,10 @@ pub fn tables(
             "< 0.5",
         ],
     );
-    for source in sources {
+    for (at, source) in sources.iter().enumerate() {
         progress.stage(format!("Reading {}", source.path.display()));
         let Input::Mesh(mesh) = open(&source.path)? else {
-            return Err(Error::input(&source.path, "file", "is no mesh").into());
+            return Err(Error::input(&source.path, "file", OTHER).into());
         };
         progress.stage(format!("Tracing {}", source.path.display()));
         let truth = Truth::of(&mesh, source.up)?;
@@ -251,10 +274,9 @@ pub fn tables(
             let (_, found, drawn) = truth.measure(stage, &scene, Detail::Pixels(pixels))?;
             table.row(format!("{}, {name}", source.name()), found.cells(drawn));
         }
-        if let Some(folder) = keep {
-            for (what, picture) in [("truth", &truth.picture), ("splats", &picture)] {
-                picture.save(&folder.join(format!("{}_{what}.png", source.name())), Some([0.0; 3]))?;
-            }
+        if let Some([of_truth, of_splats]) = keep.get(at) {
+            truth.picture.save(of_truth, Some([0.0; 3]))?;
+            picture.save(of_splats, Some([0.0; 3]))?;
         }
     }
     Ok([table, sizes])

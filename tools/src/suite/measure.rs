@@ -41,8 +41,24 @@ pub struct Counts {
     pub runs: u32,
 }
 
+/// Measures one plan after another.
+pub fn outcomes(plans: Vec<Plan>, gpu: &mut Gpu, counts: Counts, progress: &Progress) -> Vec<Outcome> {
+    let mut outcomes = Vec::new();
+    for plan in plans {
+        let outcome = outcome(plan, gpu, counts, progress);
+        // On a lost device all later cases would fail too. Where it does not open, the next one tells of it and tries again.
+        if matches!(outcome.result, Err(Error::DeviceLost(_)))
+            && let Ok(anew) = gpu.reopened()
+        {
+            *gpu = anew;
+        }
+        outcomes.push(outcome);
+    }
+    outcomes
+}
+
 /// Makes the scene of a plan, draws it and lets it go.
-pub fn outcome(plan: Plan, gpu: &Gpu, counts: Counts, progress: &Progress) -> Outcome {
+fn outcome(plan: Plan, gpu: &Gpu, counts: Counts, progress: &Progress) -> Outcome {
     let Plan { name, make } = plan;
     progress.stage(format!("Making {name}"));
     let result = make().and_then(|case| {

@@ -16,7 +16,7 @@ use case::Plan;
 use clap::{Args, ValueEnum};
 use machine::Machine;
 use measure::Counts;
-use std::path::PathBuf;
+use std::{fmt, path::PathBuf};
 use tables::Chapter;
 
 /// Frames that are measured of each case.
@@ -177,30 +177,52 @@ impl SuiteFlags {
         progress: &Progress,
     ) -> Result<(), Failure> {
         let block = self.write.as_deref().map(|path| Block::open(path, "suite", "bench --suite")).transpose()?;
-        let gpu = engine.gpu()?;
+        let mut gpu = engine.gpu()?;
         let machine = Machine::of(&gpu);
+        if let Some(block) = &block {
+            self.check_parts(&section_of(&block.inside()?, &machine))?;
+        }
         let counts = Counts { frames: frames.unwrap_or(FRAMES), runs: self.repeat };
         let mut chapters = Vec::new();
-        for &part in Part::value_variants().iter().filter(|part| self.only.is_empty() || self.only.contains(part)) {
+        for part in Part::value_variants().iter().filter(|part| self.measures(**part)) {
             let [name, title, note] = part.told();
-            let plans = part.plans(self)?;
-            let outcomes = plans.into_iter().map(|plan| measure::outcome(plan, &gpu, counts, progress)).collect();
+            let outcomes = measure::outcomes(part.plans(self)?, &mut gpu, counts, progress);
             chapters.push(Chapter { name, title, note, outcomes });
         }
         progress.clear();
         let text = self.markdown(&machine, &chapters, counts);
-        if let Some(block) = block {
-            block.replace(&with_section(&block.inside, &text))?;
-        }
         if json {
-            return output::line(serde_json::json!({
+            output::line(serde_json::json!({
                 "machine": machine.json(),
                 "frames": counts.frames,
                 "runs": counts.runs,
                 "parts": chapters.iter().map(Chapter::json).collect::<Vec<_>>(),
-            }));
+            }))?;
+        } else {
+            output::line(text.trim_end())?;
         }
-        output::line(text.trim_end())
+        let failed = chapters.iter().flat_map(|chapter| &chapter.outcomes).filter(|outcome| outcome.result.is_err());
+        match (failed.count(), block) {
+            (0, None) => Ok(()),
+            (0, Some(block)) => block.replace(|old| with_section(old, &text)),
+            (failed, _) => Err(Failure::Incomplete { failed, kept: self.write.clone() }),
+        }
+    }
+
+    fn measures(&self, part: Part) -> bool {
+        self.only.is_empty() || self.only.contains(&part)
+    }
+
+    /// A machine's section is replaced as a whole: refuses one with parts that are not measured now.
+    fn check_parts(&self, section: &str) -> Result<(), Failure> {
+        let lost = Part::value_variants().iter().filter(|part| !self.measures(**part)).map(|part| part.told());
+        match lost.into_iter().find(|[_, title, _]| section.contains(&format!("**{title}**"))) {
+            Some([name, ..]) => Err(Failure::Usage(format!(
+                "--write would remove this machine's tables of the part “{name}”, which --only leaves out; measure it too, \
+                 or leave --write out"
+            ))),
+            None => Ok(()),
+        }
     }
 
     fn markdown(&self, machine: &Machine, chapters: &[Chapter], counts: Counts) -> String {
@@ -216,17 +238,33 @@ impl SuiteFlags {
 /// How the part of a machine begins in a document.
 const HEADING: &str = "### ";
 
-/// A text with sections of several machines, one of them put in or replaced.
-fn with_section(text: &str, section: &str) -> String {
-    let heading = |section: &str| section.lines().next().unwrap_or_default().to_owned();
-    let mut sections: Vec<&str> = Vec::new();
+/// The first line of a section.
+fn heading(section: &str) -> &str {
+    section.lines().next().unwrap_or_default()
+}
+
+/// The sections of a text, one for each machine.
+fn sections(text: &str) -> Vec<&str> {
+    let mut sections = Vec::new();
     let mut rest = text.trim();
     while !rest.is_empty() {
-        let end = rest[1..].find(&format!("\n{HEADING}")).map_or(rest.len(), |at| at + 1);
+        let end = rest.find(&format!("\n{HEADING}")).unwrap_or(rest.len());
         let (first, others) = rest.split_at(end);
         sections.push(first.trim());
         rest = others.trim();
     }
+    sections
+}
+
+/// The section of a machine, empty where there is none.
+fn section_of(text: &str, machine: impl fmt::Display) -> String {
+    let wanted = format!("{HEADING}{machine}");
+    sections(text).into_iter().find(|section| heading(section) == wanted).unwrap_or_default().to_owned()
+}
+
+/// A text with sections of several machines, one of them put in or replaced.
+fn with_section(text: &str, section: &str) -> String {
+    let mut sections = sections(text);
     match sections.iter_mut().find(|old| heading(old) == heading(section)) {
         Some(old) => *old = section.trim(),
         None => sections.push(section.trim()),
@@ -244,5 +282,7 @@ mod tests {
         let both = with_section(&one, "### b\n\n2\n");
         assert_eq!(both, "### a\n\n1\n\n### b\n\n2\n");
         assert_eq!(with_section(&both, "### a\n\n3"), "### a\n\n3\n\n### b\n\n2\n");
+        assert_eq!((section_of(&both, "b").as_str(), section_of(&both, "c").as_str()), ("### b\n\n2", ""));
+        assert_eq!(with_section("– Words.\n", &one), "– Words.\n\n### a\n\n1\n");
     }
 }

@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each test file uses its part")]
 
 use std::{
+    ffi::OsStr,
     path::{Path, PathBuf},
     process::{Command, Output},
 };
@@ -32,10 +33,11 @@ impl Folder {
         self.run_with(&arguments.split_whitespace().collect::<Vec<_>>())
     }
 
-    pub fn run_with(&self, arguments: &[&str]) -> Run {
+    pub fn run_with(&self, arguments: &[impl AsRef<OsStr>]) -> Run {
         let mut command = Command::new(env!("CARGO_BIN_EXE_splatkit"));
         let output = command.args(arguments).current_dir(&self.0).env("NO_COLOR", "1").env_remove("RUST_LOG").output();
-        Run(arguments.join(" "), output.unwrap())
+        let told: Vec<_> = arguments.iter().map(|argument| argument.as_ref().to_string_lossy()).collect();
+        Run(told.join(" "), output.unwrap())
     }
 
     /// Runs a command that must succeed, with a JSON result.
