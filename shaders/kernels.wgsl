@@ -217,8 +217,8 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
     let m2 = vec3(0.0, 0.0, c.y);
     var at = frame.center + frame.scale * a.xy;
     var whitened = m2 * a.z;
-    var v0 = cross(m0, m2);
-    var v1 = cross(m1, m2);
+    var v0 = cross(m2, m0);
+    var v1 = cross(m2, m1);
     if PERSPECTIVE {
         // A centre beside the eye projects to infinity; moving it by a thousandth of its distance cannot be seen.
         let least = 1e-3 * length(a.xyz);
@@ -274,6 +274,10 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
                 along.x = 2.0 * kernel_integral(sqrt(rho2), 3e38) * e;
             } else if CLASSIFIED && !splat.is_radiance {
                 along.x = e * SQRT_TAU;
+            }
+            if PERSPECTIVE && l <= 0.0 {
+                // Its middle is behind the eye.
+                along.x = 0.0;
             }
         }
         // Whitened length to world length along the ray.

@@ -49,8 +49,9 @@ fn bin_end(bin: u32) -> u32 {
 @compute @workgroup_size(64)
 fn order(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let bins = progress[progress_word(LISTED)] * stage.groups;
-    let number = dealt(group_number(group), (bins + 63u) / 64u) * 64u + lane;
-    if number >= bins {
+    let groups = (bins + 63u) / 64u;
+    let number = dealt(group_number(group), groups) * 64u + lane;
+    if group_number(group) >= dealt_count(groups) || number >= bins {
         return;
     }
     let tile = progress[listed_tile(number / stage.groups)] - stage.first_row * frame.tiles.x;

@@ -85,6 +85,7 @@ fn opaque_tiles() -> u32 {
 
 @compute @workgroup_size(1)
 fn advance() {
+    state[ADVANCED] += 1u;
     stage.groups = 0u;
     bin_size.x = 0u;
     state[TOUCHED] = max(state[TOUCHED], state[TILES]);

@@ -27,6 +27,8 @@ const IMPOSSIBLE: u32 = 12u;
 // Tiles that the last pass drew in, and the most that a pass has.
 const TILES: u32 = 13u;
 const TOUCHED: u32 = 14u;
+// How often a pass was looked for: tells the CPU that something happens at all.
+const ADVANCED: u32 = 15u;
 // The stalled pass.
 const HELD: u32 = 16u;
 const STATE_WORDS: u32 = 24u;

@@ -321,6 +321,23 @@ fn samples_with_slopes_and_weights() {
     }
 }
 
+/// Slopes, and gradients of what is not round, are vectors across the ray.
+#[test]
+fn slopes_and_gradients_orthographic() {
+    let samples = methods::samples_with_slopes(Classification::PreIntegrated);
+    for case in [samples, methods::rectilinear(), scenes::sheared_lattice()] {
+        assert_matches(methods::orthographic(case), 50.0);
+    }
+}
+
+/// Whole kernels count where their middle is before the eye.
+#[test]
+fn whole_kernels_from_inside() {
+    for case in [methods::single_splats(Order::FrontToBack), methods::single_ellipsoids()] {
+        assert_matches(methods::from_inside(case), 50.0);
+    }
+}
+
 /// Westover's table with one more axis against the closed form.
 #[test]
 fn the_section_table_agrees_with_the_closed_form() {

@@ -10,14 +10,15 @@ use splatkit::{
         validate,
     },
     io::Limits,
-    math::{Bounds, Camera, View},
+    math::{Bounds, Camera, Kernel, View},
     picture::Picture,
     reference,
     scene::{Scene, Settings},
     splat::SplatSet,
     surface::{Mesh, SurfelOptions},
+    volume::{TransferFunction, bricks::Bricks, phantoms::Phantom},
 };
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 /// A knotted tube of about so many vertices, coloured by place.
 fn knot(count: u32) -> SplatSet {
@@ -75,6 +76,63 @@ fn trees_of_every_preset_keep_their_promises_and_all_splats() {
             assert!(inner * 4 < leaves.len(), "{inner} nodes above {} leaves", leaves.len());
         }
     }
+}
+
+/// Nodes and samples in one picture, from the first frame on: what is chosen of the one moves the runs of the other.
+#[test]
+fn a_hierarchy_in_a_volume() {
+    let volume = Arc::new(Phantom::Ball.sample_bytes([32; 3]).expect("a ball"));
+    let mut mesh = Mesh::knot(300, 24);
+    mesh.positions.iter_mut().for_each(|place| *place *= 0.4);
+    let set = mesh.surfels(&SurfelOptions::default()).expect("surfels");
+    let file =
+        to_bytes(&build(&set, 1 << 20), &WriteOptions { lossless: true, ..WriteOptions::default() }).expect("a file");
+    let hierarchy = || Hierarchy::from_bytes(file.clone(), Path::new("knot.splk"), &Limits::default()).expect("opens");
+    let transfer = TransferFunction::automatic(&volume);
+    let scene = || Scene::new().with_hierarchy(hierarchy());
+    let scenes = [
+        scene().with_volume(volume.clone(), Kernel::default(), transfer.clone()),
+        scene().with_bricks(Bricks::from_volume(volume).expect("bricks"), Kernel::default(), transfer),
+    ];
+    for scene in scenes {
+        let camera = camera(&scene.bounds(), 0.8);
+        let mut renderer = renderer();
+        let mut prepared = renderer.prepare(&scene).expect("fits");
+        // Nearer, so that bricks and pages are read anew.
+        for part in [0.3, 1.0] {
+            let camera =
+                Camera { position: camera.focal_point + (camera.position - camera.focal_point) / part, ..camera };
+            let truth = reference::render(&scene, &camera, &settings(1.0)).expect("draws");
+            let found = renderer.render(&mut prepared, &camera, &settings(1.0)).expect("draws").0;
+            let agreement = decibels(&found, &truth);
+            println!("{part}: {agreement:.1} dB");
+            assert!(agreement > 50.0, "{part}: {agreement:.1} dB");
+        }
+    }
+}
+
+/// What was at hand before a page that cannot be read is drawn as ever afterwards.
+#[test]
+fn a_page_that_cannot_be_read_takes_nothing_with_it() {
+    let mut file = to_bytes(&build(&knot(60_000), 1 << 20), &WriteOptions::default()).expect("a file");
+    let last = file.len() - 100;
+    file[last] ^= 0x55;
+    let hierarchy = Hierarchy::from_bytes(file, Path::new("knot.splk"), &Limits::default()).expect("opens");
+    assert!(hierarchy.pages().len() > 8);
+    let scene = Scene::new().with_hierarchy(hierarchy);
+    let camera = camera(&scene.bounds(), 0.8);
+    let mut renderer = renderer();
+    let mut prepared = renderer.prepare(&scene).expect("fits");
+    for _ in 0..2 {
+        let error = renderer.render(&mut prepared, &camera, &settings(0.0)).expect_err("a broken page").to_string();
+        assert!(error.contains("knot.splk: page"), "{error}");
+    }
+    let coarse = settings(16.0);
+    let found = renderer.render(&mut prepared, &camera, &coarse).expect("draws").0;
+    let mut fresh = renderer.prepare(&scene).expect("fits");
+    let truth = renderer.render(&mut fresh, &camera, &coarse).expect("draws").0;
+    assert!(truth.color.iter().any(|color| color[3] > 0.5));
+    assert!(decibels(&found, &truth) > 90.0, "{:.1} dB", decibels(&found, &truth));
 }
 
 fn bytes(splat: &splatkit::splat::Splat) -> [u8; 48] {

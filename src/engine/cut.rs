@@ -88,7 +88,10 @@ pub fn finest_within(tally: &[i32], most: u64) -> f64 {
     });
     let counts: Vec<i64> = counts.collect();
     // Not all nodes of a cut get coarser together: the last that is too much decides.
-    let step = counts.iter().rposition(|&count| count > most as i64).map_or(0, |last| last + 1);
+    let step = counts
+        .iter()
+        .rposition(|&count| u64::try_from(count).is_ok_and(|count| count > most))
+        .map_or(0, |last| last + 1);
     2f64.powf(TALLY_FIRST + step as f64 / TALLY_STEPS)
 }
 

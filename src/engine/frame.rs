@@ -65,12 +65,28 @@ impl Budget {
     }
 }
 
+/// Bytes of what a run of candidates needs.
+const RUN_NEEDS: u64 = 16;
+
 /// Bins of a pass at most; groups of sheets are made so large that they suffice.
 pub const MOST_BINS: u32 = 1 << 21;
 /// Groups hold at most 2 to this power sheets (7 bits in an entry).
 pub const MOST_GROUP_SHIFT: u32 = 7;
 /// Columns and rows of tiles that a span tells apart (10 bits each in spans.wgsl).
 const SPAN_TILES: u32 = 1 << 10;
+
+/// Groups of 2 to the power `shift` sheets that a pass through all of them has: one more than they fill, as it starts a sheet
+/// early and counts from there.
+fn groups(sheets: usize, shift: u32) -> u64 {
+    ((sheets as u64 + 2) >> shift) + 1
+}
+
+/// Rows of pixels that have bins enough for so many sheets, whatever is drawn.
+pub fn most_rows(width: u32, sheets: usize) -> u64 {
+    // A tile without the edge that it may share with its neighbours.
+    const STEP: u32 = 6;
+    u64::from(STEP) * (u64::from(MOST_BINS) / (groups(sheets, MOST_GROUP_SHIFT) * u64::from(width.div_ceil(STEP))))
+}
 
 /// Which light and which sources a picture has decides what is compiled.
 pub fn variant(
@@ -300,18 +316,20 @@ pub fn targets(
         // The renderer cuts pictures in strips of whole rows; only a single row can be too long.
         return Err(Error::Argument(format!("a picture {width} pixels wide is too wide for {}", gpu.info.name)));
     }
-    if prepared.runs >= SCAN_CAPACITY {
+    let most_runs = (gpu.binding_size() / RUN_NEEDS).min(u64::from(SCAN_CAPACITY)) as u32;
+    if prepared.runs >= most_runs {
         return Err(Error::Argument(format!(
-            "the scene has more than {} splats and samples, more than one picture takes",
-            u64::from(SCAN_CAPACITY) * u64::from(super::upload::RUN)
+            "the scene has more than {} splats and samples that may show, more than one picture takes on {}; \
+             convert it, and draw it by a coarser --cut, or let a transfer function show less",
+            u64::from(most_runs) * u64::from(super::upload::RUN),
+            gpu.info.name
         )));
     }
     let budget = budget.within(gpu);
     let step = variant.tile_step();
     let tiles = [width.div_ceil(step), height.div_ceil(step)];
     let tile_count = tiles[0] * tiles[1];
-    // One group more than the sheets fill: a pass starts a sheet early, and its groups count from there.
-    let groups = |shift: u32| ((sheets.count() as u64 + 2) >> shift) + 1;
+    let groups = |shift: u32| groups(sheets.count(), shift);
     if groups(MOST_GROUP_SHIFT) * u64::from(tile_count) > u64::from(MOST_BINS) {
         return Err(Error::Argument(format!(
             "a picture of {width}x{height} with {} sheets is too large; draw it smaller or with thicker sheets",
@@ -342,7 +360,7 @@ pub fn targets(
         planes: upload(gpu, "planes", bytemuck::cast_slice(&planes)),
         tables: upload(gpu, "tables", bytemuck::cast_slice(&table)),
         run_count: uniform("run count", bytemuck::bytes_of(&[prepared.runs, 0, 0, 0])),
-        needs: pool.take(gpu, "needs", 16 * runs),
+        needs: pool.take(gpu, "needs", RUN_NEEDS * runs),
         census: pool.take(gpu, "census", plan::census_bytes(sheets.count())),
         state: pool.take(gpu, "state", size_of::<State>() as u64),
         pass: pool.take(gpu, "pass", PASS_BYTES),

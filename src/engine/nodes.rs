@@ -187,8 +187,13 @@ impl Forest {
             }
         }
         let mut needed: Vec<u32> = (0..).zip(needed).filter(|(_, needed)| *needed).map(|(index, _)| index).collect();
-        let coarseness = |page: &u32| pages[*page as usize].largest_parent_size;
-        needed.sort_by(|a, b| coarseness(b).total_cmp(&coarseness(a)));
+        // No page goes before one above it.
+        let mut coarseness = vec![f32::INFINITY; pages.len()];
+        for (page, entry) in pages.iter().enumerate() {
+            let above = entry.parent_pages.clone().map(|parent| coarseness[parent as usize]);
+            coarseness[page] = above.fold(entry.largest_parent_size, f32::min);
+        }
+        needed.sort_by(|&a, &b| coarseness[b as usize].total_cmp(&coarseness[a as usize]).then(a.cmp(&b)));
         needed
     }
 
@@ -249,6 +254,7 @@ impl Forest {
             }
         }
         let free = self.slots.iter().filter(|slot| slot.is_none()).count();
+        let held = self.slots.len();
         let mut grown = Vec::new();
         while self.slots.len() < most && free + grown_slots(&grown) < absent.len() {
             let wanted = absent.len() - free - grown_slots(&grown);
@@ -256,7 +262,13 @@ impl Forest {
         }
         let all: Vec<(&Slots, &wgpu::Buffer)> =
             chunks.iter().copied().chain(grown.iter().map(|g: &Growth| (&g.slots, &g.splats))).collect();
-        self.load(gpu, &absent, &all)?;
+        if let Err(error) = self.load(gpu, &absent, &all) {
+            // The buffers that it grew by go, and what was put in them.
+            for (page, _) in self.slots.drain(held..).flatten() {
+                self.slot_of[page as usize] = None;
+            }
+            return Err(error);
+        }
         self.describe(gpu, &all);
         Ok(grown)
     }

@@ -20,7 +20,7 @@ use super::{
 use crate::{
     Error, Result,
     hierarchy::Detail,
-    math::{Camera, View},
+    math::{Camera, Sheets, View},
     picture::Picture,
     scene::{Optics, Scene, Settings},
 };
@@ -141,7 +141,7 @@ impl Renderer {
         let view = camera.view(settings.size)?;
         let detail = self.paced(&view, settings.detail);
         let start = Instant::now();
-        for strip in self.strips(&view) {
+        for strip in self.strips(prepared, &view, settings, detail) {
             let (targets, own) = self.draw_frame(prepared, &strip, settings, detail, false)?;
             self.read(&targets, &strip, settings, &mut picture)?;
             stats.add(own);
@@ -196,7 +196,7 @@ impl Renderer {
         let view = camera.view(settings.size)?;
         let detail = self.paced(&view, settings.detail);
         let start = Instant::now();
-        for strip in self.strips(&view) {
+        for strip in self.strips(prepared, &view, settings, detail) {
             stats.add(self.draw_frame(prepared, &strip, settings, detail, profile)?.1);
         }
         self.note(start, settings.detail);
@@ -218,10 +218,16 @@ impl Renderer {
         }
     }
 
-    /// The view cut in strips of whole rows whose colours (16 bytes a pixel) fit a binding.
-    fn strips(&self, view: &View) -> Vec<View> {
+    /// The view cut in strips of whole rows whose colours (16 bytes a pixel) fit a binding, and whose tiles have bins enough for
+    /// all sheets.
+    fn strips(&self, prepared: &PreparedScene, view: &View, settings: &Settings, detail: Detail) -> Vec<View> {
         let [width, height] = view.size;
-        let most = self.gpu.binding_size() / (16 * u64::from(width));
+        let mut most = self.gpu.binding_size() / (16 * u64::from(width));
+        if frame::most_rows(width, Sheets::MAX) < u64::from(height) {
+            let choice = prepared.scene.choice(view, settings, detail);
+            let sheets = prepared.scene.sheets_of(view, settings, choice.as_ref());
+            most = most.min(frame::most_rows(width, sheets.count()));
+        }
         let rows = u32::try_from(most).unwrap_or(u32::MAX).clamp(1, height);
         let strip = |first: u32| {
             let mut strip = view.clone();
@@ -257,7 +263,8 @@ impl Renderer {
         let pool = &mut self.pool;
         let targets = frame::targets(gpu, pool, prepared, &variant, view, &sheets, settings, self.budget, choice)?;
         let pipelines = self.pipelines.entry(variant).or_insert_with(|| Pipelines::new(gpu, &variant));
-        for chunk in prepared.chunks.iter().filter(|chunk| !matches!(chunk.origin, Origin::Nodes { .. })) {
+        // Those of nodes once more: what was chosen of volumes since the cut has moved their runs.
+        for chunk in &prepared.chunks {
             let lattice = matches!(chunk.origin, Origin::Lattice { .. } | Origin::Bricks { .. });
             let source = chunk.source(view, variant.isotropic && lattice, &prepared.forests);
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
@@ -276,12 +283,17 @@ impl Renderer {
         };
         let mut steps = work.opening();
         let mut state: State;
+        let mut advanced = 0;
         loop {
             // As many passes as the last frame took; what is too many does nothing.
             let passes = if profile { 1 } else { self.passes };
             steps.extend((0..passes).flat_map(|_| work.depth_pass()));
             submit(gpu, std::mem::take(&mut steps), profile.then_some(&mut times))?;
             state = bytemuck::pod_read_unaligned(&gpu.read(&targets.state, 0, size_of::<State>() as u64)?);
+            if std::mem::replace(&mut advanced, state.advanced) == state.advanced {
+                // The caller puts in place of this what the device complains of.
+                return Err(Error::Gpu(format!("{} did nothing of what it was asked to", gpu.info.name)));
+            }
             if state.impossible != 0 {
                 return Err(Error::Gpu(format!(
                     "more splats meet in one sheet of one tile of the picture than the driver of {} can add up; \

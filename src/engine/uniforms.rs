@@ -83,7 +83,7 @@ pub struct State {
     pub impossible: u32,
     pub tiles: u32,
     pub touched: u32,
-    unused: u32,
+    pub advanced: u32,
     held: [u32; 8],
 }
 const _: () = assert!(size_of::<State>() == 24 * 4);

@@ -27,7 +27,7 @@ use std::{borrow::Cow, sync::Arc};
 pub const RUN: u32 = 16;
 pub const WORKGROUP_CANDIDATES: u32 = 64 * RUN;
 
-/// Voxels of a chunk at most, so that the spans of all of them fit a binding of 128 MiB.
+/// Voxels of a chunk at most, besides those of its neighbours, so that the spans of all of them fit a binding of 128 MiB.
 const CHUNK_VOXELS: u64 = 1 << 24;
 
 /// Slices of the neighbouring chunks that a chunk's data hold, for gradients: layers of one kind of a body-centred lattice
@@ -269,11 +269,15 @@ impl PreparedScene {
         let [width, height, depth] = lattice.dims;
         let slice = (width * height) as u64;
         let bytes = volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
-        let voxels = CHUNK_VOXELS.min(gpu.binding_size() / bytes.max(4));
-        let slices = (voxels / slice).saturating_sub(2 * NEIGHBOURS as u64) as usize;
+        let held = gpu.binding_size() / bytes / slice;
+        // Of its own samples it also holds ranges, of four bytes as they are uploaded.
+        let own = CHUNK_VOXELS.min(gpu.binding_size() / 4) / slice;
+        let slices = held.saturating_sub(2 * NEIGHBOURS as u64).min(own) as usize;
         if slices == 0 {
             return Err(Error::Argument(format!(
-                "a few slices of the volume hold {slice} samples each, more than the {voxels} that fit a binding of {}",
+                "a slice of the volume holds {slice} samples, of which {} are too many for {}; convert the volume to bricks \
+                 (.splv), which are drawn whatever its size",
+                2 * NEIGHBOURS + 1,
                 gpu.info.name
             )));
         }

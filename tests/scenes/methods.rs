@@ -144,6 +144,16 @@ pub fn single_ellipsoids() -> Case {
     case("single_ellipsoids", Scene::new().with_splats(ellipsoids()), settings)
 }
 
+/// The same along parallel rays.
+pub fn orthographic(case: Case) -> Case {
+    Case { camera: camera(SLANT, ORTHOGRAPHIC), ..case }
+}
+
+/// The same from within.
+pub fn from_inside(case: Case) -> Case {
+    Case { camera: camera(DVec3::new(0.5, -0.4, 0.35), Projection::Perspective { view_angle: 75.0 }), ..case }
+}
+
 /// Scattered samples that count differently and have slopes, classified after interpolation or before.
 pub fn samples_with_slopes(classification: Classification) -> Case {
     let mut random = Random(16);
