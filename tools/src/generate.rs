@@ -137,11 +137,11 @@ impl Generate {
     }
 }
 
-/// Bytes that a sample takes while it is made: with its neighbours in a slice, as a number and packed, as text, which is
-/// written at once but read as a whole.
+/// Bytes that a sample takes while it is made: with its neighbours in a slice, as a number and packed, and as text, which is
+/// written as it is made but read as a whole.
 const AS_BYTES: u64 = 2;
 const AS_NUMBERS: u64 = 16;
-const AS_TEXT: u64 = 16;
+const AS_TEXT: u64 = 64;
 
 /// Refuses samples of which there are none, or more than memory may hold.
 fn check_dims(dims: [usize; 3], bytes: u64) -> Result<(), Failure> {

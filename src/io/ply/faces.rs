@@ -15,6 +15,13 @@ use ply_rs::ply::{PropertyType, ScalarType};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
+/// Stands for −1, which separates strips.
+const MARK: u32 = u32::MAX;
+
+/// Bytes that a corner takes while a polygon of more corners than few is cut.
+const OF_CORNER: u64 = 128;
+const FEW: usize = 1024;
+
 /// What the faces of a file are.
 #[derive(Default)]
 pub(super) struct Faces {
@@ -92,14 +99,19 @@ fn read_rows(
     let mut triangles = Growing::new(source, "the triangles");
     let mut uvs = Growing::new(source, "the texture coordinates");
     let mut shown = Growing::new(source, "the pictures of the triangles");
-    let (mut corners, mut own_uvs, mut picture) = (Vec::<f64>::new(), Vec::<f64>::new(), 0.0);
+    let (mut corners, mut own_uvs, mut picture) = (Vec::<u32>::new(), Vec::<f64>::new(), 0.0);
     // The corners of a face by their places in its list.
     let mut order = Vec::new();
     for row in range {
+        let mut stray = None;
         rows.visit(source, element, row, &wanted, |at, value, list| {
             if let Some(list) = list.filter(|_| at == columns.indices) {
                 corners.clear();
-                corners.extend_from_slice(list);
+                corners.extend(list.iter().map(|&value| match vertex(value, vertices) {
+                    None if are_strips && value == -1.0 => MARK,
+                    None => *stray.get_or_insert(value) as u32,
+                    Some(index) => index,
+                }));
             } else if let Some(list) = list.filter(|_| Some(at) == columns.uvs) {
                 own_uvs.clear();
                 own_uvs.extend_from_slice(list);
@@ -108,14 +120,16 @@ fn read_rows(
             }
         })?;
         let wrong = |message: String| Err(source.error(rows.place(source, element, row), message));
-        let is_mark = |value: f64| are_strips && value == -1.0;
-        if let Some(index) = corners.iter().find(|&&value| vertex(value, vertices).is_none() && !is_mark(value)) {
+        if let Some(index) = stray {
             let last = vertices.saturating_sub(1);
             return wrong(format!("refers to vertex {index}, but there are {vertices} (0 … {last})"));
         }
         if are_strips {
             strips(&corners, &mut triangles)?;
             continue;
+        }
+        if corners.len() > FEW {
+            source.spend("the size of a polygon in bytes", OF_CORNER * corners.len() as u64)?;
         }
         // Faces without coordinates stand among those that have some.
         let has_uvs = columns.uvs.is_some() && !own_uvs.is_empty();
@@ -126,21 +140,27 @@ fn read_rows(
         let Some(picture) = vertex(picture, pictures.max(1)) else {
             return wrong(format!("shows picture {picture}, but “comment TextureFile” names {pictures}"));
         };
+        let place = |index: u32| positions[index as usize].as_dvec3();
+        if columns.uvs.is_none() {
+            polygon::triangles(&corners, place, |triangle| triangles.push(triangle))?;
+            continue;
+        }
         order.clear();
         order.extend(0..corners.len() as u32);
-        let index = |corner: u32| corners[corner as usize] as u32;
-        let place = |corner: u32| positions[index(corner) as usize].as_dvec3();
-        polygon::triangles(&order, place, |cut| {
-            triangles.push(cut.map(index))?;
-            if columns.uvs.is_some() {
+        let index = |corner: u32| corners[corner as usize];
+        polygon::triangles(
+            &order,
+            |corner| place(index(corner)),
+            |cut| {
                 let uv = |corner: u32| {
-                    Vec2::new(own_uvs[2 * corner as usize] as f32, own_uvs[2 * corner as usize + 1] as f32)
+                    let at = 2 * corner as usize;
+                    Vec2::new(own_uvs[at] as f32, own_uvs[at + 1] as f32)
                 };
+                triangles.push(cut.map(index))?;
                 uvs.push(if has_uvs { cut.map(uv) } else { [Vec2::ZERO; 3] })?;
-                shown.push(picture)?;
-            }
-            Ok(())
-        })?;
+                shown.push(picture)
+            },
+        )?;
     }
     Ok(Faces { triangles: triangles.into_inner(), uvs: uvs.into_inner(), pictures: shown.into_inner() })
 }
@@ -173,12 +193,12 @@ fn vertex(value: f64, vertices: usize) -> Option<u32> {
     (value >= 0.0 && value < vertices as f64 && value.fract() == 0.0).then_some(value as u32)
 }
 
-/// Cuts strips, separated by −1, into triangles.
-fn strips(list: &[f64], triangles: &mut Growing<[u32; 3]>) -> Result<()> {
-    for run in list.split(|&value| value == -1.0) {
+/// Cuts strips, separated by marks, into triangles.
+fn strips(list: &[u32], triangles: &mut Growing<[u32; 3]>) -> Result<()> {
+    for run in list.split(|&index| index == MARK) {
         for i in 2..run.len() {
             let (a, b) = if i % 2 == 0 { (i - 2, i - 1) } else { (i - 1, i - 2) };
-            triangles.push([run[a] as u32, run[b] as u32, run[i] as u32])?;
+            triangles.push([run[a], run[b], run[i]])?;
         }
     }
     Ok(())
