@@ -4,7 +4,7 @@
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> stage: Pass;
 @group(0) @binding(2) var<storage, read> spans: array<vec2<u32>>;
-@group(0) @binding(3) var<storage, read> needs: array<vec4<u32>>;
+@group(0) @binding(3) var<storage, read> run_spans: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read> map: array<u32>;
 // The runs of which something is drawn, see active.wgsl.
 @group(0) @binding(5) var<storage, read_write> drawn: array<atomic<u32>>;
@@ -53,7 +53,7 @@ fn cull(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         return;
     }
     let run = source.first_run + number;
-    let around = needs[run].xy;
+    let around = run_spans[run];
     var mask = 0u;
     var hidden = 0u;
     if in_pass(around, stage) {

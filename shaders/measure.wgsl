@@ -4,8 +4,10 @@
 @group(0) @binding(1) var<storage, read> planes: array<f32>;
 // The span of each candidate of this chunk.
 @group(0) @binding(2) var<storage, read_write> spans: array<vec2<u32>>;
-// Per run: its span, entries, and record words and splats (16 bits each).
-@group(0) @binding(3) var<storage, read_write> needs: array<vec4<u32>>;
+// The span of each run.
+@group(0) @binding(3) var<storage, read_write> run_spans: array<vec2<u32>>;
+// Per run: entries, and record words and splats (16 bits each).
+@group(0) @binding(4) var<storage, read_write> needs: array<vec2<u32>>;
 
 fn pack_span(span: Span) -> vec2<u32> {
     return vec2(pack_corner(span.first_sheet, span.first_tile), pack_corner(span.last_sheet, span.last_tile));
@@ -35,5 +37,6 @@ fn measure(@builtin(global_invocation_id) id: vec3<u32>) {
         }
         spans[i] = packed;
     }
-    needs[source.first_run + number] = vec4(around, need);
+    run_spans[source.first_run + number] = around;
+    needs[source.first_run + number] = need;
 }

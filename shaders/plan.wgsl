@@ -5,7 +5,7 @@
 // A run is counted in full by every pass that it meets, which is more than its splats need there. What fits by that count fits.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> needs: array<vec4<u32>>;
+@group(0) @binding(1) var<storage, read> needs: array<vec2<u32>>;
 @group(0) @binding(2) var<uniform> run_count: vec4<u32>;
 @group(0) @binding(3) var<storage, read_write> state: array<u32>;
 @group(0) @binding(4) var<storage, read_write> census: array<u32>;
@@ -30,7 +30,7 @@ fn saturating_add(a: vec3<u32>, b: vec3<u32>) -> vec3<u32> {
 fn total(@builtin(local_invocation_index) lane: u32) {
     var sum = vec3(0u);
     for (var i = lane; i < run_count.x; i += 256u) {
-        let need = needs[i].zw;
+        let need = needs[i];
         sum = saturating_add(sum, vec3(need.x, need.y & (ONE_SPLAT - 1u), need.y / ONE_SPLAT));
     }
     sums[lane] = sum;

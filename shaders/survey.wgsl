@@ -1,9 +1,10 @@
 // Survey: what the runs of candidates need, by sheet and by band of the picture; plan.wgsl cuts the frame into passes by it.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> needs: array<vec4<u32>>;
-@group(0) @binding(2) var<uniform> run_count: vec4<u32>;
-@group(0) @binding(3) var<storage, read_write> census: array<atomic<u32>>;
+@group(0) @binding(1) var<storage, read> run_spans: array<vec2<u32>>;
+@group(0) @binding(2) var<storage, read> needs: array<vec2<u32>>;
+@group(0) @binding(3) var<uniform> run_count: vec4<u32>;
+@group(0) @binding(4) var<storage, read_write> census: array<atomic<u32>>;
 
 fn add(sheet: u32, band: u32, what: u32, need: vec2<u32>) {
     let at = census_index(sheet, band) + what;
@@ -17,14 +18,15 @@ fn survey(@builtin(global_invocation_id) id: vec3<u32>) {
     if number >= run_count.x {
         return;
     }
-    let run = needs[number];
-    if run.w == 0u {
+    let own = needs[number];
+    if own.y == 0u {
         return;
     }
-    let need = vec2(run.z, run.w & (ONE_SPLAT - 1u));
-    let first = sheet_of_corner(run.x);
-    let last = sheet_of_corner(run.y);
-    let tiles = tiles_of(run.xy);
+    let need = vec2(own.x, own.y & (ONE_SPLAT - 1u));
+    let span = run_spans[number];
+    let first = sheet_of_corner(span.x);
+    let last = sheet_of_corner(span.y);
+    let tiles = tiles_of(span);
     let last_band = band_of(tiles.w - 1u);
     for (var band = band_of(tiles.y); band <= last_band; band++) {
         add(first, band, STARTING, need);

@@ -10,6 +10,7 @@ use crate::{
     volume::{
         Arrangement, Lattice, Shade, TransferFunction, Volume,
         bricks::{self, Bricks, Choice},
+        reach::{EVERYTHING, first_visible},
     },
 };
 use glam::{DMat3, DVec3};
@@ -238,7 +239,7 @@ impl Scene {
     /// half of that where they are sharp, a few pixels for surfaces, the finer of both where the scene holds both. Of a volume
     /// in bricks the spacing is that of the levels drawn, between two of them in between.
     pub fn sheets(&self, view: &View, settings: &Settings) -> Sheets {
-        self.sheets_of(view, settings, self.choice(view, settings, settings.detail).as_ref())
+        self.sheets_of(view, settings, self.choice(view, settings, settings.detail, usize::MAX).as_ref())
     }
 
     /// The sheets where it is known which bricks are drawn.
@@ -289,22 +290,49 @@ const SAMPLE_WIDTH: f64 = 2.0;
 /// Volumes in bricks.
 impl Scene {
     /// Which bricks of the scene's volume a view shows, within the settings' memory; none without such a volume. A detail
-    /// that counts splats bounds the bricks by as many samples.
-    pub(crate) fn choice(&self, view: &View, settings: &Settings, detail: Detail) -> Option<Choice> {
+    /// that counts splats bounds the bricks by as many samples; there are no more than `most` bricks.
+    pub(crate) fn choice(&self, view: &View, settings: &Settings, detail: Detail, most: usize) -> Option<Choice> {
         let own = |item: &Item| match item {
             Item::Bricks(bricks, kernel, transfer) => {
                 let room = settings.page_memory / bricks::slot_bytes(bricks);
-                let (pixels, most) = match detail {
+                let (pixels, room) = match detail {
                     Detail::Pixels(pixels) => (pixels, room),
                     Detail::Splats(splats) => (Detail::PIXELS, room.min(splats / bricks::SIDE.pow(3) as u64)),
                     Detail::Milliseconds(_) => (Detail::PIXELS, room),
                 };
-                let most = usize::try_from(most).unwrap_or(usize::MAX).max(1);
-                Some(bricks::choice(bricks, view, kernel.extent, pixels / SAMPLE_WIDTH, transfer, most))
+                let most = usize::try_from(room).unwrap_or(usize::MAX).min(most).max(1);
+                let choose = |shown: &[u16; 256]| {
+                    bricks::choice(bricks, view, kernel.extent, pixels / SAMPLE_WIDTH, shown, most)
+                };
+                // Where kernels reach further than ranges hold for, these tell nothing.
+                if kernel.extent > bricks::REACH as f64 {
+                    return Some(choose(&EVERYTHING));
+                }
+                let choice = choose(&first_visible(transfer, bricks.header().range));
+                let sheets = self.sheets_of(view, settings, Some(&choice));
+                Some(if self.mixes_afar(settings, &sheets, Some(&choice)) { choose(&EVERYTHING) } else { choice })
             }
             _ => None,
         };
         self.items.iter().find_map(own)
+    }
+}
+
+/// What sheets mix.
+impl Scene {
+    /// Whether sheets are thicker than kernels reach, so that samples count of whose neighbourhood nothing shows: they change the
+    /// mean of a sheet beside what shows.
+    pub(crate) fn mixes_afar(&self, settings: &Settings, sheets: &Sheets, choice: Option<&Choice>) -> bool {
+        !settings.classifies_samples()
+            && self.items.iter().any(|item| match item {
+                Item::Volume(volume, kernel, _) => kernel.extent * volume.lattice.kernel_spacing() < sheets.step,
+                Item::Bricks(bricks, kernel, _) => {
+                    let spacing =
+                        choice.map_or(0.0, |choice| choice.lambda).exp2() * bricks.header().lattice.kernel_spacing();
+                    kernel.extent * spacing < sheets.step
+                }
+                _ => false,
+            })
     }
 }
 

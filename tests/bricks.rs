@@ -14,6 +14,7 @@ use splatkit::{
     volume::{
         Lattice, Samples, TransferFunction, Volume,
         bricks::{self, Bricks, WriteOptions},
+        reach::EVERYTHING,
     },
 };
 use std::sync::Arc;
@@ -117,6 +118,30 @@ fn the_finest_level_is_the_volume() {
     }
 }
 
+/// Sheets thicker than kernels reach mix samples of whose neighbourhood, and bricks of which, nothing shows.
+#[test]
+fn thick_sheets_take_all_bricks() {
+    let volume = volume([75, 60, 49], DVec3::ONE, true);
+    // What shows lies in one corner.
+    let corner = TransferFunction { opacity: vec![(175.0, 0.0), (190.0, 0.5)], ..transfer() };
+    let plain = Scene::new().with_volume(volume.clone(), Kernel::default(), corner.clone());
+    let bricks = Scene::new().with_bricks(bricks_of(&volume), Kernel::default(), corner);
+    let (_, camera) = &cameras(&plain)[2];
+    let mut renderer = renderer();
+    let mut prepared = renderer.prepare(&bricks).expect("a scene");
+    let mut counts = Vec::new();
+    for thickness in [1.0, 4.0, 1.0] {
+        let settings = Settings { sheet_thickness: Some(thickness), ..settings(0.0) };
+        let (expected, _) = draw(&mut renderer, &plain, camera, &settings);
+        let (found, stats) = renderer.render(&mut prepared, camera, &settings).expect("a picture");
+        let agreement = decibels(&found, &expected);
+        assert!(agreement > 80.0, "{thickness}: {agreement:.1} dB");
+        counts.push((stats.bricks, stats.splats));
+    }
+    println!("{counts:?}");
+    assert!(counts[0] == counts[2] && counts[0].1 < counts[1].1, "{counts:?}");
+}
+
 #[test]
 fn the_reference_draws_the_whole_volume() {
     let volume = volume([21, 18, 35], DVec3::ONE, true);
@@ -176,7 +201,7 @@ fn a_zoom_shows_no_pop() {
     for (name, camera) in &cameras(&scene) {
         // λ is 1 at twice the pixels that a step covers.
         let view = camera.view([96, 96]).expect("a view");
-        let lambda = |pixels| bricks::choice(&bricks, &view, 2.0, pixels, &transfer(), usize::MAX).lambda;
+        let lambda = |pixels| bricks::choice(&bricks, &view, 2.0, pixels, &EVERYTHING, usize::MAX).lambda;
         let some = (0..).map(|power| 2f64.powi(power)).find(|pixels| lambda(*pixels) > 0.0).expect("pixels");
         let covered = some / lambda(some).exp2();
         const STEPS: u32 = 8;

@@ -11,7 +11,7 @@ use splatkit::{
     engine::{AdapterChoice, Budget, Gpu, Renderer},
     picture::Picture,
     reference,
-    scene::{Classification, Optics, Order},
+    scene::{Classification, Item, Optics, Order},
 };
 
 fn drawn(case: &Case, budget: Budget) -> Picture {
@@ -250,6 +250,24 @@ fn axis_sheets_body_centred_orthographic() {
 #[test]
 fn single_ellipsoids() {
     assert_matches(methods::single_ellipsoids(), 50.0);
+}
+
+/// Sheets thicker than kernels reach mix samples of whose neighbourhood nothing shows. A single one is not lit: where it begins
+/// and ends are only the tails of kernels, which have no slope to speak of.
+#[test]
+fn thick_sheets() {
+    for case in [scenes::blobs_analytic, methods::body_centred, methods::sharp, methods::rectilinear] {
+        for samples in [1.9, 2.1, 4.0, 8.0, 1000.0] {
+            let mut case = case();
+            let Item::Volume(volume, ..) = &case.scene.items[0] else { panic!("{}", case.name) };
+            case.settings.sheet_thickness = Some(samples * volume.lattice.kernel_spacing());
+            if samples > 100.0 {
+                case.settings.volume_shade = Some(None);
+            }
+            println!("{samples} samples:");
+            assert_matches(case, 60.0);
+        }
+    }
 }
 
 #[test]

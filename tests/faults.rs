@@ -4,7 +4,9 @@
 use glam::DVec3;
 use splatkit::{
     Error,
+    compare::compare_pictures,
     engine::{AdapterChoice, Gpu, Renderer},
+    hierarchy::Detail,
     math::{Camera, Kernel},
     picture::Picture,
     scene::{Scene, Settings},
@@ -246,4 +248,31 @@ fn dispatches_of_many_rows_draw_the_same() {
         assert!(covered > 1000, "{name}: {covered} pixels");
         assert!(same(&pictures[0], &pictures[1]), "{name}: another picture");
     }
+}
+
+/// A picture takes as many candidates as one binding holds the runs of: here two million. Of bricks that show more, coarser ones
+/// are drawn.
+#[test]
+fn bricks_that_show_too_much_are_drawn_coarser() {
+    let volume = Arc::new(Phantom::Specimen.sample_bytes([128; 3]).unwrap());
+    // All of it shows, the air a little.
+    let transfer =
+        TransferFunction { opacity: vec![(0.0, 0.001), (255.0, 0.9)], ..TransferFunction::automatic(&volume) };
+    let scene = Scene::new().with_bricks(Bricks::from_volume(volume).unwrap(), Kernel::default(), transfer);
+    let (camera, settings) = view(&scene);
+    let settings = Settings { detail: Detail::Pixels(0.0), ..settings };
+    let [(fine, all), (coarse, fewer)] = [1 << 27, 1 << 20].map(|bytes| {
+        let gpu = host_device(wgpu::Limits { max_storage_buffer_binding_size: bytes, ..wgpu::Limits::default() });
+        let mut renderer = Renderer::new(&gpu);
+        let mut prepared = renderer.prepare(&scene).expect("fits");
+        let first = renderer.render(&mut prepared, &camera, &settings).expect("draws").0;
+        let (again, stats) = renderer.render(&mut prepared, &camera, &settings).expect("draws again");
+        let difference = difference(&first, &again);
+        assert!(difference < MOST_DIFFERENCE, "another picture, by {difference}");
+        (again, stats)
+    });
+    assert_eq!((all.lambda, all.bricks), (0.0, 64));
+    assert!(fewer.lambda > 0.0 && fewer.bricks < 64, "{fewer:?}");
+    let agreement = compare_pictures(&fine, &coarse).expect("pictures of one size").psnr.unwrap_or(f64::INFINITY);
+    assert!(agreement > 25.0, "{agreement:.1} dB");
 }

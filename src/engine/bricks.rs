@@ -10,16 +10,12 @@ use super::{
     scan::Scan,
     shaders,
     stage::{Binding, Stage},
-    upload::upload,
+    upload::{runs_of, upload},
 };
 use crate::{
     Result,
     math::Kernel,
-    volume::{
-        TransferFunction,
-        bricks::{BRICK_BLOCKS, Brick, Bricks, Choice, REACH, SIDE, slot_bytes},
-        reach::first_visible,
-    },
+    volume::bricks::{BRICK_BLOCKS, Brick, Bricks, Choice, SIDE, slot_bytes},
 };
 use rayon::prelude::*;
 use std::{collections::HashMap, sync::Arc};
@@ -96,12 +92,10 @@ impl Slab {
 pub struct Shelf {
     pub bricks: Arc<Bricks>,
     pub kernel: Kernel,
-    /// Whether the transfer function changed since samples were selected.
-    pub outdated: bool,
     /// Bricks read so far.
     pub reads: u64,
-    /// The bricks that are drawn, sorted; none where that is not certain.
-    drawn: Option<Vec<Key>>,
+    /// The bricks that are drawn, sorted, and what of them shows; none where that is not certain.
+    drawn: Option<(Vec<Key>, [u16; 256])>,
     /// The brick in each slot, and the last update that needed it.
     slots: Vec<Option<(Key, u64)>>,
     slot_of: HashMap<Key, usize>,
@@ -116,7 +110,6 @@ impl Shelf {
         Self {
             bricks: bricks.clone(),
             kernel: kernel.clone(),
-            outdated: true,
             reads: 0,
             drawn: None,
             slots: Vec::new(),
@@ -132,16 +125,19 @@ impl Shelf {
         self.chunks.iter().map(|(data, ranges, _)| data.size() + ranges.size()).sum()
     }
 
-    /// Brings the bricks of a choice to the GPU, within `room` bytes. Gives the slots that were added for them, or none at all
-    /// where nothing is to be done: neither the bricks nor the transfer function changed.
-    pub fn update(&mut self, gpu: &Gpu, choice: &Choice, room: u64) -> Result<Option<Vec<Slots>>> {
-        let mut needed = choice.bricks.clone();
-        needed.sort_unstable();
-        if self.drawn.as_ref() == Some(&needed) && !self.outdated {
-            return Ok(None);
-        }
+    /// Whether the bricks of a choice are those that are drawn, and show the same.
+    pub fn draws(&self, choice: &Choice) -> bool {
+        self.drawn.as_ref() == Some(&drawn_of(choice))
+    }
+
+    /// Takes note that the bricks of a choice are drawn.
+    pub fn set_drawn(&mut self, choice: &Choice) {
+        self.drawn = Some(drawn_of(choice));
+    }
+
+    /// Brings the bricks of a choice to the GPU, within `room` bytes. Gives the slots that were added for them.
+    pub fn update(&mut self, gpu: &Gpu, choice: &Choice, room: u64) -> Result<Vec<Slots>> {
         self.drawn = None;
-        self.outdated = true;
         self.update += 1;
         let mut absent = Vec::new();
         // The nearest are read first.
@@ -158,8 +154,7 @@ impl Shelf {
             wanted = wanted.saturating_sub(self.grow(gpu, wanted, most));
         }
         self.load(gpu, &absent)?;
-        self.drawn = Some(needed);
-        Ok(Some(std::mem::take(&mut self.grown)))
+        Ok(std::mem::take(&mut self.grown))
     }
 
     /// Adds slots for about `wanted` more bricks, so that there are no more than `most`; tells how many.
@@ -222,6 +217,13 @@ impl Shelf {
     }
 }
 
+/// The bricks of a choice, sorted, and what of them shows.
+fn drawn_of(choice: &Choice) -> (Vec<Key>, [u16; 256]) {
+    let mut bricks = choice.bricks.clone();
+    bricks.sort_unstable();
+    (bricks, choice.shown)
+}
+
 /// The pass.
 #[derive(Debug)]
 pub struct SelectBricks {
@@ -240,20 +242,17 @@ impl SelectBricks {
         }
     }
 
-    /// Makes the lists of all slabs, each with its uniform, in buffers of their sizes.
+    /// Makes the lists of all slabs, each with its uniform, in buffers of their sizes, unless they hold more than `most_runs` runs of
+    /// candidates; tells how many those are. `shown` is that of [`Choice`].
     pub fn update(
         &self,
         gpu: &Gpu,
         scan: &Scan,
         slabs: &mut [(&mut Slab, &wgpu::Buffer)],
-        shelf: &Shelf,
-        transfer: &TransferFunction,
-    ) -> Result<()> {
-        // Where kernels reach further than ranges hold for, all samples stay.
-        let is_wide = shelf.kernel.extent > REACH as f64;
-        let first =
-            first_visible(transfer, shelf.bricks.header().range).map(|n| if is_wide { 0 } else { u32::from(n) });
-        let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&first));
+        shown: &[u16; 256],
+        most_runs: u64,
+    ) -> Result<u64> {
+        let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&shown.map(u32::from)));
         // All slabs count in the same place, one after the other; so they count again before they write.
         let most = slabs.iter().map(|(slab, _)| slab.blocks()).max().unwrap_or(0);
         let blocks = super::buffer(gpu, "select blocks", 4 * (u64::from(most) + 1), Usage::STORAGE | Usage::COPY_SRC);
@@ -276,6 +275,10 @@ impl SelectBricks {
         }
         gpu.queue.submit([counting.finish()]);
         let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&gpu.read(&totals, 0, 4 * slabs.len() as u64)?);
+        let runs: u64 = counts.iter().map(|&count| u64::from(runs_of(count))).sum();
+        if runs > most_runs {
+            return Ok(runs);
+        }
         let mut writing = encoder();
         for ((slab, uniform), own) in slabs.iter_mut().zip(counts) {
             slab.count = own;
@@ -286,6 +289,6 @@ impl SelectBricks {
             }
         }
         gpu.queue.submit([writing.finish()]);
-        Ok(())
+        Ok(runs)
     }
 }

@@ -41,7 +41,7 @@ impl Cull {
                 &targets.frame,
                 &targets.pass,
                 &chunk.spans,
-                &targets.needs,
+                &targets.run_spans,
                 &targets.map,
                 &targets.active,
                 &targets.runs,

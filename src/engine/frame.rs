@@ -65,8 +65,14 @@ impl Budget {
     }
 }
 
-/// Bytes of what a run of candidates needs.
-const RUN_NEEDS: u64 = 16;
+/// Bytes of a run's span, and of what it needs.
+const RUN_BYTES: u64 = 8;
+
+/// Runs of candidates that a picture takes at most.
+pub fn most_runs(gpu: &Gpu) -> u32 {
+    // One place stays free for their sum.
+    (gpu.binding_size() / RUN_BYTES).min(u64::from(SCAN_CAPACITY)) as u32 - 1
+}
 
 /// Bins of a pass at most; groups of sheets are made so large that they suffice.
 pub const MOST_BINS: u32 = 1 << 21;
@@ -235,6 +241,7 @@ pub struct Targets {
     pub frame: wgpu::Buffer,
     pub planes: wgpu::Buffer,
     pub tables: wgpu::Buffer,
+    pub run_spans: wgpu::Buffer,
     pub needs: wgpu::Buffer,
     pub census: wgpu::Buffer,
     pub state: wgpu::Buffer,
@@ -265,9 +272,10 @@ pub struct Targets {
 impl Targets {
     /// Bytes of GPU memory.
     pub fn bytes(&self) -> u64 {
-        let Self { frame, planes, tables, needs, census, state, map, runs, active, records, boxes, .. } = self;
+        let Self { frame, planes, tables, run_spans, needs, census, state, map, runs, active, records, boxes, .. } =
+            self;
         let Self { bins, entries, large, long_bins, progress, colors, depths, .. } = self;
-        [frame, planes, tables, needs, census, state, map, runs, active, records, boxes]
+        [frame, planes, tables, run_spans, needs, census, state, map, runs, active, records, boxes]
             .into_iter()
             .chain([bins, entries, large, long_bins, progress, colors, depths])
             .map(wgpu::Buffer::size)
@@ -316,8 +324,8 @@ pub fn targets(
         // The renderer cuts pictures in strips of whole rows; only a single row can be too long.
         return Err(Error::Argument(format!("a picture {width} pixels wide is too wide for {}", gpu.info.name)));
     }
-    let most_runs = (gpu.binding_size() / RUN_NEEDS).min(u64::from(SCAN_CAPACITY)) as u32;
-    if prepared.runs >= most_runs {
+    let most_runs = most_runs(gpu);
+    if prepared.runs > most_runs {
         return Err(Error::Argument(format!(
             "the scene has more than {} splats and samples that may show, more than one picture takes on {}; \
              convert it, and draw it by a coarser --cut, or let a transfer function show less",
@@ -360,7 +368,8 @@ pub fn targets(
         planes: upload(gpu, "planes", bytemuck::cast_slice(&planes)),
         tables: upload(gpu, "tables", bytemuck::cast_slice(&table)),
         run_count: uniform("run count", bytemuck::bytes_of(&[prepared.runs, 0, 0, 0])),
-        needs: pool.take(gpu, "needs", RUN_NEEDS * runs),
+        run_spans: pool.take(gpu, "run spans", RUN_BYTES * runs),
+        needs: pool.take(gpu, "needs", RUN_BYTES * runs),
         census: pool.take(gpu, "census", plan::census_bytes(sheets.count())),
         state: pool.take(gpu, "state", size_of::<State>() as u64),
         pass: pool.take(gpu, "pass", PASS_BYTES),

@@ -23,6 +23,7 @@ use crate::{
     math::{Camera, Sheets, View},
     picture::Picture,
     scene::{Optics, Scene, Settings},
+    volume::bricks::Choice,
 };
 use std::{collections::HashMap, time::Instant};
 
@@ -47,6 +48,18 @@ pub struct Renderer {
 
 /// Passes that are submitted together at most: each takes some dozens of bind groups.
 const MOST_PASSES: u32 = 16;
+
+/// What is drawn of a scene in a picture, found before it is drawn.
+#[derive(Debug)]
+struct Outline {
+    /// The cut of hierarchies.
+    cut_pixels: f64,
+    /// The bricks of a volume.
+    choice: Option<Choice>,
+    /// Those of them that were read for it.
+    read_bricks: u64,
+    sheets: Sheets,
+}
 
 /// What a frame took.
 #[derive(Debug, Clone, Default)]
@@ -125,34 +138,17 @@ impl Renderer {
         camera: &Camera,
         settings: &Settings,
     ) -> Result<(Picture, FrameStats)> {
-        self.guarded(prepared, |renderer, prepared| renderer.render_strips(prepared, camera, settings))
-    }
-
-    fn render_strips(
-        &mut self,
-        prepared: &mut PreparedScene,
-        camera: &Camera,
-        settings: &Settings,
-    ) -> Result<(Picture, FrameStats)> {
         let [width, height] = settings.size;
         let mut picture = Picture { width, height, color: Vec::new(), depth: Vec::new() };
-        let mut stats = FrameStats::default();
-        prepared.scene.validate_settings(settings)?;
-        let view = camera.view(settings.size)?;
-        let detail = self.paced(&view, settings.detail);
-        let start = Instant::now();
-        for strip in self.strips(prepared, &view, settings, detail) {
-            let (targets, own) = self.draw_frame(prepared, &strip, settings, detail, false)?;
-            self.read(&targets, &strip, settings, &mut picture)?;
-            stats.add(own);
-        }
-        self.note(start, settings.detail);
+        let stats = self.draw_strips(prepared, camera, settings, false, |renderer, targets, strip| {
+            renderer.read(targets, strip, settings, &mut picture)
+        })?;
         Ok((picture, stats))
     }
 
     /// Draws a picture and leaves it on the GPU: a frame's time without the way back.
     pub fn draw(&mut self, prepared: &mut PreparedScene, camera: &Camera, settings: &Settings) -> Result<FrameStats> {
-        self.guarded(prepared, |renderer, prepared| renderer.draw_strips(prepared, camera, settings, false))
+        self.draw_strips(prepared, camera, settings, false, |_, _, _| Ok(()))
     }
 
     /// As [`Self::draw`], but tells the time of each step: by the GPU's clock, or by waiting for each where it has none.
@@ -162,7 +158,7 @@ impl Renderer {
         camera: &Camera,
         settings: &Settings,
     ) -> Result<FrameStats> {
-        self.guarded(prepared, |renderer, prepared| renderer.draw_strips(prepared, camera, settings, true))
+        self.draw_strips(prepared, camera, settings, true, |_, _, _| Ok(()))
     }
 
     /// Does some work with a scene. Where the device complains, what lies there is not trusted: the next picture begins anew.
@@ -184,23 +180,47 @@ impl Renderer {
         done?
     }
 
+    /// Draws a picture strip by strip; `done` takes each. How fine it is is found once, from the whole picture.
     fn draw_strips(
         &mut self,
         prepared: &mut PreparedScene,
         camera: &Camera,
         settings: &Settings,
         profile: bool,
+        mut done: impl FnMut(&Self, &Targets, &View) -> Result<()>,
     ) -> Result<FrameStats> {
-        let mut stats = FrameStats::default();
-        prepared.scene.validate_settings(settings)?;
-        let view = camera.view(settings.size)?;
-        let detail = self.paced(&view, settings.detail);
-        let start = Instant::now();
-        for strip in self.strips(prepared, &view, settings, detail) {
-            stats.add(self.draw_frame(prepared, &strip, settings, detail, profile)?.1);
-        }
-        self.note(start, settings.detail);
-        Ok(stats)
+        self.guarded(prepared, |renderer, prepared| {
+            prepared.scene.validate_settings(settings)?;
+            let view = camera.view(settings.size)?;
+            let start = Instant::now();
+            let outline = renderer.outline(prepared, &view, settings)?;
+            let mut stats = FrameStats { read_bricks: outline.read_bricks, ..FrameStats::default() };
+            for strip in renderer.strips(&view, &outline.sheets) {
+                let (targets, own) = renderer.draw_frame(prepared, &strip, settings, &outline, profile)?;
+                done(renderer, &targets, &strip)?;
+                stats.add(own);
+            }
+            renderer.note(start, settings.detail);
+            Ok(stats)
+        })
+    }
+
+    /// What is drawn of a scene in a view.
+    fn outline(&mut self, prepared: &mut PreparedScene, view: &View, settings: &Settings) -> Result<Outline> {
+        let detail = self.paced(view, settings.detail);
+        let cut_pixels = match detail {
+            _ if prepared.forests.is_empty() => 0.0,
+            Detail::Pixels(pixels) => pixels,
+            Detail::Splats(most) => self.finest_cut(prepared, view, settings, most)?,
+            Detail::Milliseconds(_) => Detail::PIXELS,
+        };
+        let reads = |prepared: &PreparedScene| prepared.shelf.as_ref().map_or(0, |shelf| shelf.reads);
+        let before = reads(prepared);
+        let choice = self.bring_bricks(prepared, view, settings, detail)?;
+        let sheets = prepared.scene.sheets_of(view, settings, choice.as_ref());
+        let all = prepared.scene.mixes_afar(settings, &sheets, choice.as_ref());
+        prepared.update_selections(&self.gpu, &self.select, &self.scan, view, all)?;
+        Ok(Outline { cut_pixels, choice, read_bricks: reads(prepared) - before, sheets })
     }
 
     /// A detail asked for in milliseconds, in pixels; others as they are.
@@ -218,16 +238,35 @@ impl Renderer {
         }
     }
 
+    /// Chooses the bricks of a view, and brings them to the GPU. Where they show more samples than a picture takes, coarser ones
+    /// are taken.
+    fn bring_bricks(
+        &self,
+        prepared: &mut PreparedScene,
+        view: &View,
+        settings: &Settings,
+        detail: Detail,
+    ) -> Result<Option<Choice>> {
+        let most_runs = u64::from(frame::most_runs(&self.gpu)).saturating_sub(prepared.other_runs());
+        let mut most = usize::MAX;
+        loop {
+            let Some(choice) = prepared.scene.choice(view, settings, detail, most) else { return Ok(None) };
+            let (select, room) = (&self.select_bricks, settings.page_memory);
+            let runs = prepared.update_bricks(&self.gpu, select, &self.scan, view, &choice, room, most_runs)?;
+            if runs <= most_runs || choice.bricks.len() <= 1 {
+                return Ok(Some(choice));
+            }
+            // As many as show so much, if others show as much as these do.
+            let share = most_runs as f64 / runs as f64;
+            most = ((choice.bricks.len() as f64 * share) as usize).clamp(1, choice.bricks.len() - 1);
+        }
+    }
+
     /// The view cut in strips of whole rows whose colours (16 bytes a pixel) fit a binding, and whose tiles have bins enough for
     /// all sheets.
-    fn strips(&self, prepared: &PreparedScene, view: &View, settings: &Settings, detail: Detail) -> Vec<View> {
+    fn strips(&self, view: &View, sheets: &Sheets) -> Vec<View> {
         let [width, height] = view.size;
-        let mut most = self.gpu.binding_size() / (16 * u64::from(width));
-        if frame::most_rows(width, Sheets::MAX) < u64::from(height) {
-            let choice = prepared.scene.choice(view, settings, detail);
-            let sheets = prepared.scene.sheets_of(view, settings, choice.as_ref());
-            most = most.min(frame::most_rows(width, sheets.count()));
-        }
+        let most = (self.gpu.binding_size() / (16 * u64::from(width))).min(frame::most_rows(width, sheets.count()));
         let rows = u32::try_from(most).unwrap_or(u32::MAX).clamp(1, height);
         let strip = |first: u32| {
             let mut strip = view.clone();
@@ -243,27 +282,19 @@ impl Renderer {
         prepared: &mut PreparedScene,
         view: &View,
         settings: &Settings,
-        detail: Detail,
+        outline: &Outline,
         profile: bool,
     ) -> Result<(Targets, FrameStats)> {
         view.validate_for(&prepared.bounds)?;
         let _span = tracing::debug_span!("frame", width = view.size[0], height = view.size[1]).entered();
-        let cut_pixels = self.cut_hierarchies(prepared, view, settings, detail)?;
         let gpu = &self.gpu;
-        prepared.update_selections(gpu, &self.select, &self.scan, view)?;
-        let choice = prepared.scene.choice(view, settings, detail);
+        let Outline { cut_pixels, choice, sheets, .. } = outline;
         let choice = choice.as_ref();
-        let reads = prepared.shelf.as_ref().map_or(0, |shelf| shelf.reads);
-        if let Some(choice) = choice {
-            let (select, room) = (&self.select_bricks, settings.page_memory);
-            prepared.update_bricks(gpu, select, &self.scan, view, choice, room)?;
-        }
+        prepared.update_forests(gpu, view, settings, *cut_pixels)?;
         let variant = frame::variant(gpu, prepared, view, settings, self.budget, choice);
-        let sheets = prepared.scene.sheets_of(view, settings, choice);
         let pool = &mut self.pool;
-        let targets = frame::targets(gpu, pool, prepared, &variant, view, &sheets, settings, self.budget, choice)?;
+        let targets = frame::targets(gpu, pool, prepared, &variant, view, sheets, settings, self.budget, choice)?;
         let pipelines = self.pipelines.entry(variant).or_insert_with(|| Pipelines::new(gpu, &variant));
-        // Those of nodes once more: what was chosen of volumes since the cut has moved their runs.
         for chunk in &prepared.chunks {
             let lattice = matches!(chunk.origin, Origin::Lattice { .. } | Origin::Bricks { .. });
             let source = chunk.source(view, variant.isotropic && lattice, &prepared.forests);
@@ -323,70 +354,39 @@ impl Renderer {
             entries: u64::from(state.binned),
             passes: state.passes,
             gpu_bytes: prepared.bytes + targets.bytes(),
-            cut_pixels,
+            cut_pixels: *cut_pixels,
             missing_pages: prepared.forests.iter().map(|forest| forest.missing as u64).sum(),
             lambda: choice.map_or(0.0, |choice| choice.lambda),
             bricks: choice.map_or(0, |choice| choice.bricks.len() as u64),
-            read_bricks: prepared.shelf.as_ref().map_or(0, |shelf| shelf.reads - reads),
+            // Those of the whole picture are counted already.
+            read_bricks: 0,
             brick_bytes: prepared.shelf.as_ref().map_or(0, |shelf| shelf.bytes()),
             steps: times,
         };
         Ok((targets, stats))
     }
 
-    /// Brings the pages that a view needs to the GPU and sets the cuts of all hierarchies; gives the pixels of the cut.
-    fn cut_hierarchies(
-        &self,
-        prepared: &mut PreparedScene,
-        view: &View,
-        settings: &Settings,
-        detail: Detail,
-    ) -> Result<f64> {
-        if prepared.forests.is_empty() {
-            return Ok(0.0);
-        }
-        let (gpu, cull) = (&self.gpu, settings.cull_backfaces);
-        let mut pixels = match detail {
-            Detail::Pixels(pixels) => pixels,
-            // The pages of a cut hold several times what it draws.
-            Detail::Splats(most) => {
-                let finest = |forest: &Forest| forest.finest_within(view, cull, most.saturating_mul(8).max(1 << 16));
-                prepared.forests.iter().map(finest).fold(0.0, f64::max)
-            }
-            Detail::Milliseconds(_) => Detail::PIXELS,
-        };
-        let cuts = |prepared: &PreparedScene, pixels| {
-            prepared.forests.iter().map(|forest| forest.cut(view, pixels, cull)).collect::<Vec<_>>()
-        };
-        let own = cuts(prepared, pixels);
-        prepared.update_forests(gpu, &own, settings.page_memory)?;
-        for chunk in prepared.chunks.iter().filter(|chunk| matches!(chunk.origin, Origin::Nodes { .. })) {
-            let source = chunk.source(view, false, &prepared.forests);
-            gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
-        }
-        if let Detail::Splats(most) = detail {
-            pixels = pixels.max(self.finest_cut(prepared, most)?);
-            for (forest, cut) in prepared.forests.iter().zip(cuts(prepared, pixels)) {
-                forest.set_cut(gpu, &cut);
-            }
-        }
-        Ok(pixels)
-    }
-
-    /// The finest cut, in pixels, that draws no more than `most` of the nodes at hand.
-    fn finest_cut(&self, prepared: &PreparedScene, most: u64) -> Result<f64> {
+    /// The finest cut, in pixels, that draws no more than `most` nodes of those for which there is room.
+    fn finest_cut(&self, prepared: &mut PreparedScene, view: &View, settings: &Settings, most: u64) -> Result<f64> {
+        // The pages of a cut hold several times what it draws.
+        let nodes = most.saturating_mul(8).max(1 << 16);
+        let finest = |forest: &Forest| forest.finest_within(view, settings.cull_backfaces, nodes);
+        let pixels = prepared.forests.iter().map(finest).fold(0.0, f64::max);
         let gpu = &self.gpu;
+        prepared.update_forests(gpu, view, settings, pixels)?;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         let counters = super::buffer(gpu, "tally", tally_bytes(), usage);
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("tally") });
         for chunk in &prepared.chunks {
             if let Origin::Nodes { slots, .. } = &chunk.origin {
+                let source = chunk.source(view, false, &prepared.forests);
+                gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
                 self.cut.encode_tally(gpu, &mut encoder, &slots.chunk(&chunk.uniform, &chunk.data), &counters);
             }
         }
         gpu.queue.submit([encoder.finish()]);
         let tally: Vec<i32> = bytemuck::pod_collect_to_vec(&gpu.read(&counters, 0, tally_bytes())?);
-        Ok(finest_within(&tally, most))
+        Ok(pixels.max(finest_within(&tally, most)))
     }
 
     /// Appends the rows of a strip to a picture.

@@ -1,5 +1,5 @@
 //! Select: which samples of a lattice can add to the picture under the current transfer function (shaders/select.wgsl).
-//! Runs when the transfer function changes. Explicit splats have no such list: all of them are candidates.
+//! Runs when what shows changes, by the transfer function. Explicit splats have no such list: all of them are candidates.
 
 use super::{
     Gpu,
@@ -8,10 +8,7 @@ use super::{
     stage::{Binding, Stage},
     upload::upload,
 };
-use crate::{
-    Result,
-    volume::{TransferFunction, reach::first_visible},
-};
+use crate::Result;
 use wgpu::BufferUsages as Usage;
 
 /// Samples along each side of a block (`SIDE` in select.wgsl), which an invocation handles.
@@ -27,8 +24,8 @@ pub struct Selection {
     pub selected: wgpu::Buffer,
     /// Their number.
     pub count: u32,
-    /// Whether the transfer function changed since the list was made.
-    pub outdated: bool,
+    /// What the list was made for; none before there is one.
+    shown: Option<[u16; 256]>,
 }
 
 impl Selection {
@@ -44,8 +41,13 @@ impl Selection {
             block_count,
             selected: super::buffer(gpu, "selected", 4, Usage::STORAGE),
             count: 0,
-            outdated: true,
+            shown: None,
         }
+    }
+
+    /// Whether it lists the samples of which something shows.
+    pub fn is_for(&self, shown: &[u16; 256]) -> bool {
+        self.shown.as_ref() == Some(shown)
     }
 
     pub fn bytes(&self) -> u64 {
@@ -71,19 +73,17 @@ impl Select {
         }
     }
 
-    /// Makes a chunk's list, in a buffer of its size. `uniform` is the chunk's source, `range` the volume's smallest and
-    /// largest value.
+    /// Makes a chunk's list, in a buffer of its size. `uniform` is the chunk's source; `shown` tells which ranges show something
+    /// ([`first_visible`](crate::volume::reach::first_visible)).
     pub fn update(
         &self,
         gpu: &Gpu,
         scan: &Scan,
         selection: &mut Selection,
         uniform: &wgpu::Buffer,
-        transfer: &TransferFunction,
-        range: [f64; 2],
+        shown: &[u16; 256],
     ) -> Result<()> {
-        let first = first_visible(transfer, range).map(u32::from);
-        let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&first));
+        let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&shown.map(u32::from)));
         let bind = |stage: &Stage, selection: &Selection| {
             let buffers = [uniform, &selection.ranges, &visible, &selection.blocks, &selection.selected];
             stage.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()))
@@ -102,7 +102,7 @@ impl Select {
         let mut writing = encoder();
         self.write.dispatch(&mut writing, &[&bind(&self.write, selection)], groups);
         gpu.queue.submit([writing.finish()]);
-        selection.outdated = false;
+        selection.shown = Some(*shown);
         Ok(())
     }
 }

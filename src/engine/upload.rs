@@ -10,13 +10,13 @@ use super::{
 };
 use crate::{
     Error, Result,
-    hierarchy::Cut,
     math::{Bounds, Kernel, View},
-    scene::{Item, Scene},
+    scene::{Item, Scene, Settings},
     splat::{Splat, SplatSet},
     volume::{
         Arrangement, Lattice, Samples, Scalar, TransferFunction, Volume,
         bricks::{Bricks, Choice},
+        reach::{EVERYTHING, first_visible},
     },
 };
 use glam::{UVec3, Vec3};
@@ -145,29 +145,32 @@ impl PreparedScene {
                 *shown = transfer.clone();
             }
         }
-        if let Some(shelf) = &mut self.shelf {
-            shelf.outdated = true;
-        }
-        for chunk in &mut self.chunks {
-            if let Origin::Lattice { selection, .. } = &mut chunk.origin {
-                selection.outdated = true;
-            }
-        }
     }
 
-    /// Lists the samples of lattices anew whose transfer function has changed.
-    pub(super) fn update_selections(&mut self, gpu: &Gpu, select: &Select, scan: &Scan, view: &View) -> Result<()> {
-        let is_volume = |item: &&Item| matches!(item, Item::Volume(..));
-        let Some(Item::Volume(_, _, transfer)) = self.scene.items.iter().find(is_volume) else { return Ok(()) };
+    /// Lists the samples of lattices anew where others show something than did, or all of them are asked for.
+    pub(super) fn update_selections(
+        &mut self,
+        gpu: &Gpu,
+        select: &Select,
+        scan: &Scan,
+        view: &View,
+        all: bool,
+    ) -> Result<()> {
+        let shown = self.scene.items.iter().find_map(|item| match item {
+            Item::Volume(..) if all => Some(EVERYTHING),
+            Item::Volume(volume, _, transfer) => Some(first_visible(transfer, volume.range)),
+            _ => None,
+        });
+        let Some(shown) = shown else { return Ok(()) };
         for chunk in &mut self.chunks {
             let source = chunk.source(view, false, &self.forests);
-            let Origin::Lattice { volume, selection, .. } = &mut chunk.origin else { continue };
-            if !selection.outdated {
+            let Origin::Lattice { selection, .. } = &mut chunk.origin else { continue };
+            if selection.is_for(&shown) {
                 continue;
             }
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
             self.bytes -= selection.bytes() + chunk.spans.size();
-            select.update(gpu, scan, selection, &chunk.uniform, transfer, volume.range)?;
+            select.update(gpu, scan, selection, &chunk.uniform, &shown)?;
             chunk.candidates = selection.count;
             chunk.spans = spans(gpu, selection.count);
             self.bytes += selection.bytes() + chunk.spans.size();
@@ -176,8 +179,8 @@ impl PreparedScene {
         Ok(())
     }
 
-    /// Brings the bricks of a choice to the GPU and lists what they show, within `room` bytes; nothing is done where neither
-    /// the bricks nor the transfer function changed.
+    /// Brings the bricks of a choice to the GPU, within `room` bytes, and lists what they show, unless that is more than `most`
+    /// runs of candidates; tells how many those are.
     pub(super) fn update_bricks(
         &mut self,
         gpu: &Gpu,
@@ -186,9 +189,13 @@ impl PreparedScene {
         view: &View,
         choice: &Choice,
         room: u64,
-    ) -> Result<()> {
-        let Some(shelf) = &mut self.shelf else { return Ok(()) };
-        let Some(grown) = shelf.update(gpu, choice, room)? else { return Ok(()) };
+        most: u64,
+    ) -> Result<u64> {
+        let Some(shelf) = &mut self.shelf else { return Ok(0) };
+        if shelf.draws(choice) {
+            return Ok(self.brick_runs());
+        }
+        let grown = shelf.update(gpu, choice, room)?;
         let (bricks, kernel) = (shelf.bricks.clone(), shelf.kernel.clone());
         for samples in grown {
             // One chunk for each of two levels: they share the slots.
@@ -203,7 +210,18 @@ impl PreparedScene {
             self.bytes += samples.ranges.size();
             self.bytes -= samples.data.size();
         }
-        self.select_bricks(gpu, select, scan, view, choice)
+        self.select_bricks(gpu, select, scan, view, choice, most)
+    }
+
+    /// Runs of candidates in bricks.
+    fn brick_runs(&self) -> u64 {
+        let bricks = self.chunks.iter().filter(|chunk| matches!(chunk.origin, Origin::Bricks { .. }));
+        bricks.map(|chunk| u64::from(runs_of(chunk.candidates))).sum()
+    }
+
+    /// Runs of candidates in all that does not lie in bricks.
+    pub(super) fn other_runs(&self) -> u64 {
+        u64::from(self.runs) - self.brick_runs()
     }
 
     /// Lists the samples of all slots in use that can add to the picture.
@@ -214,14 +232,9 @@ impl PreparedScene {
         scan: &Scan,
         view: &View,
         choice: &Choice,
-    ) -> Result<()> {
-        let is_bricks = |item: &Item| match item {
-            Item::Bricks(_, _, transfer) => Some(transfer.clone()),
-            _ => None,
-        };
-        let (Some(transfer), Some(shelf)) = (self.scene.items.iter().find_map(is_bricks), &mut self.shelf) else {
-            return Ok(());
-        };
+        most: u64,
+    ) -> Result<u64> {
+        let Some(shelf) = &mut self.shelf else { return Ok(0) };
         let (mut own, mut before) = (Vec::new(), 0);
         for chunk in &mut self.chunks {
             let Origin::Bricks { slab, level, .. } = &mut chunk.origin else { continue };
@@ -234,7 +247,10 @@ impl PreparedScene {
             before += slab.selected.size() + chunk.spans.size();
             own.push((slab.as_mut(), &chunk.uniform));
         }
-        select.update(gpu, scan, &mut own, shelf, &transfer)?;
+        let runs = select.update(gpu, scan, &mut own, &choice.shown, most)?;
+        if runs > most {
+            return Ok(runs);
+        }
         self.bytes -= before;
         for chunk in &mut self.chunks {
             let Origin::Bricks { slab, .. } = &chunk.origin else { continue };
@@ -242,9 +258,9 @@ impl PreparedScene {
             chunk.spans = spans(gpu, slab.count);
             self.bytes += slab.selected.size() + chunk.spans.size();
         }
-        shelf.outdated = false;
+        shelf.set_drawn(choice);
         self.number_runs();
-        Ok(())
+        Ok(runs)
     }
 
     /// Numbers the runs of candidates through all chunks; before each chunk's one number stays free (active.wgsl).
@@ -252,7 +268,7 @@ impl PreparedScene {
         self.runs = 0;
         for chunk in &mut self.chunks {
             chunk.first_run = self.runs + 1;
-            self.runs += 1 + chunk.candidates.div_ceil(RUN);
+            self.runs += runs_of(chunk.candidates);
         }
     }
 
@@ -317,9 +333,10 @@ impl PreparedScene {
         self.push_chunk(gpu, origin, data, count);
     }
 
-    /// Brings what the cuts of all hierarchies need to the GPU, within `room` bytes each.
-    pub(super) fn update_forests(&mut self, gpu: &Gpu, cuts: &[Cut], room: u64) -> Result<()> {
-        for (index, cut) in cuts.iter().enumerate() {
+    /// Brings what the cuts of all hierarchies need to the GPU, within the settings' memory each.
+    pub(super) fn update_forests(&mut self, gpu: &Gpu, view: &View, settings: &Settings, pixels: f64) -> Result<()> {
+        for index in 0..self.forests.len() {
+            let cut = self.forests[index].cut(view, pixels, settings.cull_backfaces);
             let own: Vec<(&Slots, &wgpu::Buffer)> = self
                 .chunks
                 .iter()
@@ -328,7 +345,7 @@ impl PreparedScene {
                     _ => None,
                 })
                 .collect();
-            let grown = self.forests[index].update(gpu, cut, room, &own)?;
+            let grown = self.forests[index].update(gpu, &cut, settings.page_memory, &own)?;
             for Growth { slots, splats, capacity, bytes } in grown {
                 self.bytes += bytes - splats.size();
                 self.push_chunk(gpu, Origin::Nodes { forest: index, slots: Box::new(slots) }, splats, capacity);
@@ -444,6 +461,11 @@ fn places(gpu: &Gpu, lattice: &Lattice) -> Result<wgpu::Buffer> {
         }
     }
     Ok(super::filled_buffer(gpu, "places", bytemuck::cast_slice(&places), wgpu::BufferUsages::UNIFORM))
+}
+
+/// Runs of so many candidates of a chunk, with the number that stays free before them.
+pub fn runs_of(candidates: u32) -> u32 {
+    1 + candidates.div_ceil(RUN)
 }
 
 /// A read-only storage buffer of some bytes.

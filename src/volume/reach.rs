@@ -61,6 +61,9 @@ pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]>
     ranges
 }
 
+/// What [`first_visible`] would tell if everything showed: for pictures that mix samples farther apart than ranges hold for.
+pub const EVERYTHING: [u16; 256] = [0; 256];
+
 /// For each smallest step the least largest step with which something shows; 256 where nothing does. A sample of the
 /// neighbourhood `[low, high]` may be left out where `high < first_visible[low]`.
 pub fn first_visible(transfer: &TransferFunction, range: [f64; 2]) -> [u16; 256] {
@@ -69,14 +72,21 @@ pub fn first_visible(transfer: &TransferFunction, range: [f64; 2]) -> [u16; 256]
     // A step's value may miss the sample's by a rounding error. That matters where opacity jumps, not where it rises.
     let slack = step * 1e-7;
     let jumps = |value: f64| transfer.opacity(value) > 1e-5;
-    std::array::from_fn(|low| {
-        let from = value(low as u16);
-        let shows = |high: &u16| {
-            let to = value(*high);
-            transfer.visible([from, to]) || jumps(from - slack) || jumps(to + slack)
+    let shows = |low: u16, high: u16| {
+        let [from, to] = [low, high].map(value);
+        transfer.visible([from, to]) || jumps(from - slack) || jumps(to + slack)
+    };
+    let mut first = [256; 256];
+    for low in (0..256).rev() {
+        first[usize::from(low)] = match low {
+            _ if shows(low, low) => low,
+            255 => 256,
+            _ if shows(low, low + 1) => low + 1,
+            // What shows from the next step on.
+            _ => first[usize::from(low) + 1],
         };
-        (low as u16..256).find(shows).unwrap_or(256)
-    })
+    }
+    first
 }
 
 fn smaller(into: &mut [[u8; 2]], other: &[[u8; 2]]) {

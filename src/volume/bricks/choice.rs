@@ -1,10 +1,7 @@
 //! Which bricks a picture needs.
 
-use super::{Bricks, REACH, SIDE};
-use crate::{
-    math::View,
-    volume::{TransferFunction, reach::first_visible},
-};
+use super::{Bricks, SIDE};
+use crate::math::View;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -18,30 +15,22 @@ pub struct Choice {
     pub bricks: Vec<(usize, u32)>,
     /// How coarse the picture is, a real number of levels.
     pub lambda: f64,
+    /// Which ranges of values show something, as [`first_visible`](crate::volume::reach::first_visible) tells it.
+    pub shown: [u16; 256],
 }
 
 /// A budget that is not kept is met by coarser pictures, in steps of this part of a level.
 const STEPS: f64 = 16.0;
 
 /// Chooses the levels that draw no step between samples smaller than `pixels`, and of these the bricks that meet the picture
-/// and hold something that the transfer function shows. `extent` is the kernel's, in samples of whichever level is drawn.
+/// and hold something that shows, as `shown` tells ([`Choice::shown`]). `extent` is the kernel's, in samples of whichever level is drawn.
 ///
 /// The level is a real number, λ = log₂(`pixels` / p), no less than 0 and no more than that of the coarsest level; p is how many
 /// pixels the longest step of level 0 covers at the point of the volume's box that is nearest to the eye. Between two levels
 /// both are drawn, with shares that follow λ, so that a zoom shows no pop. Where they have more than `most` bricks, λ is raised
 /// to the next sixteenth that has no more; the coarsest level, of one brick, is not refused.
-///
-/// Ranges of bricks hold as far as [`REACH`]: for wider kernels they are not looked at.
-pub fn choice(
-    bricks: &Bricks,
-    view: &View,
-    extent: f64,
-    pixels: f64,
-    transfer: &TransferFunction,
-    most: usize,
-) -> Choice {
+pub fn choice(bricks: &Bricks, view: &View, extent: f64, pixels: f64, shown: &[u16; 256], most: usize) -> Choice {
     let coarsest = (bricks.levels().len() - 1) as f64;
-    let first = first_visible(transfer, bricks.header().range);
     // A level's bricks do not depend on λ: each is looked through once, when it is asked for.
     let mut known: Vec<Option<Vec<(f64, u32)>>> = vec![None; bricks.levels().len()];
     let mut lambda = wanted(bricks, view, pixels).min(coarsest);
@@ -49,7 +38,7 @@ pub fn choice(
         let levels = shares(lambda);
         let mut count = 0;
         for &(level, _) in &levels {
-            count += known[level].get_or_insert_with(|| visible(bricks, level, view, extent, &first)).len();
+            count += known[level].get_or_insert_with(|| visible(bricks, level, view, extent, shown)).len();
         }
         if count <= most || lambda >= coarsest {
             break levels;
@@ -62,7 +51,7 @@ pub fn choice(
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)).then(a.2.cmp(&b.2)));
     let bricks = found.into_iter().map(|(_, level, brick)| (level, brick)).collect();
-    Choice { levels, bricks, lambda }
+    Choice { levels, bricks, lambda, shown: *shown }
 }
 
 /// λ before any budget.
@@ -80,12 +69,11 @@ fn shares(lambda: f64) -> Vec<(usize, f64)> {
 }
 
 /// The bricks of a level that meet the picture and show something, with their distances.
-fn visible(bricks: &Bricks, number: usize, view: &View, extent: f64, first: &[u16; 256]) -> Vec<(f64, u32)> {
+fn visible(bricks: &Bricks, number: usize, view: &View, extent: f64, shown: &[u16; 256]) -> Vec<(f64, u32)> {
     let level = bricks.level(number);
     let lattice = bricks.lattice(number);
     let sides = view.sides(1.0);
-    let far_reaching = extent > REACH as f64;
-    let shows = |[low, high]: [u8; 2]| far_reaching || u16::from(high) >= first[usize::from(low)];
+    let shows = |[low, high]: [u8; 2]| u16::from(high) >= shown[usize::from(low)];
     let look = |(brick, &range): (usize, &[u8; 2])| {
         let brick = brick as u32;
         if !shows(range) {
@@ -114,7 +102,10 @@ mod tests {
     use super::*;
     use crate::{
         math::{Camera, Projection},
-        volume::{Lattice, Samples, Volume},
+        volume::{
+            Lattice, Samples, TransferFunction, Volume,
+            reach::{EVERYTHING, first_visible},
+        },
     };
     use std::sync::Arc;
 
@@ -125,12 +116,14 @@ mod tests {
         Bricks::from_volume(Arc::new(volume)).unwrap()
     }
 
-    fn transfer(from: f64) -> TransferFunction {
-        TransferFunction {
+    /// What shows where only values over `from` do.
+    fn over(from: f64) -> [u16; 256] {
+        let transfer = TransferFunction {
             color: vec![(0.0, [1.0; 3])],
             opacity: vec![(from, 0.0), (from + 1.0, 1.0)],
             ..TransferFunction::default()
-        }
+        };
+        first_visible(&transfer, [0.0, 198.0])
     }
 
     fn flat(height: f64) -> View {
@@ -158,7 +151,7 @@ mod tests {
     #[test]
     fn levels_follow_the_size_of_steps() {
         let bricks = ramp();
-        let shows = transfer(-5.0);
+        let shows = over(-5.0);
         // A step of 2 covers one pixel where 800 units fill 400 pixels.
         for (height, pixels, lambda) in
             [(800.0, 1.0, 0.0), (400.0, 1.0, 0.0), (800.0, 2.0, 1.0), (1600.0, 1.0, 1.0), (1e9, 1.0, 2.0)]
@@ -186,7 +179,7 @@ mod tests {
     fn a_zoom_has_no_jumps() {
         let bricks = ramp();
         let share = |height: f64, level: usize| {
-            let choice = choice(&bricks, &flat(height), 2.0, 1.0, &transfer(-5.0), MANY);
+            let choice = choice(&bricks, &flat(height), 2.0, 1.0, &over(-5.0), MANY);
             choice.levels.iter().find(|(found, _)| *found == level).map_or(0.0, |found| found.1)
         };
         for step in 0..400 {
@@ -201,29 +194,28 @@ mod tests {
     fn bricks_are_those_in_the_picture_that_show() {
         let bricks = ramp();
         // Values over 150 are at x of 75 and more; kernels and ranges reach 3 further.
-        let shown = choice(&bricks, &flat(400.0), 2.0, 1.0, &transfer(150.0), MANY);
+        let shown = choice(&bricks, &flat(400.0), 2.0, 1.0, &over(150.0), MANY);
         let columns: Vec<usize> = shown.bricks.iter().map(|&(_, brick)| bricks.level(0).place(brick)[0]).collect();
         assert!(columns.len() == 32 && columns.iter().all(|x| *x >= 2), "{columns:?}");
-        let wide = choice(&bricks, &flat(400.0), 3.5, 1.0, &transfer(150.0), MANY);
-        assert_eq!(wide.bricks.len(), 64);
-        assert!(choice(&bricks, &flat(400.0), 2.0, 1.0, &transfer(250.0), MANY).bricks.is_empty());
+        assert_eq!(choice(&bricks, &flat(400.0), 2.0, 1.0, &EVERYTHING, MANY).bricks.len(), 64);
+        assert!(choice(&bricks, &flat(400.0), 2.0, 1.0, &over(250.0), MANY).bricks.is_empty());
         // A picture of the middle alone: bricks 1 and 2 along x and y.
-        let middle = choice(&bricks, &flat(10.0), 2.0, 1.0, &transfer(-5.0), MANY);
+        let middle = choice(&bricks, &flat(10.0), 2.0, 1.0, &over(-5.0), MANY);
         let places = || middle.bricks.iter().map(|&(_, brick)| bricks.level(0).place(brick));
         assert!(middle.bricks.len() == 4 && places().all(|[x, y, _]| x == 1 && y == 1), "{middle:?}");
         // The sample at 99.5 steps is the last of brick 1; wider kernels of brick 2 reach it.
-        let wider = choice(&bricks, &flat(10.0), 14.0, 1.0, &transfer(-5.0), MANY);
+        let wider = choice(&bricks, &flat(10.0), 14.0, 1.0, &over(-5.0), MANY);
         assert_eq!(wider.bricks.len(), 16);
         // Behind the eye there is nothing.
         let mut behind = at(50.0);
         behind.rotation = glam::DMat3::from_diagonal(DVec3::new(-1.0, 1.0, -1.0)) * behind.rotation;
-        assert!(choice(&bricks, &behind, 2.0, 1.0, &transfer(-5.0), MANY).bricks.is_empty());
+        assert!(choice(&bricks, &behind, 2.0, 1.0, &over(-5.0), MANY).bricks.is_empty());
     }
 
     #[test]
     fn near_bricks_come_first() {
         let bricks = ramp();
-        let found = choice(&bricks, &at(3.0 * at(1.0).scale), 2.0, 1.0, &transfer(-5.0), MANY);
+        let found = choice(&bricks, &at(3.0 * at(1.0).scale), 2.0, 1.0, &over(-5.0), MANY);
         assert_eq!((found.levels.len(), found.bricks.len()), (2, 72));
         let distance = |&(level, brick): &(usize, u32)| {
             let size = bricks.level(level);
@@ -240,7 +232,7 @@ mod tests {
     fn budgets_are_kept() {
         let bricks = ramp();
         let lambda = |most| {
-            let found = choice(&bricks, &flat(400.0), 2.0, 1.0, &transfer(-5.0), most);
+            let found = choice(&bricks, &flat(400.0), 2.0, 1.0, &over(-5.0), most);
             assert!(found.bricks.len() <= most.max(1));
             found.lambda
         };
