@@ -6,7 +6,7 @@ use splatkit::{
     Error,
     compare::compare_pictures,
     engine::{AdapterChoice, Gpu, Renderer},
-    hierarchy::Detail,
+    hierarchy::{BuildOptions, Detail, Hierarchy, Tree},
     math::{Camera, Kernel},
     picture::Picture,
     scene::{Scene, Settings},
@@ -275,4 +275,26 @@ fn bricks_that_show_too_much_are_drawn_coarser() {
     assert!(fewer.lambda > 0.0 && fewer.bricks < 64, "{fewer:?}");
     let agreement = compare_pictures(&fine, &coarse).expect("pictures of one size").psnr.unwrap_or(f64::INFINITY);
     assert!(agreement > 25.0, "{agreement:.1} dB");
+}
+
+/// A picture too large for a binding is drawn in strips; its budget is that of the whole, or the strips would differ.
+#[test]
+fn a_budget_counts_for_the_whole_picture() {
+    let splats = Mesh::knot(600, 50).surfels(&SurfelOptions::default()).unwrap();
+    let tree = Tree::build(&splats, &BuildOptions::default(), &|_, _| ()).expect("a tree");
+    let scene = Scene::new().with_hierarchy(Hierarchy::from_tree(tree).expect("a hierarchy"));
+    let (camera, settings) = view(&scene);
+    let settings = Settings { size: [400, 300], detail: Detail::Splats(3000), ..settings };
+    // 16 bytes a pixel: the second draws 163 rows at a time.
+    let pictures = [1 << 27, 1 << 20].map(|bytes| {
+        let gpu = host_device(wgpu::Limits { max_storage_buffer_binding_size: bytes, ..wgpu::Limits::default() });
+        let mut renderer = Renderer::new(&gpu);
+        let mut prepared = renderer.prepare(&scene).expect("fits");
+        renderer.render(&mut prepared, &camera, &settings).expect("draws")
+    });
+    let [(whole, own), (strips, others)] = &pictures;
+    assert!(own.cut_pixels > 0.0 && own.splats > 1500 && own.splats > others.splats, "{own:?}\n{others:?}");
+    assert!((own.cut_pixels / others.cut_pixels - 1.0).abs() < 1e-9, "{own:?}\n{others:?}");
+    let difference = difference(whole, strips);
+    assert!(difference < MOST_DIFFERENCE, "another picture, by {difference}");
 }
