@@ -11,7 +11,7 @@ use splatkit::{
     engine::{AdapterChoice, Budget, Gpu, Renderer},
     picture::Picture,
     reference,
-    scene::{Classification, Item, Optics, Order},
+    scene::{Classification, Item, Mode, Optics, Order},
 };
 
 fn drawn(case: &Case, budget: Budget) -> Picture {
@@ -351,7 +351,10 @@ fn slopes_and_gradients_orthographic() {
 /// Whole kernels count where their middle is before the eye.
 #[test]
 fn whole_kernels_from_inside() {
-    for case in [methods::single_splats(Order::FrontToBack), methods::single_ellipsoids()] {
+    let mut in_sheets = methods::single_ellipsoids();
+    in_sheets.settings.mode = Mode::AxisSheets;
+    let splats = methods::single_splats(Order::FrontToBack);
+    for case in [splats, methods::single_ellipsoids(), methods::axis_sheets(), in_sheets] {
         assert_matches(methods::from_inside(case), 50.0);
     }
 }

@@ -175,7 +175,8 @@ impl Frame {
             geometric_sheets: sheets.turn as u32,
             ratio_log2_inverse: if sheets.turn > 0 { (1.0 / sheets.ratio.log2()) as f32 } else { 0.0 },
             step_inverse: (1.0 / sheets.step) as f32,
-            z_near: (sheets.planes[0] * smallest_cosine(view)) as f32,
+            // Axis-aligned sheets may begin behind an eye among them.
+            z_near: (sheets.planes[0] * smallest_cosine(view)).max(1e-6 * sheets.step) as f32,
             surface_shade: shade(settings.surface_shade),
             levels: [1.0, 1.0, 0.0, 0.0],
             ..Self::default()
