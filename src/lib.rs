@@ -11,6 +11,7 @@ pub mod error;
 pub mod hierarchy;
 pub mod io;
 pub mod math;
+pub mod memory;
 pub mod picture;
 pub mod reference;
 pub mod scattered;

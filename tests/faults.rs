@@ -298,3 +298,40 @@ fn a_budget_counts_for_the_whole_picture() {
     let difference = difference(whole, strips);
     assert!(difference < MOST_DIFFERENCE, "another picture, by {difference}");
 }
+
+/// A scene that takes more than it may is refused before it is there: its samples, and the lists of those that show.
+#[test]
+fn memory_is_kept_to() {
+    for in_bricks in [false, true] {
+        let scene = scene(in_bricks);
+        let expected = drawn(&gpu(), &scene).expect("draws");
+        let mut outcomes = Vec::new();
+        for shift in 16..32 {
+            let gpu = gpu().with_memory(1 << shift);
+            let mut renderer = Renderer::new(&gpu);
+            let (camera, settings) = view(&scene);
+            let outcome = match renderer.prepare(&scene) {
+                Err(error) => Err(("prepared", error)),
+                Ok(mut prepared) => match renderer.render(&mut prepared, &camera, &settings) {
+                    Err(error) => Err(("drawn", error)),
+                    Ok((picture, _)) => Ok(picture),
+                },
+            };
+            outcomes.push(match outcome {
+                Ok(picture) => {
+                    assert!(same(&picture, &expected), "2^{shift} bytes: another picture");
+                    "done"
+                }
+                Err((when, Error::Gpu(message))) => {
+                    assert!(message.ends_with(" MiB may be taken"), "2^{shift} bytes: {message}");
+                    when
+                }
+                Err((_, other)) => panic!("2^{shift} bytes: {other}"),
+            });
+        }
+        println!("{outcomes:?}");
+        let mut kinds = outcomes.clone();
+        kinds.dedup();
+        assert_eq!(kinds, ["prepared", "drawn", "done"], "{outcomes:?}");
+    }
+}

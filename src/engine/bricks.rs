@@ -242,7 +242,7 @@ impl SelectBricks {
         }
     }
 
-    /// Makes the lists of all slabs, each with its uniform, in buffers of their sizes, unless they hold more than `most_runs` runs of
+    /// Makes the lists of all slabs, each with its uniform, in buffers of their sizes, unless `check` refuses as many samples, or they are more than `most_runs` runs of
     /// candidates; tells how many those are. `shown` is that of [`Choice`].
     pub fn update(
         &self,
@@ -251,6 +251,7 @@ impl SelectBricks {
         slabs: &mut [(&mut Slab, &wgpu::Buffer)],
         shown: &[u16; 256],
         most_runs: u64,
+        check: impl Fn(u64) -> Result<()>,
     ) -> Result<u64> {
         let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&shown.map(u32::from)));
         // All slabs count in the same place, one after the other; so they count again before they write.
@@ -279,6 +280,7 @@ impl SelectBricks {
         if runs > most_runs {
             return Ok(runs);
         }
+        check(counts.iter().map(|&count| u64::from(count)).sum())?;
         let mut writing = encoder();
         for ((slab, uniform), own) in slabs.iter_mut().zip(counts) {
             slab.count = own;

@@ -1,7 +1,7 @@
 //! The device: adapters and their limits.
 
 use super::{fault::Condition, timestamps};
-use crate::{Error, Result};
+use crate::{Error, Result, memory};
 use std::{sync::Arc, time::Duration};
 
 /// How long a device may take by default for what is submitted together: a large scene takes minutes on a processor.
@@ -15,6 +15,8 @@ pub struct Gpu {
     pub info: Arc<wgpu::AdapterInfo>,
     pub(super) condition: Arc<Condition>,
     pub(super) patience: Duration,
+    /// The most bytes of memory that a scene may take.
+    memory: u64,
     /// How it was found; a host's device was not.
     choice: Option<AdapterChoice>,
 }
@@ -127,7 +129,7 @@ impl Gpu {
         let Some(choice) = &self.choice else {
             return Err(Error::Argument("the device is the host's; it has to be opened there".into()));
         };
-        Ok(Self::headless(choice)?.with_patience(self.patience))
+        Ok(Self { patience: self.patience, memory: self.memory, ..Self::headless(choice)? })
     }
 
     /// The same device, which counts as lost where what is submitted together (some depth passes of a frame) takes longer than
@@ -135,6 +137,26 @@ impl Gpu {
     #[must_use]
     pub fn with_patience(self, patience: Duration) -> Self {
         Self { patience, ..self }
+    }
+
+    /// The same device, on which a scene and the lists made of it may take so many bytes of memory: what takes more is refused
+    /// before it is there. By default what [`memory::most`] tells where the adapter runs on the processor, whose memory is the
+    /// machine's; elsewhere the device itself says what is too much.
+    #[must_use]
+    pub fn with_memory(self, memory: u64) -> Self {
+        Self { memory, ..self }
+    }
+
+    /// Refuses what would take more memory than there is to take.
+    pub(super) fn check_memory(&self, bytes: u64) -> Result<()> {
+        if bytes <= self.memory {
+            return Ok(());
+        }
+        let [wanted, most] = [bytes, self.memory].map(|bytes| bytes.div_ceil(1 << 20));
+        Err(Error::Gpu(format!(
+            "the scene takes {wanted} MiB of memory or more on {}, of which {most} MiB may be taken",
+            self.info.name
+        )))
     }
 
     fn open(adapter: &wgpu::Adapter) -> Result<Self> {
@@ -159,7 +181,17 @@ impl Gpu {
     /// Takes the device of a host application. It must keep WebGPU's default limits. What goes wrong while the engine works is
     /// the engine's error; what the host hears of is its own.
     pub fn from_wgpu(device: wgpu::Device, queue: wgpu::Queue, info: wgpu::AdapterInfo) -> Self {
-        Self { device, queue, info: Arc::new(info), condition: Arc::default(), patience: PATIENCE, choice: None }
+        let on_processor = info.device_type == wgpu::DeviceType::Cpu;
+        let memory = memory::most().filter(|_| on_processor).unwrap_or(u64::MAX);
+        Self {
+            device,
+            queue,
+            info: Arc::new(info),
+            condition: Arc::default(),
+            patience: PATIENCE,
+            memory,
+            choice: None,
+        }
     }
 
     /// Whether the adapter runs on the processor. Tiles are then walked by fewer, wider invocations.

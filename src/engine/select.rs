@@ -73,7 +73,7 @@ impl Select {
         }
     }
 
-    /// Makes a chunk's list, in a buffer of its size. `uniform` is the chunk's source; `shown` tells which ranges show something
+    /// Makes a chunk's list, in a buffer of its size, unless `check` refuses as many samples. `uniform` is the chunk's source; `shown` tells which ranges show something
     /// ([`first_visible`](crate::volume::reach::first_visible)).
     pub fn update(
         &self,
@@ -82,6 +82,7 @@ impl Select {
         selection: &mut Selection,
         uniform: &wgpu::Buffer,
         shown: &[u16; 256],
+        check: impl Fn(u32) -> Result<()>,
     ) -> Result<()> {
         let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&shown.map(u32::from)));
         let bind = |stage: &Stage, selection: &Selection| {
@@ -98,6 +99,7 @@ impl Select {
         gpu.queue.submit([counting.finish()]);
         let total = gpu.read(&selection.blocks, 4 * u64::from(blocks), 4)?;
         selection.count = bytemuck::pod_read_unaligned(&total);
+        check(selection.count)?;
         selection.selected = super::buffer(gpu, "selected", 4 * u64::from(selection.count), Usage::STORAGE);
         let mut writing = encoder();
         self.write.dispatch(&mut writing, &[&bind(&self.write, selection)], groups);

@@ -119,6 +119,7 @@ impl PreparedScene {
             bounds: scene.bounds(),
         };
         for item in &scene.items {
+            gpu.check_memory(prepared.bytes + bytes_of(item))?;
             match item {
                 Item::Radiance(set) => prepared.add_splats(gpu, set, true),
                 Item::Hierarchy(hierarchy) => prepared.forests.push(Forest::new(gpu, hierarchy)),
@@ -170,7 +171,10 @@ impl PreparedScene {
             }
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
             self.bytes -= selection.bytes() + chunk.spans.size();
-            select.update(gpu, scan, selection, &chunk.uniform, &shown)?;
+            let rest = self.bytes;
+            select.update(gpu, scan, selection, &chunk.uniform, &shown, |count| {
+                gpu.check_memory(rest + list_bytes(u64::from(count)))
+            })?;
             chunk.candidates = selection.count;
             chunk.spans = spans(gpu, selection.count);
             self.bytes += selection.bytes() + chunk.spans.size();
@@ -247,7 +251,9 @@ impl PreparedScene {
             before += slab.selected.size() + chunk.spans.size();
             own.push((slab.as_mut(), &chunk.uniform));
         }
-        let runs = select.update(gpu, scan, &mut own, &choice.shown, most)?;
+        let rest = self.bytes - before;
+        let runs = select
+            .update(gpu, scan, &mut own, &choice.shown, most, |count| gpu.check_memory(rest + list_bytes(count)))?;
         if runs > most {
             return Ok(runs);
         }
@@ -391,7 +397,7 @@ fn in_space_order(splats: &[Splat]) -> Cow<'_, [Splat]> {
 }
 
 fn spans(gpu: &Gpu, candidates: u32) -> wgpu::Buffer {
-    super::buffer(gpu, "spans", 8 * u64::from(candidates), wgpu::BufferUsages::STORAGE)
+    super::buffer(gpu, "spans", SPAN_BYTES * u64::from(candidates), wgpu::BufferUsages::STORAGE)
 }
 
 impl Chunk {
@@ -462,6 +468,29 @@ fn places(gpu: &Gpu, lattice: &Lattice) -> Result<wgpu::Buffer> {
     }
     Ok(super::filled_buffer(gpu, "places", bytemuck::cast_slice(&places), wgpu::BufferUsages::UNIFORM))
 }
+
+/// Bytes of an item's splats or samples on the GPU, with what is known of each beforehand: its span, or the range around it. What
+/// is read as it is drawn takes none yet.
+fn bytes_of(item: &Item) -> u64 {
+    match item {
+        Item::Radiance(set) | Item::Scalar(set, _) => {
+            set.splats.len() as u64 * (size_of::<Splat>() as u64 + SPAN_BYTES)
+        }
+        Item::Volume(volume, ..) => {
+            let sample = volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
+            volume.drawn_lattice().len() as u64 * (sample + 2)
+        }
+        Item::Hierarchy(_) | Item::Bricks(..) => 0,
+    }
+}
+
+/// Bytes of a list of samples: their numbers and spans.
+fn list_bytes(count: u64) -> u64 {
+    count * (4 + SPAN_BYTES)
+}
+
+/// Bytes of what a candidate meets of the picture.
+const SPAN_BYTES: u64 = 8;
 
 /// Runs of so many candidates of a chunk, with the number that stays free before them.
 pub fn runs_of(candidates: u32) -> u32 {

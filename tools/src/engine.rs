@@ -27,6 +27,10 @@ pub struct EngineFlags {
     /// Seconds that the adapter may take for some passes of a picture before it counts as lost [default: 600]
     #[arg(long, value_name = "SECONDS", value_parser = parse::positive)]
     gpu_timeout: Option<f64>,
+    /// Memory that a scene may take on the adapter, in bytes or with KiB, MiB or GiB [default: on the processor three quarters of
+    /// the memory that there is]
+    #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
+    gpu_memory: Option<u64>,
     /// How a volume's gradient across the picture is found.
     #[arg(long, value_enum, default_value_t = Gradient::Analytic)]
     gradient: Gradient,
@@ -83,11 +87,14 @@ impl EngineFlags {
     pub fn gpu(&self) -> splatkit::Result<Gpu> {
         // Any text is a choice: the conversion cannot fail.
         let choice = self.gpu.as_deref().map_or(AdapterChoice::Automatic, |text| text.parse().unwrap_or_default());
-        let gpu = Gpu::headless(&choice)?;
-        Ok(match self.gpu_timeout {
-            None => gpu,
-            Some(seconds) => gpu.with_patience(Duration::from_secs_f64(seconds.min(LONGEST))),
-        })
+        let mut gpu = Gpu::headless(&choice)?;
+        if let Some(seconds) = self.gpu_timeout {
+            gpu = gpu.with_patience(Duration::from_secs_f64(seconds.min(LONGEST)));
+        }
+        if let Some(memory) = self.gpu_memory {
+            gpu = gpu.with_memory(memory);
+        }
+        Ok(gpu)
     }
 
     pub fn renderer(&self, gpu: &Gpu) -> Renderer {

@@ -57,6 +57,9 @@ impl Failure {
             Self::Library(Error::Gpu(message)) if message.ends_with("raise the budget") => {
                 Some("raise --pass-entries, or draw a smaller --size")
             }
+            Self::Library(Error::Gpu(message)) if message.ends_with("may be taken") => Some(
+                "`splatkit convert` makes .splk and .splv files of it, of which a picture takes less; --gpu-memory allows more",
+            ),
             Self::Library(Error::Gpu(_)) => {
                 Some("try a smaller --size, or another --gpu (`software` is one); --gpu-timeout waits longer")
             }

@@ -1,10 +1,10 @@
 //! `splatkit generate`: phantoms and large scans as files, to try the other commands on.
 
-use crate::{failure::Failure, output, parse, progress::Progress, scan};
+use crate::{failure::Failure, limits::LimitFlags, output, parse, progress::Progress, scan};
 use clap::{Args, ValueEnum};
 use glam::{DMat3, DVec3};
 use splatkit::{
-    Error, disk, io,
+    Error, disk, io, memory,
     volume::{Arrangement, Lattice, Volume, phantoms::Phantom},
 };
 use std::{io::Write, path::PathBuf};
@@ -83,7 +83,7 @@ impl Generate {
         let extension = self.output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
         match (self.what, &self.from, extension) {
             (What::Scan, Some(from), "ply") => {
-                let mesh = io::load_mesh(from, &io::Limits::default())?;
+                let mesh = io::load_mesh(from, &LimitFlags::default().whole(memory::most()))?;
                 if mesh.triangles.is_empty() {
                     let message = format!("{} has no triangles that could be cut in more", from.display());
                     return Err(Error::Argument(message).into());
@@ -150,7 +150,7 @@ fn check_dims(dims: [usize; 3], bytes: u64) -> Result<(), Failure> {
         return Err(Failure::Usage(format!("--dims: a volume of {x} × {y} × {z} samples holds none")));
     }
     let samples = dims.iter().try_fold(1u64, |all, &n| all.checked_mul(n as u64));
-    let most = io::Limits::default().bytes / bytes;
+    let most = memory::most().unwrap_or(u64::MAX).min(io::Limits::default().bytes) / bytes;
     match samples.filter(|&samples| samples <= most) {
         Some(_) => Ok(()),
         None => Err(Failure::Usage(format!("--dims: from 1 to {most} samples can be made at once"))),

@@ -10,7 +10,8 @@ pub struct LimitFlags {
     /// Vertices, points or faces that a file may claim [default: 2147483648]
     #[arg(long, value_name = "COUNT")]
     limit_points: Option<u64>,
-    /// Bytes that an input may occupy: its files, and all that is made of them until it is read [default: 34359738368]
+    /// Bytes that an input may occupy: its files, and all that is made of them until it is read [default: 34359738368, and of an
+    /// input that is read as a whole no more than three quarters of the memory that there is]
     #[arg(long, value_name = "BYTES")]
     limit_bytes: Option<u64>,
     /// Depth to which nodes and elements may be nested [default: 64]
@@ -34,6 +35,15 @@ impl LimitFlags {
             texels: self.limit_texels.unwrap_or(default.texels),
             seconds: self.limit_seconds.unwrap_or(default.seconds),
         }
+    }
+}
+
+impl LimitFlags {
+    /// The limits of an input that is read as a whole, for which there are `memory` bytes.
+    pub fn whole(&self, memory: Option<u64>) -> Limits {
+        let limits = self.limits();
+        let memory = memory.filter(|_| self.limit_bytes.is_none()).unwrap_or(u64::MAX);
+        Limits { bytes: limits.bytes.min(memory), ..limits }
     }
 }
 

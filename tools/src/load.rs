@@ -7,6 +7,7 @@ use splatkit::{
     Error,
     hierarchy::Hierarchy,
     io::{self, Endian, Kind, Limits, RawLayout, SampleType, VolumeStream},
+    memory,
     scattered::{Points, SampleOptions},
     surface::Mesh,
     volume::{Volume, bricks::Bricks},
@@ -66,13 +67,18 @@ impl LoadFlags {
 
     /// Reads a file.
     pub fn open(&self, path: &Path) -> Result<Input, Failure> {
-        let limits = self.limits();
+        self.open_within(path, memory::most())
+    }
+
+    /// Reads a file; where it is read as a whole it may take so many bytes of memory, unless a flag allows more.
+    pub fn open_within(&self, path: &Path, memory: Option<u64>) -> Result<Input, Failure> {
+        let (limits, whole) = (self.limits(), self.limits.whole(memory));
         Ok(match self.kind(path)? {
-            Kind::Mesh => Input::Mesh(io::load_mesh(path, &limits)?),
-            Kind::Volume => Input::Volume(io::load_volume(path, &limits, self.layout().as_ref())?),
+            Kind::Mesh => Input::Mesh(io::load_mesh(path, &whole)?),
+            Kind::Volume => Input::Volume(io::load_volume(path, &whole, self.layout().as_ref())?),
             Kind::Bricks => Input::Bricks(Arc::new(Bricks::open(path, &limits)?)),
             Kind::Hierarchy => Input::Hierarchy(Arc::new(Hierarchy::open(path, &limits)?)),
-            Kind::Samples => Input::Samples(io::load_samples(path, &limits, self.scalar.as_deref())?),
+            Kind::Samples => Input::Samples(io::load_samples(path, &whole, self.scalar.as_deref())?),
         })
     }
 

@@ -53,7 +53,7 @@ fn bricks_tell_what_they_hold() {
     assert_eq!(folder.json("info b --json")["levels"].as_u64(), Some(3));
     folder.run("render b -o b.png --size 64x48").ok();
     folder.run("convert b -o b.splk").fails(2, &["hierarchies are made of meshes and clouds"]);
-    folder.run("convert b -o b.splv").fails(2, &["holds no volume that can be cut in bricks"]);
+    folder.run("convert b -o b.splv").fails(2, &["holds no volume of which this can be made"]);
 }
 
 #[test]

@@ -1,24 +1,13 @@
 //! Volumes in levels of bricks.
 
-use super::{Convert, memory};
-use crate::{failure::Failure, load::Input, output, progress::Progress, render::milliseconds, scene::in_file};
+use super::{Convert, memory, source::Source};
+use crate::{failure::Failure, output, progress::Progress, render::milliseconds, scene::in_file};
 use serde_json::json;
 use splatkit::{
     Error,
-    io::{Kind, VolumeStream},
-    volume::{
-        Lattice, Scalar, Volume,
-        bricks::{self, WriteOptions},
-    },
+    volume::bricks::{self, WriteOptions},
 };
-use std::{path::Path, time::Instant};
-
-/// A volume to convert.
-enum Source {
-    /// Slice by slice.
-    Stream(VolumeStream),
-    Whole(Volume),
-}
+use std::time::Instant;
 
 impl Convert {
     /// Writes the volume as .splv.
@@ -30,18 +19,11 @@ impl Convert {
             return Err(Failure::Usage("--lattice is for volumes written as .nrrd".into()));
         }
         let start = Instant::now();
-        let most = self.surface.memory.or_else(memory::usual).unwrap_or(u64::MAX);
+        let most = self.most_memory();
         progress.stage(format!("Reading {}", file.display()));
         let source = self.source(file, most)?;
         let (lattice, scalar) = source.shape();
-        let need = source.memory();
-        if need > most {
-            let [wanted, most] = [need, most].map(|bytes| bytes.div_ceil(1 << 20));
-            return Err(Failure::Usage(format!(
-                "{}: this takes about {wanted} MiB, but only {most} MiB may be taken; --memory allows more",
-                file.display()
-            )));
-        }
+        memory::check(file, memory_of(&source), most)?;
         if self.dry_run {
             return self.expect_bricks(&source, progress);
         }
@@ -80,40 +62,11 @@ impl Convert {
         output::line(format_args!("time            {:.2} s", milliseconds(start) / 1e3))
     }
 
-    /// Opens the input, slice by slice where that can be.
-    fn source(&self, file: &Path, most: u64) -> Result<Source, Failure> {
-        let none = || {
-            let file = file.display();
-            Err(Failure::Usage(format!("{file} holds no volume that can be cut in bricks; write surfaces as .splk")))
-        };
-        if self.load.kind(file)? != Kind::Volume {
-            return none();
-        }
-        if let Some(stream) = self.load.stream(file)? {
-            return Ok(Source::Stream(stream));
-        }
-        // What is not packed takes no less memory than its file; what is shows when it is unpacked.
-        let bytes = file.metadata().map_err(|e| Error::file(file, "read", e))?.len();
-        if bytes > most {
-            return Err(Failure::Usage(format!(
-                "{}: {} MiB cannot be read as a whole in {} MiB; raw volumes, and NRRD files of raw encoding, are read slice \
-                 by slice, others need more --memory",
-                file.display(),
-                bytes >> 20,
-                most >> 20
-            )));
-        }
-        match self.load.open(file)? {
-            Input::Volume(volume) => Ok(Source::Whole(volume)),
-            _ => none(),
-        }
-    }
-
     /// Tells what a conversion would take.
     fn expect_bricks(&self, source: &Source, progress: &Progress) -> Result<(), Failure> {
         progress.clear();
         let (lattice, scalar) = source.shape();
-        let need = source.memory();
+        let need = memory_of(source);
         // Levels above the finest have a seventh of its samples, blocks a 32nd of the bricks' samples.
         let unpacked = (lattice.len() as u64).saturating_mul(scalar.bytes() as u64) / 7 * 8;
         let slice_by_slice = matches!(source, Source::Stream(_));
@@ -134,21 +87,12 @@ impl Convert {
     }
 }
 
-impl Source {
-    fn shape(&self) -> (Lattice, Scalar) {
-        match self {
-            Self::Stream(stream) => (stream.lattice().clone(), stream.scalar()),
-            Self::Whole(volume) => (volume.lattice.clone(), volume.samples.scalar()),
-        }
-    }
-
-    /// About how much memory converting takes.
-    fn memory(&self) -> u64 {
-        let (lattice, scalar) = self.shape();
-        let whole = match self {
-            Self::Stream(_) => 0,
-            Self::Whole(volume) => volume.samples.bytes().len() as u64,
-        };
-        bricks::memory_of(lattice.dims, scalar).saturating_add(whole)
-    }
+/// About how much memory converting takes.
+fn memory_of(source: &Source) -> u64 {
+    let (lattice, scalar) = source.shape();
+    let whole = match source {
+        Source::Stream(_) => 0,
+        Source::Whole(volume) => volume.samples.bytes().len() as u64,
+    };
+    bricks::memory_of(lattice.dims, scalar).saturating_add(whole)
 }

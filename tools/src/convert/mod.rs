@@ -3,6 +3,7 @@
 mod bricks;
 mod external;
 mod memory;
+mod source;
 mod surface;
 mod volume;
 
@@ -55,5 +56,10 @@ impl Convert {
             "splv" => self.bricks(progress),
             _ => self.surface(&extension, progress),
         }
+    }
+
+    /// The bytes of memory that a conversion may take.
+    fn most_memory(&self) -> u64 {
+        self.surface.memory.or_else(splatkit::memory::most).unwrap_or(u64::MAX)
     }
 }

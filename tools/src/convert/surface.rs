@@ -80,7 +80,7 @@ impl Convert {
         if self.lattice.is_some() {
             return Err(Failure::Usage("--lattice is for volumes written as .nrrd".into()));
         }
-        let most = self.surface.memory.or_else(memory::usual).unwrap_or(u64::MAX);
+        let most = self.most_memory();
         let need = memory::need(&self.files, &self.load.limits());
         if need.bytes > most {
             return self.in_regions(extension, need, most, progress);

@@ -1,7 +1,7 @@
 //! Volumes: in another format, or on another lattice.
 
-use super::Convert;
-use crate::{failure::Failure, load::Input, output, progress::Progress};
+use super::{Convert, memory, source::Source};
+use crate::{failure::Failure, output, progress::Progress};
 use clap::ValueEnum;
 use serde_json::json;
 use splatkit::{
@@ -28,9 +28,12 @@ impl Convert {
             ));
         }
         progress.stage(format!("Reading {}", file.display()));
-        let Input::Volume(volume) = self.load.open(file)? else {
-            let file = file.display();
-            return Err(Failure::Usage(format!("{file} holds no volume; write surfaces as .splk or .ply")));
+        let most = self.most_memory();
+        let source = self.source(file, most)?;
+        memory::check(file, memory_of(&source, self.lattice), most)?;
+        let volume = match source {
+            Source::Whole(volume) => volume,
+            Source::Stream(_) => self.whole(file, most)?,
         };
         let count = volume.len();
         progress.stage("Resampling");
@@ -53,6 +56,16 @@ impl Convert {
         output::line(format_args!("samples read      {count}"))?;
         output::line(format_args!("samples written   {} ({nx} × {ny} × {nz}, {lattice})", volume.len()))
     }
+}
+
+/// About how much memory converting takes: the samples, and of a body-centred lattice its own (0.71 of them) and what they are
+/// interpolated from.
+fn memory_of(source: &Source, wanted: Option<Wanted>) -> u64 {
+    let (lattice, scalar) = source.shape();
+    let is_resampled = wanted == Some(Wanted::Bcc) && lattice.arrangement == Arrangement::Cartesian;
+    let bytes = scalar.bytes() as u64;
+    let of_sample = if is_resampled { 2 * bytes + size_of::<f64>() as u64 } else { bytes };
+    (lattice.len() as u64).saturating_mul(of_sample)
 }
 
 fn on_lattice(volume: Volume, wanted: Option<Wanted>) -> Result<Volume, Error> {

@@ -1,0 +1,63 @@
+//! A volume that is converted: slice by slice where that can be, or as a whole.
+
+use super::Convert;
+use crate::{failure::Failure, load::Input};
+use splatkit::{
+    Error,
+    io::{Kind, VolumeStream},
+    volume::{Lattice, Scalar, Volume},
+};
+use std::path::Path;
+
+/// A volume to convert.
+pub enum Source {
+    /// Slice by slice.
+    Stream(VolumeStream),
+    Whole(Volume),
+}
+
+impl Source {
+    pub fn shape(&self) -> (Lattice, Scalar) {
+        match self {
+            Self::Stream(stream) => (stream.lattice().clone(), stream.scalar()),
+            Self::Whole(volume) => (volume.lattice.clone(), volume.samples.scalar()),
+        }
+    }
+}
+
+impl Convert {
+    /// Opens the input, slice by slice where that can be; as a whole in `most` bytes of memory.
+    pub(super) fn source(&self, file: &Path, most: u64) -> Result<Source, Failure> {
+        if self.load.kind(file)? != Kind::Volume {
+            return Err(none(file));
+        }
+        if let Some(stream) = self.load.stream(file)? {
+            return Ok(Source::Stream(stream));
+        }
+        // What is not packed takes no less memory than its file; what is shows when it is unpacked.
+        let bytes = file.metadata().map_err(|e| Error::file(file, "read", e))?.len();
+        if bytes > most {
+            return Err(Failure::Usage(format!(
+                "{}: {} MiB cannot be read as a whole in {} MiB; of raw volumes, and NRRD files of raw encoding, .splv files \
+                 are made slice by slice, others need more --memory",
+                file.display(),
+                bytes >> 20,
+                most >> 20
+            )));
+        }
+        self.whole(file, most).map(Source::Whole)
+    }
+
+    /// Reads a volume as a whole, in `most` bytes of memory.
+    pub(super) fn whole(&self, file: &Path, most: u64) -> Result<Volume, Failure> {
+        match self.load.open_within(file, Some(most))? {
+            Input::Volume(volume) => Ok(volume),
+            _ => Err(none(file)),
+        }
+    }
+}
+
+fn none(file: &Path) -> Failure {
+    let file = file.display();
+    Failure::Usage(format!("{file} holds no volume of which this can be made; write surfaces as .splk or .ply"))
+}
