@@ -131,7 +131,7 @@ impl Scene {
         let before = settings.classifies_samples();
         for (number, item) in self.items.iter().enumerate() {
             // It may have been changed since the scene was looked at as a whole.
-            numbers::check_transfer(&numbers::place_of(number), item)?;
+            numbers::check_transfer(item).map_err(numbers::of_item(number))?;
             match item {
                 Item::Radiance(_) | Item::Hierarchy(_) if settings.optics == Optics::Maximum => {
                     return wrong(
@@ -213,7 +213,7 @@ impl Scene {
             }
         }
         for (number, item) in self.items.iter().enumerate() {
-            numbers::check_item(&numbers::place_of(number), item)?;
+            numbers::check_item(item).map_err(numbers::of_item(number))?;
         }
         if fields > 1 {
             return Err(Error::Argument(format!("a picture takes one volume or sample set, the scene has {fields}")));
@@ -391,6 +391,14 @@ impl Scene {
 }
 
 impl Item {
+    /// Checks that this can be drawn by itself, as [`Scene::validate`] does for all items.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for numbers that are none, or beyond what 32 bits hold.
+    pub fn validate(&self) -> Result<()> {
+        numbers::check_item(self).map_err(Error::Argument)
+    }
+
     /// The box around the item, footprints included.
     pub fn bounds(&self) -> Bounds {
         match self {

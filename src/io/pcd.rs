@@ -5,7 +5,7 @@ mod lzf;
 #[cfg(test)]
 mod tests;
 
-use super::{Source, cloud::Cloud, growing::Growing};
+use super::{Source, cloud::Cloud, growing::Growing, text::lines_of};
 use crate::{Result, surface::Mesh};
 use glam::{DVec3, Vec3};
 use header::{Data, Field, Header};
@@ -110,7 +110,7 @@ impl<'a> Rows<'a> {
         let width = header.fields.iter().map(|field| field.count).sum::<usize>();
         let mut numbers = Growing::new(source, "the numbers");
         let mut found = 0;
-        for (number, line) in (header.lines + 1..).zip(data.split(|&b| b == b'\n')) {
+        for (number, line) in (header.lines + 1..).zip(lines_of(data)) {
             let before = numbers.len();
             let text = String::from_utf8_lossy(line);
             for word in text.split_ascii_whitespace() {

@@ -30,7 +30,7 @@ impl<'a> Text<'a> {
     /// Finds the lines of a file. Those that `skip` tells are passed over.
     pub fn of(source: &'a Source, mut skip: impl FnMut(usize, &[u8]) -> Result<bool>) -> Result<Self> {
         let mut lines: Growing<(usize, &[u8])> = Growing::new(source, "the places of the lines");
-        for (number, line) in (1..).zip(without_mark(source.bytes()).split(|&b| b == b'\n')) {
+        for (number, line) in (1..).zip(lines_of(without_mark(source.bytes()))) {
             let line = line.trim_ascii();
             if is_row(line, lines.is_empty()) && !skip(number, line)? {
                 lines.push((number, line))?;
@@ -118,10 +118,15 @@ impl<'a> Text<'a> {
 
 /// The words of the first line that counts, and whether they are names; none in a file without such a line.
 pub(super) fn first_words(bytes: &[u8]) -> Option<(Vec<String>, bool)> {
-    let line = without_mark(bytes).split(|&b| b == b'\n').map(<[u8]>::trim_ascii).find(|line| is_row(line, true))?;
+    let line = lines_of(without_mark(bytes)).map(<[u8]>::trim_ascii).find(|line| is_row(line, true))?;
     let words = split(line).1;
     let named = has_names(&words);
     Some((words, named))
+}
+
+/// The lines of a text, which end as on any system: by a line feed, a carriage return, or both.
+pub(super) fn lines_of(text: &[u8]) -> impl Iterator<Item = &[u8]> {
+    text.split(|&b| b == b'\n').flat_map(|line| line.strip_suffix(b"\r").unwrap_or(line).split(|&b| b == b'\r'))
 }
 
 /// Without the byte order mark that some writers of UTF-8 begin with.

@@ -177,6 +177,7 @@ mod tests {
         for (text, colored, normal) in [
             ("1 2 3\n4 5 6\n", false, false),
             ("1,2,3,255,128,0\r\n4,5,6,0,0,51", true, false),
+            ("1,2,3,255,128,0\r4,5,6,0,0,51\r", true, false),
             ("1 2 3 65535 32896 0\n4 5 6 0 0 13107", true, false),
             ("1 2 3 1.0 0.502 0\n4 5 6 0 0 0.2", true, false),
             ("1 2 3 0 0.6 0.8\n4 5 6 -1 0 0", false, true),
@@ -218,6 +219,8 @@ mod tests {
             ("x y z\n", "no points"),
             ("1 2 3\n4 5", "line 2: has 2 columns, but the first line has 3"),
             ("1 2 3\n4 nan 6", "line 2: number 2 is NaN"),
+            ("1 2 3\r\n4 nan 6\r\n", "line 2: number 2 is NaN"),
+            ("1 2 3\r4 nan 6\r", "line 2: number 2 is NaN"),
             ("1 2 3\n4 five 6", "line 2: “five” is not a number"),
             ("3\n1 2 3\n4 5 6\n", "line 1: counts 3 points, but there are 2"),
             ("18446744073709551615\n1 2 3\n18446744073709551615\n4 5 6\n", "line 1: counts 18446744073709551615"),

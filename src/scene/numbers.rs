@@ -18,28 +18,26 @@ const MOST_OPTICAL_DEPTH: f32 = 1e10;
 /// others that are much smaller than this part of it.
 const VALUES: f64 = 1048576.0;
 
-/// What errors call an item.
-pub(super) fn place_of(number: usize) -> String {
-    format!("item {number} of the scene")
+/// An error of the item of this number.
+pub(super) fn of_item(number: usize) -> impl Fn(String) -> Error {
+    move |message| Error::Argument(format!("item {number} of the scene: {message}"))
 }
 
 /// Checks the transfer function of an item that has one.
-pub(super) fn check_transfer(place: &str, item: &Item) -> Result<()> {
+pub(super) fn check_transfer(item: &Item) -> Result<(), String> {
     match item {
         Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => {
-            let wrong = |message: String| Error::Argument(format!("{place}: the transfer function: {message}"));
-            transfer.validate_numbers().map_err(wrong)
+            transfer.validate_numbers().map_err(|message| format!("the transfer function: {message}"))
         }
         Item::Radiance(_) | Item::Hierarchy(_) => Ok(()),
     }
 }
 
-/// Checks the numbers of an item; `place` tells which item it is.
-pub(super) fn check_item(place: &str, item: &Item) -> Result<()> {
-    let wrong = |message: String| Error::Argument(format!("{place}: {message}"));
-    check_transfer(place, item)?;
+/// Checks the numbers of an item.
+pub(super) fn check_item(item: &Item) -> Result<(), String> {
+    check_transfer(item)?;
     if let Item::Volume(_, kernel, _) | Item::Bricks(_, kernel, _) = item {
-        kernel.validate().map_err(|error| wrong(error.to_string()))?;
+        kernel.validate().map_err(|error| error.to_string())?;
     }
     let field = match item {
         Item::Scalar(set, transfer) => Some((transfer, set.value_range())),
@@ -48,18 +46,18 @@ pub(super) fn check_item(place: &str, item: &Item) -> Result<()> {
         Item::Radiance(_) | Item::Hierarchy(_) => None,
     };
     match item {
-        Item::Radiance(set) | Item::Scalar(set, _) => check_set(set).map_err(wrong)?,
-        Item::Volume(volume, ..) => volume.validate().map_err(wrong)?,
+        Item::Radiance(set) | Item::Scalar(set, _) => check_set(set)?,
+        Item::Volume(volume, ..) => volume.validate()?,
         Item::Hierarchy(_) | Item::Bricks(..) => {}
     }
     if let Some((transfer, [low, high])) = field {
         // One value far off, such as that of a broken sensor, would leave all others one colour.
         let [first, last] = transfer.span();
         if last > first && last - first < (high - low) / VALUES {
-            return Err(wrong(format!(
+            return Err(format!(
                 "the transfer function changes from {first} to {last}, too close together for values from {low} to {high}: \
                  remove values that are far off, or choose another function"
-            )));
+            ));
         }
     }
     let Bounds { min, max } = item.bounds();
@@ -67,7 +65,7 @@ pub(super) fn check_item(place: &str, item: &Item) -> Result<()> {
     // Nothing at all has bounds of its own, which are not finite.
     let is_none = matches!(item, Item::Radiance(set) | Item::Scalar(set, _) if set.splats.is_empty());
     if !is_none && ![min, max, max - min].iter().all(|v| v.to_array().into_iter().all(holds)) {
-        return Err(wrong(format!("it reaches from {min} to {max}, beyond what 32-bit numbers hold")));
+        return Err(format!("it reaches from {min} to {max}, beyond what 32-bit numbers hold"));
     }
     Ok(())
 }

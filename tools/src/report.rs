@@ -90,6 +90,26 @@ impl Report {
         tables.join("\n")
     }
 
+    /// A page of tables with these in place of those of the same titles, or behind them all; the others stay.
+    pub fn among(&self, page: &str) -> String {
+        let title = |text: &str| text.strip_prefix("**").and_then(|text| Some(text.split_once("**")?.0.to_owned()));
+        let mut parts: Vec<(Option<String>, String)> = Vec::new();
+        for line in page.lines() {
+            match (title(line), parts.last_mut()) {
+                (None, Some((_, part))) => *part += &format!("{line}\n"),
+                (own, _) => parts.push((own, format!("{line}\n"))),
+            }
+        }
+        for table in &self.tables {
+            let text = table.markdown();
+            match parts.iter_mut().find(|(own, _)| own.as_deref() == Some(table.title)) {
+                Some((_, part)) => *part = text,
+                None => parts.push((Some(table.title.to_owned()), text)),
+            }
+        }
+        parts.iter().map(|(_, part)| format!("{}\n", part.trim_end())).collect::<Vec<_>>().join("\n")
+    }
+
     pub fn json(&self) -> Value {
         let tables: Vec<_> = self.tables.iter().map(Table::json).collect();
         json!({ "adapter": self.adapter, "tables": tables })
@@ -153,6 +173,23 @@ mod tests {
         table.row("one", vec![Cell::Number(1.25, 1), Cell::None]);
         assert_eq!(table.markdown(), "**A** b.\n\n| case | x | y |\n| --- | ---: | ---: |\n| one | 1.2 | – |\n");
         assert_eq!(table.json()["rows"][0], json!({ "name": "one", "x": 1.25, "y": null }));
+    }
+
+    #[test]
+    fn tables_that_are_not_measured_stay() {
+        let table = |title, value| {
+            let mut table = Table::new(title, "b.", &["case", "x"]);
+            table.row("one", vec![Cell::Number(value, 0)]);
+            table
+        };
+        let report = |tables| Report { adapter: String::new(), tables };
+        let all = report(vec![table("A", 1.0), table("B", 2.0)]);
+        let page = all.markdown();
+        assert_eq!(all.among(&page), page);
+        let some = report(vec![table("A", 3.0)]).among(page.trim());
+        assert_eq!(some, report(vec![table("A", 3.0), table("B", 2.0)]).markdown());
+        assert_eq!(report(vec![table("C", 4.0)]).among(&some), some + "\n" + &table("C", 4.0).markdown());
+        assert_eq!(all.among(""), page);
     }
 
     #[test]

@@ -117,7 +117,16 @@ impl SceneFlags {
                 }
             }
         }
-        loaded.scene.validate()?;
+        // What cannot be drawn by itself is the fault of its file.
+        let of_file = |error| {
+            let found = self
+                .inputs
+                .iter()
+                .zip(&loaded.scene.items)
+                .find_map(|(path, item)| Some((path, item.validate().err()?)));
+            found.map_or(error, |(path, own)| in_file(path, own))
+        };
+        loaded.scene.validate().map_err(of_file)?;
         loaded.load_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(loaded)
     }

@@ -14,6 +14,8 @@ fn folder(name: &str) -> Folder {
     folder.put("a.nrrd", nrrd("uint8", &ball()));
     folder.put("flat.nrrd", nrrd("uint8", &[7; 4096]));
     folder.put("nan.nrrd", floats(|i| if i % 100 == 7 { f32::NAN } else { i as f32 }));
+    folder.put("a.ply", PLY);
+    folder.put("far.nrrd", floats(|i| if i == 7 { 1e30 } else { i as f32 }));
     folder.put("clear.json", r#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 0], [255, 0]]}"#);
     folder.put("steep.json", r#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 1]], "gradient": [[5, 1], [2, 0]]}"#);
     folder.put("cone.csv", "1\n0.5\n0\n");
@@ -106,6 +108,7 @@ const WRONG: &[(&str, i32, &str)] = &[
     ("a.nrrd --kernel none.csv --extent 2", 3, "none.csv: cannot open"),
     ("a.nrrd --kernel words.csv --extent 2", 3, "words.csv: line 2: “one half” is no number"),
     ("a.nrrd --kernel negative.json --extent 2", 2, "a kernel's values must add up to more than 0"),
+    ("a.ply far.nrrd --range 0,4096", 3, "far.nrrd: content: the transfer function changes from 0 to 4096, too close"),
     // Clips.
     (
         "a.nrrd --clip box:20,20,20:30,30,30",

@@ -38,3 +38,24 @@ fn what_can_only_be_read_as_a_whole_is_told() {
     names.sort();
     assert_eq!(names, ["a.obj", "cut.ply", "lost.ply"]);
 }
+
+#[test]
+fn volumes_keep_to_the_memory() {
+    let folder = Folder::new("volume_memory");
+    folder.put("a.nrrd", nrrd("uint8", &ball()));
+    folder.run("convert a.nrrd -o packed.nrrd --memory 5000").ok();
+    // The samples alone, and with what they are resampled from.
+    folder.run("convert a.nrrd -o b.nrrd --memory 4000").fails(2, &["a.nrrd: this takes", "--memory allows more"]);
+    folder.run("convert a.nrrd -o b.nrrd --memory 5000 --lattice bcc").fails(2, &["--memory allows more"]);
+    folder.run("convert a.nrrd -o b.nrrd --memory 50000 --lattice bcc").ok();
+    let packed = std::fs::metadata(folder.path("packed.nrrd")).unwrap().len();
+    assert!(packed < 4000, "{packed} bytes");
+    let most = packed + 100;
+    folder
+        .run(&format!("convert packed.nrrd -o c.nrrd --memory {most}"))
+        .fails(3, &["over the limit", "--limit-bytes"]);
+    folder
+        .run(&format!("convert packed.nrrd -o c.splv --memory {most}"))
+        .fails(3, &["over the limit", "--limit-bytes"]);
+    folder.run("render a.nrrd -o a.png --size 32x32 --gpu-memory 1KiB").fails(4, &["may be taken", "--gpu-memory"]);
+}

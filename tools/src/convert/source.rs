@@ -45,12 +45,12 @@ impl Convert {
                 most >> 20
             )));
         }
-        self.whole(file, most).map(Source::Whole)
+        self.whole(file, Some(most)).map(Source::Whole)
     }
 
-    /// Reads a volume as a whole, in `most` bytes of memory.
-    pub(super) fn whole(&self, file: &Path, most: u64) -> Result<Volume, Failure> {
-        match self.load.open_within(file, Some(most))? {
+    /// Reads a volume as a whole; in so many bytes of memory where it is not known what it takes.
+    pub(super) fn whole(&self, file: &Path, memory: Option<u64>) -> Result<Volume, Failure> {
+        match self.load.open_within(file, memory)? {
             Input::Volume(volume) => Ok(volume),
             _ => Err(none(file)),
         }

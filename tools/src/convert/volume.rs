@@ -33,7 +33,7 @@ impl Convert {
         memory::check(file, memory_of(&source, self.lattice), most)?;
         let volume = match source {
             Source::Whole(volume) => volume,
-            Source::Stream(_) => self.whole(file, most)?,
+            Source::Stream(_) => self.whole(file, None)?,
         };
         let count = volume.len();
         progress.stage("Resampling");
