@@ -47,9 +47,15 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     let column = tile % frame.tiles.x;
     let row = tile / frame.tiles.x;
     let resumed = atomicLoad(&progress[tile]);
+    // All lanes have seen where the tile stands before one of them changes it, and that before another does again.
+    storageBarrier();
     if resumed == FINISHED {
         return;
     }
+    if all(lane.xy == vec2(0u)) {
+        atomicStore(&progress[tile], FINISHED);
+    }
+    storageBarrier();
     first_composited = max(resumed, stage.first_sheet);
     let corner = vec2<i32>(vec2(column, row)) * TILE_STEP - APRON;
     let first_pixel = corner + vec2<i32>(i32(lane.x), i32(lane.y * ROWS));
@@ -150,9 +156,6 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     if stopped == 0u {
         // Sheets behind the pass's last are the next pass's.
         close(front, min(open, stage.end_sheet - front), lane.xy);
-    }
-    if all(lane.xy == vec2(0u)) {
-        atomicStore(&progress[tile], FINISHED);
     }
     if stopped > 0u {
         atomicStore(&progress[tile], stopped);
