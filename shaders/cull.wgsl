@@ -43,11 +43,7 @@ fn cull(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let count = candidate_count();
     let groups = (count + 64u * RUN - 1u) / (64u * RUN);
     // The dispatch is large enough for all nodes at hand, drawn or not.
-    let own_group = group_number(group);
-    if own_group >= dealt_count(groups) {
-        return;
-    }
-    let number = dealt(own_group, groups) * 64u + lane;
+    let number = dealt(group_number(group), groups) * 64u + lane;
     let start = number * RUN;
     if stage.groups == 0u || start >= count {
         return;

@@ -140,9 +140,10 @@ fn number_of(id: vec3<u32>) -> u32 {
 // much alike, so that a row may have all the work or none, numbers are dealt out like cards to this many hands.
 const HANDS: u32 = 16u;
 
+// A number behind the last card gets none, `count`.
 fn dealt(number: u32, count: u32) -> u32 {
     let each = (count + HANDS - 1u) / HANDS;
-    return (number % each) * HANDS + number / each;
+    return select((number % each) * HANDS + number / each, count, number >= each * HANDS);
 }
 
 // Numbers to deal so that all of a count come up; some are beyond it.

@@ -38,9 +38,8 @@ var<workgroup> neighbours: array<f32, 64>;
 @compute @workgroup_size(8, LANE_ROWS)
 fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) lane: vec3<u32>) {
     let tile_count = atomicLoad(&progress[progress_word(LISTED)]);
-    // The last row of the dispatch may have workgroups that no tile is dealt to.
     let number = dealt(group_number(group), tile_count);
-    if group_number(group) >= dealt_count(tile_count) || number >= tile_count {
+    if number >= tile_count {
         return;
     }
     let tile = atomicLoad(&progress[listed_tile(number)]);

@@ -51,7 +51,7 @@ fn order(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     let bins = progress[progress_word(LISTED)] * stage.groups;
     let groups = (bins + 63u) / 64u;
     let number = dealt(group_number(group), groups) * 64u + lane;
-    if group_number(group) >= dealt_count(groups) || number >= bins {
+    if number >= bins {
         return;
     }
     let tile = progress[listed_tile(number / stage.groups)] - stage.first_row * frame.tiles.x;

@@ -147,6 +147,8 @@ pub struct Forest {
     slots: Vec<Option<(u32, u64)>>,
     /// The slot of each page.
     slot_of: Vec<Option<u32>>,
+    /// All pages, the coarse ones first.
+    order: Vec<u32>,
     frame: u64,
     /// Pages that the last view needed and that found no room.
     pub missing: usize,
@@ -161,6 +163,7 @@ impl Forest {
             cut: super::buffer(gpu, "cut", size_of::<GpuCut>() as u64, Usage::UNIFORM),
             slots: Vec::new(),
             slot_of: vec![None; pages],
+            order: hierarchy.coarse_first(),
             frame: 0,
             missing: 0,
         }
@@ -186,15 +189,7 @@ impl Forest {
                 }
             }
         }
-        let mut needed: Vec<u32> = (0..).zip(needed).filter(|(_, needed)| *needed).map(|(index, _)| index).collect();
-        // No page goes before one above it.
-        let mut coarseness = vec![f32::INFINITY; pages.len()];
-        for (page, entry) in pages.iter().enumerate() {
-            let above = entry.parent_pages.clone().map(|parent| coarseness[parent as usize]);
-            coarseness[page] = above.fold(entry.largest_parent_size, f32::min);
-        }
-        needed.sort_by(|&a, &b| coarseness[b as usize].total_cmp(&coarseness[a as usize]).then(a.cmp(&b)));
-        needed
+        self.order.iter().copied().filter(|&page| needed[page as usize]).collect()
     }
 
     /// The finest cut, in pixels, whose pages hold no more than `most` nodes.

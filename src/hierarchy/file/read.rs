@@ -199,6 +199,11 @@ impl Hierarchy {
         &self.directory.pages
     }
 
+    /// The numbers of all pages, those of coarse nodes first, each behind those of its parents.
+    pub(crate) fn coarse_first(&self) -> Vec<u32> {
+        self.directory.coarse_first()
+    }
+
     /// Whether the leaves of block 0 are portals.
     pub fn is_joined(&self) -> bool {
         self.directory.blocks.len() > 1
