@@ -11,7 +11,7 @@ use splatkit::{
     picture::Picture,
     scene::{Scene, Settings},
     surface::{Mesh, SurfelOptions},
-    volume::{TransferFunction, bricks::Bricks, phantoms::Phantom},
+    volume::{Lattice, Samples, TransferFunction, Volume, bricks::Bricks, phantoms::Phantom},
 };
 use std::{sync::Arc, time::Duration};
 
@@ -237,17 +237,71 @@ fn what_did_not_fit_leaves_the_device_usable() {
     assert!(same(&first, &again));
 }
 
-/// Scenes of 67 million candidates need more workgroups than a row of a dispatch takes; where a row takes 16, so do these.
+/// Scenes of 67 million candidates, and pictures of 65,536 tiles, need more workgroups than a row of a dispatch takes; where a
+/// row takes 16 or 24, so do these. Rows of 24 end behind the last tile.
 #[test]
 fn dispatches_of_many_rows_draw_the_same() {
     let usual = host_device(wgpu::Limits::default());
-    let narrow = host_device(wgpu::Limits { max_compute_workgroups_per_dimension: 16, ..wgpu::Limits::default() });
+    let narrow = [16, 24]
+        .map(|row| host_device(wgpu::Limits { max_compute_workgroups_per_dimension: row, ..wgpu::Limits::default() }));
     for (name, scene) in [("whole", scene(false)), ("in bricks", scene(true))] {
-        let pictures = [&usual, &narrow].map(|gpu| drawn(gpu, &scene).expect("draws"));
-        let covered = pictures[0].color.iter().filter(|color| color[3] > 0.5).count();
+        let expected = drawn(&usual, &scene).expect("draws");
+        let covered = expected.color.iter().filter(|color| color[3] > 0.5).count();
         assert!(covered > 1000, "{name}: {covered} pixels");
-        assert!(same(&pictures[0], &pictures[1]), "{name}: another picture");
+        for gpu in &narrow {
+            assert!(same(&drawn(gpu, &scene).expect("draws"), &expected), "{name}: another picture");
+        }
     }
+}
+
+/// Slices so wide that a binding holds few: chunks of two slices with their neighbours. Wider ones are refused.
+#[test]
+fn wide_slices_are_drawn_in_thin_chunks() {
+    let gpu = host_device(wgpu::Limits { max_storage_buffer_binding_size: 1 << 20, ..wgpu::Limits::default() });
+    let scene = |side: usize| {
+        let value = |index: usize| {
+            let [x, y] = [index % side, index / side % side].map(|at| at as f64 / side as f64);
+            (255.0 * (20.0 * x).sin().abs() * (20.0 * y).cos().abs()) as u8
+        };
+        let samples = Samples::U8((0..9 * side * side).map(value).collect());
+        let volume = Volume::new(Lattice::with_spacing([side, side, 9], DVec3::ONE), samples).unwrap();
+        let transfer = TransferFunction::automatic(&volume);
+        Scene::new().with_volume(volume, Kernel::default(), transfer)
+    };
+    let wide = scene(300);
+    let expected = drawn(&host_device(wgpu::Limits::default()), &wide).expect("draws");
+    let covered = expected.color.iter().filter(|color| color[3] > 0.5).count();
+    assert!(covered > 1000, "{covered} pixels");
+    let difference = difference(&drawn(&gpu, &wide).expect("draws"), &expected);
+    assert!(difference < MOST_DIFFERENCE, "another picture, by {difference}");
+    let refused = drawn(&gpu, &scene(600)).unwrap_err();
+    assert!(matches!(&refused, Error::Argument(what) if what.contains("convert the volume to bricks")), "{refused}");
+}
+
+/// A picture with more tiles than there are bins for all its sheets is drawn in strips.
+#[test]
+fn many_sheets_of_many_tiles_are_drawn_in_strips() {
+    let gpu = gpu();
+    let mut knot = Mesh::knot(60, 6);
+    knot.positions.iter_mut().for_each(|place| *place *= 0.5);
+    let scene = Scene::new().with_splats(knot.surfels(&SurfelOptions::default()).unwrap());
+    let camera = Camera::framing(&scene.bounds(), DVec3::new(0.4, -0.3, -1.0), DVec3::Y, 1.2);
+    let mut renderer = Renderer::new(&gpu);
+    let mut prepared = renderer.prepare(&scene).expect("fits");
+    // 90,000 tiles of 8 × 8 pixels and some 30 groups of 128 sheets are more than 2,097,152 bins.
+    let settings = Settings { size: [2400, 2400], sheet_pixels: 0.35, ..Settings::new([1, 1]) };
+    let sheets = scene.sheets(&camera.view(settings.size).unwrap(), &settings).count();
+    assert!(sheets > 3500, "{sheets} sheets");
+    let thin = renderer.render(&mut prepared, &camera, &settings).expect("draws").0;
+    // The same number of sheets in a picture of one piece.
+    let small = Settings { size: [600, 600], sheet_pixels: 0.35 / 4.0, ..settings };
+    let whole = renderer.render(&mut prepared, &camera, &small).expect("draws").0;
+    let coverage = |picture: &Picture| {
+        let covered = picture.color.iter().filter(|color| color[3] > 0.5).count();
+        covered as f64 / picture.color.len() as f64
+    };
+    let [large, small] = [&thin, &whole].map(coverage);
+    assert!(small > 0.05 && (large / small - 1.0).abs() < 0.01, "{large} and {small}");
 }
 
 /// A picture takes as many candidates as one binding holds the runs of: here two million. Of bricks that show more, coarser ones

@@ -184,6 +184,40 @@ fn who_finds_no_room_says_so() {
     }
 }
 
+/// With ever more memory (Linux: `ulimit -v`) there is an error, or the picture, and soon. Mesa's driver may end the process
+/// where it finds none itself.
+#[cfg(target_os = "linux")]
+#[test]
+fn who_finds_no_memory_says_so_or_ends() {
+    let folder = folder("memory");
+    let arguments = "render a.nrrd --overwrite -o a.png --size 320x240";
+    folder.run(arguments).ok();
+    let whole = std::fs::read(folder.path("a.png")).unwrap();
+    let command = env!("CARGO_BIN_EXE_splatkit");
+    let mut drawn = 0;
+    for mebibytes in (200..2000).step_by(150) {
+        std::fs::remove_file(folder.path("a.png")).ok();
+        let kibibytes = mebibytes << 10;
+        let script = format!("ulimit -v {kibibytes}; exec timeout 100 '{command}' {arguments}");
+        let output = Command::new("sh").args(["-c", &script]).current_dir(&folder.0).output().unwrap();
+        let code = output.status.code();
+        let told = String::from_utf8_lossy(&output.stderr);
+        let picture = std::fs::read(folder.path("a.png")).ok();
+        println!("{mebibytes} MiB: {code:?} {}", told.lines().last().unwrap_or_default());
+        match code {
+            Some(0) => assert!(picture.as_ref() == Some(&whole), "{mebibytes} MiB: another picture"),
+            // The shell tells a signal by 128 and its number; 124 is a process that did not end.
+            Some(3 | 4 | 134 | 135 | 139) | None => {
+                assert!(picture.is_none(), "{mebibytes} MiB: {code:?}, with a picture")
+            }
+            _ => panic!("{mebibytes} MiB: {code:?}: {told}"),
+        }
+        drawn += u32::from(code == Some(0));
+        assert_eq!(left(&folder, "a.png"), [""; 0], "{mebibytes} MiB");
+    }
+    assert!((1..12).contains(&drawn), "{drawn}");
+}
+
 #[test]
 fn where_nothing_can_be_written_it_is_told() {
     let folder = folder("nowhere");
