@@ -28,7 +28,8 @@ struct Walk {
 // The part of a box that lies in a pass. What reaches in from sheets before the pass gets a window that starts one sheet
 // early: that sheet takes the splat's mass up to the pass and is not drawn.
 fn walk_of(box: Box, stage: Pass) -> Walk {
-    let first = max(box.sheets & 0xffffu, stage.first_sheet - 1u);
+    // Two pipelines place a splat, and may round its first sheet to either side of the pass's end.
+    let first = clamp(box.sheets & 0xffffu, stage.first_sheet - 1u, stage.end_sheet);
     let last = min(box.sheets >> 16u, stage.end_sheet);
     return Walk(
         box.first_tile & 0xffffu,

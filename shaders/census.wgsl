@@ -12,11 +12,12 @@ fn band_of(row: u32) -> u32 {
     return ((row + 1u) * BANDS - 1u) / frame.tiles.y;
 }
 
-const CENSUS_KINDS: u32 = 4u;
-// Entries and record words of the runs that start in the sheet. Summed up by plan: in those before it.
+const CENSUS_KINDS: u32 = 6u;
+// Entries, how often these have passed 32 bits, and record words of the runs that start in the sheet. Summed up by plan: in
+// those before it.
 const STARTING: u32 = 0u;
 // Those of the runs that end in it, or in those before it.
-const ENDING: u32 = 2u;
+const ENDING: u32 = 3u;
 
 // Behind the bands of a sheet stands the whole picture.
 fn census_index(sheet: u32, band: u32) -> u32 {

@@ -130,7 +130,9 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
         loop {
             let entry = entries[at];
             var taken = 1u;
-            if ISOTROPIC_RECORDS && (!GENERAL_RECORDS || (entry & ENTRY_ISOTROPIC) != 0u) {
+            if SINGLE_SPLATS && front < first_composited {
+                // It is in the picture since before the tile stopped.
+            } else if ISOTROPIC_RECORDS && (!GENERAL_RECORDS || (entry & ENTRY_ISOTROPIC) != 0u) {
                 for (var i = 1u; i < TOGETHER; i++) {
                     if taken == i && at + i < stop && is_alike(entries[at + i], entry) {
                         taken++;

@@ -56,23 +56,32 @@ fn accumulate(@builtin(local_invocation_index) band: u32) {
     if band > BANDS {
         return;
     }
-    var before = vec4(0u);
+    var started = vec3(0u);
+    var ended = vec3(0u);
     for (var sheet = 0u; sheet <= frame.sheet_count + 1u; sheet++) {
         let at = census_index(sheet, band);
-        let own = vec4(census[at], census[at + 1u], census[at + 2u], census[at + 3u]);
-        census[at] = before.x;
-        census[at + 1u] = before.y;
-        census[at + 2u] = before.z;
-        census[at + 3u] = before.w;
-        before += own;
+        started = replace(at + STARTING, started);
+        ended = replace(at + ENDING, ended);
     }
 }
 
-// Entries and record words of the runs that meet a band in the sheets first … end-1.
+// Puts the sum of what comes before in the place of some counts; gives the sum with them.
+fn replace(at: u32, before: vec3<u32>) -> vec3<u32> {
+    let own = vec3(census[at], census[at + 1u], census[at + 2u]);
+    census[at] = before.x;
+    census[at + 1u] = before.y;
+    census[at + 2u] = before.z;
+    let entries = before.x + own.x;
+    return vec3(entries, before.y + own.y + u32(entries < own.x), before.z + own.z);
+}
+
+// Entries and record words of the runs that meet a band in the sheets first … end-1; entries as many as 32 bits hold.
 fn needed(first: u32, end: u32, band: u32) -> vec2<u32> {
     let started = census_index(end, band) + STARTING;
     let ended = census_index(first, band) + ENDING;
-    return vec2(census[started] - census[ended], census[started + 1u] - census[ended + 1u]);
+    let entries = census[started] - census[ended];
+    let passed = census[started + 1u] - census[ended + 1u] - u32(census[started] < census[ended]);
+    return vec2(select(entries, 0xffffffffu, passed > 0u), census[started + 2u] - census[ended + 2u]);
 }
 
 fn is_room(need: vec2<u32>, target_entries: u32) -> bool {
@@ -138,12 +147,18 @@ fn begin_bands(sheet: u32) {
     var last = band + 1u;
     var need = needed(sheet, sheet + 1u, band);
     while last < BANDS {
-        let more = need + needed(sheet, sheet + 1u, last);
+        let other = needed(sheet, sheet + 1u, last);
+        let more = need + min(other, vec2(0xffffffffu) - need);
         if !is_room(more, frame.entry_capacity) {
             break;
         }
         need = more;
         last++;
+    }
+    if need.x == 0xffffffffu {
+        // So many could not be counted.
+        state[OVERFLOW] = 1u;
+        return;
     }
     state[NEXT_BAND] = last % BANDS;
     state[NEXT_SHEET] = sheet + last / BANDS;

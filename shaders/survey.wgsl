@@ -8,8 +8,11 @@
 
 fn add(sheet: u32, band: u32, what: u32, need: vec2<u32>) {
     let at = census_index(sheet, band) + what;
-    atomicAdd(&census[at], need.x);
-    atomicAdd(&census[at + 1u], need.y);
+    let before = atomicAdd(&census[at], need.x);
+    if before > 0xffffffffu - need.x {
+        atomicAdd(&census[at + 1u], 1u);
+    }
+    atomicAdd(&census[at + 2u], need.y);
 }
 
 @compute @workgroup_size(64)

@@ -393,11 +393,54 @@ fn small_budgets_draw_the_same_picture() {
     }
 }
 
+/// On a GPU an invocation draws one pixel, and a workgroup of 64 a tile; on a processor one of eight. Shown the software driver as
+/// a GPU, the engine takes the GPU's way.
+#[test]
+fn the_gpus_way_is_the_same() {
+    let cases = [
+        scenes::ellipsoids_in_perspective(),
+        scenes::huge_among_small(),
+        scenes::scattered_samples(),
+        scenes::blobs_analytic(),
+        scenes::blobs_central(),
+        scenes::surface_in_a_volume(),
+        methods::rectilinear(),
+        methods::table_of_a_gaussian(),
+        methods::axis_sheets(),
+        methods::single_splats(Order::BackToFront),
+        methods::isosurfaces_in_fog(),
+        methods::maximum(),
+        methods::clipped_surface_in_a_volume(),
+        methods::sharp_body_centred(),
+    ];
+    let own = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
+    let info = wgpu::AdapterInfo { device_type: wgpu::DeviceType::DiscreteGpu, ..wgpu::AdapterInfo::clone(&own.info) };
+    let gpu = Gpu::from_wgpu(own.device.clone(), own.queue.clone(), info);
+    let mut renderer = Renderer::new(&gpu);
+    for case in cases {
+        let mut prepared = renderer.prepare(&case.scene).expect(case.name);
+        let mut draw = || renderer.render(&mut prepared, &case.camera, &case.settings).expect(case.name).0;
+        let found = draw();
+        assert_eq!(bits(&found), bits(&draw()), "{}", case.name);
+        let expected = reference::render(&case.scene, &case.camera, &case.settings).expect(case.name);
+        let agreement = psnr(&found, &expected);
+        println!("{} the GPU's way: {agreement:.1} dB", case.name);
+        assert!(agreement >= 50.0, "{}: {agreement:.1} dB", case.name);
+    }
+}
+
 /// A tile that stops after some hundred entries and goes on in another dispatch draws the same picture.
 #[test]
 fn tiles_that_stop_go_on() {
-    for make in [scenes::blobs_analytic, scenes::blobs_central, scenes::surface_in_a_volume, scenes::huge_among_small] {
-        let case = make();
+    let cases = [
+        scenes::blobs_analytic(),
+        scenes::blobs_central(),
+        scenes::surface_in_a_volume(),
+        scenes::huge_among_small(),
+        methods::single_splats(Order::FrontToBack),
+        methods::single_splats(Order::BackToFront),
+    ];
+    for case in cases {
         let budget = Budget { tile_entries: Some(300), ..Budget::default() };
         let agreement = psnr(&drawn(&case, budget), &drawn(&case, Budget::default()));
         println!("{} in stops: {agreement:.1} dB", case.name);

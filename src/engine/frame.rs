@@ -81,17 +81,21 @@ pub const MOST_GROUP_SHIFT: u32 = 7;
 /// Columns and rows of tiles that a span tells apart (10 bits each in spans.wgsl).
 const SPAN_TILES: u32 = 1 << 10;
 
+/// Rows of tiles that a box tells apart (14 bits in bins.wgsl).
+const BOX_ROWS: u64 = 1 << 14;
+
 /// Groups of 2 to the power `shift` sheets that a pass through all of them has: one more than they fill, as it starts a sheet
 /// early and counts from there.
 fn groups(sheets: usize, shift: u32) -> u64 {
     ((sheets as u64 + 2) >> shift) + 1
 }
 
-/// Rows of pixels that have bins enough for so many sheets, whatever is drawn.
+/// Rows of pixels that have bins enough for so many sheets, whatever is drawn, and whose tiles' rows a box tells apart.
 pub fn most_rows(width: u32, sheets: usize) -> u64 {
     // A tile without the edge that it may share with its neighbours.
     const STEP: u32 = 6;
-    u64::from(STEP) * (u64::from(MOST_BINS) / (groups(sheets, MOST_GROUP_SHIFT) * u64::from(width.div_ceil(STEP))))
+    let bins = groups(sheets, MOST_GROUP_SHIFT) * u64::from(width.div_ceil(STEP));
+    u64::from(STEP) * (u64::from(MOST_BINS) / bins).min(BOX_ROWS)
 }
 
 /// Which light and which sources a picture has decides what is compiled.

@@ -7,10 +7,10 @@ use super::{
     stage::{Binding, Stage},
 };
 
-/// Bytes of the census for a number of sheets: 4 counts for each of 16 bands and for all together, also for the sheet before
+/// Bytes of the census for a number of sheets: 6 counts for each of 16 bands and for all together, also for the sheet before
 /// the first and the one behind the last.
 pub fn census_bytes(sheets: usize) -> u64 {
-    (sheets as u64 + 2) * 17 * 4 * 4
+    (sheets as u64 + 2) * 17 * 6 * 4
 }
 
 /// The passes: once a frame, and `advance` before each depth pass.
