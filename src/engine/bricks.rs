@@ -87,6 +87,15 @@ impl Slab {
     }
 }
 
+/// What the bricks of a picture may take.
+#[derive(Debug, Clone, Copy)]
+pub struct Room {
+    /// Bytes of their slots.
+    pub bytes: u64,
+    /// Runs of candidates that they show.
+    pub runs: u64,
+}
+
 /// The bricks of a volume that are at hand.
 #[derive(Debug)]
 pub struct Shelf {

@@ -2,7 +2,7 @@
 
 use super::{
     Budget, Gpu, PreparedScene,
-    bricks::SelectBricks,
+    bricks::{Room, SelectBricks},
     clear::Clear,
     cut::{Cut, finest_within, tally_bytes},
     frame::{self, Pipelines, Pool, Step, Targets, Work},
@@ -248,11 +248,11 @@ impl Renderer {
         detail: Detail,
     ) -> Result<Option<Choice>> {
         let most_runs = u64::from(frame::most_runs(&self.gpu)).saturating_sub(prepared.other_runs());
+        let room = Room { bytes: settings.page_memory, runs: most_runs };
         let mut most = usize::MAX;
         loop {
             let Some(choice) = prepared.scene.choice(view, settings, detail, most) else { return Ok(None) };
-            let (select, room) = (&self.select_bricks, settings.page_memory);
-            let runs = prepared.update_bricks(&self.gpu, select, &self.scan, view, &choice, room, most_runs)?;
+            let runs = prepared.update_bricks(&self.gpu, &self.select_bricks, &self.scan, view, &choice, room)?;
             if runs <= most_runs || choice.bricks.len() <= 1 {
                 return Ok(Some(choice));
             }

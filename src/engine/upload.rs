@@ -2,7 +2,7 @@
 
 use super::{
     Gpu,
-    bricks::{SelectBricks, Shelf, Slab},
+    bricks::{Room, SelectBricks, Shelf, Slab},
     nodes::{Forest, Growth, Slots},
     scan::Scan,
     select::{Select, Selection},
@@ -183,8 +183,8 @@ impl PreparedScene {
         Ok(())
     }
 
-    /// Brings the bricks of a choice to the GPU, within `room` bytes, and lists what they show, unless that is more than `most`
-    /// runs of candidates; tells how many those are.
+    /// Brings the bricks of a choice to the GPU and lists what they show, unless that takes more than there is room for; tells
+    /// how many runs of candidates those are.
     pub(super) fn update_bricks(
         &mut self,
         gpu: &Gpu,
@@ -192,14 +192,13 @@ impl PreparedScene {
         scan: &Scan,
         view: &View,
         choice: &Choice,
-        room: u64,
-        most: u64,
+        room: Room,
     ) -> Result<u64> {
         let Some(shelf) = &mut self.shelf else { return Ok(0) };
         if shelf.draws(choice) {
             return Ok(self.brick_runs());
         }
-        let grown = shelf.update(gpu, choice, room)?;
+        let grown = shelf.update(gpu, choice, room.bytes)?;
         let (bricks, kernel) = (shelf.bricks.clone(), shelf.kernel.clone());
         for samples in grown {
             // One chunk for each of two levels: they share the slots.
@@ -214,7 +213,7 @@ impl PreparedScene {
             self.bytes += samples.ranges.size();
             self.bytes -= samples.data.size();
         }
-        self.select_bricks(gpu, select, scan, view, choice, most)
+        self.select_bricks(gpu, select, scan, view, choice, room.runs)
     }
 
     /// Runs of candidates in bricks.
