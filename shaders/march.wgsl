@@ -130,7 +130,7 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
         loop {
             let entry = entries[at];
             var taken = 1u;
-            if SINGLE_SPLATS && front < first_composited {
+            if SINGLE_SPLATS && front < resumed {
                 // It is in the picture since before the tile stopped.
             } else if ISOTROPIC_RECORDS && (!GENERAL_RECORDS || (entry & ENTRY_ISOTROPIC) != 0u) {
                 for (var i = 1u; i < TOGETHER; i++) {

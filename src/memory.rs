@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 /// The bytes that a process should take at most: three quarters of the machine's memory, or of what its control group may have;
-/// `None` where the system does not tell.
+/// `None` where the system does not tell: it is asked on Linux alone.
 pub fn most() -> Option<u64> {
     let machine = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| total(&text));
     let limits = groups().into_iter().filter_map(|path| std::fs::read_to_string(path).ok()?.trim().parse::<u64>().ok());

@@ -239,16 +239,23 @@ impl Scene {
     /// half of that where they are sharp, a few pixels for surfaces, the finer of both where the scene holds both. Of a volume
     /// in bricks the spacing is that of the levels drawn, between two of them in between.
     pub fn sheets(&self, view: &View, settings: &Settings) -> Sheets {
-        self.sheets_of(view, settings, self.choice(view, settings, settings.detail, usize::MAX).as_ref())
+        let bounds = self.bounds();
+        let choice = self.choice(view, settings, settings.detail, usize::MAX, &bounds);
+        self.sheets_of(view, settings, choice.as_ref(), &bounds)
     }
 
-    /// The sheets where it is known which bricks are drawn.
-    pub(crate) fn sheets_of(&self, view: &View, settings: &Settings, choice: Option<&Choice>) -> Sheets {
-        let bounds = self.bounds();
+    /// The sheets where it is known which bricks are drawn, and the scene's bounds.
+    pub(crate) fn sheets_of(
+        &self,
+        view: &View,
+        settings: &Settings,
+        choice: Option<&Choice>,
+        bounds: &Bounds,
+    ) -> Sheets {
         if settings.mode == Mode::AxisSheets {
-            return self.axis_sheets(view, settings, &bounds);
+            return self.axis_sheets(view, settings, bounds);
         }
-        let [mut near, mut far] = view.distances(&bounds);
+        let [mut near, mut far] = view.distances(bounds);
         // Widened footprints, which may have stepped back, reach beyond the bounds: a flat surface seen from the front would
         // lie in sheets far thinner than itself.
         let reach = FOOTPRINT_BLUR * self.widest_reach() / view.scale;
@@ -290,8 +297,15 @@ const SAMPLE_WIDTH: f64 = 2.0;
 /// Volumes in bricks.
 impl Scene {
     /// Which bricks of the scene's volume a view shows, within the settings' memory; none without such a volume. A detail
-    /// that counts splats bounds the bricks by as many samples; there are no more than `most` bricks.
-    pub(crate) fn choice(&self, view: &View, settings: &Settings, detail: Detail, most: usize) -> Option<Choice> {
+    /// that counts splats bounds the bricks by as many samples; there are no more than `most` bricks. `bounds` are the scene's.
+    pub(crate) fn choice(
+        &self,
+        view: &View,
+        settings: &Settings,
+        detail: Detail,
+        most: usize,
+        bounds: &Bounds,
+    ) -> Option<Choice> {
         let own = |item: &Item| match item {
             Item::Bricks(bricks, kernel, transfer) => {
                 let room = settings.page_memory / bricks::slot_bytes(bricks);
@@ -309,7 +323,7 @@ impl Scene {
                     return Some(choose(&EVERYTHING));
                 }
                 let choice = choose(&first_visible(transfer, bricks.header().range));
-                let sheets = self.sheets_of(view, settings, Some(&choice));
+                let sheets = self.sheets_of(view, settings, Some(&choice), bounds);
                 Some(if self.mixes_afar(settings, &sheets, Some(&choice)) { choose(&EVERYTHING) } else { choice })
             }
             _ => None,
@@ -321,18 +335,22 @@ impl Scene {
 /// What sheets mix.
 impl Scene {
     /// Whether sheets are thicker than kernels reach, so that samples count of whose neighbourhood nothing shows: they change the
-    /// mean of a sheet beside what shows.
+    /// mean of a sheet beside what shows. Sheets of the usual thickness are thicker than that along the shortest steps of uneven
+    /// lattices alone, where it is not seen: there the typical step counts.
     pub(crate) fn mixes_afar(&self, settings: &Settings, sheets: &Sheets, choice: Option<&Choice>) -> bool {
-        !settings.classifies_samples()
-            && self.items.iter().any(|item| match item {
-                Item::Volume(volume, kernel, _) => kernel.extent * volume.lattice.kernel_spacing() < sheets.step,
-                Item::Bricks(bricks, kernel, _) => {
-                    let spacing =
-                        choice.map_or(0.0, |choice| choice.lambda).exp2() * bricks.header().lattice.kernel_spacing();
-                    kernel.extent * spacing < sheets.step
-                }
-                _ => false,
-            })
+        let step = |lattice: &Lattice| match settings.sheet_thickness {
+            Some(_) => lattice.least_kernel_spacing(),
+            None => lattice.kernel_spacing(),
+        };
+        let reach = |item: &Item| match item {
+            Item::Volume(volume, kernel, _) => Some(kernel.extent * step(&volume.lattice)),
+            Item::Bricks(bricks, kernel, _) => {
+                let coarser = choice.map_or(0.0, |choice| choice.lambda).exp2();
+                Some(kernel.extent * step(&bricks.header().lattice) * coarser)
+            }
+            _ => None,
+        };
+        !settings.classifies_samples() && self.items.iter().filter_map(reach).any(|reach| reach < sheets.step)
     }
 }
 

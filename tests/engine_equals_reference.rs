@@ -6,12 +6,14 @@
 
 mod scenes;
 
+use glam::DVec3;
 use scenes::{Case, methods};
 use splatkit::{
     engine::{AdapterChoice, Budget, Gpu, Renderer},
     picture::Picture,
     reference,
-    scene::{Classification, Item, Mode, Optics, Order},
+    scene::{Classification, Item, Mode, Optics, Order, Scene},
+    volume::Volume,
 };
 
 fn drawn(case: &Case, budget: Budget) -> Picture {
@@ -268,6 +270,16 @@ fn thick_sheets() {
             assert_matches(case, 60.0);
         }
     }
+    // Seen along short steps beside long ones.
+    let mut flat = scenes::blobs_analytic();
+    let Item::Volume(volume, kernel, transfer) = &flat.scene.items[0] else { panic!("{}", flat.name) };
+    let mut volume = Volume::clone(volume);
+    volume.lattice.axes.z_axis *= 8.0;
+    volume.lattice.origin.z -= 7.0 * 19.0 * 0.05;
+    flat.settings.sheet_thickness = Some(1.9 * volume.lattice.kernel_spacing());
+    flat.scene = Scene::new().with_volume(volume, kernel.clone(), transfer.clone());
+    flat.camera.position = flat.camera.focal_point + DVec3::new(12.0, 1.0, 2.0);
+    assert_matches(flat, 60.0);
 }
 
 #[test]

@@ -103,8 +103,10 @@ pub struct Shelf {
     pub kernel: Kernel,
     /// Bricks read so far.
     pub reads: u64,
-    /// The bricks that are drawn, sorted, and what of them shows; none where that is not certain.
-    drawn: Option<(Vec<Key>, [u16; 256])>,
+    /// What is drawn; none where that is not certain.
+    drawn: Option<Drawn>,
+    /// What was last too much for a picture of so many runs of candidates, and the number of bricks that was not.
+    fitting: Option<(Drawn, u64, usize)>,
     /// The brick in each slot, and the last update that needed it.
     slots: Vec<Option<(Key, u64)>>,
     slot_of: HashMap<Key, usize>,
@@ -121,6 +123,7 @@ impl Shelf {
             kernel: kernel.clone(),
             reads: 0,
             drawn: None,
+            fitting: None,
             slots: Vec::new(),
             slot_of: HashMap::new(),
             chunks: Vec::new(),
@@ -136,12 +139,23 @@ impl Shelf {
 
     /// Whether the bricks of a choice are those that are drawn, and show the same.
     pub fn draws(&self, choice: &Choice) -> bool {
-        self.drawn.as_ref() == Some(&drawn_of(choice))
+        self.drawn.as_ref() == Some(&Drawn::of(choice))
     }
 
     /// Takes note that the bricks of a choice are drawn.
     pub fn set_drawn(&mut self, choice: &Choice) {
-        self.drawn = Some(drawn_of(choice));
+        self.drawn = Some(Drawn::of(choice));
+    }
+
+    /// The most bricks of a choice that show no more than so many runs of candidates, where that was found for it.
+    pub fn fitting(&self, choice: &Choice, runs: u64) -> Option<usize> {
+        let (drawn, within, most) = self.fitting.as_ref()?;
+        (*within == runs && *drawn == Drawn::of(choice)).then_some(*most)
+    }
+
+    /// Takes note of that number.
+    pub fn set_fitting(&mut self, choice: &Choice, runs: u64, most: usize) {
+        self.fitting = Some((Drawn::of(choice), runs, most));
     }
 
     /// Brings the bricks of a choice to the GPU, within `room` bytes. Gives the slots that were added for them.
@@ -226,11 +240,20 @@ impl Shelf {
     }
 }
 
-/// The bricks of a choice, sorted, and what of them shows.
-fn drawn_of(choice: &Choice) -> (Vec<Key>, [u16; 256]) {
-    let mut bricks = choice.bricks.clone();
-    bricks.sort_unstable();
-    (bricks, choice.shown)
+/// Bricks in order, the levels that are drawn, and what of them shows: what the lists are made from.
+#[derive(Debug, PartialEq)]
+struct Drawn {
+    bricks: Vec<Key>,
+    levels: Vec<usize>,
+    shown: [u16; 256],
+}
+
+impl Drawn {
+    fn of(choice: &Choice) -> Self {
+        let mut bricks = choice.bricks.clone();
+        bricks.sort_unstable();
+        Self { bricks, levels: choice.levels.iter().map(|(level, _)| *level).collect(), shown: choice.shown }
+    }
 }
 
 /// The pass.

@@ -195,9 +195,14 @@ impl Renderer {
             let start = Instant::now();
             let outline = renderer.outline(prepared, &view, settings)?;
             let mut stats = FrameStats { read_bricks: outline.read_bricks, ..FrameStats::default() };
-            for strip in renderer.strips(&view, &outline.sheets) {
-                let (targets, own) = renderer.draw_frame(prepared, &strip, settings, &outline, profile)?;
-                done(renderer, &targets, &strip)?;
+            let strips = renderer.strips(&view, &outline.sheets);
+            for strip in &strips {
+                if strips.len() > 1 {
+                    // The pages of the whole may be more than there is room for.
+                    prepared.update_forests(&renderer.gpu, strip, settings, outline.cut_pixels)?;
+                }
+                let (targets, own) = renderer.draw_frame(prepared, strip, settings, &outline, profile)?;
+                done(renderer, &targets, strip)?;
                 stats.add(own);
             }
             renderer.note(start, settings.detail);
@@ -216,8 +221,9 @@ impl Renderer {
         };
         let reads = |prepared: &PreparedScene| prepared.shelf.as_ref().map_or(0, |shelf| shelf.reads);
         let before = reads(prepared);
+        prepared.update_forests(&self.gpu, view, settings, cut_pixels)?;
         let choice = self.bring_bricks(prepared, view, settings, detail)?;
-        let sheets = prepared.scene.sheets_of(view, settings, choice.as_ref());
+        let sheets = prepared.scene.sheets_of(view, settings, choice.as_ref(), &prepared.bounds);
         let all = prepared.scene.mixes_afar(settings, &sheets, choice.as_ref());
         prepared.update_selections(&self.gpu, &self.select, &self.scan, view, all)?;
         Ok(Outline { cut_pixels, choice, read_bricks: reads(prepared) - before, sheets })
@@ -247,18 +253,27 @@ impl Renderer {
         settings: &Settings,
         detail: Detail,
     ) -> Result<Option<Choice>> {
+        let choose =
+            |prepared: &PreparedScene, most| prepared.scene.choice(view, settings, detail, most, &prepared.bounds);
+        let Some(wanted) = choose(prepared, usize::MAX) else { return Ok(None) };
         let most_runs = u64::from(frame::most_runs(&self.gpu)).saturating_sub(prepared.other_runs());
-        let room = Room { bytes: settings.page_memory, runs: most_runs };
-        let mut most = usize::MAX;
+        // A view that rests is not searched again.
+        let mut most = prepared.shelf.as_ref().and_then(|shelf| shelf.fitting(&wanted, most_runs));
         loop {
-            let Some(choice) = prepared.scene.choice(view, settings, detail, most) else { return Ok(None) };
-            let runs = prepared.update_bricks(&self.gpu, &self.select_bricks, &self.scan, view, &choice, room)?;
-            if runs <= most_runs || choice.bricks.len() <= 1 {
+            let choice = most.and_then(|most| choose(prepared, most)).unwrap_or_else(|| wanted.clone());
+            // Of the coarsest all is listed, and refused where even that is too much.
+            let runs = if choice.bricks.len() > 1 { most_runs } else { u64::MAX };
+            let room = Room { bytes: settings.page_memory, runs };
+            let found = prepared.update_bricks(&self.gpu, &self.select_bricks, &self.scan, view, &choice, room)?;
+            if found <= runs {
+                if let (Some(most), Some(shelf)) = (most, &mut prepared.shelf) {
+                    shelf.set_fitting(&wanted, most_runs, most);
+                }
                 return Ok(Some(choice));
             }
             // As many as show so much, if others show as much as these do.
-            let share = most_runs as f64 / runs as f64;
-            most = ((choice.bricks.len() as f64 * share) as usize).clamp(1, choice.bricks.len() - 1);
+            let share = runs as f64 / found as f64;
+            most = Some(((choice.bricks.len() as f64 * share) as usize).clamp(1, choice.bricks.len() - 1));
         }
     }
 
@@ -290,7 +305,6 @@ impl Renderer {
         let gpu = &self.gpu;
         let Outline { cut_pixels, choice, sheets, .. } = outline;
         let choice = choice.as_ref();
-        prepared.update_forests(gpu, view, settings, *cut_pixels)?;
         let variant = frame::variant(gpu, prepared, view, settings, self.budget, choice);
         let pool = &mut self.pool;
         let targets = frame::targets(gpu, pool, prepared, &variant, view, sheets, settings, self.budget, choice)?;

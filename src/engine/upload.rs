@@ -170,14 +170,14 @@ impl PreparedScene {
                 continue;
             }
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
-            self.bytes -= selection.bytes() + chunk.spans.size();
-            let rest = self.bytes;
+            let before = selection.selected.size() + chunk.spans.size();
+            let rest = self.bytes - before;
             select.update(gpu, scan, selection, &chunk.uniform, &shown, |count| {
                 gpu.check_memory(rest + list_bytes(u64::from(count)))
             })?;
             chunk.candidates = selection.count;
             chunk.spans = spans(gpu, selection.count);
-            self.bytes += selection.bytes() + chunk.spans.size();
+            self.bytes = rest + selection.selected.size() + chunk.spans.size();
         }
         self.number_runs();
         Ok(())
@@ -291,8 +291,8 @@ impl PreparedScene {
         let slice = (width * height) as u64;
         let bytes = volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
         let held = gpu.binding_size() / bytes / slice;
-        // Of its own samples it also holds ranges, of four bytes as they are uploaded.
-        let own = CHUNK_VOXELS.min(gpu.binding_size() / 4) / slice;
+        // Of its own samples it also holds spans, where all of them show.
+        let own = CHUNK_VOXELS.min(gpu.binding_size() / SPAN_BYTES) / slice;
         let slices = held.saturating_sub(2 * NEIGHBOURS as u64).min(own) as usize;
         if slices == 0 {
             return Err(Error::Argument(format!(

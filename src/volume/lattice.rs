@@ -128,11 +128,21 @@ impl Lattice {
 
     /// The typical size of a sample's kernel unit in world units: what sheets are measured by.
     pub fn kernel_spacing(&self) -> f64 {
-        let unit = match &self.arrangement {
+        let unit = self.typical_unit();
+        (self.axes.determinant().abs() * unit.x * unit.y * unit.z).cbrt()
+    }
+
+    /// The same along the axis on which it is least.
+    pub fn least_kernel_spacing(&self) -> f64 {
+        (self.edges() * self.typical_unit()).min_element()
+    }
+
+    /// [`unit`](Self::unit), the mean on a rectilinear lattice.
+    fn typical_unit(&self) -> DVec3 {
+        match &self.arrangement {
             Arrangement::Rectilinear(_) => self.spacing() / self.edges(),
             _ => self.unit([0; 3]),
-        };
-        (self.axes.determinant().abs() * unit.x * unit.y * unit.z).cbrt()
+        }
     }
 
     /// How many samples a kernel of some extent (in units of [`unit`](Self::unit)) reaches along each axis at most.

@@ -27,8 +27,8 @@ pub struct EngineFlags {
     /// Seconds that the adapter may take for some passes of a picture before it counts as lost [default: 600]
     #[arg(long, value_name = "SECONDS", value_parser = parse::positive)]
     gpu_timeout: Option<f64>,
-    /// Memory that a scene may take on the adapter, in bytes or with KiB, MiB or GiB [default: on the processor three quarters of
-    /// the memory that there is]
+    /// Memory that a scene's splats, samples and lists may take on the adapter, beside what --memory bounds; in bytes or with KiB,
+    /// MiB or GiB [default: on the processor three quarters of the memory that there is]
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     gpu_memory: Option<u64>,
     /// How a volume's gradient across the picture is found.

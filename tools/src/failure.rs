@@ -58,7 +58,7 @@ impl Failure {
                 Some("raise --pass-entries, or draw a smaller --size")
             }
             Self::Library(Error::Gpu(message)) if message.ends_with("may be taken") => Some(
-                "`splatkit convert` makes .splk and .splv files of it, of which a picture takes less; --gpu-memory allows more",
+                "--gpu-memory allows more; `splatkit convert` makes .splk and .splv files, of which --cut and --budget draw less",
             ),
             Self::Library(Error::Gpu(_)) => {
                 Some("try a smaller --size, or another --gpu (`software` is one); --gpu-timeout waits longer")

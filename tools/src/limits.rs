@@ -10,8 +10,8 @@ pub struct LimitFlags {
     /// Vertices, points or faces that a file may claim [default: 2147483648]
     #[arg(long, value_name = "COUNT")]
     limit_points: Option<u64>,
-    /// Bytes that an input may occupy: its files, and all that is made of them until it is read [default: 34359738368, and of an
-    /// input that is read as a whole no more than three quarters of the memory that there is]
+    /// Bytes that an input may occupy: its files, and all that is made of them until it is read. Where none is told, an input that
+    /// is read as a whole also has to fit the machine's memory [default: 34359738368]
     #[arg(long, value_name = "BYTES")]
     limit_bytes: Option<u64>,
     /// Depth to which nodes and elements may be nested [default: 64]
@@ -43,7 +43,8 @@ impl LimitFlags {
     pub fn whole(&self, memory: Option<u64>) -> Limits {
         let limits = self.limits();
         let memory = memory.filter(|_| self.limit_bytes.is_none()).unwrap_or(u64::MAX);
-        Limits { bytes: limits.bytes.min(memory), ..limits }
+        // A limit counts what is dropped on the way, too: the file, and what is unpacked.
+        Limits { bytes: limits.bytes.min(memory.saturating_mul(2)), ..limits }
     }
 }
 
@@ -51,7 +52,9 @@ impl LimitFlags {
 pub fn hint(kind: LimitKind) -> &'static str {
     match kind {
         LimitKind::Points => "raise --limit-points if the file can be trusted",
-        LimitKind::Bytes => "raise --limit-bytes if the file can be trusted and memory suffices",
+        LimitKind::Bytes => {
+            "raise --limit-bytes, or of a conversion --memory, if the file can be trusted and memory suffices"
+        }
         LimitKind::Depth => "raise --limit-depth if the file can be trusted",
         LimitKind::Texels => "raise --limit-texels if the file can be trusted",
         LimitKind::Seconds => "raise --limit-seconds if the file can be trusted",

@@ -143,7 +143,7 @@ impl Convert {
     fn splats_of(&self, path: &Path, progress: &Progress) -> Result<Gathered, Failure> {
         progress.stage(format!("Reading {}", path.display()));
         let start = Instant::now();
-        let input = self.load.open(path)?;
+        let input = self.load.open_within(path, Some(self.most_memory()))?;
         let read_ms = milliseconds(start);
         let start = Instant::now();
         let (set, closed, up, points) = match input {

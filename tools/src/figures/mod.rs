@@ -52,7 +52,7 @@ pub struct Figures {
     /// Size of the pictures that are integrated densely.
     #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "96x72")]
     size: [u32; 2],
-    /// Replaces the marked block of this file by the tables; with --only, those of the same names in it.
+    /// Replaces the marked block of this file by the tables; where not all are measured, those of the same names in it.
     #[arg(long, value_name = "FILE.md")]
     write: Option<PathBuf>,
     /// Writes JSON.
@@ -138,7 +138,8 @@ impl Figures {
         } else {
             output::line(text.trim_end())?;
         }
-        let page = |old: &str| if self.only.is_empty() { text } else { report.among(old) };
+        let is_all = self.only.is_empty() && self.surfaces.is_empty() && self.detail.is_empty();
+        let page = |old: &str| if is_all { text } else { report.among(old) };
         block.map_or(Ok(()), |block| block.replace(page))
     }
 
