@@ -538,7 +538,7 @@ pub struct Settings {
     /// How fine hierarchies and volumes in bricks are drawn. A sample of the latter counts as two steps wide.
     pub detail: Detail,
     /// Whether nodes of hierarchies that face away from the eye are left out: a saving where the front hides them, a loss
-    /// where it does not. `None`: where the source was closed.
+    /// where it does not. `None`: where the source was closed, is seen from outside its bounds, and nothing is cut away.
     pub cull_backfaces: Option<bool>,
     /// GPU memory that each hierarchy's pages, or a volume's bricks, may take, in bytes; without what frames make of bricks.
     pub page_memory: u64,
@@ -581,6 +581,12 @@ impl Settings {
     /// Whether what is nearer may hide what is farther: not where all values count alike, or the farthest comes first.
     pub fn hides(&self) -> bool {
         self.optics != Optics::Maximum && self.mode != Mode::Splats(Order::BackToFront)
+    }
+
+    /// Whether nodes that face away are left out of a hierarchy that bounds a solid, or does not, within some bounds.
+    pub(crate) fn culls(&self, closed: bool, bounds: &Bounds, view: &View) -> bool {
+        let is_outside = || !view.perspective || view.distances(bounds)[0] > self.near.unwrap_or(0.0);
+        self.cull_backfaces.unwrap_or_else(|| closed && self.clips.is_empty() && is_outside())
     }
 
     /// The light on a volume that `transfer` shows.

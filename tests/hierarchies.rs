@@ -10,10 +10,10 @@ use splatkit::{
         validate,
     },
     io::Limits,
-    math::{Bounds, Camera, Kernel, View},
+    math::{Bounds, Camera, Kernel, Projection, View},
     picture::Picture,
     reference,
-    scene::{Scene, Settings},
+    scene::{Clip, ClipShape, Scene, Settings},
     splat::SplatSet,
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, bricks::Bricks, phantoms::Phantom},
@@ -376,5 +376,35 @@ fn a_closed_surface_looks_the_same_without_what_faces_away() {
         println!("{pixels}: {} of {} splats, {agreement:.1} dB", culled.splats, whole.splats);
         assert!(culled.splats * 10 < whole.splats * 8);
         assert!(agreement > 40.0, "{agreement:.1} dB");
+    }
+}
+
+/// What faces away is left out only where the surface hides it: not where a clip opens it, nor from within.
+#[test]
+fn an_opened_surface_shows_its_back() {
+    let set = knot(30_000);
+    let options = BuildOptions { closed: true, ..BuildOptions::default() };
+    let tree = Tree::build(&set, &options, &|_, _| ()).expect("a tree");
+    let bounds = set.bounds();
+    let scenes = [Scene::new().with_splats(set), Scene::new().with_hierarchy(Hierarchy::from_tree(tree).expect("one"))];
+    let mut renderer = renderer();
+    let mut prepared = scenes.map(|scene| renderer.prepare(&scene).expect("prepared"));
+    let outside = camera(&bounds, 0.9);
+    let mut within = outside.clone();
+    within.position = bounds.center() + 0.25 * (outside.position - bounds.center()).normalize() * bounds.diagonal();
+    within.projection = Projection::Perspective { view_angle: 100.0 };
+    let open = Clip { shape: ClipShape::HalfSpace { normal: DVec3::Z, offset: bounds.center().z }, inside: true };
+    for (name, camera, clips, culls) in [
+        ("whole", &outside, vec![], true),
+        ("cut open", &outside, vec![open], false),
+        ("within", &within, vec![], false),
+    ] {
+        let settings = Settings { clips, ..settings(0.0) };
+        let [(expected, all), (found, drawn)] =
+            prepared.each_mut().map(|prepared| renderer.render(prepared, camera, &settings).expect("a picture"));
+        let agreement = decibels(&found, &expected);
+        println!("{name}: {} of {} splats, {agreement:.1} dB", drawn.splats, all.splats);
+        assert!(agreement > 40.0, "{name}: {agreement:.1} dB");
+        assert_eq!(drawn.splats * 10 < all.splats * 8, culls, "{name}: {} of {}", drawn.splats, all.splats);
     }
 }

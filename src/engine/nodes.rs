@@ -15,6 +15,7 @@ use crate::{
         file::{PAGE_NODES, Page, PageEntry},
     },
     math::View,
+    scene::Settings,
 };
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
@@ -170,9 +171,10 @@ impl Forest {
     }
 
     /// The cut of this hierarchy in a view.
-    pub fn cut(&self, view: &View, pixels: f64, cull: Option<bool>) -> hierarchy::Cut {
+    pub fn cut(&self, view: &View, settings: &Settings, pixels: f64) -> hierarchy::Cut {
         let header = self.hierarchy.header();
-        hierarchy::Cut::new(view, header.origin, pixels, cull.unwrap_or(header.closed))
+        let culls = settings.culls(header.closed, &header.bounds, view);
+        hierarchy::Cut::new(view, header.origin, pixels, culls)
     }
 
     /// The pages that a cut may need, the coarse ones first, with all pages above them.
@@ -193,10 +195,10 @@ impl Forest {
     }
 
     /// The finest cut, in pixels, whose pages hold no more than `most` nodes.
-    pub fn finest_within(&self, view: &View, cull: Option<bool>, most: u64) -> f64 {
+    pub fn finest_within(&self, view: &View, settings: &Settings, most: u64) -> f64 {
         let pages = self.hierarchy.pages();
         let nodes = |pixels: f64| {
-            let needed = self.needed(&self.cut(view, pixels, cull));
+            let needed = self.needed(&self.cut(view, settings, pixels));
             needed.iter().map(|&page| u64::from(pages[page as usize].nodes)).sum::<u64>()
         };
         if nodes(0.0) <= most {

@@ -384,7 +384,7 @@ impl Renderer {
     fn finest_cut(&self, prepared: &mut PreparedScene, view: &View, settings: &Settings, most: u64) -> Result<f64> {
         // The pages of a cut hold several times what it draws.
         let nodes = most.saturating_mul(8).max(1 << 16);
-        let finest = |forest: &Forest| forest.finest_within(view, settings.cull_backfaces, nodes);
+        let finest = |forest: &Forest| forest.finest_within(view, settings, nodes);
         let pixels = prepared.forests.iter().map(finest).fold(0.0, f64::max);
         let gpu = &self.gpu;
         prepared.update_forests(gpu, view, settings, pixels)?;

@@ -341,7 +341,7 @@ impl PreparedScene {
     /// Brings what the cuts of all hierarchies need to the GPU, within the settings' memory each.
     pub(super) fn update_forests(&mut self, gpu: &Gpu, view: &View, settings: &Settings, pixels: f64) -> Result<()> {
         for index in 0..self.forests.len() {
-            let cut = self.forests[index].cut(view, pixels, settings.cull_backfaces);
+            let cut = self.forests[index].cut(view, settings, pixels);
             let own: Vec<(&Slots, &wgpu::Buffer)> = self
                 .chunks
                 .iter()

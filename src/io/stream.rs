@@ -88,6 +88,11 @@ impl<'a> Stream<'a> {
         Counts { points: points as u64, triangles: triangles as u64 }
     }
 
+    /// Whether the third axis of its points is up, as for [`Mesh::z_is_up`](crate::surface::Mesh::z_is_up).
+    pub fn z_is_up(&self) -> bool {
+        matches!(self.form, Form::Las(_))
+    }
+
     /// The first pass over all points: where they are, and what their colours are made from. `watch` is told how many have
     /// been seen.
     pub(crate) fn settle(&mut self, watch: &dyn Fn(u64)) -> Result<()> {

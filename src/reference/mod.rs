@@ -167,7 +167,9 @@ fn without_bricks(scene: &Scene) -> Result<Scene> {
 fn with_cuts(scene: &Scene, view: &View, settings: &Settings) -> Result<Scene> {
     let flat = |item: &Item| match item {
         Item::Hierarchy(hierarchy) => {
-            let cut = hierarchy.read_tree()?.cut(view, settings.detail, settings.cull_backfaces)?;
+            let header = hierarchy.header();
+            let culls = settings.culls(header.closed, &header.bounds, view);
+            let cut = hierarchy.read_tree()?.cut(view, settings.detail, Some(culls))?;
             Ok(Item::Radiance(cut.into()))
         }
         other => Ok(other.clone()),

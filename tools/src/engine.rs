@@ -60,7 +60,8 @@ pub struct EngineFlags {
     /// little; in bytes or with KiB, MiB or GiB [default: 1GiB]
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     memory: Option<u64>,
-    /// Hierarchies: whether splats that face away are left out [default: where the surface is closed]
+    /// Hierarchies: whether splats that face away are left out [default: where the surface is closed, seen from outside
+    /// its bounds, and nothing is cut away]
     #[arg(long, value_name = "BOOL")]
     cull_backfaces: Option<bool>,
     /// Draws what lies behind opaque parts too: the same picture, for comparing times.

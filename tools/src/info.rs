@@ -45,8 +45,10 @@ impl Info {
         facts.insert("count".into(), json!(count));
         facts.insert("bytes".into(), json!(bytes));
         facts.insert("bytes_per_point".into(), json!(bytes as f64 / count.max(1) as f64));
-        // Only hierarchies and bricks have more.
-        facts.entry("levels").or_insert(json!(1));
+        // Bricks tell their own; those of a hierarchy lie at different depths.
+        if !matches!(input, Input::Hierarchy(_)) {
+            facts.entry("levels").or_insert(json!(1));
+        }
         if self.json {
             return output::line(Value::Object(facts));
         }

@@ -8,7 +8,9 @@ use splatkit::{
     hierarchy::{
         BuildOptions,
         external::{ExternalOptions, Stage, convert},
+        file::UpAxis,
     },
+    io::Stream,
 };
 use std::time::Instant;
 
@@ -53,8 +55,11 @@ impl Convert {
             };
             stages.set(name, done, total);
         };
-        let write = self.surface.write_options(&self.files, None);
-        let done = convert(&self.files, &self.load.limits(), &self.output, &options, &write, &watch)?;
+        let limits = self.load.limits();
+        let first = self.files.first().map(|file| Stream::open(file, &limits)).transpose()?.flatten();
+        let up = first.filter(Stream::z_is_up).map(|_| UpAxis::Z);
+        let write = self.surface.write_options(&self.files, up);
+        let done = convert(&self.files, &limits, &self.output, &options, &write, &watch)?;
         drop(stages);
         progress.clear();
         let bytes = self.output.metadata().map_err(|e| Error::file(&self.output, "read", e))?.len();
