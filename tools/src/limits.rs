@@ -53,7 +53,7 @@ pub fn hint(kind: LimitKind) -> &'static str {
     match kind {
         LimitKind::Points => "raise --limit-points if the file can be trusted",
         LimitKind::Bytes => {
-            "raise --limit-bytes, or of a conversion --memory, if the file can be trusted and memory suffices"
+            "raise --limit-bytes if the file can be trusted and memory suffices; of a conversion also --memory"
         }
         LimitKind::Depth => "raise --limit-depth if the file can be trusted",
         LimitKind::Texels => "raise --limit-texels if the file can be trusted",
