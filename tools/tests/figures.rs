@@ -30,12 +30,13 @@ fn figure(table: &serde_json::Value, row: &str, column: &str) -> f64 {
 fn figures_are_measured_and_written() {
     let folder = Folder::new("figures");
     let marks = ["<!-- figures: written by `splatkit figures --write` -->", "<!-- end of figures -->"];
-    folder.put("page.md", format!("before\n{}\nold\n{}\nafter\n", marks[0], marks[1]));
+    folder.put("page.md", format!("before\n{}\n**Another.** Kept.\n{}\nafter\n", marks[0], marks[1]));
     folder.put("plain.md", "no marks");
     folder.run("figures --only ripple --write plain.md").fails(3, &["plain.md", "end of figures"]);
     folder.run("figures --only ripple --write page.md").ok();
     let page = std::fs::read_to_string(folder.path("page.md")).unwrap();
-    assert!(page.starts_with("before\n<!--") && page.ends_with("-->\nafter\n") && !page.contains("old"), "{page}");
+    assert!(page.starts_with("before\n<!--") && page.ends_with("-->\nafter\n"), "{page}");
+    assert!(page.contains("\n**Another.** Kept.\n"), "{page}");
     assert!(page.contains("| Gaussian, σ 0.6, extent 2 (default) | 1."), "{page}");
     let found = folder.json("figures --only bleeding --json");
     let bleeding = &found["tables"][0];
