@@ -141,7 +141,8 @@ fn furthest(first: u32, end: u32, target_entries: u32) -> u32 {
     return last;
 }
 
-// Of a sheet that is too much for one pass as many bands as fit together; a single band is tried whatever it needs, if that can be counted.
+// Of a sheet that is too much for one pass as many bands as fit together; a single band is tried whatever it needs, if that can
+// be counted.
 fn begin_bands(sheet: u32) {
     let band = state[NEXT_BAND];
     var last = band + 1u;

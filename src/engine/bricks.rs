@@ -274,8 +274,8 @@ impl SelectBricks {
         }
     }
 
-    /// Makes the lists of all slabs, each with its uniform, in buffers of their sizes, unless `check` refuses as many samples, or they are more than `most_runs` runs of
-    /// candidates; tells how many those are. `shown` is that of [`Choice`].
+    /// Makes the lists of all slabs, each with its uniform, in buffers of their sizes, unless `check` refuses as many samples,
+    /// or they are more than `most_runs` runs of candidates; tells how many those are. `shown` is that of [`Choice`].
     pub fn update(
         &self,
         gpu: &Gpu,

@@ -73,8 +73,8 @@ impl Select {
         }
     }
 
-    /// Makes a chunk's list, in a buffer of its size, unless `check` refuses as many samples. `uniform` is the chunk's source; `shown` tells which ranges show something
-    /// ([`first_visible`](crate::volume::reach::first_visible)).
+    /// Makes a chunk's list, in a buffer of its size, unless `check` refuses as many samples. `uniform` is the chunk's source;
+    /// `shown` tells which ranges show something ([`first_visible`](crate::volume::reach::first_visible)).
     pub fn update(
         &self,
         gpu: &Gpu,

@@ -36,9 +36,7 @@ impl LimitFlags {
             seconds: self.limit_seconds.unwrap_or(default.seconds),
         }
     }
-}
 
-impl LimitFlags {
     /// The limits of an input that is read as a whole, for which there are `memory` bytes.
     pub fn whole(&self, memory: Option<u64>) -> Limits {
         let limits = self.limits();

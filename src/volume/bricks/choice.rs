@@ -23,7 +23,8 @@ pub struct Choice {
 const STEPS: f64 = 16.0;
 
 /// Chooses the levels that draw no step between samples smaller than `pixels`, and of these the bricks that meet the picture
-/// and hold something that shows, as `shown` tells ([`Choice::shown`]). `extent` is the kernel's, in samples of whichever level is drawn.
+/// and hold something that shows, as `shown` tells ([`Choice::shown`]). `extent` is the kernel's, in samples of whichever level
+/// is drawn.
 ///
 /// The level is a real number, λ = log₂(`pixels` / p), no less than 0 and no more than that of the coarsest level; p is how many
 /// pixels the longest step of level 0 covers at the point of the volume's box that is nearest to the eye. Between two levels
