@@ -84,7 +84,7 @@ fn both_ways(folder: &Folder, name: &str) -> (Vec<Splat>, Vec<Splat>, Converted)
     hierarchy::build_file(&set, &whole, &build, &lossless(), &|_, _| ()).unwrap();
     let parts = folder.path("parts.splk");
     let converted = in_regions(&[path], &parts).unwrap();
-    assert_eq!(converted.closed, mesh.is_closed(), "{name}");
+    assert_eq!(converted.closed, mesh.is_solid(), "{name}");
     assert_eq!(converted.points, mesh.positions.len() as u64, "{name}");
     let header = |path: &Path| Hierarchy::open(path, &Limits::default()).unwrap().header().clone();
     let (one, other) = (header(&whole), header(&parts));
@@ -166,9 +166,25 @@ fn meshes_have_the_same_leaves() {
         triangles: (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
         ..Mesh::default()
     };
+    // A vertex that no triangle has does not count for the size of the whole, a part that is inside out is told.
+    let mut stray = shared.clone();
+    stray.positions.push(Vec3::splat(2000.0));
+    stray.colors.push([1, 2, 3, 255]);
+    let mut turned = shared.clone();
+    let second = shared.positions.len() as u32;
+    turned.positions.extend(shared.positions.iter().map(|place| *place + Vec3::X * 9.0));
+    turned.colors.extend(&shared.colors);
+    turned.triangles.extend(shared.triangles.iter().map(|&[a, b, c]| [a, c, b].map(|vertex| vertex + second)));
+    let mut turned_split = split.clone();
+    turned_split.positions.extend(split.positions.iter().map(|place| *place + Vec3::X * 9.0));
+    let second = split.positions.len() as u32;
+    turned_split.triangles.extend(split.triangles.iter().map(|&[a, b, c]| [a, c, b].map(|vertex| vertex + second)));
     let mut far = shared.clone();
     far.origin = glam::DVec3::new(4_500_000.25, 5_300_000.5, 417.125);
     for (name, mesh, big, double) in [
+        ("stray.ply", stray, false, false),
+        ("turned.ply", turned, false, false),
+        ("turned_split.ply", turned_split, false, false),
         ("shared.ply", shared, false, false),
         ("long.ply", long, true, false),
         ("split.ply", split, false, false),
@@ -177,6 +193,7 @@ fn meshes_have_the_same_leaves() {
         std::fs::write(folder.path(name), ply(&mesh, big, double)).unwrap();
         let (whole, parts, converted) = both_ways(&folder, name);
         assert!(converted.regions > 10, "{name}: {}", converted.regions);
+        assert_eq!(converted.closed, ["stray", "shared", "split", "far"].contains(&&name[..name.len() - 4]), "{name}");
         assert_eq!(whole.len(), parts.len(), "{name}");
         if name == "long.ply" {
             // Normals over what was cut are interpolated; the shares of the corners are rounded.
@@ -251,7 +268,7 @@ fn several_files_become_one() {
     std::fs::write(folder.path("b.ply"), ply(&far, false, true)).unwrap();
     let out = folder.path("out.splk");
     let converted = in_regions(&[folder.path("a.ply"), folder.path("b.ply")], &out).unwrap();
-    assert_eq!((converted.points, converted.closed), (6000, near.is_closed()));
+    assert_eq!((converted.points, converted.closed), (6000, near.is_solid()));
     assert_eq!(leaves(&out).len() as u64, converted.splats);
     let bounds = Hierarchy::open(&out, &Limits::default()).unwrap().header().bounds;
     assert!(bounds.max.z > 29.0 && bounds.min.z < 0.0, "{bounds:?}");

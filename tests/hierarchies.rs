@@ -78,6 +78,29 @@ fn trees_of_every_preset_keep_their_promises_and_all_splats() {
     }
 }
 
+/// Lengths may be in any unit: coarse nodes keep their opacity.
+#[test]
+fn trees_of_any_size_are_alike() {
+    let set = knot(5000);
+    let whole = build(&set, 1 << 20);
+    for scale in [2f32.powi(-50), 2f32.powi(-20), 2f32.powi(18)] {
+        let mut scaled = set.clone();
+        for splat in &mut scaled.splats {
+            splat.center = splat.center.map(|v| v * scale);
+            splat.factor = splat.factor.map(|v| v * scale);
+        }
+        scaled.origin = DVec3::ZERO;
+        let tree = build(&scaled, 1 << 20);
+        let nodes = |tree: &Tree| tree.nodes().copied().collect::<Vec<_>>();
+        assert_eq!(nodes(&tree).len(), nodes(&whole).len(), "{scale:e}");
+        for (own, other) in nodes(&tree).iter().zip(nodes(&whole)) {
+            let near = |a: f32, b: f32| (a - b).abs() <= 1e-3 * b.abs();
+            assert!(near(own.splat.strength, other.splat.strength), "{scale:e}: {own:?} {other:?}");
+            assert!(near(own.size, other.size * scale), "{scale:e}: {own:?} {other:?}");
+        }
+    }
+}
+
 /// Nodes and samples in one picture, from the first frame on: what is chosen of the one moves the runs of the other.
 #[test]
 fn a_hierarchy_in_a_volume() {

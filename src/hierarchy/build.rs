@@ -173,7 +173,8 @@ pub(crate) fn join(roots: &[Node], preset: Preset, outer: Sphere) -> (Block, Vec
     (block, portals)
 }
 
-/// Places and shapes up to this can be merged: masses have their fourth powers, and must fit in 32 bits.
+/// Places and shapes up to this can be merged: masses have their squares times optical
+/// depths, and sums of many must fit in 32 bits.
 const FARTHEST: f32 = 1e9;
 
 /// Whether a hierarchy can be built of splats.

@@ -57,25 +57,32 @@ fn factor(m: &Moments) -> [f32; 6] {
 /// cos(acos(r)/3) as a polynomial of √(1 + r), by rising powers: at most 3·10⁻⁶ off.
 const THIRD: [f32; 6] = [0.500_002_7, 0.408_164, -0.054_907_8, 0.016_816_5, -0.004_783_6, 0.000_734_3];
 
+/// The mean variance along the axes, and the matrix in it: products of variances themselves are lost in 32 bits where a
+/// splat is smaller than 1e-10 or larger than 1e9. 0 where there is no variance.
+fn by_mean([xx, xy, xz, yy, yz, zz]: &Moments) -> (f32, Moments) {
+    let mean = ((xx + yy + zz) / 3.0).max(0.0);
+    let per_mean = if mean > 0.0 { 1.0 / mean } else { 0.0 };
+    (mean, [xx, xy, xz, yy, yz, zz].map(|value| value * per_mean))
+}
+
 /// The largest eigenvalue, by the trigonometric solution of the characteristic polynomial (Smith 1961).
 fn largest(m: &Moments) -> f32 {
-    let [xx, xy, xz, yy, yz, zz] = *m;
-    let mean = (xx + yy + zz) / 3.0;
-    let (x, y, z) = (xx - mean, yy - mean, zz - mean);
+    let (mean, [xx, xy, xz, yy, yz, zz]) = by_mean(m);
+    let (x, y, z) = (xx - 1.0, yy - 1.0, zz - 1.0);
     let p = ((x * x + y * y + z * z + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0).sqrt();
-    if p <= mean * 1e-6 {
-        return mean + p;
+    if p <= 1e-6 {
+        return mean + mean * p;
     }
     let (x, y, z, xy, xz, yz) = (x / p, y / p, z / p, xy / p, xz / p, yz / p);
     let half = (x * (y * z - yz * yz) - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz)) * 0.5;
     let root = (1.0 + half.clamp(-1.0, 1.0)).sqrt();
-    mean + 2.0 * p * THIRD.iter().rev().fold(0.0, |sum, factor| sum * root + factor)
+    mean + mean * 2.0 * p * THIRD.iter().rev().fold(0.0, |sum, factor| sum * root + factor)
 }
 
 /// About σ₁·σ₂: the root of the sum of the principal minors, which for a flat splat is the larger two axes' alone.
 fn area(m: &Moments) -> f32 {
-    let [xx, xy, xz, yy, yz, zz] = *m;
-    (xx * yy - xy * xy + xx * zz - xz * xz + yy * zz - yz * yz).max(0.0).sqrt()
+    let (mean, [xx, xy, xz, yy, yz, zz]) = by_mean(m);
+    mean * (xx * yy - xy * xy + xx * zz - xz * xz + yy * zz - yz * yz).max(0.0).sqrt()
 }
 
 /// A leaf's node; `extent` is where footprints end, in standard deviations.
@@ -100,7 +107,7 @@ impl Mass {
         let area = area(&covariance);
         let alpha = (splat.color >> 24) as f32 / 255.0;
         // What is fully transparent still has a place.
-        let mass = (splat.strength * alpha * area).max(f32::MIN_POSITIVE);
+        let mass = (splat.strength.min(MOST_STRENGTH) * alpha * area).max(f32::MIN_POSITIVE);
         Self { mass, area, mean: Vec3::from(splat.center), moments: covariance }
     }
 }

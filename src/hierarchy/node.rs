@@ -53,8 +53,8 @@ pub struct Tree {
     pub origin: DVec3,
     /// Footprints end this many standard deviations from the centre.
     pub extent: f32,
-    /// Whether the source was closed: each side of its surfaces hides the other from every point outside, so that what
-    /// faces away need not be drawn.
+    /// Whether the source was solid ([`Mesh::is_solid`](crate::surface::Mesh::is_solid)): each side of its surfaces hides the
+    /// other from every point outside, so that what faces away need not be drawn.
     pub closed: bool,
     /// The box around all footprints, in world coordinates.
     pub bounds: Bounds,

@@ -294,7 +294,7 @@ impl Sums {
         self.volume += place.dot(cross);
     }
 
-    /// Adds the corners of a triangle; `unit` as of [`are_inside_out`](Self::are_inside_out).
+    /// Adds the corners of a triangle; `unit` as of [`side`](Self::side).
     pub fn add_triangle(&mut self, corners: [Vec3; 3], unit: f32) {
         let [a, b, c] = corners.map(|corner| corner.as_dvec3());
         let cross = (b - a).cross(c - a) * (0.5 / f64::from(unit).powi(2));
@@ -315,11 +315,13 @@ impl Sums {
         }
     }
 
-    /// Whether there is a volume, and a negative one. It is counted from the centre of the area, so that an open surface has
-    /// one only as far as it is curved. `unit` is the length that areas are counted in the square of.
-    pub fn are_inside_out(&self, unit: f32) -> bool {
+    /// 1 where there is a volume, −1 where there is a negative one: then the surface is inside out. It is counted from the
+    /// centre of the area, so that an open surface has one only as far as it is curved. `unit` is the length that areas are
+    /// counted in the square of.
+    pub fn side(&self, unit: f32) -> i8 {
         let volume = (self.volume - self.cross.dot(self.place) / self.area) / (9.0 * f64::from(unit));
-        volume < -1e-3 * (self.area / 3.0).powf(1.5)
+        let least = 1e-3 * (self.area / 3.0).powf(1.5);
+        i8::from(volume > least) - i8::from(volume < -least)
     }
 }
 

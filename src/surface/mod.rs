@@ -12,14 +12,16 @@ mod piece;
 mod refine;
 mod shapes;
 mod smooth;
+mod solid;
 mod surfels;
 mod survey;
 
 pub use mesh::{Material, Mesh, Sensor, Texture};
 pub(crate) use orient::Known;
 pub(crate) use paint::color_at;
-pub(crate) use piece::{MeshPieces, Triangles, cloud_piece};
+pub(crate) use piece::{MeshPieces, PiecesClosing, Triangles, cloud_piece};
 pub(crate) use smooth::corner_normals;
+pub(crate) use solid::{Parts, Sides};
 pub(crate) use surfels::EXTENT;
 pub use surfels::SurfelOptions;
 pub use survey::Survey;

@@ -11,7 +11,7 @@ use super::{
     survey::{edge, edge_of_places},
 };
 use crate::{Result, splat::Splat};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// What going through the triangles of a mesh once tells of it. Two parts add up.
 #[derive(Debug, Clone, Default)]
@@ -22,6 +22,8 @@ pub(crate) struct Triangles {
     sums: Sums,
     /// About how many triangles they will be once long edges are cut.
     expected: f64,
+    /// The smallest and the largest coordinates of corners.
+    bounds: Option<[Vec3; 2]>,
     /// The corners of those with an edge that is to be cut.
     pub long: Vec<Vec3>,
     pub longest: f32,
@@ -37,6 +39,7 @@ impl Triangles {
         ];
         self.edges.iter_mut().zip(sums).for_each(|(sum, more)| *sum = sum.wrapping_add(more));
         self.sums.add_triangle(corners, 1.0);
+        self.surround([p.min(q).min(r), p.max(q).max(r)]);
         let edges = [(p, q), (q, r), (r, p)].map(|(a, b)| (a - b).length());
         let longest = edges[0].max(edges[1]).max(edges[2]);
         self.longest = self.longest.max(longest);
@@ -46,7 +49,19 @@ impl Triangles {
         }
     }
 
+    fn surround(&mut self, [low, high]: [Vec3; 2]) {
+        let [own_low, own_high] = self.bounds.unwrap_or([low, high]);
+        self.bounds = Some([own_low.min(low), own_high.max(high)]);
+    }
+
+    /// The diagonal of the box around all corners that are at this origin.
+    fn diagonal(&self, origin: DVec3) -> f32 {
+        let [low, high] = self.bounds.unwrap_or_default().map(|corner| origin + corner.as_dvec3());
+        (high - low).length() as f32
+    }
+
     pub fn join(&mut self, other: Self) {
+        other.bounds.into_iter().for_each(|bounds| self.surround(bounds));
         self.edges.iter_mut().zip(other.edges).for_each(|(sum, more)| *sum = sum.wrapping_add(more));
         self.sums = self.sums.with(other.sums);
         self.expected += other.expected;
@@ -66,38 +81,53 @@ pub(crate) struct MeshPieces {
     is_coarse: bool,
     /// The longest that an edge may stay.
     pub length: f32,
-    pub is_closed: bool,
+    pub closing: Option<PiecesClosing>,
+}
+
+/// What closes a mesh, as of [`Mesh::is_closed`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PiecesClosing {
+    Vertices,
+    Places,
 }
 
 impl MeshPieces {
-    /// Of a mesh with a bounding box of this `diagonal`; `look` goes through its triangles where edges longer than what it is
-    /// given are cut. Also gives what the last look told.
+    /// Of a mesh around an `origin` whose vertices lie in a box of this `diagonal`; `look` goes through its triangles where
+    /// edges longer than what it is given are cut. Also gives what the last look told.
     pub fn new(
         [points, triangles]: [usize; 2],
         [has_normals, has_uvs]: [bool; 2],
-        diagonal: f32,
+        (origin, diagonal): (DVec3, f32),
         options: &SurfelOptions,
         mut look: impl FnMut(f32) -> Result<Triangles>,
     ) -> Result<(Self, Triangles)> {
-        let mut seen = None;
         let budget = options.most_triangles.max(triangles) as f64;
-        let unit = (diagonal * options.largest_spacing).max(f32::MIN_POSITIVE);
+        let unit_of = |diagonal: f32| (diagonal * options.largest_spacing).max(f32::MIN_POSITIVE);
+        let mut unit = unit_of(diagonal);
+        let mut seen = (unit, look(unit)?);
+        // Vertices that no triangle has do not count.
+        unit = unit_of(seen.1.diagonal(origin));
         let length = affordable(unit, budget, |length| {
-            let found = look(length)?;
-            let expected = found.expected;
-            seen = Some((length, found));
-            Ok::<f64, crate::Error>(expected)
+            if seen.0 != length {
+                seen = (length, look(length)?);
+            }
+            Ok::<f64, crate::Error>(seen.1.expected)
         })?;
-        let seen = match seen {
-            Some((at, found)) if at == length => found,
-            _ => look(length)?,
+        if seen.0 != length {
+            seen = (length, look(length)?);
+        }
+        let (_, seen) = seen;
+        let closing = if seen.edges[0] == 0 {
+            Some(PiecesClosing::Vertices)
+        } else {
+            let is_closed = seen.edges[1] == 0 && may_be_split(has_uvs || has_normals, points, triangles);
+            is_closed.then_some(PiecesClosing::Places)
         };
-        let is_closed = triangles > 0
-            && (seen.edges[0] == 0 || (seen.edges[1] == 0 && may_be_split(has_uvs || has_normals, points, triangles)));
-        let outward = if seen.sums.are_inside_out(1.0) { -1.0 } else { 1.0 };
+        let outward = if seen.sums.side(1.0) < 0 { -1.0 } else { 1.0 };
         let is_coarse = seen.longest > length;
+        let closing = closing.filter(|_| triangles > 0);
         Ok((
-            Self { is_coarse, is_split: may_be_split(has_uvs, points, triangles), unit, outward, length, is_closed },
+            Self { is_coarse, is_split: may_be_split(has_uvs, points, triangles), unit, outward, length, closing },
             seen,
         ))
     }

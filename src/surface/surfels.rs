@@ -82,12 +82,20 @@ impl Mesh {
         Ok(SplatSet { origin: self.origin, payload: Payload::Radiance, splats, extent: EXTENT, overlap: 1.0 })
     }
 
-    /// The smallest and the largest world coordinates of the positions; `None` where there are none.
+    /// The smallest and the largest world coordinates of what is drawn: of the corners of all triangles, or of all positions
+    /// where there are none; `None` where there is nothing.
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
-        let first = self.positions.first()?;
-        let pairs = self.positions.par_iter().map(|&p| (p, p));
-        let (low, high) = pairs.reduce(|| (*first, *first), |a, b| (a.0.min(b.0), a.1.max(b.1)));
-        Some([self.origin + low.as_dvec3(), self.origin + high.as_dvec3()])
+        let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let with = |(low, high): (Vec3, Vec3), place: &Vec3| (low.min(*place), high.max(*place));
+        let union = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
+        let (low, high) = if self.triangles.is_empty() {
+            self.positions.par_iter().fold(none, with).reduce(none, union)
+        } else {
+            let places = |triangle: &[u32; 3]| triangle.map(|vertex| self.positions.get(vertex as usize));
+            let triangles = self.triangles.par_iter();
+            triangles.fold(none, |all, t| places(t).into_iter().flatten().fold(all, with)).reduce(none, union)
+        };
+        low.cmple(high).all().then(|| [self.origin + low.as_dvec3(), self.origin + high.as_dvec3()])
     }
 
     pub(super) fn check(&self, options: &SurfelOptions) -> Result<()> {
@@ -150,7 +158,7 @@ fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
     let is_coarse = parts.iter().any(|part| part.longest > 1.0);
     let is_textured = !mesh.uvs.is_empty() && mesh.materials.iter().any(|material| material.texture.is_some());
     let sums = parts.iter().fold(Sums::default(), |sums, part| sums.with(part.sums));
-    let outward = if sums.are_inside_out(largest) { -1.0 } else { 1.0 };
+    let outward = if sums.side(largest) < 0 { -1.0 } else { 1.0 };
     if !is_coarse && !is_textured && outward == 1.0 {
         return joined(parts);
     }

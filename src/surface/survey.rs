@@ -18,15 +18,32 @@ pub struct Survey {
     pub unused: usize,
 }
 
+/// What meets at the edges of a closed surface.
+pub(super) enum Closing {
+    /// Triangles that share vertices.
+    Vertices,
+    /// Triangles whose vertices lie at one place; each vertex's first one there.
+    Places(Vec<u32>),
+}
+
 impl Mesh {
     /// Whether the triangles bound a solid: along every edge as many run one way as the other. From outside, such a surface
     /// hides its own back.
     ///
     /// Edges are not listed: each adds a number made of its ends by a hash, or takes it away, by its direction. The sum over a
     /// closed surface is zero; over another one it is, by chance, once in 2⁶⁴.
+    ///
+    /// See [`is_solid`](Self::is_solid) for whether that back need not be drawn.
     pub fn is_closed(&self) -> bool {
-        if self.triangles.is_empty() {
-            return false;
+        self.closing().is_some()
+    }
+
+    /// What closes the surface; `None` where it is not closed.
+    pub(super) fn closing(&self) -> Option<Closing> {
+        let refers_beyond =
+            |triangle: &[u32; 3]| triangle.iter().any(|&vertex| vertex as usize >= self.positions.len());
+        if self.triangles.is_empty() || self.triangles.par_iter().any(refers_beyond) {
+            return None;
         }
         let sum = |name: &(dyn Fn(u32) -> u32 + Sync)| {
             let of_triangle = |t: &[u32; 3]| {
@@ -37,15 +54,15 @@ impl Mesh {
             triangles.map(of_triangle).reduce(|| 0, u64::wrapping_add)
         };
         if sum(&|vertex| vertex) == 0 {
-            return true;
+            return Some(Closing::Vertices);
         }
         // Scans that share all vertices have fewer than files that split them.
         let has_seams = !self.uvs.is_empty() || !self.normals.is_empty();
         if !may_be_split(has_seams, self.positions.len(), self.triangles.len()) {
-            return false;
+            return None;
         }
         let first = first_of_equals(&self.positions);
-        sum(&|vertex| first[vertex as usize]) == 0
+        (sum(&|vertex| first[vertex as usize]) == 0).then_some(Closing::Places(first))
     }
 
     /// Looks through the mesh for what gives nothing to draw.

@@ -112,7 +112,7 @@ impl Demo {
         io::ply::write(&mesh, &self.folder.join(MESH))?;
         progress.stage("Building a hierarchy");
         let build = BuildOptions {
-            closed: mesh.is_closed(),
+            closed: mesh.is_solid(),
             source_points: Some(mesh.positions.len() as u64),
             ..BuildOptions::default()
         };

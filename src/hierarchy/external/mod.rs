@@ -12,6 +12,7 @@ mod bins;
 mod build;
 mod distribute;
 mod regions;
+mod solid;
 mod survey;
 
 use super::{Preset, build::Builder, file::WriteOptions, sphere::Sphere};
@@ -103,7 +104,7 @@ pub fn convert(
         let stream = Stream::open(file, limits)?.ok_or_else(|| {
             Error::Argument(format!("{}: a file of this kind can only be read as a whole", file.display()))
         })?;
-        let input = survey::survey(stream, most, &options.surfels, watch)?;
+        let input = survey::survey(stream, most, options, watch)?;
         tracing::info!(file = %file.display(), regions = input.regions(), "cut in regions");
         inputs.push(distribute::distribute(input, most, path, watch)?);
     }
@@ -114,7 +115,7 @@ pub fn convert(
     let mut done = Converted {
         points: inputs.iter().map(|input| input.input.stream.point_count()).sum(),
         splats: 0,
-        closed: inputs.iter().all(|input| input.input.mesh.as_ref().is_some_and(|mesh| mesh.pieces.is_closed)),
+        closed: inputs.iter().all(|input| input.input.mesh.as_ref().is_some_and(|mesh| mesh.is_solid)),
         regions: inputs.iter().map(|input| input.input.regions()).sum(),
     };
     let mut work = build::Work {

@@ -5,13 +5,14 @@ use super::{
         partition::Cube,
         sphere::{DIRECTIONS, Sphere},
     },
-    Stage, StageWatch,
+    ExternalOptions, Stage, StageWatch,
     regions::Regions,
+    solid::is_solid,
 };
 use crate::{
     Result,
     io::Stream,
-    surface::{MeshPieces, SurfelOptions, Triangles},
+    surface::{MeshPieces, Triangles},
 };
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
@@ -31,6 +32,8 @@ pub struct Surveyed<'a> {
 /// What is known of the triangles of a mesh.
 pub struct Triangulated {
     pub pieces: MeshPieces,
+    /// As of [`Mesh::is_solid`](crate::surface::Mesh::is_solid).
+    pub is_solid: bool,
     /// The places of the corners of triangles that are to be cut: what is at them is made on its own.
     pub long: HashSet<[u32; 3]>,
     /// The longest edge that stays.
@@ -42,11 +45,11 @@ pub fn name(place: Vec3) -> [u32; 3] {
     (place + Vec3::ZERO).to_array().map(f32::to_bits)
 }
 
-/// Goes through the input as often as it takes.
+/// Goes through the input as often as it takes, and cuts it in regions of at most `most` points.
 pub fn survey<'a>(
     mut stream: Stream<'a>,
     most: u64,
-    options: &SurfelOptions,
+    options: &ExternalOptions,
     watch: StageWatch<'_>,
 ) -> Result<Surveyed<'a>> {
     let counted = stream.counts();
@@ -85,7 +88,7 @@ pub fn survey<'a>(
     Ok(Surveyed { core: extremes.core(), stream, regions, center, mesh })
 }
 
-fn triangulated(stream: &Stream, options: &SurfelOptions, watch: StageWatch<'_>) -> Result<Triangulated> {
+fn triangulated(stream: &Stream, options: &ExternalOptions, watch: StageWatch<'_>) -> Result<Triangulated> {
     let (counts, origin) = (stream.counts(), stream.origin());
     let [low, high] = stream.bounds().map(|corner| origin + corner.as_dvec3());
     let look = |length: f32| {
@@ -111,12 +114,17 @@ fn triangulated(stream: &Stream, options: &SurfelOptions, watch: StageWatch<'_>)
     let (pieces, seen) = MeshPieces::new(
         [counts.points as usize, counts.triangles as usize],
         [stream.has_normals(), stream.has_uvs()],
-        (high - low).length() as f32,
-        options,
+        (origin, (high - low).length() as f32),
+        &options.surfels,
         look,
     )?;
     let longest = seen.longest.min(pieces.length);
-    Ok(Triangulated { pieces, long: seen.long.into_iter().map(name).collect(), longest })
+    let long = seen.long.into_iter().map(name).collect();
+    let is_solid = match pieces.closing {
+        Some(closing) => is_solid(stream, closing, options.memory, watch)?,
+        None => false,
+    };
+    Ok(Triangulated { pieces, is_solid, long, longest })
 }
 
 /// The places that are farthest in each of some directions, and against it.

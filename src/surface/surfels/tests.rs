@@ -269,3 +269,16 @@ fn bounds_are_in_the_world() {
     assert_eq!(mesh.bounds(), Some([DVec3::new(99.0, -1.0, -1.0), DVec3::new(101.0, 1.0, 1.0)]));
     assert_eq!(Mesh::default().bounds(), None);
 }
+
+#[test]
+fn a_vertex_of_no_triangle_changes_nothing() {
+    let mesh = Mesh::cube(2.0);
+    let mut stray = mesh.clone();
+    stray.positions.insert(0, Vec3::splat(300.0));
+    stray.normals.clear();
+    stray.triangles.iter_mut().for_each(|triangle| *triangle = triangle.map(|vertex| vertex + 1));
+    let mut alone = mesh;
+    alone.normals.clear();
+    assert_eq!(stray.bounds(), alone.bounds());
+    assert_eq!(surfels(&stray).splats.len(), surfels(&alone).splats.len());
+}

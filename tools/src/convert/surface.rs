@@ -149,7 +149,7 @@ impl Convert {
         let (set, closed, up, points) = match input {
             Input::Mesh(mesh) => {
                 progress.stage(format!("Making splats of {} points", mesh.positions.len()));
-                let closed = mesh.is_closed();
+                let closed = mesh.is_solid();
                 let set = mesh.surfels(&self.surface.surfel_options()).map_err(|e| in_file(path, e))?;
                 (set, closed, mesh.z_is_up.then_some(UpAxis::Z), mesh.positions.len() as u64)
             }

@@ -38,7 +38,7 @@ fn hierarchy(source: &Source, input: Input) -> Result<Arc<Hierarchy>, Failure> {
     match input {
         Input::Hierarchy(hierarchy) => Ok(hierarchy),
         Input::Mesh(mesh) => {
-            let options = BuildOptions { closed: mesh.is_closed(), ..BuildOptions::default() };
+            let options = BuildOptions { closed: mesh.is_solid(), ..BuildOptions::default() };
             let tree = Tree::build(&mesh.surfels(&SurfelOptions::default())?, &options, &|_, _| ())?;
             Ok(Arc::new(Hierarchy::from_tree(tree)?))
         }

@@ -260,7 +260,7 @@ pub fn tables(
         progress.stage(format!("Drawing {}", source.path.display()));
         let splats = mesh.surfels(&SurfelOptions::default())?;
         let options = BuildOptions {
-            closed: mesh.is_closed(),
+            closed: mesh.is_solid(),
             source_points: Some(mesh.positions.len() as u64),
             ..BuildOptions::default()
         };
