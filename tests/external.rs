@@ -231,6 +231,29 @@ fn clouds_have_nearly_the_same_leaves() {
     assert!(other_shapes <= most && other_sides <= most, "{other_shapes} shapes and {other_sides} sides of {most}");
 }
 
+/// Points of far coarser parts are drawn so many times as wide as the median one, which regions know about.
+#[test]
+fn uneven_clouds_are_as_wide() {
+    let folder = Folder::new("uneven");
+    let shifted = |i: u32, edge: u32, step: f32| {
+        let jitter = |salt: u32| (i.wrapping_mul(salt) >> 16 & 255) as f32 / 255.0 - 0.5;
+        let [x, y] = [(i % edge) as f32 + jitter(2_654_435_761), (i / edge) as f32 + jitter(2_246_822_519)];
+        Vec3::new(x, y, 0.3 * jitter(3_266_489_917)) * step
+    };
+    let mut cloud = Mesh { positions: (0..40_000).map(|i| shifted(i, 200, 0.01)).collect(), ..Mesh::default() };
+    cloud.positions.extend((0..400).map(|i| shifted(i, 20, 1.0) + Vec3::new(5.0, 5.0, 0.0)));
+    std::fs::write(folder.path("cloud.ply"), ply(&cloud, false, false)).unwrap();
+    let (whole, parts, converted) = both_ways(&folder, "cloud.ply");
+    assert!(converted.regions > 10 && whole.len() == parts.len());
+    let coarse = |splats: &[Splat]| {
+        let is_coarse = |splat: &&Splat| splat.center[0] > 4.0;
+        let widths = splats.iter().filter(is_coarse).map(|splat| f64::from(splat.factor[0]));
+        widths.sum::<f64>()
+    };
+    let ratio = coarse(&parts) / coarse(&whole);
+    assert!((0.9..1.1).contains(&ratio), "{ratio} times as wide in regions");
+}
+
 #[test]
 fn crowded_clouds_are_cut_too() {
     let folder = Folder::new("crowded");

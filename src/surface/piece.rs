@@ -7,7 +7,7 @@ use super::{
     cloud,
     fan::Sums,
     refine::{affordable, pieces},
-    surfels::of_part,
+    surfels::{largest_edge, of_part},
     survey::{edge, edge_of_places},
 };
 use crate::{Result, splat::Splat};
@@ -20,8 +20,9 @@ pub(crate) struct Triangles {
     edges: [u64; 2],
     /// Which side is out.
     sums: Sums,
-    /// About how many triangles they will be once long edges are cut.
-    expected: f64,
+    /// About how many triangles they will be once long edges are cut, and those with long edges alone.
+    pub expected: f64,
+    pub expected_of_long: f64,
     /// The smallest and the largest coordinates of corners.
     bounds: Option<[Vec3; 2]>,
     /// The corners of those with an edge that is to be cut.
@@ -43,8 +44,10 @@ impl Triangles {
         let edges = [(p, q), (q, r), (r, p)].map(|(a, b)| (a - b).length());
         let longest = edges[0].max(edges[1]).max(edges[2]);
         self.longest = self.longest.max(longest);
-        self.expected += pieces(edges.map(|edge| f64::from(edge / length)));
+        let pieces = pieces(edges.map(|edge| f64::from(edge / length)));
+        self.expected += pieces;
         if longest / length > 1.0 {
+            self.expected_of_long += pieces;
             self.long.extend(corners);
         }
     }
@@ -65,6 +68,7 @@ impl Triangles {
         self.edges.iter_mut().zip(other.edges).for_each(|(sum, more)| *sum = sum.wrapping_add(more));
         self.sums = self.sums.with(other.sums);
         self.expected += other.expected;
+        self.expected_of_long += other.expected_of_long;
         self.long.extend(other.long);
         self.longest = self.longest.max(other.longest);
     }
@@ -102,11 +106,10 @@ impl MeshPieces {
         mut look: impl FnMut(f32) -> Result<Triangles>,
     ) -> Result<(Self, Triangles)> {
         let budget = options.most_triangles.max(triangles) as f64;
-        let unit_of = |diagonal: f32| (diagonal * options.largest_spacing).max(f32::MIN_POSITIVE);
-        let mut unit = unit_of(diagonal);
+        let mut unit = largest_edge(diagonal, options);
         let mut seen = (unit, look(unit)?);
         // Vertices that no triangle has do not count.
-        unit = unit_of(seen.1.diagonal(origin));
+        unit = largest_edge(seen.1.diagonal(origin), options);
         let length = affordable(unit, budget, |length| {
             if seen.0 != length {
                 seen = (length, look(length)?);

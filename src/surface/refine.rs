@@ -33,12 +33,12 @@ pub(super) struct Refined<'a> {
 /// Lengths grow where there would be more than about `most` triangles.
 pub(super) fn refine(mesh: &Mesh, length: f32, most: usize) -> Refined<'_> {
     let wanted = Wanted { mesh, length, coarser: 1.0 };
-    if mesh.triangles.par_iter().enumerate().all(|(index, &t)| wanted.is_small(index, t)) {
+    if wanted.are_small() {
         return Refined { mesh: Cow::Borrowed(mesh), sources: None };
     }
     // While triangles are cut, the number of the one that each was cut from stands in its material's place.
     let mut fine = Mesh { triangle_materials: (0..mesh.triangles.len() as u32).collect(), ..mesh.clone() };
-    cut_all(&mut fine, wanted, most);
+    cut_all(&mut fine, &wanted.affordable(most).0);
     let sources = std::mem::take(&mut fine.triangle_materials);
     if !mesh.triangle_materials.is_empty() {
         fine.triangle_materials = sources.par_iter().map(|&source| mesh.triangle_materials[source as usize]).collect();
@@ -70,24 +70,18 @@ impl<'a> Origin<'a> {
     }
 }
 
-fn cut_all(fine: &mut Mesh, mut wanted: Wanted, most: usize) {
-    let (mesh, length) = (wanted.mesh, wanted.length);
-    let budget = most.max(mesh.triangles.len()) as f64;
-    for _ in 0..8 {
-        let expected = wanted.expected(fine);
-        if expected <= budget * 1.1 {
-            break;
-        }
-        // Slivers need fewer by the first power only; the next round corrects for them.
-        let factor = (expected / budget).sqrt() as f32;
-        wanted.coarser *= factor;
-        wanted.length = length * (wanted.coarser * FINEST).max(1.0);
-    }
+/// About how many triangles there are once the mesh is refined.
+pub(super) fn count_of_refined(mesh: &Mesh, length: f32, most: usize) -> usize {
+    let wanted = Wanted { mesh, length, coarser: 1.0 };
+    if wanted.are_small() { mesh.triangles.len() } else { wanted.affordable(most).1 as usize }
+}
+
+fn cut_all(fine: &mut Mesh, wanted: &Wanted) {
     // Triangles before `settled` have no long edge.
     let mut settled = 0;
     loop {
-        slice_needles(fine, &wanted, settled);
-        let mut marked = marked_edges(fine, &wanted, settled);
+        slice_needles(fine, wanted, settled);
+        let mut marked = marked_edges(fine, wanted, settled);
         if marked.is_empty() || fine.positions.len() + marked.len() > u32::MAX as usize {
             return;
         }
@@ -123,14 +117,35 @@ impl Wanted<'_> {
         [(0, 1), (1, 2), (2, 0)].iter().all(|&(i, j)| self.excess(self.mesh, triangle, t[i], t[j]) <= 1.0)
     }
 
+    /// Whether all triangles of the mesh may.
+    fn are_small(&self) -> bool {
+        self.mesh.triangles.par_iter().enumerate().all(|(index, &t)| self.is_small(index, t))
+    }
+
     /// About how many triangles there will be.
-    fn expected(&self, mesh: &Mesh) -> f64 {
-        let parts = |(t, &source): (&[u32; 3], &u32)| {
-            let [p, q, r] =
-                [(0, 1), (1, 2), (2, 0)].map(|(i, j)| f64::from(self.excess(mesh, source as usize, t[i], t[j])));
-            pieces([p, q, r])
+    fn expected(&self) -> f64 {
+        let parts = |(source, t): (usize, &[u32; 3])| {
+            pieces([(0, 1), (1, 2), (2, 0)].map(|(i, j)| f64::from(self.excess(self.mesh, source, t[i], t[j]))))
         };
-        mesh.triangles.par_iter().zip(&mesh.triangle_materials).map(parts).sum()
+        self.mesh.triangles.par_iter().enumerate().map(parts).sum()
+    }
+
+    /// What may stay so that there are no more than about `most` triangles, or than there are already; and about how many
+    /// there are then.
+    fn affordable(mut self, most: usize) -> (Self, f64) {
+        let length = self.length;
+        let budget = most.max(self.mesh.triangles.len()) as f64;
+        let mut expected = self.expected();
+        for _ in 0..8 {
+            if expected <= budget * 1.1 {
+                break;
+            }
+            // Slivers need fewer by the first power only; the next round corrects for them.
+            self.coarser *= (expected / budget).sqrt() as f32;
+            self.length = length * (self.coarser * FINEST).max(1.0);
+            expected = self.expected();
+        }
+        (self, expected)
     }
 }
 

@@ -11,7 +11,7 @@ use super::{
     adjacency::{Connected, is_split},
     cloud,
     fan::{Made, Maker, Sums},
-    refine::{Origin, refine},
+    refine::{Origin, count_of_refined, refine},
 };
 use crate::{
     Error, Result,
@@ -19,7 +19,7 @@ use crate::{
 };
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use std::borrow::Cow;
+use std::{borrow::Cow, ops::RangeInclusive};
 
 /// How surfels are made from a mesh or cloud.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,6 +36,11 @@ pub struct SurfelOptions {
     pub most_triangles: usize,
 }
 
+impl SurfelOptions {
+    /// Factors on radii that leave squares in 32 bits.
+    pub const RADIUS_SCALES: RangeInclusive<f32> = 1e-6..=1e6;
+}
+
 impl Default for SurfelOptions {
     fn default() -> Self {
         Self {
@@ -50,9 +55,6 @@ impl Default for SurfelOptions {
 
 /// Where footprints end, in standard deviations.
 pub(crate) const EXTENT: f32 = 3.0;
-
-/// Factors on radii that leave squares in 32 bits.
-const RADIUS_SCALES: std::ops::RangeInclusive<f32> = 1e-6..=1e6;
 
 /// Vertices of one parallel task.
 const CHUNK: usize = 1 << 12;
@@ -98,6 +100,15 @@ impl Mesh {
         low.cmple(high).all().then(|| [self.origin + low.as_dvec3(), self.origin + high.as_dvec3()])
     }
 
+    /// About how many triangles surfels are made of, once large ones are cut; 0 where a triangle refers beyond the positions.
+    pub fn triangles_once_cut(&self, options: &SurfelOptions) -> usize {
+        if self.check(options).is_err() {
+            return 0;
+        }
+        let length = |[low, high]: [DVec3; 2]| largest_edge((high - low).length() as f32, options);
+        self.bounds().map_or(0, |bounds| count_of_refined(self, length(bounds), options.most_triangles))
+    }
+
     pub(super) fn check(&self, options: &SurfelOptions) -> Result<()> {
         let values = [
             ("radius_scale", options.radius_scale),
@@ -110,8 +121,9 @@ impl Mesh {
                 return Err(Error::Argument(format!("{name} is {value}; a positive number is needed")));
             }
         }
-        if !RADIUS_SCALES.contains(&options.radius_scale) {
-            let (least, most) = (RADIUS_SCALES.start(), RADIUS_SCALES.end());
+        let scales = SurfelOptions::RADIUS_SCALES;
+        if !scales.contains(&options.radius_scale) {
+            let (least, most) = (scales.start(), scales.end());
             let message = format!("radius_scale is {:e}; {least:e} to {most:e} can be", options.radius_scale);
             return Err(Error::Argument(message));
         }
@@ -150,9 +162,14 @@ impl Mesh {
     }
 }
 
+/// The longest edge that may stay in a mesh of this size.
+pub(super) fn largest_edge(diagonal: f32, options: &SurfelOptions) -> f32 {
+    (diagonal * options.largest_spacing).max(f32::MIN_POSITIVE)
+}
+
 fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
     let Some([low, high]) = mesh.bounds() else { return Vec::new() };
-    let largest = ((high - low).length() as f32 * options.largest_spacing).max(f32::MIN_POSITIVE);
+    let largest = largest_edge((high - low).length() as f32, options);
     // Most large meshes are fine enough, and right side out. One look at the triangles finds that out and makes the surfels.
     let parts = make(mesh, None, is_split(mesh), options, [largest, 1.0], |_| true);
     let is_coarse = parts.iter().any(|part| part.longest > 1.0);

@@ -1,7 +1,10 @@
 //! Values of flags that are more than a word or a number.
 
 use glam::DVec3;
-use splatkit::io::{Endian, SampleType};
+use splatkit::{
+    io::{Endian, SampleType},
+    surface::SurfelOptions,
+};
 use std::str::FromStr;
 
 /// Numbers with a separator, exactly as many as asked for.
@@ -96,6 +99,13 @@ pub fn samples(text: &str) -> Result<u32, String> {
 /// A number above 0.
 pub fn positive(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "a number above 0 is needed".into())
+}
+
+/// A factor on radii.
+pub fn radius_scale(text: &str) -> Result<f32, String> {
+    let scales = SurfelOptions::RADIUS_SCALES;
+    let fits = text.parse().ok().filter(|scale| scales.contains(scale));
+    fits.ok_or_else(|| format!("a number from {:e} to {:e} is needed", scales.start(), scales.end()))
 }
 
 /// Neighbours of a sample.

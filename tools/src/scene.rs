@@ -64,7 +64,7 @@ impl SceneFlags {
                 Input::Mesh(mesh) => {
                     progress.stage(format!("Making surfels of {}", path.display()));
                     let mut options = SurfelOptions::default();
-                    options.radius_scale *= self.show.radius_scale.unwrap_or(1.0) as f32;
+                    options.radius_scale *= self.show.radius_scale.unwrap_or(1.0);
                     let splats = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
                     let bounds = mesh.bounds().map_or(splats.bounds(), |[min, max]| Bounds { min, max });
                     loaded.add(bounds, splats.splats.len());
@@ -74,6 +74,13 @@ impl SceneFlags {
                     }
                 }
                 Input::Hierarchy(hierarchy) => {
+                    if self.show.radius_scale.is_some() {
+                        return Err(Failure::Usage(format!(
+                            "--radius-scale does not change {}: a hierarchy has the radii that it was converted with; convert \
+                             it with --radius-scale",
+                            path.display()
+                        )));
+                    }
                     let header = hierarchy.header();
                     loaded.add(header.bounds, header.leaves as usize);
                     loaded.subject.up = match header.up {

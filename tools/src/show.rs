@@ -31,9 +31,9 @@ pub struct ShowFlags {
     /// Factors of 0 … 1 on the opacity by the gradient's magnitude (value per world length), linear in between.
     #[arg(long, value_name = "MAGNITUDE,FACTOR:…", value_parser = Factors::parse)]
     gradient_opacity: Option<Factors>,
-    /// Factor on the radii of surfels.
-    #[arg(long, value_name = "FACTOR", value_parser = parse::positive)]
-    pub radius_scale: Option<f64>,
+    /// Factor on the radii of the surfels of meshes and clouds. Hierarchies have those that they were converted with.
+    #[arg(long, value_name = "FACTOR", value_parser = parse::radius_scale)]
+    pub radius_scale: Option<f32>,
     #[command(flatten)]
     kernel: KernelFlags,
 }

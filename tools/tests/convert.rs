@@ -4,6 +4,7 @@ mod common;
 
 use common::*;
 use splatkit::{
+    hierarchy::Hierarchy,
     io::{self, Limits},
     volume::{Arrangement, Volume},
 };
@@ -41,6 +42,30 @@ fn body_centred_volumes_are_written_and_read() {
     assert_eq!((&again.samples, &again.lattice), (&written.samples, &written.lattice));
     folder.run("convert bcc.nrrd -o again.nrrd --overwrite --lattice bcc").ok();
     folder.run("convert bcc.nrrd -o cartesian.nrrd --lattice cartesian").fails(2, &["bcc", "cartesian"]);
+}
+
+#[test]
+fn a_hierarchy_of_a_hierarchy_keeps_what_is_told_of_it() {
+    let folder = Folder::new("again");
+    folder.put("a.ply", PLY);
+    folder.run("convert a.ply -o a.splk --up x --unit mm --lossless").ok();
+    folder.run("convert a.splk -o b.splk --radius-scale 2 --lossless").ok();
+    let open = |name: &str| Hierarchy::open(&folder.path(name), &Limits::default()).unwrap();
+    let (a, b) = (open("a.splk"), open("b.splk"));
+    assert_eq!((b.header().up, b.header().unit.as_str()), (a.header().up, "mm"));
+    let widths = |hierarchy: &Hierarchy| {
+        let mut widths: Vec<f32> = hierarchy.leaves().unwrap().splats.iter().map(|splat| splat.factor[0]).collect();
+        widths.sort_by(f32::total_cmp);
+        widths
+    };
+    let doubled: Vec<f32> = widths(&a).iter().map(|width| width * 2.0).collect();
+    assert_eq!(widths(&b), doubled);
+    folder.run("render a.splk -o a.png --radius-scale 2").fails(2, &["a.splk", "convert it with --radius-scale"]);
+    for scale in ["1e-7", "2e6", "0", "-1", "nan"] {
+        let number = format!("--radius-scale={scale}");
+        folder.run(&format!("convert a.ply -o c.splk {number}")).fails(2, &["a number from 1e-6 to 1e6 is needed"]);
+        folder.run(&format!("render a.ply -o c.png {number}")).fails(2, &["a number from 1e-6 to 1e6 is needed"]);
+    }
 }
 
 #[test]

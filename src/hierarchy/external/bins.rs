@@ -7,8 +7,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Bytes that wait in memory for all bins together.
-const WAITING: usize = 64 << 20;
+/// The most bytes that wait in memory for all bins together.
+const MOST_WAITING: u64 = 64 << 20;
 
 /// Some bins of records. Each keeps its records in the order in which they came.
 pub struct Bins<T> {
@@ -26,12 +26,13 @@ pub struct Bins<T> {
 }
 
 impl<T: Pod> Bins<T> {
-    /// So many empty bins, in a file beside `wanted`.
+    /// So many empty bins, in a file beside `wanted`; an eighth of `memory` may wait to be written.
     ///
     /// # Errors
     /// [`Error::Output`] where none can be made.
-    pub fn beside(wanted: &Path, bins: usize) -> Result<Self> {
-        let most = (WAITING / bins.max(1) / size_of::<T>()).clamp(64, 1 << 16);
+    pub fn beside(wanted: &Path, bins: usize, memory: u64) -> Result<Self> {
+        let waiting = (memory / 8).min(MOST_WAITING) as usize;
+        let most = (waiting / bins.max(1) / size_of::<T>()).clamp(64, 1 << 16);
         let file = Scratch::beside(wanted)?;
         let (waiting, runs) = (vec![Vec::new(); bins], vec![Vec::new(); bins]);
         Ok(Self { file, wanted: wanted.to_owned(), end: 0, waiting, most, runs, counts: vec![0; bins] })

@@ -62,14 +62,14 @@ impl Work<'_> {
         let regions = input.input.regions() as u32;
         let orients = input.input.mesh.is_none() && !input.input.stream.has_normals();
         let mut sides = match orients {
-            true => Some(Bins::<Side>::beside(wanted, regions as usize)?),
+            true => Some(Bins::<Side>::beside(wanted, regions as usize, self.options.memory)?),
             false => None,
         };
         (self.watch)(Stage::Building, self.built, self.points);
         for region in 0..regions {
             let part = Part::read(&mut input, region)?;
             let splats = match &input.input.mesh {
-                Some(mesh) => part.of_mesh(mesh, region == input.input.regions.count() as u32, self.options)?,
+                Some(mesh) => part.of_mesh(mesh, Some(region) == input.input.long_region(), self.options)?,
                 None => part.of_cloud(&input, sides.as_mut(), region, self.options)?,
             };
             let owned = part.owned.iter().filter(|owned| **owned).count() as u64;

@@ -25,7 +25,13 @@ pub struct Distributed<'a> {
 impl Surveyed<'_> {
     /// How many regions answer for points.
     pub fn regions(&self) -> usize {
-        self.regions.count() + usize::from(self.mesh.as_ref().is_some_and(|mesh| !mesh.long.is_empty()))
+        self.regions.count() + usize::from(self.long_region().is_some())
+    }
+
+    /// The one that answers for the corners of triangles that are to be cut, where there are any.
+    pub fn long_region(&self) -> Option<u32> {
+        let has_long = self.mesh.as_ref().is_some_and(|mesh| !mesh.long.is_empty());
+        has_long.then_some(self.regions.count() as u32)
     }
 
     /// The region that answers for a point at a place.
@@ -44,10 +50,15 @@ struct Shares<T> {
     radius: f64,
 }
 
-/// Distributes an input to files beside `wanted`.
-pub fn distribute<'a>(input: Surveyed<'a>, most: u64, wanted: &Path, watch: StageWatch<'_>) -> Result<Distributed<'a>> {
+/// Distributes an input to files beside `wanted`, in regions of at most so many points, with so many bytes of memory.
+pub fn distribute<'a>(
+    input: Surveyed<'a>,
+    [most, memory]: [u64; 2],
+    wanted: &Path,
+    watch: StageWatch<'_>,
+) -> Result<Distributed<'a>> {
     let bins = input.regions();
-    let mut points = Bins::beside(wanted, bins)?;
+    let mut points = Bins::beside(wanted, bins, memory)?;
     let mut radius = 0.0f64;
     let total = input.stream.point_count();
     let mut done = 0;
@@ -67,7 +78,7 @@ pub fn distribute<'a>(input: Surveyed<'a>, most: u64, wanted: &Path, watch: Stag
     })?;
     let mut triangles = None;
     if input.mesh.is_some() {
-        let mut bins = Bins::beside(wanted, bins)?;
+        let mut bins = Bins::beside(wanted, bins, memory)?;
         let total = input.stream.counts().triangles;
         let mut done = 0;
         input.stream.triangles(
@@ -131,6 +142,8 @@ struct Crowd<'a> {
     stream: &'a Stream<'a>,
     most: usize,
     is_cloud: bool,
+    /// The region of triangles that are to be cut.
+    long: Option<u32>,
     /// The places of regions that have more points than they may.
     places: Vec<Option<HashSet<[u32; 3]>>>,
 }
@@ -139,7 +152,8 @@ impl<'a> Crowd<'a> {
     fn new(input: &'a Surveyed<'_>, most: u64) -> Self {
         // A region's neighbours may make it larger.
         let most = usize::try_from(most).unwrap_or(usize::MAX).saturating_mul(2);
-        Self { stream: &input.stream, most, is_cloud: input.mesh.is_none(), places: vec![None; input.regions()] }
+        let places = vec![None; input.regions()];
+        Self { stream: &input.stream, most, is_cloud: input.mesh.is_none(), long: input.long_region(), places }
     }
 
     /// Whether a region keeps a point.
@@ -148,7 +162,8 @@ impl<'a> Crowd<'a> {
     /// [`Error::Input`](crate::Error::Input) where more points lie together than can be told apart from where the farthest ones are.
     fn takes(&mut self, points: &mut Bins<StreamPoint>, region: u32, point: &StreamPoint) -> Result<bool> {
         let held = points.count(region);
-        if held >= self.most.saturating_mul(MOST_TIMES) {
+        // Triangles that are cut together are as many as memory suffices for, however many points of a region that is.
+        if held >= self.most.saturating_mul(MOST_TIMES) && Some(region) != self.long {
             let message = format!(
                 "more than {held} lie within a two-millionth of the way to the farthest ones, more than fit into memory at once"
             );

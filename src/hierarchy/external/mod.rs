@@ -11,6 +11,7 @@
 mod bins;
 mod build;
 mod distribute;
+mod memory;
 mod regions;
 mod solid;
 mod survey;
@@ -19,11 +20,13 @@ use super::{Preset, build::Builder, file::WriteOptions, sphere::Sphere};
 use crate::{
     Error, Result,
     hierarchy::file::Whole,
-    io::{Counts, Limits, Stream},
+    io::{Limits, Stream},
     math::Bounds,
     surface::{EXTENT, SurfelOptions},
 };
 use std::path::{Path, PathBuf};
+
+pub use memory::{memory_of_mesh, memory_of_stream};
 
 /// What is at work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,7 +48,8 @@ pub type StageWatch<'a> = &'a (dyn Fn(Stage, u64, u64) + Sync);
 /// How a file is converted in regions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExternalOptions {
-    /// Bytes of memory that are to suffice, about; regions are made as small as that needs, down to a thousand points.
+    /// Bytes of memory that are to suffice, about; regions are made as small as that needs, down to a thousand points. A
+    /// few hundred million are taken in any case.
     pub memory: u64,
     pub preset: Preset,
     /// Splats of a block.
@@ -69,25 +73,14 @@ const OF_POINT: u64 = 1000;
 const MOST_POINTS: u64 = 1 << 22;
 const FEWEST_POINTS: u64 = 1 << 10;
 
-/// About how many bytes making a hierarchy of a file takes where all of it is in memory: of a mesh its arrays, which corners
-/// meet at its vertices, and splats in parts and as a whole; of a cloud its arrays, the tree that finds neighbours, what is
-/// found of them, and the edges along which sides are told; with splats, their order and the blocks at work.
-pub fn memory_of_whole(counts: Counts) -> u64 {
-    const BLOCKS: u64 = 200 << 20;
-    if counts.triangles > 0 {
-        BLOCKS + 140 * counts.points + 26 * counts.triangles
-    } else {
-        BLOCKS + 330 * counts.points
-    }
-}
-
 /// Converts files, each read as a [`Stream`], to one hierarchy, as [`build_file`](super::build_file) makes it of the surfels
 /// of all. Memory is for one region at a time; the disk beside `path` has to hold about 40 bytes a point and 14 a triangle
 /// meanwhile.
 ///
 /// # Errors
 /// Those of [`Stream::open`] and of reading on; [`Error::Argument`] for a file that can only be read as a whole, and for
-/// options of [`Mesh::surfels`](crate::surface::Mesh::surfels) that are no positive numbers; [`Error::NothingToDraw`] where
+/// options of [`Mesh::surfels`](crate::surface::Mesh::surfels) that are no positive numbers; [`Error::Input`] for a mesh
+/// of so many long triangles, which are cut together, that the memory does not suffice; [`Error::NothingToDraw`] where
 /// nothing is left; [`Error::Output`] where something cannot be written. Then nothing is left of the file.
 pub fn convert(
     files: &[PathBuf],
@@ -106,7 +99,7 @@ pub fn convert(
         })?;
         let input = survey::survey(stream, most, options, watch)?;
         tracing::info!(file = %file.display(), regions = input.regions(), "cut in regions");
-        inputs.push(distribute::distribute(input, most, path, watch)?);
+        inputs.push(distribute::distribute(input, [most, options.memory], path, watch)?);
     }
     let Some(first) = inputs.first() else { return Err(Error::NothingToDraw("there are no files".into())) };
     let origin = first.input.stream.origin();

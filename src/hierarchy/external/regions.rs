@@ -18,6 +18,9 @@ const REACH_ON_SURFACE: f32 = 6.0;
 const REACH_IN_SOLID: f32 = 2.0;
 /// … where it is a cell of as many points.
 const ENOUGH: u64 = 64;
+/// The distance of the neighbour that points are judged by, the sixth, in mean spacings: of points strewn on a surface the sixth
+/// lies in a circle of area 6 around a point, of one each.
+const SIXTH: f32 = 1.382;
 /// In the table of cells, one that is in several regions, or that is cut.
 const SEVERAL: u32 = u32::MAX;
 
@@ -31,7 +34,7 @@ pub struct Regions {
     /// How far the neighbours of the points in each coarse cell may be; of cut ones in `cut`.
     reach: Vec<f32>,
     cut: BTreeMap<u64, f32>,
-    /// About the median distance between points that are next to each other, taken as those of a surface.
+    /// About the median distance of the neighbours that points are judged by, taken as those of a surface.
     pub spacing: f32,
 }
 
@@ -106,8 +109,12 @@ impl Regions {
                 cut.insert(cell.start, own);
             }
         }
+        if starts.len() == 1 {
+            // Nothing is to be looked up; many files together would take much memory for that.
+            (reach, cut) = (Vec::new(), BTreeMap::new());
+        }
         let coarse = table(&starts, reach.len());
-        Self { cube, starts, coarse, reach, cut, spacing: middle(typical) }
+        Self { cube, starts, coarse, reach, cut, spacing: SIXTH * middle(typical) }
     }
 
     /// How many regions there are, 1 at least.
@@ -125,6 +132,9 @@ impl Regions {
     }
 
     fn of_key(&self, key: u64) -> u32 {
+        if self.starts.len() == 1 {
+            return 0;
+        }
         match self.coarse[(key >> BELOW_COARSE) as usize] {
             SEVERAL => self.search(key),
             region => region,
@@ -134,6 +144,9 @@ impl Regions {
     /// The other regions that a point at a place may be a neighbour in.
     pub fn around(&self, place: Vec3, found: &mut Vec<u32>) {
         found.clear();
+        if self.starts.len() == 1 {
+            return;
+        }
         let key = self.cube.fine_key(place);
         let own = self.of_key(key);
         let mut reach = self.reach[(key >> BELOW_COARSE) as usize];

@@ -6,13 +6,14 @@ use super::{
         sphere::{DIRECTIONS, Sphere},
     },
     ExternalOptions, Stage, StageWatch,
+    memory::check_long,
     regions::Regions,
     solid::is_solid,
 };
 use crate::{
     Result,
     io::Stream,
-    surface::{MeshPieces, Triangles},
+    surface::{MeshPieces, SurfelOptions, Triangles},
 };
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
@@ -88,7 +89,8 @@ pub fn survey<'a>(
     Ok(Surveyed { core: extremes.core(), stream, regions, center, mesh })
 }
 
-fn triangulated(stream: &Stream, options: &ExternalOptions, watch: StageWatch<'_>) -> Result<Triangulated> {
+/// Goes through the triangles until it is known which of them are cut.
+pub fn look(stream: &Stream, options: &SurfelOptions, watch: StageWatch<'_>) -> Result<(MeshPieces, Triangles)> {
     let (counts, origin) = (stream.counts(), stream.origin());
     let [low, high] = stream.bounds().map(|corner| origin + corner.as_dvec3());
     let look = |length: f32| {
@@ -111,13 +113,18 @@ fn triangulated(stream: &Stream, options: &ExternalOptions, watch: StageWatch<'_
         )?;
         Ok(seen)
     };
-    let (pieces, seen) = MeshPieces::new(
+    MeshPieces::new(
         [counts.points as usize, counts.triangles as usize],
         [stream.has_normals(), stream.has_uvs()],
         (origin, (high - low).length() as f32),
-        &options.surfels,
+        options,
         look,
-    )?;
+    )
+}
+
+fn triangulated(stream: &Stream, options: &ExternalOptions, watch: StageWatch<'_>) -> Result<Triangulated> {
+    let (pieces, seen) = look(stream, &options.surfels, watch)?;
+    check_long(stream, &pieces, &seen, options)?;
     let longest = seen.longest.min(pieces.length);
     let long = seen.long.into_iter().map(name).collect();
     let is_solid = match pieces.closing {

@@ -28,7 +28,7 @@ impl Convert {
             return self.expect_bricks(&source, progress);
         }
         let options = WriteOptions {
-            unit: self.surface.unit.clone(),
+            unit: self.surface.unit.clone().unwrap_or_default(),
             source: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         };
         let stages = progress.stages();

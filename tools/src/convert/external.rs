@@ -1,6 +1,6 @@
 //! Files larger than memory, region by region.
 
-use super::{Convert, memory::Need};
+use super::{Convert, memory::Need, surface::Frame};
 use crate::{failure::Failure, output, progress::Progress, render::milliseconds};
 use serde_json::json;
 use splatkit::{
@@ -57,8 +57,8 @@ impl Convert {
         };
         let limits = self.load.limits();
         let first = self.files.first().map(|file| Stream::open(file, &limits)).transpose()?.flatten();
-        let up = first.filter(Stream::z_is_up).map(|_| UpAxis::Z);
-        let write = self.surface.write_options(&self.files, up);
+        let frame = Frame { up: first.filter(Stream::z_is_up).map(|_| UpAxis::Z), ..Frame::default() };
+        let write = self.surface.write_options(&self.files, &frame);
         let done = convert(&self.files, &limits, &self.output, &options, &write, &watch)?;
         drop(stages);
         progress.clear();

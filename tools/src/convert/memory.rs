@@ -2,8 +2,9 @@
 
 use crate::failure::Failure;
 use splatkit::{
-    hierarchy::external::memory_of_whole,
+    hierarchy::external::memory_of_stream,
     io::{Limits, Stream},
+    surface::SurfelOptions,
 };
 use std::path::{Path, PathBuf};
 
@@ -21,14 +22,15 @@ const OF_BYTE: u64 = 4;
 /// The same of a hierarchy, whose splats are packed.
 const OF_PACKED_BYTE: u64 = 24;
 
-/// About what converting files takes where all of them are in memory.
-pub fn need(files: &[PathBuf], limits: &Limits) -> Need {
+/// About what converting files takes where all of them are in memory, as far as it matters where so much is `enough`.
+pub fn need(files: &[PathBuf], limits: &Limits, options: &SurfelOptions, enough: u64) -> Need {
     let mut need = Need { bytes: 0, in_pieces: Ok(true) };
     for file in files {
         let is_packed = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("splk"));
         let guess = file_bytes(file) * if is_packed { OF_PACKED_BYTE } else { OF_BYTE };
-        match Stream::open(file, limits) {
-            Ok(Some(stream)) => need.bytes += memory_of_whole(stream.counts()) + file_bytes(file),
+        let of_stream = |mut stream: Stream| memory_of_stream(&mut stream, options, enough.saturating_sub(need.bytes));
+        match Stream::open(file, limits).and_then(|stream| stream.map(of_stream).transpose()) {
+            Ok(Some(bytes)) => need.bytes += bytes + file_bytes(file),
             Ok(None) => {
                 need.bytes += guess;
                 need.in_pieces = need.in_pieces.map(|_| false);

@@ -8,6 +8,7 @@ use splatkit::{
     Error,
     hierarchy::{
         self, BuildOptions,
+        external::memory_of_mesh,
         file::{UpAxis, WriteOptions},
     },
     splat::SplatSet,
@@ -29,14 +30,14 @@ pub struct SurfaceFlags {
     #[arg(long)]
     lossless: bool,
     /// A factor on all radii; below 1 surfaces may show holes.
-    #[arg(long, value_name = "FACTOR", value_parser = parse::positive, default_value_t = 1.0)]
-    radius_scale: f64,
+    #[arg(long, value_name = "FACTOR", value_parser = parse::radius_scale, default_value_t = 1.0)]
+    radius_scale: f32,
     /// The axis that points up, for viewers of the result.
     #[arg(long, value_name = "AXIS")]
     up: Option<Up>,
-    /// The unit of lengths, for viewers of the result, such as m or mm.
-    #[arg(long, value_name = "NAME", default_value = "")]
-    pub(super) unit: String,
+    /// The unit of lengths, for viewers of the result, such as m or mm [default: that of a hierarchy that is converted]
+    #[arg(long, value_name = "NAME")]
+    pub(super) unit: Option<String>,
     /// What a conversion may take, such as 8GiB. Binary PLY of points or triangles, LAS and LAZ that would take more are
     /// converted region by region, with files of about their size beside the output meanwhile. Volumes that are raw, or NRRD
     /// of raw encoding, become .splv slice by slice [default: three quarters of the memory that there is]
@@ -65,10 +66,17 @@ struct Gathered {
     set: SplatSet,
     closed: bool,
     /// What the first input says of it.
-    up: Option<UpAxis>,
+    frame: Frame,
     points: u64,
     read_ms: f64,
     splats_ms: f64,
+}
+
+/// What viewers are told of an input's coordinates.
+#[derive(Default)]
+pub(super) struct Frame {
+    pub up: Option<UpAxis>,
+    pub unit: String,
 }
 
 /// Splats that a dry run tries.
@@ -81,7 +89,7 @@ impl Convert {
             return Err(Failure::Usage("--lattice is for volumes written as .nrrd".into()));
         }
         let most = self.most_memory();
-        let need = memory::need(&self.files, &self.load.limits());
+        let need = memory::need(&self.files, &self.load.limits(), &self.surface.surfel_options(), most);
         if need.bytes > most {
             return self.in_regions(extension, need, most, progress);
         }
@@ -97,7 +105,7 @@ impl Convert {
             let bar = progress.bar("Building the hierarchy", gathered.set.splats.len() as u64);
             let watch = |done: u64, _: u64| bar.set(done);
             let (build, write) =
-                (self.surface.build_options(&gathered), self.surface.write_options(&self.files, gathered.up));
+                (self.surface.build_options(&gathered), self.surface.write_options(&self.files, &gathered.frame));
             hierarchy::build_file(&gathered.set, &self.output, &build, &write, &watch)?;
         }
         progress.clear();
@@ -146,17 +154,25 @@ impl Convert {
         let input = self.load.open_within(path, Some(self.most_memory()))?;
         let read_ms = milliseconds(start);
         let start = Instant::now();
-        let (set, closed, up, points) = match input {
+        let (set, closed, frame, points) = match input {
             Input::Mesh(mesh) => {
                 progress.stage(format!("Making splats of {} points", mesh.positions.len()));
+                let options = self.surface.surfel_options();
+                let most = self.most_memory();
+                memory::check(path, memory_of_mesh(&mesh, &options, most), most)?;
                 let closed = mesh.is_solid();
-                let set = mesh.surfels(&self.surface.surfel_options()).map_err(|e| in_file(path, e))?;
-                (set, closed, mesh.z_is_up.then_some(UpAxis::Z), mesh.positions.len() as u64)
+                let set = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
+                let frame = Frame { up: mesh.z_is_up.then_some(UpAxis::Z), ..Frame::default() };
+                (set, closed, frame, mesh.positions.len() as u64)
             }
             Input::Hierarchy(hierarchy) => {
                 progress.stage("Reading the splats of the finest level");
                 let header = hierarchy.header();
-                (hierarchy.leaves()?, header.closed, header.up, header.source_points)
+                let mut set = hierarchy.leaves()?;
+                let scale = self.surface.radius_scale;
+                set.splats.iter_mut().for_each(|splat| splat.factor = splat.factor.map(|entry| entry * scale));
+                let frame = Frame { up: header.up, unit: header.unit.clone() };
+                (set, header.closed, frame, header.source_points)
             }
             Input::Volume(_) | Input::Samples(_) | Input::Bricks(_) => {
                 let file = path.display();
@@ -165,7 +181,7 @@ impl Convert {
                 )));
             }
         };
-        Ok(Gathered { set, closed, up, points, read_ms, splats_ms: milliseconds(start) })
+        Ok(Gathered { set, closed, frame, points, read_ms, splats_ms: milliseconds(start) })
     }
 
     /// Tells what a conversion would take, by that of a run of the splats.
@@ -177,7 +193,7 @@ impl Convert {
         let SplatSet { origin, payload, extent, overlap, .. } = gathered.set;
         let part = SplatSet { origin, payload, splats: splats[first..first + count].to_vec(), extent, overlap };
         let (build, write) =
-            (self.surface.build_options(gathered), self.surface.write_options(&self.files, gathered.up));
+            (self.surface.build_options(gathered), self.surface.write_options(&self.files, &gathered.frame));
         let start = Instant::now();
         let tree = hierarchy::Tree::build(&part, &build, &|_, _| ())?;
         let bytes = hierarchy::file::to_bytes(&tree, &write)?.len() as f64;
@@ -237,7 +253,7 @@ impl SurfaceFlags {
     }
 
     pub(super) fn surfel_options(&self) -> SurfelOptions {
-        SurfelOptions { radius_scale: self.radius_scale as f32, ..SurfelOptions::default() }
+        SurfelOptions { radius_scale: self.radius_scale, ..SurfelOptions::default() }
     }
 
     fn build_options(&self, gathered: &Gathered) -> BuildOptions {
@@ -249,8 +265,8 @@ impl SurfaceFlags {
         }
     }
 
-    /// `up` counts where no flag says otherwise.
-    pub(super) fn write_options(&self, files: &[PathBuf], up: Option<UpAxis>) -> WriteOptions {
+    /// What the `frame` says counts where no flag says otherwise.
+    pub(super) fn write_options(&self, files: &[PathBuf], frame: &Frame) -> WriteOptions {
         let name = |path: &PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
         WriteOptions {
             lossless: self.lossless,
@@ -258,9 +274,9 @@ impl SurfaceFlags {
                 Some(Up::X) => Some(UpAxis::X),
                 Some(Up::Y) => Some(UpAxis::Y),
                 Some(Up::Z) => Some(UpAxis::Z),
-                None => up,
+                None => frame.up,
             },
-            unit: self.unit.clone(),
+            unit: self.unit.clone().unwrap_or_else(|| frame.unit.clone()),
             source: files.iter().filter_map(name).collect::<Vec<_>>().join(", "),
         }
     }
