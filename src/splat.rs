@@ -112,6 +112,14 @@ pub fn decode_normal(packed: u32) -> Option<Vec3> {
     Some(Vec3::new(x - fold * x.signum(), y - fold * y.signum(), z).normalize())
 }
 
+impl Splat {
+    /// The standard deviations along the axes: the half extents of an ellipsoid are the lengths of the rows of its factor.
+    pub(crate) fn deviations(&self) -> Vec3 {
+        let [b00, b10, b11, b20, b21, b22] = self.factor;
+        Vec3::new(b00.abs(), (b10 * b10 + b11 * b11).sqrt(), (b20 * b20 + b21 * b21 + b22 * b22).sqrt())
+    }
+}
+
 impl SplatSet {
     /// The widest footprint that the engine takes, in standard deviations.
     pub const MAX_EXTENT: f32 = 8.0;
@@ -155,10 +163,7 @@ impl SplatSet {
     pub fn bounds(&self) -> Bounds {
         let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let grow = |(low, high): (Vec3, Vec3), splat: &Splat| {
-            let [b00, b10, b11, b20, b21, b22] = splat.factor;
-            // The half extents of an ellipsoid along the axes are the lengths of the rows of its factor.
-            let reach = self.extent
-                * Vec3::new(b00.abs(), (b10 * b10 + b11 * b11).sqrt(), (b20 * b20 + b21 * b21 + b22 * b22).sqrt());
+            let reach = self.extent * splat.deviations();
             let center = Vec3::from(splat.center);
             (low.min(center - reach), high.max(center + reach))
         };

@@ -189,6 +189,10 @@ pub fn check_splats(set: &SplatSet) -> Result<()> {
     if set.splats.is_empty() {
         return Err(Error::NothingToDraw("there are no splats to build a hierarchy of".into()));
     }
+    if !(set.extent > 0.0 && set.extent <= SplatSet::MAX_EXTENT) {
+        let most = SplatSet::MAX_EXTENT;
+        return Err(Error::Argument(format!("a splat set's extent must lie in 0 … {most}, is {}", set.extent)));
+    }
     if u32::try_from(set.splats.len()).is_err() {
         return Err(Error::Argument("a set holds more splats than 32 bits can name; build it in blocks".into()));
     }

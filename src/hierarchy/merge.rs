@@ -85,9 +85,14 @@ fn area(m: &Moments) -> f32 {
     mean * (xx * yy - xy * xy + xx * zz - xz * xz + yy * zz - yz * yz).max(0.0).sqrt()
 }
 
+/// The largest standard deviation of a splat.
+pub(crate) fn deviation(splat: &Splat) -> f32 {
+    largest(&covariance(&splat.factor)).max(0.0).sqrt()
+}
+
 /// A leaf's node; `extent` is where footprints end, in standard deviations.
 pub(crate) fn leaf(splat: &Splat, extent: f32) -> Node {
-    let sigma = largest(&covariance(&splat.factor)).max(0.0).sqrt();
+    let sigma = deviation(splat);
     Node {
         splat: *splat,
         center: splat.center,
@@ -149,7 +154,7 @@ pub(crate) fn merge(children: &[Node], masses: &[Mass]) -> (Node, Mass) {
         color: u32::from_le_bytes(color.map(|part| part.round() as u8)),
         normal: packed_normal,
     };
-    let sigma = largest(&covariance(&splat.factor)).max(0.0).sqrt();
+    let sigma = deviation(&splat);
     let size = children.iter().map(|child| child.size).fold(WIDTH * sigma, f32::max);
     let node = Node {
         splat,

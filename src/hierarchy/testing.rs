@@ -3,7 +3,7 @@
 use super::{Block, Node, Tree, file};
 use crate::{
     math::{Bounds, eigen},
-    splat::{NO_NORMAL, Splat, decode_normal, encode_normal},
+    splat::{NO_NORMAL, Payload, Splat, SplatSet, decode_normal, encode_normal},
 };
 use glam::{DMat3, DVec3, Vec3};
 
@@ -236,12 +236,10 @@ pub fn joined(splats: &[Splat], count: usize) -> Tree {
 }
 
 fn whole(blocks: Vec<Block>, points: usize) -> Tree {
-    Tree {
-        origin: DVec3::new(4e5, -2e6, 30.0),
-        extent: EXTENT,
-        closed: true,
-        bounds: Bounds { min: DVec3::splat(-9.0), max: DVec3::splat(9.0) },
-        source_points: points as u64,
-        blocks,
-    }
+    let origin = DVec3::new(4e5, -2e6, 30.0);
+    let bounds = Bounds { min: origin, max: origin };
+    let mut tree = Tree { origin, extent: EXTENT, closed: true, bounds, source_points: points as u64, blocks };
+    let splats = tree.nodes().filter(|node| node.is_leaf()).map(|node| node.splat).collect();
+    tree.bounds = SplatSet { origin, payload: Payload::Radiance, splats, extent: EXTENT, overlap: 1.0 }.bounds();
+    tree
 }

@@ -1,11 +1,15 @@
 //! What must hold in every hierarchy.
 
+use super::merge::{WIDTH, deviation};
 use super::{
     Node, Tree,
     file::{in_order, joint_angle, reach},
 };
-use crate::splat::decode_normal;
-use glam::DVec3;
+use crate::{
+    math::Bounds,
+    splat::{SplatSet, decode_normal},
+};
+use glam::{DVec3, Vec3};
 
 /// How bad a finding is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,24 +69,28 @@ impl Findings {
 }
 
 /// Checks every promise of [`Node`], [`Block`](super::Block) and [`Tree`]: each child's sphere in its parent's, each child's
-/// cone in its parent's, no size below a child's, children behind their parents and in order, blocks in the places of
-/// portals that bound their roots, numbers finite. Bounds may miss by what 32-bit numbers round: 10⁻⁶ of the radius and of
-/// the cosine. Finds nothing in a sound tree.
+/// cone in its parent's, no size below a child's or that of its own splat, leaves' footprints in their spheres, children
+/// behind their parents and in order, blocks in the places of portals that bound their roots, the box around all footprints,
+/// numbers finite. Bounds may miss by what 32-bit numbers round: 10⁻⁶ of the radius and of the cosine, 10⁻³ of a footprint.
+/// Finds nothing in a sound tree.
 pub fn validate(tree: &Tree) -> Vec<Finding> {
     let mut findings = Findings::default();
     let sound = tree.origin.is_finite() && tree.bounds.min.is_finite() && tree.bounds.max.is_finite();
     if !sound || tree.bounds.is_empty() {
         findings.push(Finding::error("bounds", "tree", "its origin or its bounds are none"));
     }
-    if !(tree.extent > 0.0 && tree.extent.is_finite()) {
+    if !(tree.extent > 0.0 && tree.extent <= SplatSet::MAX_EXTENT) {
         findings.push(Finding::error("extent", "tree", format!("its extent is {}", tree.extent)));
     }
     if tree.blocks.is_empty() {
         findings.push(Finding::error("blocks", "tree", "it has no blocks"));
     }
+    let mut footprints = Footprints::new(tree.extent);
     for (number, block) in tree.blocks.iter().enumerate() {
-        check_block(number, &block.nodes, &mut findings);
+        let has_portals = number == 0 && tree.is_joined();
+        check_block(number, &block.nodes, (!has_portals).then_some(&mut footprints), &mut findings);
     }
+    footprints.check_box(tree.origin, &tree.bounds, "tree", &mut findings);
     if let Some((top, below)) = tree.blocks.split_first() {
         let roots = below.iter().map(|block| (block.portal, block.nodes.first()));
         check_portals(&top.nodes, top.portal, &roots.collect::<Vec<_>>(), &mut findings);
@@ -90,8 +98,58 @@ pub fn validate(tree: &Tree) -> Vec<Finding> {
     findings.finish()
 }
 
-/// Checks the nodes of a block.
-pub fn check_block(number: usize, nodes: &[Node], findings: &mut Findings) {
+/// Where the footprints of all leaves are.
+pub struct Footprints {
+    /// In standard deviations.
+    extent: f32,
+    low: Vec3,
+    high: Vec3,
+    /// The farthest that one reaches from its centre.
+    widest: f32,
+}
+
+/// What rounding may take from a footprint: 32 bits tell the width of a disc, by its covariance, to some 10⁻⁴.
+const ROUNDING: f32 = 1e-3;
+/// What the box may miss by, of its diagonal and of the widest footprint: splats are moved and widened where they are
+/// written with few bits.
+const BOX: f64 = 0.01;
+const BOX_OF_WIDEST: f64 = 0.5;
+
+impl Footprints {
+    pub fn new(extent: f32) -> Self {
+        Self { extent, low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, widest: 0.0 }
+    }
+
+    /// Adds a leaf; what is wrong with its sphere.
+    fn add(&mut self, leaf: &Node) -> Option<String> {
+        let (center, reach) = (Vec3::from(leaf.splat.center), self.extent * leaf.splat.deviations());
+        (self.low, self.high) = (self.low.min(center - reach), self.high.max(center + reach));
+        self.widest = self.widest.max(reach.max_element());
+        let reach = self.extent * deviation(&leaf.splat);
+        let needed = leaf.center().distance(center) + reach;
+        (needed * (1.0 - ROUNDING) > leaf.radius)
+            .then(|| format!("its footprint ends {needed} from its centre, its sphere has radius {}", leaf.radius))
+    }
+
+    /// Checks the box that is told of; nothing where there were no leaves.
+    pub fn check_box(&self, origin: DVec3, told: &Bounds, place: &str, findings: &mut Findings) {
+        if !self.low.cmple(self.high).all() {
+            return;
+        }
+        let found = Bounds { min: origin + self.low.as_dvec3(), max: origin + self.high.as_dvec3() };
+        let most = BOX * found.diagonal().max(told.diagonal()) + BOX_OF_WIDEST * f64::from(self.widest);
+        let off = (found.min - told.min).abs().max((found.max - told.max).abs()).max_element();
+        if off > most {
+            let [low, high, told_low, told_high] = [found.min, found.max, told.min, told.max];
+            let message =
+                format!("footprints lie between {low} and {high}, and it tells of {told_low} and {told_high}");
+            findings.push(Finding::error("bounds", place, message));
+        }
+    }
+}
+
+/// Checks the nodes of a block, whose leaves are added to the `footprints`; those of a block of portals are none.
+pub fn check_block(number: usize, nodes: &[Node], mut footprints: Option<&mut Footprints>, findings: &mut Findings) {
     let place = |node: usize| format!("block {number}, node {node}");
     if let Err(message) = in_order(nodes) {
         findings.push(Finding::error("order", format!("block {number}"), message));
@@ -101,6 +159,16 @@ pub fn check_block(number: usize, nodes: &[Node], findings: &mut Findings) {
         if let Some(message) = values(node) {
             findings.push(Finding::error("values", place(index), message));
             continue;
+        }
+        let width = WIDTH * deviation(&node.splat);
+        if width * (1.0 - ROUNDING) > node.size {
+            let message = format!("its size is {}, its splat {width} wide", node.size);
+            findings.push(Finding::error("size", place(index), message));
+        }
+        if let (true, Some(footprints)) = (node.is_leaf(), &mut footprints)
+            && let Some(message) = footprints.add(node)
+        {
+            findings.push(Finding::error("sphere", place(index), message));
         }
         let first = node.first_child as usize;
         for (child, below) in nodes[first..first + node.children as usize].iter().enumerate() {
@@ -149,8 +217,8 @@ fn values(node: &Node) -> Option<String> {
     if !numbers.copied().all(f32::is_finite) {
         return Some("a value is not finite".into());
     }
-    if *radius < 0.0 || *size < 0.0 {
-        return Some(format!("its radius is {radius}, its size {size}"));
+    if *radius < 0.0 || *size < 0.0 || splat.strength < 0.0 {
+        return Some(format!("its radius is {radius}, its size {size}, its optical depth {}", splat.strength));
     }
     if !(-1.0..=1.0).contains(cone) {
         return Some(format!("the cosine of its cone is {cone}"));

@@ -298,12 +298,16 @@ impl Sums {
     pub fn add_triangle(&mut self, corners: [Vec3; 3], unit: f32) {
         let [a, b, c] = corners.map(|corner| corner.as_dvec3());
         let cross = (b - a).cross(c - a) * (0.5 / f64::from(unit).powi(2));
-        for place in [a, b, c] {
-            self.area += cross.length();
-            self.place += place * cross.length();
-            self.cross += cross;
-            self.volume += place.dot(cross);
-        }
+        let (places, area) = (a + b + c, cross.length());
+        self.area += 3.0 * area;
+        self.place += places * area;
+        self.cross += 3.0 * cross;
+        self.volume += places.dot(cross);
+    }
+
+    /// The area of all corners, three times that of the triangles.
+    pub fn area(&self) -> f64 {
+        self.area
     }
 
     pub fn with(self, other: Self) -> Self {

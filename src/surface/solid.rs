@@ -66,33 +66,32 @@ const BEYOND: f32 = 0.25;
 #[derive(Debug, Default, Clone, Copy)]
 struct Part {
     sums: Sums,
-    area: f64,
     /// Where given normals point to the side that the triangle runs counter-clockwise on, or to the other one.
     along: f64,
     against: f64,
 }
 
 impl Part {
-    fn add(&mut self, corners: [Vec3; 3], normals: [Vec3; 3]) {
+    /// Adds a triangle, with those normals that are given at its corners.
+    fn add(&mut self, corners: [Vec3; 3], normals: [Option<Vec3>; 3]) {
         self.sums.add_triangle(corners, 1.0);
+        if normals == [None; 3] {
+            return;
+        }
         let [a, b, c] = corners.map(|corner| corner.as_dvec3());
-        let cross = (b - a).cross(c - a);
+        let cross = (b - a).cross(c - a) * 0.5;
         let area = cross.length();
         let across = (cross / area).as_vec3();
-        for normal in normals {
-            self.area += area;
-            match given(normal).map(|normal| normal.dot(across)) {
-                Some(cosine) if cosine > BEYOND => self.along += area,
-                Some(cosine) if cosine < -BEYOND => self.against += area,
-                _ => {}
-            }
+        for normal in normals.into_iter().flatten() {
+            let cosine = normal.dot(across);
+            self.along += if cosine > BEYOND { area } else { 0.0 };
+            self.against += if cosine < -BEYOND { area } else { 0.0 };
         }
     }
 
     fn with(self, other: Self) -> Self {
         Self {
             sums: self.sums.with(other.sums),
-            area: self.area + other.area,
             along: self.along + other.along,
             against: self.against + other.against,
         }
@@ -119,7 +118,8 @@ impl Sides {
     /// Adds a triangle of a part; normals of no length are none.
     pub fn add(&mut self, part: u32, corners: [Vec3; 3], normals: [Vec3; 3], is_opaque: bool) {
         self.is_translucent |= !is_opaque;
-        self.lacks_normals |= normals.iter().any(|&normal| given(normal).is_none());
+        let normals = normals.map(given);
+        self.lacks_normals |= normals.contains(&None);
         if part != self.last.0 {
             self.put_last();
             self.last.0 = part;
@@ -155,7 +155,7 @@ impl Sides {
             && self.parts.values().all(|part| {
                 let side = part.sums.side(1.0);
                 let wrong = if side < 0 { part.along } else { part.against };
-                wrong <= FOLDS * part.area && !(self.lacks_normals && side * turned < 0)
+                wrong <= FOLDS * part.sums.area() && !(self.lacks_normals && side * turned < 0)
             })
     }
 }

@@ -10,7 +10,7 @@ use crate::{
     Error,
     hierarchy::{
         Finding, Node,
-        validate::{Findings, check_block, check_portals},
+        validate::{Findings, Footprints, check_block, check_portals},
     },
     io::Limits,
     splat::NO_NORMAL,
@@ -68,6 +68,7 @@ fn contents(hierarchy: &Hierarchy, findings: &mut Findings) {
     let mut top = Vec::new();
     let mut leaves = 0;
     let mut has_normals = false;
+    let mut footprints = Footprints::new(hierarchy.header().extent);
     for (number, entry) in directory.blocks.iter().enumerate() {
         let block = match hierarchy.read_block(number as u32) {
             Ok(block) => block,
@@ -79,11 +80,12 @@ fn contents(hierarchy: &Hierarchy, findings: &mut Findings) {
                 continue;
             }
         };
-        check_block(number, &block.nodes, findings);
+        let has_portals = number == 0 && hierarchy.is_joined();
+        check_block(number, &block.nodes, (!has_portals).then_some(&mut footprints), findings);
         let first = entry.first_page as usize;
         let stated = &directory.pages[first..first + entry.pages as usize];
         check_entries(first, stated, &block.nodes, &top, entry.portal, findings);
-        if number == 0 && hierarchy.is_joined() {
+        if has_portals {
             top = block.nodes;
             continue;
         }
@@ -103,6 +105,9 @@ fn contents(hierarchy: &Hierarchy, findings: &mut Findings) {
     if is_whole && leaves != header.leaves {
         let message = format!("it tells of {} leaves, and {leaves} are there", header.leaves);
         findings.push(Finding::error("counts", "header", message));
+    }
+    if is_whole {
+        footprints.check_box(header.origin, &header.bounds, "header", findings);
     }
     if is_whole && has_normals != header.has_normals {
         findings.push(Finding::error("attributes", "header", "what it tells of normals is not so"));

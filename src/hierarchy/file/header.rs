@@ -4,7 +4,7 @@ use super::{
     MAGIC, VERSION,
     bytes::{Cursor, Put},
 };
-use crate::math::Bounds;
+use crate::{math::Bounds, splat::SplatSet};
 use glam::DVec3;
 
 /// Which axis of the source points up.
@@ -142,7 +142,7 @@ impl Stored {
             && bounds.max.is_finite()
             && !bounds.is_empty()
             && extent > 0.0
-            && extent.is_finite()
+            && extent <= SplatSet::MAX_EXTENT
             && (1..=nodes).contains(&leaves)
             && (1..=pages).contains(&blocks);
         if !sound {

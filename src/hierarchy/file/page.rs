@@ -6,7 +6,10 @@ use super::{
     quantise::Shape,
 };
 use crate::{
-    hierarchy::{MOST_CHILDREN, Node},
+    hierarchy::{
+        MOST_CHILDREN, Node,
+        merge::{WIDTH, deviation},
+    },
     splat::decode_normal,
 };
 use glam::Vec3;
@@ -215,7 +218,8 @@ pub fn enclose(nodes: &mut [Node]) {
 fn enclose_children(node: &mut Node, children: &[Node]) {
     let center = node.center().as_dvec3();
     node.radius = children.iter().map(|child| round_up(reach(center, child))).fold(node.radius, f32::max);
-    node.size = children.iter().map(|child| child.size).fold(node.size, f32::max);
+    let own = node.size.max(WIDTH * deviation(&node.splat));
+    node.size = children.iter().map(|child| child.size).fold(own, f32::max);
     node.cone = children.iter().map(|child| cosine_below(joint_angle(node, child))).fold(node.cone, f32::min);
 }
 

@@ -368,12 +368,12 @@ fn a_smooth_surface_takes_few_bytes() {
 #[test]
 fn splats_beyond_the_codes_are_kept_whole() {
     let mut splats = surface(300, 1);
-    splats[0].strength = -1.0;
+    splats[0].strength = f32::MAX;
     splats[150].center = [1e30, 0.0, 0.0];
     let tree = tree(&splats);
     let read = open(to_bytes(&tree, &options(false)).unwrap()).read_tree().unwrap();
     assert_eq!(validate(&read), []);
-    assert!(read.nodes().any(|node| node.splat.strength == -1.0));
+    assert!(read.nodes().any(|node| node.splat.strength == f32::MAX));
 }
 
 #[test]
@@ -407,6 +407,22 @@ fn validation_finds_what_is_loose() {
     found(|nodes| nodes[0].radius *= 0.99, "sphere");
     found(|nodes| nodes[1].center[0] += 0.5, "sphere");
     found(|nodes| nodes[0].size = nodes[1].size * 0.5, "size");
+    // What is above a leaf does not tell of it.
+    let found_at_leaf = |change: fn(&mut crate::hierarchy::Node), code: &str| {
+        let mut tree = sound.clone();
+        tree.blocks[0].nodes.iter_mut().find(|node| node.is_leaf()).map_or((), change);
+        let codes: Vec<&str> = validate(&tree).iter().map(|finding| finding.code).collect();
+        assert_eq!(codes, [code]);
+    };
+    found_at_leaf(|leaf| leaf.radius *= 0.95, "sphere");
+    found_at_leaf(|leaf| leaf.splat.center[2] += 0.1 * leaf.radius, "sphere");
+    found_at_leaf(|leaf| leaf.size *= 0.95, "size");
+    found_at_leaf(|leaf| leaf.splat.strength = -1.0, "values");
+    let mut boxed = sound.clone();
+    boxed.bounds.max.x += 0.1 * boxed.bounds.diagonal();
+    assert_eq!(validate(&boxed).iter().map(|finding| finding.code).collect::<Vec<_>>(), ["bounds"]);
+    boxed.extent = 9.0;
+    assert_eq!(validate(&boxed)[0].code, "extent");
     found(|nodes| nodes[1].cone = 1.0, "cone");
     found(|nodes| nodes[2].splat.center[1] = f32::INFINITY, "values");
 }
