@@ -96,6 +96,17 @@ pub struct Room {
     pub runs: u64,
 }
 
+/// Whether what bricks show was listed.
+#[derive(Debug, Clone, Copy)]
+pub enum Listed {
+    All,
+    /// Nothing was: they show so many runs of candidates, of which there is room for `most`.
+    TooMany {
+        runs: u64,
+        most: u64,
+    },
+}
+
 /// The bricks of a volume that are at hand.
 #[derive(Debug)]
 pub struct Shelf {

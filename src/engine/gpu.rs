@@ -147,6 +147,11 @@ impl Gpu {
         Self { memory, ..self }
     }
 
+    /// How much more may be taken where so many bytes are.
+    pub(super) fn memory_left(&self, taken: u64) -> u64 {
+        self.memory.saturating_sub(taken)
+    }
+
     /// Refuses what would take more memory than there is to take.
     pub(super) fn check_memory(&self, bytes: u64) -> Result<()> {
         if bytes <= self.memory {

@@ -2,7 +2,7 @@
 
 use super::{
     Budget, Gpu, PreparedScene,
-    bricks::{Room, SelectBricks},
+    bricks::{Listed, Room, SelectBricks},
     clear::Clear,
     cut::{Cut, finest_within, tally_bytes},
     frame::{self, Pipelines, Pool, Step, Targets, Work},
@@ -23,7 +23,7 @@ use crate::{
     math::{Camera, Sheets, View},
     picture::Picture,
     scene::{Optics, Scene, Settings},
-    volume::bricks::Choice,
+    volume::bricks::{Choice, slot_bytes},
 };
 use std::{collections::HashMap, time::Instant};
 
@@ -255,7 +255,11 @@ impl Renderer {
     ) -> Result<Option<Choice>> {
         let choose =
             |prepared: &PreparedScene, most| prepared.scene.choice(view, settings, detail, most, &prepared.bounds);
-        let Some(wanted) = choose(prepared, usize::MAX) else { return Ok(None) };
+        let Some(shelf) = &prepared.shelf else { return Ok(None) };
+        // Half of the memory is for what they show.
+        let bytes = settings.page_memory.min(prepared.room_for_bricks(&self.gpu) / 2);
+        let held = usize::try_from(bytes / slot_bytes(&shelf.bricks)).unwrap_or(usize::MAX);
+        let Some(wanted) = choose(prepared, held) else { return Ok(None) };
         let most_runs = u64::from(frame::most_runs(&self.gpu)).saturating_sub(prepared.other_runs());
         // A view that rests is not searched again.
         let mut most = prepared.shelf.as_ref().and_then(|shelf| shelf.fitting(&wanted, most_runs));
@@ -263,16 +267,17 @@ impl Renderer {
             let choice = most.and_then(|most| choose(prepared, most)).unwrap_or_else(|| wanted.clone());
             // Of the coarsest all is listed, and refused where even that is too much.
             let runs = if choice.bricks.len() > 1 { most_runs } else { u64::MAX };
-            let room = Room { bytes: settings.page_memory, runs };
-            let found = prepared.update_bricks(&self.gpu, &self.select_bricks, &self.scan, view, &choice, room)?;
-            if found <= runs {
+            let room = Room { bytes, runs };
+            let Listed::TooMany { runs, most: fit } =
+                prepared.update_bricks(&self.gpu, &self.select_bricks, &self.scan, view, &choice, room)?
+            else {
                 if let (Some(most), Some(shelf)) = (most, &mut prepared.shelf) {
                     shelf.set_fitting(&wanted, most_runs, most);
                 }
                 return Ok(Some(choice));
-            }
+            };
             // As many as show so much, if others show as much as these do.
-            let share = runs as f64 / found as f64;
+            let share = fit as f64 / runs as f64;
             most = Some(((choice.bricks.len() as f64 * share) as usize).clamp(1, choice.bricks.len() - 1));
         }
     }

@@ -2,7 +2,7 @@
 
 use super::{
     Gpu,
-    bricks::{Room, SelectBricks, Shelf, Slab},
+    bricks::{Listed, Room, SelectBricks, Shelf, Slab},
     nodes::{Forest, Growth, Slots},
     scan::Scan,
     select::{Select, Selection},
@@ -183,8 +183,7 @@ impl PreparedScene {
         Ok(())
     }
 
-    /// Brings the bricks of a choice to the GPU and lists what they show, unless that takes more than there is room for; tells
-    /// how many runs of candidates those are.
+    /// Brings the bricks of a choice to the GPU and lists what they show, unless that is more than there is room for; tells which.
     pub(super) fn update_bricks(
         &mut self,
         gpu: &Gpu,
@@ -193,10 +192,11 @@ impl PreparedScene {
         view: &View,
         choice: &Choice,
         room: Room,
-    ) -> Result<u64> {
-        let Some(shelf) = &mut self.shelf else { return Ok(0) };
+    ) -> Result<Listed> {
+        let Some(shelf) = &mut self.shelf else { return Ok(Listed::All) };
         if shelf.draws(choice) {
-            return Ok(self.brick_runs());
+            let (runs, most) = (self.brick_runs(), room.runs);
+            return Ok(if runs <= most { Listed::All } else { Listed::TooMany { runs, most } });
         }
         let grown = shelf.update(gpu, choice, room.bytes)?;
         let (bricks, kernel) = (shelf.bricks.clone(), shelf.kernel.clone());
@@ -222,6 +222,16 @@ impl PreparedScene {
         bricks.map(|chunk| u64::from(runs_of(chunk.candidates))).sum()
     }
 
+    /// The bytes that bricks and their lists may take.
+    pub(super) fn room_for_bricks(&self, gpu: &Gpu) -> u64 {
+        let lists = self.chunks.iter().filter_map(|chunk| match &chunk.origin {
+            Origin::Bricks { slab, .. } => Some(slab.bytes() + chunk.spans.size()),
+            _ => None,
+        });
+        let slots = self.shelf.as_ref().map_or(0, Shelf::bytes);
+        gpu.memory_left(self.bytes.saturating_sub(slots + lists.sum::<u64>()))
+    }
+
     /// Runs of candidates in all that does not lie in bricks.
     pub(super) fn other_runs(&self) -> u64 {
         u64::from(self.runs) - self.brick_runs()
@@ -236,8 +246,8 @@ impl PreparedScene {
         view: &View,
         choice: &Choice,
         most: u64,
-    ) -> Result<u64> {
-        let Some(shelf) = &mut self.shelf else { return Ok(0) };
+    ) -> Result<Listed> {
+        let Some(shelf) = &mut self.shelf else { return Ok(Listed::All) };
         let (mut own, mut before) = (Vec::new(), 0);
         for chunk in &mut self.chunks {
             let Origin::Bricks { slab, level, .. } = &mut chunk.origin else { continue };
@@ -251,10 +261,13 @@ impl PreparedScene {
             own.push((slab.as_mut(), &chunk.uniform));
         }
         let rest = self.bytes - before;
+        // Where nothing coarser is left, too little memory is an error.
+        let held = if most == u64::MAX { most } else { gpu.memory_left(rest) / list_bytes(u64::from(RUN)) };
+        let most = most.min(held);
         let runs = select
             .update(gpu, scan, &mut own, &choice.shown, most, |count| gpu.check_memory(rest + list_bytes(count)))?;
         if runs > most {
-            return Ok(runs);
+            return Ok(Listed::TooMany { runs, most });
         }
         self.bytes -= before;
         for chunk in &mut self.chunks {
@@ -265,7 +278,7 @@ impl PreparedScene {
         }
         shelf.set_drawn(choice);
         self.number_runs();
-        Ok(runs)
+        Ok(Listed::All)
     }
 
     /// Numbers the runs of candidates through all chunks; before each chunk's one number stays free (active.wgsl).

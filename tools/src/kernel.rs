@@ -76,6 +76,8 @@ fn read_table(path: &Path, limits: &Limits) -> splatkit::Result<Vec<f64>> {
     if text.trim_start().starts_with('[') {
         return serde_json::from_str(&text).map_err(|e| source.error("kernel", e.to_string()));
     }
+    // Old editors end lines with a carriage return alone.
+    let text = text.replace("\r\n", "\n").replace('\r', "\n");
     let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let number = |(at, line): (usize, &str)| {
         let error = || source.error(format!("line {}", at + 1), format!("“{}” is no number", line.trim()));

@@ -21,6 +21,7 @@ fn folder(name: &str) -> Folder {
     folder.put("cone.csv", "1\n0.5\n0\n");
     folder.put("cone.json", "[1, 0.5, 0]");
     folder.put("words.csv", "1\none half\n");
+    folder.put("old.csv", "1\r0.5\rone half\r");
     folder.put("negative.json", "[-1, 0]");
     folder.put("twins.csv", "x,y,z,value\n1,2,3,4\n1,2,3,8\n");
     folder.put("hole.csv", "x,y,z,value\n1,2,3,4\n1,nan,3,8\n");
@@ -107,6 +108,7 @@ const WRONG: &[(&str, i32, &str)] = &[
     ("a.nrrd --kernel cone.csv", 2, "cone.csv: a kernel of one's own needs --extent, where its last value lies"),
     ("a.nrrd --kernel none.csv --extent 2", 3, "none.csv: cannot open"),
     ("a.nrrd --kernel words.csv --extent 2", 3, "words.csv: line 2: “one half” is no number"),
+    ("a.nrrd --kernel old.csv --extent 2", 3, "old.csv: line 3: “one half” is no number"),
     ("a.nrrd --kernel negative.json --extent 2", 2, "a kernel's values must add up to more than 0"),
     ("a.ply far.nrrd --range 0,4096", 3, "far.nrrd: content: the transfer function changes from 0 to 4096, too close"),
     // Clips.
