@@ -361,6 +361,15 @@ fn a_page_cache_of_any_size_draws_a_whole_picture() {
         assert!(agreement > last, "{agreement}");
         last = agreement;
     }
+    // What a device may take bounds them, too, all hierarchies together.
+    let hierarchy = || Hierarchy::from_tree(tree.clone()).expect("a hierarchy");
+    let scene = Scene::new().with_hierarchy(hierarchy()).with_hierarchy(hierarchy());
+    let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("an adapter").with_memory(20 * 4096 * 96);
+    let mut renderer = Renderer::new(&gpu);
+    let mut prepared = renderer.prepare(&scene).expect("prepared");
+    let (both, stats) = renderer.render(&mut prepared, &camera, &settings(0.0)).expect("a picture");
+    assert!(stats.missing_pages > 0, "{stats:?}");
+    assert_eq!(holes(&all, &both), 0);
 }
 
 /// Pages come and go while the view moves; what is drawn does not depend on what was at hand before.

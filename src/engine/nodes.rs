@@ -123,6 +123,12 @@ impl Slots {
         NodeChunk { source, splats, slots: self }
     }
 
+    /// Bytes of its own buffers.
+    pub fn bytes(&self) -> u64 {
+        let own = [&self.nodes, &self.bounds, &self.counts, &self.found, &self.selected];
+        own.map(wgpu::Buffer::size).iter().sum()
+    }
+
     /// How many slots take part in the frame.
     pub fn active(&self) -> u32 {
         self.active.load(Relaxed)
@@ -135,7 +141,6 @@ pub struct Growth {
     pub slots: Slots,
     pub splats: wgpu::Buffer,
     pub capacity: u32,
-    pub bytes: u64,
 }
 
 /// The pages of one hierarchy that are at hand.
@@ -293,9 +298,7 @@ impl Forest {
             active: AtomicU32::new(0),
         };
         self.slots.extend(std::iter::repeat_n(None, count));
-        let others = [&slots.bounds, &slots.counts, &slots.found, &slots.selected];
-        let bytes = 2 * half + others.map(wgpu::Buffer::size).iter().sum::<u64>();
-        Growth { slots, splats: super::buffer(gpu, "node splats", half, Usage::STORAGE), capacity, bytes }
+        Growth { slots, splats: super::buffer(gpu, "node splats", half, Usage::STORAGE), capacity }
     }
 
     /// Reads pages and puts them in slots that are free or whose pages were not needed for longest.

@@ -164,20 +164,19 @@ impl PreparedScene {
         });
         let Some(shown) = shown else { return Ok(()) };
         for chunk in &mut self.chunks {
-            let source = chunk.source(view, false, &self.forests);
+            let (source, before) = (chunk.source(view, false, &self.forests), chunk.list_bytes());
             let Origin::Lattice { selection, .. } = &mut chunk.origin else { continue };
             if selection.is_for(&shown) {
                 continue;
             }
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
-            let before = selection.selected.size() + chunk.spans.size();
             let rest = self.bytes - before;
             select.update(gpu, scan, selection, &chunk.uniform, &shown, |count| {
                 gpu.check_memory(rest + list_bytes(u64::from(count)))
             })?;
             chunk.candidates = selection.count;
             chunk.spans = spans(gpu, selection.count);
-            self.bytes = rest + selection.selected.size() + chunk.spans.size();
+            self.bytes = rest + chunk.list_bytes();
         }
         self.number_runs();
         Ok(())
@@ -225,7 +224,7 @@ impl PreparedScene {
     /// The bytes that bricks and their lists may take.
     pub(super) fn room_for_bricks(&self, gpu: &Gpu) -> u64 {
         let lists = self.chunks.iter().filter_map(|chunk| match &chunk.origin {
-            Origin::Bricks { slab, .. } => Some(slab.bytes() + chunk.spans.size()),
+            Origin::Bricks { slab, .. } => Some(slab.slots.size() + chunk.list_bytes()),
             _ => None,
         });
         let slots = self.shelf.as_ref().map_or(0, Shelf::bytes);
@@ -256,8 +255,8 @@ impl PreparedScene {
             shelf.describe(gpu, slab, drawn);
             let source = chunk.source(view, false, &self.forests);
             gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
+            before += chunk.list_bytes();
             let Origin::Bricks { slab, .. } = &mut chunk.origin else { continue };
-            before += slab.selected.size() + chunk.spans.size();
             own.push((slab.as_mut(), &chunk.uniform));
         }
         let rest = self.bytes - before;
@@ -274,7 +273,7 @@ impl PreparedScene {
             let Origin::Bricks { slab, .. } = &chunk.origin else { continue };
             chunk.candidates = slab.count;
             chunk.spans = spans(gpu, slab.count);
-            self.bytes += slab.selected.size() + chunk.spans.size();
+            self.bytes += chunk.list_bytes();
         }
         shelf.set_drawn(choice);
         self.number_runs();
@@ -351,8 +350,18 @@ impl PreparedScene {
         self.push_chunk(gpu, origin, data, count);
     }
 
-    /// Brings what the cuts of all hierarchies need to the GPU, within the settings' memory each.
+    /// The bytes that the pages of each hierarchy may take: those of the settings, or its part of what the device has for them
+    /// and for the lists of their nodes.
+    fn room_for_pages(&self, gpu: &Gpu, settings: &Settings) -> u64 {
+        let of_pages = |chunk: &&Chunk| matches!(chunk.origin, Origin::Nodes { .. });
+        let held: u64 = self.chunks.iter().filter(of_pages).map(|chunk| chunk.data.size() + chunk.list_bytes()).sum();
+        let part = gpu.memory_left(self.bytes.saturating_sub(held)) / self.forests.len().max(1) as u64;
+        settings.page_memory.min(part)
+    }
+
+    /// Brings what the cuts of all hierarchies need to the GPU, as far as there is room for it.
     pub(super) fn update_forests(&mut self, gpu: &Gpu, view: &View, settings: &Settings, pixels: f64) -> Result<()> {
+        let room = self.room_for_pages(gpu, settings);
         for index in 0..self.forests.len() {
             let cut = self.forests[index].cut(view, settings, pixels);
             let own: Vec<(&Slots, &wgpu::Buffer)> = self
@@ -363,9 +372,9 @@ impl PreparedScene {
                     _ => None,
                 })
                 .collect();
-            let grown = self.forests[index].update(gpu, &cut, settings.page_memory, &own)?;
-            for Growth { slots, splats, capacity, bytes } in grown {
-                self.bytes += bytes - splats.size();
+            let grown = self.forests[index].update(gpu, &cut, room, &own)?;
+            for Growth { slots, splats, capacity } in grown {
+                self.bytes += slots.bytes();
                 self.push_chunk(gpu, Origin::Nodes { forest: index, slots: Box::new(slots) }, splats, capacity);
             }
         }
@@ -413,6 +422,17 @@ fn spans(gpu: &Gpu, candidates: u32) -> wgpu::Buffer {
 }
 
 impl Chunk {
+    /// Bytes of what lists its candidates, and of what these meet.
+    fn list_bytes(&self) -> u64 {
+        let selected = match &self.origin {
+            Origin::Lattice { selection, .. } => selection.selected.size(),
+            Origin::Bricks { slab, .. } => slab.selected.size(),
+            Origin::Nodes { slots, .. } => slots.bytes(),
+            Origin::Splats { .. } => 0,
+        };
+        selected + self.spans.size()
+    }
+
     /// The chunk's uniform for a view.
     pub fn source(&self, view: &View, isotropic: bool, forests: &[Forest]) -> Source {
         let source = match &self.origin {
