@@ -33,9 +33,9 @@ pub struct Comparison {
 /// # Errors
 /// [`Error::Argument`] where a picture has another number of bytes than its size asks for, or no pixels.
 pub fn compare(a: &[u8], b: &[u8], size: [u32; 2]) -> Result<Comparison> {
-    let bytes = 4 * u64::from(size[0]) * u64::from(size[1]);
+    let bytes = 4 * u128::from(size[0]) * u128::from(size[1]);
     for (name, found) in [("first", a.len()), ("second", b.len())] {
-        if found as u64 != bytes {
+        if found as u128 != bytes {
             let [width, height] = size;
             return Err(Error::Argument(format!(
                 "the {name} picture has {found} bytes where {width}x{height} pixels take {bytes}"
@@ -52,17 +52,11 @@ pub fn compare(a: &[u8], b: &[u8], size: [u32; 2]) -> Result<Comparison> {
 /// Compares the colours and opacities of two pictures; their depths are not compared.
 ///
 /// # Errors
-/// [`Error::Argument`] where the sizes differ.
+/// [`Error::Argument`] where the sizes differ, and where a picture has not as many colours as pixels.
 pub fn compare_pictures(a: &Picture, b: &Picture) -> Result<Comparison> {
     let size = same_size([a.width, a.height], [b.width, b.height])?;
-    let count = size[0] as usize * size[1] as usize;
-    for picture in [a, b] {
-        if picture.color.len() != count {
-            let [width, height] = size;
-            let found = picture.color.len();
-            return Err(Error::Argument(format!("a picture of {width}x{height} pixels cannot have {found} pixels")));
-        }
-    }
+    a.check_colors()?;
+    b.check_colors()?;
     compare_pixels(|at| a.color[at].map(f64::from), |at| b.color[at].map(f64::from), size)
 }
 

@@ -32,26 +32,53 @@ impl Picture {
         out
     }
 
-    /// Averages blocks of `factor` × `factor` pixels: the second half of supersampling. Depth takes the nearest.
-    pub fn reduced(&self, factor: u32) -> Self {
+    /// Refuses a picture that has not as many colours as pixels.
+    pub(crate) fn check_colors(&self) -> Result<()> {
+        self.check("colours", self.color.len())
+    }
+
+    fn check_depths(&self) -> Result<()> {
+        self.check("depths", self.depth.len())
+    }
+
+    fn check(&self, what: &str, found: usize) -> Result<()> {
+        let Self { width, height, .. } = self;
+        if found as u64 == u64::from(*width) * u64::from(*height) {
+            return Ok(());
+        }
+        Err(Error::Argument(format!("a picture of {width}x{height} pixels cannot have {found} {what}")))
+    }
+
+    /// Averages blocks of `factor` × `factor` pixels: the second half of supersampling. Depth takes the nearest. Rows and
+    /// columns beyond the last whole block are left out.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a factor of 0, and where the picture has not as many colours and depths as pixels.
+    pub fn reduced(&self, factor: u32) -> Result<Self> {
+        self.check_colors()?;
+        self.check_depths()?;
+        if factor == 0 {
+            return Err(Error::Argument("a picture cannot be reduced by a factor of 0".into()));
+        }
         let (width, height) = (self.width / factor, self.height / factor);
-        let mut color = Vec::with_capacity((width * height) as usize);
+        let mut color = Vec::with_capacity(width as usize * height as usize);
         let mut depth = Vec::with_capacity(color.capacity());
         for y in 0..height {
             for x in 0..width {
                 let mut sum = [0.0f32; 4];
                 let mut nearest = f32::INFINITY;
-                for i in 0..factor * factor {
-                    let (px, py) = (x * factor + i % factor, y * factor + i / factor);
-                    let at = (py * self.width + px) as usize;
-                    (0..4).for_each(|c| sum[c] += self.color[at][c]);
-                    nearest = nearest.min(self.depth[at]);
+                for row in y * factor..(y + 1) * factor {
+                    let first = row as usize * self.width as usize + (x * factor) as usize;
+                    for at in first..first + factor as usize {
+                        (0..4).for_each(|c| sum[c] += self.color[at][c]);
+                        nearest = nearest.min(self.depth[at]);
+                    }
                 }
-                color.push(sum.map(|v| v / (factor * factor) as f32));
+                color.push(sum.map(|v| v / (factor as f32 * factor as f32)));
                 depth.push(nearest);
             }
         }
-        Self { width, height, color, depth }
+        Ok(Self { width, height, color, depth })
     }
 
     /// Writes a PNG or JPEG, chosen by the extension. JPEG has no opacity: without a background it gets black.
@@ -66,8 +93,9 @@ impl Picture {
     /// The bytes of a picture file. JPEG has no opacity: without a background it gets black.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a picture that the format cannot hold.
+    /// [`Error::Argument`] for a picture that the format cannot hold, or that has not as many colours as pixels.
     pub fn encode(&self, format: PictureFormat, background: Option<[f32; 3]>) -> Result<Vec<u8>> {
+        self.check_colors()?;
         let rgba = |back| {
             let picture = image::RgbaImage::from_raw(self.width, self.height, self.to_rgba8(back));
             picture.map(image::DynamicImage::from).ok_or_else(too_large)
@@ -85,8 +113,9 @@ impl Picture {
     /// 0 where there is none.
     ///
     /// # Errors
-    /// As [`encode`](Self::encode).
+    /// [`Error::Argument`] for a picture that the format cannot hold, or that has not as many depths as pixels.
     pub fn encode_depth(&self) -> Result<Vec<u8>> {
+        self.check_depths()?;
         let finite = self.depth.iter().copied().filter(|d| d.is_finite());
         let [near, far] = finite.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], d| [low.min(d), high.max(d)]);
         let grey = |&depth: &f32| match (far - depth) / (far - near) {
@@ -145,6 +174,29 @@ mod tests {
         let flat = Picture { width: 2, height: 1, color: vec![[0.0; 4]; 2], depth: vec![1.0, f32::INFINITY] };
         let read = image::load_from_memory(&flat.encode_depth().unwrap()).unwrap().to_luma16();
         assert_eq!(read.into_raw(), [65535, 0]);
+    }
+
+    #[test]
+    fn pictures_that_contradict_themselves_are_refused() {
+        let refused = |result: Result<()>| assert!(matches!(result, Err(Error::Argument(_))), "{result:?}");
+        for (size, colors, depths) in [(2, 3, 4), (2, 9, 9), (2, 4, 0), (0, 1, 1), (u32::MAX, 1, 1)] {
+            let color = vec![[0.5; 4]; colors];
+            let picture = Picture { width: size, height: size, color, depth: vec![1.0; depths] };
+            refused(picture.reduced(2).map(|_| ()));
+            if colors != 4 {
+                refused(picture.encode(PictureFormat::Png, None).map(|_| ()));
+                refused(crate::compare::compare_pictures(&picture, &picture).map(|_| ()));
+            }
+            if depths != 4 {
+                refused(picture.encode_depth().map(|_| ()));
+            }
+        }
+        let picture = Picture { width: 2, height: 3, color: vec![[0.5; 4]; 6], depth: vec![1.0; 6] };
+        refused(picture.reduced(0).map(|_| ()));
+        let reduced = picture.reduced(2).unwrap();
+        assert_eq!((reduced.width, reduced.height, reduced.color), (1, 1, vec![[0.5; 4]]));
+        assert!(picture.reduced(9).unwrap().color.is_empty());
+        refused(crate::compare::compare(&[], &[], [u32::MAX; 2]).map(|_| ()));
     }
 
     #[test]

@@ -134,7 +134,7 @@ impl Render {
             let (picture, stats) = drawer.draw(&loaded, &camera, &settings)?;
             times.push(milliseconds(start));
             self.engine.require_content(&picture)?;
-            let picture = if self.samples > 1 { picture.reduced(self.samples) } else { picture };
+            let picture = if self.samples > 1 { picture.reduced(self.samples)? } else { picture };
             progress.stage(format!("Writing {}", target.name()));
             target.write(&picture.encode(target.format(), self.background.0)?)?;
             if let Some(depth) = &self.depth {
