@@ -6,9 +6,12 @@
 //! the picture is its parent's number less its own. Along every way from the root to a leaf the shares add up to one: a node
 //! fades out while its children fade in, and nothing pops.
 
-use super::{Node, Tree, file::CutSphere};
+use super::{
+    Node, Tree,
+    file::{CutSphere, in_order},
+};
 use crate::{
-    Result,
+    Error, Result,
     math::View,
     splat::{Payload, Splat, SplatSet, decode_normal},
 };
@@ -180,7 +183,13 @@ impl Tree {
     ///
     /// A number of splats is kept to as by the engine, by cuts an eighth of an octave apart; a frame time is not known here,
     /// and taken for the usual cut.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a tree whose nodes are not in order, as [`Block`](super::Block) tells.
     pub fn cut(&self, view: &View, detail: Detail, cull_backfaces: Option<bool>) -> Result<SplatSet> {
+        for (number, block) in self.blocks.iter().enumerate() {
+            in_order(&block.nodes).map_err(|message| Error::Argument(format!("block {number}: {message}")))?;
+        }
         let culls = cull_backfaces.unwrap_or(self.closed);
         let at = |pixels: f64| self.selected(&Cut::new(view, self.origin, pixels, culls));
         let selected = match detail {
@@ -201,6 +210,9 @@ impl Tree {
     }
 
     /// The nodes of a cut, with their shares in parts of [`SHARE_UNIT`].
+    ///
+    /// # Panics
+    /// Where the nodes of a block are not in order, as [`cut`](Self::cut) finds out and [`validate`](super::validate()) tells.
     pub fn selected(&self, cut: &Cut) -> Vec<(&Node, u32)> {
         let mut selected = Vec::new();
         for (index, block) in self.blocks.iter().enumerate() {

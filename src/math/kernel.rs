@@ -128,9 +128,10 @@ impl Kernel {
                 filter * (0.5 * PI * r / self.extent).cos().powi(2)
             }
             Profile::Table(values) => {
-                let at = r / self.extent * (values.len() - 1) as f64;
-                let low = (at as usize).min(values.len() - 2);
-                values[low] + (values[low + 1] - values[low]) * (at - low as f64)
+                let Some(last) = values.len().checked_sub(1) else { return 0.0 };
+                let at = r / self.extent * last as f64;
+                let low = (at as usize).min(last.saturating_sub(1));
+                values[low] + (values[last.min(low + 1)] - values[low]) * (at - low as f64)
             }
         }
     }

@@ -209,9 +209,10 @@ impl Hierarchy {
         self.directory.blocks.len() > 1
     }
 
-    /// Whether a page is there: all are, but where only the beginning of a file is.
+    /// Whether a page is there: all are, but where only the beginning of a file is, and those that the directory does not tell of.
     pub fn is_present(&self, page: u32) -> bool {
-        let Place { offset, bytes, .. } = self.directory.pages[page as usize].place;
+        let Some(entry) = self.directory.pages.get(page as usize) else { return false };
+        let Place { offset, bytes, .. } = entry.place;
         match &self.store {
             Store::Blocks(_) => true,
             store => offset + u64::from(bytes) <= store.bytes().len() as u64,

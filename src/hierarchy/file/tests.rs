@@ -3,12 +3,14 @@
 use super::*;
 use crate::{
     hierarchy::{
-        Block, Tree,
+        Block, Detail, Tree,
         testing::{cloud, joined, surface, tree},
         validate,
     },
     io::{Limits, testing::Folder},
+    math::Camera,
 };
+use glam::DVec3;
 use std::path::Path;
 
 fn options(lossless: bool) -> WriteOptions {
@@ -393,6 +395,14 @@ fn disorder_is_refused() {
     refused(|tree| tree.blocks[0].nodes[3].radius = f32::NAN);
     refused(|tree| tree.extent = 0.0);
     refused(|tree| tree.blocks.push(tree.blocks[0].clone()));
+    // Nor is it drawn.
+    let view = Camera::framing(&sound.bounds, DVec3::X, DVec3::Z, 1.0).view([9, 9]).expect("a view");
+    assert!(!sound.cut(&view, Detail::Pixels(1.0), None).expect("a cut").splats.is_empty());
+    let mut torn = sound.clone();
+    torn.blocks[0].nodes[0].first_child = u32::MAX;
+    assert!(matches!(torn.cut(&view, Detail::Pixels(1.0), None), Err(crate::Error::Argument(_))));
+    let whole = Hierarchy::from_tree(sound).expect("a hierarchy");
+    assert!(whole.is_present(0) && !whole.is_present(u32::MAX));
 }
 
 #[test]
