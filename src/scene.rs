@@ -538,7 +538,7 @@ pub struct Settings {
     /// How fine hierarchies and volumes in bricks are drawn. A sample of the latter counts as two steps wide.
     pub detail: Detail,
     /// Whether nodes of hierarchies that face away from the eye are left out: a saving where the front hides them, a loss
-    /// where it does not. `None`: where the source was closed, is seen from outside its bounds, and nothing is cut away.
+    /// where it does not. `None`: where the source was solid, is seen from outside its bounds, and nothing is cut away.
     pub cull_backfaces: Option<bool>,
     /// GPU memory that each hierarchy's pages, or a volume's bricks, may take, in bytes; without what frames make of bricks.
     pub page_memory: u64,

@@ -323,8 +323,17 @@ impl Sums {
     /// centre of the area, so that an open surface has one only as far as it is curved. `unit` is the length that areas are
     /// counted in the square of.
     pub fn side(&self, unit: f32) -> i8 {
+        self.side_beyond(1e-3, unit)
+    }
+
+    /// As [`side`](Self::side), of a closed surface, of which the least volume counts: it may be as thin as rounding allows.
+    pub fn side_of_closed(&self) -> i8 {
+        self.side_beyond(1e-9, 1.0)
+    }
+
+    fn side_beyond(&self, part: f64, unit: f32) -> i8 {
         let volume = (self.volume - self.cross.dot(self.place) / self.area) / (9.0 * f64::from(unit));
-        let least = 1e-3 * (self.area / 3.0).powf(1.5);
+        let least = part * (self.area / 3.0).powf(1.5);
         i8::from(volume > least) - i8::from(volume < -least)
     }
 }

@@ -125,7 +125,18 @@ impl Wanted<'_> {
     /// About how many triangles there will be.
     fn expected(&self) -> f64 {
         let parts = |(source, t): (usize, &[u32; 3])| {
-            pieces([(0, 1), (1, 2), (2, 0)].map(|(i, j)| f64::from(self.excess(self.mesh, source, t[i], t[j]))))
+            let edges = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| [t[i], t[j]]);
+            let excess = edges.map(|[a, b]| f64::from(self.excess(self.mesh, source, a, b)));
+            let plain = edges.map(|[a, b]| {
+                let [a, b] = [a, b].map(|vertex| self.mesh.positions[vertex as usize]);
+                f64::from((a - b).length() / self.length)
+            });
+            // Edges that texels make longer need not be those of any triangle: then two of them tell the most that there can be.
+            if excess.iter().zip(plain).all(|(excess, plain)| *excess <= plain) {
+                pieces(excess)
+            } else {
+                most_pieces(excess)
+            }
         };
         self.mesh.triangles.par_iter().enumerate().map(parts).sum()
     }
@@ -155,6 +166,13 @@ pub(super) fn pieces([p, q, r]: [f64; 3]) -> f64 {
     let s = (p + q + r) * 0.5;
     let area = (s * (s - p) * (s - q) * (s - r)).max(0.0).sqrt();
     (area / 0.21).max(p.max(q).max(r)).max(1.0)
+}
+
+/// The most triangles that one is cut into whose edges are so many times too long, whether or not there is such a triangle.
+fn most_pieces(mut edges: [f64; 3]) -> f64 {
+    edges.sort_by(f64::total_cmp);
+    let [short, middle, long] = edges;
+    (0.5 * short.max(1.0) * middle.max(1.0) / 0.21).max(long)
 }
 
 /// The length that edges without texture may have where there is a budget of triangles: `length`, or more where `expected`,

@@ -153,9 +153,11 @@ impl Sides {
         let turned = if all.side(1.0) < 0 { -1 } else { 1 };
         !self.is_translucent
             && self.parts.values().all(|part| {
-                let side = part.sums.side(1.0);
+                let side = part.sums.side_of_closed();
                 let wrong = if side < 0 { part.along } else { part.against };
-                wrong <= FOLDS * part.sums.area() && !(self.lacks_normals && side * turned < 0)
+                // A part without a volume has no side, and one without an area does not matter.
+                part.sums.area() == 0.0
+                    || (side != 0 && wrong <= FOLDS * part.sums.area() && !(self.lacks_normals && side * turned < 0))
             })
     }
 }
@@ -163,7 +165,7 @@ impl Sides {
 impl Mesh {
     /// Whether whoever is outside sees the front of it alone, as [`Tree::closed`](crate::hierarchy::Tree::closed) promises: it
     /// [is closed](Self::is_closed), opaque everywhere, and the normals of its surfels point out of every connected part.
-    /// Where a part has a hollow within, the answer is no.
+    /// Where a part has a hollow within, or no volume, the answer is no. Parts that share a vertex are one.
     pub fn is_solid(&self) -> bool {
         let Some(closing) = self.closing() else { return false };
         if !self.has_opaque_materials() {
@@ -266,6 +268,27 @@ mod tests {
             ..Mesh::default()
         };
         assert!(split.is_closed() && !split.is_solid());
+    }
+
+    #[test]
+    fn thin_parts_count() {
+        let flat = |mesh: Mesh| Mesh {
+            positions: mesh.positions.iter().map(|p| *p * Vec3::new(1.0, 1.0, 1e-4)).collect(),
+            ..mesh
+        };
+        assert!(flat(sphere(0.0)).is_solid());
+        assert!(!both(sphere(5.0), turned(flat(sphere(0.0)))).is_solid());
+        assert!(
+            !both(
+                sphere(5.0),
+                Mesh {
+                    positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+                    triangles: vec![[0, 1, 2], [0, 2, 1]],
+                    ..Mesh::default()
+                }
+            )
+            .is_solid()
+        );
     }
 
     #[test]

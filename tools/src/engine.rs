@@ -27,8 +27,8 @@ pub struct EngineFlags {
     /// Seconds that the adapter may take for some passes of a picture before it counts as lost [default: 600]
     #[arg(long, value_name = "SECONDS", value_parser = parse::positive)]
     gpu_timeout: Option<f64>,
-    /// Memory that a scene's splats, samples and lists may take on the adapter, beside what --memory bounds; in bytes or with KiB,
-    /// MiB or GiB [default: on the processor three quarters of the memory that there is]
+    /// Memory that a scene's splats, samples, pages, bricks and lists may take on the adapter; in bytes or with KiB, MiB or GiB
+    /// [default: on the processor three quarters of the memory that there is]
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     gpu_memory: Option<u64>,
     /// How a volume's gradient across the picture is found.
@@ -60,7 +60,7 @@ pub struct EngineFlags {
     /// little; in bytes or with KiB, MiB or GiB [default: 1GiB]
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     memory: Option<u64>,
-    /// Hierarchies: whether splats that face away are left out [default: where the surface is closed, seen from outside
+    /// Hierarchies: whether splats that face away are left out [default: where the surface is solid, seen from outside
     /// its bounds, and nothing is cut away]
     #[arg(long, value_name = "BOOL")]
     cull_backfaces: Option<bool>,

@@ -58,10 +58,12 @@ impl SceneFlags {
             count: 0,
             load_ms: 0.0,
         };
+        let (mut is_scaled, mut unscaled) = (false, None);
         for path in &self.inputs {
             progress.stage(format!("Reading {}", path.display()));
             match self.load.open(path)? {
                 Input::Mesh(mesh) => {
+                    is_scaled = true;
                     progress.stage(format!("Making surfels of {}", path.display()));
                     let mut options = SurfelOptions::default();
                     options.radius_scale *= self.show.radius_scale.unwrap_or(1.0);
@@ -74,13 +76,7 @@ impl SceneFlags {
                     }
                 }
                 Input::Hierarchy(hierarchy) => {
-                    if self.show.radius_scale.is_some() {
-                        return Err(Failure::Usage(format!(
-                            "--radius-scale does not change {}: a hierarchy has the radii that it was converted with; convert \
-                             it with --radius-scale",
-                            path.display()
-                        )));
-                    }
+                    unscaled = Some(path);
                     let header = hierarchy.header();
                     loaded.add(header.bounds, header.leaves as usize);
                     loaded.subject.up = match header.up {
@@ -123,6 +119,13 @@ impl SceneFlags {
                     loaded.scene = loaded.scene.with_samples(splats, transfer);
                 }
             }
+        }
+        if let (Some(_), Some(path), false) = (self.show.radius_scale, unscaled, is_scaled) {
+            return Err(Failure::Usage(format!(
+                "--radius-scale does not change {}: a hierarchy has the radii that it was converted with; convert it with \
+                 --radius-scale",
+                path.display()
+            )));
         }
         // What cannot be drawn by itself is the fault of its file.
         let of_file = |error| {

@@ -24,7 +24,7 @@ pub struct Header {
     pub bounds: Bounds,
     /// Footprints end this many standard deviations from the centre.
     pub extent: f32,
-    /// Whether the source was closed ([`Tree::closed`](crate::hierarchy::Tree::closed)).
+    /// Whether the source was solid ([`Tree::closed`](crate::hierarchy::Tree::closed)).
     pub closed: bool,
     /// Whether leaves differ in colour.
     pub has_color: bool,

@@ -262,6 +262,32 @@ fn a_fine_texture_on_coarse_triangles_is_averaged() {
     }
 }
 
+/// Whatever the coordinates of a texture are: the budget holds.
+#[test]
+fn textures_keep_to_the_budget() {
+    let texture = Some(Arc::new(Texture { width: 1024, height: 1024, texels: vec![[99; 4]; 1024 * 1024] }));
+    for far in [1.0, 5.0, 1e5, 1e20, f32::NAN, f32::INFINITY] {
+        for across in [0.0, 0.01, far] {
+            let mesh = Mesh {
+                positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
+                triangles: vec![[0, 1, 2], [0, 2, 3]],
+                uvs: [[0.0, 0.0], [far, 0.0], [far, across], [0.0, across]].map(glam::Vec2::from_array).to_vec(),
+                triangle_materials: vec![0; 2],
+                materials: vec![Material { name: String::new(), color: [1.0; 4], texture: texture.clone() }],
+                ..Mesh::default()
+            };
+            let options = SurfelOptions { most_triangles: 30_000, ..SurfelOptions::default() };
+            let (told, made) = (mesh.triangles_once_cut(&options), surfels_of(&mesh, &options));
+            // The least that its size asks for is 35,000.
+            assert!(made < 100_000 && 2 * told > made, "{far} {across}: {made} surfels, {told} triangles told");
+        }
+    }
+}
+
+fn surfels_of(mesh: &Mesh, options: &SurfelOptions) -> usize {
+    mesh.surfels(options).expect("surfels").splats.len()
+}
+
 #[test]
 fn bounds_are_in_the_world() {
     let mut mesh = Mesh::cube(2.0);
