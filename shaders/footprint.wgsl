@@ -19,7 +19,7 @@ struct Candidate {
     strength: f32,
     color: u32,
     normal: u32,
-    // Scalars: how much it counts, and the change of its value per world unit in view space.
+    // Scalars: how much it counts, and the change of its value (entries per world unit) in view space.
     weight: f32,
     gradient: vec3<f32>,
 }
@@ -62,11 +62,16 @@ fn sheet_of(distance: f32) -> u32 {
 }
 
 // Bounds of x/z over an ellipsoid in front of the eye: tangents of its outline (dual conic), exact in perspective.
-// The expanded discriminant has no cancellation for small, distant splats.
+// The expanded discriminant has no cancellation for small, distant splats. All is counted in units of z, whose fourth power
+// may be more or less than 32 bits hold.
 fn tangent_bounds(x: f32, z: f32, xx: f32, xz: f32, zz: f32) -> vec2<f32> {
-    let denominator = 1.0 / (z * z - zz);
-    let middle = (x * z - xz) * denominator;
-    let square = xx * z * z - 2.0 * xz * x * z + zz * x * x - (xx * zz - xz * xz);
+    let p = x / z;
+    let a = xx / z / z;
+    let b = xz / z / z;
+    let c = zz / z / z;
+    let denominator = 1.0 / (1.0 - c);
+    let middle = (p - b) * denominator;
+    let square = a - 2.0 * b * p + c * p * p - (a * c - b * b);
     let half_width = sqrt(max(square, 0.0)) * abs(denominator);
     return vec2(middle - half_width, middle + half_width);
 }

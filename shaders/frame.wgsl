@@ -33,8 +33,13 @@ struct Frame {
     // Standard deviation of the isotropic lattice kernel (world units), its inverse, its squared extent in sigmas; what kernels
     // must add up to for a value.
     isotropic: vec4<f32>,
-    // First value, table entries per value, last table index; entries per gradient magnitude.
+    // The value of the first entry of the transfer function's table, entries per value, the last entry.
     transfer: vec4<f32>,
+    // The magnitude of the first entry of the gradient's factor, entries per magnitude; the world length that gradients are
+    // counted over, and that length in pixels, as `scale`.
+    gradients: vec4<f32>,
+    // Where the parts of `tables` start: integrals, factors of the gradient, kernel, sections.
+    table_starts: vec4<u32>,
     // Extinction times colour, and extinction, of values before the first table entry, and behind the last one.
     before: vec4<f32>,
     behind: vec4<f32>,
@@ -61,7 +66,7 @@ struct Clip {
 }
 
 struct Isosurface {
-    // Value, opacity, optical depth.
+    // Value, as an entry of the table; opacity, optical depth.
     value: vec4<f32>,
     color: vec4<f32>,
 }

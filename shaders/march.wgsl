@@ -224,7 +224,7 @@ fn close(front: u32, count: u32, lane: vec2<u32>) {
         for (var r = 0u; r < ROWS; r++) {
             var own = resolve(r, sheet);
             if CENTRAL {
-                own.back.slope = in_world_units(r, difference(lane, r), planes[sheet + 1u]);
+                own.back.slope = slope_on_plane(r, difference(lane, r), planes[sheet + 1u]);
             }
             pixels[r].front = own.back;
             composite(r, sheet, own);

@@ -1,6 +1,6 @@
 // What an invocation of march keeps for each of its pixels while it walks a tile, and the pixel's ray.
 
-// A value on the plane between two sheets, and its change across the picture, per world unit.
+// A value on the plane between two sheets, and its change across the picture (slope_on_plane in sheet.wgsl).
 struct Face {
     has_value: bool,
     value: f32,

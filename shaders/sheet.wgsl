@@ -19,12 +19,13 @@ fn lit(color: vec3<f32>, normal: vec3<f32>, direction: vec3<f32>, shade: vec4<f3
     return min(color * (shade.x + shade.y * facing) + shade.z * pow(facing, shade.w), vec3(1.0));
 }
 
-// Slope across the picture per world unit of the plane at a distance, from that per pixel.
-fn in_world_units(r: u32, slope: vec2<f32>, distance: f32) -> vec2<f32> {
-    return slope * frame.scale / select(1.0, pixels[r].cosine * distance, PERSPECTIVE);
+// Slope across the picture on the plane at a distance, from that per pixel. Gradients are entries of the table per thickness of
+// a sheet, or about that (`frame.gradients`): their squares fit 32 bits in any units.
+fn slope_on_plane(r: u32, slope: vec2<f32>, distance: f32) -> vec2<f32> {
+    return slope * frame.gradients.w / select(1.0, pixels[r].cosine * distance, PERSPECTIVE);
 }
 
-// Gradient in view space from the slope across the picture and the derivative along the ray, per world unit.
+// Gradient in view space from the slope across the picture and the derivative along the ray.
 fn gradient(r: u32, slope: vec2<f32>, along: f32) -> vec3<f32> {
     let d = direction_of(r);
     let g = slope + along * d.xy;
@@ -49,7 +50,7 @@ fn resolve_face(r: u32, sheet: u32) -> Face {
     if GRADIENTS && !CENTRAL {
         let slope = face.value * vec2(pixels[r].weight_x.x, pixels[r].weight_y.x)
             - vec2(pixels[r].value_x.x, pixels[r].value_y.x);
-        face.slope = in_world_units(r, slope * inverse, planes[sheet + 1u]);
+        face.slope = slope_on_plane(r, slope * inverse, planes[sheet + 1u]);
         pixels[r].weight_x = shift_faces(pixels[r].weight_x);
         pixels[r].weight_y = shift_faces(pixels[r].weight_y);
         pixels[r].value_x = shift_faces(pixels[r].value_x);
@@ -124,7 +125,7 @@ const NO_VALUE: f32 = -3e38;
 fn gradient_at(r: u32, medium: Medium, u: f32) -> vec3<f32> {
     let curve = medium.curve;
     let along = curve.x * (4.0 * u - 3.0) + curve.y * (4.0 - 8.0 * u) + curve.z * (4.0 * u - 1.0);
-    return gradient(r, mix(medium.front, medium.back, u), along / medium.thickness);
+    return gradient(r, mix(medium.front, medium.back, u), along * (frame.gradients.z / medium.thickness));
 }
 
 // The part of a sheet between two distances, in which the field is a parabola with the values of the faces at the ends and

@@ -1,18 +1,13 @@
-// Functions of one value, looked up: the transfer function and its integral, the gradient's factor, the kernel's sections.
+// Functions of one value, looked up by its place among the entries: the transfer function and its integral, the gradient's factor, the kernel's sections.
 // Mirrors engine/tables.rs, which says where each lies in `tables`.
 
 // Colour and extinction per value; their integrals (extinction times colour, extinction) from the first value on, counted in
 // entries; the factor on the extinction by gradient magnitude; the kernel and its sections.
 @group(0) @binding(6) var<storage, read> tables: array<vec4<f32>>;
 
-// A value as a place in the tables of values, also before and behind them; finite, however far.
-fn place_of(value: f32) -> f32 {
-    return clamp((value - frame.transfer.x) * frame.transfer.y, -1e30, 1e30);
-}
-
 // Colour and extinction of one value.
 fn classify(value: f32) -> vec4<f32> {
-    let at = clamp(place_of(value), 0.0, frame.transfer.z);
+    let at = clamp(value, 0.0, frame.transfer.z);
     let low = u32(at);
     return mix(tables[low], tables[low + 1u], at - f32(low));
 }
@@ -26,26 +21,26 @@ const NARROW_AFAR: f32 = 1e-6;
 // without the attenuation inside, which the parts of a sheet are thin enough for).
 fn classify_between(a: f32, b: f32) -> vec4<f32> {
     if BEYOND {
-        return classify_beyond(place_of(a), place_of(b));
+        return classify_beyond(a, b);
     }
     let end = frame.transfer.z;
-    let at = clamp(vec2(place_of(a), place_of(b)), vec2(0.0), vec2(end));
+    let at = clamp(vec2(a, b), vec2(0.0), vec2(end));
     let middle = 0.5 * (at.x + at.y);
     let reach = 0.5 * max(abs(at.x - at.y), NARROW);
     // To whole entries outwards, which saves half of the look-ups; the mean moves by half an entry at most.
     let low = max(floor(middle - reach), 0.0);
     let high = min(ceil(middle + reach), end);
-    return (tables[INTEGRAL_TABLE + u32(high)] - tables[INTEGRAL_TABLE + u32(low)]) / (high - low);
+    return (tables[frame.table_starts.x + u32(high)] - tables[frame.table_starts.x + u32(low)]) / (high - low);
 }
 
-// The same of places that may lie before and behind the tables, where the function keeps its value.
+// The same of values that may lie before and behind the tables, where the function keeps its value.
 fn classify_beyond(a: f32, b: f32) -> vec4<f32> {
     let end = frame.transfer.z;
     let middle = 0.5 * (a + b);
     let reach = max(0.5 * max(abs(a - b), NARROW), NARROW_AFAR * abs(middle));
     let low = floor(middle - reach);
     let high = ceil(middle + reach);
-    let within = tables[INTEGRAL_TABLE + u32(clamp(high, 0.0, end))] - tables[INTEGRAL_TABLE + u32(clamp(low, 0.0, end))];
+    let within = tables[frame.table_starts.x + u32(clamp(high, 0.0, end))] - tables[frame.table_starts.x + u32(clamp(low, 0.0, end))];
     // Ratios first: what lies far beyond may be as large as numbers get.
     let inverse = 1.0 / (high - low);
     let before = (min(high, 0.0) - min(low, 0.0)) * inverse;
@@ -55,16 +50,17 @@ fn classify_beyond(a: f32, b: f32) -> vec4<f32> {
 
 // The factor on the extinction where the gradient has a magnitude.
 fn gradient_factor(magnitude: f32) -> f32 {
-    let at = min(magnitude * frame.transfer.w, f32(GRADIENT_ENTRIES - 1u));
+    let at = clamp((magnitude - frame.gradients.x) * frame.gradients.y, 0.0, f32(GRADIENT_ENTRIES - 1u));
     let low = u32(at);
-    return mix(tables[GRADIENT_TABLE + low].x, tables[GRADIENT_TABLE + low + 1u].x, at - f32(low));
+    let first = frame.table_starts.y + low;
+    return mix(tables[first].x, tables[first + 1u].x, at - f32(low));
 }
 
 // Kernel and −h′(r)/r at a radius, in kernel space; nothing beyond its extent, also where it ends by a step.
 fn kernel_at(radius: f32) -> vec2<f32> {
     let at = min(radius * frame.kernel.y * f32(RADIAL_ENTRIES - 1u), f32(RADIAL_ENTRIES - 1u));
     let low = u32(at);
-    let entry = tables[RADIAL_TABLE + low];
+    let entry = tables[frame.table_starts.z + low];
     return select(mix(entry.xy, entry.zw, at - f32(low)), vec2(0.0), radius > frame.kernel.x);
 }
 
@@ -75,7 +71,7 @@ fn kernel_integral(rho: f32, t: f32) -> f32 {
     let at = min(vec2(rho, abs(t)) * frame.kernel.y * last, vec2(last - 1e-3));
     let low = vec2<u32>(at);
     let part = at - vec2<f32>(low);
-    let cell = tables[SECTION_TABLE + low.x * SECTION_CELLS + low.y];
+    let cell = tables[frame.table_starts.w + low.x * SECTION_CELLS + low.y];
     let value = mix(mix(cell.x, cell.y, part.y), mix(cell.z, cell.w, part.y), part.x);
     return select(-value, value, t >= 0.0);
 }

@@ -78,6 +78,21 @@ impl Scene {
         self
     }
 
+    /// The same scene with another transfer function for its volume or sample set.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for one that [`validate`](Self::validate) would refuse.
+    pub(crate) fn shown_by(&self, transfer: &TransferFunction) -> Result<Self> {
+        let mut scene = self.clone();
+        for (number, item) in scene.items.iter_mut().enumerate() {
+            if let Item::Scalar(_, shown) | Item::Volume(_, _, shown) | Item::Bricks(_, _, shown) = item {
+                shown.clone_from(transfer);
+            }
+            numbers::check_field(item).map_err(numbers::of_item(number))?;
+        }
+        Ok(scene)
+    }
+
     /// The box around everything that can be seen, footprints included.
     pub fn bounds(&self) -> Bounds {
         self.items.iter().fold(Bounds::EMPTY, |all, item| all.union(item.bounds()))
@@ -261,7 +276,9 @@ impl Scene {
         let reach = FOOTPRINT_BLUR * self.widest_reach() / view.scale;
         if view.perspective {
             (near, far) = (near * (1.0 - reach), far * (1.0 + reach));
-            near = near.max(settings.near.unwrap_or(1e-3 * bounds.diagonal()));
+            // Growing from 0, sheets would never get anywhere; and 32 bits tell nothing nearer apart.
+            let size = bounds.diagonal();
+            near = near.max(settings.near.unwrap_or(1e-3 * size).max(1e-6 * size));
         } else {
             (near, far) = (near - reach, far + reach);
         }
@@ -542,7 +559,8 @@ pub struct Settings {
     pub cull_backfaces: Option<bool>,
     /// GPU memory that each hierarchy's pages, or a volume's bricks, may take, in bytes; without what frames make of bricks.
     pub page_memory: u64,
-    /// Perspective views show nothing nearer than this (world units); a thousandth of the scene where `None`.
+    /// Perspective views show nothing nearer than this (world units), nor than a millionth of the scene; a thousandth of it where
+    /// `None`.
     pub near: Option<f64>,
 }
 

@@ -113,6 +113,9 @@ pub fn decode_normal(packed: u32) -> Option<Vec3> {
 }
 
 impl Splat {
+    /// The largest optical depth: what is above it is as opaque, and sums of it lose what lies beside.
+    pub const MOST_OPTICAL_DEPTH: f32 = 1e10;
+
     /// The standard deviations along the axes: the half extents of an ellipsoid are the lengths of the rows of its factor.
     pub(crate) fn deviations(&self) -> Vec3 {
         let [b00, b10, b11, b20, b21, b22] = self.factor;
@@ -133,9 +136,12 @@ impl SplatSet {
     /// Gives the set another origin, with all splats where they were.
     ///
     /// # Errors
-    /// [`Error::Argument`] where 32 bits hold places around it less finely than a quarter of the splats' mean deviation: splats
+    /// [`Error::Argument`] for an origin that is not finite, and where 32 bits hold places around it less finely than a quarter of the splats' mean deviation: splats
     /// beside each other would become one.
     pub fn move_origin(&mut self, origin: DVec3) -> Result<()> {
+        if !origin.is_finite() {
+            return Err(Error::Argument(format!("the new origin {origin} of the splats is not finite")));
+        }
         let shift = self.origin - origin;
         self.origin = origin;
         if shift == DVec3::ZERO || self.splats.is_empty() {
@@ -188,5 +194,8 @@ mod tests {
         assert!((places[0] - 1.0).abs() < 1e-4 && (places[1] - 1.25).abs() < 1e-4, "{places:?}");
         let error = set.move_origin(DVec3::new(4e6, 0.0, 0.0)).unwrap_err().to_string();
         assert!(error.contains("in steps of 0.477"), "{error}");
+        let (before, nowhere) = (set.origin, DVec3::new(0.0, f64::NAN, 0.0));
+        let error = set.move_origin(nowhere).unwrap_err().to_string();
+        assert!(error.contains("is not finite") && set.origin == before, "{error}");
     }
 }

@@ -251,7 +251,7 @@ fn bricks_are_read_once() {
     let mut turned = camera.clone();
     turned.position += DVec3::X;
     assert_eq!(frame(&mut prepared, &turned).1.read_bricks, 0);
-    prepared.set_transfer(&other);
+    prepared.set_transfer(&other).unwrap();
     let (third, stats) = frame(&mut prepared, camera);
     assert_eq!(stats.read_bricks, 0);
     assert!(decibels(&third, &expected) > 60.0 && decibels(&third, &first) < 40.0);

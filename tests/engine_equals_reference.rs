@@ -230,6 +230,11 @@ fn one_value_far_off() {
 }
 
 #[test]
+fn points_far_off() {
+    assert_matches(methods::points_far_off(), 50.0);
+}
+
+#[test]
 fn post_classified() {
     assert_matches(methods::post_classified(), 50.0);
 }
@@ -516,7 +521,7 @@ fn a_new_transfer_function_needs_no_new_upload() {
     let mut renderer = Renderer::new(&gpu);
     let mut prepared = renderer.prepare(&case.scene).expect(case.name);
     renderer.render(&mut prepared, &case.camera, &case.settings).expect(case.name);
-    prepared.set_transfer(&other);
+    prepared.set_transfer(&other).unwrap();
     let (found, _) = renderer.render(&mut prepared, &case.camera, &case.settings).expect(case.name);
     let scene = splatkit::scene::Scene::new().with_volume(volume.clone(), kernel.clone(), other);
     let expected = reference::render(&scene, &case.camera, &case.settings).expect(case.name);

@@ -353,6 +353,37 @@ fn a_budget_counts_for_the_whole_picture() {
     assert!(difference < MOST_DIFFERENCE, "another picture, by {difference}");
 }
 
+/// Hierarchies and bricks that share too little memory show the same whatever was seen before.
+#[test]
+fn memory_is_shared_the_same_each_time() {
+    let splats = Mesh::knot(600, 50).surfels(&SurfelOptions::default()).unwrap();
+    let tree = Tree::build(&splats, &BuildOptions::default(), &|_, _| ()).expect("a tree");
+    let scene = scene(true).with_hierarchy(Hierarchy::from_tree(tree).expect("a hierarchy"));
+    let (camera, settings) = view(&scene);
+    let mut nearer = camera.clone();
+    nearer.position = nearer.position.lerp(nearer.focal_point, 0.6);
+    let mut kinds = Vec::new();
+    for shift in 20..28 {
+        let gpu = gpu().with_memory(1 << shift);
+        let pictures = |cameras: &[&Camera]| {
+            let mut renderer = Renderer::new(&gpu);
+            let mut prepared = renderer.prepare(&scene)?;
+            let mut draw = |camera: &&Camera| renderer.render(&mut prepared, camera, &settings);
+            cameras.iter().map(|camera| Ok(draw(camera)?.0)).collect::<splatkit::Result<Vec<_>>>()
+        };
+        let (alone, later) = (pictures(&[&camera]), pictures(&[&nearer, &camera]));
+        kinds.push(match (alone, later) {
+            (Ok(alone), Ok(later)) => {
+                assert!(same(&alone[0], &later[1]), "2^{shift} bytes: another picture after another view");
+                true
+            }
+            (Err(_), Err(_)) => false,
+            (alone, later) => panic!("2^{shift} bytes: {:?} and {:?}", alone.err(), later.err()),
+        });
+    }
+    assert!(kinds.contains(&true), "{kinds:?}");
+}
+
 /// A scene that takes more than it may is refused before it is there: its samples, and the lists of those that show. Of bricks
 /// coarser ones are drawn where they fit.
 #[test]
@@ -361,6 +392,7 @@ fn memory_is_kept_to() {
         let scene = scene(in_bricks);
         let expected = drawn(&gpu(), &scene).expect("draws");
         let mut outcomes = Vec::new();
+        let mut coarsest = f64::INFINITY;
         for shift in 16..32 {
             let gpu = gpu().with_memory(1 << shift);
             let mut renderer = Renderer::new(&gpu);
@@ -376,8 +408,10 @@ fn memory_is_kept_to() {
                             assert_eq!(first.err(), Some(error.to_string()));
                             Err(("drawn", error))
                         }
-                        Ok((picture, _)) => {
+                        Ok((picture, stats)) => {
                             assert!(same(&picture, &first.expect("draws the first time, too")), "2^{shift} bytes");
+                            assert!(stats.lambda <= coarsest, "2^{shift} bytes: coarser than with less");
+                            coarsest = stats.lambda;
                             Ok(picture)
                         }
                     }

@@ -22,7 +22,7 @@ use std::{collections::HashMap, sync::Arc};
 use wgpu::BufferUsages as Usage;
 
 /// Samples of a slot.
-const SLOT_SAMPLES: u32 = (SIDE * SIDE * SIDE) as u32;
+pub const SLOT_SAMPLES: u32 = (SIDE * SIDE * SIDE) as u32;
 /// Slots of a chunk at most (`slots` in source_bricks.wgsl): the spans of all their samples fit a binding of 128 MiB.
 const MOST_SLOTS: usize = 512;
 /// Bricks read before they are sent.

@@ -357,7 +357,7 @@ pub fn targets(
     frame.tile_shift = most_tiles.div_ceil(SPAN_TILES).next_power_of_two().trailing_zeros();
     frame.entry_capacity = budget.entries;
     frame.record_capacity = budget.record_words;
-    let table = tables_of(prepared, &mut frame);
+    let table = tables_of(prepared, view, sheets, &mut frame);
 
     // The sheet before the first reaches back, the one after the last forward, without end.
     let mut planes = vec![-3e38f32];
@@ -401,7 +401,7 @@ pub fn targets(
 }
 
 /// The tables of the scene's field; a frame without one gets some of no meaning.
-fn tables_of(prepared: &PreparedScene, frame: &mut Frame) -> Vec<[f32; 4]> {
+fn tables_of(prepared: &PreparedScene, view: &View, sheets: &Sheets, frame: &mut Frame) -> Vec<[f32; 4]> {
     let field = prepared.scene.items.iter().find_map(|item| match item {
         Item::Radiance(_) | Item::Hierarchy(_) => None,
         Item::Scalar(set, transfer) => Some((transfer, set.value_range(), None)),
@@ -410,7 +410,7 @@ fn tables_of(prepared: &PreparedScene, frame: &mut Frame) -> Vec<[f32; 4]> {
     });
     let Some((transfer, range, kernel)) = field else { return vec![[0.0; 4]; 2] };
     let tables = Tables::new(transfer, range, kernel);
-    (frame.transfer, frame.beyond) = (tables.transfer, tables.beyond);
+    frame.set_tables(&tables, transfer, view, sheets);
     tables.entries
 }
 

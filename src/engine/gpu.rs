@@ -183,7 +183,7 @@ impl Gpu {
         Ok(Self::from_wgpu(device, queue, adapter.get_info()))
     }
 
-    /// Takes the device of a host application. It must keep WebGPU's default limits. What goes wrong while the engine works is
+    /// Takes the device of a host application, once: what is made with one `Gpu` goes with it and its clones. It must keep WebGPU's default limits. What goes wrong while the engine works is
     /// the engine's error; what the host hears of is its own.
     pub fn from_wgpu(device: wgpu::Device, queue: wgpu::Queue, info: wgpu::AdapterInfo) -> Self {
         let on_processor = info.device_type == wgpu::DeviceType::Cpu;
@@ -197,6 +197,11 @@ impl Gpu {
             memory,
             choice: None,
         }
+    }
+
+    /// Whether the other is a clone of this one. What wgpu compares devices by may be the same in two instances of it.
+    pub(super) fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.condition, &other.condition)
     }
 
     /// Whether the adapter runs on the processor. Tiles are then walked by fewer, wider invocations.

@@ -2,7 +2,7 @@
 
 use super::{
     Budget, Gpu, PreparedScene,
-    bricks::{Listed, Room, SelectBricks},
+    bricks::{Listed, Room, SLOT_SAMPLES, SelectBricks},
     clear::Clear,
     cut::{Cut, finest_within, tally_bytes},
     frame::{self, Pipelines, Pool, Step, Targets, Work},
@@ -15,7 +15,7 @@ use super::{
     tiles::Tiles,
     timestamps::Timestamps,
     uniforms::State,
-    upload::Origin,
+    upload::{Origin, RUN, list_bytes},
 };
 use crate::{
     Error, Result,
@@ -129,7 +129,7 @@ impl Renderer {
     /// Draws a picture and reads it back. Pictures larger than a binding holds are drawn in strips, one below the other.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a camera or settings that make no picture of this scene; [`Error::Gpu`] where the device's memory
+    /// [`Error::Argument`] for a camera or settings that make no picture of this scene, or a scene prepared on another device; [`Error::Gpu`] where the device's memory
     /// runs out or a driver's limits are met: a smaller picture may do; [`Error::DeviceLost`]: see [`Gpu::reopened`]; those of
     /// reading, for scenes that are read as they are drawn.
     pub fn render(
@@ -168,6 +168,7 @@ impl Renderer {
         work: impl FnOnce(&mut Self, &mut PreparedScene) -> Result<T>,
     ) -> Result<T> {
         let gpu = self.gpu.clone();
+        prepared.check_device(&gpu)?;
         let done = gpu.watch(|| {
             prepared.mend(&gpu)?;
             work(self, prepared)
@@ -257,15 +258,17 @@ impl Renderer {
             |prepared: &PreparedScene, most| prepared.scene.choice(view, settings, detail, most, &prepared.bounds);
         let Some(shelf) = &prepared.shelf else { return Ok(None) };
         // Half of the memory is for what they show.
-        let bytes = settings.page_memory.min(prepared.room_for_bricks(&self.gpu) / 2);
+        let room = prepared.room_to_read(&self.gpu);
+        let bytes = settings.page_memory.min(room / 2);
         let held = usize::try_from(bytes / slot_bytes(&shelf.bricks)).unwrap_or(usize::MAX);
         let Some(wanted) = choose(prepared, held) else { return Ok(None) };
         let most_runs = u64::from(frame::most_runs(&self.gpu)).saturating_sub(prepared.other_runs());
+        let most_runs = most_runs.min((room - bytes) / list_bytes(u64::from(RUN)));
         // A view that rests is not searched again.
         let mut most = prepared.shelf.as_ref().and_then(|shelf| shelf.fitting(&wanted, most_runs));
         loop {
             let choice = most.and_then(|most| choose(prepared, most)).unwrap_or_else(|| wanted.clone());
-            // Of the coarsest all is listed, and refused where even that is too much.
+            // Of the coarsest all is listed, and refused where even that is too much memory.
             let runs = if choice.bricks.len() > 1 { most_runs } else { u64::MAX };
             let room = Room { bytes, runs };
             let Listed::TooMany { runs, most: fit } =
@@ -276,9 +279,10 @@ impl Renderer {
                 }
                 return Ok(Some(choice));
             };
-            // As many as show so much, if others show as much as these do.
-            let share = fit as f64 / runs as f64;
-            most = Some(((choice.bricks.len() as f64 * share) as usize).clamp(1, choice.bricks.len() - 1));
+            // As many as show so much, if others show as much as these do; and those that fit if all of them shows.
+            let alike = (choice.bricks.len() as f64 * (fit as f64 / runs as f64)) as usize;
+            let certain = fit * u64::from(RUN) / u64::from(SLOT_SAMPLES);
+            most = Some(alike.max(certain as usize).clamp(1, choice.bricks.len() - 1));
         }
     }
 

@@ -5,6 +5,7 @@ use crate::scene::{Classification, Mode, Optics, Order};
 
 pub const FRAME: &str = include_str!("../../shaders/frame.wgsl");
 pub const NORMAL: &str = include_str!("../../shaders/normal.wgsl");
+pub const VALUE: &str = include_str!("../../shaders/value.wgsl");
 pub const SAMPLE: &str = include_str!("../../shaders/sample.wgsl");
 pub const FOOTPRINT: &str = include_str!("../../shaders/footprint.wgsl");
 pub const SPLATS: &str = include_str!("../../shaders/splats.wgsl");

@@ -20,11 +20,11 @@ pub struct Sources<T> {
 /// Makes all kinds of a stage from the source's shader and the bindings of its group.
 pub fn per_source(make: impl Fn(&str, &[Binding]) -> Stage) -> Sources<Stage> {
     use Binding::{Read, Uniform};
-    let lattice = [shaders::SAMPLE, shaders::SOURCE_LATTICE].concat();
-    let bricks = [shaders::SAMPLE, shaders::SOURCE_BRICKS].concat();
+    let lattice = [shaders::VALUE, shaders::SAMPLE, shaders::SOURCE_LATTICE].concat();
+    let bricks = [shaders::VALUE, shaders::SAMPLE, shaders::SOURCE_BRICKS].concat();
     Sources {
-        splats: make(&[shaders::SPLATS, shaders::SOURCE_SPLATS].concat(), &[Uniform, Read]),
-        nodes: make(&[shaders::SPLATS, shaders::SOURCE_NODES].concat(), &[Uniform, Read, Read]),
+        splats: make(&[shaders::VALUE, shaders::SPLATS, shaders::SOURCE_SPLATS].concat(), &[Uniform, Read]),
+        nodes: make(&[shaders::VALUE, shaders::SPLATS, shaders::SOURCE_NODES].concat(), &[Uniform, Read, Read]),
         lattice: make(&lattice, &[Uniform, Read, Read, Uniform]),
         bricks: make(&bricks, &[Uniform, Read, Read, Uniform]),
     }

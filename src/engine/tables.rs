@@ -1,36 +1,34 @@
 //! Functions of one value, tabulated for march (shaders/tables.wgsl): the transfer function, its integral, the gradient's
-//! factor, the kernel and its sections. All lie in one buffer, whose parts start at fixed places.
+//! factor, the kernel and its sections. All lie in one buffer.
 
 use crate::{
     math::{Kernel, Profile},
     volume::TransferFunction,
 };
 
-/// Entries of the transfer function, over the values between which it changes.
+/// Entries of the transfer function at least, over the values between which it changes.
 const VALUES: usize = 4096;
+/// The most of them: integrals of more are sums in which 32 bits lose single entries.
+const MOST_VALUES: usize = 4 * VALUES;
+/// Entries of the shortest part in which the function changes, where there are enough of them.
+const PART: f64 = 256.0;
 /// Entries before the first value that the function changes at, and behind the last one.
 const BESIDE: f64 = 2.0;
 /// Values of a field may leave the range of its samples by this part of it, where kernels have negative parts.
 const OVERSHOOT: f64 = 0.25;
+/// The part of the samples' range in which a step is looked up at least. Smaller ones are lost in the sums of a sheet.
+const LEAST_PART: f64 = 1.0 / 1048576.0;
 /// Entries of the gradient's factor.
-const GRADIENTS: usize = 256;
+const GRADIENTS: usize = 1024;
 /// Entries of the kernel along its radius.
 const RADII: usize = 1024;
 /// Cells of the sections' table along each side.
 const SECTIONS: usize = 128;
 
-/// Where the parts start, one element more in each than its last index, for interpolation at the upper end.
-const INTEGRAL_START: usize = VALUES + 1;
-const GRADIENT_START: usize = 2 * INTEGRAL_START;
-const RADIAL_START: usize = GRADIENT_START + GRADIENTS + 1;
-const SECTION_START: usize = RADIAL_START + RADII;
-
 /// The constants that tables.wgsl reads them by.
 pub fn constants() -> String {
     format!(
-        "const INTEGRAL_TABLE: u32 = {INTEGRAL_START}u;\nconst GRADIENT_TABLE: u32 = {GRADIENT_START}u;\n\
-         const GRADIENT_ENTRIES: u32 = {GRADIENTS}u;\nconst RADIAL_TABLE: u32 = {RADIAL_START}u;\n\
-         const RADIAL_ENTRIES: u32 = {RADII}u;\nconst SECTION_TABLE: u32 = {SECTION_START}u;\n\
+        "const GRADIENT_ENTRIES: u32 = {GRADIENTS}u;\nconst RADIAL_ENTRIES: u32 = {RADII}u;\n\
          const SECTION_CELLS: u32 = {SECTIONS}u;\n"
     )
 }
@@ -39,8 +37,12 @@ pub fn constants() -> String {
 #[derive(Debug)]
 pub struct Tables {
     pub entries: Vec<[f32; 4]>,
-    /// First value, entries per value, last index, entries per gradient magnitude.
-    pub transfer: [f32; 4],
+    /// Where the parts start behind the transfer function: its integrals, the gradient's factors, the kernel, its sections.
+    pub starts: [u32; 4],
+    /// The value of the first entry, entries per value, and the last entry. The value fits 32 bits.
+    pub values: [f64; 3],
+    /// The gradient's magnitude at the first of its factors, and factors per magnitude; value per world length.
+    pub gradients: [f64; 2],
     /// Extinction times colour, and extinction, of all values before the first entry and of all behind the last one.
     pub beyond: [[f32; 4]; 2],
 }
@@ -48,24 +50,26 @@ pub struct Tables {
 impl Tables {
     /// Of a transfer function and the range of the samples. Only a kernel without closed form gets tables.
     pub fn new(transfer: &TransferFunction, range: [f64; 2], kernel: Option<&Kernel>) -> Self {
-        let last = (VALUES - 1) as f64;
-        let [low, high] = window(transfer, range);
-        let mut entries = transfer.table([low, high], VALUES);
-        entries.push(entries[VALUES - 1]);
-        entries.extend(integrals(transfer, [low, high]));
-        let most =
-            transfer.gradient.last().map_or(1.0, |point| point.0.max(f64::from(f32::MIN_POSITIVE) * GRADIENTS as f64));
-        let magnitude = |i: usize| most * i as f64 / (GRADIENTS - 1) as f64;
-        entries.extend((0..=GRADIENTS).map(|i| [transfer.gradient_factor(magnitude(i)) as f32, 0.0, 0.0, 0.0]));
+        let Window { ends: [low, high], entries: count } = window(transfer, range);
+        let last = (count - 1) as f64;
+        let mut entries = transfer.table([low, high], count);
+        // One more than the last, for interpolation at the upper end.
+        entries.push(entries[count - 1]);
+        let mut starts = [entries.len() as u32; 4];
+        entries.extend(integrals(transfer, [low, high], count));
+        starts[1] = entries.len() as u32;
+        let (first, per_magnitude) = factors(transfer, &mut entries);
+        starts[2] = entries.len() as u32;
         if let Some(kernel) = kernel.filter(|kernel| !matches!(kernel.profile, Profile::Gaussian(_))) {
             entries.extend(radial(kernel));
+            starts[3] = entries.len() as u32;
             entries.extend(sections(kernel));
         }
-        let per_value = last / (high - low);
-        let per_magnitude = (GRADIENTS - 1) as f64 / most;
         Self {
             entries,
-            transfer: [low as f32, per_value as f32, last as f32, per_magnitude as f32],
+            starts,
+            values: [low, last / (high - low), last],
+            gradients: [first, per_magnitude],
             beyond: [low, high].map(|value| shown(transfer, value).map(|v| v as f32)),
         }
     }
@@ -78,29 +82,70 @@ fn shown(transfer: &TransferFunction, value: f64) -> [f64; 4] {
     [red, green, blue, 1.0].map(|part| part * extinction)
 }
 
-/// The values that get entries: those between which the function changes, as far as a field with samples in `range` has
-/// them. So a function of a few values has its corners where they are, however wide the data's range is.
-fn window(transfer: &TransferFunction, [low, high]: [f64; 2]) -> [f64; 2] {
+/// The values that get entries, and how many of these.
+#[derive(Debug, Clone, Copy)]
+struct Window {
+    ends: [f64; 2],
+    entries: usize,
+}
+
+/// The values between which the function changes, as far as a field with samples in `range` has them. So a function of a few
+/// values has its corners where they are, however wide the data's range is and wherever its other points are.
+fn window(transfer: &TransferFunction, [low, high]: [f64; 2]) -> Window {
     // No samples have no range.
     let [low, high] = if low <= high { [low, high] } else { [0.0; 2] };
     let reach = OVERSHOOT * (high - low);
-    let [first, last] = transfer.span().map(|value| value.clamp(low - reach, high + reach));
-    // A single step, or a function that does not change there. 32 bits tell so many values near one from each other.
-    let least = (first.abs() * 2f64.powi(-12)).max(f64::from(f32::MIN_POSITIVE) * VALUES as f64);
+    let within = |[first, last]: [f64; 2]| [first, last].map(|value| value.clamp(low - reach, high + reach));
+    let changes: Vec<_> = changes(transfer).into_iter().map(within).collect();
+    let [mut first, mut last] = within(transfer.span());
+    let changing =
+        changes.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], part| [a.min(part[0]), b.max(part[1])]);
+    // To look values up that have no entries costs a little more.
+    if changing[1] - changing[0] < 0.25 * (last - first) {
+        [first, last] = if changing[0] <= changing[1] { changing } else { [first; 2] };
+    }
+    // A single step, or a function that does not change there: as wide as values of 32 bits are apart, or more.
+    let least =
+        (first.abs() * 2f64.powi(-22)).max(LEAST_PART * (high - low)).max(f64::from(f32::MIN_POSITIVE) * VALUES as f64);
     let lack = (least - (last - first)).max(0.0);
+    let shortest = changes.iter().map(|[a, b]| b - a).filter(|width| *width > 0.0).fold(f64::INFINITY, f64::min);
+    let wanted = PART * (last - first).max(least) / shortest;
+    let entries = (wanted as usize).next_power_of_two().clamp(VALUES, MOST_VALUES);
     // Where it begins or ends by a step, both sides of that have entries.
-    let beside = (last - first).max(least) * BESIDE / (VALUES - 1) as f64;
-    [first - lack / 2.0 - beside, last + lack / 2.0 + beside]
+    let beside = (last - first).max(least) * BESIDE / (entries - 1) as f64;
+    // A value of 32 bits, from which those of the samples are told exactly.
+    let start = first - lack / 2.0 - beside;
+    let exact = start as f32;
+    let exact = if f64::from(exact) > start { exact.next_down() } else { exact };
+    Window { ends: [exact.max(f32::MIN).into(), last + lack / 2.0 + beside], entries }
+}
+
+/// The parts between two points of the function in which what it shows changes.
+fn changes(transfer: &TransferFunction) -> Vec<[f64; 2]> {
+    let opacity = transfer.opacity.windows(2).filter(|pair| pair[0].1 != pair[1].1).map(|pair| [pair[0].0, pair[1].0]);
+    // Colours count where there is opacity.
+    let shown = transfer.opacity.windows(2).filter(|pair| pair[0].1 > 0.0 || pair[1].1 > 0.0);
+    let ends = |points: &[(f64, f64)]| [(points[0], f64::NEG_INFINITY), (points[points.len() - 1], f64::INFINITY)];
+    let beyond = ends(&transfer.opacity).into_iter().filter(|(point, _)| point.1 > 0.0);
+    let shown: Vec<[f64; 2]> = shown
+        .map(|pair| [pair[0].0, pair[1].0])
+        .chain(beyond.map(|((value, _), end)| [value.min(end), value.max(end)]))
+        .collect();
+    let color = transfer.color.windows(2).filter(|pair| pair[0].1 != pair[1].1).flat_map(|pair| {
+        let own = [pair[0].0, pair[1].0];
+        shown.iter().map(move |part| [own[0].max(part[0]), own[1].min(part[1])])
+    });
+    opacity.chain(color.filter(|part| part[0] <= part[1])).collect()
 }
 
 /// Running integrals of extinction times colour, and of extinction, in entries. Each step is a mean over points inside it, so
 /// that a jump of the function between two entries counts where it is.
-fn integrals(transfer: &TransferFunction, [low, high]: [f64; 2]) -> Vec<[f32; 4]> {
+fn integrals(transfer: &TransferFunction, [low, high]: [f64; 2], count: usize) -> Vec<[f32; 4]> {
     const INSIDE: usize = 4;
-    let last = (VALUES - 1) as f64;
+    let last = (count - 1) as f64;
     let mut sum = [0.0f64; 4];
     let mut all = vec![[0.0f32; 4]];
-    for i in 0..VALUES {
+    for i in 0..count {
         for j in 0..INSIDE {
             let at = (i as f64 + (j as f64 + 0.5) / INSIDE as f64).min(last);
             let value = low + (high - low) * at / last;
@@ -111,6 +156,22 @@ fn integrals(transfer: &TransferFunction, [low, high]: [f64; 2]) -> Vec<[f32; 4]
         all.push(sum.map(|v| v as f32));
     }
     all
+}
+
+/// Adds the gradient's factors at the magnitudes between which they change; tells the first of these, and factors per
+/// magnitude.
+fn factors(transfer: &TransferFunction, entries: &mut Vec<[f32; 4]>) -> (f64, f64) {
+    let changing = transfer.gradient.windows(2).filter(|pair| pair[0].1 != pair[1].1);
+    let [first, last] =
+        changing.fold([f64::INFINITY, 0.0], |[low, high], pair| [f64::min(low, pair[0].0), f64::max(high, pair[1].0)]);
+    let first = if first <= last { first } else { 0.0 };
+    // A step has both its sides within two entries.
+    let width = (last - first).max(first * 2f64.powi(-12)).max(f64::from(f32::MIN_POSITIVE) * GRADIENTS as f64);
+    let step = width / (GRADIENTS - 2) as f64;
+    let start = first - 0.5 * step;
+    let factor = |i: usize| transfer.gradient_factor(start + step * i.min(GRADIENTS - 1) as f64);
+    entries.extend((0..=GRADIENTS).map(|i| [factor(i) as f32, 0.0, 0.0, 0.0]));
+    (start, 1.0 / step)
 }
 
 /// Value and −h′(r)/r at each radius, beside those at the next.
@@ -161,7 +222,7 @@ fn sections(kernel: &Kernel) -> Vec<[f32; 4]> {
 
 /// Whether samples in a range have values that get no entries.
 pub fn leaves_out(transfer: &TransferFunction, range: [f64; 2]) -> bool {
-    let [low, high] = window(transfer, range);
+    let [low, high] = window(transfer, range).ends;
     range[0] < low || high < range[1]
 }
 
@@ -173,9 +234,11 @@ mod tests {
     fn the_parts_start_where_the_shader_looks() {
         let transfer = TransferFunction { gradient: vec![(0.0, 0.0), (2.0, 1.0)], ..TransferFunction::default() };
         let tables = Tables::new(&transfer, [0.0, 1.0], Some(&Kernel::b_spline(2.0).unwrap()));
-        assert_eq!(tables.entries.len(), SECTION_START + SECTIONS * SECTIONS);
-        assert_eq!(tables.entries[RADIAL_START][0], 1.0);
-        let factor = tables.entries[GRADIENT_START + GRADIENTS / 2][0];
+        let [integrals, factors, radii, sections] = tables.starts.map(|start| start as usize);
+        assert_eq!(tables.entries.len(), sections + SECTIONS * SECTIONS);
+        assert_eq!(tables.entries[integrals], [0.0; 4]);
+        assert_eq!(tables.entries[radii][0], 1.0);
+        let factor = tables.entries[factors + GRADIENTS / 2][0];
         assert!((factor - 0.5).abs() < 0.01, "{factor}");
     }
 
@@ -184,8 +247,8 @@ mod tests {
         let opacity = vec![(0.0, 0.0), (0.5, 0.0), (0.5, 0.9), (1.0, 0.9)];
         let transfer = TransferFunction { opacity, ..TransferFunction::default() };
         let tables = Tables::new(&transfer, [0.0, 1.0], None);
-        let [low, per_value, last, _] = tables.transfer.map(f64::from);
-        let whole = f64::from(tables.entries[INTEGRAL_START + VALUES - 1][3]) / per_value;
+        let [low, per_value, last] = tables.values;
+        let whole = f64::from(tables.entries[tables.starts[0] as usize + VALUES - 1][3]) / per_value;
         let expected = (low + last / per_value - 0.5) * transfer.extinction(0.9);
         assert!((whole / expected - 1.0).abs() < 1e-3, "{whole} {expected}");
     }
@@ -198,7 +261,7 @@ mod tests {
                 opacity: points.to_vec(),
                 ..TransferFunction::default()
             };
-            window(&transfer, range)
+            window(&transfer, range).ends
         };
         // Of 16-bit data a few hundred values; of a function far wider than the data what these can have.
         let near = |found: [f64; 2], expected: [f64; 2]| {
@@ -213,7 +276,10 @@ mod tests {
         // A step, at 0 too, and values that are all one.
         for (value, range) in [(80.0, [0.0, 255.0]), (0.0, [-1.0, 1e30]), (7.0, [7.0, 7.0])] {
             let [low, high] = over(&[(value, 0.0), (value, 1.0)], range);
-            assert!(low < value && value < high && high - low <= value * 1e-3 + 1e-30, "{low} {high}");
+            assert!(
+                low < value && value < high && high - low <= (value * 1e-3).max((range[1] - range[0]) * 1e-6) + 1e-30,
+                "{low} {high}"
+            );
             assert!(((VALUES as f64 / (high - low)) as f32).is_finite());
         }
     }

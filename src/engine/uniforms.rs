@@ -1,5 +1,6 @@
 //! The structures that Rust writes and shaders read, field by field as in shaders/frame.wgsl.
 
+use super::tables::Tables;
 use crate::{
     math::{Bounds, Kernel, Profile, Sheets, View},
     scene::{Clip, ClipShape, Item, Mode, Scene, Settings},
@@ -34,6 +35,8 @@ pub struct Frame {
     pub surface_shade: [f32; 4],
     pub isotropic: [f32; 4],
     pub transfer: [f32; 4],
+    pub gradients: [f32; 4],
+    pub table_starts: [u32; 4],
     pub beyond: [[f32; 4]; 2],
     pub kernel: [f32; 4],
     pub levels: [f32; 4],
@@ -43,7 +46,7 @@ pub struct Frame {
     pub holes: [[[f32; 4]; 2]; Settings::MAX_CLIPS],
     pub isosurfaces: [[[f32; 4]; 2]; TransferFunction::MAX_ISOSURFACES],
 }
-const _: () = assert!(size_of::<Frame>() == 64 + (18 + 3 * 16) * 16);
+const _: () = assert!(size_of::<Frame>() == 64 + (20 + 3 * 16) * 16);
 
 /// `Source` in frame.wgsl.
 #[repr(C)]
@@ -164,7 +167,7 @@ fn smallest_cosine(view: &View) -> f64 {
 }
 
 impl Frame {
-    /// Everything but the tiles, the capacities and the transfer table.
+    /// Everything but the tiles, the capacities and the tables.
     pub fn new(scene: &Scene, view: &View, sheets: &Sheets, settings: &Settings, choice: Option<&Choice>) -> Self {
         let mut frame = Self {
             size: view.size,
@@ -213,16 +216,27 @@ impl Frame {
             if settings.classifies_samples() {
                 frame.surface_shade = frame.volume_shade;
             }
-            let mut surfaces = transfer.isosurfaces.clone();
-            surfaces.sort_by(|a, b| a.value.total_cmp(&b.value));
-            for (own, surface) in frame.isosurfaces.iter_mut().zip(surfaces) {
-                let Isosurface { value, color: [red, green, blue], opacity } = surface;
-                let depth = -(1.0 - opacity).max(1e-9).ln();
-                *own = [[value, opacity, depth, 0.0], [red, green, blue, 0.0]].map(|part| part.map(|v| v as f32));
-            }
         }
         frame.set_clips(view, settings);
         frame
+    }
+
+    /// How values are looked up. Gradients count over the thickness of a sheet.
+    pub fn set_tables(&mut self, tables: &Tables, transfer: &TransferFunction, view: &View, sheets: &Sheets) {
+        let [low, per_value, last] = tables.values;
+        self.transfer = [low, per_value, last, 0.0].map(|v| v as f32);
+        let [first, per_magnitude] = tables.gradients;
+        let (to_own, length) = (per_value * sheets.step, sheets.step);
+        self.gradients = [first * to_own, per_magnitude / to_own, length, view.scale * length].map(|v| v as f32);
+        self.table_starts = tables.starts;
+        self.beyond = tables.beyond;
+        let mut surfaces = transfer.isosurfaces.clone();
+        surfaces.sort_by(|a, b| a.value.total_cmp(&b.value));
+        for (own, surface) in self.isosurfaces.iter_mut().zip(surfaces) {
+            let Isosurface { value, color: [red, green, blue], opacity } = surface;
+            let (entry, depth) = ((value - low) * per_value, -(1.0 - opacity).max(1e-9).ln());
+            *own = [[entry, opacity, depth, 0.0], [red, green, blue, 0.0]].map(|part| part.map(|v| v as f32));
+        }
     }
 
     fn set_field(&mut self, view: &View, lattice: &Lattice) {

@@ -102,6 +102,8 @@ pub struct PreparedScene {
     pub(super) broken: bool,
     /// The box around everything, which does not change.
     pub(super) bounds: Bounds,
+    /// Where all of it lies.
+    gpu: Gpu,
 }
 
 impl PreparedScene {
@@ -117,6 +119,7 @@ impl PreparedScene {
             bytes: 0,
             broken: false,
             bounds: scene.bounds(),
+            gpu: gpu.clone(),
         };
         for item in &scene.items {
             gpu.check_memory(prepared.bytes + bytes_of(item))?;
@@ -131,6 +134,17 @@ impl PreparedScene {
         Ok(prepared)
     }
 
+    /// Refuses what lies on another device.
+    pub(super) fn check_device(&self, gpu: &Gpu) -> Result<()> {
+        if self.gpu.is(gpu) {
+            return Ok(());
+        }
+        let name = &gpu.info.name;
+        Err(Error::Argument(format!(
+            "the scene was prepared on another device than the renderer's ({name}); prepare it by this renderer"
+        )))
+    }
+
     /// Uploads the scene anew where it is broken.
     pub(super) fn mend(&mut self, gpu: &Gpu) -> Result<()> {
         if self.broken {
@@ -140,12 +154,13 @@ impl PreparedScene {
     }
 
     /// Shows the scene's volume or sample set by another transfer function. Nothing is rebuilt on the CPU.
-    pub fn set_transfer(&mut self, transfer: &TransferFunction) {
-        for item in &mut self.scene.items {
-            if let Item::Scalar(_, shown) | Item::Volume(_, _, shown) | Item::Bricks(_, _, shown) = item {
-                *shown = transfer.clone();
-            }
-        }
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for one that [`Renderer::prepare`](super::Renderer::prepare) would refuse; the scene is then shown as
+    /// before.
+    pub fn set_transfer(&mut self, transfer: &TransferFunction) -> Result<()> {
+        self.scene = self.scene.shown_by(transfer)?;
+        Ok(())
     }
 
     /// Lists the samples of lattices anew where others show something than did, or all of them are asked for.
@@ -221,14 +236,17 @@ impl PreparedScene {
         bricks.map(|chunk| u64::from(runs_of(chunk.candidates))).sum()
     }
 
-    /// The bytes that bricks and their lists may take.
-    pub(super) fn room_for_bricks(&self, gpu: &Gpu) -> u64 {
-        let lists = self.chunks.iter().filter_map(|chunk| match &chunk.origin {
-            Origin::Bricks { slab, .. } => Some(slab.slots.size() + chunk.list_bytes()),
-            _ => None,
+    /// The bytes that each hierarchy, and the volume in bricks, may take with all lists: equal parts of what the device has for
+    /// what is read as it is drawn. So none depends on what another was first to take.
+    pub(super) fn room_to_read(&self, gpu: &Gpu) -> u64 {
+        let held = self.chunks.iter().map(|chunk| match &chunk.origin {
+            Origin::Nodes { .. } => chunk.data.size() + chunk.list_bytes(),
+            Origin::Bricks { slab, .. } => slab.slots.size() + chunk.list_bytes(),
+            Origin::Splats { .. } | Origin::Lattice { .. } => 0,
         });
         let slots = self.shelf.as_ref().map_or(0, Shelf::bytes);
-        gpu.memory_left(self.bytes.saturating_sub(slots + lists.sum::<u64>()))
+        let readers = self.forests.len() + usize::from(self.shelf.is_some());
+        gpu.memory_left(self.bytes.saturating_sub(slots + held.sum::<u64>())) / readers.max(1) as u64
     }
 
     /// Runs of candidates in all that does not lie in bricks.
@@ -260,9 +278,6 @@ impl PreparedScene {
             own.push((slab.as_mut(), &chunk.uniform));
         }
         let rest = self.bytes - before;
-        // Where nothing coarser is left, too little memory is an error.
-        let held = if most == u64::MAX { most } else { gpu.memory_left(rest) / list_bytes(u64::from(RUN)) };
-        let most = most.min(held);
         let runs = select
             .update(gpu, scan, &mut own, &choice.shown, most, |count| gpu.check_memory(rest + list_bytes(count)))?;
         if runs > most {
@@ -350,18 +365,9 @@ impl PreparedScene {
         self.push_chunk(gpu, origin, data, count);
     }
 
-    /// The bytes that the pages of each hierarchy may take: those of the settings, or its part of what the device has for them
-    /// and for the lists of their nodes.
-    fn room_for_pages(&self, gpu: &Gpu, settings: &Settings) -> u64 {
-        let of_pages = |chunk: &&Chunk| matches!(chunk.origin, Origin::Nodes { .. });
-        let held: u64 = self.chunks.iter().filter(of_pages).map(|chunk| chunk.data.size() + chunk.list_bytes()).sum();
-        let part = gpu.memory_left(self.bytes.saturating_sub(held)) / self.forests.len().max(1) as u64;
-        settings.page_memory.min(part)
-    }
-
     /// Brings what the cuts of all hierarchies need to the GPU, as far as there is room for it.
     pub(super) fn update_forests(&mut self, gpu: &Gpu, view: &View, settings: &Settings, pixels: f64) -> Result<()> {
-        let room = self.room_for_pages(gpu, settings);
+        let room = settings.page_memory.min(self.room_to_read(gpu));
         for index in 0..self.forests.len() {
             let cut = self.forests[index].cut(view, settings, pixels);
             let own: Vec<(&Slots, &wgpu::Buffer)> = self
@@ -517,7 +523,7 @@ fn bytes_of(item: &Item) -> u64 {
 }
 
 /// Bytes of a list of samples: their numbers and spans.
-fn list_bytes(count: u64) -> u64 {
+pub fn list_bytes(count: u64) -> u64 {
     count * (4 + SPAN_BYTES)
 }
 

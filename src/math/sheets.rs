@@ -64,8 +64,10 @@ impl Sheets {
             }
             step = if uniform.is_finite() { uniform } else { s * per_pixel };
         } else {
-            step = uniform.min(if view.perspective { f64::INFINITY } else { per_pixel }).min(far - near);
+            step = uniform.min(if view.perspective { f64::INFINITY } else { per_pixel });
         }
+        // What the step is compared with lies between the bounds.
+        let step = step.min(far - near);
         let turn = planes.len() - 1;
         let start = planes[turn];
         let more = ((far - start) / step).ceil().max(if turn == 0 { 1.0 } else { 0.0 });

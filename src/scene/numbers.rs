@@ -11,9 +11,6 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// Splats above this are as opaque below it, and sums of them lose what lies beside them.
-const MOST_OPTICAL_DEPTH: f32 = 1e10;
-
 /// The most values that a transfer function tells apart over the range of its data: beside one value, sums of 32 bits lose
 /// others that are much smaller than this part of it.
 const VALUES: f64 = 1048576.0;
@@ -33,33 +30,37 @@ pub(super) fn check_transfer(item: &Item) -> Result<(), String> {
     }
 }
 
+/// Checks the transfer function of an item that has one, also against the range of its values.
+pub(super) fn check_field(item: &Item) -> Result<(), String> {
+    check_transfer(item)?;
+    let (transfer, [low, high]) = match item {
+        Item::Scalar(set, transfer) => (transfer, set.value_range()),
+        Item::Volume(volume, _, transfer) => (transfer, volume.range),
+        Item::Bricks(bricks, _, transfer) => (transfer, bricks.header().range),
+        Item::Radiance(_) | Item::Hierarchy(_) => return Ok(()),
+    };
+    // One value far off, such as that of a broken sensor, would leave all others one colour.
+    let [first, last] = transfer.span();
+    if last > first && last - first < (high - low) / VALUES {
+        return Err(format!(
+            "the transfer function changes from {first} to {last}, too close together for values from {low} to {high}: \
+             remove values that are far off, or choose another function"
+        ));
+    }
+    Ok(())
+}
+
 /// Checks the numbers of an item.
 pub(super) fn check_item(item: &Item) -> Result<(), String> {
-    check_transfer(item)?;
     if let Item::Volume(_, kernel, _) | Item::Bricks(_, kernel, _) = item {
         kernel.validate().map_err(|error| error.to_string())?;
     }
-    let field = match item {
-        Item::Scalar(set, transfer) => Some((transfer, set.value_range())),
-        Item::Volume(volume, _, transfer) => Some((transfer, volume.range)),
-        Item::Bricks(bricks, _, transfer) => Some((transfer, bricks.header().range)),
-        Item::Radiance(_) | Item::Hierarchy(_) => None,
-    };
     match item {
         Item::Radiance(set) | Item::Scalar(set, _) => check_set(set)?,
         Item::Volume(volume, ..) => volume.validate()?,
         Item::Hierarchy(_) | Item::Bricks(..) => {}
     }
-    if let Some((transfer, [low, high])) = field {
-        // One value far off, such as that of a broken sensor, would leave all others one colour.
-        let [first, last] = transfer.span();
-        if last > first && last - first < (high - low) / VALUES {
-            return Err(format!(
-                "the transfer function changes from {first} to {last}, too close together for values from {low} to {high}: \
-                 remove values that are far off, or choose another function"
-            ));
-        }
-    }
+    check_field(item)?;
     let Bounds { min, max } = item.bounds();
     let holds = |v: f64| v.abs() <= f64::from(f32::MAX);
     // Nothing at all has bounds of its own, which are not finite.
@@ -74,7 +75,8 @@ fn check_set(set: &SplatSet) -> Result<(), String> {
     if !set.origin.is_finite() {
         return Err(format!("the origin {} is not finite", set.origin));
     }
-    if !(set.overlap > 0.0 && set.overlap.is_finite()) {
+    // The inverse of what is smaller than normal numbers is not finite.
+    if !(set.overlap > 0.0 && set.overlap.is_normal()) {
         return Err(format!("the overlap is {}; a positive number is needed", set.overlap));
     }
     let first = set.splats.par_iter().position_first(|splat| fault(splat, set.payload).is_some());
@@ -95,9 +97,10 @@ fn fault(splat: &Splat, payload: Payload) -> Option<String> {
         return Some(format!("the factor {factor:?} is not finite"));
     }
     match payload {
-        Payload::Radiance if !(0.0..=MOST_OPTICAL_DEPTH).contains(strength) => {
-            Some(format!("the optical depth is {strength}, but those from 0 to {MOST_OPTICAL_DEPTH:e} can be drawn"))
-        }
+        Payload::Radiance if !(0.0..=Splat::MOST_OPTICAL_DEPTH).contains(strength) => Some(format!(
+            "the optical depth is {strength}, but those from 0 to {:e} can be drawn",
+            Splat::MOST_OPTICAL_DEPTH
+        )),
         // A field's kernel needs a volume; radiance is widened to a pixel.
         Payload::Scalar if [factor[0], factor[2], factor[5]].contains(&0.0) => {
             Some(format!("the factor {factor:?} is that of a flat kernel"))

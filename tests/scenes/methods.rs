@@ -112,6 +112,19 @@ pub fn one_value_far_off() -> Case {
     case("one_value_far_off", volume_scene(volume, Kernel::default(), steep()), settings())
 }
 
+/// The same with points of all functions that are far off, and nothing that shows changes up to there.
+pub fn points_far_off() -> Case {
+    let mut transfer = TransferFunction { gradient: vec![(0.2, 0.0), (1.5, 1.0), (3e5, 1.0)], ..steep() };
+    let last = transfer.opacity[transfer.opacity.len() - 1].1;
+    transfer.opacity.push((4e5, last));
+    transfer.color.push((2e5, transfer.color[transfer.color.len() - 1].1));
+    transfer.color.insert(0, (-3e5, [0.0; 3]));
+    let mut volume = cubic();
+    let values = (0..volume.len()).map(|i| if i == 0 { 1e5 } else { volume.value(i) as f32 }).collect();
+    volume = Volume::new(volume.lattice, Samples::F32(values)).expect("as many samples");
+    case("points_far_off", volume_scene(volume, Kernel::default(), transfer), settings())
+}
+
 pub fn post_classified() -> Case {
     let settings = Settings { classification: Classification::Post, ..settings() };
     case("post_classified", volume_scene(cubic(), Kernel::default(), steep()), settings)

@@ -1,0 +1,201 @@
+//! A scene shows the same picture in any units: of lengths, of values, and wherever the values' zero is.
+
+use glam::DVec3;
+use splatkit::{
+    engine::{AdapterChoice, Gpu, PreparedScene, Renderer},
+    math::{Camera, Kernel, Projection},
+    picture::Picture,
+    scene::{Scene, Settings},
+    splat::{Payload, Splat, SplatSet, encode_normal},
+    volume::{Isosurface, Lattice, Samples, Shade, TransferFunction, Volume},
+};
+use std::sync::OnceLock;
+
+fn gpu() -> &'static Gpu {
+    static GPU: OnceLock<Gpu> = OnceLock::new();
+    GPU.get_or_init(|| Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver"))
+}
+
+/// World lengths per length, values per value and the value of what was 0.
+#[derive(Debug, Clone, Copy)]
+struct Units {
+    length: f64,
+    value: f64,
+    zero: f64,
+}
+
+const USUAL: Units = Units { length: 1.0, value: 1.0, zero: 0.0 };
+
+impl Units {
+    fn to_value(self, value: f64) -> f64 {
+        self.zero + self.value * value
+    }
+
+    /// Seen from outside, or from within.
+    fn camera(self, projection: Projection, is_inside: bool) -> Camera {
+        let position = if is_inside { DVec3::new(0.3, -0.2, 0.1) } else { DVec3::new(2.0, -3.0, 1.5) } * self.length;
+        let projection = match projection {
+            Projection::Orthographic { height } => Projection::Orthographic { height: height * self.length },
+            other => other,
+        };
+        Camera { position, focal_point: DVec3::new(-0.1, 0.1, 0.0) * self.length, view_up: DVec3::Z, projection }
+    }
+
+    fn transfer(self) -> TransferFunction {
+        let point = |value: f64, opacity: f64| (self.to_value(value), opacity);
+        let color = |value: f64, color: [f64; 3]| (self.to_value(value), color);
+        let slope = |magnitude: f64, factor: f64| (magnitude * self.value / self.length, factor);
+        TransferFunction {
+            color: vec![color(20.0, [0.9, 0.3, 0.1]), color(180.0, [0.2, 0.5, 0.9])],
+            opacity: vec![point(20.0, 0.0), point(90.0, 0.5), point(140.0, 0.1), point(200.0, 0.6)],
+            unit: 0.2 * self.length,
+            shade: Some(Shade::default()),
+            gradient: vec![slope(20.0, 0.2), slope(200.0, 1.0)],
+            isosurfaces: vec![Isosurface { value: self.to_value(150.0), color: [0.4, 0.9, 0.4], opacity: 0.5 }],
+        }
+    }
+
+    fn lattice(self) -> Lattice {
+        const SIDE: usize = 24;
+        let step = 2.0 / (SIDE - 1) as f64 * self.length;
+        Lattice { origin: DVec3::splat(-self.length), ..Lattice::with_spacing([SIDE; 3], DVec3::splat(step)) }
+    }
+
+    /// Whole values from 0 to 255 in their own units.
+    fn samples(self) -> Vec<f64> {
+        let lattice = USUAL.lattice();
+        let value = |sample: usize| {
+            let at = lattice.sample_position(sample);
+            (255.0 * (1.0 - at.length_squared() / 1.5).max(0.0) * (0.75 + 0.25 * (5.0 * at.x).sin())).round()
+        };
+        (0..lattice.len()).map(|sample| self.to_value(value(sample))).collect()
+    }
+
+    fn volume(self, samples: Samples) -> Scene {
+        let volume = Volume::new(self.lattice(), samples).expect("the samples fill the lattice");
+        Scene::new().with_volume(volume, Kernel::default(), self.transfer())
+    }
+
+    fn splats(self) -> Scene {
+        let splats = (0..300u16).map(|i| {
+            let angle = f64::from(i) * 2.4;
+            let normal = DVec3::new(angle.cos(), angle.sin(), f64::from(i) / 150.0 - 1.0).normalize();
+            let size = (0.08 * self.length) as f32;
+            Splat {
+                center: (normal * self.length).as_vec3().to_array(),
+                strength: 3.0,
+                factor: [size, 0.0, size, 0.0, 0.0, 0.5 * size],
+                color: u32::from_le_bytes([i as u8, 200, 90, 255]),
+                normal: encode_normal(normal.as_vec3()),
+            }
+        });
+        let (payload, splats) = (Payload::Radiance, splats.collect());
+        Scene::new().with_splats(SplatSet { payload, origin: DVec3::ZERO, extent: 3.0, overlap: 1.0, splats })
+    }
+}
+
+const PERSPECTIVE: Projection = Projection::Perspective { view_angle: 40.0 };
+const WIDE: Projection = Projection::Perspective { view_angle: 80.0 };
+const ORTHOGRAPHIC: Projection = Projection::Orthographic { height: 2.6 };
+
+fn drawn(scene: &Scene, camera: &Camera, settings: &Settings) -> Picture {
+    let mut renderer = Renderer::new(gpu());
+    let mut prepared = renderer.prepare(scene).expect("a scene");
+    renderer.render(&mut prepared, camera, settings).expect("a picture").0
+}
+
+/// Peak signal-to-noise ratio of colour and opacity, in dB; of pictures that show something.
+fn psnr(a: &Picture, b: &Picture) -> f64 {
+    assert!(a.color.iter().filter(|color| color[3] > 0.1).count() > a.color.len() / 8, "an empty picture");
+    let squares = a.color.iter().zip(&b.color).flat_map(|(a, b)| (0..4).map(|c| f64::from(a[c] - b[c]).powi(2)));
+    -10.0 * (squares.sum::<f64>() / (4 * a.color.len()) as f64).log10()
+}
+
+fn settings() -> Settings {
+    Settings::new([48, 40])
+}
+
+#[test]
+fn values_of_any_unit_and_zero() {
+    let camera = USUAL.camera(PERSPECTIVE, false);
+    let floats = |units: Units| Samples::F32(units.samples().iter().map(|v| *v as f32).collect());
+    let expected = drawn(&USUAL.volume(floats(USUAL)), &camera, &settings());
+    for (value, zero) in [(1e25, 0.0), (1e-25, 0.0), (1.0, 1e6), (1.0, 1.6e7)] {
+        let units = Units { value, zero, ..USUAL };
+        let agreement = psnr(&expected, &drawn(&units.volume(floats(units)), &camera, &settings()));
+        println!("values times {value:e}, from {zero:e} on: {agreement:.1} dB");
+        assert!(agreement > 70.0, "{units:?}: {agreement:.1} dB");
+    }
+    // More bits than a float has.
+    let units = Units { zero: 2e9 - 77.0, ..USUAL };
+    let samples = Samples::I32(units.samples().iter().map(|v| *v as i32).collect());
+    let agreement = psnr(&expected, &drawn(&units.volume(samples), &camera, &settings()));
+    println!("whole values from 2e9 on: {agreement:.1} dB");
+    assert!(agreement > 70.0, "{agreement:.1} dB");
+}
+
+#[test]
+fn lengths_of_any_unit() {
+    let floats = Samples::F32(USUAL.samples().iter().map(|v| *v as f32).collect());
+    for (projection, is_inside) in [(PERSPECTIVE, false), (ORTHOGRAPHIC, false), (WIDE, true)] {
+        let pictures = |units: Units| {
+            let camera = units.camera(projection, is_inside);
+            [units.volume(floats.clone()), units.splats()].map(|scene| drawn(&scene, &camera, &settings()))
+        };
+        let expected = pictures(USUAL);
+        for length in [1e-14, 1e-9, 1e9, 1e15] {
+            let found = pictures(Units { length, ..USUAL });
+            for (what, (found, expected)) in ["volume", "splats"].iter().zip(found.iter().zip(&expected)) {
+                let agreement = psnr(expected, found);
+                println!("{projection:?}, lengths times {length:e}, {what}: {agreement:.1} dB");
+                assert!(agreement > 60.0, "{projection:?}, lengths times {length:e}, {what}: {agreement:.1} dB");
+            }
+        }
+    }
+}
+
+/// From within a scene, everything from the eye on is drawn in order, and sheets may be as thick as they like.
+#[test]
+fn from_the_eye_on() {
+    let camera = USUAL.camera(WIDE, true);
+    let scene = USUAL.splats();
+    let expected = drawn(&scene, &camera, &settings());
+    for near in [0.0, 1e-30, 1e-4] {
+        let agreement = psnr(&expected, &drawn(&scene, &camera, &Settings { near: Some(near), ..settings() }));
+        println!("from {near:e} on: {agreement:.1} dB");
+        assert!(agreement > 40.0, "from {near} on: {agreement:.1} dB");
+    }
+    let thick = |thickness: Option<f64>, pixels: f64| {
+        let settings = Settings { sheet_thickness: thickness, sheet_pixels: pixels, ..settings() };
+        drawn(&scene, &camera, &settings)
+    };
+    let expected = thick(None, 1e3);
+    for (thickness, pixels) in [(None, 1e5), (None, 1e30), (Some(1e7), 1e30), (Some(1e30), 1e30)] {
+        let agreement = psnr(&expected, &thick(thickness, pixels));
+        println!("{thickness:?}, {pixels:e} pixels: {agreement:.1} dB");
+        assert!(agreement > 20.0, "{thickness:?}, {pixels} pixels: {agreement:.1} dB");
+    }
+}
+
+#[test]
+fn a_scene_belongs_to_its_device() {
+    let other = Gpu::headless(&AdapterChoice::Automatic).expect("another device");
+    let mut prepared: PreparedScene = Renderer::new(&other).prepare(&USUAL.splats()).expect("a scene");
+    let found = Renderer::new(gpu()).render(&mut prepared, &USUAL.camera(PERSPECTIVE, false), &settings());
+    let message = found.expect_err("another device").to_string();
+    assert!(message.contains("prepared on another device"), "{message}");
+}
+
+#[test]
+fn transfer_functions_are_checked_when_they_change() {
+    let floats = Samples::F32(USUAL.samples().iter().map(|v| *v as f32).collect());
+    let mut prepared = Renderer::new(gpu()).prepare(&USUAL.volume(floats)).expect("a scene");
+    let narrow = TransferFunction {
+        opacity: vec![(10.0, 0.0), (10.0 + 1e-9, 0.5)],
+        color: vec![(10.0, [1.0; 3])],
+        ..USUAL.transfer()
+    };
+    let message = prepared.set_transfer(&narrow).expect_err("too narrow").to_string();
+    assert!(message.contains("too close together"), "{message}");
+    prepared.set_transfer(&USUAL.transfer()).expect("as before");
+}
