@@ -29,6 +29,8 @@ pub(super) struct Survey {
     pub colors: bool,
     /// All corners of all faces have a normal.
     normals: bool,
+    /// Some face stands before what it refers to.
+    ahead: bool,
 }
 
 impl Survey {
@@ -37,6 +39,9 @@ impl Survey {
         // Positions, texture coordinates and normals so far, and the largest index used of each with its line.
         let mut counts = [0i64; 3];
         let mut largest = [(0i64, 0usize); 3];
+        // The first line that refers to what stands behind it, and one that counts back from where it stands.
+        let mut ahead = None;
+        let mut back = None;
         for (line, number) in text.lines().zip(1usize..) {
             if number.is_multiple_of(LINES) {
                 source.check_time()?;
@@ -86,6 +91,11 @@ impl Survey {
                             if index == 0 || -index > counts[kind] {
                                 return Err(source.error(place(), wrong(index, kind, counts[kind])));
                             }
+                            if index > counts[kind] {
+                                ahead.get_or_insert((number, index, kind));
+                            } else if index < 0 {
+                                back = Some(number);
+                            }
                             if index > largest[kind].0 {
                                 largest[kind] = (index, number);
                             }
@@ -105,6 +115,16 @@ impl Survey {
                 return Err(source.error(format!("line {line}"), wrong(index, kind, counts[kind])));
             }
         }
+        if let (Some((line, index, kind)), Some(back)) = (ahead, back) {
+            let message = format!(
+                "a face refers to {} {index}, which stands behind it, while that of line {back} counts back from where it stands",
+                WHAT[kind]
+            );
+            return Err(source
+                .error(format!("line {line}"), message)
+                .hint("put the faces behind all that they refer to"));
+        }
+        survey.ahead = ahead.is_some();
         survey.vertices = counts[0] as u64;
         survey.others = (counts[1] + counts[2]) as u64;
         survey.colors &= counts[0] > 0;
@@ -117,18 +137,35 @@ impl Survey {
 
     /// The file's lines for tobj.
     pub fn feed<'a>(&self, text: &'a str) -> Feed<'a> {
-        Feed { rest: text, line: 0, current: &[], colors: self.colors, normals: self.normals }
+        // tobj ends a part of the mesh at each `usemtl`, with what it has read so far.
+        let (rest, again) = (text, self.ahead.then_some(text));
+        let kinds = if self.ahead { Kinds::Values } else { Kinds::All };
+        Feed { rest, again, kinds, line: 0, current: &[], colors: self.colors, normals: self.normals }
     }
 }
 
+const WHAT: [&str; 3] = ["vertex", "texture coordinate", "normal"];
+
 fn wrong(index: i64, kind: usize, count: i64) -> String {
-    let what = ["vertex", "texture coordinate", "normal"][kind];
+    let what = WHAT[kind];
     format!("a face refers to {what} {index}, but there are {count} (1 … {count}, or −1 … −{count})")
 }
 
-/// Serves the statements that matter, one at a time, and counts lines.
+/// What a feed serves: positions, texture coordinates and normals, or what refers to them.
+#[derive(PartialEq)]
+enum Kinds {
+    All,
+    Values,
+    References,
+}
+
+/// Serves the statements that matter, one at a time, and counts lines. Where faces stand before what they refer to, all of that
+/// comes first.
 pub(super) struct Feed<'a> {
     rest: &'a str,
+    /// The text where it is served twice.
+    again: Option<&'a str>,
+    kinds: Kinds,
     line: usize,
     current: &'a [u8],
     colors: bool,
@@ -145,7 +182,12 @@ impl<'a> Feed<'a> {
     /// out because tobj would split vertices between them.
     fn useful(&self, line: &'a str) -> &'a str {
         let keep = |words: usize| first_words(line, words + 1);
-        match line.split_whitespace().next() {
+        let word = line.split_whitespace().next();
+        let is_value = matches!(word, Some("v" | "vt" | "vn"));
+        if self.kinds == if is_value { Kinds::References } else { Kinds::Values } {
+            return "";
+        }
+        match word {
             Some("v") if self.colors => keep(6),
             Some("v") if line.split_whitespace().count() == 5 => keep(4),
             Some("v") => keep(3),
@@ -182,7 +224,8 @@ impl BufRead for Feed<'_> {
     fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
         while self.current.is_empty() {
             if self.rest.is_empty() {
-                return Ok(&[]);
+                let Some(text) = self.again.take() else { return Ok(&[]) };
+                (self.rest, self.line, self.kinds) = (text, 0, Kinds::References);
             }
             let end = self.rest.find('\n').map_or(self.rest.len(), |end| end + 1);
             let (line, rest) = self.rest.split_at(end);

@@ -102,6 +102,19 @@ fn normals_split_vertices_and_partial_ones_are_left_out() {
     assert_eq!((mesh.positions.len(), mesh.normals.len()), (4, 0));
 }
 
+/// tobj ends a part of the mesh at each material, with the normals that it has read so far.
+#[test]
+fn faces_may_stand_before_what_they_refer_to() {
+    let faces = ["f 1//1 2//1 3//1\n", "usemtl other\nf 1//2 3//2 4//2\n"];
+    let positions = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+    let ahead = load(format!("{}{positions}vn 0 0 1\n{}vn 1 0 0\n", faces[0], faces[1])).unwrap();
+    let behind = load(format!("{positions}vn 0 0 1\nvn 1 0 0\n{}{}", faces[0], faces[1])).unwrap();
+    assert_eq!((&ahead.positions, &ahead.normals), (&behind.positions, &behind.normals));
+    assert_eq!((ahead.triangles, ahead.normals.len()), (behind.triangles, 6));
+    let error = load(format!("{}{positions}vn 0 0 1\nf -4 -3 -1\n", faces[0])).unwrap_err().to_string();
+    assert!(error.contains("line 1: a face refers to vertex 1, which stands behind it"), "{error}");
+}
+
 #[test]
 fn materials_and_pictures() {
     let folder = Folder::new();
