@@ -12,6 +12,17 @@ pub fn most() -> Option<u64> {
     limits.chain(machine).min().map(|bytes| bytes / 4 * 3)
 }
 
+/// Says in words where something takes more bytes than a process should: asked before it is allocated, because what cannot be
+/// allocated ends the process.
+pub(crate) fn check(what: &str, bytes: u64) -> Result<(), String> {
+    // Nothing that is allocated is larger than that.
+    let most = most().unwrap_or(u64::MAX).min(isize::MAX as u64);
+    if bytes > most {
+        return Err(format!("{what} takes {bytes} bytes of memory, more than the {most} that may be taken here"));
+    }
+    Ok(())
+}
+
 /// The files that may tell the limit of the process's control group, or of one that it is in: of version 2, and of version 1.
 /// There are none but on Linux.
 fn groups() -> Vec<PathBuf> {
@@ -42,6 +53,9 @@ mod tests {
         // No machine that builds this has less, and none has so much more.
         let found = most().expect("an amount");
         assert!((1 << 28..1 << 50).contains(&found), "{found}");
+        assert!(check("that", 1 << 20).is_ok());
+        let message = check("this", u64::MAX).unwrap_err();
+        assert!(message.starts_with("this takes 18446744073709551615 bytes of memory, more than"), "{message}");
         let groups = groups();
         assert!(groups.iter().all(|path| path.starts_with("/sys/fs/cgroup")), "{groups:?}");
     }

@@ -3,9 +3,9 @@
 use super::{composite::Composite, composite::Medium, picture, ray::Ray, shade};
 use crate::{
     Error, Result,
-    math::{Camera, View},
+    math::{Bounds, Camera, View},
     picture::Picture,
-    scene::Settings,
+    scene::{Scene, Settings},
     surface::{Mesh, color_at, corner_normals},
 };
 use glam::{DMat3, DVec2, DVec3, Vec3, Vec3A};
@@ -27,7 +27,9 @@ use std::time::Duration;
 /// Triangles are met in double precision; boxes around them are found in single precision (Bvh: Meister & Bittner 2018).
 ///
 /// # Errors
-/// What [`Camera::view`] finds; [`Error::NothingToDraw`] for a mesh without triangles; [`Error::Argument`] for no rays.
+/// What [`Camera::view`] and [`Scene::validate_settings`] find; [`Error::NothingToDraw`] for a mesh without triangles;
+/// [`Error::Argument`] for no rays and for more than 256² a pixel, and for a mesh that was put together by hand and contradicts
+/// itself.
 pub fn trace(
     mesh: &Mesh,
     crease_angle_degrees: f32,
@@ -39,8 +41,13 @@ pub fn trace(
     if mesh.triangles.is_empty() {
         return Err(Error::NothingToDraw("there are no triangles".into()));
     }
-    if side == 0 {
-        return Err(Error::Argument("a pixel needs a ray at least".into()));
+    if !(1..=MOST_SIDE).contains(&side) {
+        return Err(Error::Argument(format!("a pixel takes 1² to {MOST_SIDE}² rays, not {side}²")));
+    }
+    mesh.validate()?;
+    Scene::new().validate_settings(settings)?;
+    if let Some([min, max]) = mesh.bounds() {
+        view.validate_for(&Bounds { min, max })?;
     }
     let traced = Traced::new(mesh, crease_angle_degrees, &view, settings);
     let [width, height] = settings.size;
@@ -62,6 +69,9 @@ pub fn trace(
     };
     Ok(picture(&view, (0..height).into_par_iter().map(row).collect()))
 }
+
+/// Rays of a pixel along each side at most.
+const MOST_SIDE: u32 = 256;
 
 /// Light of less than this is not followed further.
 const LEAST_LIGHT: f64 = 1e-3;
@@ -265,6 +275,24 @@ mod tests {
         let camera = camera(Projection::Perspective { view_angle: 30.0 });
         let settings = Settings::new([4, 4]);
         assert!(matches!(trace(&Mesh::default(), 60.0, &camera, &settings, 1), Err(Error::NothingToDraw(_))));
-        assert!(matches!(trace(&Mesh::cube(1.0), 60.0, &camera, &settings, 0), Err(Error::Argument(_))));
+        let told = |mesh: &Mesh, settings: &Settings, side: u32| match trace(mesh, 60.0, &camera, settings, side) {
+            Err(Error::Argument(message)) => message,
+            other => panic!("{:?}", other.map(|_| ())),
+        };
+        let cube = Mesh::cube(1.0);
+        for side in [0, 257, 65_536, u32::MAX] {
+            assert!(told(&cube, &settings, side).contains("rays"));
+        }
+        let beyond = Mesh { triangles: vec![[0, 1, 99]], ..cube.clone() };
+        assert!(told(&beyond, &settings, 1).contains("beyond the mesh's 8 vertices"));
+        let materials = Mesh { triangle_materials: vec![3; 12], ..cube.clone() };
+        assert!(told(&materials, &settings, 1).contains("a material that is not there"));
+        let mut nowhere = cube.clone();
+        nowhere.positions[0] = Vec3::NAN;
+        assert!(told(&nowhere, &settings, 1).contains("not finite"));
+        let shade = Shade { ambient: f64::NAN, ..Shade::default() };
+        let dark = Settings { surface_shade: Some(shade), ..settings.clone() };
+        assert!(told(&cube, &dark, 1).contains("light"));
+        trace(&cube, 60.0, &camera, &settings, 2).unwrap();
     }
 }

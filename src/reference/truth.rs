@@ -28,7 +28,7 @@ use rayon::prelude::*;
 ///
 /// # Errors
 /// As [`render`](super::render); [`Error::Argument`] for a scene that is not one volume on a Cartesian or body-centred
-/// lattice, for other optics, and for a step that is no length.
+/// lattice, for other optics, and for a step that is no length, or of which a ray would hold more than 2²⁰.
 pub fn integrate(scene: &Scene, camera: &Camera, settings: &Settings, step: f64) -> Result<Picture> {
     scene.validate()?;
     scene.validate_settings(settings)?;
@@ -44,7 +44,14 @@ pub fn integrate(scene: &Scene, camera: &Camera, settings: &Settings, step: f64)
     if !(step > 0.0 && step.is_finite()) {
         return Err(Error::Argument(format!("rays are integrated in steps of a length, found {step}")));
     }
+    let points = scene.bounds().diagonal() / step;
+    if points > MOST_POINTS {
+        return Err(Error::Argument(format!(
+            "rays through the volume take up to {points:.1e} steps of {step:e}; {MOST_POINTS} are the most: take longer ones"
+        )));
+    }
     let view = camera.view(settings.size)?;
+    view.validate_for(&scene.bounds())?;
     let field = Pointwise::new(volume, kernel, transfer, &view, settings.shade_of(transfer));
     let near = nearest(scene, &view, settings);
     let [width, height] = settings.size;
@@ -60,6 +67,9 @@ pub fn integrate(scene: &Scene, camera: &Camera, settings: &Settings, step: f64)
     };
     Ok(picture(&view, (0..height).into_par_iter().map(row).collect()))
 }
+
+/// Steps of a ray at most: finer ones would change no picture, and take hours.
+const MOST_POINTS: f64 = 1_048_576.0;
 
 /// Light of less than this is not followed further.
 const LEAST_LIGHT: f64 = 1e-6;
@@ -149,7 +159,7 @@ impl<'a> Pointwise<'a> {
             let count = count as usize;
             let place = |i: usize| from + (i as f64 + 0.5) * step;
             // Blocks of points share the samples around them, which reach over their ends.
-            let block = (4.0 * tail / step).ceil() as usize;
+            let block = (4.0 * tail / step).ceil().max(1.0) as usize;
             let mut last = None;
             for first in (0..count).step_by(block) {
                 let (block, at) = (block.min(count - first), place(first));

@@ -10,6 +10,7 @@ mod tests;
 
 pub use splats::SampleOptions;
 
+use crate::volume::Volume;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -97,7 +98,16 @@ impl Points {
 
     /// How many values fall into each of `bins` equal parts of the range, the largest in the last bin; equal values all
     /// fill the first bin.
-    pub fn histogram(&self, bins: usize) -> Vec<u64> {
+    ///
+    /// # Errors
+    /// [`Error::Argument`](crate::Error::Argument) for more bins than [`Volume::MAX_BINS`].
+    pub fn histogram(&self, bins: usize) -> crate::Result<Vec<u64>> {
+        Volume::check_bins(bins)?;
+        Ok(self.counts(bins))
+    }
+
+    /// The [`histogram`](Self::histogram) of so many bins, which are known to be few enough.
+    pub(crate) fn counts(&self, bins: usize) -> Vec<u64> {
         let mut counts = vec![0; bins];
         let [low, high] = self.range();
         let scale = if high > low { bins as f64 / (high - low) } else { 0.0 };

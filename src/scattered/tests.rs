@@ -293,7 +293,8 @@ fn ranges_bounds_and_histograms() {
         values: vec![-4.0, 0.0, 4.0],
         ..points(vec![Vec3::ZERO, Vec3::X, Vec3::new(-1.0, 2.0, 0.0)], |p| p.x)
     };
-    assert_eq!((samples.range(), samples.histogram(4)), ([-4.0, 4.0], vec![1, 0, 1, 1]));
+    assert_eq!((samples.range(), samples.histogram(4).unwrap()), ([-4.0, 4.0], vec![1, 0, 1, 1]));
+    assert!(matches!(samples.histogram(usize::MAX), Err(crate::Error::Argument(_))));
     assert_eq!(samples.bounds(), [DVec3::ZERO, DVec3::new(2.0, 2.0, 0.0)]);
     let transfer = crate::volume::TransferFunction::automatic_for_points(&samples);
     transfer.validate().unwrap();

@@ -26,18 +26,22 @@ impl Texture {
         sum.map(|sum| sum / (rows * columns) as f32)
     }
 
-    /// The colour at `uv`, between the four nearest texels, repeated in both directions; channels in 0 … 1.
+    /// The colour at `uv`, between the four nearest texels, repeated in both directions; channels in 0 … 1. Texels that are not
+    /// there, in a texture that was put together by hand, are clear; coordinates that are not finite count as 0.
     pub fn sample(&self, uv: Vec2) -> [f32; 4] {
         let axis = |part: f32, size: u32| {
             let part = if part.is_finite() { part - part.floor() } else { 0.0 };
             let at = part * size as f32 - 0.5;
             let first = at.floor();
-            let wrap = |i: f32| (i as i64).rem_euclid(i64::from(size)) as usize;
+            let wrap = |i: f32| (i as i64).rem_euclid(i64::from(size.max(1))) as usize;
             (wrap(first), wrap(first + 1.0), at - first)
         };
         let (x0, x1, fx) = axis(uv.x, self.width);
         let (y0, y1, fy) = axis(uv.y, self.height);
-        let texel = |x: usize, y: usize| self.texels[y * self.width as usize + x].map(f32::from);
+        let texel = |x: usize, y: usize| {
+            let index = y * self.width as usize + x;
+            self.texels.get(index).copied().unwrap_or_default().map(f32::from)
+        };
         let (a, b, c, d) = (texel(x0, y0), texel(x1, y0), texel(x0, y1), texel(x1, y1));
         std::array::from_fn(|i| {
             let top = a[i] + (b[i] - a[i]) * fx;
@@ -96,4 +100,25 @@ pub(super) fn point_color(mesh: &Mesh, vertex: usize) -> [f32; 4] {
 /// A colour in 32 bits, red lowest.
 pub(super) fn pack(color: [f32; 4]) -> u32 {
     u32::from_le_bytes(color.map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn textures_that_contradict_themselves_are_clear() {
+        let clear = [0.0; 4];
+        for (width, height, count) in [(0, 0, 0), (0, 3, 3), (3, 0, 3), (u32::MAX, u32::MAX, 1)] {
+            let texture = Texture { width, height, texels: vec![[255; 4]; count] };
+            let found = [0.0, 0.9].map(|at| texture.sample(Vec2::splat(at)));
+            assert!(found.iter().all(|color| color.iter().all(|part| (0.0..=1.0).contains(part))), "{found:?}");
+        }
+        let short = Texture { width: 2, height: 2, texels: vec![[255; 4]; 1] };
+        assert_eq!((short.sample(Vec2::splat(0.25)), short.sample(Vec2::splat(0.75))), ([1.0; 4], clear));
+        let whole = Texture { width: 3, height: 2, texels: vec![[51; 4]; 6] };
+        for uv in [f32::NAN, f32::INFINITY, f32::MAX, -1e-30] {
+            assert_eq!(whole.sample(Vec2::splat(uv)), [0.2; 4], "{uv}");
+        }
+    }
 }

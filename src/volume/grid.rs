@@ -41,6 +41,11 @@ impl Grid {
         Self { dims: [side; 3], ..self }
     }
 
+    /// Number of points.
+    pub fn len(self) -> usize {
+        self.dims.iter().fold(1, |all, &n| all.saturating_mul(n))
+    }
+
     /// The distance between points, in the lattice's kernel units: half an edge, of which √½ is a unit.
     pub fn step(self) -> f64 {
         if self.body_centred { std::f64::consts::FRAC_1_SQRT_2 } else { 1.0 }

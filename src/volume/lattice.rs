@@ -47,9 +47,9 @@ impl Lattice {
         Self { dims, origin, axes: edges, arrangement: Arrangement::BodyCentred }
     }
 
-    /// Number of samples.
+    /// Number of samples; of more than can be counted, the largest number.
     pub fn len(&self) -> usize {
-        self.dims.iter().product()
+        self.dims.iter().fold(1, |all, &n| all.saturating_mul(n))
     }
 
     pub fn is_empty(&self) -> bool {
@@ -161,7 +161,7 @@ impl Lattice {
                     let reach = extent * self.unit(index)[axis];
                     let before = places.partition_point(|place| *place < places[at] - reach);
                     let after = places.partition_point(|place| *place <= places[at] + reach);
-                    (at - before).max(after - 1 - at)
+                    at.saturating_sub(before).max(after.saturating_sub(at + 1))
                 };
                 (0..places.len()).map(reach).max().unwrap_or(0)
             }),
@@ -219,7 +219,8 @@ impl Lattice {
         if self.dims.contains(&0) {
             return Err(format!("a volume of {nx} × {ny} × {nz} samples holds none"));
         }
-        if nx.checked_mul(ny).and_then(|n| n.checked_mul(nz)).is_none() {
+        // What is allocated has no more bytes than that.
+        if self.len() > isize::MAX as usize {
             return Err(format!("{nx} × {ny} × {nz} samples are more than memory can hold"));
         }
         if !self.origin.is_finite() || !self.axes.is_finite() {
@@ -289,6 +290,7 @@ mod tests {
         for (bad, word) in [
             (Lattice { dims: [2, 0, 2], ..good.clone() }, "none"),
             (Lattice { dims: [usize::MAX, 2, 2], ..good.clone() }, "memory"),
+            (Lattice { dims: [usize::MAX, 1, 1], ..good.clone() }, "memory"),
             (Lattice { origin: DVec3::NAN, ..good.clone() }, "finite"),
             (Lattice::with_spacing([2, 2, 2], DVec3::new(1.0, 0.0, 1.0)), "spacing"),
             (Lattice { axes: flat, ..good.clone() }, "plane"),

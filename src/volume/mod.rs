@@ -1,6 +1,8 @@
 //! Volumes: samples on a lattice, and the transfer functions that show them.
 
 pub mod bricks;
+#[cfg(test)]
+mod contradictions;
 mod grid;
 mod head;
 mod lattice;

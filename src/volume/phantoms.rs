@@ -2,6 +2,7 @@
 //! in 0 … 1, sampled over the cube from −1 to 1.
 
 use super::{Lattice, Samples, Volume, head::head};
+use crate::memory;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -53,7 +54,7 @@ impl Phantom {
     /// of one sample: at 0).
     ///
     /// # Errors
-    /// In words, for dimensions of 0 or more samples than memory can hold.
+    /// In words, for dimensions of 0 or more samples than memory can hold ([`memory::most`]).
     pub fn sample(self, dims: [usize; 3]) -> Result<Volume, String> {
         self.sample_on(lattice(dims)?)
     }
@@ -61,10 +62,10 @@ impl Phantom {
     /// 32-bit samples at the places of any lattice; those outside the cube have the function's value there too.
     ///
     /// # Errors
-    /// In words, for a lattice that is none ([`Lattice::validate`]).
+    /// In words, for a lattice that is none ([`Lattice::validate`]), or that has more samples than memory can hold.
     pub fn sample_on(self, lattice: Lattice) -> Result<Volume, String> {
         lattice.validate()?;
-        let values = self.fill(&lattice, |value| value as f32);
+        let values = self.fill(&lattice, |value| value as f32)?;
         Volume::new(lattice, Samples::F32(values))
     }
 
@@ -74,21 +75,27 @@ impl Phantom {
     /// As there.
     pub fn sample_bytes(self, dims: [usize; 3]) -> Result<Volume, String> {
         let lattice = lattice(dims)?;
-        let values = self.fill(&lattice, byte);
+        let values = self.fill(&lattice, byte)?;
         Volume::new(lattice, Samples::U8(values))
     }
 
     /// The samples of [`sample_bytes`](Self::sample_bytes) slice by slice, for those who cannot hold all of them.
     ///
     /// # Errors
-    /// As there.
+    /// In words, for dimensions of 0 and slices that memory cannot hold.
     pub fn byte_slices(self, dims: [usize; 3]) -> Result<ByteSlices, String> {
-        Ok(ByteSlices { phantom: self, lattice: lattice(dims)? })
+        let [nx, ny, _] = dims;
+        let lattice = lattice(dims)?;
+        memory::check(&format!("a slice of {nx} × {ny} samples"), (nx * ny) as u64)?;
+        Ok(ByteSlices { phantom: self, lattice })
     }
 
-    fn fill<T: Send>(self, lattice: &Lattice, turn: impl Fn(f64) -> T + Sync) -> Vec<T> {
+    fn fill<T: Send>(self, lattice: &Lattice, turn: impl Fn(f64) -> T + Sync) -> Result<Vec<T>, String> {
+        let [nx, ny, nz] = lattice.dims;
+        let bytes = (lattice.len() as u64).saturating_mul(size_of::<T>() as u64);
+        memory::check(&format!("a volume of {nx} × {ny} × {nz} samples"), bytes)?;
         let value = |index: usize| turn(self.value(lattice.sample_position(index)));
-        (0..lattice.len()).into_par_iter().map(value).collect()
+        Ok((0..lattice.len()).into_par_iter().map(value).collect())
     }
 }
 
@@ -205,6 +212,14 @@ mod tests {
         assert_eq!((volume.value(7), volume.range), (1.0, [0.0, 1.0]));
         assert_eq!(Phantom::Constant(0.5).sample_bytes([2, 2, 2]).unwrap().range, [128.0, 128.0]);
         assert!(Phantom::Ball.sample([0, 2, 2]).is_err());
+        for dims in [[1 << 20; 3], [1 << 21; 3], [usize::MAX, 1, 1]] {
+            let told = [Phantom::Ball.sample(dims), Phantom::Ball.sample_bytes(dims)].map(|volume| volume.unwrap_err());
+            assert!(told.iter().all(|message| message.contains("memory")), "{told:?}");
+        }
+        let lattice = Lattice::body_centred([usize::MAX, 1, 1], DVec3::ZERO, DMat3::IDENTITY);
+        assert!(Phantom::Ball.sample_on(lattice).unwrap_err().contains("memory"));
+        assert!(Phantom::Ball.byte_slices([1 << 25, 1 << 25, 4]).unwrap_err().contains("memory"));
+        assert!(Phantom::Ball.byte_slices([8, 8, 1 << 40]).is_ok());
         let slices = Phantom::Ball.byte_slices([5, 3, 4]).unwrap();
         let whole = Phantom::Ball.sample_bytes([5, 3, 4]).unwrap();
         let bytes = (0..4).flat_map(|k| slices.slice(k)).collect();
@@ -225,7 +240,7 @@ mod tests {
     fn the_specimen_has_its_parts_and_clear_air() {
         let volume = Phantom::Specimen.sample_bytes([48; 3]).unwrap();
         assert_eq!(volume.range, [0.0, 255.0]);
-        let counts = volume.histogram(10);
+        let counts = volume.histogram(10).unwrap();
         assert!(counts[0] > 40_000 && [1, 3, 7].iter().all(|&bin| counts[bin] > 1000), "{counts:?}");
         let transfer = TransferFunction::automatic(&volume);
         assert_eq!(transfer.opacity(0.0), 0.0);

@@ -92,12 +92,16 @@ impl TransferFunction {
     /// is background, the low side where the border is mixed. Opacity begins three standard deviations from the
     /// background's mode and rises over the threshold and the quantiles above it. It is measured in hundredths of the
     /// volume's diagonal, so that thin things show and thick ones are no fog, whatever the sampling. A constant volume
-    /// is shown as a faint haze.
+    /// is shown as a faint haze, as is one that was put together by hand and contradicts itself: what would draw that one tells
+    /// why it cannot.
     pub fn automatic(volume: &Volume) -> Self {
+        if volume.validate().is_err() {
+            return Self::of_histogram(Vec::new(), [0.0; 2], 1.0, false);
+        }
         let [first, last] = volume.bounds();
         let diagonal = (last - first).length();
         let unit = if diagonal > 0.0 { diagonal / 100.0 } else { volume.lattice.spacing().max_element() };
-        let counts = volume.histogram(BINS);
+        let counts = volume.counts(BINS);
         let bright = bright_border(volume, otsu(&counts));
         Self::of_histogram(counts, volume.range, unit, bright)
     }
@@ -108,7 +112,7 @@ impl TransferFunction {
         let [first, last] = points.bounds();
         let diagonal = (last - first).length();
         let unit = if diagonal > 0.0 { diagonal / 100.0 } else { 1.0 };
-        Self::of_histogram(points.histogram(BINS), points.range(), unit, false)
+        Self::of_histogram(points.counts(BINS), points.range(), unit, false)
     }
 
     /// Shows values by how many of them fall into equal parts of their range. The background's values are the low ones, or

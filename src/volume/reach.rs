@@ -12,6 +12,9 @@ use rayon::prelude::*;
 /// The extremes of a box are those along each axis after another. Smallest values and 255 minus the largest ones lie
 /// beside each other, so that one minimum of bytes serves both, and rounding goes before it because it keeps the order.
 /// Besides the result, a thread holds 2·`radius[2]` + 3 slices.
+///
+/// # Panics
+/// Where the samples do not fill the lattice.
 pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]> {
     let [nx, ny, nz] = volume.lattice.dims;
     let steps = Steps::new(volume.samples.scalar(), volume.range);

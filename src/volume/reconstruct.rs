@@ -15,8 +15,11 @@ pub struct Reconstruction<'a> {
 
 impl<'a> Reconstruction<'a> {
     /// # Errors
-    /// [`Error::Argument`] for a rectilinear lattice, and for a volume that was made sharp for another kernel.
+    /// [`Error::Argument`] for a rectilinear lattice, for a volume that was made sharp for another kernel, and for a volume or a
+    /// kernel that was put together by hand and contradicts itself.
     pub fn new(volume: &'a Volume, kernel: &'a Kernel) -> Result<Self> {
+        volume.validate().map_err(Error::Argument)?;
+        kernel.validate()?;
         if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_)) {
             return Err(Error::Argument("a rectilinear lattice cannot be reconstructed at single positions".into()));
         }

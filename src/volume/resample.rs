@@ -31,8 +31,10 @@ const PASSED: f64 = 0.95;
 /// interpolation overshoots. Besides volume and result this takes 8 bytes a sample.
 ///
 /// # Errors
-/// [`Error::Argument`] for another arrangement than Cartesian and for fewer than 2 samples along an axis.
+/// [`Error::Argument`] for another arrangement than Cartesian and for fewer than 2 samples along an axis, and for a volume that
+/// was put together by hand and contradicts itself.
 pub fn body_centred(volume: &Volume) -> Result<Volume> {
+    volume.validate().map_err(Error::Argument)?;
     let [nx, ny, nz] = volume.lattice.dims;
     if volume.lattice.arrangement != Arrangement::Cartesian {
         return Err(Error::Argument("only Cartesian volumes can be resampled on a body-centred lattice".into()));

@@ -1,7 +1,7 @@
 //! The values of a volume, in the type of their file.
 
 use super::{Lattice, Scalar, reach::neighbourhood_ranges};
-use crate::math::Kernel;
+use crate::{Error, Result, math::Kernel};
 use rayon::prelude::*;
 use std::{borrow::Cow, sync::Arc};
 
@@ -141,6 +141,9 @@ pub struct Coefficients {
 }
 
 impl Volume {
+    /// The most bins of a [`histogram`](Self::histogram): every thread counts in bins of its own.
+    pub const MAX_BINS: usize = 1 << 20;
+
     /// Puts samples on a lattice and measures their range (in parallel).
     ///
     /// # Errors
@@ -156,7 +159,8 @@ impl Volume {
         Ok(Self { lattice, samples, range, coefficients: None })
     }
 
-    /// Says in words what [`new`](Self::new) would refuse, and what has been changed since then.
+    /// Says in words what [`new`](Self::new) would refuse, and what has been changed since then: whoever takes a volume that
+    /// may have been put together by hand asks first.
     pub(crate) fn validate(&self) -> Result<(), String> {
         self.lattice.validate()?;
         if self.samples.len() != self.lattice.len() {
@@ -164,10 +168,10 @@ impl Volume {
         }
         let [low, high] = self.samples.range()?;
         let [stated_low, stated_high] = self.range;
-        if !(stated_low <= low && high <= stated_high && stated_low.is_finite() && stated_high.is_finite()) {
+        if !(stated_low <= low && high <= stated_high && (stated_high - stated_low).is_finite()) {
             return Err(format!("the range is {stated_low} … {stated_high}, but values are in {low} … {high}"));
         }
-        Ok(())
+        self.coefficients.as_ref().map_or(Ok(()), |coefficients| coefficients.validate(&self.lattice))
     }
 
     /// Number of samples.
@@ -202,6 +206,9 @@ impl Volume {
 
     /// For each sample of [`drawn_lattice`](Self::drawn_lattice) the range of the values around it
     /// ([`neighbourhood_ranges`]), as far as the kernel reaches.
+    ///
+    /// # Panics
+    /// Where the samples do not fill the lattice.
     pub fn drawn_ranges(&self, kernel: &Kernel) -> Cow<'_, [[u8; 2]]> {
         match &self.coefficients {
             Some(coefficients) => Cow::Borrowed(&coefficients.ranges),
@@ -220,7 +227,24 @@ impl Volume {
 
     /// How many samples fall into each of `bins` equal parts of the range; a value on a border counts above it, the
     /// largest in the last bin. A constant volume fills the first bin.
-    pub fn histogram(&self, bins: usize) -> Vec<u64> {
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for more bins than [`MAX_BINS`](Self::MAX_BINS).
+    pub fn histogram(&self, bins: usize) -> Result<Vec<u64>> {
+        Self::check_bins(bins)?;
+        Ok(self.counts(bins))
+    }
+
+    /// Refuses more bins than a histogram may have.
+    pub(crate) fn check_bins(bins: usize) -> Result<()> {
+        if bins > Self::MAX_BINS {
+            return Err(Error::Argument(format!("{bins} bins of values are more than {}", Self::MAX_BINS)));
+        }
+        Ok(())
+    }
+
+    /// The [`histogram`](Self::histogram) of so many bins, which are known to be few enough.
+    pub(super) fn counts(&self, bins: usize) -> Vec<u64> {
         if bins == 0 {
             return Vec::new();
         }
@@ -264,18 +288,21 @@ mod tests {
     fn range_and_histogram() {
         let v = volume([2, 3, 1], Samples::I16(vec![-4, 0, 4, 4, 1, 2])).unwrap();
         assert_eq!(v.range, [-4.0, 4.0]);
-        assert_eq!(v.histogram(4), [1, 0, 2, 3]);
+        assert_eq!(v.histogram(4).unwrap(), [1, 0, 2, 3]);
         assert_eq!(v.value(4), 1.0);
         assert_eq!((v.samples.type_name(), v.samples.sample_bytes()), ("i16", 2));
         let large = volume([300, 300, 3], Samples::F32((0..270_000).map(|i| i as f32).collect())).unwrap();
         assert_eq!(large.range, [0.0, 269_999.0]);
-        assert_eq!(large.histogram(3).iter().sum::<u64>(), 270_000);
+        assert_eq!(large.histogram(3).unwrap().iter().sum::<u64>(), 270_000);
+        assert!(v.histogram(0).unwrap().is_empty());
+        assert_eq!(v.histogram(Volume::MAX_BINS).unwrap().iter().sum::<u64>(), 6);
+        assert!(matches!(v.histogram(usize::MAX), Err(Error::Argument(_))));
     }
 
     #[test]
     fn constant_volumes_are_fine() {
         let v = volume([1, 1, 2], Samples::U8(vec![7, 7])).unwrap();
-        assert_eq!((v.range, v.histogram(3)), ([7.0, 7.0], vec![2, 0, 0]));
+        assert_eq!((v.range, v.histogram(3).unwrap()), ([7.0, 7.0], vec![2, 0, 0]));
     }
 
     #[test]

@@ -13,6 +13,7 @@ use super::{
 use crate::{
     Error, Result,
     math::{Kernel, Profile},
+    memory,
 };
 use glam::DVec3;
 use rayon::prelude::*;
@@ -32,10 +33,18 @@ impl Volume {
     ///
     /// # Errors
     /// [`Error::Argument`] where the kernel takes some wave of the samples away (a Gaussian's sigma too large), for values near
-    /// the largest of 32 bits, on
-    /// rectilinear lattices, and on body-centred ones of one layer.
+    /// the largest of 32 bits, on rectilinear lattices, and on body-centred ones of one layer; for a volume or a kernel that was
+    /// put together by hand and contradicts itself, and where memory cannot hold the result.
     pub fn sharpened(self, kernel: &Kernel) -> Result<Self> {
-        let grid = Grid::of(&self.lattice)?;
+        // Those of another kernel are replaced, whatever they are.
+        let volume = Self { coefficients: None, ..self };
+        volume.validate().map_err(Error::Argument)?;
+        kernel.validate()?;
+        let grid = Grid::of(&volume.lattice)?;
+        let (lattice, margin) = continued(&volume.lattice, kernel.extent);
+        let (points, drawn) = (grid.len() as u64, lattice.len() as u64);
+        memory::check("a sharp volume", points.saturating_mul(8).saturating_add(drawn.saturating_mul(14)))
+            .map_err(Error::Argument)?;
         let response = Response::new(grid, kernel);
         let least = response.least();
         // A kernel whose values at the samples sum to nothing has no response: infinity stands for it.
@@ -49,20 +58,19 @@ impl Volume {
                  are needed; {remedy}"
             )));
         }
-        let largest = self.range[0].abs().max(self.range[1].abs());
+        let largest = volume.range[0].abs().max(volume.range[1].abs());
         if largest / least > f64::from(f32::MAX) {
             return Err(Error::Argument(format!(
                 "values as large as {largest:.1e} cannot be made sharp: take another unit"
             )));
         }
-        let mut points = grid.fill(&self.samples);
+        let mut points = grid.fill(&volume.samples);
         response.divide(&mut points);
         let overshoot = Overshoot::new(grid, kernel);
-        let reach = |(further, _): &(f64, f64)| self.lattice.reach(kernel.extent + further);
-        let boxes: Vec<_> = overshoot.tails.iter().map(|tail| neighbourhood_ranges(&self, reach(tail))).collect();
+        let reach = |(further, _): &(f64, f64)| volume.lattice.reach(kernel.extent + further);
+        let boxes: Vec<_> = overshoot.tails.iter().map(|tail| neighbourhood_ranges(&volume, reach(tail))).collect();
 
-        let (lattice, margin) = continued(&self.lattice, kernel.extent);
-        let [nx, ny, _] = self.lattice.dims;
+        let [nx, ny, _] = volume.lattice.dims;
         let [width, height, _] = lattice.dims;
         let mut values = vec![0f32; lattice.len()];
         let mut ranges = vec![[0u8; 2]; lattice.len()];
@@ -80,7 +88,38 @@ impl Volume {
             }
         });
         let coefficients = Coefficients { lattice, values, ranges, kernel: kernel.clone() };
-        Ok(Self { coefficients: Some(Arc::new(coefficients)), ..self })
+        Ok(Self { coefficients: Some(Arc::new(coefficients)), ..volume })
+    }
+}
+
+impl Coefficients {
+    /// Says in words why these are not what [`Volume::sharpened`] makes for a volume on a lattice.
+    pub(super) fn validate(&self, lattice: &Lattice) -> Result<(), String> {
+        const REMEDY: &str = "make the volume sharp again";
+        Grid::of(lattice).map_err(|error| error.to_string())?;
+        self.kernel.validate().map_err(|error| format!("the kernel of the coefficients: {error}"))?;
+        let (wanted, _) = continued(lattice, self.kernel.extent);
+        // Where both have been moved or turned, by the same, they may differ by roundings.
+        let step = lattice.edges().max_element();
+        let fits = self.lattice.dims == wanted.dims
+            && self.lattice.arrangement == wanted.arrangement
+            && self.lattice.axes.abs_diff_eq(wanted.axes, 1e-6 * step)
+            && self.lattice.origin.abs_diff_eq(wanted.origin, 1e-3 * step);
+        if !fits {
+            return Err(format!(
+                "the lattice of the coefficients is not the volume's, continued as far as their kernel reaches; {REMEDY}"
+            ));
+        }
+        let (count, values, ranges) = (wanted.len(), self.values.len(), self.ranges.len());
+        if [values, ranges] != [count; 2] {
+            return Err(format!(
+                "{values} coefficients with {ranges} ranges do not fill their lattice of {count}; {REMEDY}"
+            ));
+        }
+        match self.values.par_iter().position_first(|value| !value.is_finite()) {
+            Some(at) => Err(format!("coefficient {at} is {}; {REMEDY}", self.values[at])),
+            None => Ok(()),
+        }
     }
 }
 

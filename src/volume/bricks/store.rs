@@ -33,6 +33,19 @@ pub struct Header {
     pub source: String,
 }
 
+impl Header {
+    /// Says in words why there are no bricks of such a volume, in memory or in a file.
+    pub(super) fn validate(&self) -> Result<(), String> {
+        self.lattice.validate()?;
+        level::refusal(&self.lattice)?;
+        let [low, high] = self.range;
+        if !(low <= high && (high - low).is_finite()) {
+            return Err(format!("its range of values is {low} … {high}, which is none"));
+        }
+        Ok(())
+    }
+}
+
 /// A volume in levels and bricks. Any number of threads may read from it.
 pub struct Bricks {
     path: PathBuf,
@@ -73,10 +86,19 @@ impl Bricks {
     /// are cut when they are read. Coefficients ([`Volume::sharpened`]) are left out.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a lattice that is not Cartesian, or has more bricks than 32 bits can count.
+    /// [`Error::Argument`] for a lattice that is not Cartesian, or has more bricks than 32 bits can count, and for a volume that
+    /// was put together by hand and contradicts itself.
     pub fn from_volume(volume: Arc<Volume>) -> Result<Self> {
-        level::refusal(&volume.lattice).map_err(Error::Argument)?;
+        volume.validate().map_err(Error::Argument)?;
         let scalar = volume.samples.scalar();
+        let header = Header {
+            lattice: volume.lattice.clone(),
+            scalar,
+            range: volume.range,
+            unit: String::new(),
+            source: String::new(),
+        };
+        header.validate().map_err(Error::Argument)?;
         let levels = level::levels(volume.lattice.dims);
         let mut coarse: Vec<Vec<u8>> = Vec::with_capacity(levels.len());
         for level in &levels[..levels.len() - 1] {
@@ -90,13 +112,6 @@ impl Bricks {
             (0..level.bricks() as u32).into_par_iter().map(range).collect()
         });
         let ranges = ranges.collect();
-        let header = Header {
-            lattice: volume.lattice.clone(),
-            scalar,
-            range: volume.range,
-            unit: String::new(),
-            source: String::new(),
-        };
         let path = PathBuf::from("memory");
         let origin = Origin::Memory { volume, coarse, steps };
         Ok(Self { path, header, levels, ranges, origin, limits: Limits::none() })

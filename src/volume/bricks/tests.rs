@@ -190,6 +190,14 @@ fn streams_become_the_same_file() {
         assert_eq!(streamed, to_bytes(&volume, &options()).unwrap());
         write(&volume, &path, &options(), &|_, _| ()).unwrap();
         assert_eq!(streamed, std::fs::read(&path).unwrap());
+        // A range that is none leaves the file as it was.
+        for range in [[f64::NAN; 2], [1.0, 0.0], [0.0, f64::INFINITY]] {
+            let result = convert(&stream, range, &path, &options(), &|_, _| ());
+            assert!(
+                matches!(&result, Err(Error::Argument(message)) if message.contains("range of values")),
+                "{result:?}"
+            );
+        }
         let report = check(&path, &limits, &|_, _| ());
         assert!(report.is_sound(), "{report:?}");
         // Nothing but the file is left.

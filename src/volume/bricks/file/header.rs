@@ -100,17 +100,14 @@ impl Stored {
             let scalar = *Scalar::ALL.get(scalar as usize).ok_or_else(|| wrong("type of samples"))?;
             let [Ok(nx), Ok(ny), Ok(nz)] = dims.map(usize::try_from) else { return Err(wrong("size")) };
             let lattice = Lattice::cartesian([nx, ny, nz], origin, axes);
-            lattice.validate()?;
-            level::refusal(&lattice)?;
-            if [levels, side, reach].map(|n| n as usize) != [level::levels(lattice.dims).len(), SIDE, REACH] {
-                return Err(wrong("number of levels, or the size of its bricks,"));
-            }
-            if !(range[0].is_finite() && range[1].is_finite() && range[0] <= range[1]) {
-                return Err(wrong("range of values"));
-            }
             let text = |bytes| std::str::from_utf8(bytes).map(str::to_owned).map_err(|_| "its texts are not UTF-8");
             let (unit, source) = (text(&texts[..unit])?, text(&texts[unit..])?);
-            Ok(Self { header: Header { lattice, scalar, range, unit, source }, file_bytes })
+            let header = Header { lattice, scalar, range, unit, source };
+            header.validate()?;
+            if [levels, side, reach].map(|n| n as usize) != [level::levels(header.lattice.dims).len(), SIDE, REACH] {
+                return Err(wrong("number of levels, or the size of its bricks,"));
+            }
+            Ok(Self { header, file_bytes })
         };
         Some(sound())
     }

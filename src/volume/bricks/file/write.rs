@@ -50,9 +50,10 @@ pub fn memory_of(dims: [usize; 3], scalar: Scalar) -> u64 {
 /// many slices are done, of how many.
 ///
 /// # Errors
-/// [`Error::Argument`] for a lattice that is not Cartesian; [`Error::Output`] where nothing can be written.
+/// [`Error::Argument`] for a lattice that is not Cartesian, and for a volume that was put together by hand and contradicts itself;
+/// [`Error::Output`] where nothing can be written.
 pub fn write(volume: &Volume, path: &Path, options: &WriteOptions, watch: Watch) -> Result<()> {
-    level::refusal(&volume.lattice).map_err(Error::Argument)?;
+    volume.validate().map_err(Error::Argument)?;
     let spill = || Spill::beside(path);
     all(&header(volume, options), path, spill, || Target::at(path), |z| Ok(slices(volume, z)), watch).map(|_| ())
 }
@@ -61,7 +62,7 @@ pub fn write(volume: &Volume, path: &Path, options: &WriteOptions, watch: Watch)
 /// its values is told by the caller, who went through the file for it ([`VolumeStream::range`]).
 ///
 /// # Errors
-/// As of [`write`](write()).
+/// As of [`write`](write()), also for a range that is none.
 pub fn convert(
     stream: &VolumeStream,
     range: [f64; 2],
@@ -70,7 +71,6 @@ pub fn convert(
     watch: Watch,
 ) -> Result<()> {
     let WriteOptions { unit, source } = options.clone();
-    level::refusal(stream.lattice()).map_err(Error::Argument)?;
     let header = Header { lattice: stream.lattice().clone(), scalar: stream.scalar(), range, unit, source };
     let slices = |z| Ok(Cow::Owned(stream.slices(z)?.bytes().to_vec()));
     all(&header, path, || Spill::beside(path), || Target::at(path), slices, watch).map(|_| ())
@@ -79,7 +79,6 @@ pub fn convert(
 /// The bytes of the file that [`write`](write()) would write.
 #[cfg(test)]
 pub fn to_bytes(volume: &Volume, options: &WriteOptions) -> Result<Vec<u8>> {
-    level::refusal(&volume.lattice).map_err(Error::Argument)?;
     let memory = || Ok(Spill::Memory(Vec::new()));
     let target = || Ok(Target::Memory(Vec::new()));
     all(&header(volume, options), Path::new("memory"), memory, target, |z| Ok(slices(volume, z)), &|_, _| ())
@@ -121,6 +120,7 @@ fn all<'a>(
     slices: impl Fn(Range<usize>) -> Result<Cow<'a, [u8]>>,
     watch: Watch,
 ) -> Result<Vec<u8>> {
+    header.validate().map_err(Error::Argument)?;
     let dims = header.lattice.dims;
     let mut coder = Coder::new(header, spill()?);
     let mut pyramid = Pyramid::new(header.scalar, dims);
