@@ -297,6 +297,39 @@ fn several_files_become_one() {
     assert!(bounds.max.z > 29.0 && bounds.min.z < 0.0, "{bounds:?}");
 }
 
+/// Whether parts are turned outward is told in regions as of the whole: also of those that share a vertex alone. Where there
+/// are too many to be told apart in the memory that there is, the answer is that nothing is solid.
+#[test]
+fn solid_parts_are_those_of_the_whole() {
+    let folder = Folder::new("solid");
+    let tetrahedra = |count: u32, turned: u32| {
+        let mut mesh = Mesh::default();
+        for i in 0..count {
+            // In rows, each with the last corner of the one before as its first.
+            let place = Vec3::new((i % 400) as f32, (i / 400) as f32 * 2.0, 0.0);
+            let first = mesh.positions.len() as u32;
+            let [a, b, c, d] = if i % 400 == 0 {
+                mesh.positions.push(place);
+                [first, first + 1, first + 2, first + 3]
+            } else {
+                [first - 1, first, first + 1, first + 2]
+            };
+            mesh.positions.extend([Vec3::Y, Vec3::Z, Vec3::X].map(|side| place + side));
+            mesh.triangles.extend([[a, b, c], [a, c, d], [b, d, c], [a, d, b]].map(|[p, q, r]| match i == turned {
+                true => [p, q, r],
+                false => [q, p, r],
+            }));
+        }
+        mesh
+    };
+    for (mesh, is_solid) in [(tetrahedra(1000, u32::MAX), true), (tetrahedra(1000, 500), false)] {
+        std::fs::write(folder.path("a.ply"), ply(&mesh, false, false)).unwrap();
+        let (whole, parts, converted) = both_ways(&folder, "a.ply");
+        assert!(converted.regions > 1 && whole.len() == parts.len());
+        assert_eq!((mesh.is_closed(), converted.closed), (true, is_solid));
+    }
+}
+
 #[test]
 fn what_is_damaged_leaves_nothing() {
     let folder = Folder::new("damaged");

@@ -14,7 +14,7 @@ use splatkit::{
     picture::Picture,
     reference,
     scene::{Clip, ClipShape, Scene, Settings},
-    splat::SplatSet,
+    splat::{Splat, SplatSet},
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, bricks::Bricks, phantoms::Phantom},
 };
@@ -438,5 +438,52 @@ fn an_opened_surface_shows_its_back() {
         println!("{name}: {} of {} splats, {agreement:.1} dB", drawn.splats, all.splats);
         assert!(agreement > 40.0, "{name}: {agreement:.1} dB");
         assert_eq!(drawn.splats * 10 < all.splats * 8, culls, "{name}: {} of {}", drawn.splats, all.splats);
+    }
+}
+
+/// As of a set of splats, so of a tree: no optical depth is so large that a picture of it is none.
+#[test]
+fn optical_depths_beyond_what_can_be_drawn_are_refused() {
+    let mut set = knot(500);
+    let built = |set: &SplatSet| Tree::build(set, &BuildOptions::default(), &|_, _| ());
+    set.splats[7].strength = Splat::MOST_OPTICAL_DEPTH;
+    let tree = built(&set).expect("a tree");
+    let scene = Scene::new().with_hierarchy(Hierarchy::from_tree(tree.clone()).expect("a hierarchy"));
+    let picture = reference::render(&scene, &camera(&scene.bounds(), 0.9), &settings(0.0)).expect("draws");
+    assert!(picture.color.iter().flatten().all(|value| value.is_finite()));
+    set.splats[7].strength *= 1.01;
+    let error = built(&set).expect_err("too deep").to_string();
+    assert!(error.contains("splat 7 at") && error.contains("optical depths from 0 to 1e10 can be merged"), "{error}");
+}
+
+/// Normals that are smooth over edges are not those of the faces, and it is the faces that face away.
+#[test]
+fn smooth_normals_over_edges_lose_nothing() {
+    let mut cube = Mesh::cube(2.0);
+    cube.normals = cube.positions.iter().map(|place| place.normalize()).collect();
+    let options = SurfelOptions { largest_spacing: 1.0 / 32.0, ..SurfelOptions::default() };
+    let set = cube.surfels(&options).expect("surfels");
+    assert!(cube.is_solid());
+    let tree =
+        Tree::build(&set, &BuildOptions { closed: true, ..BuildOptions::default() }, &|_, _| ()).expect("a tree");
+    let file = to_bytes(&tree, &WriteOptions::default()).expect("a file");
+    let file = Hierarchy::from_bytes(file, Path::new("memory"), &Limits::default()).expect("a hierarchy");
+    assert!(file.check().is_sound(), "{:?}", file.check().findings);
+    for tree in [file.read_tree().expect("a tree"), tree] {
+        assert_eq!(validate(&tree), []);
+        let (mut lost, mut counts) = (0, [0; 2]);
+        for side in [-0.9, -0.5, 0.2, 0.7] {
+            let camera = Camera::framing(&set.bounds(), DVec3::new(1.0, side, 0.3), DVec3::Z, 1.0);
+            let [all, culled] = [false, true].map(|culls| {
+                let view = camera.view([64, 64]).expect("a view");
+                let cut = tree.cut(&view, Detail::Pixels(2.0), Some(culls)).expect("a cut");
+                counts[usize::from(culls)] += cut.splats.len();
+                let scene = Scene::new().with_splats(cut);
+                reference::render(&scene, &camera, &Settings::new([64, 64])).expect("draws").color
+            });
+            lost += all.iter().zip(&culled).filter(|(all, culled)| culled[3] < all[3] - 0.1).count();
+        }
+        println!("{lost} pixels lost; {} of {} splats drawn", counts[1], counts[0]);
+        assert!(lost == 0 && counts[1] < counts[0] * 95 / 100, "{lost} {counts:?}");
     }
 }

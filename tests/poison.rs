@@ -222,6 +222,7 @@ fn sets_that_are_not_finite_are_named() {
         refused(&|set| set.overlap = poison, "overlap");
     }
     refused(&|set| set.extent = -1.0, "extent");
+    refused(&|set| set.overlap = 1e-45, "overlap");
     refused(&|set| set.origin = DVec3::splat(1e300), "beyond");
 }
 

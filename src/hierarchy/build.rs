@@ -54,7 +54,7 @@ impl Tree {
     /// Builds the tree of a set of splats that carry radiance. The same set gives the same tree.
     ///
     /// # Errors
-    /// [`Error::NothingToDraw`] for an empty set, [`Error::Argument`] for one of scalars or with places that are not finite.
+    /// Those of [`check_splats`].
     pub fn build(set: &SplatSet, options: &BuildOptions, watch: Watch<'_>) -> Result<Self> {
         let _span = tracing::info_span!("build").entered();
         check_splats(set)?;
@@ -180,8 +180,8 @@ const FARTHEST: f32 = 1e9;
 /// Whether a hierarchy can be built of splats.
 ///
 /// # Errors
-/// [`Error::Argument`] for splats that are no finite numbers or of more than 32 bits can add up, and for samples;
-/// [`Error::NothingToDraw`] where there are none.
+/// [`Error::Argument`] for splats that are no finite numbers, of more than 32 bits can add up, or of an optical depth above
+/// [`MOST_OPTICAL_DEPTH`](Splat::MOST_OPTICAL_DEPTH), and for samples; [`Error::NothingToDraw`] where there are none.
 pub fn check_splats(set: &SplatSet) -> Result<()> {
     if set.payload != Payload::Radiance {
         return Err(Error::Argument("a hierarchy is built of splats that carry colour, not of samples".into()));
@@ -199,14 +199,17 @@ pub fn check_splats(set: &SplatSet) -> Result<()> {
     if !set.origin.is_finite() {
         return Err(Error::Argument(format!("the origin {} of the splats is not finite", set.origin)));
     }
+    let most = Splat::MOST_OPTICAL_DEPTH;
     let is_sound = |s: &Splat| {
         let fits = |v: &f32| v.abs() <= FARTHEST;
-        s.center.iter().chain(&s.factor).all(fits) && s.strength.is_finite() && s.strength >= 0.0
+        s.center.iter().chain(&s.factor).all(fits) && (0.0..=most).contains(&s.strength)
     };
     if let Some(index) = set.splats.par_iter().position_first(|splat| !is_sound(splat)) {
         let Splat { center, strength, factor, .. } = set.splats[index];
         let message = format!("splat {index} at {center:?}, of factor {factor:?} and optical depth {strength}");
-        return Err(Error::Argument(format!("{message}: no finite numbers, or of more than {FARTHEST:e}")));
+        return Err(Error::Argument(format!(
+            "{message}: places and shapes up to {FARTHEST:e} and optical depths from 0 to {most:e} can be merged"
+        )));
     }
     Ok(())
 }

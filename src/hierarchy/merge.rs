@@ -5,7 +5,7 @@
 //! from level to level.
 
 use super::Node;
-use crate::splat::{NO_NORMAL, Splat, decode_normal, encode_normal};
+use crate::splat::{Splat, decode_normal, encode_normal};
 use glam::Vec3;
 
 /// Full width at half height of a Gaussian, in standard deviations.
@@ -99,10 +99,38 @@ pub(crate) fn leaf(splat: &Splat, extent: f32) -> Node {
         // Room for rounding.
         radius: extent * sigma * (1.0 + 1e-5),
         size: WIDTH * sigma,
-        cone: if splat.normal == NO_NORMAL { -1.0 } else { 1.0 },
+        cone: decode_normal(splat.normal)
+            .map_or(-1.0, |normal| leaf_cone(normal.dot(thin_axis(&splat.factor, normal)))),
         first_child: 0,
         children: 0,
     }
+}
+
+/// A surface is culled by its shading normals, but what faces away is the surface. Surfels lie across a normal that is this
+/// near that of their triangles (cosine of 20°), which the margin of culling covers.
+const ALIKE: f32 = 0.94;
+
+/// The cone of a leaf that lies across an axis of this cosine with its normal.
+pub(crate) fn leaf_cone(cosine: f32) -> f32 {
+    // Room for rounding.
+    if cosine.abs() < ALIKE { (cosine.abs() - 2e-6).max(0.0) } else { 1.0 }
+}
+
+/// The axis along which a splat is thinnest, seen from a direction near it: two steps of inverse iteration.
+fn thin_axis(factor: &[f32; 6], from: Vec3) -> Vec3 {
+    let scale = factor.iter().fold(f32::MIN_POSITIVE, |most, v| most.max(v.abs())).recip();
+    let [b00, b10, b11, b20, b21, b22] = factor.map(|v| v * scale);
+    // Of what is flat without end, nearly.
+    let [c00, c11, c22] = [b00, b11, b22].map(|v| v.abs().max(1e-6).copysign(v).recip());
+    let mut axis = from;
+    for _ in 0..2 {
+        let x = axis.x * c00;
+        let y = (axis.y - b10 * x) * c11;
+        let z = (axis.z - b20 * x - b21 * y) * c22 * c22;
+        let y = (y - b21 * z) * c11;
+        axis = Vec3::new((x - b10 * y - b20 * z) * c00, y, z).normalize_or(from);
+    }
+    axis
 }
 
 impl Mass {

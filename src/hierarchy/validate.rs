@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     math::Bounds,
-    splat::{SplatSet, decode_normal},
+    splat::{Splat, SplatSet},
 };
 use glam::{DVec3, Vec3};
 
@@ -71,16 +71,15 @@ impl Findings {
 /// Checks every promise of [`Node`], [`Block`](super::Block) and [`Tree`]: each child's sphere in its parent's, each child's
 /// cone in its parent's, no size below a child's or that of its own splat, leaves' footprints in their spheres, children
 /// behind their parents and in order, blocks in the places of portals that bound their roots, the box around all footprints,
-/// numbers finite. Bounds may miss by what 32-bit numbers round: 10⁻⁶ of the radius and of the cosine, 10⁻³ of a footprint.
+/// numbers such that can be drawn. Bounds may miss by what 32-bit numbers round: 10⁻⁶ of the radius and of the cosine, 10⁻³ of a footprint.
 /// Finds nothing in a sound tree.
 pub fn validate(tree: &Tree) -> Vec<Finding> {
     let mut findings = Findings::default();
-    let sound = tree.origin.is_finite() && tree.bounds.min.is_finite() && tree.bounds.max.is_finite();
-    if !sound || tree.bounds.is_empty() {
-        findings.push(Finding::error("bounds", "tree", "its origin or its bounds are none"));
+    if let Some(fault) = fault_of_box(tree.origin, &tree.bounds) {
+        findings.push(Finding::error("bounds", "tree", fault));
     }
-    if !(tree.extent > 0.0 && tree.extent <= SplatSet::MAX_EXTENT) {
-        findings.push(Finding::error("extent", "tree", format!("its extent is {}", tree.extent)));
+    if let Some(fault) = fault_of_extent(tree.extent) {
+        findings.push(Finding::error("extent", "tree", fault));
     }
     if tree.blocks.is_empty() {
         findings.push(Finding::error("blocks", "tree", "it has no blocks"));
@@ -156,8 +155,8 @@ pub fn check_block(number: usize, nodes: &[Node], mut footprints: Option<&mut Fo
         return;
     }
     for (index, node) in nodes.iter().enumerate() {
-        if let Some(message) = values(node) {
-            findings.push(Finding::error("values", place(index), message));
+        if let Some(fault) = fault(node) {
+            findings.push(Finding::error("values", place(index), format!("it has {fault}")));
             continue;
         }
         let width = WIDTH * deviation(&node.splat);
@@ -210,24 +209,51 @@ pub fn check_portals(
     }
 }
 
-/// What is wrong with a node by itself.
-fn values(node: &Node) -> Option<String> {
+/// Coordinates of centres and elements of factors up to this can be drawn: their squares fit in 32 bits.
+const LARGEST: f32 = 1e18;
+
+fn fits(values: &[f32]) -> bool {
+    values.iter().all(|value| value.abs() <= LARGEST)
+}
+
+/// Whether the numbers of a node's splat can be drawn.
+pub fn is_drawable(splat: &Splat) -> bool {
+    fits(&splat.center) && fits(&splat.factor) && (0.0..=Splat::MOST_OPTICAL_DEPTH).contains(&splat.strength)
+}
+
+/// The fault that a node has by itself.
+pub fn fault(node: &Node) -> Option<String> {
     let Node { splat, center, radius, size, cone, .. } = node;
+    let is_length = |value: f32| value >= 0.0 && value.is_finite();
+    if is_drawable(splat) && fits(center) && is_length(*radius) && is_length(*size) && (-1.0..=1.0).contains(cone) {
+        return None;
+    }
     let numbers = splat.center.iter().chain(&splat.factor).chain(center).chain([&splat.strength, radius, size, cone]);
-    if !numbers.copied().all(f32::is_finite) {
-        return Some("a value is not finite".into());
-    }
-    if *radius < 0.0 || *size < 0.0 || splat.strength < 0.0 {
-        return Some(format!("its radius is {radius}, its size {size}, its optical depth {}", splat.strength));
-    }
-    if !(-1.0..=1.0).contains(cone) {
-        return Some(format!("the cosine of its cone is {cone}"));
-    }
-    let normal = decode_normal(splat.normal);
-    if normal.is_some_and(|normal| !normal.is_finite()) {
-        return Some("its normal is none".into());
-    }
-    None
+    let most = Splat::MOST_OPTICAL_DEPTH;
+    Some(if !numbers.copied().all(f32::is_finite) {
+        "a value that is not finite".into()
+    } else if !(0.0..=most).contains(&splat.strength) {
+        format!("an optical depth of {}, but those from 0 to {most:e} can be drawn", splat.strength)
+    } else if *radius < 0.0 || *size < 0.0 {
+        format!("a radius of {radius} and a size of {size}")
+    } else if !(-1.0..=1.0).contains(cone) {
+        format!("a cone of cosine {cone}")
+    } else {
+        format!("a coordinate or an element of its factor beyond {LARGEST:e}")
+    })
+}
+
+/// What is wrong with where a whole hierarchy is.
+pub fn fault_of_box(origin: DVec3, bounds: &Bounds) -> Option<&'static str> {
+    let is_sound = origin.is_finite() && bounds.min.is_finite() && bounds.max.is_finite() && !bounds.is_empty();
+    (!is_sound).then_some("its origin or its bounds are none")
+}
+
+/// What is wrong with where footprints end, in standard deviations.
+pub fn fault_of_extent(extent: f32) -> Option<String> {
+    let most = SplatSet::MAX_EXTENT;
+    let is_sound = extent > 0.0 && extent <= most;
+    (!is_sound).then(|| format!("its extent is {extent}; it must lie in 0 … {most}"))
 }
 
 /// Checks that a node bounds one below it.

@@ -152,8 +152,8 @@ fn settle_known(mesh: &Mesh, kept: &[u32], normals: &mut [Vec3]) -> Vec<bool> {
         .par_iter_mut()
         .zip(kept)
         .map(|(normal, &index)| {
-            let given = mesh.normals.get(index as usize).filter(|given| given.length_squared() > 0.25);
-            *normal = given.map_or(*normal, |given| given.normalize());
+            let given = mesh.given_normal(index as usize);
+            *normal = given.unwrap_or(*normal);
             given.is_none()
         })
         .collect();

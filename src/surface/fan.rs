@@ -204,11 +204,8 @@ impl Maker<'_> {
     fn surfel(&self, vertex: usize, group: &mut [Around], shading: Option<Vec3>) -> Option<Splat> {
         let first = group.first()?.normal;
         let own = group.iter().map(|t| t.normal * t.angle).sum::<Vec3>().try_normalize().unwrap_or(first);
-        let given = self.mesh.normals.get(vertex).filter(|normal| normal.length_squared() > 0.25);
-        let shading = match given {
-            Some(given) => given.normalize(),
-            None => shading.and_then(Vec3::try_normalize).unwrap_or(own),
-        };
+        let given = self.mesh.given_normal(vertex);
+        let shading = given.or_else(|| shading.and_then(Vec3::try_normalize)).unwrap_or(own);
         let normal = if shading.dot(own).abs() >= ALIKE { shading } else { own };
         let (x, y) = normal.any_orthonormal_pair();
         let mut moments = Moments::default();
@@ -294,15 +291,16 @@ impl Sums {
         self.volume += place.dot(cross);
     }
 
-    /// Adds the corners of a triangle; `unit` as of [`side`](Self::side).
-    pub fn add_triangle(&mut self, corners: [Vec3; 3], unit: f32) {
+    /// Adds the corners of a triangle; gives its normal times its area.
+    pub fn add_triangle(&mut self, corners: [Vec3; 3]) -> DVec3 {
         let [a, b, c] = corners.map(|corner| corner.as_dvec3());
-        let cross = (b - a).cross(c - a) * (0.5 / f64::from(unit).powi(2));
+        let cross = (b - a).cross(c - a) * 0.5;
         let (places, area) = (a + b + c, cross.length());
         self.area += 3.0 * area;
         self.place += places * area;
         self.cross += 3.0 * cross;
         self.volume += places.dot(cross);
+        cross
     }
 
     /// The area of all corners, three times that of the triangles.

@@ -11,7 +11,8 @@ use std::{ops::Range, sync::Arc};
 pub struct Mesh {
     pub origin: DVec3,
     pub positions: Vec<Vec3>,
-    /// Unit normals as the file gives them; empty where it gives none.
+    /// Unit normals as the file gives them; empty where it gives none. Those that are shorter than half a unit, or not finite,
+    /// count as none.
     pub normals: Vec<Vec3>,
     /// Linear copies of the file's display colours, 8 bits a channel: red, green, blue, opacity.
     pub colors: Vec<[u8; 4]>,
@@ -26,6 +27,18 @@ pub struct Mesh {
     pub sensors: Vec<Sensor>,
     /// Whether +Z is up by the custom of the format, as in surveying.
     pub z_is_up: bool,
+}
+
+impl Mesh {
+    /// The unit normal that the file gives at a vertex.
+    pub(super) fn given_normal(&self, vertex: usize) -> Option<Vec3> {
+        self.normals.get(vertex).copied().and_then(given)
+    }
+}
+
+/// A unit normal; none where what stands in its place is shorter than half of one, or not finite.
+pub(super) fn given(normal: Vec3) -> Option<Vec3> {
+    Some(normal).filter(|normal| normal.length_squared() > 0.25)?.try_normalize()
 }
 
 /// The place of a scanner.

@@ -6,12 +6,13 @@ use super::{
     adjacency::may_be_split,
     cloud,
     fan::Sums,
-    refine::{affordable, pieces},
+    refine::{affordable, count_once_cut, pieces},
     surfels::{largest_edge, of_part},
     survey::{edge, edge_of_places},
 };
 use crate::{Result, splat::Splat};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
+use rayon::prelude::*;
 
 /// What going through the triangles of a mesh once tells of it. Two parts add up.
 #[derive(Debug, Clone, Default)]
@@ -20,13 +21,15 @@ pub(crate) struct Triangles {
     edges: [u64; 2],
     /// Which side is out.
     sums: Sums,
-    /// About how many triangles they will be once long edges are cut, and those with long edges alone.
+    /// About how many triangles they will be once long edges are cut.
     pub expected: f64,
-    pub expected_of_long: f64,
+    /// How many those with long edges become, once they are counted; about how many, where they are more than there is room for.
+    pub cut: usize,
     /// The smallest and the largest coordinates of corners.
     bounds: Option<[Vec3; 2]>,
-    /// The corners of those with an edge that is to be cut.
-    pub long: Vec<Vec3>,
+    /// The corners of those with an edge that is to be cut, and what names them.
+    pub long: Vec<[Vec3; 3]>,
+    names: Vec<[u32; 3]>,
     pub longest: f32,
 }
 
@@ -39,16 +42,15 @@ impl Triangles {
             edge_of_places(p, q).wrapping_add(edge_of_places(q, r)).wrapping_add(edge_of_places(r, p)),
         ];
         self.edges.iter_mut().zip(sums).for_each(|(sum, more)| *sum = sum.wrapping_add(more));
-        self.sums.add_triangle(corners, 1.0);
+        self.sums.add_triangle(corners);
         self.surround([p.min(q).min(r), p.max(q).max(r)]);
         let edges = [(p, q), (q, r), (r, p)].map(|(a, b)| (a - b).length());
         let longest = edges[0].max(edges[1]).max(edges[2]);
         self.longest = self.longest.max(longest);
-        let pieces = pieces(edges.map(|edge| f64::from(edge / length)));
-        self.expected += pieces;
+        self.expected += pieces(edges.map(|edge| f64::from(edge / length)));
         if longest / length > 1.0 {
-            self.expected_of_long += pieces;
-            self.long.extend(corners);
+            self.long.push(corners);
+            self.names.push([a, b, c]);
         }
     }
 
@@ -57,20 +59,28 @@ impl Triangles {
         self.bounds = Some([own_low.min(low), own_high.max(high)]);
     }
 
-    /// The diagonal of the box around all corners that are at this origin.
-    fn diagonal(&self, origin: DVec3) -> f32 {
-        let [low, high] = self.bounds.unwrap_or_default().map(|corner| origin + corner.as_dvec3());
-        (high - low).length() as f32
-    }
-
     pub fn join(&mut self, other: Self) {
         other.bounds.into_iter().for_each(|bounds| self.surround(bounds));
         self.edges.iter_mut().zip(other.edges).for_each(|(sum, more)| *sum = sum.wrapping_add(more));
         self.sums = self.sums.with(other.sums);
         self.expected += other.expected;
-        self.expected_of_long += other.expected_of_long;
         self.long.extend(other.long);
+        self.names.extend(other.names);
         self.longest = self.longest.max(other.longest);
+    }
+
+    /// Counts what those with long edges are cut into, where there is room for so many.
+    fn count_long(&mut self, length: f32, room: usize) {
+        let mut vertices: Vec<u32> = self.names.as_flattened().to_vec();
+        vertices.par_sort_unstable();
+        vertices.dedup();
+        let place = |name: u32| vertices.binary_search(&name).unwrap_or(0) as u32;
+        let triangles: Vec<[u32; 3]> = self.names.par_iter().map(|names| names.map(place)).collect();
+        let mut positions = vec![Vec3::ZERO; vertices.len()];
+        for (triangle, corners) in triangles.iter().zip(&self.long) {
+            triangle.iter().zip(corners).for_each(|(&vertex, corner)| positions[vertex as usize] = *corner);
+        }
+        self.cut = count_once_cut(&Mesh { positions, triangles, ..Mesh::default() }, length, room);
     }
 }
 
@@ -96,30 +106,35 @@ pub(crate) enum PiecesClosing {
 }
 
 impl MeshPieces {
-    /// Of a mesh around an `origin` whose vertices lie in a box of this `diagonal`; `look` goes through its triangles where
-    /// edges longer than what it is given are cut. Also gives what the last look told.
+    /// Of a mesh whose vertices lie between these `bounds`, relative to its origin; `look` goes through its triangles where
+    /// edges longer than what it is given are cut. Also gives what the last look told. Where there is no `room` for so many
+    /// triangles, what they are cut into is more than that.
     pub fn new(
         [points, triangles]: [usize; 2],
         [has_normals, has_uvs]: [bool; 2],
-        (origin, diagonal): (DVec3, f32),
+        bounds: [Vec3; 2],
         options: &SurfelOptions,
+        room: usize,
         mut look: impl FnMut(f32) -> Result<Triangles>,
     ) -> Result<(Self, Triangles)> {
-        let budget = options.most_triangles.max(triangles) as f64;
-        let mut unit = largest_edge(diagonal, options);
-        let mut seen = (unit, look(unit)?);
-        // Vertices that no triangle has do not count.
-        unit = largest_edge(seen.1.diagonal(origin), options);
-        let length = affordable(unit, budget, |length| {
-            if seen.0 != length {
-                seen = (length, look(length)?);
-            }
-            Ok::<f64, crate::Error>(seen.1.expected)
-        })?;
-        if seen.0 != length {
-            seen = (length, look(length)?);
-        }
-        let (_, seen) = seen;
+        let budget = options.most_triangles.max(triangles);
+        let around_all = largest_edge(bounds, f64::INFINITY, options);
+        let first = look(around_all)?;
+        // Vertices that no triangle has do not count, and the area may.
+        let unit = largest_edge(first.bounds.unwrap_or_default(), first.sums.area() / 3.0, options);
+        let mut first = (unit == around_all).then_some(first);
+        let (length, seen) = affordable(
+            unit,
+            budget,
+            |length| first.take().map_or_else(|| look(length), Ok),
+            |seen| seen.expected,
+            |seen, length| {
+                let others = triangles.saturating_sub(seen.long.len());
+                let [room, budget] = [room, budget].map(|all| all.saturating_sub(others));
+                seen.count_long(length, room.min(budget));
+                seen.cut <= budget || room < budget
+            },
+        )?;
         let closing = if seen.edges[0] == 0 {
             Some(PiecesClosing::Vertices)
         } else {
@@ -154,4 +169,48 @@ pub(crate) fn cloud_piece(
 ) -> Result<Vec<(u32, Splat)>> {
     part.check(options)?;
     Ok(cloud::some_surfels(part, options, known, |point| owned[point]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::refine::count_of_refined;
+
+    fn seen(mesh: &Mesh, length: f32) -> Triangles {
+        let mut seen = Triangles::default();
+        for &triangle in &mesh.triangles {
+            seen.add(triangle, triangle.map(|vertex| mesh.positions[vertex as usize]), length);
+        }
+        seen
+    }
+
+    /// Pieces are cut as the whole is, also where there is a budget, and no farther than there is room.
+    #[test]
+    fn the_budget_is_that_of_the_whole() {
+        let mut mixed = Mesh::cube(1.0);
+        let small = Mesh::sphere(2);
+        mixed.triangles.extend(small.triangles.iter().map(|triangle| triangle.map(|vertex| vertex + 8)));
+        mixed.positions.extend(small.positions.iter().map(|place| *place * 0.2));
+        for mesh in [Mesh::cube(1.0), Mesh::sphere(1), mixed] {
+            for most_triangles in [300, 500, 900, 1000, 1500, 2000, 5000] {
+                let options = SurfelOptions { most_triangles, largest_spacing: 1e-3, ..SurfelOptions::default() };
+                let bounds = [
+                    mesh.positions.iter().copied().reduce(Vec3::min),
+                    mesh.positions.iter().copied().reduce(Vec3::max),
+                ];
+                let pieces = |room: usize| {
+                    let counts = [mesh.positions.len(), mesh.triangles.len()];
+                    MeshPieces::new(counts, [false; 2], bounds.map(Option::unwrap), &options, room, |length| {
+                        Ok(seen(&mesh, length))
+                    })
+                };
+                let (pieces_of_all, told) = pieces(usize::MAX).unwrap();
+                let count = mesh.triangles.len() - told.long.len() + told.cut;
+                assert_eq!(count, count_of_refined(&mesh, pieces_of_all.unit, most_triangles, usize::MAX));
+                assert!(count <= most_triangles.max(mesh.triangles.len()), "{count} of {most_triangles}");
+                let (_, told) = pieces(count - 1).unwrap();
+                assert!(mesh.triangles.len() - told.long.len() + told.cut >= count);
+            }
+        }
+    }
 }

@@ -14,12 +14,19 @@ const TEXELS: f32 = 1.5;
 /// … but no closer than this part of the longest edge that is allowed.
 const FINEST: f32 = 1.0 / 8.0;
 
+/// Where there would be too many triangles, lengths grow by whole steps of this factor: two that look at the same triangles, in
+/// whatever order they add them up, take the same number of steps.
+const STEP: f64 = 1.05;
+
 /// What edges may stay.
 struct Wanted<'a> {
     mesh: &'a Mesh,
+    /// The longest edge that was asked for.
+    asked: f32,
     length: f32,
     /// Factor on [`TEXELS`] and [`FINEST`] that keeps to the budget.
     coarser: f32,
+    steps: i32,
 }
 
 /// A mesh of small triangles.
@@ -30,20 +37,46 @@ pub(super) struct Refined<'a> {
 }
 
 /// The mesh with no edge longer than `length` (in its unit), and textured triangles cut to about the size of the texels.
-/// Lengths grow where there would be more than about `most` triangles.
+/// Lengths grow where there would be more than `most` triangles, and more than there are already.
 pub(super) fn refine(mesh: &Mesh, length: f32, most: usize) -> Refined<'_> {
-    let wanted = Wanted { mesh, length, coarser: 1.0 };
-    if wanted.are_small() {
+    let Ok(Some(mut fine)) = refined(mesh, length, most, usize::MAX) else {
         return Refined { mesh: Cow::Borrowed(mesh), sources: None };
-    }
-    // While triangles are cut, the number of the one that each was cut from stands in its material's place.
-    let mut fine = Mesh { triangle_materials: (0..mesh.triangles.len() as u32).collect(), ..mesh.clone() };
-    cut_all(&mut fine, &wanted.affordable(most).0);
+    };
     let sources = std::mem::take(&mut fine.triangle_materials);
     if !mesh.triangle_materials.is_empty() {
         fine.triangle_materials = sources.par_iter().map(|&source| mesh.triangle_materials[source as usize]).collect();
     }
     Refined { mesh: Cow::Owned(fine), sources: Some(sources) }
+}
+
+/// That triangles would be cut into more than there may be.
+struct TooMany;
+
+/// As [`refine`], with the number of the triangle that each was cut from in its material's place; `None` where nothing is to be
+/// cut.
+///
+/// # Errors
+/// For more than `room`, before there are as many: about how many they would be.
+fn refined(mesh: &Mesh, length: f32, most: usize, room: usize) -> Result<Option<Mesh>, usize> {
+    let mut wanted = Wanted::new(mesh, length);
+    if wanted.are_small() {
+        return Ok(None);
+    }
+    let budget = most.max(mesh.triangles.len());
+    loop {
+        let expected = wanted.expected();
+        if expected > budget as f64 {
+            wanted.coarsen(steps(expected, budget));
+            continue;
+        }
+        // A triangle is also cut where its neighbours are, so that only cutting tells how many there are.
+        let mut fine = Mesh { triangle_materials: (0..mesh.triangles.len() as u32).collect(), ..mesh.clone() };
+        match cut_all(&mut fine, &wanted, budget.min(room)) {
+            Ok(()) => return Ok(Some(fine)),
+            Err(TooMany) if room < budget => return Err((expected as usize).max(room + 1)),
+            Err(TooMany) => wanted.coarsen(1),
+        }
+    }
 }
 
 /// The triangles that those of a refined mesh were cut from.
@@ -70,28 +103,103 @@ impl<'a> Origin<'a> {
     }
 }
 
-/// About how many triangles there are once the mesh is refined.
-pub(super) fn count_of_refined(mesh: &Mesh, length: f32, most: usize) -> usize {
-    let wanted = Wanted { mesh, length, coarser: 1.0 };
-    if wanted.are_small() { mesh.triangles.len() } else { wanted.affordable(most).1 as usize }
-}
-
-fn cut_all(fine: &mut Mesh, wanted: &Wanted) {
-    // Triangles before `settled` have no long edge.
-    let mut settled = 0;
-    loop {
-        slice_needles(fine, wanted, settled);
-        let mut marked = marked_edges(fine, wanted, settled);
-        if marked.is_empty() || fine.positions.len() + marked.len() > u32::MAX as usize {
-            return;
-        }
-        marked.par_sort_unstable();
-        marked.dedup();
-        settled = cut(fine, &marked, settled);
+/// How many triangles there are once the mesh is refined; about how many, where they are more than `room`.
+pub(super) fn count_of_refined(mesh: &Mesh, length: f32, most: usize, room: usize) -> usize {
+    let Mesh { positions, uvs, triangles, triangle_materials, materials, .. } = mesh;
+    let bare = Mesh {
+        positions: positions.clone(),
+        uvs: uvs.clone(),
+        triangles: triangles.clone(),
+        triangle_materials: triangle_materials.clone(),
+        materials: materials.clone(),
+        ..Mesh::default()
+    };
+    match refined(&bare, length, most, room) {
+        Ok(fine) => fine.unwrap_or(bare).triangles.len(),
+        Err(about) => about,
     }
 }
 
-impl Wanted<'_> {
+/// How many triangles there are once those of a mesh without texture are cut until no edge is longer than `length`; about how
+/// many, where they are more than `room`.
+pub(super) fn count_once_cut(mesh: &Mesh, length: f32, room: usize) -> usize {
+    count_of_refined(mesh, length, usize::MAX, room)
+}
+
+/// The length that edges without texture may have where there is a budget of triangles, which are no more already: `length`, or
+/// longer, as [`refine`] chooses it. `look` tells what a length leads to, `expected` how many triangles these are, about, and
+/// `fits` whether those that are really made keep to the budget.
+pub(super) fn affordable<S, E>(
+    length: f32,
+    budget: usize,
+    mut look: impl FnMut(f32) -> Result<S, E>,
+    expected: impl Fn(&S) -> f64,
+    mut fits: impl FnMut(&mut S, f32) -> bool,
+) -> Result<(f32, S), E> {
+    let mut taken = 0;
+    loop {
+        let length = length * coarser(taken).max(1.0);
+        let mut seen = look(length)?;
+        let expected = expected(&seen);
+        if expected > budget as f64 {
+            taken += steps(expected, budget);
+        } else if fits(&mut seen, length) {
+            return Ok((length, seen));
+        } else {
+            taken += 1;
+        }
+    }
+}
+
+/// A factor on lengths after so many steps.
+fn coarser(steps: i32) -> f32 {
+    STEP.powi(steps) as f32
+}
+
+/// How many steps longer edges have to be, where so many triangles are expected.
+fn steps(expected: f64, budget: usize) -> i32 {
+    let wanted = (expected / budget as f64).sqrt().ln() / STEP.ln();
+    wanted.ceil().clamp(1.0, 1e3) as i32
+}
+
+/// Cuts until every edge may stay.
+///
+/// # Errors
+/// [`TooMany`] for more than `most` triangles, before there are as many.
+fn cut_all(fine: &mut Mesh, wanted: &Wanted, most: usize) -> Result<(), TooMany> {
+    // Triangles before `settled` have no long edge.
+    let mut settled = 0;
+    loop {
+        slice_needles(fine, wanted, settled, most)?;
+        let mut marked = marked_edges(fine, wanted, settled);
+        if marked.is_empty() || fine.positions.len() + marked.len() > u32::MAX as usize {
+            return Ok(());
+        }
+        marked.par_sort_unstable();
+        marked.dedup();
+        settled = cut(fine, &marked, settled, most)?;
+    }
+}
+
+impl<'a> Wanted<'a> {
+    fn new(mesh: &'a Mesh, length: f32) -> Self {
+        let mut wanted = Self { mesh, asked: length, length, coarser: 1.0, steps: 0 };
+        wanted.coarsen(0);
+        wanted
+    }
+
+    fn is_textured(&self) -> bool {
+        !self.mesh.uvs.is_empty() && self.mesh.materials.iter().any(|material| material.texture.is_some())
+    }
+
+    /// Takes so many steps. Those of a texture's triangles come first, up to the length of others.
+    fn coarsen(&mut self, steps: i32) {
+        self.steps = self.steps.saturating_add(steps);
+        let first = if self.is_textured() { 1.0 } else { 1.0 / FINEST };
+        self.coarser = first * coarser(self.steps);
+        self.length = self.asked * (self.coarser * FINEST).max(1.0);
+    }
+
     /// The size of a texel along an edge, in texels: how long it is in its triangle's texture; 0 without one.
     fn texels(&self, mesh: &Mesh, source: usize, a: u32, b: u32) -> f32 {
         let material = self.mesh.triangle_materials.get(source).map(|&index| &self.mesh.materials[index as usize]);
@@ -140,28 +248,13 @@ impl Wanted<'_> {
         };
         self.mesh.triangles.par_iter().enumerate().map(parts).sum()
     }
-
-    /// What may stay so that there are no more than about `most` triangles, or than there are already; and about how many
-    /// there are then.
-    fn affordable(mut self, most: usize) -> (Self, f64) {
-        let length = self.length;
-        let budget = most.max(self.mesh.triangles.len()) as f64;
-        let mut expected = self.expected();
-        for _ in 0..8 {
-            if expected <= budget * 1.1 {
-                break;
-            }
-            // Slivers need fewer by the first power only; the next round corrects for them.
-            self.coarser *= (expected / budget).sqrt() as f32;
-            self.length = length * (self.coarser * FINEST).max(1.0);
-            expected = self.expected();
-        }
-        (self, expected)
-    }
 }
 
 /// About how many triangles are made of one whose edges are so many times too long.
 pub(super) fn pieces([p, q, r]: [f64; 3]) -> f64 {
+    if p.max(q).max(r) <= 1.0 {
+        return 1.0;
+    }
     // The triangle measured in the lengths that are wanted, by Heron; a cut leaves edges of about 0.7.
     let s = (p + q + r) * 0.5;
     let area = (s * (s - p) * (s - q) * (s - r)).max(0.0).sqrt();
@@ -172,26 +265,10 @@ pub(super) fn pieces([p, q, r]: [f64; 3]) -> f64 {
 fn most_pieces(mut edges: [f64; 3]) -> f64 {
     edges.sort_by(f64::total_cmp);
     let [short, middle, long] = edges;
-    (0.5 * short.max(1.0) * middle.max(1.0) / 0.21).max(long)
-}
-
-/// The length that edges without texture may have where there is a budget of triangles: `length`, or more where `expected`,
-/// which tells about how many a length leads to, is above it.
-pub(super) fn affordable<E>(
-    length: f32,
-    budget: f64,
-    mut expected: impl FnMut(f32) -> Result<f64, E>,
-) -> Result<f32, E> {
-    let (mut coarser, mut wanted) = (1.0f32, length);
-    for _ in 0..8 {
-        let count = expected(wanted)?;
-        if count <= budget * 1.1 {
-            break;
-        }
-        coarser *= (count / budget).sqrt() as f32;
-        wanted = length * (coarser * FINEST).max(1.0);
+    if long <= 1.0 {
+        return 1.0;
     }
-    Ok(wanted)
+    (0.5 * short.max(1.0) * middle.max(1.0) / 0.21).max(long)
 }
 
 /// A needle's corners from its tip on, and into how many parts its long edges are to be cut.
@@ -202,7 +279,10 @@ struct Needle {
 }
 
 /// Cuts the triangles with two long edges and a short one in slabs across, each as long as it may be.
-fn slice_needles(mesh: &mut Mesh, wanted: &Wanted, settled: usize) {
+///
+/// # Errors
+/// [`TooMany`] for more than `most` triangles, before there are as many.
+fn slice_needles(mesh: &mut Mesh, wanted: &Wanted, settled: usize, most: usize) -> Result<(), TooMany> {
     let needle = |(index, &t): (usize, &[u32; 3])| {
         let triangle = settled + index;
         let source = mesh.triangle_materials[triangle] as usize;
@@ -218,13 +298,21 @@ fn slice_needles(mesh: &mut Mesh, wanted: &Wanted, settled: usize) {
     };
     let needles: Vec<Needle> = mesh.triangles[settled..].par_iter().enumerate().filter_map(needle).collect();
     if needles.is_empty() {
-        return;
+        return Ok(());
     }
     // The long edges with the parts that the more demanding neighbour asks for, and where each one's new vertices begin.
     let mut edges: Vec<((u32, u32), u32)> =
         needles.iter().flat_map(|n| [1, 2].map(|i| (sorted((n.corners[0], n.corners[i])), n.parts))).collect();
     edges.par_sort_unstable_by_key(|&(edge, parts)| (edge, std::cmp::Reverse(parts)));
     edges.dedup_by_key(|&mut (edge, _)| edge);
+    let rank = |edge: (u32, u32)| edges.binary_search_by_key(&edge, |&(edge, _)| edge).unwrap_or(0);
+    let slabs = |needle: &Needle| {
+        let [tip, a, b] = needle.corners;
+        [a, b].map(|corner| u64::from(edges[rank(sorted((tip, corner)))].1) - 1).iter().sum::<u64>()
+    };
+    if mesh.triangles.len() as u64 + needles.iter().map(slabs).sum::<u64>() > most as u64 {
+        return Err(TooMany);
+    }
     let mut next = mesh.positions.len() as u64;
     let mut starts = Vec::with_capacity(edges.len());
     let mut new = Vec::new();
@@ -234,13 +322,13 @@ fn slice_needles(mesh: &mut Mesh, wanted: &Wanted, settled: usize) {
         new.extend((1..parts).map(|i| (a, b, i as f32 / parts as f32)));
     }
     if next > u64::from(u32::MAX) {
-        return;
+        return Ok(());
     }
     add_vertices(mesh, &new);
     // Vertex `i` of `parts` from `from` to `to`, and `parts`.
     let chain = |from: u32, to: u32| {
         let edge = sorted((from, to));
-        let rank = edges.binary_search_by_key(&edge, |&(edge, _)| edge).unwrap_or(0);
+        let rank = rank(edge);
         let (parts, start) = (edges[rank].1, starts[rank]);
         let vertex = move |i: u32| match i {
             0 => from,
@@ -270,6 +358,7 @@ fn slice_needles(mesh: &mut Mesh, wanted: &Wanted, settled: usize) {
             mesh.triangle_materials.push(source);
         }
     }
+    Ok(())
 }
 
 /// Every edge (smaller index first) that is too long for one of its triangles, possibly twice.
@@ -294,12 +383,19 @@ fn sorted((a, b): (u32, u32)) -> (u32, u32) {
 
 /// Halves the marked edges of the triangles from `settled` on. The triangles without any come first afterwards; gives
 /// the number of all that are settled.
-fn cut(mesh: &mut Mesh, marked: &[(u32, u32)], settled: usize) -> usize {
+///
+/// # Errors
+/// [`TooMany`] for more than `most` triangles, before there are as many.
+fn cut(mesh: &mut Mesh, marked: &[(u32, u32)], settled: usize, most: usize) -> Result<usize, TooMany> {
     let base = mesh.positions.len() as u32;
     let halves = |t: [u32; 3]| {
         [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]
             .map(|edge| marked.binary_search(&sorted(edge)).ok().map(|rank| base + rank as u32))
     };
+    let count = |&t: &[u32; 3]| 1 + halves(t).iter().flatten().count();
+    if settled + mesh.triangles[settled..].par_iter().map(count).sum::<usize>() > most {
+        return Err(TooMany);
+    }
     let middles: Vec<_> = marked.iter().map(|&(a, b)| (a, b, 0.5)).collect();
     add_vertices(mesh, &middles);
     let positions = &mesh.positions;
@@ -319,7 +415,7 @@ fn cut(mesh: &mut Mesh, marked: &[(u32, u32)], settled: usize) -> usize {
             now_settled = mesh.triangles.len();
         }
     }
-    now_settled
+    Ok(now_settled)
 }
 
 /// Appends vertices between pairs of others, each at a part of the way.
@@ -405,11 +501,21 @@ mod tests {
         assert!(refine(&mesh, 0.01, 1 << 20).mesh.triangles.len() < 400);
     }
 
+    /// Whatever the triangles are like, and however little there is too much of.
     #[test]
     fn the_budget_holds() {
-        let mesh = one(Vec3::new(0.3, 0.8, 0.0));
-        let count = refine(&mesh, 1e-4, 10_000).mesh.triangles.len();
-        assert!((2_000..40_000).contains(&count), "{count}");
+        let apexes = [[0.3, 0.8], [0.5, 0.87], [0.0, 1.0], [0.5, 0.01], [0.02, 0.5], [-3.0, 0.5], [0.9, 1e-4]];
+        let meshes = apexes.map(|[x, y]| one(Vec3::new(x, y, 0.0))).into_iter();
+        for (number, mesh) in meshes.chain([Mesh::sphere(2), Mesh::cube(1.0)]).enumerate() {
+            let most = 2_000 + mesh.triangles.len();
+            for length in [0.1, 0.05, 0.03, 0.025, 0.02, 0.015, 1e-2, 1e-3, 1e-4, 1e-9] {
+                let fine = refine(&mesh, length, most).mesh;
+                let count = fine.triangles.len();
+                assert!(count <= most && (length > 1e-3 || count > most / 6), "{number}, {length}: {count}");
+                assert_eq!(count_of_refined(&mesh, length, most, usize::MAX), count);
+                assert!(count_of_refined(&mesh, length, most, count - 1) >= count);
+            }
+        }
     }
 
     #[test]

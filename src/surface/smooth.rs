@@ -53,7 +53,6 @@ impl Groups {
 /// The normal that each triangle has at its corners: the file's at the vertex, or the mean of the corner's smooth group,
 /// weighted by angle. Triangles without area have their vertices' normals alone, or zero.
 pub(crate) fn corner_normals(mesh: &Mesh, crease_angle_degrees: f32) -> Vec<[Vec3; 3]> {
-    let given = |vertex: u32| mesh.normals.get(vertex as usize).filter(|normal| normal.length_squared() > 0.25);
     let adjacency = Connected::new(mesh, is_split(mesh)).adjacency;
     let own: Vec<Vec<(u32, Vec3)>> = (0..mesh.positions.len())
         .into_par_iter()
@@ -81,7 +80,7 @@ pub(crate) fn corner_normals(mesh: &Mesh, crease_angle_degrees: f32) -> Vec<[Vec
     if !mesh.normals.is_empty() {
         normals.par_iter_mut().zip(&mesh.triangles).for_each(|(normals, triangle)| {
             for (normal, &vertex) in normals.iter_mut().zip(triangle) {
-                *normal = given(vertex).map_or(*normal, |given| given.normalize());
+                *normal = mesh.given_normal(vertex as usize).unwrap_or(*normal);
             }
         });
     }

@@ -3,58 +3,9 @@
 //! A closed surface alone is not enough. Through a translucent front its back is seen; and where the normals of a part point
 //! into it, what faces away is its front. Which side of a part is out is told by the sign of the volume within.
 
-use super::{Mesh, fan::Sums, survey::Closing};
+use super::{Mesh, fan::Sums, mesh::given, parts::Joining, survey::Closing};
 use glam::Vec3;
 use rayon::prelude::*;
-use std::{
-    collections::HashMap,
-    sync::atomic::{AtomicU32, Ordering::Relaxed},
-};
-
-/// The connected parts of a mesh. Vertices are joined by any number of threads at once: each links to itself, or to one of a
-/// smaller index, and a link is only taken by whoever finds a root there still (Anderson & Woll 1991).
-pub(crate) struct Parts(Vec<AtomicU32>);
-
-impl Parts {
-    /// Each vertex is a part of its own.
-    pub fn new(vertices: u32) -> Self {
-        Self((0..vertices).into_par_iter().map(AtomicU32::new).collect())
-    }
-
-    /// The vertex of the smallest index in the part of this one, once all are joined.
-    pub fn of(&self, mut vertex: u32) -> u32 {
-        loop {
-            let above = self.0[vertex as usize].load(Relaxed);
-            if above == vertex {
-                return vertex;
-            }
-            let higher = self.0[above as usize].load(Relaxed);
-            if higher < above {
-                // Halves the way for the next time. It does no harm where another thread has done so.
-                self.0[vertex as usize].store(higher, Relaxed);
-            }
-            vertex = higher;
-        }
-    }
-
-    pub fn join(&self, [a, b, c]: [u32; 3]) {
-        self.join_two(a, b);
-        self.join_two(b, c);
-    }
-
-    fn join_two(&self, mut a: u32, mut b: u32) {
-        loop {
-            (a, b) = (self.of(a), self.of(b));
-            if a == b {
-                return;
-            }
-            let (low, high) = (a.min(b), a.max(b));
-            if self.0[high as usize].compare_exchange(high, low, Relaxed, Relaxed).is_ok() {
-                return;
-            }
-        }
-    }
-}
 
 /// Of the area of a part: so little of it may have normals on the wrong side. Scans have folds of a few triangles.
 const FOLDS: f64 = 1e-3;
@@ -74,12 +25,10 @@ struct Part {
 impl Part {
     /// Adds a triangle, with those normals that are given at its corners.
     fn add(&mut self, corners: [Vec3; 3], normals: [Option<Vec3>; 3]) {
-        self.sums.add_triangle(corners, 1.0);
+        let cross = self.sums.add_triangle(corners);
         if normals == [None; 3] {
             return;
         }
-        let [a, b, c] = corners.map(|corner| corner.as_dvec3());
-        let cross = (b - a).cross(c - a) * 0.5;
         let area = cross.length();
         let across = (cross / area).as_vec3();
         for normal in normals.into_iter().flatten() {
@@ -98,61 +47,69 @@ impl Part {
     }
 }
 
-/// The normal that a surfel takes from its vertex.
-fn given(normal: Vec3) -> Option<Vec3> {
-    Some(normal).filter(|normal| normal.length_squared() > 0.25)?.try_normalize()
-}
-
-/// The parts of a mesh, as its triangles tell of them. Two halves add up.
+/// What some triangles tell of the parts that they are of.
 #[derive(Debug, Default)]
-pub(crate) struct Sides {
-    parts: HashMap<u32, Part>,
-    /// The part of the triangles that came last.
-    last: (u32, Part),
+pub(crate) struct Told {
+    /// Those of one part that came after each other are together.
+    runs: Vec<(u32, Part)>,
     is_translucent: bool,
     /// Whether a corner has no normal of its own.
     lacks_normals: bool,
 }
 
-impl Sides {
+impl Told {
     /// Adds a triangle of a part; normals of no length are none.
     pub fn add(&mut self, part: u32, corners: [Vec3; 3], normals: [Vec3; 3], is_opaque: bool) {
         self.is_translucent |= !is_opaque;
         let normals = normals.map(given);
         self.lacks_normals |= normals.contains(&None);
-        if part != self.last.0 {
-            self.put_last();
-            self.last.0 = part;
+        match self.runs.last_mut() {
+            Some((last, run)) if *last == part => run.add(corners, normals),
+            _ => {
+                let mut run = Part::default();
+                run.add(corners, normals);
+                self.runs.push((part, run));
+            }
         }
-        self.last.1.add(corners, normals);
+    }
+}
+
+/// The parts of a mesh, as its triangles tell of them.
+#[derive(Debug)]
+pub(crate) struct Sides {
+    parts: Vec<Part>,
+    is_translucent: bool,
+    lacks_normals: bool,
+}
+
+impl Sides {
+    /// Bytes of so many parts.
+    pub fn memory(parts: usize) -> u64 {
+        (parts * size_of::<Part>()) as u64
     }
 
-    fn put_last(&mut self) {
-        let (part, sums) = std::mem::take(&mut self.last);
-        let found = self.parts.entry(part).or_default();
-        *found = found.with(sums);
+    /// So many parts, of which nothing is known.
+    pub fn new(parts: usize) -> Self {
+        Self { parts: vec![Part::default(); parts], is_translucent: false, lacks_normals: false }
     }
 
-    pub fn join(&mut self, mut other: Self) {
-        self.put_last();
-        other.put_last();
-        self.is_translucent |= other.is_translucent;
-        self.lacks_normals |= other.lacks_normals;
-        for (part, sums) in other.parts {
-            let found = self.parts.entry(part).or_default();
-            *found = found.with(sums);
+    pub fn add(&mut self, told: Told) {
+        self.is_translucent |= told.is_translucent;
+        self.lacks_normals |= told.lacks_normals;
+        for (part, run) in told.runs {
+            let part = &mut self.parts[part as usize];
+            *part = part.with(run);
         }
     }
 
     /// Whether all that was added is opaque, and shows its front to whoever is outside. A hollow within a part is one that
     /// shows its back: it cannot be told from a part beside the others that is inside out.
-    pub fn are_solid(mut self) -> bool {
-        self.put_last();
+    pub fn are_solid(&self) -> bool {
         // Normals that the file does not give are turned as a whole.
-        let all = self.parts.values().fold(Sums::default(), |sums, part| sums.with(part.sums));
+        let all = self.parts.iter().fold(Sums::default(), |sums, part| sums.with(part.sums));
         let turned = if all.side(1.0) < 0 { -1 } else { 1 };
         !self.is_translucent
-            && self.parts.values().all(|part| {
+            && self.parts.iter().all(|part| {
                 let side = part.sums.side_of_closed();
                 let wrong = if side < 0 { part.along } else { part.against };
                 // A part without a volume has no side, and one without an area does not matter.
@@ -162,38 +119,50 @@ impl Sides {
     }
 }
 
+/// Triangles of one parallel task, and tasks whose sums wait for each other.
+const CHUNK: usize = 1 << 14;
+const TOGETHER: usize = 64;
+
+/// What vertices have of which the mesh tells no normal or colour.
+const NO_DIRECTION: Vec3 = Vec3::ZERO;
+const OPAQUE: u8 = 255;
+
 impl Mesh {
     /// Whether whoever is outside sees the front of it alone, as [`Tree::closed`](crate::hierarchy::Tree::closed) promises: it
     /// [is closed](Self::is_closed), opaque everywhere, and the normals of its surfels point out of every connected part.
-    /// Where a part has a hollow within, or no volume, the answer is no. Parts that share a vertex are one.
+    /// Where a part has a hollow within, or no volume, the answer is no. Parts that share an edge are one.
     pub fn is_solid(&self) -> bool {
         let Some(closing) = self.closing() else { return false };
-        if !self.has_opaque_materials() {
+        if !self.has_opaque_materials() || u32::try_from(self.triangles.len()).is_err() {
             return false;
         }
         let name = |vertex: u32| match &closing {
             Closing::Vertices => vertex,
             Closing::Places(first) => first[vertex as usize],
         };
-        let parts = Parts::new(self.positions.len() as u32);
-        self.triangles.par_iter().for_each(|triangle| parts.join(triangle.map(name)));
-        let none = (Vec3::ZERO, 255);
-        let sides = self.triangles.par_chunks(1 << 14).map(|triangles| {
-            let mut sides = Sides::default();
-            for triangle in triangles {
+        let chunks: Vec<(usize, &[[u32; 3]])> = self.triangles.chunks(CHUNK).enumerate().collect();
+        let joining = Joining::new(self.triangles.len());
+        let open =
+            chunks.par_iter().flat_map_iter(|(chunk, triangles)| joining.add((chunk * CHUNK) as u32, triangles, name));
+        let open = open.collect();
+        let parts = joining.parts(open);
+        let told = |(chunk, triangles): (usize, &[[u32; 3]])| {
+            let mut told = Told::default();
+            for (number, triangle) in (chunk * CHUNK..).zip(triangles) {
                 let at = triangle.map(|vertex| vertex as usize);
-                let normals = at.map(|vertex| self.normals.get(vertex).copied().unwrap_or(none.0));
+                let normals = at.map(|vertex| self.normals.get(vertex).copied().unwrap_or(NO_DIRECTION));
                 let is_opaque =
-                    at.iter().all(|&vertex| self.colors.get(vertex).map_or(none.1, |color| color[3]) == 255);
-                sides.add(parts.of(name(triangle[0])), at.map(|vertex| self.positions[vertex]), normals, is_opaque);
+                    at.iter().all(|&vertex| self.colors.get(vertex).map_or(OPAQUE, |color| color[3]) == OPAQUE);
+                told.add(parts.of(number), at.map(|vertex| self.positions[vertex]), normals, is_opaque);
             }
-            sides
-        });
-        let join = |mut sides: Sides, more| {
-            sides.join(more);
-            sides
+            told
         };
-        sides.reduce(Sides::default, join).are_solid()
+        let mut sides = Sides::new(parts.count());
+        for few in chunks.chunks(TOGETHER) {
+            let all: Vec<Told> = few.par_iter().copied().map(told).collect();
+            all.into_iter().for_each(|told| sides.add(told));
+        }
+        sides.are_solid()
     }
 
     /// Whether the materials that triangles have let nothing through.
@@ -239,6 +208,16 @@ mod tests {
         mesh
     }
 
+    /// With vertices of their own for all triangles.
+    fn split(mesh: &Mesh) -> Mesh {
+        let corners = mesh.triangles.iter().flatten();
+        Mesh {
+            positions: corners.map(|&corner| mesh.positions[corner as usize]).collect(),
+            triangles: (0..mesh.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+            ..Mesh::default()
+        }
+    }
+
     /// With the normals of a sphere around a place, or the opposite.
     fn with_normals(mut mesh: Mesh, center: f32, sign: f32) -> Mesh {
         mesh.normals = mesh.positions.iter().map(|place| (place - Vec3::X * center).normalize() * sign).collect();
@@ -260,14 +239,33 @@ mod tests {
         assert!(!both(sphere(0.0), turned(sphere(5.0))).is_solid());
         assert!(!both(turned(sphere(5.0)), sphere(0.0)).is_solid());
         // Of vertices of their own, too.
-        let parts = both(sphere(0.0), turned(sphere(5.0)));
-        let corners: Vec<u32> = parts.triangles.iter().flatten().copied().collect();
-        let split = Mesh {
-            positions: corners.iter().map(|&corner| parts.positions[corner as usize]).collect(),
-            triangles: (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
-            ..Mesh::default()
-        };
+        let split = split(&both(sphere(0.0), turned(sphere(5.0))));
         assert!(split.is_closed() && !split.is_solid());
+    }
+
+    /// One beside the other, with the vertex that is farthest along x of the one in the place of the other's first one.
+    fn hanging(one: Mesh, mut other: Mesh) -> Mesh {
+        let farthest = |mesh: &Mesh, sign: f32| {
+            let along = |vertex: &u32| mesh.positions[*vertex as usize].x * sign;
+            (0..mesh.positions.len() as u32).max_by(|a, b| along(a).total_cmp(&along(b))).expect("a vertex")
+        };
+        let (shared, hung, count) = (farthest(&one, 1.0), farthest(&other, -1.0), one.positions.len() as u32);
+        let shift = one.positions[shared as usize] - other.positions[hung as usize];
+        other.positions.iter_mut().for_each(|place| *place += shift);
+        let mut both = both(one, other);
+        let join = |vertex: u32| if vertex == count + hung { shared } else { vertex };
+        both.triangles.iter_mut().for_each(|triangle| *triangle = triangle.map(join));
+        both
+    }
+
+    /// As one part the larger would hide that the smaller is inside out.
+    #[test]
+    fn parts_that_share_a_vertex_are_told_apart() {
+        let small = || Mesh { positions: sphere(0.0).positions.iter().map(|p| *p * 0.5).collect(), ..sphere(0.0) };
+        assert!(hanging(sphere(0.0), small()).is_solid());
+        let hidden = hanging(sphere(0.0), turned(small()));
+        assert!(hidden.is_closed() && !hidden.is_solid());
+        assert!(!split(&hidden).is_solid() && split(&hanging(sphere(0.0), small())).is_solid());
     }
 
     #[test]
@@ -321,14 +319,5 @@ mod tests {
             mesh.materials = vec![material(opacity, alpha), material(0.0, 0)];
             assert_eq!(mesh.is_solid(), is_solid, "{opacity} {alpha}");
         }
-    }
-
-    #[test]
-    fn parts_are_those_of_one_thread() {
-        let mesh = (0..40).map(|i| sphere(3.0 * i as f32)).reduce(both).unwrap_or_default();
-        let parts = Parts::new(mesh.positions.len() as u32);
-        mesh.triangles.par_iter().rev().for_each(|&triangle| parts.join(triangle));
-        let per_sphere = mesh.positions.len() as u32 / 40;
-        assert!((0..mesh.positions.len() as u32).all(|vertex| parts.of(vertex) == vertex / per_sphere * per_sphere));
     }
 }

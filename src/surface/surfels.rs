@@ -32,13 +32,15 @@ pub struct SurfelOptions {
     pub crease_angle_degrees: f32,
     /// Triangles are cut until no edge is longer than this part of the bounding box's diagonal.
     pub largest_spacing: f32,
-    /// About the most triangles that cutting may lead to; spacing grows to keep to it.
+    /// The most triangles that cutting may lead to, where there are not more already; spacing grows to keep to it.
     pub most_triangles: usize,
 }
 
 impl SurfelOptions {
     /// Factors on radii that leave squares in 32 bits.
     pub const RADIUS_SCALES: RangeInclusive<f32> = 1e-6..=1e6;
+    /// Parts of the diagonal whose edges can be cut: in finer ones its fourth power does not fit 32 bits. None is cut from 1 on.
+    pub const SPACINGS: RangeInclusive<f32> = 1e-9..=f32::MAX;
 }
 
 impl Default for SurfelOptions {
@@ -70,8 +72,10 @@ impl Mesh {
     /// nothing; nor do points that coincide with another.
     ///
     /// # Errors
-    /// [`Error::NothingToDraw`] where nothing is left; [`Error::Argument`] for options that are no positive numbers and
-    /// for a mesh whose indices or attributes do not fit its positions.
+    /// [`Error::NothingToDraw`] where nothing is left; [`Error::Argument`] for options that are no positive numbers, or beyond
+    /// [`RADIUS_SCALES`](SurfelOptions::RADIUS_SCALES), [`SPACINGS`](SurfelOptions::SPACINGS) and
+    /// [`MOST_OPTICAL_DEPTH`](Splat::MOST_OPTICAL_DEPTH), and for a mesh whose origin or positions are not finite, or whose
+    /// indices or attributes do not fit its positions.
     pub fn surfels(&self, options: &SurfelOptions) -> Result<SplatSet> {
         let _span = tracing::info_span!("surfels").entered();
         self.check(options)?;
@@ -87,6 +91,11 @@ impl Mesh {
     /// The smallest and the largest world coordinates of what is drawn: of the corners of all triangles, or of all positions
     /// where there are none; `None` where there is nothing.
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        Some(self.local_bounds()?.map(|corner| self.origin + corner.as_dvec3()))
+    }
+
+    /// As [`bounds`](Self::bounds), relative to the origin: beside one that is far away nothing might be left of their size.
+    fn local_bounds(&self) -> Option<[Vec3; 2]> {
         let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let with = |(low, high): (Vec3, Vec3), place: &Vec3| (low.min(*place), high.max(*place));
         let union = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
@@ -97,16 +106,27 @@ impl Mesh {
             let triangles = self.triangles.par_iter();
             triangles.fold(none, |all, t| places(t).into_iter().flatten().fold(all, with)).reduce(none, union)
         };
-        low.cmple(high).all().then(|| [self.origin + low.as_dvec3(), self.origin + high.as_dvec3()])
+        low.cmple(high).all().then_some([low, high])
     }
 
-    /// About how many triangles surfels are made of, once large ones are cut; 0 where a triangle refers beyond the positions.
-    pub fn triangles_once_cut(&self, options: &SurfelOptions) -> usize {
+    /// The area of all triangles, which must not refer beyond the positions.
+    fn area(&self) -> f64 {
+        let area = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|vertex| self.positions[vertex as usize].as_dvec3());
+            (b - a).cross(c - a).length() * 0.5
+        };
+        self.triangles.par_iter().with_min_len(CHUNK).map(area).sum()
+    }
+
+    /// How many triangles surfels are made of, once large ones are cut; about how many, where they are more than there is
+    /// `room` for, which takes no more memory to find out. 0 where a triangle refers beyond the positions.
+    pub fn triangles_once_cut(&self, options: &SurfelOptions, room: usize) -> usize {
         if self.check(options).is_err() {
             return 0;
         }
-        let length = |[low, high]: [DVec3; 2]| largest_edge((high - low).length() as f32, options);
-        self.bounds().map_or(0, |bounds| count_of_refined(self, length(bounds), options.most_triangles))
+        let count =
+            |bounds| count_of_refined(self, largest_edge(bounds, self.area(), options), options.most_triangles, room);
+        self.local_bounds().map_or(0, count)
     }
 
     pub(super) fn check(&self, options: &SurfelOptions) -> Result<()> {
@@ -121,11 +141,23 @@ impl Mesh {
                 return Err(Error::Argument(format!("{name} is {value}; a positive number is needed")));
             }
         }
-        let scales = SurfelOptions::RADIUS_SCALES;
-        if !scales.contains(&options.radius_scale) {
-            let (least, most) = (scales.start(), scales.end());
-            let message = format!("radius_scale is {:e}; {least:e} to {most:e} can be", options.radius_scale);
-            return Err(Error::Argument(message));
+        for (name, value, range) in [
+            ("radius_scale", options.radius_scale, SurfelOptions::RADIUS_SCALES),
+            ("largest_spacing", options.largest_spacing, SurfelOptions::SPACINGS),
+            ("optical_depth", options.optical_depth, 0.0..=Splat::MOST_OPTICAL_DEPTH),
+        ] {
+            if !range.contains(&value) {
+                let (least, most) = (range.start(), range.end());
+                return Err(Error::Argument(format!("{name} is {value:e}; {least:e} to {most:e} can be")));
+            }
+        }
+        self.validate()
+    }
+
+    /// Refuses a mesh that was put together by hand and contradicts itself, or whose places are not finite.
+    pub(crate) fn validate(&self) -> Result<()> {
+        if !self.origin.is_finite() {
+            return Err(Error::Argument(format!("the origin {} of the mesh is not finite", self.origin)));
         }
         let count = self.positions.len();
         for (name, length, wanted) in [
@@ -162,14 +194,23 @@ impl Mesh {
     }
 }
 
-/// The longest edge that may stay in a mesh of this size.
-pub(super) fn largest_edge(diagonal: f32, options: &SurfelOptions) -> f32 {
-    (diagonal * options.largest_spacing).max(f32::MIN_POSITIVE)
+/// A mesh that is longer than so many times the root of its area counts as no longer: a triangle or two lie far from all others,
+/// which would be no more than points beside the whole.
+const LONGEST: f64 = 1024.0;
+
+/// The longest edge that may stay in a mesh of this area between these places, which are relative to its origin.
+pub(super) fn largest_edge([low, high]: [Vec3; 2], area: f64, options: &SurfelOptions) -> f32 {
+    // In 64 bits squares of the smallest are not lost.
+    let diagonal = (high.as_dvec3() - low.as_dvec3()).length();
+    // Whoever adds up the area in another order finds the same power of two.
+    let longest = if area > 0.0 { area.sqrt().log2().ceil().exp2() * LONGEST } else { f64::INFINITY };
+    // No edge is longer than the diagonal: a longer one would only be a unit that is too coarse for them.
+    (diagonal.min(longest) as f32 * options.largest_spacing.min(1.0)).max(f32::MIN_POSITIVE)
 }
 
 fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
-    let Some([low, high]) = mesh.bounds() else { return Vec::new() };
-    let largest = largest_edge((high - low).length() as f32, options);
+    let Some(bounds) = mesh.local_bounds() else { return Vec::new() };
+    let largest = largest_edge(bounds, mesh.area(), options);
     // Most large meshes are fine enough, and right side out. One look at the triangles finds that out and makes the surfels.
     let parts = make(mesh, None, is_split(mesh), options, [largest, 1.0], |_| true);
     let is_coarse = parts.iter().any(|part| part.longest > 1.0);

@@ -82,7 +82,7 @@ pub fn distribute<'a>(
         let total = input.stream.counts().triangles;
         let mut done = 0;
         input.stream.triangles(
-            |found| (triangle_shares(&input, found), found.len() as u64),
+            |_, found| (triangle_shares(&input, found), found.len() as u64),
             |((corners, foreign), seen)| {
                 done += seen;
                 watch(Stage::Distributing, done, total);

@@ -1,14 +1,18 @@
 //! How much memory conversions take.
 
-use super::{ExternalOptions, survey::look};
+use super::{ExternalOptions, Stage, StageWatch, survey::look};
 use crate::{
     Error, Result,
-    io::{Counts, Stream},
+    io::{Counts, Limits, Stream},
+    splat::Splat,
     surface::{Mesh, MeshPieces, SurfelOptions, Triangles},
 };
+use std::path::PathBuf;
 
 /// What blocks at work take, and what a conversion in regions takes in any case.
-const BLOCKS: u64 = 200 << 20;
+pub const BLOCKS: u64 = 200 << 20;
+/// What each triangle takes that cutting adds, with three quarters of a vertex.
+const OF_CUT: u64 = 131;
 
 /// About how many bytes making a hierarchy takes where all is in memory: of a mesh its arrays, which corners meet at its
 /// vertices, and splats in parts and as a whole; of a cloud its arrays, the tree that finds neighbours, what is found of them,
@@ -17,59 +21,96 @@ fn of_counts(counts: Counts) -> u64 {
     if counts.triangles > 0 { 140 * counts.points + 26 * counts.triangles } else { 330 * counts.points }
 }
 
-/// The counts once triangles are cut to about so many: where none are neighbours, each is cut with corners of its own.
+/// The counts once triangles are cut to so many: where none are neighbours, each is cut with corners of its own.
 fn once_cut(counts: Counts, triangles: u64) -> Counts {
     let more = triangles.saturating_sub(counts.triangles);
-    Counts { points: counts.points + more / 4 * 3, triangles: counts.triangles + more }
+    Counts { points: counts.points + more.div_ceil(4) * 3, triangles: counts.triangles + more }
 }
 
-/// Whether the counts tell by themselves if that is more than `enough`.
-fn is_clear(counts: Counts, options: &SurfelOptions, enough: u64) -> bool {
-    let need = |triangles: u64| of_counts(once_cut(counts, triangles));
-    counts.triangles == 0 || need(0) > enough || need(options.most_triangles as u64) <= enough
+/// How many triangles there may be, once they are cut, where so many bytes are to suffice.
+fn room(counts: Counts, bytes: u64) -> usize {
+    let spare = bytes.saturating_sub(of_counts(counts));
+    usize::try_from(counts.triangles + spare / OF_CUT).unwrap_or(usize::MAX)
 }
 
-/// About how many bytes making a hierarchy of a mesh or cloud takes, but for the blocks at work; less where that is not more
+/// Between what lies how many bytes making a hierarchy takes of what has these counts, where all of it is in memory: without any
+/// triangle cut, and with as many as cutting may lead to.
+pub fn memory_between(counts: Counts, options: &SurfelOptions) -> [u64; 2] {
+    let most = if counts.triangles == 0 { 0 } else { options.most_triangles as u64 };
+    [0, most].map(|triangles| of_counts(once_cut(counts, triangles)))
+}
+
+/// About how many bytes splats take from when they are gathered until a hierarchy is made of them: twice their own, for a list of
+/// them that grows moves.
+pub fn memory_of_splats(splats: usize) -> u64 {
+    (2 * size_of::<Splat>() * splats) as u64
+}
+
+/// About how many bytes making a hierarchy of a mesh or cloud takes, but for the [`BLOCKS`] at work; less where that is not more
 /// than `enough` anyway.
 pub fn memory_of_mesh(mesh: &Mesh, options: &SurfelOptions, enough: u64) -> u64 {
     let counts = Counts { points: mesh.positions.len() as u64, triangles: mesh.triangles.len() as u64 };
-    let is_clear = is_clear(counts, options, enough);
-    of_counts(once_cut(counts, if is_clear { 0 } else { mesh.triangles_once_cut(options) as u64 }))
+    let [least, most] = memory_between(counts, options);
+    if least > enough || most <= enough {
+        return least;
+    }
+    of_counts(once_cut(counts, mesh.triangles_once_cut(options, room(counts, enough)) as u64))
 }
 
-/// About how many bytes making a hierarchy of a file takes where all of it is in memory. Where it depends on how many triangles
-/// are cut whether that is more than `enough`, the file is looked through.
+/// About how many bytes making a hierarchy of a file takes where all of it is in memory, but for the [`BLOCKS`] at work: it is
+/// looked through for triangles that are cut. Where it is more than `enough`, it may be more than what is told.
 ///
 /// # Errors
 /// Those of reading the file.
 pub fn memory_of_stream(stream: &mut Stream, options: &SurfelOptions, enough: u64) -> Result<u64> {
-    let counts = stream.counts();
-    let need = |triangles: u64| BLOCKS + of_counts(once_cut(counts, triangles));
-    if is_clear(counts, options, enough.saturating_sub(BLOCKS)) {
-        return Ok(need(0));
-    }
     stream.settle(&|_| ())?;
-    let (_, seen) = look(stream, options, &|_, _, _| ())?;
-    Ok(need(seen.expected as u64))
+    let counts = stream.counts();
+    if counts.triangles == 0 {
+        return Ok(of_counts(counts));
+    }
+    let (_, seen) = look(stream, options, room(counts, enough), &|_, _, _| ())?;
+    let others = counts.triangles.saturating_sub(seen.long.len() as u64);
+    Ok(of_counts(once_cut(counts, others + seen.cut as u64)))
 }
 
-/// Refuses a mesh whose long triangles are too many to be cut together.
-pub(super) fn check_long(
+/// Looks at the triangles of a mesh that is converted in regions, and refuses one whose long triangles are too many to be cut
+/// together.
+pub(super) fn look_at_long(
     stream: &Stream,
-    pieces: &MeshPieces,
-    seen: &Triangles,
     options: &ExternalOptions,
-) -> Result<()> {
-    let triangles = seen.expected_of_long as u64;
-    let need = of_counts(once_cut(Counts { points: 0, triangles: 0 }, triangles));
-    if need <= options.memory.max(BLOCKS) {
-        return Ok(());
+    watch: StageWatch<'_>,
+) -> Result<(MeshPieces, Triangles)> {
+    let most = options.memory.max(BLOCKS);
+    let none = Counts { points: 0, triangles: 0 };
+    let room = usize::try_from(stream.counts().triangles).unwrap_or(usize::MAX).saturating_add(room(none, most));
+    let (pieces, seen) = look(stream, &options.surfels, room, watch)?;
+    let need = |triangles: u64| of_counts(once_cut(none, triangles));
+    if need(seen.cut as u64) <= most {
+        return Ok((pieces, seen));
     }
-    let [count, mib] = [seen.long.len() as u64 / 3, need >> 20];
+    let [count, mib] = [seen.long.len() as u64, need(seen.cut as u64) >> 20];
     let message = format!(
-        "{count} of them have edges longer than {:e}, and are cut into about {triangles} together, which takes about {mib} MiB",
-        pieces.length
+        "{count} of them have edges longer than {:e}, and are cut into about {} together, which takes about {mib} MiB",
+        pieces.length, seen.cut
     );
     let error: Error = stream.error("triangles", message);
     Err(error.hint("allow more memory"))
+}
+
+/// Refuses files as [`convert`](super::convert) does before it writes anything, as far as their headers, places and triangles
+/// tell.
+///
+/// # Errors
+/// Those of [`Stream::open`] and of reading on, and [`Error::Input`] for a mesh of so many long triangles, which are cut
+/// together, that the memory does not suffice.
+pub fn check(files: &[PathBuf], limits: &Limits, options: &ExternalOptions, watch: StageWatch<'_>) -> Result<()> {
+    for file in files {
+        let Some(mut stream) = Stream::open(file, limits)? else { continue };
+        let points = stream.counts().points;
+        stream.settle(&|done| watch(Stage::Reading, done, points))?;
+        if stream.counts().triangles > 0 {
+            look_at_long(&stream, options, watch)?;
+        }
+    }
+    Ok(())
 }

@@ -26,7 +26,7 @@ use crate::{
 };
 use std::path::{Path, PathBuf};
 
-pub use memory::{memory_of_mesh, memory_of_stream};
+pub use memory::{BLOCKS, check, memory_between, memory_of_mesh, memory_of_splats, memory_of_stream};
 
 /// What is at work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,67 +3,70 @@
 use super::{Stage, StageWatch};
 use crate::{
     Result,
-    io::Stream,
+    io::{Counts, Stream},
     math::weld::first_of_equals,
-    surface::{Parts, PiecesClosing, Sides},
+    surface::{Joining, PiecesClosing, Sides, Told},
 };
 use glam::Vec3;
 
 /// Bytes that are taken in any case.
 const LEAST_MEMORY: u64 = 32 << 20;
-/// Bytes of a vertex: which part it is in; and, where those at one place are one, the places, their order and the first ones.
-const OF_PART: u64 = 4;
+/// Bytes of a vertex where those at one place are one: the places, their order and the first ones.
 const OF_PLACE: u64 = 24;
 
 /// As [`Mesh::is_solid`](crate::surface::Mesh::is_solid), of a mesh that is closed this way. Where half of `memory` does not
-/// hold what names the parts of its vertices, the answer is no: then nothing is left out of pictures.
+/// hold what joins its triangles to parts, and what is known of each part, the answer is no: then nothing is left out of
+/// pictures.
 pub fn is_solid(stream: &Stream, closing: PiecesClosing, memory: u64, watch: StageWatch<'_>) -> Result<bool> {
-    let points = stream.counts().points;
-    let need = points * if closing == PiecesClosing::Places { OF_PART + OF_PLACE } else { OF_PART };
-    if need > (memory / 2).max(LEAST_MEMORY) {
-        tracing::info!(need, "too little memory to tell whether all parts are turned outward: backs will be drawn");
-        return Ok(false);
-    }
-    let first = match closing {
-        PiecesClosing::Vertices => None,
-        PiecesClosing::Places => {
-            let mut places = Vec::with_capacity(points as usize);
-            stream.points(
-                |points| points.iter().map(|point| Vec3::from(point.position)).collect::<Vec<_>>(),
-                |more| {
-                    places.extend(more);
-                    Ok(())
-                },
-            )?;
-            Some(first_of_equals(&places))
-        }
+    let Counts { points, triangles } = stream.counts();
+    let is_by_place = closing == PiecesClosing::Places;
+    let of_places = if is_by_place { OF_PLACE * points } else { 0 };
+    let fits = |more: u64| of_places + more <= (memory / 2).max(LEAST_MEMORY);
+    let give_up = || {
+        tracing::info!("too little memory to tell whether all parts are turned outward: backs will be drawn");
+        Ok(false)
     };
+    if !fits(Joining::memory(triangles, 0)) || u32::try_from(triangles).is_err() {
+        return give_up();
+    }
+    let first = if is_by_place { Some(first_of_equals(&places(stream)?)) } else { None };
     let name = |vertex: u32| first.as_ref().map_or(vertex, |first| first[vertex as usize]);
-    let parts = Parts::new(points as u32);
-    let mut seen = Seen { done: 0, of: stream.counts().triangles, watch };
+    let mut seen = Seen { done: 0, of: triangles, watch };
+    let joining = Joining::new(triangles as usize);
+    let (mut open, mut count) = (Vec::new(), 0);
     stream.triangles(
-        |triangles| {
-            triangles.iter().for_each(|triangle| parts.join(triangle.map(name)));
-            triangles.len()
+        |first, found| (joining.add(first as u32, found, name), found.len()),
+        |(more, found)| {
+            count += more.len() as u64;
+            if fits(Joining::memory(triangles, count)) {
+                open.extend(more);
+            }
+            seen.add(found)
         },
-        |count| seen.add(count),
     )?;
-    let mut sides = Sides::default();
+    if !fits(Joining::memory(triangles, count)) {
+        return give_up();
+    }
+    let parts = joining.parts(open);
+    if !fits(Joining::memory(triangles, 0) + Sides::memory(parts.count())) {
+        return give_up();
+    }
     seen.done = 0;
+    let mut sides = Sides::new(parts.count());
     stream.triangles(
-        |triangles| {
-            let mut sides = Sides::default();
-            for &triangle in triangles {
+        |first, triangles| {
+            let mut told = Told::default();
+            for (number, triangle) in (first..).zip(triangles) {
                 let corners = triangle.map(|vertex| stream.vertex(vertex));
                 let is_opaque = corners.iter().all(|corner| corner.color[3] == 255);
                 let [places, normals] =
                     [corners.map(|corner| corner.position.into()), corners.map(|corner| corner.normal.into())];
-                sides.add(parts.of(name(triangle[0])), places, normals, is_opaque);
+                told.add(parts.of(number), places, normals, is_opaque);
             }
-            (sides, triangles.len())
+            (told, triangles.len())
         },
-        |(more, count)| {
-            sides.join(more);
+        |(told, count)| {
+            sides.add(told);
             seen.add(count)
         },
     )?;
@@ -82,5 +85,61 @@ impl Seen<'_> {
         self.done += count as u64;
         (self.watch)(Stage::Reading, self.done, self.of);
         Ok(())
+    }
+}
+
+/// The places of all vertices.
+fn places(stream: &Stream) -> Result<Vec<Vec3>> {
+    let mut places = Vec::with_capacity(stream.counts().points as usize);
+    stream.points(
+        |points| points.iter().map(|point| Vec3::from(point.position)).collect::<Vec<_>>(),
+        |more| {
+            places.extend(more);
+            Ok(())
+        },
+    )?;
+    Ok(places)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::{Limits, testing::Folder};
+
+    /// Tetrahedra side by side, none of which shares a vertex, as a binary PLY file.
+    fn tetrahedra(count: u32) -> Vec<u8> {
+        let mut out = format!("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", 4 * count);
+        ["x", "y", "z"].iter().for_each(|axis| out += &format!("property float {axis}\n"));
+        out += &format!("element face {}\nproperty list uchar int vertex_indices\nend_header\n", 4 * count);
+        let mut out = out.into_bytes();
+        for i in 0..count {
+            let place = Vec3::new((i % 500) as f32, (i / 500) as f32, 0.0);
+            for corner in [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z] {
+                (place + corner * 0.5).to_array().iter().for_each(|value| out.extend(value.to_le_bytes()));
+            }
+        }
+        for first in (0..count).map(|i| 4 * i) {
+            for triangle in [[0u32, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]] {
+                out.push(3);
+                triangle.iter().for_each(|corner| out.extend((first + corner).to_le_bytes()));
+            }
+        }
+        out
+    }
+
+    /// Triangles alone fit in what is taken in any case, but not what is known of each part.
+    #[test]
+    fn parts_that_take_too_much_memory_are_not_solid() {
+        let folder = Folder::new();
+        let count = 360_000;
+        let path = folder.write("parts.ply", tetrahedra(count as u32));
+        let limits = Limits::default();
+        let mut stream = Stream::open(&path, &limits).unwrap().unwrap();
+        stream.settle(&|_| ()).unwrap();
+        let solid = |memory| is_solid(&stream, PiecesClosing::Vertices, memory, &|_, _, _| ()).unwrap();
+        let triangles = Joining::memory(4 * count, 0);
+        let need = triangles + Sides::memory(count as usize);
+        assert!(2 * triangles < LEAST_MEMORY);
+        assert_eq!([0, 2 * need - 1, 2 * need].map(solid), [false, false, true]);
     }
 }

@@ -6,7 +6,7 @@ use super::{
         sphere::{DIRECTIONS, Sphere},
     },
     ExternalOptions, Stage, StageWatch,
-    memory::check_long,
+    memory::look_at_long,
     regions::Regions,
     solid::is_solid,
 };
@@ -89,15 +89,20 @@ pub fn survey<'a>(
     Ok(Surveyed { core: extremes.core(), stream, regions, center, mesh })
 }
 
-/// Goes through the triangles until it is known which of them are cut.
-pub fn look(stream: &Stream, options: &SurfelOptions, watch: StageWatch<'_>) -> Result<(MeshPieces, Triangles)> {
-    let (counts, origin) = (stream.counts(), stream.origin());
-    let [low, high] = stream.bounds().map(|corner| origin + corner.as_dvec3());
+/// Goes through the triangles until it is known which of them are cut, and into how many; no farther than there is `room` for so
+/// many triangles.
+pub fn look(
+    stream: &Stream,
+    options: &SurfelOptions,
+    room: usize,
+    watch: StageWatch<'_>,
+) -> Result<(MeshPieces, Triangles)> {
+    let counts = stream.counts();
     let look = |length: f32| {
         let mut seen = Triangles::default();
         let mut done = 0;
         stream.triangles(
-            |triangles| {
+            |_, triangles| {
                 let mut seen = Triangles::default();
                 for &triangle in triangles {
                     seen.add(triangle, triangle.map(|vertex| stream.position(vertex)), length);
@@ -116,17 +121,17 @@ pub fn look(stream: &Stream, options: &SurfelOptions, watch: StageWatch<'_>) -> 
     MeshPieces::new(
         [counts.points as usize, counts.triangles as usize],
         [stream.has_normals(), stream.has_uvs()],
-        (origin, (high - low).length() as f32),
+        stream.bounds(),
         options,
+        room,
         look,
     )
 }
 
 fn triangulated(stream: &Stream, options: &ExternalOptions, watch: StageWatch<'_>) -> Result<Triangulated> {
-    let (pieces, seen) = look(stream, &options.surfels, watch)?;
-    check_long(stream, &pieces, &seen, options)?;
+    let (pieces, seen) = look_at_long(stream, options, watch)?;
     let longest = seen.longest.min(pieces.length);
-    let long = seen.long.into_iter().map(name).collect();
+    let long = seen.long.into_iter().flatten().map(name).collect();
     let is_solid = match pieces.closing {
         Some(closing) => is_solid(stream, closing, options.memory, watch)?,
         None => false,

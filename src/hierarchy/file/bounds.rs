@@ -1,14 +1,12 @@
 //! Bounds of inner nodes as whole numbers, made from below, so that they hold for what is read.
 
 use super::{
+    direction::unpacked,
     page::{cosine_below, joint_cosine},
     pages::reach,
     quantise::{FULL_WIDTH, PARTS, Shape, inner_sigma, logarithm, power, sigma_of_inner},
 };
-use crate::{
-    hierarchy::{Node, sphere::Sphere},
-    splat::NO_NORMAL,
-};
+use crate::hierarchy::{Node, merge::leaf_cone, sphere::Sphere};
 use glam::DVec3;
 use std::{f64::consts::PI, sync::LazyLock};
 
@@ -58,7 +56,15 @@ pub fn leaf(node: &mut Node, shape: &Shape, extent: f32) {
     // What rounding takes from 32 bits is less than what this adds.
     node.radius = (f64::from(extent) * largest * 1.000_001) as f32;
     node.size = (FULL_WIDTH * largest) as f32;
-    node.cone = if node.splat.normal == NO_NORMAL { -1.0 } else { 1.0 };
+    node.cone = unpacked(node.splat.normal).map_or(-1.0, |normal| {
+        // As of `merge::leaf`, by the axes themselves.
+        let along = |i: usize| {
+            let (thinner, axis) = (shape.sigma[2] / shape.sigma[i], shape.axes[i]);
+            axis * (axis.dot(normal) * thinner * thinner * thinner * thinner)
+        };
+        let thin = along(0) + along(1) + along(2);
+        leaf_cone((thin.dot(normal) / thin.length_squared().sqrt()) as f32)
+    });
 }
 
 fn cones() -> &'static [f32; NO_CONE as usize + 1] {

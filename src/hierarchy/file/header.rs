@@ -4,7 +4,10 @@ use super::{
     MAGIC, VERSION,
     bytes::{Cursor, Put},
 };
-use crate::{math::Bounds, splat::SplatSet};
+use crate::{
+    hierarchy::validate::{fault_of_box, fault_of_extent},
+    math::Bounds,
+};
 use glam::DVec3;
 
 /// Which axis of the source points up.
@@ -137,12 +140,8 @@ impl Stored {
             return Some(Err(Refusal::Damaged("its texts are not UTF-8")));
         };
         let sound = flags < 16
-            && origin.is_finite()
-            && bounds.min.is_finite()
-            && bounds.max.is_finite()
-            && !bounds.is_empty()
-            && extent > 0.0
-            && extent <= SplatSet::MAX_EXTENT
+            && fault_of_box(origin, &bounds).is_none()
+            && fault_of_extent(extent).is_none()
             && (1..=nodes).contains(&leaves)
             && (1..=pages).contains(&blocks);
         if !sound {

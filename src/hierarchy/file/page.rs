@@ -9,6 +9,7 @@ use crate::{
     hierarchy::{
         MOST_CHILDREN, Node,
         merge::{WIDTH, deviation},
+        validate::fault,
     },
     splat::decode_normal,
 };
@@ -180,8 +181,8 @@ pub fn decode(bytes: &[u8], count: usize, first_child: u32, extent: f32) -> Resu
     };
     let mut next = first_child;
     for (index, node) in nodes.iter().enumerate() {
-        if !is_finite(node) {
-            return Err(format!("its node {index} has a value that is not finite"));
+        if let Some(fault) = fault(node) {
+            return Err(format!("its node {index} has {fault}"));
         }
         if node.children as usize > MOST_CHILDREN {
             return Err(format!("its node {index} has {} children; {MOST_CHILDREN} are the most", node.children));
@@ -193,13 +194,6 @@ pub fn decode(bytes: &[u8], count: usize, first_child: u32, extent: f32) -> Resu
         next = next.checked_add(node.children).ok_or("it has more children than can be numbered")?;
     }
     Ok(nodes)
-}
-
-/// Whether all numbers of a node are.
-pub fn is_finite(node: &Node) -> bool {
-    let Node { splat, center, radius, size, cone, .. } = node;
-    let numbers = splat.center.iter().chain(&splat.factor).chain(center).chain([&splat.strength, radius, size, cone]);
-    numbers.copied().all(f32::is_finite)
 }
 
 /// Grows the nodes of a block, from below, until each bounds its children: sphere, size and cone.

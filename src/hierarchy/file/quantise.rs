@@ -4,7 +4,10 @@
 //! tables from `libm`, so that a file gives the same nodes everywhere.
 
 use super::direction::{self, Directions};
-use crate::splat::{NO_NORMAL, Splat};
+use crate::{
+    hierarchy::validate::is_drawable,
+    splat::{NO_NORMAL, Splat},
+};
 use glam::{DMat3, DQuat, DVec3};
 use std::{f64::consts::PI, sync::LazyLock};
 
@@ -369,8 +372,7 @@ impl Code {
         };
         let color = color(before.color)? | alpha << 24;
         let splat = Splat { center: before.center, strength, factor: shape.factor(), color, normal };
-        let numbers = splat.center.iter().chain(&splat.factor).chain([&splat.strength]);
-        numbers.copied().all(f32::is_finite).then_some(splat)
+        is_drawable(&splat).then_some(splat)
     }
 
     /// The code of a splat, and what comes back of it. `None` for splats beyond what codes can tell: without width, of

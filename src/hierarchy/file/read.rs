@@ -6,11 +6,14 @@ use super::{
     header::{Header, Refusal, Stored},
     page,
     pages::{in_order, pages},
-    write::arounds,
+    write::{arounds, check_nodes},
 };
 use crate::{
     Error, Result,
-    hierarchy::{Block, Node, Tree},
+    hierarchy::{
+        Block, Node, Tree,
+        validate::{fault_of_box, fault_of_extent},
+    },
     io::{LimitKind, Limits, Mapping, Source, intact},
     math::Bounds,
 };
@@ -124,16 +127,21 @@ impl Hierarchy {
     /// Takes a tree as it is; nothing is encoded.
     ///
     /// # Errors
-    /// [`Error::Argument`] where the nodes of a block are not in the order of [`Block`], or blocks and portals do not fit.
+    /// [`Error::Argument`] where the nodes of a block are not in the order of [`Block`], or blocks and portals do not fit, and
+    /// for numbers that cannot be drawn: those that [`validate`](crate::hierarchy::validate()) finds by themselves.
     pub fn from_tree(tree: Tree) -> Result<Self> {
         let mut directory = Directory::default();
         let mut portals = Vec::new();
         let Some(top) = tree.blocks.first() else {
             return Err(Error::Argument("the hierarchy has no blocks".into()));
         };
+        let fault = fault_of_box(tree.origin, &tree.bounds).map(str::to_owned);
+        if let Some(fault) = fault.or_else(|| fault_of_extent(tree.extent)) {
+            return Err(Error::Argument(format!("the hierarchy: {fault}")));
+        }
         for (number, block) in tree.blocks.iter().enumerate() {
             let refuse = |message| Error::Argument(format!("block {number} of the hierarchy: {message}"));
-            in_order(&block.nodes).map_err(refuse)?;
+            in_order(&block.nodes).and_then(|()| check_nodes(&block.nodes)).map_err(refuse)?;
             let runs = pages(&block.nodes);
             directory.push_block(&runs, &arounds(&block.nodes, &runs), &vec![Place::default(); runs.len()]);
             match (number, block.portal) {

@@ -9,6 +9,7 @@ use crate::{
     },
     io::{Limits, testing::Folder},
     math::Camera,
+    splat::Splat,
 };
 use glam::DVec3;
 use std::path::Path;
@@ -370,12 +371,12 @@ fn a_smooth_surface_takes_few_bytes() {
 #[test]
 fn splats_beyond_the_codes_are_kept_whole() {
     let mut splats = surface(300, 1);
-    splats[0].strength = f32::MAX;
-    splats[150].center = [1e30, 0.0, 0.0];
+    splats[0].strength = Splat::MOST_OPTICAL_DEPTH;
+    splats[150].center = [1e18, 0.0, 0.0];
     let tree = tree(&splats);
     let read = open(to_bytes(&tree, &options(false)).unwrap()).read_tree().unwrap();
     assert_eq!(validate(&read), []);
-    assert!(read.nodes().any(|node| node.splat.strength == f32::MAX));
+    assert!(read.nodes().any(|node| node.splat.strength == Splat::MOST_OPTICAL_DEPTH));
 }
 
 #[test]
@@ -437,4 +438,60 @@ fn validation_finds_what_is_loose() {
     assert_eq!(validate(&boxed)[0].code, "extent");
     found(|nodes| nodes[1].cone = 1.0, "cone");
     found(|nodes| nodes[2].splat.center[1] = f32::INFINITY, "values");
+}
+
+/// Numbers that make no picture come neither from a tree nor into a file, nor out of one.
+#[test]
+fn numbers_that_cannot_be_drawn_are_refused() {
+    let sound = tree(&surface(50, 1));
+    let refused = |change: &dyn Fn(&mut Tree), message: &str| {
+        let mut tree = sound.clone();
+        change(&mut tree);
+        assert!(validate(&tree).iter().any(|finding| finding.message.contains(message)), "{:?}", validate(&tree));
+        for lossless in [true, false] {
+            let error = to_bytes(&tree, &options(lossless)).unwrap_err().to_string();
+            assert!(error.contains(message), "{error}");
+        }
+        let error = Hierarchy::from_tree(tree).unwrap_err().to_string();
+        assert!(error.contains(message), "{error}");
+    };
+    type Change = fn(&mut crate::hierarchy::Node);
+    let nodes: [(Change, &str); 7] = [
+        (|node| node.splat.strength = 1.1e10, "an optical depth of 11000000000, but"),
+        (|node| node.splat.strength = -1.0, "an optical depth of -1, but"),
+        (|node| node.splat.factor[3] = 1e19, "a coordinate or an element of its factor beyond 1e18"),
+        (|node| node.center[1] = -1e19, "a coordinate or an element of its factor beyond 1e18"),
+        (|node| node.splat.center[2] = f32::NAN, "a value that is not finite"),
+        (|node| node.radius = -1.0, "a radius of -1 and"),
+        (|node| node.cone = 1.5, "a cone of cosine 1.5"),
+    ];
+    for (change, message) in nodes {
+        refused(&|tree| change(&mut tree.blocks[0].nodes[7]), &format!("has {message}"));
+        let mut nodes = sound.blocks[0].nodes.clone();
+        change(&mut nodes[7]);
+        let page = page::encode(&nodes, sound.extent, true).pages.swap_remove(0);
+        let error = page::decode(&page, nodes.len(), 1, sound.extent).unwrap_err();
+        assert!(error.contains(&format!("its node 7 has {message}")), "{error}");
+    }
+    refused(&|tree| tree.extent = 8.1, "its extent is 8.1; it must lie in 0 … 8");
+    refused(&|tree| tree.extent = f32::NAN, "its extent is NaN; it must lie in 0 … 8");
+    refused(&|tree| tree.origin.y = f64::INFINITY, "its origin or its bounds are none");
+    refused(&|tree| tree.bounds.max.x = f64::NAN, "its origin or its bounds are none");
+}
+
+/// What few bits tell of a splat does not go beyond what can be drawn where the splat itself does not.
+#[test]
+fn rounding_stays_within_what_can_be_drawn() {
+    let mut kept = [0; 2];
+    // The steps count from the root's strength, here the mean of so many.
+    for count in 50..62 {
+        let mut splats = surface(count, 1);
+        splats[7].strength = Splat::MOST_OPTICAL_DEPTH;
+        let read = open(to_bytes(&tree(&splats), &options(false)).unwrap()).read_tree().unwrap();
+        assert_eq!(validate(&read), []);
+        let most = read.nodes().map(|node| node.splat.strength).fold(0.0, f32::max);
+        kept[usize::from(most == Splat::MOST_OPTICAL_DEPTH)] += 1;
+    }
+    // Some are rounded down; where it would be up the page keeps all bits.
+    assert!(kept[0] > 0 && kept[1] > 0, "{kept:?}");
 }

@@ -10,7 +10,10 @@ use super::{
 };
 use crate::{
     Error, Result,
-    hierarchy::{Node, Tree},
+    hierarchy::{
+        Node, Tree,
+        validate::{fault, fault_of_box, fault_of_extent},
+    },
     math::Bounds,
     splat::NO_NORMAL,
 };
@@ -72,7 +75,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`Error::Output`] where nothing can be written beside `path`; [`Error::Argument`] for an extent that is no positive
-    /// number.
+    /// number, or above [`MAX_EXTENT`](crate::splat::SplatSet::MAX_EXTENT).
     pub fn new(path: &Path, extent: f32, options: &WriteOptions) -> Result<Self> {
         Self::begin(Some(path.to_owned()), extent, options, || Spill::beside(path))
     }
@@ -83,8 +86,8 @@ impl Writer {
         options: &WriteOptions,
         spill: impl FnOnce() -> Result<Spill>,
     ) -> Result<Self> {
-        if !(extent > 0.0 && extent.is_finite()) {
-            return Err(Error::Argument(format!("the extent is {extent}; a positive number is needed")));
+        if let Some(fault) = fault_of_extent(extent) {
+            return Err(Error::Argument(format!("the hierarchy: {fault}")));
         }
         Ok(Self {
             path,
@@ -102,7 +105,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`Error::Argument`] for nodes that are not in the order of [`Block`](crate::hierarchy::Block), or have values that
-    /// are not finite; [`Error::Output`] where they cannot be written.
+    /// are not finite or cannot be drawn; [`Error::Output`] where they cannot be written.
     pub fn block(&mut self, nodes: &[Node]) -> Result<Node> {
         Ok(self.blocks(&[nodes])?[0])
     }
@@ -116,10 +119,7 @@ impl Writer {
         for (number, nodes) in (written..).zip(blocks) {
             let refuse = |message: String| Error::Argument(format!("block {number} of the hierarchy: {message}"));
             in_order(nodes).map_err(refuse)?;
-            let odd = nodes.par_iter().position_first(|node| !page::is_finite(node));
-            if let Some(node) = odd {
-                return Err(refuse(format!("node {node} has a value that is not finite")));
-            }
+            check_nodes(nodes).map_err(refuse)?;
         }
         let (extent, is_lossless) = (self.extent, self.options.lossless);
         let encode = |nodes: &&[Node]| {
@@ -141,7 +141,8 @@ impl Writer {
     /// bounds of the roots in their place, and whose other nodes grow where they must.
     ///
     /// # Errors
-    /// [`Error::Argument`] where `top` does not fit the blocks that were written; [`Error::Output`] where the file cannot
+    /// [`Error::Argument`] where `top` does not fit the blocks that were written, or has values that cannot be drawn, and for
+    /// an origin or bounds that are not finite; [`Error::Output`] where the file cannot
     /// be written.
     pub fn finish(self, top: Option<Top>, whole: &Whole) -> Result<()> {
         let path = self.path.clone();
@@ -150,6 +151,9 @@ impl Writer {
     }
 
     fn end(mut self, top: Option<Top>, whole: &Whole, target: impl FnOnce() -> Result<Target>) -> Result<Vec<u8>> {
+        if let Some(fault) = fault_of_box(whole.origin, &whole.bounds) {
+            return Err(Error::Argument(format!("the hierarchy: {fault}")));
+        }
         let mut directory = match (top, self.roots.len()) {
             (_, 0) => return Err(Error::Argument("the hierarchy has no blocks".into())),
             (None, 1) => std::mem::take(&mut self.directory),
@@ -207,9 +211,7 @@ impl Writer {
             nodes[portal] = Node { first_child: 0, children: 0, ..*root };
         }
         page::enclose(&mut nodes);
-        if let Some(node) = nodes.iter().position(|node| !page::is_finite(node)) {
-            return Err(refuse(format!("node {node} has a value that is not finite")));
-        }
+        check_nodes(&nodes).map_err(refuse)?;
         let coded = page::encode(&nodes, self.extent, true);
         let places = self.push(&coded.pages)?;
         let mut directory = Directory::default();
@@ -246,6 +248,12 @@ impl Writer {
             source: self.options.source.clone(),
         }
     }
+}
+
+/// Refuses nodes whose numbers cannot be drawn.
+pub(super) fn check_nodes(nodes: &[Node]) -> Result<(), String> {
+    let found = nodes.par_iter().enumerate().find_map_first(|(index, node)| Some((index, fault(node)?)));
+    found.map_or(Ok(()), |(index, fault)| Err(format!("node {index} has {fault}")))
 }
 
 /// What the leaves of ordinary blocks have.

@@ -277,7 +277,7 @@ fn textures_keep_to_the_budget() {
                 ..Mesh::default()
             };
             let options = SurfelOptions { most_triangles: 30_000, ..SurfelOptions::default() };
-            let (told, made) = (mesh.triangles_once_cut(&options), surfels_of(&mesh, &options));
+            let (told, made) = (mesh.triangles_once_cut(&options, usize::MAX), surfels_of(&mesh, &options));
             // The least that its size asks for is 35,000.
             assert!(made < 100_000 && 2 * told > made, "{far} {across}: {made} surfels, {told} triangles told");
         }
@@ -307,4 +307,80 @@ fn a_vertex_of_no_triangle_changes_nothing() {
     alone.normals.clear();
     assert_eq!(stray.bounds(), alone.bounds());
     assert_eq!(surfels(&stray).splats.len(), surfels(&alone).splats.len());
+}
+
+/// What is far from the world's origin is as large as near it, even where 64 bits tell its places no more.
+#[test]
+fn a_far_origin_changes_nothing() {
+    let mesh = Mesh::sphere(1);
+    let cloud = Mesh { triangles: Vec::new(), ..mesh.clone() };
+    for mesh in [mesh, cloud] {
+        let near = surfels(&mesh);
+        for origin in [DVec3::splat(1e16), DVec3::X * -1e300] {
+            let far = Mesh { origin, ..mesh.clone() };
+            let splats = surfels(&far).splats;
+            assert!(splats.len() == near.splats.len() && splats.iter().zip(&near.splats).all(|(a, b)| a == b));
+            let options = SurfelOptions::default();
+            assert_eq!(far.triangles_once_cut(&options, usize::MAX), mesh.triangles_once_cut(&options, usize::MAX));
+        }
+        for origin in [DVec3::X * f64::NAN, DVec3::Y * f64::INFINITY] {
+            let error = Mesh { origin, ..mesh.clone() }.surfels(&SurfelOptions::default()).unwrap_err().to_string();
+            assert!(error.contains("of the mesh is not finite"), "{error}");
+        }
+    }
+}
+
+/// Normals that are none are made of what is around, as are those that the file lacks.
+#[test]
+fn normals_that_are_not_finite_are_none() {
+    let with = |normal: Vec3, triangles: bool| {
+        let mut mesh = Mesh::sphere(1);
+        mesh.normals = vec![normal; mesh.positions.len()];
+        mesh.triangles.truncate(if triangles { usize::MAX } else { 0 });
+        surfels(&mesh).splats
+    };
+    for triangles in [true, false] {
+        let without = with(Vec3::ZERO, triangles);
+        for normal in [Vec3::INFINITY, Vec3::NAN, Vec3::X * f32::NEG_INFINITY, Vec3::Y * 1e30] {
+            let splats = with(normal, triangles);
+            assert!(splats.iter().zip(&without).all(|(a, b)| a == b), "{normal}: {:?}", splats[0]);
+        }
+    }
+}
+
+#[test]
+fn options_are_numbers_that_surfels_can_be_made_of() {
+    let mesh = Mesh::cube(2.0);
+    let fine = |options: SurfelOptions| {
+        let set = mesh.surfels(&SurfelOptions { most_triangles: 1000, ..options })?;
+        let is_sound = |splat: &Splat| splat.center.iter().chain(&splat.factor).all(|value| value.abs() < 9.0);
+        assert!(set.splats.iter().all(is_sound));
+        Ok(set.splats.len())
+    };
+    let spaced = |largest_spacing| fine(SurfelOptions { largest_spacing, ..SurfelOptions::default() });
+    let deep = |optical_depth| fine(SurfelOptions { optical_depth, ..SurfelOptions::default() });
+    let refused = |found: Result<usize>, message: &str| {
+        let error = found.unwrap_err().to_string();
+        assert!(error.contains(message), "{error}");
+    };
+    // However coarse, what is there is drawn.
+    assert_eq!((spaced(1.0).unwrap(), spaced(f32::MAX).unwrap()), (24, 24));
+    assert!((300..1000).contains(&spaced(1e-9).unwrap()));
+    refused(spaced(1e-38), "largest_spacing is 1e-38; 1e-9 to ");
+    assert!(deep(1e10).is_ok());
+    refused(deep(1.1e10), "optical_depth is 1.1e10; 0e0 to 1e10 can be");
+}
+
+/// What is far off, such as the triangle of a broken scan, leaves all else as it is.
+#[test]
+fn a_triangle_far_off_takes_nothing_away() {
+    let mesh = Mesh::sphere(3);
+    for (far, size) in [(1e8, 16.0), (-3e9, 512.0)] {
+        let mut both = mesh.clone();
+        let first = mesh.positions.len() as u32;
+        both.positions.extend([Vec3::ZERO, Vec3::X, Vec3::Y].map(|side| Vec3::X * far + side * size));
+        both.triangles.push([first, first + 1, first + 2]);
+        let count = surfels(&both).splats.len();
+        assert!(count >= mesh.positions.len() + 3, "{far:e}: {count} surfels");
+    }
 }

@@ -1,0 +1,228 @@
+//! The connected parts of a closed surface: triangles that share an edge are of one part, those that share a vertex alone need
+//! not be.
+//!
+//! Neighbours mostly come near each other in a file, so each few thousand triangles are joined by themselves, in tables that stay
+//! in a core's cache. Edges of which they have one side alone are few; all of these together are sorted, and what meets there
+//! is joined. Where more than two triangles meet at an edge they are of one part, or of several that are closed each.
+
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+/// Triangles that are joined by themselves, and the places of their table: a third more than they have edges.
+const FEW: usize = 1 << 13;
+const PLACE_BITS: u32 = 15;
+
+/// An edge in the table; an empty place is all zeros.
+#[derive(Debug, Clone, Copy, Default)]
+struct Place {
+    /// The smaller vertex above the larger one.
+    edge: u64,
+    /// The first triangle there, counted among the few.
+    triangle: u32,
+    /// How many triangles run to the larger vertex less those that run to the smaller.
+    balance: i32,
+}
+
+/// An edge with one side alone, above the triangle there.
+type Open = u128;
+
+/// Joins triangles to parts, in any number of threads. Vertices may have any numbers that are the same where the surface hangs
+/// together.
+pub(crate) struct Joining(Sets);
+
+impl Joining {
+    /// So many triangles, at most `u32::MAX`.
+    pub fn new(triangles: usize) -> Self {
+        Self(Sets::new(triangles))
+    }
+
+    /// Bytes that joining takes, of so many triangles and such edges as [`add`](Self::add) gives.
+    pub fn memory(triangles: u64, open: u64) -> u64 {
+        // Lists are made longer when they are full.
+        triangles * size_of::<u32>() as u64 + 2 * open * size_of::<Open>() as u64
+    }
+
+    /// Joins triangles by themselves, the first of which has this number, and gives the edges at which others are to come.
+    pub fn add(&self, first: u32, triangles: &[[u32; 3]], name: impl Fn(u32) -> u32) -> Vec<Open> {
+        let mut open = Vec::new();
+        let mut table = vec![Place::default(); 1 << PLACE_BITS];
+        let mut own: Vec<u32> = Vec::with_capacity(FEW);
+        for (few, first) in triangles.chunks(FEW).zip((first..).step_by(FEW)) {
+            table.fill(Place::default());
+            own.clear();
+            own.extend(0..few.len() as u32);
+            for (triangle, corners) in (0..).zip(few) {
+                let [a, b, c] = corners.map(&name);
+                for [from, to] in [[a, b], [b, c], [c, a]] {
+                    if from != to {
+                        let other = at_edge(&mut table, triangle, [from, to]);
+                        join(&mut own, other, triangle);
+                    }
+                }
+            }
+            for triangle in 0..few.len() as u32 {
+                self.0.0[(first + triangle) as usize].store(first + root(&mut own, triangle), Relaxed);
+            }
+            // What has as many triangles of one direction as of the other is closed there, whatever else is.
+            let left = table.iter().filter(|place| place.balance != 0);
+            open.extend(left.map(|place| Open::from(place.edge) << 32 | Open::from(first + place.triangle)));
+        }
+        open
+    }
+
+    /// The parts, from all edges that [`add`](Self::add) gave.
+    pub fn parts(self, mut open: Vec<Open>) -> Parts {
+        open.par_sort_unstable();
+        let same = open.par_windows(2).filter(|pair| pair[0] >> 32 == pair[1] >> 32);
+        same.for_each(|pair| self.0.join(pair[0] as u32, pair[1] as u32));
+        self.0.parts()
+    }
+}
+
+/// Puts an edge of a triangle in the table, and gives the first triangle there.
+fn at_edge(table: &mut [Place], triangle: u32, [from, to]: [u32; 2]) -> u32 {
+    let edge = u64::from(from.min(to)) << 32 | u64::from(from.max(to));
+    // By the golden ratio (Knuth 1973).
+    let mut at = (edge.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (u64::BITS - PLACE_BITS)) as usize;
+    while table[at].edge != edge && table[at].edge != 0 {
+        at = (at + 1) % table.len();
+    }
+    let place = &mut table[at];
+    if place.edge == 0 {
+        *place = Place { edge, triangle, balance: 0 };
+    }
+    place.balance += if from < to { 1 } else { -1 };
+    place.triangle
+}
+
+/// As of [`Sets`], for one thread alone.
+fn root(above: &mut [u32], mut member: u32) -> u32 {
+    while above[member as usize] != member {
+        let higher = above[above[member as usize] as usize];
+        above[member as usize] = higher;
+        member = higher;
+    }
+    member
+}
+
+fn join(above: &mut [u32], a: u32, b: u32) {
+    let (a, b) = (root(above, a), root(above, b));
+    above[a.max(b) as usize] = a.min(b);
+}
+
+/// Which part each triangle is of.
+pub(crate) struct Parts {
+    of: Vec<u32>,
+    count: usize,
+}
+
+impl Parts {
+    /// How many there are; triangles that are but a point are parts of their own.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The part of the triangle of this number. Parts are numbered in the order of their first triangles.
+    pub fn of(&self, number: usize) -> u32 {
+        self.of[number]
+    }
+}
+
+/// Disjoint sets that any number of threads joins at once: each member links to itself, or to one of a smaller index, and a
+/// link is only taken by whoever finds a root there still (Anderson & Woll 1991).
+struct Sets(Vec<AtomicU32>);
+
+impl Sets {
+    fn new(count: usize) -> Self {
+        Self((0..count as u32).into_par_iter().map(AtomicU32::new).collect())
+    }
+
+    fn root(&self, mut member: u32) -> u32 {
+        loop {
+            let above = self.0[member as usize].load(Relaxed);
+            if above == member {
+                return member;
+            }
+            let higher = self.0[above as usize].load(Relaxed);
+            if higher < above {
+                // Halves the way for the next time. It does no harm where another thread has done so.
+                self.0[member as usize].store(higher, Relaxed);
+            }
+            member = higher;
+        }
+    }
+
+    fn join(&self, mut a: u32, mut b: u32) {
+        loop {
+            (a, b) = (self.root(a), self.root(b));
+            if a == b {
+                return;
+            }
+            let (low, high) = (a.min(b), a.max(b));
+            if self.0[high as usize].compare_exchange(high, low, Relaxed, Relaxed).is_ok() {
+                return;
+            }
+        }
+    }
+
+    fn parts(self) -> Parts {
+        let mut of: Vec<u32> = self.0.into_iter().map(AtomicU32::into_inner).collect();
+        let mut count = 0;
+        for member in 0..of.len() {
+            // What it links to comes before it, and has its number already.
+            let above = of[member] as usize;
+            of[member] = if above < member { of[above] } else { count };
+            count += u32::from(above == member);
+        }
+        Parts { of, count: count as usize }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each time so many triangles by themselves.
+    fn parts(triangles: &[[u32; 3]], few: usize) -> Parts {
+        let joining = Joining::new(triangles.len());
+        let chunks = triangles.par_chunks(few).enumerate().rev();
+        let open =
+            chunks.flat_map_iter(|(chunk, triangles)| joining.add((chunk * few) as u32, triangles, |vertex| vertex));
+        let open = open.collect();
+        joining.parts(open)
+    }
+
+    #[test]
+    fn parts_are_those_of_one_thread() {
+        let sphere = crate::surface::Mesh::sphere(2);
+        let per_sphere = sphere.positions.len() as u32;
+        // Each hangs by a vertex at the one before.
+        let shifted = |i: u32| sphere.triangles.iter().map(move |t| t.map(|vertex| vertex + i * (per_sphere - 1)));
+        let triangles: Vec<[u32; 3]> = (0..40).flat_map(shifted).collect();
+        for few in [1, 7, 500, triangles.len()] {
+            let parts = parts(&triangles, few);
+            assert_eq!(parts.count(), 40, "{few}");
+            assert!((0..triangles.len()).all(|number| parts.of(number) as usize == number / sphere.triangles.len()));
+        }
+    }
+
+    #[test]
+    fn triangles_without_area_are_of_the_parts_around() {
+        let sheet = [[0, 1, 2], [0, 2, 1], [1, 1, 2], [5, 5, 5]];
+        assert_eq!(parts(&sheet, 4).of, [0, 0, 0, 1]);
+        // What has no area is of any part.
+        assert_eq!(parts(&sheet, 1).of, [0, 0, 1, 2]);
+    }
+
+    /// Two tetrahedra at one edge, which is four times there.
+    #[test]
+    fn all_triangles_at_an_edge_are_of_one_part() {
+        let tetrahedron = |[a, b, c, d]: [u32; 4]| [[a, c, b], [a, b, d], [b, c, d], [c, a, d]];
+        let both = [tetrahedron([0, 1, 2, 3]), tetrahedron([0, 1, 4, 5])].concat();
+        assert_eq!([1, 8].map(|few| parts(&both, few).count()), [1; 2]);
+        // Where each is closed before the other comes, they may be two.
+        assert_eq!(parts(&both, 4).count(), 2);
+        let by_a_vertex = [tetrahedron([0, 1, 2, 3]), tetrahedron([0, 6, 4, 5])].concat();
+        assert_eq!([1, 3, 8].map(|few| parts(&by_a_vertex, few).count()), [2; 3]);
+    }
+}
