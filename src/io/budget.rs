@@ -1,10 +1,13 @@
-//! What reading one input has taken so far: bytes and time. The files of one model share a budget.
+//! What reading one input has taken so far: bytes, time and files. The files of one model share a budget.
 
 use super::{LimitKind, Limits};
 use crate::Result;
 use std::{
-    path::Path,
-    sync::atomic::{AtomicU64, Ordering::Relaxed},
+    path::{Path, PathBuf},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicU64, Ordering::Relaxed},
+    },
     time::{Duration, Instant},
 };
 
@@ -14,11 +17,13 @@ pub(super) struct Budget {
     created: Instant,
     /// Nanoseconds from then to the beginning of what the limit of time holds for.
     begun: AtomicU64,
+    /// The files that were opened.
+    files: Mutex<Vec<PathBuf>>,
 }
 
 impl Budget {
     pub fn new() -> Self {
-        Self { spent: AtomicU64::new(0), created: Instant::now(), begun: AtomicU64::new(0) }
+        Self { spent: AtomicU64::new(0), created: Instant::now(), begun: AtomicU64::new(0), files: Mutex::default() }
     }
 
     /// Takes bytes for `what`. Nothing is given back: what is dropped while a file is read counts as well, so the sum is
@@ -34,6 +39,16 @@ impl Budget {
             return limits.check(LimitKind::Bytes, file, what, total);
         }
         Ok(())
+    }
+
+    /// Keeps the path of a file that was opened.
+    pub fn opened(&self, file: &Path) {
+        self.files.lock().unwrap_or_else(PoisonError::into_inner).push(file.to_owned());
+    }
+
+    /// The files that were opened so far.
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.files.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Refuses to go on where reading took too long.

@@ -3,7 +3,12 @@
 
 use super::{LimitKind, Limits, budget::Budget, mapping::Mapping};
 use crate::{Error, Result};
-use std::{fs::File, io::Read, path::Path, sync::Arc};
+use std::{
+    fs::File,
+    io::Read,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 /// Bytes that are unpacked between two looks at the clock.
 const PORTION: u64 = 16 << 20;
@@ -47,6 +52,11 @@ impl<'a> Source<'a> {
     /// Maps a file as [`open`](Self::open) does, for those who read from it later.
     pub(crate) fn map(path: &Path, limits: &Limits) -> Result<Mapping> {
         map_within(path, limits, &Budget::new())
+    }
+
+    /// The files that were opened so far: this one, and those that it refers to where a reader has asked for them.
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.budget.files()
     }
 
     /// Takes bytes in place of a file: of a program that has them from elsewhere. `name` is what errors call them, and its
@@ -202,6 +212,7 @@ fn map_within(path: &Path, limits: &Limits, budget: &Budget) -> Result<Mapping> 
     let meta = file.metadata().map_err(|e| Error::file(path, "read", e))?;
     regular(&meta)?;
     budget.spend(limits, path, "the file's size in bytes", meta.len())?;
+    budget.opened(path);
     Mapping::new(file).map_err(|e| Error::file(path, "map", e))
 }
 

@@ -207,14 +207,18 @@ impl<'a> Stream<'a> {
         }
     }
 
-    /// As [`points`](Self::points), of the triangles.
+    /// As [`points`](Self::points), of the triangles; `map` also gets the number of the first one.
     pub(crate) fn triangles<T: Send>(
         &self,
-        map: impl Fn(&[[u32; 3]]) -> T + Sync,
+        map: impl Fn(usize, &[[u32; 3]]) -> T + Sync,
         take: impl FnMut(T) -> Result<()>,
     ) -> Result<()> {
         let Form::Ply(pieces) = &self.form else { return Ok(()) };
-        self.in_order(pieces.pieces()[1], |piece| Ok(map(&pieces.triangle_piece(&self.source, piece)?)), take)
+        let of_piece = |piece: usize| {
+            let (first, triangles) = pieces.triangle_piece(&self.source, piece)?;
+            Ok(map(first, &triangles))
+        };
+        self.in_order(pieces.pieces()[1], of_piece, take)
     }
 
     /// The place of a vertex of a mesh.

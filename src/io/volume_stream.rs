@@ -68,6 +68,11 @@ impl VolumeStream {
         Ok(is_whole.then_some(Self { plain, scalar, map }))
     }
 
+    /// The file that holds the samples: a detached header's is another one.
+    pub fn path(&self) -> &Path {
+        &self.plain.path
+    }
+
     /// Where the samples lie.
     pub fn lattice(&self) -> &Lattice {
         &self.plain.lattice

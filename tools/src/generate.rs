@@ -83,7 +83,10 @@ impl Generate {
         let extension = self.output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
         match (self.what, &self.from, extension) {
             (What::Scan, Some(from), "ply") => {
-                let mesh = io::load_mesh(from, &LimitFlags::default().whole(memory::most()))?;
+                let limits = LimitFlags::default().whole(memory::most());
+                let source = io::Source::open(from, &limits)?;
+                let mesh = io::read_mesh(&source)?;
+                output::check_unneeded(&self.output, &source.files())?;
                 if mesh.triangles.is_empty() {
                     let message = format!("{} has no triangles that could be cut in more", from.display());
                     return Err(Error::Argument(message).into());

@@ -190,7 +190,8 @@ fn bounds(bounds: Option<[glam::DVec3; 2]>) -> Value {
 /// A value for people.
 fn plain(value: &Value) -> String {
     match value {
-        Value::String(text) => text.clone(),
+        // A file's own texts are not to command the terminal.
+        Value::String(text) => text.replace(char::is_control, "\u{fffd}"),
         Value::Array(values) => values.iter().map(plain).collect::<Vec<_>>().join(", "),
         Value::Object(map) => {
             map.iter().map(|(name, value)| format!("{name} {}", plain(value))).collect::<Vec<_>>().join("; ")

@@ -6,7 +6,7 @@ use splatkit::{
     io::{Limits, Source},
     math::Kernel,
 };
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The kernel of a volume's samples. Lengths are counted in samples.
 #[derive(Args, Debug, Clone)]
@@ -61,6 +61,11 @@ impl KernelFlags {
         // A wider kernel keeps its shape unless the user cuts it.
         let extent = self.extent.unwrap_or(default.extent.max(default.radius() * sigma));
         Kernel::gaussian(sigma, extent)
+    }
+
+    /// The file of a kernel of one's own.
+    pub fn file(&self) -> Option<PathBuf> {
+        self.kernel.as_ref().filter(|name| !NAMES.contains(&name.as_str())).map(PathBuf::from)
     }
 
     /// Whether kernels are to pass through the samples.

@@ -6,13 +6,16 @@ use glam::DVec3;
 use splatkit::{
     Error,
     hierarchy::Hierarchy,
-    io::{self, Endian, Kind, Limits, RawLayout, SampleType, VolumeStream},
+    io::{self, Endian, Kind, Limits, RawLayout, SampleType, Source, VolumeStream},
     memory,
     scattered::{Points, SampleOptions},
     surface::Mesh,
     volume::{Volume, bricks::Bricks},
 };
-use std::{path::Path, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 /// What an input holds.
 pub enum Input {
@@ -67,19 +70,32 @@ impl LoadFlags {
 
     /// Reads a file.
     pub fn open(&self, path: &Path) -> Result<Input, Failure> {
-        self.open_within(path, memory::most())
+        self.open_within(path, memory::most(), &mut Vec::new())
     }
 
-    /// Reads a file; where it is read as a whole it may take so many bytes of memory, unless a flag allows more.
-    pub fn open_within(&self, path: &Path, memory: Option<u64>) -> Result<Input, Failure> {
+    /// Reads a file; where it is read as a whole it may take so many bytes of memory, unless a flag allows more. Adds the file
+    /// and those that it refers to to those that were `read`.
+    pub fn open_within(&self, path: &Path, memory: Option<u64>, read: &mut Vec<PathBuf>) -> Result<Input, Failure> {
         let (limits, whole) = (self.limits(), self.limits.whole(memory));
-        Ok(match self.kind(path)? {
-            Kind::Mesh => Input::Mesh(io::load_mesh(path, &whole)?),
-            Kind::Volume => Input::Volume(io::load_volume(path, &whole, self.layout().as_ref())?),
-            Kind::Bricks => Input::Bricks(Arc::new(Bricks::open(path, &limits)?)),
-            Kind::Hierarchy => Input::Hierarchy(Arc::new(Hierarchy::open(path, &limits)?)),
-            Kind::Samples => Input::Samples(io::load_samples(path, &whole, self.scalar.as_deref())?),
-        })
+        let (input, files) = match self.kind(path)? {
+            // These refer to no others.
+            Kind::Bricks => (Input::Bricks(Arc::new(Bricks::open(path, &limits)?)), vec![path.to_owned()]),
+            Kind::Hierarchy => (Input::Hierarchy(Arc::new(Hierarchy::open(path, &limits)?)), vec![path.to_owned()]),
+            Kind::Mesh => {
+                let source = Source::open(path, &whole)?;
+                (Input::Mesh(io::read_mesh(&source)?), source.files())
+            }
+            Kind::Volume => {
+                let source = Source::open(path, &whole)?;
+                (Input::Volume(io::read_volume(&source, self.layout().as_ref())?), source.files())
+            }
+            Kind::Samples => {
+                let source = Source::open(path, &whole)?;
+                (Input::Samples(io::read_samples(&source, self.scalar.as_deref())?), source.files())
+            }
+        };
+        read.extend(files);
+        Ok(input)
     }
 
     /// What a file holds, sound or not.

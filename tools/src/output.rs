@@ -41,6 +41,14 @@ impl Target {
         }
     }
 
+    /// The file, where it is one.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::Stdout => None,
+            Self::File(path, _) => Some(path),
+        }
+    }
+
     pub fn write(&self, bytes: &[u8]) -> Result<(), Failure> {
         match self {
             Self::Stdout => stdout(bytes),
@@ -70,15 +78,26 @@ pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
 
 /// Finds out whether a file can be written before the work is done, and that it is none of the inputs.
 pub fn try_writing(path: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
-    let real = path.canonicalize().ok();
-    if real.is_some() && inputs.iter().any(|input| input.canonicalize().ok() == real) {
+    check_unread(path, inputs, "is an input too")?;
+    drop(disk::AtomicFile::create(path)?);
+    Ok(())
+}
+
+/// Refuses a file that is one of those that inputs and flags refer to, which loading them tells.
+pub fn check_unneeded(path: &Path, read: &[PathBuf]) -> Result<(), Failure> {
+    check_unread(path, read, "is read too: an input or a flag refers to it")
+}
+
+/// Refuses a file that is one of those that were read, with this message.
+fn check_unread(path: &Path, read: &[PathBuf], message: &str) -> Result<(), Failure> {
+    let Ok(real) = path.canonicalize() else { return Ok(()) };
+    if read.iter().any(|file| file.canonicalize().is_ok_and(|file| file == real)) {
         return Err(Failure::Output {
             file: path.to_owned(),
-            message: "is an input too".into(),
+            message: message.into(),
             hint: Some("give another name"),
         });
     }
-    drop(disk::AtomicFile::create(path)?);
     Ok(())
 }
 

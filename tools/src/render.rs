@@ -112,6 +112,8 @@ impl Render {
         let targets = self.targets(frames)?;
         self.engine.check()?;
         let loaded = self.scene.load(progress)?;
+        let files = targets.iter().filter_map(Target::file).chain(self.depth.as_deref());
+        files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
         let settings = self.engine.settings(&loaded, self.samples)?;
         let start = Instant::now();
         let mut drawer = match self.reference {
@@ -203,7 +205,7 @@ impl Render {
             names.iter().map(|name| Target::new(name, self.overwrite)).collect::<Result<_, _>>()?;
         // The frames of a turntable go where the first one goes.
         for file in names.first().filter(|_| !stdout).into_iter().chain(&self.depth) {
-            output::try_writing(file, &[])?;
+            output::try_writing(file, &self.scene.inputs)?;
         }
         Ok(targets)
     }

@@ -13,6 +13,7 @@ use splatkit::{
     Error,
     hierarchy::file::UpAxis,
     math::Bounds,
+    memory,
     scene::Scene,
     surface::SurfelOptions,
     volume::{
@@ -45,6 +46,8 @@ pub struct Loaded {
     /// Splats and samples.
     pub count: u64,
     pub load_ms: f64,
+    /// The files that were read: the inputs, those that they refer to, and those of flags.
+    pub read: Vec<PathBuf>,
 }
 
 impl SceneFlags {
@@ -57,11 +60,12 @@ impl SceneFlags {
             subject: Subject { bounds: Bounds::EMPTY, up: DVec3::Z },
             count: 0,
             load_ms: 0.0,
+            read: self.show.files(),
         };
         let (mut is_scaled, mut unscaled) = (false, None);
         for path in &self.inputs {
             progress.stage(format!("Reading {}", path.display()));
-            match self.load.open(path)? {
+            match self.load.open_within(path, memory::most(), &mut loaded.read)? {
                 Input::Mesh(mesh) => {
                     is_scaled = true;
                     progress.stage(format!("Making surfels of {}", path.display()));
@@ -127,16 +131,19 @@ impl SceneFlags {
                 path.display()
             )));
         }
-        // What cannot be drawn by itself is the fault of its file.
-        let of_file = |error| {
-            let found = self
-                .inputs
-                .iter()
-                .zip(&loaded.scene.items)
-                .find_map(|(path, item)| Some((path, item.validate().err()?)));
-            found.map_or(error, |(path, own)| in_file(path, own))
+        // What cannot be drawn by itself is the fault of its file, or of the flags that say how it is shown.
+        let at_fault = |error: Error| -> Failure {
+            let items = self.inputs.iter().zip(&loaded.scene.items);
+            let found = items.into_iter().find_map(|(path, item)| Some((path, item.validate().err()?)));
+            match (found, self.show.transfer_text()) {
+                (None, _) => error.into(),
+                (Some((path, Error::Argument(what))), Some(flags)) if what.starts_with("the transfer function") => {
+                    Failure::Usage(format!("{flags}: {what}; the values are those of {}", path.display()))
+                }
+                (Some((path, own)), _) => in_file(path, own).into(),
+            }
         };
-        loaded.scene.validate().map_err(of_file)?;
+        loaded.scene.validate().map_err(at_fault)?;
         loaded.load_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(loaded)
     }

@@ -8,7 +8,7 @@ use splatkit::{
     math::Kernel,
     volume::{Isosurface, TransferFunction},
 };
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How a scene's values and surfaces are shown.
 #[derive(Args, Debug, Clone)]
@@ -65,6 +65,24 @@ enum Transfer<'a> {
 }
 
 impl ShowFlags {
+    /// The flags that change the transfer function as they were given, for messages; `None` without any.
+    pub fn transfer_text(&self) -> Option<String> {
+        let transfer = self.transfer.as_ref().map(|transfer| format!("--transfer {transfer}"));
+        let unit = self.opacity_unit.map(|unit| format!("--opacity-unit {}", plain(unit)));
+        let texts: Vec<_> = [transfer, self.range_text(), unit].into_iter().flatten().collect();
+        (!texts.is_empty()).then(|| texts.join(" "))
+    }
+
+    fn range_text(&self) -> Option<String> {
+        self.range.map(|[low, high]| format!("--range {},{}", plain(low), plain(high)))
+    }
+
+    /// The files that flags name.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let transfer = self.transfer.as_ref().filter(|transfer| is_file(transfer)).map(PathBuf::from);
+        transfer.into_iter().chain(self.kernel.file()).collect()
+    }
+
     pub fn open(&self, limits: &Limits) -> Result<Show<'_>, Failure> {
         let transfer = match &self.transfer {
             None => Transfer::Automatic,
@@ -87,6 +105,11 @@ impl ShowFlags {
         }
         Ok(Show { flags: self, kernel: self.kernel.kernel(limits)?, sharp: self.kernel.is_sharp(), transfer })
     }
+}
+
+/// A number as one types it.
+fn plain(value: f64) -> String {
+    if value == 0.0 || (1e-4..1e16).contains(&value.abs()) { format!("{value}") } else { format!("{value:e}") }
 }
 
 fn is_file(text: &str) -> bool {
@@ -124,8 +147,9 @@ impl Show<'_> {
                 Some([from, to]) => format!("shows values between {from} and {to}"),
                 None => "shows no value".to_owned(),
             };
+            let spread = self.flags.range_text().map_or(String::new(), |range| format!("spread over {range}, "));
             return Err(Error::NothingToDraw(format!(
-                "the transfer function {shown}, but those of {} lie between {low} and {high}",
+                "{spread}the transfer function {shown}, but those of {} lie between {low} and {high}",
                 path.display()
             ))
             .into());

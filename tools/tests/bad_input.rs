@@ -110,7 +110,18 @@ const WRONG: &[(&str, i32, &str)] = &[
     ("a.nrrd --kernel words.csv --extent 2", 3, "words.csv: line 2: “one half” is no number"),
     ("a.nrrd --kernel old.csv --extent 2", 3, "old.csv: line 3: “one half” is no number"),
     ("a.nrrd --kernel negative.json --extent 2", 2, "a kernel's values must add up to more than 0"),
-    ("a.ply far.nrrd --range 0,4096", 3, "far.nrrd: content: the transfer function changes from 0 to 4096, too close"),
+    ("a.ply far.nrrd --range 0,4096", 2, "--range 0,4096: the transfer function changes from 0 to 4096, too close"),
+    ("a.nrrd --range 0,1e-9", 2, "the values are those of a.nrrd"),
+    (
+        "a.nrrd --transfer generic --opacity-unit 1e-300",
+        2,
+        "--transfer generic --opacity-unit 1e-300: the transfer function: the unit of 0.000",
+    ),
+    (
+        "a.nrrd --range=-20,-10 --iso 300",
+        3,
+        "nothing to draw: spread over --range -20,-10, the transfer function shows the value 300 alone, but those of a.nrrd lie",
+    ),
     // Clips.
     (
         "a.nrrd --clip box:20,20,20:30,30,30",

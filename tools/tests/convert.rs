@@ -84,6 +84,27 @@ fn what_cannot_be_converted_is_told() {
             .run(&format!("convert a.nrrd -o {output}"))
             .fails(2, &["only .splk, .ply, .nrrd and .splv files can be written"]);
     }
+    folder.put("samples.csv", "x,y,z,value\n1,2,3,4\n5,6,7,8\n");
+    folder
+        .run("convert samples.csv -o b.nrrd")
+        .fails(2, &["samples.csv holds no volume of which this can be made, but scattered samples"]);
+    std::fs::remove_file(folder.path("samples.csv")).unwrap();
+    folder.run("convert a.nrrd -o a.splv").ok();
+    for output in ["b.nrrd", "b.splv"] {
+        folder
+            .run(&format!("convert a.splv -o {output}"))
+            .fails(2, &["a.splv holds no volume of which this can be made: it is in bricks already"]);
+    }
+    std::fs::remove_file(folder.path("a.splv")).unwrap();
+    for (arguments, flag) in [
+        ("a.ply -o b.ply --lossless", "--lossless is for .splk files"),
+        ("a.ply -o b.ply --preset best", "--preset is for .splk files"),
+        ("a.ply -o b.ply --unit mm", "--unit is for .splk and .splv files"),
+        ("a.nrrd -o b.splv --up z", "--up is for .splk files"),
+        ("a.nrrd -o b.nrrd --radius-scale 1", "--radius-scale is for .splk and .ply files"),
+    ] {
+        folder.run(&format!("convert {arguments}")).fails(2, &[flag]);
+    }
     folder.run("convert a.nrrd -o b.nrrd --lattice fcc").fails(2, &["fcc", "bcc"]);
     folder.run("convert a.nrrd").fails(2, &["--output"]);
     let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 4 1\nencoding: raw\n\n";
@@ -91,6 +112,34 @@ fn what_cannot_be_converted_is_told() {
     folder.run("convert flat.nrrd -o b.nrrd --lattice bcc").fails(2, &["4 × 4 × 1", "2 or more"]);
     folder.put("odd.nrrd", [header.replace("raw", "raw\nlattice:=fcc").as_bytes(), &[1; 16]].concat());
     folder.run("convert odd.nrrd -o b.nrrd").fails(3, &["odd.nrrd", "lattice", "fcc"]);
+    // Nor may what an input refers to be replaced.
+    let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 16 16 16\nencoding: raw\ndata file: data.nrrd\n";
+    folder.put("away.nhdr", header);
+    folder.put("data.nrrd", ball());
+    folder.put("text.nhdr", header.replace("raw", "ascii").replace("data.nrrd", "text.nrrd"));
+    folder.put("text.nrrd", ball().iter().map(|value| format!("{value} ")).collect::<String>());
+    let gltf = r#"{"asset": {"version": "2.0"}, "buffers": [{"uri": "away.ply", "byteLength": 36}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}], "scene": 0}"#;
+    folder.put("a.gltf", gltf);
+    folder.put("away.ply", [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes).concat());
+    folder
+        .run("generate scan --from a.gltf -o away.ply --overwrite")
+        .fails(1, &["away.ply: is read too: an input or a flag refers to it"]);
+    for (input, output) in [("away.nhdr", "data.nrrd"), ("text.nhdr", "text.nrrd"), ("a.gltf", "away.ply")] {
+        let before = std::fs::read(folder.path(output)).unwrap();
+        folder
+            .run(&format!("convert {input} -o ./{output} --overwrite"))
+            .fails(1, &[&format!("{output}: is read too: an input or a flag refers to it"), "give another name"]);
+        assert_eq!(std::fs::read(folder.path(output)).unwrap(), before);
+        let other = format!("other-{output}");
+        folder.run(&format!("convert {input} -o {other}")).ok();
+        for name in [input, output, &other] {
+            std::fs::remove_file(folder.path(name)).unwrap();
+        }
+    }
     // Nothing half done is left.
     let mut names: Vec<_> = std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     names.sort();

@@ -39,35 +39,61 @@ fn what_can_only_be_read_as_a_whole_is_told() {
     assert_eq!(names, ["a.obj", "cut.ply", "lost.ply"]);
 }
 
-/// Few triangles become many where they are cut: what that takes counts, and is told before.
-#[test]
-fn cutting_keeps_to_the_memory() {
-    let folder = Folder::new("cutting");
+/// So many large triangles, each above the other, as PLY and as OBJ.
+fn long(count: u32) -> (Vec<u8>, String) {
     let corners: Vec<[f32; 3]> =
-        (0..150).map(|i| i as f32 * 0.4).flat_map(|z| [[0.0, 0.0, z], [100.0, 0.0, z], [0.0, 100.0, z]]).collect();
+        (0..count).map(|i| i as f32 * 0.4).flat_map(|z| [[0.0, 0.0, z], [100.0, 0.0, z], [0.0, 100.0, z]]).collect();
     let mut ply = format!(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
-         element face 150\nproperty list uchar int vertex_indices\nend_header\n",
+         element face {count}\nproperty list uchar int vertex_indices\nend_header\n",
         corners.len()
     )
     .into_bytes();
     ply.extend(corners.iter().flatten().flat_map(|value| value.to_le_bytes()));
     let mut obj: String = corners.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
-    for i in 0..150i32 {
+    for i in 0..count {
         ply.push(3);
-        ply.extend((3 * i..3 * i + 3).flat_map(i32::to_le_bytes));
+        ply.extend((3 * i..3 * i + 3).flat_map(u32::to_le_bytes));
         obj += &format!("f {} {} {}\n", 3 * i + 1, 3 * i + 2, 3 * i + 3);
     }
+    (ply, obj)
+}
+
+/// Few triangles become many where they are cut: what that takes counts, and is told before.
+#[test]
+fn cutting_keeps_to_the_memory() {
+    let folder = Folder::new("cutting");
+    let (ply, obj) = long(150);
     folder.put("a.ply", ply);
     folder.put("a.obj", obj);
     folder.run("convert a.obj -o a.splk --memory 40MiB").fails(2, &["a.obj: this takes about", "--memory allows more"]);
-    folder
-        .run("convert a.ply -o a.splk --memory 40MiB")
-        .fails(3, &["a.ply: triangles: 150 of them have edges longer than", "allow more memory"]);
+    // A dry run tells the same.
+    for arguments in ["--memory 40MiB", "--memory 40MiB --dry-run", "--memory 100 --dry-run --json"] {
+        folder
+            .run(&format!("convert a.ply -o a.splk {arguments}"))
+            .fails(3, &["a.ply: triangles: 150 of them have edges longer than", "allow more memory"]);
+    }
     assert!(!folder.path("a.splk").exists());
-    // Nothing is looked at where it is clear.
-    let expected = folder.json("convert a.ply -o a.splk --memory 100 --dry-run --json");
-    assert_eq!(expected["in_regions"].as_bool(), Some(true));
+}
+
+/// What fits by itself need not fit beside others.
+#[test]
+fn inputs_keep_to_the_memory_together() {
+    let folder = Folder::new("together");
+    let (ply, obj) = long(10);
+    for name in ["a", "b", "c"] {
+        folder.put(&format!("{name}.ply"), &ply);
+        folder.put(&format!("{name}.obj"), &obj);
+    }
+    let in_regions = |arguments: &str| {
+        let told = folder.json(&format!("convert {arguments} -o a.splk --memory 260MiB --dry-run --json"));
+        told["in_regions"].as_bool() == Some(true)
+    };
+    assert!(!in_regions("a.ply b.ply") && in_regions("a.ply b.ply c.ply"));
+    folder.run("convert a.obj -o a.splk --memory 34MiB --dry-run").ok();
+    folder
+        .run("convert a.obj b.obj c.obj -o a.splk --memory 34MiB")
+        .fails(2, &["c.obj: this takes about", "MiB of the inputs before", "--memory allows more"]);
 }
 
 #[test]

@@ -38,6 +38,15 @@ fn info_tells_what_a_file_holds() {
 }
 
 #[test]
+fn texts_of_files_do_not_command_the_terminal() {
+    let folder = Folder::new("escape");
+    folder.put("a.ply", PLY);
+    folder.run_with(&["convert", "a.ply", "-o", "a.splk", "--unit", "\u{1b}[31m"]).ok();
+    let told = folder.run("info a.splk").stdout();
+    assert!(told.contains("\u{fffd}[31m") && !told.contains('\u{1b}'), "{told:?}");
+}
+
+#[test]
 fn scattered_samples_are_told_from_clouds_and_volumes() {
     let folder = Folder::new("samples");
     let ply = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
@@ -59,6 +68,40 @@ fn scattered_samples_are_told_from_clouds_and_volumes() {
         format!("{header} POLYDATA\nPOINTS 2 float\n0 0 0 1 1 1\nPOINT_DATA 2\nSCALARS s int\nLOOKUP_TABLE d\n1 2\n");
     assert_eq!(folder.json(&format!("info {} --json", folder.put("points.vtk", points)))["kind"], "samples");
     folder.run("info a.csv --neighbours 3").fails(2, &["4 to 64"]);
+}
+
+/// What a model refers to is an input as well, by whatever name it is called.
+#[test]
+fn pictures_do_not_replace_what_the_scene_is_read_from() {
+    let folder = Folder::new("replaced");
+    let text = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+    folder.put("a.obj", text);
+    folder.put("a.mtl", "newmtl m\nmap_Kd a.png\n");
+    let pixels = vec![[1.0; 4]; 4];
+    let texture = splatkit::picture::Picture { width: 2, height: 2, color: pixels, depth: vec![1.0; 4] };
+    let png = texture.encode(splatkit::picture::PictureFormat::Png, None).unwrap();
+    folder.put("a.png", &png);
+    folder.put("a_0001.png", &png);
+    folder.put("raw.png", [7; 64]);
+    std::fs::create_dir(folder.path("below")).unwrap();
+    let needed = ["is read too: an input or a flag refers to it", "give another name"];
+    for arguments in ["a.obj -o a.png", "a.obj -o below/../a.png", "a.obj -o b.png --depth a.png"] {
+        folder.run(&format!("render {arguments} --overwrite --reference --size 8x8")).fails(1, &needed[1..]);
+    }
+    folder.run("render a.obj -o a.png --overwrite --reference --size 8x8").fails(1, &[needed[0], "a.png"]);
+    folder.put("a.mtl", "newmtl m\nmap_Kd a_0001.png\n");
+    folder
+        .run("render a.obj -o a.png --turntable 2 --overwrite --reference --size 8x8")
+        .fails(1, &["a_0001.png: is read too"]);
+    folder
+        .run("render raw.png --dims 4x4x4 --type u8 -o raw.png --overwrite")
+        .fails(1, &["raw.png: is an input too", "give another name"]);
+    assert_eq!(
+        [folder.path("a.png"), folder.path("a_0001.png")].map(|path| std::fs::read(path).unwrap()),
+        [png.clone(), png]
+    );
+    // A texture that is no longer referred to.
+    folder.run("render a.obj -o a.png --overwrite --reference --size 8x8").ok();
 }
 
 #[test]

@@ -164,12 +164,12 @@ impl Pieces {
         found
     }
 
-    /// The triangles of a piece.
+    /// The triangles of a piece, and the number of the first one.
     ///
     /// # Errors
     /// [`Error::Input`] for a polygon, and for an index without a vertex.
-    pub fn triangle_piece(&self, source: &Source, piece: usize) -> Result<Vec<[u32; 3]>> {
-        let Some(faces) = &self.faces else { return Ok(Vec::new()) };
+    pub fn triangle_piece(&self, source: &Source, piece: usize) -> Result<(usize, Vec<[u32; 3]>)> {
+        let Some(faces) = &self.faces else { return Ok((0, Vec::new())) };
         let Rows { at, count, stride, big } = faces.rows;
         let vertices = self.points();
         let triangle = |row: usize| {
@@ -191,7 +191,8 @@ impl Pieces {
                 None => Ok(corners),
             }
         };
-        (piece * ROWS..((piece + 1) * ROWS).min(count)).map(triangle).collect()
+        let rows = piece * ROWS..((piece + 1) * ROWS).min(count);
+        Ok((rows.start, rows.map(triangle).collect::<Result<_>>()?))
     }
 }
 

@@ -23,7 +23,7 @@ impl Convert {
         progress.stage(format!("Reading {}", file.display()));
         let source = self.source(file, most)?;
         let (lattice, scalar) = source.shape();
-        memory::check(file, memory_of(&source), most)?;
+        memory::check(file, memory_of(&source), 0, most)?;
         if self.dry_run {
             return self.expect_bricks(&source, progress);
         }

@@ -7,7 +7,7 @@ use splatkit::{
     Error,
     hierarchy::{
         BuildOptions,
-        external::{ExternalOptions, Stage, convert},
+        external::{BLOCKS, ExternalOptions, Stage, check, convert},
         file::UpAxis,
     },
     io::Stream,
@@ -30,14 +30,6 @@ impl Convert {
                  triangles, LAS and LAZ become hierarchies in less; --memory allows more"
             )));
         }
-        if self.dry_run {
-            if self.json {
-                return output::line(json!({"expected_memory": need.bytes, "memory": most, "in_regions": true}));
-            }
-            return output::line(format_args!(
-                "memory          about {wanted} MiB as a whole; region by region in {most_mib} MiB"
-            ));
-        }
         let start = Instant::now();
         let options = ExternalOptions {
             memory: most,
@@ -56,6 +48,20 @@ impl Convert {
             stages.set(name, done, total);
         };
         let limits = self.load.limits();
+        if self.dry_run {
+            // Blocks at work take so much in any case.
+            let taken = most.max(BLOCKS);
+            check(&self.files, &limits, &options, &watch)?;
+            drop(stages);
+            progress.clear();
+            if self.json {
+                return output::line(json!({"expected_memory": need.bytes, "memory": taken, "in_regions": true}));
+            }
+            return output::line(format_args!(
+                "memory          about {wanted} MiB as a whole; region by region in {} MiB",
+                taken >> 20
+            ));
+        }
         let first = self.files.first().map(|file| Stream::open(file, &limits)).transpose()?.flatten();
         let frame = Frame { up: first.filter(Stream::z_is_up).map(|_| UpAxis::Z), ..Frame::default() };
         let write = self.surface.write_options(&self.files, &frame);

@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use splatkit::{
-    hierarchy::external::memory_of_stream,
+    hierarchy::external::{BLOCKS, memory_between, memory_of_stream},
     io::{Limits, Stream},
     surface::SurfelOptions,
 };
@@ -22,37 +22,70 @@ const OF_BYTE: u64 = 4;
 /// The same of a hierarchy, whose splats are packed.
 const OF_PACKED_BYTE: u64 = 24;
 
-/// About what converting files takes where all of them are in memory, as far as it matters where so much is `enough`.
+/// About what converting files takes where all of them are in memory, as far as it matters where so much is `enough`. What is cut
+/// into more triangles counts as that where it does: then files are looked through, one after another, until it is known whether
+/// all of them together are more.
 pub fn need(files: &[PathBuf], limits: &Limits, options: &SurfelOptions, enough: u64) -> Need {
-    let mut need = Need { bytes: 0, in_pieces: Ok(true) };
+    let mut in_pieces = Ok(true);
+    let mut is_stream = false;
+    let mut between = Vec::new();
     for file in files {
-        let is_packed = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("splk"));
-        let guess = file_bytes(file) * if is_packed { OF_PACKED_BYTE } else { OF_BYTE };
-        let of_stream = |mut stream: Stream| memory_of_stream(&mut stream, options, enough.saturating_sub(need.bytes));
-        match Stream::open(file, limits).and_then(|stream| stream.map(of_stream).transpose()) {
-            Ok(Some(bytes)) => need.bytes += bytes + file_bytes(file),
-            Ok(None) => {
-                need.bytes += guess;
-                need.in_pieces = need.in_pieces.map(|_| false);
+        let own = file_bytes(file);
+        match Stream::open(file, limits) {
+            Ok(Some(stream)) => {
+                is_stream = true;
+                between.push(memory_between(stream.counts(), options).map(|bytes| bytes.saturating_add(own)));
+                continue;
             }
+            Ok(None) => in_pieces = in_pieces.map(|_| false),
             // Where the file fits, its reader tells what is wrong with it.
-            Err(error) => {
-                need.bytes += guess;
-                need.in_pieces = need.in_pieces.and(Err(error));
+            Err(error) => in_pieces = in_pieces.and(Err(error)),
+        }
+        let is_packed = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("splk"));
+        between.push([own.saturating_mul(if is_packed { OF_PACKED_BYTE } else { OF_BYTE }); 2]);
+    }
+    let blocks = if is_stream { BLOCKS } else { 0 };
+    for (index, file) in files.iter().enumerate() {
+        let [least, most] = sums(&between, blocks);
+        if least > enough || most <= enough {
+            break;
+        }
+        let [least_of_this, most_of_this] = between[index];
+        if least_of_this < most_of_this {
+            match looked_through(file, limits, options, enough - (least - least_of_this)) {
+                Ok(bytes) => between[index] = [bytes; 2],
+                // As above.
+                Err(error) => {
+                    between[index] = [least_of_this; 2];
+                    in_pieces = in_pieces.and(Err(error));
+                }
             }
         }
     }
-    need
+    Need { bytes: sums(&between, blocks)[0], in_pieces }
 }
 
-/// Refuses what needs more memory than `most`.
-pub fn check(file: &Path, need: u64, most: u64) -> Result<(), Failure> {
-    if need <= most {
+/// What all files take at least and at most.
+fn sums(between: &[[u64; 2]], blocks: u64) -> [u64; 2] {
+    [0, 1].map(|side| between.iter().map(|bytes| bytes[side]).fold(blocks, u64::saturating_add))
+}
+
+/// What a file takes that is read in pieces, where so much is `enough`.
+fn looked_through(file: &Path, limits: &Limits, options: &SurfelOptions, enough: u64) -> splatkit::Result<u64> {
+    let own = file_bytes(file);
+    let Some(mut stream) = Stream::open(file, limits)? else { return Ok(own) };
+    Ok(memory_of_stream(&mut stream, options, enough.saturating_sub(own))?.saturating_add(own))
+}
+
+/// Refuses what needs more memory than `most`, where other inputs have `taken` some of it already.
+pub fn check(file: &Path, need: u64, taken: u64, most: u64) -> Result<(), Failure> {
+    if need.saturating_add(taken) <= most {
         return Ok(());
     }
-    let [wanted, most] = [need, most].map(|bytes| bytes.div_ceil(1 << 20));
+    let [need, taken, most] = [need, taken, most].map(|bytes| bytes.div_ceil(1 << 20));
+    let before = if taken > 0 { format!(" beside {taken} MiB of the inputs before") } else { String::new() };
     Err(Failure::Usage(format!(
-        "{}: this takes about {wanted} MiB, but only {most} MiB may be taken; --memory allows more",
+        "{}: this takes about {need} MiB{before}, but only {most} MiB may be taken; --memory allows more",
         file.display()
     )))
 }

@@ -47,6 +47,7 @@ impl Convert {
             let file = self.output.display();
             return Err(Failure::Usage(format!("{file}: only .splk, .ply, .nrrd and .splv files can be written")));
         }
+        self.surface.check(&extension)?;
         if !self.dry_run {
             output::check(&self.output, self.overwrite)?;
             output::try_writing(&self.output, &self.files)?;
@@ -56,6 +57,11 @@ impl Convert {
             "splv" => self.bricks(progress),
             _ => self.surface(&extension, progress),
         }
+    }
+
+    /// Refuses to replace a file that was read.
+    fn check_unneeded(&self, read: &[PathBuf]) -> Result<(), Failure> {
+        if self.dry_run { Ok(()) } else { output::check_unneeded(&self.output, read) }
     }
 
     /// The bytes of memory that a conversion may take.

@@ -28,10 +28,24 @@ impl Source {
 impl Convert {
     /// Opens the input, slice by slice where that can be; as a whole in `most` bytes of memory.
     pub(super) fn source(&self, file: &Path, most: u64) -> Result<Source, Failure> {
-        if self.load.kind(file)? != Kind::Volume {
-            return Err(none(file));
+        let name = file.display();
+        match self.load.kind(file)? {
+            Kind::Volume => {}
+            Kind::Bricks => {
+                let message = format!(
+                    "{name} holds no volume of which this can be made: it is in bricks already; convert the one that it was made from"
+                );
+                return Err(Failure::Usage(message));
+            }
+            Kind::Samples => {
+                return Err(Failure::Usage(format!(
+                    "{name} holds no volume of which this can be made, but scattered samples"
+                )));
+            }
+            Kind::Mesh | Kind::Hierarchy => return Err(none(file)),
         }
         if let Some(stream) = self.load.stream(file)? {
+            self.check_unneeded(&[stream.path().to_owned()])?;
             return Ok(Source::Stream(stream));
         }
         // What is not packed takes no less memory than its file; what is shows when it is unpacked.
@@ -50,7 +64,10 @@ impl Convert {
 
     /// Reads a volume as a whole; in so many bytes of memory where it is not known what it takes.
     pub(super) fn whole(&self, file: &Path, memory: Option<u64>) -> Result<Volume, Failure> {
-        match self.load.open_within(file, memory)? {
+        let mut read = Vec::new();
+        let input = self.load.open_within(file, memory, &mut read)?;
+        self.check_unneeded(&read)?;
+        match input {
             Input::Volume(volume) => Ok(volume),
             _ => Err(none(file)),
         }

@@ -8,7 +8,7 @@ use splatkit::{
     Error,
     hierarchy::{
         self, BuildOptions,
-        external::memory_of_mesh,
+        external::{memory_of_mesh, memory_of_splats},
         file::{UpAxis, WriteOptions},
     },
     splat::SplatSet,
@@ -23,15 +23,15 @@ use std::{
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Hierarchy")]
 pub struct SurfaceFlags {
-    /// How much time building may take for how good a tree.
-    #[arg(long, value_enum, value_name = "NAME", default_value_t = Preset::Balanced)]
-    preset: Preset,
+    /// How much time building may take for how good a tree [default: balanced]
+    #[arg(long, value_enum, value_name = "NAME")]
+    preset: Option<Preset>,
     /// Keeps every bit of the splats, at about eight times the size.
     #[arg(long)]
     lossless: bool,
-    /// A factor on all radii; below 1 surfaces may show holes.
-    #[arg(long, value_name = "FACTOR", value_parser = parse::radius_scale, default_value_t = 1.0)]
-    radius_scale: f32,
+    /// A factor on all radii; below 1 surfaces may show holes [default: 1]
+    #[arg(long, value_name = "FACTOR", value_parser = parse::radius_scale)]
+    radius_scale: Option<f32>,
     /// The axis that points up, for viewers of the result.
     #[arg(long, value_name = "AXIS")]
     up: Option<Up>,
@@ -40,7 +40,8 @@ pub struct SurfaceFlags {
     pub(super) unit: Option<String>,
     /// What a conversion may take, such as 8GiB. Binary PLY of points or triangles, LAS and LAZ that would take more are
     /// converted region by region, with files of about their size beside the output meanwhile. Volumes that are raw, or NRRD
-    /// of raw encoding, become .splv slice by slice [default: three quarters of the memory that there is]
+    /// of raw encoding, become .splv slice by slice. Region by region, 200 MiB are taken in any case [default: three quarters of
+    /// the memory that there is]
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     pub(super) memory: Option<u64>,
 }
@@ -95,7 +96,7 @@ impl Convert {
         }
         let gathered = self.gather(progress)?;
         if self.dry_run {
-            return self.expect(&gathered, need, progress);
+            return self.expect(&gathered, need.bytes, progress);
         }
         let start = Instant::now();
         if extension == "ply" {
@@ -138,7 +139,8 @@ impl Convert {
     fn gather(&self, progress: &Progress) -> Result<Gathered, Failure> {
         let mut gathered: Option<Gathered> = None;
         for path in &self.files {
-            let own = self.splats_of(path, progress)?;
+            let taken = gathered.as_ref().map_or(0, |all| memory_of_splats(all.set.splats.len()));
+            let own = self.splats_of(path, taken, progress)?;
             hierarchy::check_splats(&own.set).map_err(|error| in_file(path, error))?;
             match &mut gathered {
                 None => gathered = Some(own),
@@ -148,18 +150,21 @@ impl Convert {
         gathered.ok_or_else(|| Failure::Usage("there is nothing to convert".into()))
     }
 
-    fn splats_of(&self, path: &Path, progress: &Progress) -> Result<Gathered, Failure> {
+    /// The splats of an input, beside those of others that have `taken` so many bytes.
+    fn splats_of(&self, path: &Path, taken: u64, progress: &Progress) -> Result<Gathered, Failure> {
         progress.stage(format!("Reading {}", path.display()));
         let start = Instant::now();
-        let input = self.load.open_within(path, Some(self.most_memory()))?;
+        let most = self.most_memory();
+        let mut read = Vec::new();
+        let input = self.load.open_within(path, Some(most), &mut read)?;
+        self.check_unneeded(&read)?;
         let read_ms = milliseconds(start);
         let start = Instant::now();
         let (set, closed, frame, points) = match input {
             Input::Mesh(mesh) => {
                 progress.stage(format!("Making splats of {} points", mesh.positions.len()));
                 let options = self.surface.surfel_options();
-                let most = self.most_memory();
-                memory::check(path, memory_of_mesh(&mesh, &options, most), most)?;
+                memory::check(path, memory_of_mesh(&mesh, &options, most.saturating_sub(taken)), taken, most)?;
                 let closed = mesh.is_solid();
                 let set = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
                 let frame = Frame { up: mesh.z_is_up.then_some(UpAxis::Z), ..Frame::default() };
@@ -168,8 +173,9 @@ impl Convert {
             Input::Hierarchy(hierarchy) => {
                 progress.stage("Reading the splats of the finest level");
                 let header = hierarchy.header();
+                memory::check(path, memory_of_splats(header.leaves as usize), taken, most)?;
                 let mut set = hierarchy.leaves()?;
-                let scale = self.surface.radius_scale;
+                let scale = self.surface.radius_scale();
                 set.splats.iter_mut().for_each(|splat| splat.factor = splat.factor.map(|entry| entry * scale));
                 let frame = Frame { up: header.up, unit: header.unit.clone() };
                 (set, header.closed, frame, header.source_points)
@@ -185,9 +191,11 @@ impl Convert {
     }
 
     /// Tells what a conversion would take, by that of a run of the splats.
-    fn expect(&self, gathered: &Gathered, need: memory::Need, progress: &Progress) -> Result<(), Failure> {
+    fn expect(&self, gathered: &Gathered, need: u64, progress: &Progress) -> Result<(), Failure> {
         progress.stage("Trying a part");
         let splats = &gathered.set.splats;
+        // Triangles that are cut are many more splats; what these are made from takes about as much again.
+        let memory = need.max(2 * memory_of_splats(splats.len()));
         let count = splats.len().min(SAMPLE);
         let first = (splats.len() - count) / 2;
         let SplatSet { origin, payload, extent, overlap, .. } = gathered.set;
@@ -206,7 +214,7 @@ impl Convert {
                 "points": gathered.points,
                 "splats": splats.len(),
                 "expected_bytes": bytes,
-                "expected_memory": need.bytes,
+                "expected_memory": memory,
                 "expected_build_ms": build_ms,
                 "read_ms": gathered.read_ms,
                 "splats_ms": gathered.splats_ms,
@@ -215,7 +223,7 @@ impl Convert {
         output::line(format_args!("points          {}", gathered.points))?;
         output::line(format_args!("splats          {}", splats.len()))?;
         output::line(format_args!("bytes           about {bytes}"))?;
-        output::line(format_args!("memory          about {} MiB", need.bytes >> 20))?;
+        output::line(format_args!("memory          about {} MiB", memory >> 20))?;
         let [read, made] = [gathered.read_ms, gathered.splats_ms].map(|ms| ms / 1e3);
         let build = build_ms / 1e3;
         output::line(format_args!(
@@ -242,8 +250,26 @@ impl Gathered {
 }
 
 impl SurfaceFlags {
+    /// Refuses flags that would change nothing in a file of this extension.
+    pub(super) fn check(&self, extension: &str) -> Result<(), Failure> {
+        let flags = [
+            ("--preset", self.preset.is_some(), &["splk"][..]),
+            ("--lossless", self.lossless, &["splk"]),
+            ("--up", self.up.is_some(), &["splk"]),
+            ("--unit", self.unit.is_some(), &["splk", "splv"]),
+            ("--radius-scale", self.radius_scale.is_some(), &["splk", "ply"]),
+        ];
+        match flags.into_iter().find(|(_, is_given, of)| *is_given && !of.contains(&extension)) {
+            Some((flag, _, of)) => {
+                let of = of.iter().map(|extension| format!(".{extension}")).collect::<Vec<_>>().join(" and ");
+                Err(Failure::Usage(format!("{flag} is for {of} files; it changes nothing in .{extension} ones")))
+            }
+            None => Ok(()),
+        }
+    }
+
     pub(super) fn preset(&self) -> hierarchy::Preset {
-        match self.preset {
+        match self.preset.unwrap_or(Preset::Balanced) {
             Preset::Fastest => hierarchy::Preset::Fastest,
             Preset::Fast => hierarchy::Preset::Fast,
             Preset::Balanced => hierarchy::Preset::Balanced,
@@ -252,8 +278,12 @@ impl SurfaceFlags {
         }
     }
 
+    fn radius_scale(&self) -> f32 {
+        self.radius_scale.unwrap_or(1.0)
+    }
+
     pub(super) fn surfel_options(&self) -> SurfelOptions {
-        SurfelOptions { radius_scale: self.radius_scale, ..SurfelOptions::default() }
+        SurfelOptions { radius_scale: self.radius_scale(), ..SurfelOptions::default() }
     }
 
     fn build_options(&self, gathered: &Gathered) -> BuildOptions {

@@ -30,7 +30,7 @@ impl Convert {
         progress.stage(format!("Reading {}", file.display()));
         let most = self.most_memory();
         let source = self.source(file, most)?;
-        memory::check(file, memory_of(&source, self.lattice), most)?;
+        memory::check(file, memory_of(&source, self.lattice), 0, most)?;
         let volume = match source {
             Source::Whole(volume) => volume,
             Source::Stream(_) => self.whole(file, None)?,
