@@ -269,7 +269,9 @@ fn bounds(node: &Node, below: &Node, place: impl Fn() -> String, findings: &mut 
         findings.push(Finding::error("size", place(), message));
     }
     if node.cone > -1.0 {
-        let wanted = libm::cos(joint_angle(node, below));
+        // Of a leaf its normal: what more its disc needs the first builds did not tell, whose files are sound.
+        let cone = if below.is_leaf() && below.cone > -1.0 { 1.0 } else { below.cone };
+        let wanted = libm::cos(joint_angle(node, &Node { cone, ..*below }));
         if f64::from(node.cone) > wanted + 1e-6 {
             let message =
                 format!("its cone needs one of cosine {wanted} around its parent's normal, which has {}", node.cone);
