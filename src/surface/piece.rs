@@ -6,7 +6,7 @@ use super::{
     adjacency::may_be_split,
     cloud,
     fan::Sums,
-    refine::{affordable, count_once_cut, pieces},
+    refine::{Expected, affordable, count_once_cut, pieces},
     surfels::{largest_edge, of_part},
     survey::{edge, edge_of_places},
 };
@@ -117,7 +117,7 @@ impl MeshPieces {
         room: usize,
         mut look: impl FnMut(f32) -> Result<Triangles>,
     ) -> Result<(Self, Triangles)> {
-        let budget = options.most_triangles.max(triangles);
+        let budget = options.most_once_cut(triangles);
         let around_all = largest_edge(bounds, f64::INFINITY, options);
         let first = look(around_all)?;
         // Vertices that no triangle has do not count, and the area may.
@@ -127,7 +127,10 @@ impl MeshPieces {
             unit,
             budget,
             |length| first.take().map_or_else(|| look(length), Ok),
-            |seen| seen.expected,
+            |seen| {
+                let whole = triangles.saturating_sub(seen.long.len()) as f64;
+                Expected { whole, cut: seen.expected - whole }
+            },
             |seen, length| {
                 let others = triangles.saturating_sub(seen.long.len());
                 let [room, budget] = [room, budget].map(|all| all.saturating_sub(others));
@@ -184,6 +187,29 @@ mod tests {
         seen
     }
 
+    /// A few long triangles below a scan that has all triangles of the budget: they are cut, and the scan is not gone through again
+    /// and again.
+    #[test]
+    fn the_long_ones_of_a_large_scan_are_cut() {
+        let mut mesh = Mesh::cube(1.0);
+        let scan = Mesh::sphere(5);
+        mesh.triangles.extend(scan.triangles.iter().map(|triangle| triangle.map(|vertex| vertex + 8)));
+        mesh.positions.extend(scan.positions.iter().map(|place| *place * 0.02));
+        let counts = [mesh.positions.len(), mesh.triangles.len()];
+        let options = SurfelOptions { most_triangles: counts[1], ..SurfelOptions::default() };
+        let mut looks = 0;
+        let look = |length: f32| {
+            looks += 1;
+            Ok(seen(&mesh, length))
+        };
+        let (pieces, told) =
+            MeshPieces::new(counts, [false; 2], [Vec3::splat(-1.0), Vec3::ONE], &options, usize::MAX, look).unwrap();
+        assert!(pieces.unit < 0.1 && told.cut > counts[1] / 20, "{} and {}", pieces.unit, told.cut);
+        assert!(looks < 8, "{looks} looks");
+        let fine = mesh.triangles_once_cut(&options, usize::MAX);
+        assert_eq!(fine, counts[1] - told.long.len() + told.cut);
+    }
+
     /// Pieces are cut as the whole is, also where there is a budget, and no farther than there is room.
     #[test]
     fn the_budget_is_that_of_the_whole() {
@@ -207,7 +233,7 @@ mod tests {
                 let (pieces_of_all, told) = pieces(usize::MAX).unwrap();
                 let count = mesh.triangles.len() - told.long.len() + told.cut;
                 assert_eq!(count, count_of_refined(&mesh, pieces_of_all.unit, most_triangles, usize::MAX));
-                assert!(count <= most_triangles.max(mesh.triangles.len()), "{count} of {most_triangles}");
+                assert!(count <= options.most_once_cut(mesh.triangles.len()), "{count} of {most_triangles}");
                 let (_, told) = pieces(count - 1).unwrap();
                 assert!(mesh.triangles.len() - told.long.len() + told.cut >= count);
             }

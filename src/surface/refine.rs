@@ -37,7 +37,7 @@ pub(super) struct Refined<'a> {
 }
 
 /// The mesh with no edge longer than `length` (in its unit), and textured triangles cut to about the size of the texels.
-/// Lengths grow where there would be more than `most` triangles, and more than there are already.
+/// Lengths grow where there would be more triangles than the [`budget`].
 pub(super) fn refine(mesh: &Mesh, length: f32, most: usize) -> Refined<'_> {
     let Ok(Some(mut fine)) = refined(mesh, length, most, usize::MAX) else {
         return Refined { mesh: Cow::Borrowed(mesh), sources: None };
@@ -47,6 +47,37 @@ pub(super) fn refine(mesh: &Mesh, length: f32, most: usize) -> Refined<'_> {
         fine.triangle_materials = sources.par_iter().map(|&source| mesh.triangle_materials[source as usize]).collect();
     }
     Refined { mesh: Cow::Owned(fine), sources: Some(sources) }
+}
+
+/// How many triangles cutting may lead to: `most`, or an eighth more than there are, so that the few long ones of a large scan are
+/// cut, too.
+pub(super) fn budget(most: usize, triangles: usize) -> usize {
+    most.max(triangles.saturating_add(triangles / 8))
+}
+
+/// How many triangles there will be.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Expected {
+    /// Those that stay whole.
+    pub whole: f64,
+    /// About how many others are cut into.
+    pub cut: f64,
+}
+
+impl Expected {
+    fn all(self) -> f64 {
+        self.whole + self.cut
+    }
+
+    fn with(self, other: Self) -> Self {
+        Self { whole: self.whole + other.whole, cut: self.cut + other.cut }
+    }
+
+    /// How many steps longer edges have to be. Those that stay whole are no fewer then.
+    fn steps(self, budget: usize) -> i32 {
+        let wanted = (self.cut / (budget as f64 - self.whole).max(1.0)).sqrt().ln() / STEP.ln();
+        wanted.ceil().clamp(1.0, 1e3) as i32
+    }
 }
 
 /// That triangles would be cut into more than there may be.
@@ -62,18 +93,18 @@ fn refined(mesh: &Mesh, length: f32, most: usize, room: usize) -> Result<Option<
     if wanted.are_small() {
         return Ok(None);
     }
-    let budget = most.max(mesh.triangles.len());
+    let budget = budget(most, mesh.triangles.len());
     loop {
         let expected = wanted.expected();
-        if expected > budget as f64 {
-            wanted.coarsen(steps(expected, budget));
+        if expected.all() > budget as f64 {
+            wanted.coarsen(expected.steps(budget));
             continue;
         }
         // A triangle is also cut where its neighbours are, so that only cutting tells how many there are.
         let mut fine = Mesh { triangle_materials: (0..mesh.triangles.len() as u32).collect(), ..mesh.clone() };
         match cut_all(&mut fine, &wanted, budget.min(room)) {
             Ok(()) => return Ok(Some(fine)),
-            Err(TooMany) if room < budget => return Err((expected as usize).max(room + 1)),
+            Err(TooMany) if room < budget => return Err((expected.all() as usize).max(room + 1)),
             Err(TooMany) => wanted.coarsen(1),
         }
     }
@@ -127,13 +158,13 @@ pub(super) fn count_once_cut(mesh: &Mesh, length: f32, room: usize) -> usize {
 }
 
 /// The length that edges without texture may have where there is a budget of triangles, which are no more already: `length`, or
-/// longer, as [`refine`] chooses it. `look` tells what a length leads to, `expected` how many triangles these are, about, and
+/// longer, as [`refine`] chooses it. `look` tells what a length leads to, `expected` how many triangles these are, and
 /// `fits` whether those that are really made keep to the budget.
 pub(super) fn affordable<S, E>(
     length: f32,
     budget: usize,
     mut look: impl FnMut(f32) -> Result<S, E>,
-    expected: impl Fn(&S) -> f64,
+    expected: impl Fn(&S) -> Expected,
     mut fits: impl FnMut(&mut S, f32) -> bool,
 ) -> Result<(f32, S), E> {
     let mut taken = 0;
@@ -141,8 +172,8 @@ pub(super) fn affordable<S, E>(
         let length = length * coarser(taken).max(1.0);
         let mut seen = look(length)?;
         let expected = expected(&seen);
-        if expected > budget as f64 {
-            taken += steps(expected, budget);
+        if expected.all() > budget as f64 {
+            taken += expected.steps(budget);
         } else if fits(&mut seen, length) {
             return Ok((length, seen));
         } else {
@@ -154,12 +185,6 @@ pub(super) fn affordable<S, E>(
 /// A factor on lengths after so many steps.
 fn coarser(steps: i32) -> f32 {
     STEP.powi(steps) as f32
-}
-
-/// How many steps longer edges have to be, where so many triangles are expected.
-fn steps(expected: f64, budget: usize) -> i32 {
-    let wanted = (expected / budget as f64).sqrt().ln() / STEP.ln();
-    wanted.ceil().clamp(1.0, 1e3) as i32
 }
 
 /// Cuts until every edge may stay.
@@ -231,7 +256,7 @@ impl<'a> Wanted<'a> {
     }
 
     /// About how many triangles there will be.
-    fn expected(&self) -> f64 {
+    fn expected(&self) -> Expected {
         let parts = |(source, t): (usize, &[u32; 3])| {
             let edges = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| [t[i], t[j]]);
             let excess = edges.map(|[a, b]| f64::from(self.excess(self.mesh, source, a, b)));
@@ -240,13 +265,15 @@ impl<'a> Wanted<'a> {
                 f64::from((a - b).length() / self.length)
             });
             // Edges that texels make longer need not be those of any triangle: then two of them tell the most that there can be.
-            if excess.iter().zip(plain).all(|(excess, plain)| *excess <= plain) {
-                pieces(excess)
+            if excess.iter().all(|excess| *excess <= 1.0) {
+                Expected { whole: 1.0, cut: 0.0 }
+            } else if excess.iter().zip(plain).all(|(excess, plain)| *excess <= plain) {
+                Expected { whole: 0.0, cut: pieces(excess) }
             } else {
-                most_pieces(excess)
+                Expected { whole: 0.0, cut: most_pieces(excess) }
             }
         };
-        self.mesh.triangles.par_iter().enumerate().map(parts).sum()
+        self.mesh.triangles.par_iter().enumerate().map(parts).reduce(Expected::default, Expected::with)
     }
 }
 

@@ -7,7 +7,8 @@ use super::{Mesh, fan::Sums, mesh::given, parts::Joining, survey::Closing};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Of the area of a part: so little of it may have normals on the wrong side. Scans have folds of a few triangles.
+/// Of the area of a part: so little of it may have normals on the wrong side. And of that of all: so little may be of parts without
+/// a volume. Scans have folds of a few triangles.
 const FOLDS: f64 = 1e-3;
 /// A given normal is on the other side of a triangle where its cosine with the triangle's is below the negative of this:
 /// at slanting ones it may be a little beyond.
@@ -108,13 +109,14 @@ impl Sides {
         // Normals that the file does not give are turned as a whole.
         let all = self.parts.iter().fold(Sums::default(), |sums, part| sums.with(part.sums));
         let turned = if all.side(1.0) < 0 { -1 } else { 1 };
+        // What has no volume has no side.
+        let (flat, parts): (Vec<&Part>, Vec<&Part>) = self.parts.iter().partition(|part| part.sums.side_of_closed() == 0);
         !self.is_translucent
-            && self.parts.iter().all(|part| {
+            && flat.iter().map(|part| part.sums.area()).sum::<f64>() <= FOLDS * all.area()
+            && parts.iter().all(|part| {
                 let side = part.sums.side_of_closed();
                 let wrong = if side < 0 { part.along } else { part.against };
-                // A part without a volume has no side, and one without an area does not matter.
-                part.sums.area() == 0.0
-                    || (side != 0 && wrong <= FOLDS * part.sums.area() && !(self.lacks_normals && side * turned < 0))
+                wrong <= FOLDS * part.sums.area() && !(self.lacks_normals && side * turned < 0)
             })
     }
 }
@@ -287,6 +289,20 @@ mod tests {
             )
             .is_solid()
         );
+    }
+
+    /// Two triangles back to back, as scanners leave them, do not make a scan open; large ones do.
+    #[test]
+    fn small_flaps_do_not_count() {
+        let with_flap = |size: f32| {
+            let mut mesh = sphere(0.0);
+            let first = mesh.positions.len() as u32;
+            let at = mesh.positions[0];
+            mesh.positions.extend([at + size * Vec3::X, at + size * Vec3::Y]);
+            mesh.triangles.extend([[0, first, first + 1], [0, first + 1, first]]);
+            mesh
+        };
+        assert!(with_flap(0.01).is_solid() && !with_flap(1.0).is_solid());
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::{
     adjacency::{Connected, is_split},
     cloud,
     fan::{Made, Maker, Sums},
-    refine::{Origin, count_of_refined, refine},
+    refine::{Origin, budget, count_of_refined, refine},
 };
 use crate::{
     Error, Result,
@@ -32,7 +32,7 @@ pub struct SurfelOptions {
     pub crease_angle_degrees: f32,
     /// Triangles are cut until no edge is longer than this part of the bounding box's diagonal.
     pub largest_spacing: f32,
-    /// The most triangles that cutting may lead to, where there are not more already; spacing grows to keep to it.
+    /// The most triangles that cutting may lead to, or an eighth more than there are already; spacing grows to keep to it.
     pub most_triangles: usize,
 }
 
@@ -41,6 +41,11 @@ impl SurfelOptions {
     pub const RADIUS_SCALES: RangeInclusive<f32> = 1e-6..=1e6;
     /// Parts of the diagonal whose edges can be cut: in finer ones its fourth power does not fit 32 bits. None is cut from 1 on.
     pub const SPACINGS: RangeInclusive<f32> = 1e-9..=f32::MAX;
+
+    /// The most triangles that cutting so many may lead to.
+    pub(crate) fn most_once_cut(&self, triangles: usize) -> usize {
+        budget(self.most_triangles, triangles)
+    }
 }
 
 impl Default for SurfelOptions {

@@ -36,7 +36,8 @@ fn room(counts: Counts, bytes: u64) -> usize {
 /// Between what lies how many bytes making a hierarchy takes of what has these counts, where all of it is in memory: without any
 /// triangle cut, and with as many as cutting may lead to.
 pub fn memory_between(counts: Counts, options: &SurfelOptions) -> [u64; 2] {
-    let most = if counts.triangles == 0 { 0 } else { options.most_triangles as u64 };
+    let triangles = usize::try_from(counts.triangles).unwrap_or(usize::MAX);
+    let most = if triangles == 0 { 0 } else { options.most_once_cut(triangles) as u64 };
     [0, most].map(|triangles| of_counts(once_cut(counts, triangles)))
 }
 
