@@ -33,7 +33,8 @@ struct Frame {
     // Standard deviation of the isotropic lattice kernel (world units), its inverse, its squared extent in sigmas; what kernels
     // must add up to for a value.
     isotropic: vec4<f32>,
-    // The value of the first entry of the transfer function's table, entries per value, the last entry.
+    // The value that is counted as 0, entries of the transfer function's table per value, the last entry; the place of that value
+    // among them.
     transfer: vec4<f32>,
     // The magnitude of the first entry of the gradient's factor, entries per magnitude; the world length that gradients are
     // counted over, and that length in pixels, as `scale`.
@@ -66,7 +67,7 @@ struct Clip {
 }
 
 struct Isosurface {
-    // Value, as an entry of the table; opacity, optical depth.
+    // Value, in entries of the table; opacity, optical depth.
     value: vec4<f32>,
     color: vec4<f32>,
 }

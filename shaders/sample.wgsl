@@ -7,19 +7,19 @@ const SAMPLE_I32: u32 = 3u;
 
 fn sample_value(index: u32, kind: u32) -> f32 {
     if kind == SAMPLE_U8 {
-        return place_of(f32((samples[index >> 2u] >> (8u * (index & 3u))) & 0xffu));
+        return counted(f32((samples[index >> 2u] >> (8u * (index & 3u))) & 0xffu));
     }
     if kind == SAMPLE_U16 {
-        return place_of(f32((samples[index >> 1u] >> (16u * (index & 1u))) & 0xffffu));
+        return counted(f32((samples[index >> 1u] >> (16u * (index & 1u))) & 0xffffu));
     }
     if kind == SAMPLE_I16 {
         // Shifted up and back down as a signed number, which keeps the sign.
-        return place_of(f32(i32((samples[index >> 1u] >> (16u * (index & 1u))) << 16u) >> 16u));
+        return counted(f32(i32((samples[index >> 1u] >> (16u * (index & 1u))) << 16u) >> 16u));
     }
     if kind == SAMPLE_I32 {
         // In two parts: 32 bits of a float do not hold the whole.
         let low = samples[index] & 0xffffu;
-        return place_of_sum(f32(i32(samples[index] - low)), f32(low));
+        return counted_sum(f32(i32(samples[index] - low)), f32(low));
     }
-    return place_of(bitcast<f32>(samples[index]));
+    return counted(bitcast<f32>(samples[index]));
 }

@@ -50,7 +50,7 @@ fn splat_at(index: u32) -> Candidate {
         let slope_y = (high.x - d.x * slope_z) / b.z;
         let slope_x = (low.y - b.y * slope_y - b.w * slope_z) / b.x;
         splat.gradient = to_view * vec3(slope_x, slope_y, slope_z) * frame.transfer.y;
-        splat.strength = place_of(splat.strength);
+        splat.strength = counted(splat.strength);
     }
     if (source.flags & RADIANCE) != 0u {
         splat.strength = splat.strength * f32(splat.color >> 24u) / 255.0;

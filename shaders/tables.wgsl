@@ -1,13 +1,18 @@
-// Functions of one value, looked up by its place among the entries: the transfer function and its integral, the gradient's factor, the kernel's sections.
+// Functions of one value, looked up: the transfer function and its integral, the gradient's factor, the kernel's sections.
 // Mirrors engine/tables.rs, which says where each lies in `tables`.
 
 // Colour and extinction per value; their integrals (extinction times colour, extinction) from the first value on, counted in
 // entries; the factor on the extinction by gradient magnitude; the kernel and its sections.
 @group(0) @binding(6) var<storage, read> tables: array<vec4<f32>>;
 
+// The place of a value among the entries, before and behind them too.
+fn place_of(value: f32) -> f32 {
+    return value + frame.transfer.w;
+}
+
 // Colour and extinction of one value.
 fn classify(value: f32) -> vec4<f32> {
-    let at = clamp(value, 0.0, frame.transfer.z);
+    let at = clamp(place_of(value), 0.0, frame.transfer.z);
     let low = u32(at);
     return mix(tables[low], tables[low + 1u], at - f32(low));
 }
@@ -21,10 +26,10 @@ const NARROW_AFAR: f32 = 1e-6;
 // without the attenuation inside, which the parts of a sheet are thin enough for).
 fn classify_between(a: f32, b: f32) -> vec4<f32> {
     if BEYOND {
-        return classify_beyond(a, b);
+        return classify_beyond(place_of(a), place_of(b));
     }
     let end = frame.transfer.z;
-    let at = clamp(vec2(a, b), vec2(0.0), vec2(end));
+    let at = clamp(vec2(place_of(a), place_of(b)), vec2(0.0), vec2(end));
     let middle = 0.5 * (at.x + at.y);
     let reach = 0.5 * max(abs(at.x - at.y), NARROW);
     // To whole entries outwards, which saves half of the look-ups; the mean moves by half an entry at most.
@@ -33,7 +38,7 @@ fn classify_between(a: f32, b: f32) -> vec4<f32> {
     return (tables[frame.table_starts.x + u32(high)] - tables[frame.table_starts.x + u32(low)]) / (high - low);
 }
 
-// The same of values that may lie before and behind the tables, where the function keeps its value.
+// The same of places that may lie before and behind the tables, where the function keeps its value.
 fn classify_beyond(a: f32, b: f32) -> vec4<f32> {
     let end = frame.transfer.z;
     let middle = 0.5 * (a + b);

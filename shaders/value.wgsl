@@ -1,12 +1,13 @@
-// Values of a field. From where they are read on they are counted in entries of the transfer function's table (tables.wgsl), so
-// that 32 bits tell apart what the function does, wherever the data's zero and whatever their unit is.
+// Values of a field. From where they are read on they are counted in entries of the transfer function's table (tables.wgsl), from
+// a value among the data's on, so that 32 bits tell apart what the function does, wherever the data's zero and whatever their unit
+// is.
 
-// A value of the data as a place among the entries, before and behind them too; finite, however far.
-fn place_of(value: f32) -> f32 {
-    return place_of_sum(value, 0.0);
+// A value of the data in entries; finite, however far.
+fn counted(value: f32) -> f32 {
+    return counted_sum(value, 0.0);
 }
 
 // The same of the sum of two numbers.
-fn place_of_sum(large: f32, small: f32) -> f32 {
+fn counted_sum(large: f32, small: f32) -> f32 {
     return clamp(((large - frame.transfer.x) + small) * frame.transfer.y, -1e30, 1e30);
 }

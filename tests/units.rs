@@ -5,6 +5,7 @@ use splatkit::{
     engine::{AdapterChoice, Gpu, PreparedScene, Renderer},
     math::{Camera, Kernel, Projection},
     picture::Picture,
+    reference,
     scene::{Scene, Settings},
     splat::{Payload, Splat, SplatSet, encode_normal},
     volume::{Isosurface, Lattice, Samples, Shade, TransferFunction, Volume},
@@ -132,6 +133,27 @@ fn values_of_any_unit_and_zero() {
     let agreement = psnr(&expected, &drawn(&units.volume(samples), &camera, &settings()));
     println!("whole values from 2e9 on: {agreement:.1} dB");
     assert!(agreement > 70.0, "{agreement:.1} dB");
+}
+
+/// Where nothing changes there is no slope that rounding could leave and light fall on.
+#[test]
+fn flat_surroundings_are_flat() {
+    let inside = |sample: usize| USUAL.lattice().sample_position(sample).length() < 0.6;
+    let transfer = TransferFunction {
+        color: vec![(0.0, [0.9, 0.5, 0.2]), (255.0, [0.3, 0.6, 0.9])],
+        opacity: vec![(0.0, 0.03), (255.0, 0.5)],
+        unit: 0.1,
+        shade: Some(Shade::default()),
+        ..TransferFunction::default()
+    };
+    let samples = (0..USUAL.lattice().len()).map(|sample| if inside(sample) { 255 } else { 0 }).collect();
+    let volume = Volume::new(USUAL.lattice(), Samples::U8(samples)).expect("the samples fill the lattice");
+    let scene = Scene::new().with_volume(volume, Kernel::default(), transfer);
+    let camera = USUAL.camera(PERSPECTIVE, false);
+    let expected = reference::render(&scene, &camera, &settings()).expect("a picture");
+    let agreement = psnr(&expected, &drawn(&scene, &camera, &settings()));
+    println!("flat surroundings: {agreement:.1} dB");
+    assert!(agreement > 40.0, "{agreement:.1} dB");
 }
 
 #[test]

@@ -39,8 +39,8 @@ pub struct Tables {
     pub entries: Vec<[f32; 4]>,
     /// Where the parts start behind the transfer function: its integrals, the gradient's factors, the kernel, its sections.
     pub starts: [u32; 4],
-    /// The value of the first entry, entries per value, and the last entry. The value fits 32 bits.
-    pub values: [f64; 3],
+    /// The value that is counted as 0, which fits 32 bits; entries per value; the last entry; where the value lies among them.
+    pub values: [f64; 4],
     /// The gradient's magnitude at the first of its factors, and factors per magnitude; value per world length.
     pub gradients: [f64; 2],
     /// Extinction times colour, and extinction, of all values before the first entry and of all behind the last one.
@@ -65,10 +65,11 @@ impl Tables {
             starts[3] = entries.len() as u32;
             entries.extend(sections(kernel));
         }
+        let (zero, per_value) = (zero(range), last / (high - low));
         Self {
             entries,
             starts,
-            values: [low, last / (high - low), last],
+            values: [zero, per_value, last, (zero - low) * per_value],
             gradients: [first, per_magnitude],
             beyond: [low, high].map(|value| shown(transfer, value).map(|v| v as f32)),
         }
@@ -110,14 +111,17 @@ fn window(transfer: &TransferFunction, [low, high]: [f64; 2]) -> Window {
     let lack = (least - (last - first)).max(0.0);
     let shortest = changes.iter().map(|[a, b]| b - a).filter(|width| *width > 0.0).fold(f64::INFINITY, f64::min);
     let wanted = PART * (last - first).max(least) / shortest;
-    let entries = (wanted as usize).next_power_of_two().clamp(VALUES, MOST_VALUES);
+    let entries = (wanted.min(MOST_VALUES as f64) as usize).next_power_of_two().max(VALUES);
     // Where it begins or ends by a step, both sides of that have entries.
     let beside = (last - first).max(least) * BESIDE / (entries - 1) as f64;
-    // A value of 32 bits, from which those of the samples are told exactly.
-    let start = first - lack / 2.0 - beside;
-    let exact = start as f32;
-    let exact = if f64::from(exact) > start { exact.next_down() } else { exact };
-    Window { ends: [exact.max(f32::MIN).into(), last + lack / 2.0 + beside], entries }
+    Window { ends: [first - lack / 2.0 - beside, last + lack / 2.0 + beside], entries }
+}
+
+/// The value that is counted as 0: that of the samples which is nearest to it. Where all samples around have it, as beside what was
+/// scanned, sums of it are exact, and there is no slope that light could be seen on.
+fn zero([low, high]: [f64; 2]) -> f64 {
+    // No samples have no range.
+    if low <= high { f64::from(0.0f64.clamp(low, high) as f32) } else { 0.0 }
 }
 
 /// The parts between two points of the function in which what it shows changes.
@@ -247,7 +251,8 @@ mod tests {
         let opacity = vec![(0.0, 0.0), (0.5, 0.0), (0.5, 0.9), (1.0, 0.9)];
         let transfer = TransferFunction { opacity, ..TransferFunction::default() };
         let tables = Tables::new(&transfer, [0.0, 1.0], None);
-        let [low, per_value, last] = tables.values;
+        let [zero, per_value, last, place] = tables.values;
+        let low = zero - place / per_value;
         let whole = f64::from(tables.entries[tables.starts[0] as usize + VALUES - 1][3]) / per_value;
         let expected = (low + last / per_value - 0.5) * transfer.extinction(0.9);
         assert!((whole / expected - 1.0).abs() < 1e-3, "{whole} {expected}");

@@ -223,18 +223,20 @@ impl Frame {
 
     /// How values are looked up. Gradients count over the thickness of a sheet.
     pub fn set_tables(&mut self, tables: &Tables, transfer: &TransferFunction, view: &View, sheets: &Sheets) {
-        let [low, per_value, last] = tables.values;
-        self.transfer = [low, per_value, last, 0.0].map(|v| v as f32);
+        let [zero, per_value, ..] = tables.values;
+        self.transfer = tables.values.map(|v| v as f32);
         let [first, per_magnitude] = tables.gradients;
         let (to_own, length) = (per_value * sheets.step, sheets.step);
-        self.gradients = [first * to_own, per_magnitude / to_own, length, view.scale * length].map(|v| v as f32);
+        // Of factors that do not change, or by one step, there may be more than 32 bits hold.
+        let per_own = (per_magnitude / to_own).min(1e30);
+        self.gradients = [first * to_own, per_own, length, view.scale * length].map(|v| v as f32);
         self.table_starts = tables.starts;
         self.beyond = tables.beyond;
         let mut surfaces = transfer.isosurfaces.clone();
         surfaces.sort_by(|a, b| a.value.total_cmp(&b.value));
         for (own, surface) in self.isosurfaces.iter_mut().zip(surfaces) {
             let Isosurface { value, color: [red, green, blue], opacity } = surface;
-            let (entry, depth) = ((value - low) * per_value, -(1.0 - opacity).max(1e-9).ln());
+            let (entry, depth) = ((value - zero) * per_value, -(1.0 - opacity).max(1e-9).ln());
             *own = [[entry, opacity, depth, 0.0], [red, green, blue, 0.0]].map(|part| part.map(|v| v as f32));
         }
     }
