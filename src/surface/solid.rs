@@ -110,7 +110,8 @@ impl Sides {
         let all = self.parts.iter().fold(Sums::default(), |sums, part| sums.with(part.sums));
         let turned = if all.side(1.0) < 0 { -1 } else { 1 };
         // What has no volume has no side.
-        let (flat, parts): (Vec<&Part>, Vec<&Part>) = self.parts.iter().partition(|part| part.sums.side_of_closed() == 0);
+        let (flat, parts): (Vec<&Part>, Vec<&Part>) =
+            self.parts.iter().partition(|part| part.sums.side_of_closed() == 0);
         !self.is_translucent
             && flat.iter().map(|part| part.sums.area()).sum::<f64>() <= FOLDS * all.area()
             && parts.iter().all(|part| {
