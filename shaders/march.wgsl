@@ -7,8 +7,8 @@
 // them to the fourth lane. A splat that is longer gets its next window three sheets on: there, the first lane takes back
 // what the window before gave it too much. So each entry evaluates three planes, however long its splat is.
 //
-// A tile with very many entries stops between two sheets and goes on in another dispatch, because some drivers end long
-// loops without a word (see docs/engine.md). It then collects again what reaches into the sheets to come from before.
+// A tile with very many entries stops among them and goes on in another dispatch, because some drivers end long loops without
+// a word (see docs/engine.md). Its sums are kept meanwhile (saved.wgsl).
 //
 // An invocation holds ROWS pixels, one below the other, so that they share the loads of an entry.
 
@@ -20,20 +20,21 @@
 @group(0) @binding(5) var<storage, read> entries: array<u32>;
 // Binding 6: the tables of tables.wgsl.
 // Premultiplied colour and opacity; distance at which half of the light is taken, or the largest value. Both carry over
-// from pass to pass.
+// from pass to pass. Behind the colours lie the slots of saved.wgsl.
 @group(0) @binding(7) var<storage, read_write> colors: array<vec4<f32>>;
 @group(0) @binding(8) var<storage, read_write> depths: array<f32>;
 // See progress.wgsl.
 @group(0) @binding(9) var<storage, read_write> progress: array<atomic<u32>>;
 
-// The progress of a tile that needs no more work.
-const FINISHED: u32 = 0xffffffffu;
 // The largest value, stored for a pixel that has none, and for one where it is 0.
 const STORED_NONE: f32 = 0.0;
 const STORED_ZERO: f32 = 1e-37;
 
 // Face values of the sheet that is being closed, for differences between neighbouring pixels.
 var<workgroup> neighbours: array<f32, 64>;
+// Whether an invocation of the tile stopped, and the tile's slot.
+var<workgroup> any_stopped: atomic<u32>;
+var<workgroup> own_slot: u32;
 
 @compute @workgroup_size(8, LANE_ROWS)
 fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) lane: vec3<u32>) {
@@ -55,7 +56,6 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
         atomicStore(&progress[tile], FINISHED);
     }
     storageBarrier();
-    first_composited = max(resumed, stage.first_sheet);
     let corner = vec2<i32>(vec2(column, row)) * TILE_STEP - APRON;
     let first_pixel = corner + vec2<i32>(i32(lane.x), i32(lane.y * ROWS));
     for (var r = 0u; r < ROWS; r++) {
@@ -75,26 +75,32 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     }
 
     let tile_bins = ((row - stage.first_row) * frame.tiles.x + column) * stage.groups;
-    var group_end = bin_end(tile_bins);
-    var bin = tile_bins;
-    let last_bin = tile_bins + stage.groups - 1u;
-    // The first window that reaches into the sheets to come.
+    let end = bin_end(tile_bins + stage.groups - 1u);
     let origin = stage.first_sheet - 1u;
-    let first_window = first_composited - min(first_composited, 3u);
-    bin += (max(first_window, origin) - origin) >> stage.group_shift;
+    var bin = tile_bins;
     var at = 0u;
     if bin > 0u {
         at = bin_end(bin - 1u);
     }
-    group_end = bin_end(bin);
-    let end = bin_end(last_bin);
-    var entries_left = MOST_ENTRIES;
-    var stopped = 0u;
     var front = origin;
     // Sheets from `front` on that may hold something.
     var open = 0u;
+    if CAN_STOP && resumed > 0u {
+        let walk = restore(resumed - 1u, lane.xy);
+        at = walk.x;
+        bin = walk.y;
+        front = walk.z;
+        open = walk.w;
+    }
+    var group_end = bin_end(bin);
+    var entries_left = MOST_ENTRIES;
+    var stopped = false;
     loop {
         if at >= end {
+            break;
+        }
+        if CAN_STOP && entries_left == 0u {
+            stopped = true;
             break;
         }
         while group_end <= at {
@@ -107,14 +113,9 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
             let closed = min(sheet - front, open);
             close(front, closed, lane.xy);
             entries_left -= min(entries_left, closed * CLOSING_ENTRIES);
-            open -= min(sheet - front, open);
+            open -= closed;
         }
         front = sheet;
-        // All sheets before this one are closed. A tile stops only when it has got further than where it started.
-        if entries_left == 0u && front > first_composited + 1u {
-            stopped = front;
-            break;
-        }
         // With differences between pixels, all lanes must reach every barrier.
         if !CENTRAL && !BACK_TO_FRONT {
             var light = 0.0;
@@ -122,17 +123,15 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
                 light = max(light, pixels[r].transmittance);
             }
             if light < OPAQUE {
+                at = end;
                 break;
             }
         }
-        let run_end = at + min(LONGEST_RUN, end - at);
-        let stop = min(end, group_end);
+        let stop = min(min(end, group_end), at + max(entries_left, 1u));
         loop {
             let entry = entries[at];
             var taken = 1u;
-            if SINGLE_SPLATS && front < resumed {
-                // It is in the picture since before the tile stopped.
-            } else if ISOTROPIC_RECORDS && (!GENERAL_RECORDS || (entry & ENTRY_ISOTROPIC) != 0u) {
+            if ISOTROPIC_RECORDS && (!GENERAL_RECORDS || (entry & ENTRY_ISOTROPIC) != 0u) {
                 for (var i = 1u; i < TOGETHER; i++) {
                     if taken == i && at + i < stop && is_alike(entries[at + i], entry) {
                         taken++;
@@ -147,20 +146,38 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
             if at >= stop || (entries[at] >> ENTRY_SHEET_SHIFT) != entry_sheet {
                 break;
             }
-            if at >= run_end {
-                atomicStore(&progress[progress_word(UNFINISHABLE)], 1u);
-                break;
-            }
         }
         open = 4u;
     }
-    if stopped == 0u {
+    if !stopped {
         // Sheets behind the pass's last are the next pass's.
         close(front, min(open, stage.end_sheet - front), lane.xy);
+        open = 0u;
     }
-    if stopped > 0u {
-        atomicStore(&progress[tile], stopped);
-        atomicStore(&progress[progress_word(UNFINISHED)], 1u);
+    if CAN_STOP {
+        if stopped {
+            atomicStore(&any_stopped, 1u);
+        }
+        workgroupBarrier();
+        if atomicLoad(&any_stopped) > 0u {
+            if all(lane.xy == vec2(0u)) {
+                own_slot = resumed - 1u;
+                if resumed == 0u {
+                    own_slot = claim_slot();
+                }
+                atomicStore(&progress[tile], own_slot + 1u);
+                atomicStore(&progress[progress_word(UNFINISHED)], 1u);
+                atomicAdd(&progress[progress_word(STOPS)], select(1u, 0u, own_slot == NO_SLOT));
+            }
+            workgroupBarrier();
+            if own_slot == NO_SLOT {
+                // The tile begins anew, from what the picture holds.
+                return;
+            }
+            save(own_slot, lane.xy, vec4(at, bin, front, open));
+        } else if resumed > 0u && all(lane.xy == vec2(0u)) {
+            free_slot(resumed - 1u);
+        }
     }
 
     for (var r = 0u; r < ROWS; r++) {

@@ -94,7 +94,6 @@ fn opaque_tiles() -> u32 {
 
 @compute @workgroup_size(1)
 fn advance() {
-    state[ADVANCED] += 1u;
     stage.groups = 0u;
     bin_size.x = 0u;
     state[TOUCHED] = max(state[TOUCHED], state[TILES]);
@@ -180,8 +179,9 @@ fn begin(first: u32, end: u32, first_band: u32, end_band: u32, entries: u32) {
     }
     stage = Pass(first, end, first_row, end_row, select(0u, groups, tiles > 0u), shift, vec2(0u));
     state[PASSES] += 1u;
+    state[ADVANCED] += 1u;
     let bins = groups * tiles;
     bin_size.x = bins + 1u;
-    arguments[SCAN_ARGUMENTS] = max(bins, frame.tiles.x * frame.tiles.y + 2u) / SEGMENTS + 1u;
+    arguments[SCAN_ARGUMENTS] = max(bins, progress_word(LISTED)) / SEGMENTS + 1u;
     arguments[TILE_ARGUMENTS] = (tiles + 63u) / 64u;
 }

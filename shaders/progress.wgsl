@@ -1,9 +1,16 @@
-// What the tiles of a pass have come to: for each the sheet that it goes on from; behind them, whether any is unfinished,
-// whether one can't be finished, and how many tiles have entries, with the list of these.
+// How far the tiles of a pass have come. For each tile: 0, or one more than the slot that holds its sums (saved.wgsl), or
+// FINISHED. Behind the tiles: whether any is unfinished, how often one stopped, which slots are taken, and how many tiles have
+// entries, with the list of these.
+
+// A tile that needs no more work.
+const FINISHED: u32 = 0xffffffffu;
 
 const UNFINISHED: u32 = 0u;
-const UNFINISHABLE: u32 = 1u;
-const LISTED: u32 = 2u;
+const STOPS: u32 = 1u;
+const SLOTS: u32 = 2u;
+// Bits for the slots; mirrors engine/frame.rs.
+const SLOT_WORDS: u32 = 32u;
+const LISTED: u32 = SLOTS + SLOT_WORDS;
 
 fn progress_word(word: u32) -> u32 {
     return frame.tiles.x * frame.tiles.y + word;

@@ -11,7 +11,8 @@
 fn take_unfinished() -> bool {
     let unfinished = progress[progress_word(UNFINISHED)] != 0u;
     progress[progress_word(UNFINISHED)] = 0u;
-    state[IMPOSSIBLE] |= progress[progress_word(UNFINISHABLE)];
+    state[ADVANCED] += progress[progress_word(STOPS)];
+    progress[progress_word(STOPS)] = 0u;
     return unfinished;
 }
 

@@ -6,9 +6,6 @@ const LEAST_DEPTH: f32 = 1e-5;
 // Optical depth that counts as opaque.
 const MOST_DEPTH: f32 = 20.0;
 
-// First sheet that this invocation composites: the pass's own, or where its tile stopped.
-var<private> first_composited: u32;
-
 // Blinn's light (1977) at the eye, on both sides.
 fn lit(color: vec3<f32>, normal: vec3<f32>, direction: vec3<f32>, shade: vec4<f32>) -> vec3<f32> {
     let size = length(normal);
@@ -262,7 +259,7 @@ fn pass_field(r: u32, sheet: u32, own: Sheet) -> Medium {
 
 // Adds a sheet to the picture.
 fn composite(r: u32, sheet: u32, own: Sheet) {
-    if sheet < first_composited || sheet >= stage.end_sheet {
+    if sheet < stage.first_sheet || sheet >= stage.end_sheet {
         return;
     }
     var premultiplied = own.radiance.xyz;

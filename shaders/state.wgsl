@@ -22,15 +22,13 @@ const OVERFLOW: u32 = 9u;
 const HIDDEN: u32 = 10u;
 // Entries that were binned.
 const BINNED: u32 = 11u;
-// More splats meet in a tile of a sheet than the driver can add up.
-const IMPOSSIBLE: u32 = 12u;
 // Tiles that the last pass drew in, and the most that a pass has.
-const TILES: u32 = 13u;
-const TOUCHED: u32 = 14u;
-// How often a pass was looked for: tells the CPU that something happens at all.
-const ADVANCED: u32 = 15u;
+const TILES: u32 = 12u;
+const TOUCHED: u32 = 13u;
+// Passes that began, and tiles that stopped after some entries: a frame in which this rests gets nowhere.
+const ADVANCED: u32 = 14u;
 // The stalled pass.
-const HELD: u32 = 16u;
+const HELD: u32 = 15u;
 const STATE_WORDS: u32 = 24u;
 
 // Indirect dispatches of a pass, as places in `arguments`: over the bins for clear and scan, over the bins for order, over

@@ -185,6 +185,13 @@ pub fn variant(
     variant
 }
 
+/// Tiles that march may stop in one pass with their sums kept (`SLOT_WORDS` in progress.wgsl has a bit for each).
+const SLOTS: u64 = 1024;
+/// Bytes of a tile's sums (`SAVED_VECTORS` in saved.wgsl).
+const SLOT_BYTES: u64 = 64 * 17 * 16;
+/// Bytes that slots take behind the colours of a picture at most.
+pub const MOST_SLOT_BYTES: u64 = SLOTS * SLOT_BYTES;
+
 /// Mesa's software driver ends all loops of an invocation after 65,535 iterations together. In march an entry takes up to
 /// six: its own, and those that find its sheet and close the sheets before it.
 const SOFTWARE_ENTRIES: u32 = 10_000;
@@ -348,6 +355,7 @@ pub fn targets(
             sheets.count()
         )));
     }
+    let slots = if variant.can_stop() { SLOTS.min(u64::from(tile_count)) } else { 0 };
     // The number of entries stands behind the last bin.
     let bin_count = (groups(0) * u64::from(tile_count)).min(u64::from(MOST_BINS)) + 1;
     let most_tiles = tiles[0].max(tiles[1]);
@@ -392,8 +400,8 @@ pub fn targets(
         long_bins: pool.take(gpu, "long bins", 4 * bin_count),
         long_count: pool.take(gpu, "long count", 4),
         long_arguments: pool.take(gpu, "long arguments", 12),
-        progress: pool.take(gpu, "progress", 4 * (2 * u64::from(tile_count) + 3)),
-        colors: pool.take(gpu, "colors", 16 * pixels),
+        progress: pool.take(gpu, "progress", 4 * (2 * u64::from(tile_count) + SLOTS / 32 + 3)),
+        colors: pool.take(gpu, "colors", 16 * pixels + slots * SLOT_BYTES),
         depths: pool.take(gpu, "depths", 4 * pixels),
         run_total: prepared.runs,
         tiles,
@@ -501,12 +509,18 @@ impl<'a> Work<'a> {
 
     /// The steps that go on with a pass at which the frame stopped.
     pub fn resumed(self) -> Vec<Step<'a>> {
+        // Each march that finds nothing left is empty.
+        const MARCHES: usize = 8;
         let Self { gpu, resume, pipelines, targets, .. } = self;
         let march: Step<'a> = (
             "march",
             Box::new(move |encoder| {
                 resume.encode_resume(gpu, encoder, targets);
                 pipelines.march.encode(gpu, encoder, targets, MARCH_ARGUMENTS);
+                for _ in 1..MARCHES {
+                    resume.encode_again(gpu, encoder, targets);
+                    pipelines.march.encode(gpu, encoder, targets, AGAIN_ARGUMENTS);
+                }
                 resume.encode_hold(gpu, encoder, targets);
             }),
         );

@@ -23,6 +23,7 @@ impl March {
             shaders::KERNELS,
             shaders::SHEET,
             shaders::PROGRESS,
+            shaders::SAVED,
             shaders::MARCH,
         ];
         let bindings = [Uniform, Read, Uniform, Read, Read, Read, Read, Write, Write, Write];

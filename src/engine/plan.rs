@@ -28,7 +28,7 @@ impl Plan {
         let constants = variant.constants();
         let shared = [&constants, shaders::FRAME, shaders::SPANS, shaders::CENSUS];
         let plan = |label, entry| {
-            let own = [shaders::STATE, shaders::MAP, shaders::PLAN];
+            let own = [shaders::STATE, shaders::MAP, shaders::PROGRESS, shaders::PLAN];
             let bindings = [Uniform, Read, Uniform, Write, Write, Write, Write, Write, Read];
             Stage::new(gpu, label, &[shared.as_slice(), &own].concat(), entry, &[&bindings])
         };

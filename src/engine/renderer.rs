@@ -222,6 +222,8 @@ impl Renderer {
         };
         let reads = |prepared: &PreparedScene| prepared.shelf.as_ref().map_or(0, |shelf| shelf.reads);
         let before = reads(prepared);
+        let pixels = if let Detail::Pixels(pixels) = detail { pixels } else { Detail::PIXELS };
+        prepared.update_levels(&self.gpu, view, pixels)?;
         prepared.update_forests(&self.gpu, view, settings, cut_pixels)?;
         let choice = self.bring_bricks(prepared, view, settings, detail)?;
         let sheets = prepared.scene.sheets_of(view, settings, choice.as_ref(), &prepared.bounds);
@@ -290,7 +292,8 @@ impl Renderer {
     /// all sheets.
     fn strips(&self, view: &View, sheets: &Sheets) -> Vec<View> {
         let [width, height] = view.size;
-        let most = (self.gpu.binding_size() / (16 * u64::from(width))).min(frame::most_rows(width, sheets.count()));
+        let colors = self.gpu.binding_size().saturating_sub(frame::MOST_SLOT_BYTES);
+        let most = (colors / (16 * u64::from(width))).min(frame::most_rows(width, sheets.count()));
         let rows = u32::try_from(most).unwrap_or(u32::MAX).clamp(1, height);
         let strip = |first: u32| {
             let mut strip = view.clone();
@@ -338,22 +341,18 @@ impl Renderer {
         let mut steps = work.opening();
         let mut state: State;
         let mut advanced = 0;
+        let start = Instant::now();
         loop {
             // As many passes as the last frame took; what is too many does nothing.
             let passes = if profile { 1 } else { self.passes };
             steps.extend((0..passes).flat_map(|_| work.depth_pass()));
             submit(gpu, std::mem::take(&mut steps), profile.then_some(&mut times))?;
-            state = bytemuck::pod_read_unaligned(&gpu.read(&targets.state, 0, size_of::<State>() as u64)?);
-            if std::mem::replace(&mut advanced, state.advanced) == state.advanced {
+            let left = gpu.clone().with_patience(gpu.patience.saturating_sub(start.elapsed()));
+            state = bytemuck::pod_read_unaligned(&left.read(&targets.state, 0, size_of::<State>() as u64)?);
+            let is_done = state.done != 0 && state.stalled == 0;
+            if std::mem::replace(&mut advanced, state.advanced) == state.advanced && !is_done {
                 // The caller puts in place of this what the device complains of.
                 return Err(Error::Gpu(format!("{} did nothing of what it was asked to", gpu.info.name)));
-            }
-            if state.impossible != 0 {
-                return Err(Error::Gpu(format!(
-                    "more splats meet in one sheet of one tile of the picture than the driver of {} can add up; \
-                     draw the scene nearer, or on a GPU",
-                    gpu.info.name
-                )));
             }
             if state.overflow != 0 {
                 return Err(Error::Gpu(format!(
@@ -362,10 +361,18 @@ impl Renderer {
                     self.budget.entries
                 )));
             }
+            if is_done {
+                break;
+            }
+            if start.elapsed() >= gpu.patience {
+                return Err(Error::Gpu(format!(
+                    "{} did not finish the picture within {} s",
+                    gpu.info.name,
+                    gpu.patience.as_secs_f64()
+                )));
+            }
             if state.stalled != 0 {
                 steps = work.resumed();
-            } else if state.done != 0 {
-                break;
             }
         }
         drop(steps);

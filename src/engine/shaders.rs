@@ -34,6 +34,7 @@ pub const MAP: &str = include_str!("../../shaders/map.wgsl");
 pub const OCCLUSION: &str = include_str!("../../shaders/occlusion.wgsl");
 pub const RESUME: &str = include_str!("../../shaders/resume.wgsl");
 pub const PROGRESS: &str = include_str!("../../shaders/progress.wgsl");
+pub const SAVED: &str = include_str!("../../shaders/saved.wgsl");
 pub const TILES: &str = include_str!("../../shaders/tiles.wgsl");
 pub const STATE: &str = include_str!("../../shaders/state.wgsl");
 pub const LARGE: &str = include_str!("../../shaders/large.wgsl");
@@ -101,6 +102,11 @@ impl Variant {
         self.scalar && (self.volume_shaded || self.gradient_opacity)
     }
 
+    /// Whether march may stop a tile among its entries.
+    pub fn can_stop(&self) -> bool {
+        self.most_entries < u32::MAX
+    }
+
     /// The constants, as WGSL.
     pub fn constants(&self) -> String {
         let whole = self.mode != Mode::Sheets;
@@ -142,6 +148,7 @@ impl Variant {
             ("PARABOLA", parabola),
             ("MAXIMUM", maximum),
             ("XRAY", self.optics == Optics::XRay),
+            ("CAN_STOP", self.can_stop()),
         ];
         // What closing a sheet takes of the iterations that a driver allows, in entries (see docs/engine.md).
         let closing = (2 + self.rows * parts * (1 + self.isosurfaces) * (1 + self.holes)).div_ceil(6);
@@ -155,7 +162,6 @@ impl Variant {
             ("MOST_BINS", super::frame::MOST_BINS),
             ("MOST_GROUP_SHIFT", super::frame::MOST_GROUP_SHIFT),
             ("MOST_ENTRIES", self.most_entries),
-            ("LONGEST_RUN", self.most_entries.saturating_mul(4)),
             ("CLOSING_ENTRIES", closing),
             ("ROWS", self.rows),
             ("LANE_ROWS", 8 / self.rows),

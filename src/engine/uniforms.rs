@@ -83,11 +83,11 @@ pub struct State {
     pub overflow: u32,
     pub hidden: u32,
     pub binned: u32,
-    pub impossible: u32,
     pub tiles: u32,
     pub touched: u32,
     pub advanced: u32,
     held: [u32; 8],
+    unused: u32,
 }
 const _: () = assert!(size_of::<State>() == 24 * 4);
 

@@ -10,6 +10,7 @@ use super::{
 };
 use crate::{
     Error, Result,
+    hierarchy::{Cut, Levels},
     math::{Bounds, Kernel, View},
     scene::{Item, Scene, Settings},
     splat::{Splat, SplatSet},
@@ -43,12 +44,11 @@ pub enum Origin {
     Splats {
         set: Arc<SplatSet>,
         radiance: bool,
+        /// The number of their item in the scene.
+        item: usize,
     },
     /// Slots for pages of the hierarchy of this number.
-    Nodes {
-        forest: usize,
-        slots: Box<Slots>,
-    },
+    Nodes { forest: usize, slots: Box<Slots> },
     Lattice {
         volume: Arc<Volume>,
         kernel: Kernel,
@@ -59,12 +59,7 @@ pub enum Origin {
         places: wgpu::Buffer,
     },
     /// Those bricks of one level that lie in some slots.
-    Bricks {
-        bricks: Arc<Bricks>,
-        kernel: Kernel,
-        slab: Box<Slab>,
-        level: usize,
-    },
+    Bricks { bricks: Arc<Bricks>, kernel: Kernel, slab: Box<Slab>, level: usize },
 }
 
 /// A part of an item that fits a binding.
@@ -85,11 +80,24 @@ pub struct Chunk {
     pub first_run: u32,
 }
 
+/// A set of splats with levels of detail, of which the GPU holds what the last view showed.
+#[derive(Debug)]
+struct LevelledSet {
+    item: usize,
+    levels: Levels,
+    /// The cut of the last view.
+    cut: Option<Cut>,
+    /// What lies on the GPU.
+    set: Option<Arc<SplatSet>>,
+}
+
 /// A scene whose splats and samples lie on the GPU. Cameras, settings and transfer functions may change between frames.
 #[derive(Debug)]
 pub struct PreparedScene {
     pub(super) scene: Scene,
     pub(super) chunks: Vec<Chunk>,
+    /// The splats that pictures may show by levels of detail.
+    levels: Vec<LevelledSet>,
     /// The hierarchies, in the scene's order.
     pub(super) forests: Vec<Forest>,
     /// The bricks at hand of the scene's volume in bricks.
@@ -113,6 +121,7 @@ impl PreparedScene {
         let mut prepared = Self {
             scene: scene.clone(),
             chunks: Vec::new(),
+            levels: Vec::new(),
             forests: Vec::new(),
             shelf: None,
             runs: 0,
@@ -121,12 +130,18 @@ impl PreparedScene {
             bounds: scene.bounds(),
             gpu: gpu.clone(),
         };
-        for item in &scene.items {
+        for (number, item) in scene.items.iter().enumerate() {
+            if let Item::Radiance(set) = item
+                && let Some(levels) = Levels::new(set)
+            {
+                prepared.levels.push(LevelledSet { item: number, levels, cut: None, set: None });
+                continue;
+            }
             gpu.check_memory(prepared.bytes + bytes_of(item))?;
             match item {
-                Item::Radiance(set) => prepared.add_splats(gpu, set, true),
+                Item::Radiance(set) => prepared.add_splats(gpu, set, true, number),
                 Item::Hierarchy(hierarchy) => prepared.forests.push(Forest::new(gpu, hierarchy)),
-                Item::Scalar(set, _) => prepared.add_splats(gpu, set, false),
+                Item::Scalar(set, _) => prepared.add_splats(gpu, set, false, number),
                 Item::Volume(volume, kernel, _) => prepared.add_volume(gpu, volume, kernel.clone())?,
                 Item::Bricks(bricks, kernel, _) => prepared.shelf = Some(Shelf::new(bricks, kernel)),
             }
@@ -304,10 +319,44 @@ impl PreparedScene {
         }
     }
 
-    fn add_splats(&mut self, gpu: &Gpu, set: &Arc<SplatSet>, radiance: bool) {
+    /// Brings what a view shows of the sets with levels of detail to the GPU; `pixels` as of [`Detail::Pixels`].
+    pub(super) fn update_levels(&mut self, gpu: &Gpu, view: &View, pixels: f64) -> Result<()> {
+        let mut levels = std::mem::take(&mut self.levels);
+        let done = levels.iter_mut().try_for_each(|own| self.update_level(gpu, own, view, pixels));
+        self.levels = levels;
+        // Sums depend on the order of the splats, which must not depend on the views before.
+        self.chunks.sort_by_key(|chunk| match &chunk.origin {
+            Origin::Splats { item, .. } => *item,
+            _ => usize::MAX,
+        });
+        self.number_runs();
+        done
+    }
+
+    fn update_level(&mut self, gpu: &Gpu, own: &mut LevelledSet, view: &View, pixels: f64) -> Result<()> {
+        let cut = Cut::new(view, own.levels.origin(), pixels, false);
+        if own.cut == Some(cut) {
+            return Ok(());
+        }
+        let set = own.levels.drawn(&cut)?;
+        own.cut = Some(cut);
+        if own.set.as_ref().is_some_and(|shown| Arc::ptr_eq(shown, &set)) {
+            return Ok(());
+        }
+        let is_old = |chunk: &Chunk| matches!(&chunk.origin, Origin::Splats { item, .. } if *item == own.item);
+        self.bytes -= self.chunks.iter().filter(|chunk| is_old(chunk)).map(Chunk::bytes).sum::<u64>();
+        self.chunks.retain(|chunk| !is_old(chunk));
+        own.set = None;
+        gpu.check_memory(self.bytes + splat_bytes(&set))?;
+        self.add_splats(gpu, &set, true, own.item);
+        own.set = Some(set);
+        Ok(())
+    }
+
+    fn add_splats(&mut self, gpu: &Gpu, set: &Arc<SplatSet>, radiance: bool, item: usize) {
         let most = (gpu.binding_size() / size_of::<Splat>() as u64) as usize;
         for splats in in_space_order(&set.splats).chunks(most) {
-            let origin = Origin::Splats { set: set.clone(), radiance };
+            let origin = Origin::Splats { set: set.clone(), radiance, item };
             self.add_chunk(gpu, origin, bytemuck::cast_slice(splats), splats.len() as u32);
         }
     }
@@ -428,6 +477,11 @@ fn spans(gpu: &Gpu, candidates: u32) -> wgpu::Buffer {
 }
 
 impl Chunk {
+    /// Bytes of its splats or samples, and of what these meet.
+    fn bytes(&self) -> u64 {
+        self.data.size() + self.spans.size()
+    }
+
     /// Bytes of what lists its candidates, and of what these meet.
     fn list_bytes(&self) -> u64 {
         let selected = match &self.origin {
@@ -446,7 +500,7 @@ impl Chunk {
                 let header = forests[*forest].hierarchy.header();
                 Source::of_radiance(view, header.origin, header.extent)
             }
-            Origin::Splats { set, radiance } => Source::of_splats(view, set, *radiance),
+            Origin::Splats { set, radiance, .. } => Source::of_splats(view, set, *radiance),
             Origin::Bricks { bricks, kernel, slab, level } => {
                 let lattice = bricks.lattice(*level);
                 let [width, height, depth] = lattice.dims.map(|n| n as u32);
@@ -511,15 +565,18 @@ fn places(gpu: &Gpu, lattice: &Lattice) -> Result<wgpu::Buffer> {
 /// is read as it is drawn takes none yet.
 fn bytes_of(item: &Item) -> u64 {
     match item {
-        Item::Radiance(set) | Item::Scalar(set, _) => {
-            set.splats.len() as u64 * (size_of::<Splat>() as u64 + SPAN_BYTES)
-        }
+        Item::Radiance(set) | Item::Scalar(set, _) => splat_bytes(set),
         Item::Volume(volume, ..) => {
             let sample = volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
             volume.drawn_lattice().len() as u64 * (sample + 2)
         }
         Item::Hierarchy(_) | Item::Bricks(..) => 0,
     }
+}
+
+/// Bytes of a set's splats on the GPU, and of what these meet.
+fn splat_bytes(set: &SplatSet) -> u64 {
+    set.splats.len() as u64 * (size_of::<Splat>() as u64 + SPAN_BYTES)
 }
 
 /// Bytes of a list of samples: their numbers and spans.

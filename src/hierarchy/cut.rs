@@ -7,7 +7,7 @@
 //! fades out while its children fade in, and nothing pops.
 
 use super::{
-    Node, Tree,
+    Block, Node, Tree,
     file::{CutSphere, in_order},
 };
 use crate::{
@@ -16,6 +16,7 @@ use crate::{
     splat::{Payload, Splat, SplatSet, decode_normal},
 };
 use glam::{DMat3, DVec3, Vec3, Vec4};
+use rayon::prelude::*;
 
 /// How fine a hierarchy is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +56,7 @@ const MOST_PIXELS: f32 = 1e9;
 const CONE_MARGIN_DEGREES: f64 = 25.0;
 
 /// A cut of one hierarchy in one view. All in 32 bits, as on the GPU, which does the same (shaders/cut.wgsl).
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cut {
     /// Columns of the turn from the hierarchy's frame to view space, and the view-space place of its origin.
     pub(crate) axes: [Vec3; 3],
@@ -102,9 +103,14 @@ impl Cut {
         }
     }
 
+    /// The same as a multiple of what the cut allows.
+    pub(super) fn widths(&self, sphere: &CutSphere) -> f32 {
+        self.pixels(sphere) * self.fineness
+    }
+
     /// How far what has this sphere is refined, in parts of [`SHARE_UNIT`].
     pub fn refinement(&self, sphere: &CutSphere) -> u32 {
-        let excess = (self.pixels(sphere) * self.fineness - 1.0) / (BLEND_BAND - 1.0);
+        let excess = (self.widths(sphere) - 1.0) / (BLEND_BAND - 1.0);
         (excess.clamp(0.0, 1.0) * SHARE_UNIT as f32 + 0.5) as u32
     }
 
@@ -120,7 +126,7 @@ impl Cut {
     }
 
     /// Whether nothing of a node's splat can be seen: it is beside the picture, or faces away.
-    fn is_hidden(&self, node: &Node) -> bool {
+    pub(super) fn is_hidden(&self, node: &Node) -> bool {
         // A merged footprint may reach beyond what it stands for.
         let reach = node.radius + 1.3 * node.size;
         let center = self.to_view(node.splat.center);
@@ -191,8 +197,8 @@ impl Tree {
             in_order(&block.nodes).map_err(|message| Error::Argument(format!("block {number}: {message}")))?;
         }
         let culls = cull_backfaces.unwrap_or(self.closed);
-        let at = |pixels: f64| self.selected(&Cut::new(view, self.origin, pixels, culls));
-        let selected = match detail {
+        let at = |pixels: f64| Cut::new(view, self.origin, pixels, culls);
+        let cut = match detail {
             Detail::Pixels(pixels) => at(pixels),
             Detail::Milliseconds(_) => at(Detail::PIXELS),
             Detail::Splats(most) => {
@@ -200,13 +206,19 @@ impl Tree {
                 let (mut fine, mut coarse) = (-1, 255);
                 while coarse - fine > 1 {
                     let middle = (fine + coarse) / 2;
-                    *(if step(middle).len() as u64 <= most { &mut coarse } else { &mut fine }) = middle;
+                    let fits = self.selected(&step(middle)).len() as u64 <= most;
+                    *(if fits { &mut coarse } else { &mut fine }) = middle;
                 }
                 step(coarse)
             }
         };
-        let splats = selected.iter().map(|(node, share)| faded(&node.splat, *share)).collect();
-        Ok(SplatSet { origin: self.origin, payload: Payload::Radiance, splats, extent: self.extent, overlap: 1.0 })
+        Ok(self.at_cut(&cut))
+    }
+
+    /// The splats of a cut, as those of [`Self::cut`], of a tree whose nodes are in order.
+    pub(super) fn at_cut(&self, cut: &Cut) -> SplatSet {
+        let splats = self.selected(cut).iter().map(|(node, share)| faded(&node.splat, *share)).collect();
+        SplatSet { origin: self.origin, payload: Payload::Radiance, splats, extent: self.extent, overlap: 1.0 }
     }
 
     /// The nodes of a cut, with their shares in parts of [`SHARE_UNIT`].
@@ -214,24 +226,33 @@ impl Tree {
     /// # Panics
     /// Where the nodes of a block are not in order, as [`cut`](Self::cut) finds out and [`validate`](super::validate()) tells.
     pub fn selected(&self, cut: &Cut) -> Vec<(&Node, u32)> {
+        let own = self.blocks.par_iter().enumerate().map(|(index, block)| self.selected_of(index, block, cut));
+        own.collect::<Vec<_>>().concat()
+    }
+
+    /// Those of one block.
+    fn selected_of<'a>(&'a self, index: usize, block: &'a Block, cut: &Cut) -> Vec<(&'a Node, u32)> {
+        let above = block.portal.zip(self.blocks.first()).and_then(|(portal, top)| {
+            let holds = |node: &&Node| (node.first_child..node.first_child + node.children).contains(&portal);
+            top.nodes.iter().find(holds).map(CutSphere::of)
+        });
+        if above.is_some_and(|above| cut.refinement(&above) == 0) {
+            // Nothing below is refined further than what is above.
+            return Vec::new();
+        }
+        let mut parents: Vec<Option<CutSphere>> = vec![None; block.nodes.len()];
+        for node in &block.nodes {
+            let children = node.first_child as usize..(node.first_child + node.children) as usize;
+            parents[children].fill(Some(CutSphere::of(node)));
+        }
+        parents[0] = above;
         let mut selected = Vec::new();
-        for (index, block) in self.blocks.iter().enumerate() {
-            let mut parents: Vec<Option<CutSphere>> = vec![None; block.nodes.len()];
-            for node in &block.nodes {
-                let children = node.first_child as usize..(node.first_child + node.children) as usize;
-                parents[children].fill(Some(CutSphere::of(node)));
-            }
-            if let (Some(portal), Some(top)) = (block.portal, self.blocks.first()) {
-                let holds = |node: &&Node| (node.first_child..node.first_child + node.children).contains(&portal);
-                parents[0] = top.nodes.iter().find(holds).map(CutSphere::of);
-            }
-            for (node, parent) in block.nodes.iter().zip(&parents) {
-                // The root of its block stands in a portal's place.
-                let is_portal = self.is_joined() && index == 0 && node.is_leaf();
-                let share = if is_portal { 0 } else { cut.share(node, parent.as_ref(), !node.is_leaf()) };
-                if share > 0 {
-                    selected.push((node, share));
-                }
+        for (node, parent) in block.nodes.iter().zip(&parents) {
+            // The root of its block stands in a portal's place.
+            let is_portal = self.is_joined() && index == 0 && node.is_leaf();
+            let share = if is_portal { 0 } else { cut.share(node, parent.as_ref(), !node.is_leaf()) };
+            if share > 0 {
+                selected.push((node, share));
             }
         }
         selected

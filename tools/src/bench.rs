@@ -8,6 +8,7 @@ use crate::{
     output,
     progress::Progress,
     render::milliseconds,
+    samples::Samples,
     scene::SceneFlags,
     suite::SuiteFlags,
     timing::{self, Times},
@@ -50,7 +51,7 @@ impl Bench {
         self.engine.check()?;
         let frames = self.frames.unwrap_or(FRAMES);
         let loaded = self.scene.load(progress)?;
-        let settings = self.engine.settings(&loaded, 1)?;
+        let settings = self.engine.settings(&loaded, Samples::Factor(1))?;
         progress.stage("Opening the GPU");
         let gpu = self.engine.gpu()?;
         progress.stage("Uploading");

@@ -7,6 +7,7 @@ use crate::{
     output,
     progress::Progress,
     render::{Drawer, milliseconds},
+    samples::Samples,
     scene::SceneFlags,
 };
 use clap::{Args, Parser};
@@ -137,7 +138,7 @@ impl Demo {
         let flags = Flags::try_parse_from(&arguments).map_err(|e| Failure::Usage(e.to_string()))?;
         let loaded = flags.scene.load(progress)?;
         let mut drawer = Drawer::engine(&flags.engine, &loaded, progress)?;
-        let settings = flags.engine.settings(&loaded, 1)?;
+        let settings = flags.engine.settings(&loaded, Samples::Factor(1))?;
         let camera = flags.camera.camera(&loaded.subject, settings.size)?;
         progress.stage(format!("Drawing {}", shot.name));
         let mut draw = || {

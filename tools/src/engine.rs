@@ -1,6 +1,6 @@
 //! The engine's flags: the adapter, and the settings of a picture.
 
-use crate::{clip::ClipFlags, failure::Failure, method::MethodFlags, parse, scene::Loaded};
+use crate::{clip::ClipFlags, failure::Failure, method::MethodFlags, parse, samples::Samples, scene::Loaded};
 use clap::{Args, ValueEnum};
 use splatkit::{
     Error,
@@ -112,12 +112,15 @@ impl EngineFlags {
         self.clip.check()
     }
 
-    /// The settings of a picture, each side `factor` times as long; those that do not go with the scene are an error.
-    pub fn settings(&self, loaded: &Loaded, factor: u32) -> splatkit::Result<Settings> {
+    /// The settings of a picture before it is averaged down; those that do not go with the scene are an error.
+    pub fn settings(&self, loaded: &Loaded, samples: Samples) -> splatkit::Result<Settings> {
+        let factor = samples.factor(self.size);
         let mut settings = Settings::new(self.size.map(|side| side.saturating_mul(factor)));
         settings.sheet_thickness = self.sheet_thickness;
-        // Sheets stay as thick as they are without the extra pixels: thinner ones would part what overlaps on a surface.
-        settings.sheet_pixels *= f64::from(factor);
+        // Sheets and cuts stay as they are without the extra pixels: thinner sheets would part what overlaps on a surface. But a
+        // small picture is drawn as a larger one is.
+        let wider = if let Samples::Factor(factor) = samples { f64::from(factor) } else { 1.0 };
+        settings.sheet_pixels *= wider;
         settings.occlusion = !self.no_occlusion;
         settings.gradient = match self.gradient {
             Gradient::Analytic => scene::Gradient::Analytic,
@@ -139,7 +142,7 @@ impl EngineFlags {
         settings.detail = match (self.budget, self.frame_time) {
             (Some(splats), _) => Detail::Splats(splats),
             (_, Some(milliseconds)) => Detail::Milliseconds(milliseconds),
-            _ => Detail::Pixels(self.cut.unwrap_or(Detail::PIXELS) * f64::from(factor)),
+            _ => Detail::Pixels(self.cut.unwrap_or(Detail::PIXELS) * wider),
         };
         settings.cull_backfaces = self.cull_backfaces;
         if let Some(memory) = self.memory {

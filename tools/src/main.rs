@@ -27,6 +27,7 @@ mod parse;
 mod progress;
 mod render;
 mod report;
+mod samples;
 mod scan;
 mod scene;
 mod show;

@@ -85,17 +85,6 @@ pub fn axis(text: &str) -> Result<DVec3, String> {
     Ok(sign * axis)
 }
 
-/// Pixels drawn for one of the picture; gives how many along each side.
-pub fn samples(text: &str) -> Result<u32, String> {
-    match text {
-        "1" => Ok(1),
-        "4" => Ok(2),
-        "9" => Ok(3),
-        "16" => Ok(4),
-        _ => Err("use 1, 4, 9 or 16".into()),
-    }
-}
-
 /// A number above 0.
 pub fn positive(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "a number above 0 is needed".into())

@@ -8,6 +8,7 @@ use crate::{
     output::{self, Target},
     parse::{self, Background},
     progress::Progress,
+    samples::Samples,
     scene::{Loaded, SceneFlags},
 };
 use clap::Args;
@@ -41,9 +42,9 @@ pub struct Render {
     /// '#rrggbb', or none for a transparent PNG.
     #[arg(long, value_name = "COLOR", value_parser = parse::background, default_value = "#000000")]
     background: Background,
-    /// Pixels drawn for one of the picture: 1, 4, 9 or 16.
-    #[arg(long, value_name = "N", value_parser = parse::samples, default_value = "1")]
-    samples: u32,
+    /// Pixels drawn for one of the picture: 1, 4, 9 or 16; auto takes as many as 512x512 pixels allow.
+    #[arg(long, value_name = "N|auto", default_value = "auto")]
+    samples: Samples,
     /// Draws this many frames around the up axis.
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     turntable: Option<u32>,
@@ -115,6 +116,7 @@ impl Render {
         let files = targets.iter().filter_map(Target::file).chain(self.depth.as_deref());
         files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
         let settings = self.engine.settings(&loaded, self.samples)?;
+        let factor = self.samples.factor(self.engine.size);
         let start = Instant::now();
         let mut drawer = match self.reference {
             true => Drawer::Reference,
@@ -136,7 +138,7 @@ impl Render {
             let (picture, stats) = drawer.draw(&loaded, &camera, &settings)?;
             times.push(milliseconds(start));
             self.engine.require_content(&picture)?;
-            let picture = if self.samples > 1 { picture.reduced(self.samples)? } else { picture };
+            let picture = if factor > 1 { picture.reduced(factor)? } else { picture };
             progress.stage(format!("Writing {}", target.name()));
             target.write(&picture.encode(target.format(), self.background.0)?)?;
             if let Some(depth) = &self.depth {

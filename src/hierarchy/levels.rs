@@ -1,0 +1,117 @@
+//! Levels of detail of splats that come without a hierarchy, as raw meshes and clouds do. Where most of them are far smaller
+//! than what a picture can show, a tree is built in memory, once, and the picture takes a cut of it.
+
+use super::{BuildOptions, Cut, Node, Preset, Tree, check_splats, file::CutSphere, merge::leaf};
+use crate::{Result, memory, splat::SplatSet};
+use glam::DVec3;
+use std::sync::Arc;
+
+/// Fewer splats than this are drawn as fast as a tree of them is built.
+const FEWEST: usize = 1 << 17;
+/// Splats of a set that are measured to decide whether a cut pays.
+const PROBES: usize = 1 << 12;
+/// A splat is fine where it is narrower than this part of what a cut allows. Over a surface, one node of the cut then stands for
+/// sixteen of them or more.
+const FINE: f32 = 0.25;
+
+/// A set of splats and, once a picture needs it, their tree.
+#[derive(Debug)]
+pub struct Levels {
+    set: Arc<SplatSet>,
+    probes: Vec<Node>,
+    /// Splats of the set that each probe stands for.
+    each: usize,
+    tree: Option<Tree>,
+}
+
+impl Levels {
+    /// `None` for sets that are drawn as they are: they are small, a tree of them cannot be built, or it would take half of
+    /// the memory that there is.
+    pub fn new(set: &Arc<SplatSet>) -> Option<Self> {
+        let count = set.splats.len();
+        let bytes = 2 * (count * size_of::<Node>()) as u64;
+        if count < FEWEST || check_splats(set).is_err() || memory::most().is_some_and(|most| bytes > most / 2) {
+            return None;
+        }
+        let each = count.div_ceil(PROBES);
+        let probes = set.splats.iter().step_by(each).map(|splat| leaf(splat, set.extent)).collect();
+        Some(Self { set: set.clone(), probes, each, tree: None })
+    }
+
+    /// What the set's places count from.
+    pub fn origin(&self) -> DVec3 {
+        self.set.origin
+    }
+
+    /// The set that a cut draws: the whole one, or the nodes of the cut.
+    ///
+    /// # Errors
+    /// Those of [`Tree::build`].
+    pub fn drawn(&mut self, cut: &Cut) -> Result<Arc<SplatSet>> {
+        if !self.pays(cut) {
+            return Ok(self.set.clone());
+        }
+        let tree = match &mut self.tree {
+            Some(tree) => tree,
+            none => {
+                let options = BuildOptions { preset: Preset::Fastest, ..BuildOptions::default() };
+                none.insert(Tree::build(&self.set, &options, &|_, _| {})?)
+            }
+        };
+        Ok(Arc::new(tree.at_cut(cut)))
+    }
+
+    /// Whether most of the splats in view are fine, and they are many.
+    fn pays(&self, cut: &Cut) -> bool {
+        let (mut seen, mut fine) = (0, 0);
+        for probe in self.probes.iter().filter(|probe| !cut.is_hidden(probe)) {
+            seen += 1;
+            fine += usize::from(cut.widths(&CutSphere::of(probe)) < FINE);
+        }
+        2 * fine >= seen && fine * self.each >= FEWEST
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        math::{Bounds, Camera, View},
+        splat::{Payload, Splat},
+    };
+
+    /// A square grid of `side`² splats.
+    fn grid(side: u32) -> Arc<SplatSet> {
+        let step = 1.0 / side as f32;
+        let splat = |i: u32| {
+            let center = [(i % side) as f32 * step, (i / side) as f32 * step, 0.0];
+            let factor = [step, 0.0, step, 0.0, 0.0, 0.1 * step];
+            Splat { center, strength: 1.0, factor, color: u32::MAX, normal: 0 }
+        };
+        let splats = (0..side * side).map(splat).collect();
+        Arc::new(SplatSet { origin: DVec3::ZERO, payload: Payload::Radiance, splats, extent: 3.0, overlap: 1.0 })
+    }
+
+    fn view(size: [u32; 2]) -> View {
+        let bounds = Bounds { min: DVec3::ZERO, max: DVec3::new(1.0, 1.0, 0.0) };
+        Camera::framing(&bounds, DVec3::Z, DVec3::Y, 1.0).view(size).expect("a view")
+    }
+
+    #[test]
+    fn small_pictures_take_a_cut_and_large_ones_the_set() {
+        let set = grid(400);
+        let mut levels = Levels::new(&set).expect("levels");
+        let count = |levels: &mut Levels, side, pixels| {
+            let cut = Cut::new(&view([side; 2]), set.origin, pixels, false);
+            levels.drawn(&cut).expect("a set").splats.len()
+        };
+        assert_eq!(count(&mut levels, 1000, 2.0), set.splats.len());
+        assert!(levels.tree.is_none());
+        let few = count(&mut levels, 40, 2.0);
+        assert!(few < 4000, "{few}");
+        assert!(count(&mut levels, 1, 2.0) < 40);
+        // Leaves were asked for.
+        assert_eq!(count(&mut levels, 40, 0.0), set.splats.len());
+        assert!(Levels::new(&grid(300)).is_none());
+    }
+}
