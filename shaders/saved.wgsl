@@ -13,11 +13,15 @@ fn saved_at(slot: u32, lane: vec2<u32>, r: u32) -> u32 {
 
 // Takes a free slot. There may be none: the tile then begins anew, once other tiles are done.
 fn claim_slot() -> u32 {
+    let slots = (arrayLength(&colors) - frame.size.x * frame.size.y) / (64u * SAVED_VECTORS);
     for (var word = 0u; word < SLOT_WORDS; word++) {
         let at = progress_word(SLOTS + word);
         let free = ~atomicLoad(&progress[at]);
         if free != 0u {
             let bit = firstTrailingBit(free);
+            if 32u * word + bit >= slots {
+                return NO_SLOT;
+            }
             if (atomicOr(&progress[at], 1u << bit) & (1u << bit)) == 0u {
                 return 32u * word + bit;
             }

@@ -98,6 +98,11 @@ impl Scene {
         self.items.iter().fold(Bounds::EMPTY, |all, item| all.union(item.bounds()))
     }
 
+    /// Whether it holds explicit splats, which are widened by [`FOOTPRINT_BLUR`] and have edges: surfaces and scattered samples.
+    pub fn has_splats(&self) -> bool {
+        self.items.iter().any(|item| !matches!(item, Item::Volume(..) | Item::Bricks(..)))
+    }
+
     /// Whether any part can become so opaque that it hides what lies behind it: surfaces can, a field only where a line
     /// through its box takes nearly all light.
     pub(crate) fn can_hide(&self) -> bool {

@@ -127,6 +127,11 @@ impl SplatSet {
     /// The widest footprint that the engine takes, in standard deviations.
     pub const MAX_EXTENT: f32 = 8.0;
 
+    /// A set of the same kind without splats.
+    pub(crate) fn empty(&self) -> Self {
+        Self { splats: Vec::new(), ..*self }
+    }
+
     /// The smallest and the largest value of a set of scalars.
     pub fn value_range(&self) -> [f64; 2] {
         let values = self.splats.iter().map(|splat| f64::from(splat.strength));

@@ -189,8 +189,10 @@ pub fn variant(
 const SLOTS: u64 = 1024;
 /// Bytes of a tile's sums (`SAVED_VECTORS` in saved.wgsl).
 const SLOT_BYTES: u64 = 64 * 17 * 16;
-/// Bytes that slots take behind the colours of a picture at most.
-pub const MOST_SLOT_BYTES: u64 = SLOTS * SLOT_BYTES;
+/// Bytes that slots take at most behind the colours of a picture, which they share a binding with.
+pub fn most_slot_bytes(gpu: &Gpu) -> u64 {
+    SLOTS.min(gpu.binding_size() / 2 / SLOT_BYTES) * SLOT_BYTES
+}
 
 /// Mesa's software driver ends all loops of an invocation after 65,535 iterations together. In march an entry takes up to
 /// six: its own, and those that find its sheet and close the sheets before it.
@@ -355,7 +357,8 @@ pub fn targets(
             sheets.count()
         )));
     }
-    let slots = if variant.can_stop() { SLOTS.min(u64::from(tile_count)) } else { 0 };
+    let slots = (u64::from(tile_count) * SLOT_BYTES).min(most_slot_bytes(gpu));
+    let slots = if variant.can_stop() { slots } else { 0 };
     // The number of entries stands behind the last bin.
     let bin_count = (groups(0) * u64::from(tile_count)).min(u64::from(MOST_BINS)) + 1;
     let most_tiles = tiles[0].max(tiles[1]);
@@ -401,7 +404,7 @@ pub fn targets(
         long_count: pool.take(gpu, "long count", 4),
         long_arguments: pool.take(gpu, "long arguments", 12),
         progress: pool.take(gpu, "progress", 4 * (2 * u64::from(tile_count) + SLOTS / 32 + 3)),
-        colors: pool.take(gpu, "colors", 16 * pixels + slots * SLOT_BYTES),
+        colors: pool.take(gpu, "colors", 16 * pixels + slots),
         depths: pool.take(gpu, "depths", 4 * pixels),
         run_total: prepared.runs,
         tiles,

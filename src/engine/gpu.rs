@@ -4,7 +4,7 @@ use super::{fault::Condition, timestamps};
 use crate::{Error, Result, memory};
 use std::{sync::Arc, time::Duration};
 
-/// How long a device may take by default for what is submitted together: a large scene takes minutes on a processor.
+/// How long a picture may take by default: a large scene takes minutes on a processor.
 const PATIENCE: Duration = Duration::from_secs(600);
 
 /// A wgpu device and queue, with the adapter's description.
@@ -132,8 +132,8 @@ impl Gpu {
         Ok(Self { patience: self.patience, memory: self.memory, ..Self::headless(choice)? })
     }
 
-    /// The same device, which counts as lost where what is submitted together (some depth passes of a frame) takes longer than
-    /// this. By default ten minutes.
+    /// The same device with a time limit, ten minutes by default. A picture that takes longer is an error. A device that does not
+    /// finish one submission in that time counts as lost.
     #[must_use]
     pub fn with_patience(self, patience: Duration) -> Self {
         Self { patience, ..self }

@@ -292,7 +292,7 @@ impl Renderer {
     /// all sheets.
     fn strips(&self, view: &View, sheets: &Sheets) -> Vec<View> {
         let [width, height] = view.size;
-        let colors = self.gpu.binding_size().saturating_sub(frame::MOST_SLOT_BYTES);
+        let colors = self.gpu.binding_size() - frame::most_slot_bytes(&self.gpu);
         let most = (colors / (16 * u64::from(width))).min(frame::most_rows(width, sheets.count()));
         let rows = u32::try_from(most).unwrap_or(u32::MAX).clamp(1, height);
         let strip = |first: u32| {
@@ -347,8 +347,7 @@ impl Renderer {
             let passes = if profile { 1 } else { self.passes };
             steps.extend((0..passes).flat_map(|_| work.depth_pass()));
             submit(gpu, std::mem::take(&mut steps), profile.then_some(&mut times))?;
-            let left = gpu.clone().with_patience(gpu.patience.saturating_sub(start.elapsed()));
-            state = bytemuck::pod_read_unaligned(&left.read(&targets.state, 0, size_of::<State>() as u64)?);
+            state = bytemuck::pod_read_unaligned(&gpu.read(&targets.state, 0, size_of::<State>() as u64)?);
             let is_done = state.done != 0 && state.stalled == 0;
             if std::mem::replace(&mut advanced, state.advanced) == state.advanced && !is_done {
                 // The caller puts in place of this what the device complains of.

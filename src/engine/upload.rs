@@ -13,7 +13,7 @@ use crate::{
     hierarchy::{Cut, Levels},
     math::{Bounds, Kernel, View},
     scene::{Item, Scene, Settings},
-    splat::{Splat, SplatSet},
+    splat::{Payload, Splat, SplatSet},
     volume::{
         Arrangement, Lattice, Samples, Scalar, TransferFunction, Volume,
         bricks::{Bricks, Choice},
@@ -131,7 +131,7 @@ impl PreparedScene {
             gpu: gpu.clone(),
         };
         for (number, item) in scene.items.iter().enumerate() {
-            if let Item::Radiance(set) = item
+            if let Item::Radiance(set) | Item::Scalar(set, _) = item
                 && let Some(levels) = Levels::new(set)
             {
                 prepared.levels.push(LevelledSet { item: number, levels, cut: None, set: None });
@@ -348,7 +348,7 @@ impl PreparedScene {
         self.chunks.retain(|chunk| !is_old(chunk));
         own.set = None;
         gpu.check_memory(self.bytes + splat_bytes(&set))?;
-        self.add_splats(gpu, &set, true, own.item);
+        self.add_splats(gpu, &set, set.payload == Payload::Radiance, own.item);
         own.set = Some(set);
         Ok(())
     }

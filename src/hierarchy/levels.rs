@@ -1,8 +1,12 @@
 //! Levels of detail of splats that come without a hierarchy, as raw meshes and clouds do. Where most of them are far smaller
-//! than what a picture can show, a tree is built in memory, once, and the picture takes a cut of it.
+//! than what a picture can show, it takes fewer: of splats that carry colour a cut of a tree that is built in memory, once; of
+//! scattered samples one for each cell of a grid.
 
-use super::{BuildOptions, Cut, Node, Preset, Tree, check_splats, file::CutSphere, merge::leaf};
-use crate::{Result, memory, splat::SplatSet};
+use super::{BuildOptions, Cut, Node, Preset, Tree, check_splats, file::CutSphere, merge::leaf, sphere::enclosing};
+use crate::{
+    Result, memory, scattered,
+    splat::{Payload, SplatSet},
+};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -13,15 +17,26 @@ const PROBES: usize = 1 << 12;
 /// A splat is fine where it is narrower than this part of what a cut allows. Over a surface, one node of the cut then stands for
 /// sixteen of them or more.
 const FINE: f32 = 0.25;
+/// The edge of a cell of samples as a part of what a cut allows: as of bricks, a sample counts as two steps wide.
+const CELL: f64 = 0.5;
 
-/// A set of splats and, once a picture needs it, their tree.
+/// A set of splats, and what was made of it for pictures.
 #[derive(Debug)]
 pub struct Levels {
     set: Arc<SplatSet>,
     probes: Vec<Node>,
     /// Splats of the set that each probe stands for.
     each: usize,
-    tree: Option<Tree>,
+    fewer: Fewer,
+}
+
+/// What stands for the set where it is too fine.
+#[derive(Debug)]
+enum Fewer {
+    Nothing,
+    Tree(Tree),
+    /// Samples merged in cells of an edge of 2 to this power.
+    Cells(i32, Arc<SplatSet>),
 }
 
 impl Levels {
@@ -30,12 +45,14 @@ impl Levels {
     pub fn new(set: &Arc<SplatSet>) -> Option<Self> {
         let count = set.splats.len();
         let bytes = 2 * (count * size_of::<Node>()) as u64;
-        if count < FEWEST || check_splats(set).is_err() || memory::most().is_some_and(|most| bytes > most / 2) {
+        let is_refused = set.payload == Payload::Radiance && check_splats(set).is_err();
+        if count < FEWEST || is_refused || memory::most().is_some_and(|most| bytes > most / 2) {
             return None;
         }
         let each = count.div_ceil(PROBES);
+        // Samples have no normals, but only their places and widths are looked at.
         let probes = set.splats.iter().step_by(each).map(|splat| leaf(splat, set.extent)).collect();
-        Some(Self { set: set.clone(), probes, each, tree: None })
+        Some(Self { set: set.clone(), probes, each, fewer: Fewer::Nothing })
     }
 
     /// What the set's places count from.
@@ -43,7 +60,7 @@ impl Levels {
         self.set.origin
     }
 
-    /// The set that a cut draws: the whole one, or the nodes of the cut.
+    /// The set that a cut draws: the whole one, or what stands for it.
     ///
     /// # Errors
     /// Those of [`Tree::build`].
@@ -51,14 +68,34 @@ impl Levels {
         if !self.pays(cut) {
             return Ok(self.set.clone());
         }
-        let tree = match &mut self.tree {
-            Some(tree) => tree,
-            none => {
-                let options = BuildOptions { preset: Preset::Fastest, ..BuildOptions::default() };
-                none.insert(Tree::build(&self.set, &options, &|_, _| {})?)
-            }
-        };
+        match self.set.payload {
+            Payload::Radiance => self.nodes(cut),
+            Payload::Scalar => Ok(self.cells(cut)),
+        }
+    }
+
+    fn nodes(&mut self, cut: &Cut) -> Result<Arc<SplatSet>> {
+        if !matches!(self.fewer, Fewer::Tree(_)) {
+            let options = BuildOptions { preset: Preset::Fastest, ..BuildOptions::default() };
+            self.fewer = Fewer::Tree(Tree::build(&self.set, &options, &|_, _| {})?);
+        }
+        let Fewer::Tree(tree) = &self.fewer else { return Ok(self.set.clone()) };
         Ok(Arc::new(tree.at_cut(cut)))
+    }
+
+    fn cells(&mut self, cut: &Cut) -> Arc<SplatSet> {
+        let around = enclosing(&self.set.splats, self.set.extent);
+        let unit = CutSphere { center: around.center.as_vec3().to_array(), radius: around.radius as f32, size: 1.0 };
+        let edge = CELL / f64::from(cut.widths(&unit)).max(f64::from(f32::MIN_POSITIVE));
+        let power = edge.log2().floor().clamp(-100.0, 100.0) as i32;
+        if let Fewer::Cells(own, set) = &self.fewer
+            && *own == power
+        {
+            return set.clone();
+        }
+        let set = Arc::new(scattered::merged(&self.set, f64::from(power).exp2()));
+        self.fewer = Fewer::Cells(power, set.clone());
+        set
     }
 
     /// Whether most of the splats in view are fine, and they are many.
@@ -106,7 +143,7 @@ mod tests {
             levels.drawn(&cut).expect("a set").splats.len()
         };
         assert_eq!(count(&mut levels, 1000, 2.0), set.splats.len());
-        assert!(levels.tree.is_none());
+        assert!(matches!(levels.fewer, Fewer::Nothing));
         let few = count(&mut levels, 40, 2.0);
         assert!(few < 4000, "{few}");
         assert!(count(&mut levels, 1, 2.0) < 40);

@@ -3,11 +3,13 @@
 //! The field between them is the weighted mean of what their kernels carry (Shepard 1968), each its value and a slope
 //! (Franke & Nielson 1980, "Smooth interpolation of large sets of scattered data").
 
+mod merge;
 mod neighbourhood;
 mod splats;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use merge::merged;
 pub use splats::SampleOptions;
 
 use crate::volume::Volume;

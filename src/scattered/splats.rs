@@ -23,7 +23,7 @@ const WEIGHTS: [f64; 2] = [1e-4, 6e4];
 /// Over the whole extent of its kernel a sample's value changes by at most this many widths of the range around it.
 const LARGEST_RISE: f64 = 2.5;
 /// What 16 bits hold of a slope.
-const LARGEST_SLOPE: f64 = 65_504.0;
+pub(super) const LARGEST_SLOPE: f64 = 65_504.0;
 
 /// How scattered samples become splats.
 #[derive(Debug, Clone, PartialEq)]

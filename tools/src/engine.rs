@@ -24,7 +24,7 @@ pub struct EngineFlags {
     /// The adapter: its number in `splatkit gpus`, a part of its name, or `software`. By default the fastest.
     #[arg(long, value_name = "N|NAME|software")]
     gpu: Option<String>,
-    /// Seconds that the adapter may take for some passes of a picture before it counts as lost [default: 600]
+    /// The most seconds that drawing a picture may take [default: 600]
     #[arg(long, value_name = "SECONDS", value_parser = parse::positive)]
     gpu_timeout: Option<f64>,
     /// Memory that a scene's splats, samples, pages, bricks and lists may take on the adapter; in bytes or with KiB, MiB or GiB
@@ -114,7 +114,7 @@ impl EngineFlags {
 
     /// The settings of a picture before it is averaged down; those that do not go with the scene are an error.
     pub fn settings(&self, loaded: &Loaded, samples: Samples) -> splatkit::Result<Settings> {
-        let factor = samples.factor(self.size);
+        let factor = samples.factor(self.size, loaded.scene.has_splats());
         let mut settings = Settings::new(self.size.map(|side| side.saturating_mul(factor)));
         settings.sheet_thickness = self.sheet_thickness;
         // Sheets and cuts stay as they are without the extra pixels: thinner sheets would part what overlaps on a surface. But a

@@ -42,7 +42,8 @@ pub struct Render {
     /// '#rrggbb', or none for a transparent PNG.
     #[arg(long, value_name = "COLOR", value_parser = parse::background, default_value = "#000000")]
     background: Background,
-    /// Pixels drawn for one of the picture: 1, 4, 9 or 16; auto takes as many as 512x512 pixels allow.
+    /// Pixels drawn for one of the picture: 1, 4, 9, 16 or 64; auto takes as many as 512x512 pixels
+    /// allow, of volumes 16 at most.
     #[arg(long, value_name = "N|auto", default_value = "auto")]
     samples: Samples,
     /// Draws this many frames around the up axis.
@@ -116,7 +117,7 @@ impl Render {
         let files = targets.iter().filter_map(Target::file).chain(self.depth.as_deref());
         files.into_iter().try_for_each(|file| output::check_unneeded(file, &loaded.read))?;
         let settings = self.engine.settings(&loaded, self.samples)?;
-        let factor = self.samples.factor(self.engine.size);
+        let factor = self.samples.factor(self.engine.size, loaded.scene.has_splats());
         let start = Instant::now();
         let mut drawer = match self.reference {
             true => Drawer::Reference,

@@ -15,11 +15,12 @@ impl Samples {
     /// Pixels drawn at most where the picture's size decides.
     const MOST_PIXELS: u64 = 1 << 18;
 
-    /// Pixels drawn along each side of one of the picture.
-    pub fn factor(self, [width, height]: [u32; 2]) -> u32 {
+    /// Pixels drawn along each side of one of the picture. Explicit splats have edges and are widened, which takes more of them than a volume does.
+    pub fn factor(self, [width, height]: [u32; 2], has_splats: bool) -> u32 {
         let drawn = |factor: u32| u64::from(factor * factor) * u64::from(width) * u64::from(height);
+        let most = if has_splats { 8 } else { 4 };
         match self {
-            Self::Auto => (2..=4).rev().find(|factor| drawn(*factor) <= Self::MOST_PIXELS).unwrap_or(1),
+            Self::Auto => (2..=most).rev().find(|factor| drawn(*factor) <= Self::MOST_PIXELS).unwrap_or(1),
             Self::Factor(factor) => factor,
         }
     }
@@ -35,7 +36,8 @@ impl FromStr for Samples {
             "4" => Ok(Self::Factor(2)),
             "9" => Ok(Self::Factor(3)),
             "16" => Ok(Self::Factor(4)),
-            _ => Err("use auto, 1, 4, 9 or 16".into()),
+            "64" => Ok(Self::Factor(8)),
+            _ => Err("use auto, 1, 4, 9, 16 or 64".into()),
         }
     }
 }
@@ -46,9 +48,11 @@ mod tests {
 
     #[test]
     fn small_pictures_take_more_pixels() {
-        let factor = |text: &str, size| Samples::from_str(text).map(|samples| samples.factor(size));
-        assert_eq!(factor("auto", [1, 1]), Ok(4));
+        let factor = |text: &str, size| Samples::from_str(text).map(|samples| samples.factor(size, true));
+        assert_eq!(factor("auto", [1, 1]), Ok(8));
+        assert_eq!(factor("auto", [64, 64]), Ok(8));
         assert_eq!(factor("auto", [128, 128]), Ok(4));
+        assert_eq!(Samples::Auto.factor([64, 64], false), 4);
         assert_eq!(factor("auto", [160, 160]), Ok(3));
         assert_eq!(factor("auto", [256, 256]), Ok(2));
         assert_eq!(factor("auto", [257, 256]), Ok(1));
