@@ -2,7 +2,7 @@
 //! description in NumPy Enhancement Proposal 1.
 
 use super::{
-    Endian, SampleType, Source,
+    Endian, SampleType, Source, copy,
     gather::{Columns, gather},
 };
 use crate::{Result, scattered::Points};
@@ -71,7 +71,7 @@ fn header(bytes: &[u8]) -> Option<(String, usize)> {
         _ => return None,
     };
     let text = bytes.get(start..)?.get(..length)?;
-    Some((String::from_utf8_lossy(text).into_owned(), start + length))
+    Some((copy::lossy(text), start + length))
 }
 
 /// What stands behind a name in the header, a Python dictionary: up to the comma outside brackets.

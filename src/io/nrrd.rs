@@ -4,7 +4,7 @@
 mod files;
 mod write;
 
-use super::{Endian, SampleType, Source, volume_stream::Plain};
+use super::{Endian, SampleType, Source, copy, volume_stream::Plain};
 use crate::{
     Result,
     volume::{Arrangement, Lattice, Volume},
@@ -334,7 +334,8 @@ impl<'a> Header<'a> {
             || data.get(skip..).ok_or_else(|| file.error(place, format!("end before the {skip} bytes to skip do")));
         let text = || {
             let bytes = after_skip()?;
-            std::str::from_utf8(bytes).map_err(|e| file.error(place, format!("byte {} is not text", e.valid_up_to())))
+            file.room::<u8>("the text", bytes.len())?;
+            copy::text(bytes).map_err(|at| file.error(place, format!("byte {at} is not text")))
         };
         Ok(match encoding.as_str() {
             "raw" => {
@@ -354,12 +355,12 @@ impl<'a> Header<'a> {
             }
             "ascii" | "txt" | "text" => {
                 file.spend("the size of the numbers in bytes", size as u64)?;
-                let bytes = kind.parse(text()?, size / kind.bytes()).map_err(|message| file.error(place, message))?;
+                let bytes = kind.parse(&text()?, size / kind.bytes()).map_err(|message| file.error(place, message))?;
                 (bytes.into(), Endian::Little)
             }
             "hex" => {
                 file.spend("the size of the digits in bytes", data.len() as u64)?;
-                let bytes = from_hex(text()?, size).map_err(|message| file.error(place, message))?;
+                let bytes = from_hex(&text()?, size).map_err(|message| file.error(place, message))?;
                 (bytes.into(), self.endian(kind)?)
             }
             _ => {
