@@ -26,6 +26,9 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
         let (parts, None) = (words.next(), words.next()) else {
             return Err(wrong(format!("“{}” is not “LIST” with the axes of a file", shown(field))));
         };
+        if rest.len() > super::LONGEST {
+            return Err(wrong(format!("the list of files is longer than {} bytes", super::LONGEST)));
+        }
         source.spend("the size of the names of files in bytes", 5 * rest.len() as u64)?;
         let text = copy::text(rest).map_err(|at| wrong(format!("byte {at} of the list of files is not text")))?;
         let names = text.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned);

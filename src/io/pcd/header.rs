@@ -91,6 +91,9 @@ pub fn read(source: &Source) -> Result<Header> {
         }
         let window = &bytes[at..bytes.len().min(at + LONGEST)];
         let Some(length) = window.iter().position(|&b| b == b'\n') else {
+            if at + window.len() < bytes.len() {
+                return Err(source.error(place(), format!("the line is longer than {LONGEST} bytes")));
+            }
             return Err(source.error(place(), "the header ends before its line “DATA”"));
         };
         let line = copy::lossy(&bytes[at..at + length]);

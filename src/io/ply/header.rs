@@ -87,6 +87,10 @@ pub(super) fn read(source: &Source) -> Result<Header> {
         let rest = bytes.get(at..).unwrap_or(&[]);
         let window = &rest[..rest.len().min(LONGEST.saturating_sub(at))];
         let Some(end) = window.iter().position(|b| matches!(b, b'\n' | b'\r')) else {
+            if window.len() < rest.len() {
+                let message = format!("the header is longer than {LONGEST} bytes, with no line “end_header” in them");
+                return Err(source.error(place(), message));
+            }
             return Err(source.error(place(), "the header has no “end_header” line; the file is cut or is no PLY"));
         };
         let line = copy::lossy(&rest[..end]);

@@ -6,6 +6,9 @@ use crate::{Error, Result};
 /// Bytes that an array of a field takes beside its name and its numbers.
 const FIELD: u64 = 256;
 
+/// No line of a real file comes near this many bytes. Arrays are no lines.
+const LONGEST: usize = 1 << 20;
+
 /// A place in a file.
 pub(super) struct Parser<'a> {
     source: &'a Source<'a>,
@@ -23,7 +26,7 @@ impl<'a> Parser<'a> {
         }
         // The title may be empty, and in any encoding.
         for _ in 0..2 {
-            parser.raw_line().ok_or_else(|| cut(&parser))?;
+            parser.raw_line()?.ok_or_else(|| cut(&parser))?;
         }
         let (place, encoding) = parser.line()?.ok_or_else(|| cut(&parser))?;
         parser.binary = match encoding.to_ascii_uppercase().as_str() {
@@ -50,7 +53,7 @@ impl<'a> Parser<'a> {
                         parser.field()?;
                     }
                 }
-                [keyword, ..] if keyword.eq_ignore_ascii_case("METADATA") => parser.skip_to_blank(),
+                [keyword, ..] if keyword.eq_ignore_ascii_case("METADATA") => parser.skip_to_blank()?,
                 _ => return Err(source.error(place, "is not the line “DATASET …” that was expected")),
             }
         }
@@ -66,18 +69,22 @@ impl<'a> Parser<'a> {
     }
 
     /// The next line as it stands; none at the end of the file.
-    fn raw_line(&mut self) -> Option<&'a [u8]> {
+    fn raw_line(&mut self) -> Result<Option<&'a [u8]>> {
         let rest = self.rest();
-        let line = rest.split_inclusive(|&b| b == b'\n').next()?;
+        let window = &rest[..rest.len().min(LONGEST)];
+        let Some(line) = window.split_inclusive(|&b| b == b'\n').next() else { return Ok(None) };
+        if line.len() == LONGEST && line.len() < rest.len() && !line.ends_with(b"\n") {
+            return Err(self.source.error(self.place(), format!("the line is longer than {LONGEST} bytes")));
+        }
         self.at += line.len();
-        Some(line.trim_ascii())
+        Ok(Some(line.trim_ascii()))
     }
 
     /// The next line that is not empty, and its place.
     pub fn line(&mut self) -> Result<Option<(String, String)>> {
         loop {
             let place = self.place();
-            match self.raw_line() {
+            match self.raw_line()? {
                 None => return Ok(None),
                 Some([]) => {}
                 Some(line) => {
@@ -97,8 +104,9 @@ impl<'a> Parser<'a> {
     }
 
     /// Passes over lines up to an empty one.
-    pub fn skip_to_blank(&mut self) {
-        while self.raw_line().is_some_and(|line| !line.is_empty()) {}
+    pub fn skip_to_blank(&mut self) -> Result<()> {
+        while self.raw_line()?.is_some_and(|line| !line.is_empty()) {}
+        Ok(())
     }
 
     /// A count from a keyword's line, within the limits of points.
@@ -193,7 +201,7 @@ impl<'a> Parser<'a> {
             return Err(self.source.error(self.place(), "the file ends inside a FIELD"));
         };
         if line.starts_with("METADATA") {
-            self.skip_to_blank();
+            self.skip_to_blank()?;
             let next = self.line()?;
             (place, line) = next.ok_or_else(|| self.source.error(place, "the file ends inside a FIELD"))?;
         }
