@@ -99,7 +99,7 @@ mod tests {
         write_gaussians(&set, &path).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
-        let header = std::str::from_utf8(&bytes[..end]).unwrap();
+        let header = crate::io::copy::text(&bytes[..end]).unwrap();
         assert!(header.contains(&format!("element vertex {}\n", set.splats.len())));
         let rows: Vec<[f32; 17]> = bytes[end..]
             .chunks_exact(68)
