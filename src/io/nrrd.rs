@@ -654,8 +654,7 @@ mod tests {
         assert!(sizes("0 2 2").to_string().contains("holds none"));
         assert!(sizes("2 2").to_string().contains("3 numbers"));
         for (fields, data, word) in [
-            ("dimension: 2\ntype: uint8\nsizes: 2 2\nencoding: raw", &[0; 4][..], "3 axes"),
-            ("type: block\nsizes: 1 1 1\nencoding: raw", &[0], "block"),
+            ("type: block\nsizes: 1 1 1\nencoding: raw", &[0][..], "block"),
             ("type: short\nsizes: 1 1 1\nencoding: raw", &[0; 2], "endian"),
             ("type: short\nsizes: 1 1 1\nencoding: raw\nendian: middle", &[0; 2], "middle"),
             ("type: uchar\nsizes: 1 1 1\nencoding: ascii", b"256", "256"),
@@ -666,7 +665,11 @@ mod tests {
             let message = error(fields, data).to_string();
             assert!(message.contains(word), "{message}");
         }
+        let flat = "NRRD0004\ntype: uint8\ndimension: 2\nsizes: 2 2\nencoding: raw\n\n1234";
+        let message = read_with(&folder.write("volume.nrrd", flat), read).unwrap_err().to_string();
+        assert!(message.contains("3 axes"), "{message}");
     }
+
     #[test]
     fn fields_stand_once() {
         let folder = Folder::new();
