@@ -296,6 +296,7 @@ fn each_limit_names_its_flag() {
         // What the hint asks for is enough for what was met.
         let number = |text: &str| text.split(' ').find_map(|word| word.parse::<u64>().ok());
         let least = told.split_once(&format!("raise {flag} to ")).and_then(|(_, rest)| number(rest));
+        assert!(least.is_some() || flag == &"--limit-seconds", "{arguments}: {told}");
         if let (Some(least), Some((start, _))) = (least, arguments.rsplit_once(' ')) {
             let again = folder.run(&format!("{start} {}", least + 1)).stderr();
             assert!(!again.contains(message), "{arguments}: {again}");
