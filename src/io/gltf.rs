@@ -10,7 +10,7 @@ mod nodes;
 #[cfg(test)]
 mod tests;
 
-use super::{Source, positions};
+use super::{Source, copy, positions};
 use crate::{
     Result,
     surface::{Mesh, Texture},
@@ -35,9 +35,11 @@ const KNOWN: [&str; 4] = ["KHR_mesh_quantization", "KHR_texture_transform", "KHR
 /// (Draco and meshopt compression among them); [`Error::Limit`](crate::Error::Limit) for counts over the limits.
 pub fn read(source: &Source) -> Result<Mesh> {
     let (text, binary) = buffers::split(source)?;
-    source.spend("the size of the scene's tree in bytes", tree_bytes(text))?;
+    // The copy of the text counts as well.
+    source.spend("the size of the scene's tree in bytes", tree_bytes(text).saturating_add(text.len() as u64))?;
+    let text = copy::text(text).map_err(|at| source.error("JSON", format!("byte {at} is not UTF-8 text")))?;
     let root: json::Root =
-        json::deserialize::from_slice(text).map_err(|error| source.error("JSON", error.to_string()))?;
+        json::deserialize::from_str(&text).map_err(|error| source.error("JSON", error.to_string()))?;
     for extension in &root.extensions_required {
         if !KNOWN.iter().any(|known| extension.starts_with(known)) {
             return Err(source

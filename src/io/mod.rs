@@ -4,8 +4,11 @@
 //! volume or scattered samples; [`Kind`] tells which of them a file needs. [`read_mesh`], [`read_volume`] and
 //! [`read_samples`] do the same with bytes in memory ([`Source::from_bytes`]).
 
+#![deny(clippy::disallowed_methods)]
+
 mod budget;
 mod cloud;
+pub(crate) mod copy;
 pub mod csv;
 pub mod e57;
 mod gather;

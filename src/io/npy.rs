@@ -2,7 +2,7 @@
 //! description in NumPy Enhancement Proposal 1.
 
 use super::{
-    Endian, SampleType, Source,
+    Endian, SampleType, Source, copy,
     gather::{Columns, gather},
 };
 use crate::{Result, scattered::Points};
@@ -15,7 +15,8 @@ use glam::DVec3;
 /// that are not finite, with the row; [`Error::Limit`](crate::Error::Limit) for more rows than points are allowed.
 pub fn read(source: &Source) -> Result<Points> {
     let bytes = source.bytes();
-    let (header, start) = header(bytes).ok_or_else(|| source.error("header", "is cut off, or is none of NumPy's"))?;
+    let (header, start) = header(bytes)
+        .ok_or_else(|| source.error("header", "is cut off, is longer than 1 MiB, or is none of NumPy's"))?;
     let wrong = |message: String| source.error("header", message);
     let field = |name: &str| field(&header, name).ok_or_else(|| wrong(format!("has no “{name}”")));
     let descr = field("descr")?;
@@ -70,8 +71,9 @@ fn header(bytes: &[u8]) -> Option<(String, usize)> {
         2 | 3 => (u32::from_le_bytes(*bytes.get(8..)?.first_chunk()?) as usize, 12),
         _ => return None,
     };
-    let text = bytes.get(start..)?.get(..length)?;
-    Some((String::from_utf8_lossy(text).into_owned(), start + length))
+    // No header of a real file comes near this many bytes.
+    let text = bytes.get(start..)?.get(..length).filter(|text| text.len() <= 1 << 20)?;
+    Some((copy::lossy(text), start + length))
 }
 
 /// What stands behind a name in the header, a Python dictionary: up to the comma outside brackets.

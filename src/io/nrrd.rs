@@ -4,14 +4,14 @@
 mod files;
 mod write;
 
-use super::{Endian, SampleType, Source, volume_stream::Plain};
+use super::{Endian, SampleType, Source, copy, volume_stream::Plain};
 use crate::{
-    Result,
+    Error, Result,
     volume::{Arrangement, Lattice, Volume},
 };
 use flate2::read::MultiGzDecoder;
 use glam::{DMat3, DVec3};
-use std::{borrow::Cow, collections::HashMap, sync::Arc};
+use std::{borrow::Cow, collections::HashMap, path::Path, sync::Arc};
 pub use write::{write, write_bytes};
 
 /// Reads a volume of three axes with one scalar each. Positions are in the file's own space (RAS, LPS, …: nothing is
@@ -37,9 +37,14 @@ pub fn read(source: &Source) -> Result<Volume> {
     let dims = header.dims()?;
     let lattice = header.lattice(dims)?;
     let kind = header.sample_type()?;
-    let size = source.check_bytes("the size of the samples in bytes", kind.bytes_of(dims).unwrap_or(u64::MAX))?;
-    source.spend("the size of the samples in bytes", kind.decoded_bytes(size))?;
     let rest = &source.bytes()[body..];
+    let claimed = kind.bytes_of(dims).unwrap_or(u64::MAX);
+    // No limit helps where raw samples are missing, so that is told first.
+    if header.data_file().is_none() && !header.has_skips() && header.is_raw()? && (rest.len() as u64) < claimed {
+        return Err(source.error("data", format!("there are {} bytes where {claimed} were expected", rest.len())));
+    }
+    let size = source.check_bytes("the size of the samples in bytes", claimed)?;
+    source.spend("the size of the samples in bytes", kind.decoded_bytes(size))?;
     let Some(field) = header.data_file() else {
         let (bytes, endian) = header.bytes(source, rest, kind, size)?;
         return Volume::new(lattice, kind.decode(bytes, endian)).map_err(|message| source.error("samples", message));
@@ -74,18 +79,37 @@ pub(super) fn plain(source: &Source) -> Result<Option<Plain>> {
     let (header, body) = Header::read(source)?;
     let lattice = header.lattice(header.dims()?)?;
     let sample_type = header.sample_type()?;
-    let skips = header.get(&["line skip", "lineskip", "byte skip", "byteskip"]).is_some();
-    if skips || !header.need("encoding")?.eq_ignore_ascii_case("raw") {
+    if header.has_skips() || !header.is_raw()? {
         return Ok(None);
     }
     let endian = header.endian(sample_type)?;
     let (path, start) = match header.data_file() {
         None => (source.path.to_owned(), body),
         Some(field) if files::are_several(field) => return Ok(None),
-        Some(name) => (source.neighbour("data file", name)?, 0),
+        Some(name) => {
+            let path = source.neighbour("data file", name)?;
+            let size = sample_type.bytes_of(lattice.dims).unwrap_or(u64::MAX);
+            // Fewer bytes are told where they are read.
+            if let Ok(found) = path.metadata() {
+                refuse_more(&path, found.len(), size)?;
+            }
+            (path, 0)
+        }
     };
     Ok(Some(Plain { path, start, sample_type, endian, lattice }))
 }
+
+/// Refuses raw samples in a file of their own that has more bytes than they take.
+fn refuse_more(path: &Path, there: u64, expected: u64) -> Result<()> {
+    if there <= expected {
+        return Ok(());
+    }
+    Err(Error::input(path, "data", format!("there are {there} bytes where {expected} were expected"))
+        .hint("“sizes” or “type” of the header are wrong, or “byte skip” is missing (-1 takes the last bytes)"))
+}
+
+/// No header of a real file comes near this many bytes.
+const LONGEST: usize = 64 << 20;
 
 /// Bytes that a line of the header takes beside its text.
 const ENTRY: u64 = 256;
@@ -106,11 +130,20 @@ impl<'a> Header<'a> {
         }
         let mut fields = HashMap::new();
         let mut keys = HashMap::new();
+        // The line of each field, by its name in the spelling without spaces.
+        let mut lines: HashMap<String, usize> = HashMap::new();
         let mut at = 0;
-        for (number, line) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
+        // A byte more tells a line that is too long.
+        let window = &bytes[..bytes.len().min(LONGEST + 1)];
+        for (number, line) in window.split_inclusive(|&b| b == b'\n').enumerate() {
             at += line.len();
+            if at > LONGEST {
+                return Err(source
+                    .error(format!("line {}", number + 1), format!("the header is longer than {LONGEST} bytes"))
+                    .hint("an empty line must stand between the header and the data"));
+            }
             // Comments may be in any encoding.
-            let text = String::from_utf8_lossy(line);
+            let text = copy::lossy(line);
             let text = text.trim_end_matches(['\n', '\r']);
             if text.is_empty() {
                 break;
@@ -120,11 +153,27 @@ impl<'a> Header<'a> {
                 _ if number == 0 || text.starts_with('#') => {}
                 // “key:=value”
                 Some((key, value)) if value.starts_with('=') => {
-                    keys.insert(key.trim().to_owned(), value[1..].trim().to_owned());
+                    let key = key.trim();
+                    let is_read = key == "lattice" || key.starts_with("axis positions ");
+                    if keys.insert(key.to_owned(), value[1..].trim().to_owned()).is_some() && is_read {
+                        let message = format!("the key “{}” is given twice; it must stand once", shown(key));
+                        return Err(source.error(format!("line {}", number + 1), message));
+                    }
                 }
                 Some((name, value)) => {
                     let (name, value) = (name.trim().to_ascii_lowercase(), value.trim());
-                    let is_list = name.replace(' ', "") == "datafile" && files::is_list(value);
+                    let spelling = match name.replace(' ', "").as_str() {
+                        "centerings" => "centers".to_owned(),
+                        other => other.to_owned(),
+                    };
+                    let is_list = spelling == "datafile" && files::is_list(value);
+                    if let Some(before) = lines.insert(spelling, number + 1) {
+                        let message = format!(
+                            "the field “{}” is given twice, in line {before} too; it must stand once",
+                            shown(&name)
+                        );
+                        return Err(source.error(format!("line {}", number + 1), message));
+                    }
                     fields.insert(name, value.to_owned());
                     // The names of files follow, up to the end.
                     if is_list {
@@ -152,6 +201,16 @@ impl<'a> Header<'a> {
 
     fn need(&self, name: &str) -> Result<&str> {
         self.get(&[name]).ok_or_else(|| self.source.error("header", format!("has no field “{name}”")))
+    }
+
+    /// Whether the samples stand as they are.
+    fn is_raw(&self) -> Result<bool> {
+        Ok(self.need("encoding")?.eq_ignore_ascii_case("raw"))
+    }
+
+    /// Whether something stands before the samples that is to be skipped.
+    fn has_skips(&self) -> bool {
+        self.get(&["line skip", "lineskip", "byte skip", "byteskip"]).is_some()
     }
 
     /// The numbers of a field, exactly `N`.
@@ -334,11 +393,15 @@ impl<'a> Header<'a> {
             || data.get(skip..).ok_or_else(|| file.error(place, format!("end before the {skip} bytes to skip do")));
         let text = || {
             let bytes = after_skip()?;
-            std::str::from_utf8(bytes).map_err(|e| file.error(place, format!("byte {} is not text", e.valid_up_to())))
+            file.room::<u8>("the text", bytes.len())?;
+            copy::text(bytes).map_err(|at| file.error(place, format!("byte {at} is not text")))
         };
         Ok(match encoding.as_str() {
             "raw" => {
                 let start = if from_end { data.len().checked_sub(size) } else { Some(skip) };
+                if !from_end && self.data_file().is_some() {
+                    refuse_more(file.path, data.len().saturating_sub(skip) as u64, size as u64)?;
+                }
                 let found = start.and_then(|start| data.get(start..)).and_then(|rest| rest.get(..size));
                 let found = found.ok_or_else(|| {
                     let there = data.len().saturating_sub(skip);
@@ -354,12 +417,12 @@ impl<'a> Header<'a> {
             }
             "ascii" | "txt" | "text" => {
                 file.spend("the size of the numbers in bytes", size as u64)?;
-                let bytes = kind.parse(text()?, size / kind.bytes()).map_err(|message| file.error(place, message))?;
+                let bytes = kind.parse(&text()?, size / kind.bytes()).map_err(|message| file.error(place, message))?;
                 (bytes.into(), Endian::Little)
             }
             "hex" => {
                 file.spend("the size of the digits in bytes", data.len() as u64)?;
-                let bytes = from_hex(text()?, size).map_err(|message| file.error(place, message))?;
+                let bytes = from_hex(&text()?, size).map_err(|message| file.error(place, message))?;
                 (bytes.into(), self.endian(kind)?)
             }
             _ => {
@@ -591,8 +654,7 @@ mod tests {
         assert!(sizes("0 2 2").to_string().contains("holds none"));
         assert!(sizes("2 2").to_string().contains("3 numbers"));
         for (fields, data, word) in [
-            ("dimension: 2\ntype: uint8\nsizes: 2 2\nencoding: raw", &[0; 4][..], "3 axes"),
-            ("type: block\nsizes: 1 1 1\nencoding: raw", &[0], "block"),
+            ("type: block\nsizes: 1 1 1\nencoding: raw", &[0][..], "block"),
             ("type: short\nsizes: 1 1 1\nencoding: raw", &[0; 2], "endian"),
             ("type: short\nsizes: 1 1 1\nencoding: raw\nendian: middle", &[0; 2], "middle"),
             ("type: uchar\nsizes: 1 1 1\nencoding: ascii", b"256", "256"),
@@ -602,6 +664,51 @@ mod tests {
         ] {
             let message = error(fields, data).to_string();
             assert!(message.contains(word), "{message}");
+        }
+        let flat = "NRRD0004\ntype: uint8\ndimension: 2\nsizes: 2 2\nencoding: raw\n\n1234";
+        let message = read_with(&folder.write("volume.nrrd", flat), read).unwrap_err().to_string();
+        assert!(message.contains("3 axes"), "{message}");
+    }
+
+    #[test]
+    fn fields_stand_once() {
+        let folder = Folder::new();
+        let start = "type: uint8\nsizes: 2 1 1\nencoding: raw";
+        let load = |fields: &str| {
+            let content = file(&format!("{start}\n{fields}"), &[1, 2]);
+            read_with(&folder.write("volume.nrrd", &content), read)
+        };
+        assert!(load("content: a\nkey:=1\nkey:=2").is_ok());
+        for (fields, word) in [
+            ("sizes: 2 1 1", "“sizes” is given twice"),
+            ("Sizes: 1 2 1", "“sizes” is given twice"),
+            ("spacings: 1 1 1\nspacings: 1 1 2", "“spacings” is given twice"),
+            ("axis mins: 0 0 0\naxismins: 0 0 0", "“axismins” is given twice"),
+            ("centers: node node node\ncenterings: cell cell cell", "“centerings” is given twice"),
+            ("lattice:=bcc\nlattice:=bcc", "the key “lattice” is given twice"),
+        ] {
+            let message = load(fields).unwrap_err().to_string();
+            assert!(message.contains("line ") && message.contains(word), "{fields}: {message}");
+        }
+    }
+
+    #[test]
+    fn files_of_data_have_no_more_than_the_samples() {
+        let folder = Folder::new();
+        folder.write("a.raw", [9, 1, 2]);
+        let detached = |fields: &str| {
+            let text = format!("NRRD0001\ntype: uchar\ndimension: 3\nsizes: 2 1 1\nencoding: raw\n{fields}\n");
+            let path = folder.write("volume.nhdr", text);
+            (read_with(&path, read), read_with(&path, plain).map(|found| found.is_some()))
+        };
+        let (whole, plain) = detached("data file: a.raw");
+        for error in [whole.err(), plain.err()] {
+            let message = error.unwrap().to_string();
+            assert!(message.ends_with("a.raw: data: there are 3 bytes where 2 were expected"), "{message}");
+        }
+        for skip in ["byte skip: 1", "byte skip: -1"] {
+            let (whole, plain) = detached(&format!("{skip}\ndata file: a.raw"));
+            assert_eq!((whole.unwrap().samples, plain.unwrap()), (Samples::U8(vec![1, 2]), false));
         }
     }
 }

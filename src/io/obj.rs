@@ -9,13 +9,13 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
-use super::{Source, isolate::isolated, polygon, positions};
+use super::{Source, copy, isolate::isolated, polygon, positions};
 use crate::{
     Error, Result,
     surface::{Material, Mesh},
 };
 use glam::{DVec3, Vec2, Vec3};
-use std::{borrow::Cow, cell::RefCell, collections::HashMap, path::Path};
+use std::{cell::RefCell, collections::HashMap, path::Path};
 use survey::Survey;
 
 /// Reads an OBJ file: polygons, concave ones too, cut into triangles, with vertex colours, normals and materials. Texture
@@ -26,12 +26,8 @@ use survey::Survey;
 /// [`Error::Input`] for malformed numbers, positions that are not finite, indices without a vertex, and references to
 /// files outside the file's folder. Missing material files and pictures are warnings.
 pub fn read(source: &Source) -> Result<Mesh> {
-    let text = String::from_utf8_lossy(source.bytes());
-    let is_copy = matches!(text, Cow::Owned(_));
-    let text = join_lines(text);
-    if is_copy || matches!(text, Cow::Owned(_)) {
-        source.room::<u8>("the text", 2 * text.len())?;
-    }
+    source.room::<u8>("the text", source.bytes().len())?;
+    let text = join_lines(source, copy::lossy(source.bytes()))?;
     let survey = Survey::of(source, &text)?;
     if survey.faces == 0 {
         return read_cloud(source, &text, &survey);
@@ -97,11 +93,12 @@ fn neutral() -> Material {
 }
 
 /// Joins lines that end with a backslash.
-fn join_lines(text: Cow<str>) -> Cow<str> {
+fn join_lines(source: &Source, text: String) -> Result<String> {
     if text.contains("\\\n") || text.contains("\\\r\n") {
-        return Cow::Owned(text.replace("\\\r\n", " ").replace("\\\n", " "));
+        source.room::<u8>("the joined lines", 2 * text.len())?;
+        return Ok(text.replace("\\\r\n", " ").replace("\\\n", " "));
     }
-    text
+    Ok(text)
 }
 
 /// The vertices of all models; a corner's index triple makes one.

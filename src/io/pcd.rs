@@ -5,7 +5,7 @@ mod lzf;
 #[cfg(test)]
 mod tests;
 
-use super::{Source, cloud::Cloud, growing::Growing, text::lines_of};
+use super::{Source, cloud::Cloud, copy, growing::Growing, text::lines_of};
 use crate::{Result, surface::Mesh};
 use glam::{DVec3, Vec3};
 use header::{Data, Field, Header};
@@ -112,10 +112,9 @@ impl<'a> Rows<'a> {
         let mut found = 0;
         for (number, line) in (header.lines + 1..).zip(lines_of(data)) {
             let before = numbers.len();
-            let text = String::from_utf8_lossy(line);
-            for word in text.split_ascii_whitespace() {
-                let value = word.parse::<f64>().map_err(|_| {
-                    let shown: String = word.chars().take(40).collect();
+            for word in line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()) {
+                let value: f64 = copy::number(word).ok_or_else(|| {
+                    let shown = copy::excerpt(word);
                     source.error(format!("line {number}"), format!("“{shown}” is not a number"))
                 })?;
                 numbers.push(value)?;

@@ -21,6 +21,7 @@ use crate::{
     surface::{Material, Mesh},
 };
 use faces::Faces;
+pub(super) use gaussians::warn as warn_of_gaussians;
 pub use gaussians::{write_gaussian_leaves, write_gaussians};
 use glam::{DVec3, Vec2, Vec3};
 use header::Element;
@@ -58,6 +59,9 @@ pub fn read(source: &Source) -> Result<Mesh> {
         }
         let rows = Rows::find(source, element, header.encoding, &mut at)?;
         if vertices.is_some_and(|vertices| std::ptr::eq(vertices, element)) {
+            if gaussians::are_gaussians(element) {
+                gaussians::warn(source);
+            }
             read_vertices(source, element, &rows, &mut mesh)?;
         } else if is_face {
             // Their vertices may stand behind them.

@@ -1,13 +1,13 @@
 //! The guarded opening: every format reads its bytes through a [`Source`], which maps the file, holds the limits
 //! and gives errors that name the file.
 
-use super::{LimitKind, Limits, budget::Budget, mapping::Mapping};
+use super::{LimitKind, Limits, budget::Budget, copy, mapping::Mapping};
 use crate::{Error, Result};
 use std::{
     fs::File,
     io::Read,
     path::{Path, PathBuf},
-    sync::Arc,
+    sync::{Arc, OnceLock},
 };
 
 /// Bytes that are unpacked between two looks at the clock.
@@ -25,6 +25,8 @@ pub struct Source<'a> {
     pub path: &'a Path,
     pub limits: &'a Limits,
     content: Content<'a>,
+    /// Text of the file that the reader refers to, as a copy.
+    text: OnceLock<String>,
     /// Shared by all files of a model.
     budget: Arc<Budget>,
 }
@@ -46,7 +48,7 @@ impl<'a> Source<'a> {
 
     fn open_within(path: &'a Path, limits: &'a Limits, budget: Arc<Budget>) -> Result<Self> {
         let content = Content::Mapped(map_within(path, limits, &budget)?);
-        Ok(Self { path, limits, content, budget })
+        Ok(Self { path, limits, content, text: OnceLock::new(), budget })
     }
 
     /// Maps a file as [`open`](Self::open) does, for those who read from it later.
@@ -68,7 +70,7 @@ impl<'a> Source<'a> {
     pub fn from_bytes(name: &'a Path, bytes: &'a [u8], limits: &'a Limits) -> Result<Self> {
         let budget = Arc::new(Budget::new());
         budget.spend(limits, name, "the file's size in bytes", bytes.len() as u64)?;
-        Ok(Self { path: name, limits, content: Content::Held(bytes), budget })
+        Ok(Self { path: name, limits, content: Content::Held(bytes), text: OnceLock::new(), budget })
     }
 
     /// Whether this is no file but bytes from elsewhere, which have no neighbours.
@@ -106,10 +108,18 @@ impl<'a> Source<'a> {
         if size > most {
             return Err(self.error("file", format!("has {size} bytes, but {what} has {most} at most")));
         }
-        let bytes = self.bytes().to_vec();
+        let text = copy::text(self.bytes());
         self.intact()?;
-        String::from_utf8(bytes)
-            .map_err(|e| self.error(format!("byte {}", e.utf8_error().valid_up_to()), "is not UTF-8 text"))
+        text.map_err(|at| self.error(format!("byte {at}"), "is not UTF-8 text"))
+    }
+
+    /// A part of the file as text, copied and kept as long as this source. Only one part can be kept: a second call returns
+    /// the first text. `what` names it in errors.
+    pub(super) fn keep_text(&self, bytes: &[u8], what: &str) -> Result<&str> {
+        self.room::<u8>("the text", bytes.len())?;
+        let text =
+            copy::text(bytes).map_err(|at| self.error(format!("byte {at}"), format!("{what} is not UTF-8 text")))?;
+        Ok(self.text.get_or_init(|| text))
     }
 
     /// What was made of the file, or why it was not; and where the file was changed meanwhile, that alone.

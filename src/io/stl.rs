@@ -1,7 +1,7 @@
 //! STL, binary and as text. Every triangle has three vertices of its own; those at one place are made one where surfels
 //! are made. The normals of the facets say nothing that the corners do not, and are passed over.
 
-use super::{Source, growing::Growing, positions, text::lines_of};
+use super::{Source, copy, growing::Growing, positions, text::lines_of};
 use crate::{Result, surface::Mesh};
 use glam::DVec3;
 
@@ -70,7 +70,7 @@ fn of_text(source: &Source) -> Result<(Vec<DVec3>, Vec<usize>)> {
     let mut last = 1;
     for (number, line) in (1..).zip(lines_of(source.bytes())) {
         let wrong = |message: String| source.error(format!("line {number}"), message);
-        let text = String::from_utf8_lossy(line);
+        let text = copy::lossy(line);
         let mut words = text.split_ascii_whitespace();
         let Some(word) = words.next() else { continue };
         last = number;

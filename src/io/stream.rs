@@ -88,6 +88,15 @@ impl<'a> Stream<'a> {
         Counts { points: points as u64, triangles: triangles as u64 }
     }
 
+    /// Warns where the file holds more than its points, which alone are read.
+    pub(crate) fn warn(&self) {
+        if let Form::Ply(pieces) = &self.form
+            && pieces.are_gaussians
+        {
+            ply::warn_of_gaussians(&self.source);
+        }
+    }
+
     /// Whether the third axis of its points is up, as for [`Mesh::z_is_up`](crate::surface::Mesh::z_is_up).
     pub fn z_is_up(&self) -> bool {
         matches!(self.form, Form::Las(_))

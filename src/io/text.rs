@@ -4,7 +4,7 @@
 //! (The csv crate takes single bytes only, not runs of spaces.) Lines that are empty or begin with `#` or `//` are passed
 //! over, but for a first one that names the columns. Numbers have points, no decimal commas.
 
-use super::{Source, growing::Growing};
+use super::{Source, copy, growing::Growing};
 use crate::{Error, Result};
 use rayon::prelude::*;
 
@@ -45,9 +45,11 @@ impl<'a> Text<'a> {
         }
         let names = has_names(&words).then(|| words.clone());
         if names.is_some() && !line.iter().any(|b| b.is_ascii_alphabetic() || !b.is_ascii()) {
-            let shown = String::from_utf8_lossy(line).chars().take(40).collect::<String>();
             return Err(source
-                .error(format!("line {first}"), format!("{shown:?} is neither numbers nor names of columns"))
+                .error(
+                    format!("line {first}"),
+                    format!("{:?} is neither numbers nor names of columns", copy::excerpt(line)),
+                )
                 .hint("numbers have points, no decimal commas"));
         }
         if names.is_some() {
@@ -85,10 +87,9 @@ impl<'a> Text<'a> {
             let mut count = 0;
             for word in words(line, self.separator) {
                 if let Some(slot) = row.get_mut(count).filter(|_| asked(count)) {
-                    let text = String::from_utf8_lossy(word);
-                    let text = text.trim_matches('"');
-                    *slot = text.parse().map_err(|_| {
-                        let shown: String = text.chars().take(40).collect();
+                    let word = without_quotes(word);
+                    *slot = copy::number(word).ok_or_else(|| {
+                        let shown = copy::excerpt(word);
                         let error = source.error(place(), format!("“{shown}” is not a number"));
                         if shown.contains(',') { error.hint("numbers have points, no decimal commas") } else { error }
                     })?;
@@ -129,6 +130,14 @@ pub(super) fn lines_of(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     text.split(|&b| b == b'\n').flat_map(|line| line.strip_suffix(b"\r").unwrap_or(line).split(|&b| b == b'\r'))
 }
 
+/// Without quotation marks around it.
+fn without_quotes(mut word: &[u8]) -> &[u8] {
+    while let [b'"', rest @ ..] | [rest @ .., b'"'] = word {
+        word = rest;
+    }
+    word
+}
+
 /// Without the byte order mark that some writers of UTF-8 begin with.
 fn without_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
@@ -156,7 +165,7 @@ fn split(line: &[u8]) -> (Option<u8>, Vec<String>) {
     let outside: Vec<&[u8]> = line.split(|&b| b == b'"').step_by(2).collect();
     let has = |separator: &u8| outside.iter().any(|part| part.contains(separator));
     let separator = [b';', b',', b'\t'].into_iter().find(has);
-    let name = |word: &[u8]| String::from_utf8_lossy(word).trim_matches('"').trim().to_owned();
+    let name = |word: &[u8]| copy::lossy(word).trim_matches('"').trim().to_owned();
     // One more than there may be tells that there are too many.
     (separator, words(line, separator).take(MOST_COLUMNS + 1).map(name).collect())
 }

@@ -162,7 +162,7 @@ impl<'a> DataSet<'a> {
                     data.of_cells.count = parser.count(&place, count)?;
                     attributes = Some(true);
                 }
-                ("METADATA", _) => parser.skip_to_blank(),
+                ("METADATA", _) => parser.skip_to_blank()?,
                 ("LOOKUP_TABLE", [_, count]) => parser.skip_colors(&place, parser.count(&place, count)?, 4)?,
                 ("FIELD", [_, arrays]) => {
                     for _ in 0..parser.count(&place, arrays)? {

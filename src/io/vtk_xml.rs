@@ -2,7 +2,7 @@
 //! appended (raw or base64), packed by zlib or not. After the file formats' description in the VTK User's Guide.
 
 use super::{
-    Endian, SampleType, Source,
+    Endian, SampleType, Source, copy,
     vtk_array::{ArrayEncoding, from_base64},
 };
 use crate::{Error, Result};
@@ -84,8 +84,7 @@ impl<'a> Document<'a> {
             return Err(source.error(format!("byte {}", bytes.len()), "the file ends before </VTKFile>"));
         }
         let (xml, appended) = Appended::split(source)?;
-        let xml = std::str::from_utf8(xml)
-            .map_err(|e| source.error(format!("byte {}", e.valid_up_to()), "the XML is not UTF-8 text"))?;
+        let xml = source.keep_text(xml, "the XML")?;
         let mut document = Self {
             source,
             attributes: Attributes::new(),
@@ -301,7 +300,7 @@ impl<'a> Appended<'a> {
         let (xml, section) = bytes.split_at(at);
         let close = section.iter().position(|&b| b == b'>').ok_or_else(|| source.error(place, "is cut off"))?;
         let (tag, data) = section.split_at(close + 1);
-        let tag = String::from_utf8_lossy(tag);
+        let tag = copy::lossy(tag);
         let base64 = if tag.contains("\"raw\"") || tag.contains("'raw'") {
             false
         } else if tag.contains("\"base64\"") || tag.contains("'base64'") {

@@ -4,6 +4,7 @@
 use super::{
     Source,
     cloud::{Cloud, greys},
+    copy,
     growing::Growing,
     text::{Text, first_words},
 };
@@ -32,9 +33,9 @@ const INTENSITY: &[&str] = &["intensity", "i", "grey", "gray", "reflectance"];
 /// lines than points are allowed.
 pub fn read(source: &Source) -> Result<Mesh> {
     let mut counts = Growing::new(source, "the counts");
-    let text = Text::of(source, |number, line| match std::str::from_utf8(line).map(str::parse::<u64>) {
-        Ok(Ok(count)) => counts.push((number, count)).map(|()| true),
-        _ => Ok(false),
+    let text = Text::of(source, |number, line| match copy::number::<u64>(line) {
+        Some(count) => counts.push((number, count)).map(|()| true),
+        None => Ok(false),
     })?;
     let counted = counts.iter().fold(0u64, |sum, &(_, count)| sum.saturating_add(count));
     if let Some(&(line, _)) = counts.first().filter(|_| counted != text.len() as u64) {

@@ -83,7 +83,9 @@ impl Camera {
 
     /// As [`framing`](Self::framing), with a vertical view angle in degrees, between 0 and 180.
     pub fn framing_with(bounds: &Bounds, direction: DVec3, view_up: DVec3, aspect: f64, view_angle: f64) -> Self {
-        let radius = (0.5 * bounds.diagonal()).max(f64::MIN_POSITIVE.sqrt());
+        // The camera stands far enough from a single point that its coordinates differ.
+        let least = f64::MIN_POSITIVE.sqrt().max(1e-13 * bounds.center().abs().max_element());
+        let radius = (0.5 * bounds.diagonal()).max(least);
         let half = (0.5 * view_angle).to_radians();
         // The horizontal half angle is the narrower one in a portrait picture.
         let narrow = (half.tan() * aspect.min(1.0)).atan();
@@ -352,5 +354,14 @@ mod tests {
         c = camera();
         c.projection = Projection::Perspective { view_angle: 180.0 };
         assert!(c.view([5, 5]).is_err());
+    }
+    #[test]
+    fn a_single_point_is_looked_at() {
+        for place in [DVec3::ZERO, DVec3::new(1.0, -2.0, 3.0), DVec3::splat(1e8), DVec3::splat(-1e150)] {
+            let bounds = Bounds { min: place, max: place };
+            let camera = Camera::framing(&bounds, DVec3::Y, DVec3::Z, 1.5);
+            assert_eq!(camera.focal_point, place);
+            assert!(camera.view([30, 20]).is_ok(), "{camera:?}");
+        }
     }
 }

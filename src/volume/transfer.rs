@@ -203,7 +203,7 @@ impl TransferFunction {
         let extinction = self.most_extinction();
         if extinction > 0.0 && !EXTINCTIONS.contains(&extinction) {
             return Err(format!(
-                "the unit of {} leads to an extinction of {extinction}, beyond what can be drawn",
+                "the unit of {:?} leads to an extinction of {extinction}, beyond what can be drawn",
                 self.unit
             ));
         }

@@ -70,7 +70,7 @@
         ("index.ply", faces("uchar int", "3 0 1 3\n"), "index.ply: element “face”, row 0, byte 172: refers to vertex 3, but there are 3 (0 … 2)"),
         ("indexminus.ply", faces("uchar int", "3 0 1 -1\n"), "indexminus.ply: element “face”, row 0, byte 172: refers to vertex -1, but there are 3 (0 … 2)"),
         ("columns.ply", ply(&format!("element vertex 1\n{}", "property float x\n".repeat(5000)), ""), "columns.ply: header line 4099: more than 4096 elements and properties"),
-        ("endless.ply", format!("ply\nformat ascii 1.0\n{}", "comment\n".repeat(200_000)).into(), "endless.ply: header line 131072: the header has no “end_header” line; the file is cut or is no PLY"),
+        ("endless.ply", format!("ply\nformat ascii 1.0\n{}", "comment\n".repeat(200_000)).into(), "endless.ply: header line 131072: the header is longer than 1048576 bytes, with no line “end_header” in them"),
         // PLY: numbers that are none.
         ("nan.ply", vertices("2", "1 2 3\n1 nan 3\n"), "nan.ply: element “vertex”, row 1, byte 106: the position [1, NaN, 3] is not finite"),
         ("inf.ply", vertices("1", "1 2 inf\n"), "inf.ply: element “vertex”, row 0, byte 100: the position [1, 2, inf] is not finite"),

@@ -84,7 +84,7 @@ impl Bench {
         let [width, height] = self.engine.size;
         let culled = loaded.count.saturating_sub(stats.splats);
         if self.json {
-            return output::line(serde_json::json!({
+            return output::json(&serde_json::json!({
                 "scene": self.scene.name(),
                 "adapter": gpu.info.name,
                 "width": width,

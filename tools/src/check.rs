@@ -5,6 +5,7 @@ use crate::{
     load::{Input, LoadFlags},
     output,
     progress::Progress,
+    terminal::safe,
 };
 use clap::Args;
 use serde_json::json;
@@ -48,11 +49,12 @@ impl Check {
         let ok = findings.iter().all(|finding| finding.severity != Severity::Error);
         if self.json {
             let findings: Vec<_> = findings.iter().map(as_json).collect();
-            output::line(json!({ "ok": ok, "findings": findings }))?;
+            output::json(&json!({ "ok": ok, "findings": findings }))?;
         } else {
             for finding in &findings {
                 let severity = name_of(finding.severity);
-                output::line(format_args!("{severity} ({}) {}: {}", finding.code, finding.place, finding.message))?;
+                let (place, message) = (safe(&finding.place), safe(&finding.message));
+                output::line(format_args!("{severity} ({}) {place}: {message}", finding.code))?;
             }
             output::line(if ok { "sound" } else { "damaged" })?;
         }

@@ -29,7 +29,7 @@ impl Compare {
             other => other.into(),
         })?;
         if self.json {
-            output::line(serde_json::json!({
+            output::json(&serde_json::json!({
                 "psnr": found.psnr,
                 "ssim": found.ssim,
                 "max_difference": found.max_difference,

@@ -1,10 +1,14 @@
 //! What can go wrong, the exit code of each, and how it is told.
 
-use crate::limits;
+use crate::{
+    limits,
+    terminal::{safe, safe_lines},
+};
 use splatkit::Error;
 use std::{
+    borrow::Cow,
     fmt,
-    io::{self, ErrorKind, Write},
+    io::{self, ErrorKind, IsTerminal, Write},
     path::{Path, PathBuf},
     process::ExitCode,
 };
@@ -45,11 +49,13 @@ impl Failure {
         }
     }
 
-    fn hint(&self) -> Option<&str> {
-        match self {
+    fn hint(&self) -> Option<Cow<'_, str>> {
+        let hint = match self {
             Self::Library(Error::Input { hint, .. }) => hint.as_deref(),
             Self::Library(Error::Output { source, .. }) => room(source),
-            Self::Library(Error::Limit { kind, .. }) => Some(limits::hint(*kind)),
+            Self::Library(Error::Limit { file, kind, found, .. }) => {
+                return Some(limits::hint(file, *kind, *found).into());
+            }
             Self::Library(Error::NoAdapter(_)) => {
                 Some("`splatkit gpus` lists what there is; `--reference` needs no GPU")
             }
@@ -74,15 +80,54 @@ impl Failure {
             Self::Damaged { .. } => Some("make it again from its source, or fetch it again"),
             Self::Incomplete { .. } => Some("the tables tell the reason of each"),
             Self::Output { hint, .. } => *hint,
-        }
+        };
+        hint.map(Cow::Borrowed)
     }
 
-    /// Tells the failure on stderr.
+    /// Prints the failure on stderr. Lines are broken where the terminal ends; other readers, such as logs, get whole ones.
     pub fn report(self) -> ExitCode {
-        let code = self.code();
+        let is_terminal = io::stderr().is_terminal();
+        // An error only where there is a hook already.
+        miette::set_hook(Box::new(move |_| Box::new(miette::MietteHandlerOpts::new().wrap_lines(is_terminal).build())))
+            .ok();
         // Who reads stderr may be gone already.
-        writeln!(io::stderr(), "{:?}", miette::Report::new(self)).ok();
-        ExitCode::from(code)
+        writeln!(io::stderr(), "{:?}", miette::Report::new(Printed::of(&self))).ok();
+        ExitCode::from(self.code())
+    }
+
+    /// Whether the message is of the GPU's driver or library, which write several lines. Others are of one line, and a line
+    /// break in them is of a file's text.
+    fn has_lines(&self) -> bool {
+        matches!(self, Self::Library(Error::NoAdapter(_) | Error::Gpu(_) | Error::DeviceLost(_)))
+    }
+}
+
+/// A failure as it is printed: no text in it commands the terminal.
+#[derive(Debug)]
+struct Printed {
+    message: String,
+    hint: Option<String>,
+}
+
+impl Printed {
+    fn of(failure: &Failure) -> Self {
+        let message = failure.to_string();
+        let message = if failure.has_lines() { safe_lines(&message) } else { safe(&message) };
+        Self { message: message.into_owned(), hint: failure.hint().map(|hint| safe(&hint).into_owned()) }
+    }
+}
+
+impl fmt::Display for Printed {
+    fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
+        out.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Printed {}
+
+impl miette::Diagnostic for Printed {
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.hint.as_ref().map(|hint| Box::new(hint) as Box<dyn fmt::Display>)
     }
 }
 
@@ -122,9 +167,3 @@ impl fmt::Display for Failure {
 }
 
 impl std::error::Error for Failure {}
-
-impl miette::Diagnostic for Failure {
-    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        self.hint().map(|hint| Box::new(hint) as Box<dyn fmt::Display>)
-    }
-}

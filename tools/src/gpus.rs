@@ -27,7 +27,7 @@ impl Gpus {
                     "max_binding_bytes": limits.max_storage_buffer_binding_size,
                 })
             });
-            output::line(serde_json::Value::from_iter(list))?;
+            output::json(&serde_json::Value::from_iter(list))?;
         }
         if adapters.is_empty() {
             // The library's own message says what to install.

@@ -5,6 +5,7 @@ use crate::{
     load::{Input, LoadFlags},
     output,
     progress::Progress,
+    terminal::safe,
 };
 use clap::Args;
 use serde_json::{Map, Value, json};
@@ -50,7 +51,7 @@ impl Info {
             facts.entry("levels").or_insert(json!(1));
         }
         if self.json {
-            return output::line(Value::Object(facts));
+            return output::json(&Value::Object(facts));
         }
         let order = [
             "file",
@@ -190,8 +191,7 @@ fn bounds(bounds: Option<[glam::DVec3; 2]>) -> Value {
 /// A value for people.
 fn plain(value: &Value) -> String {
     match value {
-        // A file's own texts are not to command the terminal.
-        Value::String(text) => text.replace(char::is_control, "\u{fffd}"),
+        Value::String(text) => safe(text).into_owned(),
         Value::Array(values) => values.iter().map(plain).collect::<Vec<_>>().join(", "),
         Value::Object(map) => {
             map.iter().map(|(name, value)| format!("{name} {}", plain(value))).collect::<Vec<_>>().join("; ")

@@ -1,6 +1,6 @@
 //! The flags of the kernel that stands for a sample of a lattice.
 
-use crate::{failure::Failure, parse};
+use crate::{failure::Failure, parse, scene::in_file};
 use clap::Args;
 use splatkit::{
     io::{Limits, Source},
@@ -46,7 +46,11 @@ impl KernelFlags {
                 let extent = self.extent.ok_or_else(|| {
                     Failure::Usage(format!("{file}: a kernel of one's own needs --extent, where its last value lies"))
                 })?;
-                Kernel::table(read_table(Path::new(file), limits)?, extent)?
+                // An extent that is wrong is not the file's fault.
+                Kernel::table(vec![1.0, 0.0], extent)?;
+                let file = Path::new(file);
+                Kernel::table(read_table(file, limits)?, extent)
+                    .map_err(|error| in_file(file, error).hint("the form is a JSON array, or one number in a line"))?
             }
             _ => {
                 let names = NAMES.join(", ");

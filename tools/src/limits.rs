@@ -2,6 +2,7 @@
 
 use clap::Args;
 use splatkit::io::{LimitKind, Limits};
+use std::path::Path;
 
 /// How much any file may claim, occupy and take.
 #[derive(Args, Debug, Clone, Default)]
@@ -46,17 +47,41 @@ impl LimitFlags {
     }
 }
 
-/// What the user can do about a limit that was met.
-pub fn hint(kind: LimitKind) -> &'static str {
-    match kind {
-        LimitKind::Points => "raise --limit-points if the file can be trusted",
-        LimitKind::Bytes => {
-            "raise --limit-bytes if the file can be trusted and memory suffices; of a conversion also --memory"
+/// What the user can do about a limit that was met. No limit helps a file that claims more than its bytes can hold.
+pub fn hint(file: &Path, kind: LimitKind, found: u64) -> String {
+    let flag = match kind {
+        LimitKind::Points | LimitKind::Bytes => {
+            if let Some(bytes) = too_few_bytes(file, kind, found) {
+                return format!(
+                    "the file has {bytes} bytes, which cannot hold that: it is cut or damaged; make it again"
+                );
+            }
+            if found == u64::MAX {
+                return "no machine holds that much: the file is damaged; make it again".into();
+            }
+            if kind == LimitKind::Points { "points" } else { "bytes" }
         }
-        LimitKind::Depth => "raise --limit-depth if the file can be trusted",
-        LimitKind::Texels => "raise --limit-texels if the file can be trusted",
-        LimitKind::Seconds => "raise --limit-seconds if the file can be trusted",
+        LimitKind::Depth => "depth",
+        LimitKind::Texels => "texels",
+        LimitKind::Seconds => return "raise --limit-seconds if the file can be trusted".into(),
+    };
+    if kind == LimitKind::Bytes {
+        return format!(
+            "raise --limit-bytes to more than {found} if the file can be trusted and memory suffices; of a conversion also --memory"
+        );
     }
+    format!("raise --limit-{flag} to {found} or more if the file can be trusted")
+}
+
+/// The bytes of a file that are far too few for what it claims.
+fn too_few_bytes(file: &Path, kind: LimitKind, found: u64) -> Option<u64> {
+    // The data of these may be in other files.
+    let refers =
+        file.extension().is_some_and(|e| ["gltf", "nrrd", "nhdr", "obj"].iter().any(|o| e.eq_ignore_ascii_case(o)));
+    // A packed point takes a part of a byte at least. A byte unpacks to a thousand, which may take several hundred each.
+    let most = if kind == LimitKind::Points { 64 } else { 1 << 20 };
+    let bytes = file.metadata().ok()?.len();
+    (!refers && bytes.saturating_mul(most) < found).then_some(bytes)
 }
 
 #[cfg(test)]
@@ -79,7 +104,8 @@ mod tests {
             let flag = command.get_arguments().find(|flag| flag.get_long() == Some(name)).expect(name);
             let help = flag.get_help().expect("a text").to_string();
             assert!(help.ends_with(&format!("[default: {}]", default.of(kind))), "{help}");
-            assert!(hint(kind).contains(&format!("--{name} ")), "{}", hint(kind));
+            let told = hint(Path::new("none"), kind, 7);
+            assert!(told.contains(&format!("--{name} ")), "{told}");
             let matches = command.clone().get_matches_from(["test", &format!("--{name}=7")]);
             let limits = LimitFlags::from_arg_matches(&matches).expect("flags").limits();
             assert_eq!(limits.of(kind), 7);

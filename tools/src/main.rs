@@ -32,11 +32,17 @@ mod scan;
 mod scene;
 mod show;
 mod suite;
+mod terminal;
 mod timing;
 
 use clap::{Parser, Subcommand};
+use failure::Failure;
 use progress::Progress;
-use std::{io::IsTerminal, process::ExitCode};
+use std::{
+    io::{ErrorKind, IsTerminal, Write},
+    path::Path,
+    process::ExitCode,
+};
 
 /// Draws volumes and surfaces as elliptic splats.
 ///
@@ -82,7 +88,10 @@ enum Task {
 }
 
 fn main() -> ExitCode {
-    let command = Command::parse();
+    let command = match Command::try_parse() {
+        Ok(command) => command,
+        Err(answer) => return tell(&answer),
+    };
     start_log(&command);
     interrupt::answer();
     let progress = Progress::new(!command.quiet);
@@ -105,6 +114,24 @@ fn main() -> ExitCode {
     }
 }
 
+/// Prints what clap answers instead of a command: a help text, the version, or what is wrong with the arguments.
+fn tell(answer: &clap::Error) -> ExitCode {
+    if answer.use_stderr() {
+        let is_plain = |argument: std::ffi::OsString| terminal::is_safe(&argument.to_string_lossy());
+        if std::env::args_os().all(is_plain) {
+            answer.print().ok();
+        } else {
+            // Without colours, since those cannot be told from what arguments hold.
+            write!(std::io::stderr(), "{}", terminal::safe_lines(&answer.render().to_string())).ok();
+        }
+        return u8::try_from(answer.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from);
+    }
+    match answer.print().and_then(|()| std::io::stdout().flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Failure::output(Path::new("stdout"), error).report(),
+        _ => ExitCode::SUCCESS,
+    }
+}
+
 /// Sends the library's events to stderr; `RUST_LOG` decides where it is set.
 fn start_log(command: &Command) {
     let default = match (command.quiet, command.verbose) {
@@ -117,6 +144,7 @@ fn start_log(command: &Command) {
     let colored = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
     tracing_subscriber::fmt()
         .with_env_filter(filter)
+        .fmt_fields(terminal::SafeFields)
         .with_writer(std::io::stderr)
         // Where stderr is closed, telling of that on stderr would panic.
         .log_internal_errors(false)

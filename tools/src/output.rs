@@ -1,6 +1,9 @@
 //! Where results go: files that appear whole or not at all, and stdout.
 
-use crate::failure::Failure;
+use crate::{
+    failure::Failure,
+    terminal::{safe_json, safe_lines},
+};
 use splatkit::{disk, picture::PictureFormat};
 use std::{
     io::Write,
@@ -114,7 +117,12 @@ pub fn stdout(bytes: &[u8]) -> Result<(), Failure> {
     }
 }
 
-/// Writes a line to stdout.
+/// Writes a line, or several, to stdout.
 pub fn line(text: impl std::fmt::Display) -> Result<(), Failure> {
-    stdout(format!("{text}\n").as_bytes())
+    stdout(format!("{}\n", safe_lines(&text.to_string())).as_bytes())
+}
+
+/// Writes JSON to stdout, on one line.
+pub fn json(value: &serde_json::Value) -> Result<(), Failure> {
+    stdout(format!("{}\n", safe_json(value)).as_bytes())
 }

@@ -1,5 +1,6 @@
 //! What the command is doing, on a terminal's stderr; nothing anywhere else.
 
+use crate::terminal::safe;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{io::IsTerminal, sync::Mutex, time::Duration};
 
@@ -27,7 +28,7 @@ impl Progress {
     /// Names what begins now.
     pub fn stage(&self, name: impl Into<String>) {
         self.0.reset_elapsed();
-        self.0.set_message(name.into());
+        self.0.set_message(safe(&name.into()).into_owned());
     }
 
     /// Names what begins now, of which there is so much.

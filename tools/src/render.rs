@@ -159,7 +159,7 @@ impl Render {
             "drawn"
         );
         if self.json {
-            output::line(serde_json::json!({
+            output::json(&serde_json::json!({
                 "output": self.output.to_string_lossy(),
                 "width": self.engine.size[0],
                 "height": self.engine.size[1],

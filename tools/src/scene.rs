@@ -138,12 +138,20 @@ impl SceneFlags {
             match (found, self.show.transfer_text()) {
                 (None, _) => error.into(),
                 (Some((path, Error::Argument(what))), Some(flags)) if what.starts_with("the transfer function") => {
+                    if let Some(file) = self.show.own_transfer() {
+                        let message = format!("{what}; the values are those of {}", path.display());
+                        return Error::input(file, "content", message).into();
+                    }
                     Failure::Usage(format!("{flags}: {what}; the values are those of {}", path.display()))
                 }
                 (Some((path, own)), _) => in_file(path, own).into(),
             }
         };
         loaded.scene.validate().map_err(at_fault)?;
+        // Points that all lie at one place have no extent, but what is drawn of them has one.
+        if is_one_place(&loaded.subject.bounds) {
+            loaded.subject.bounds = loaded.scene.bounds();
+        }
         loaded.load_ms = start.elapsed().as_secs_f64() * 1e3;
         Ok(loaded)
     }
@@ -159,6 +167,11 @@ impl Loaded {
         self.subject.bounds = self.subject.bounds.union(bounds);
         self.count += count as u64;
     }
+}
+
+/// Whether a box is no larger than the rounding of its coordinates.
+fn is_one_place(bounds: &Bounds) -> bool {
+    bounds.diagonal() <= 1e-13 * bounds.center().abs().max_element()
 }
 
 /// The finest level of a volume that is quickly looked through as a whole.

@@ -77,6 +77,13 @@ impl ShowFlags {
         self.range.map(|[low, high]| format!("--range {},{}", plain(low), plain(high)))
     }
 
+    /// The file of the transfer function, where no other flag changes what it says.
+    pub fn own_transfer(&self) -> Option<&Path> {
+        let is_changed = self.range.is_some() || self.opacity_unit.is_some();
+        let named = |name: &&String| !TransferFunction::NAMES.contains(&name.as_str()) && is_file(name);
+        self.transfer.as_ref().filter(named).filter(|_| !is_changed).map(Path::new)
+    }
+
     /// The files that flags name.
     pub fn files(&self) -> Vec<PathBuf> {
         let transfer = self.transfer.as_ref().filter(|transfer| is_file(transfer)).map(PathBuf::from);

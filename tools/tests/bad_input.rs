@@ -45,6 +45,14 @@ fn folder(name: &str) -> Folder {
         "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 1\nencoding: raw\ndata file: LIST\n../a.raw\n",
     );
     folder.put("none.pcd", format!("{fields}POINTS 1\nDATA ascii\nnan nan nan\n"));
+    folder.put("single.csv", "1\n");
+    folder.put("sudden.json", r#"{"color": [[0, 1, 1, 1], [1e-30, 1, 0, 0]], "opacity": [[0, 1]]}"#);
+    let volume = |lines: &str| format!("NRRD0004\ntype: uint8\ndimension: 3\n{lines}\n");
+    folder.put("twice.nrrd", volume("sizes: 2 2 2\nsizes: 2 2 1\nencoding: raw\n") + "12345678");
+    folder.put("twice.nhdr", volume("sizes: 2 2 2\nencoding: raw\ndata file: long.raw\ndatafile: other.raw"));
+    folder.put("long.nhdr", volume("sizes: 2 2 2\nencoding: raw\ndata file: long.raw"));
+    folder.put("long.raw", "123456789");
+    folder.put("huge.nrrd", volume("sizes: 1048576 1048576 1\nencoding: raw\n") + "12345678");
     folder.put(
         "crossed.nrrd",
         b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nlattice:=fcc\nencoding: raw\n\n12345678",
@@ -109,14 +117,35 @@ const WRONG: &[(&str, i32, &str)] = &[
     ("a.nrrd --kernel none.csv --extent 2", 3, "none.csv: cannot open"),
     ("a.nrrd --kernel words.csv --extent 2", 3, "words.csv: line 2: “one half” is no number"),
     ("a.nrrd --kernel old.csv --extent 2", 3, "old.csv: line 3: “one half” is no number"),
-    ("a.nrrd --kernel negative.json --extent 2", 2, "a kernel's values must add up to more than 0"),
+    (
+        "a.nrrd --kernel negative.json --extent 2",
+        3,
+        "negative.json: content: a kernel's values must add up to more than 0 help: the form is a JSON array",
+    ),
+    ("a.nrrd --kernel single.csv --extent 2", 3, "single.csv: content: a kernel's table has 2 to 65536 finite values"),
+    ("a.nrrd --kernel negative.json --extent 99", 2, "a kernel's extent must lie in 0.71"),
     ("a.ply far.nrrd --range 0,4096", 2, "--range 0,4096: the transfer function changes from 0 to 4096, too close"),
     ("a.nrrd --range 0,1e-9", 2, "the values are those of a.nrrd"),
     (
         "a.nrrd --transfer generic --opacity-unit 1e-300",
         2,
-        "--transfer generic --opacity-unit 1e-300: the transfer function: the unit of 0.000",
+        "--transfer generic --opacity-unit 1e-300: the transfer function: the unit of 1e-300",
     ),
+    (
+        "a.nrrd --transfer sudden.json",
+        3,
+        "sudden.json: content: the transfer function changes from 0 to 0.000000000000000000000000000001, too close together",
+    ),
+    ("a.nrrd --transfer sudden.json --range 0,1e-9", 2, "--transfer sudden.json --range 0,1e-9: the transfer"),
+    // NRRD.
+    ("twice.nrrd", 3, "twice.nrrd: line 5: the field “sizes” is given twice, in line 4 too; it must stand once"),
+    ("twice.nhdr", 3, "twice.nhdr: line 7: the field “datafile” is given twice, in line 6 too"),
+    (
+        "long.nhdr",
+        3,
+        "long.raw: data: there are 9 bytes where 8 were expected help: “sizes” or “type” of the header are wrong",
+    ),
+    ("huge.nrrd", 3, "huge.nrrd: data: there are 8 bytes where 1099511627776 were expected"),
     (
         "a.nrrd --range=-20,-10 --iso 300",
         3,
@@ -261,7 +290,17 @@ fn each_limit_names_its_flag() {
     folder.run("convert a.ply -o a.splk").ok();
     folder.run("convert a.nrrd -o a.splv").ok();
     for (arguments, message, flag) in OVER {
-        folder.run(arguments).fails(3, &[message, &format!("raise {flag}")]);
+        let run = folder.run(arguments);
+        let told = run.stderr();
+        run.fails(3, &[message, &format!("raise {flag}")]);
+        // What the hint asks for is enough for what was met.
+        let number = |text: &str| text.split(' ').find_map(|word| word.parse::<u64>().ok());
+        let least = told.split_once(&format!("raise {flag} to ")).and_then(|(_, rest)| number(rest));
+        assert!(least.is_some() || flag == &"--limit-seconds", "{arguments}: {told}");
+        if let (Some(least), Some((start, _))) = (least, arguments.rsplit_once(' ')) {
+            let again = folder.run(&format!("{start} {}", least + 1)).stderr();
+            assert!(!again.contains(message), "{arguments}: {again}");
+        }
     }
 }
 
@@ -357,4 +396,181 @@ fn errors_that_nobody_reads_keep_their_code() {
     drop(child.stderr.take());
     assert_eq!(child.wait().unwrap().code(), Some(0));
     assert!(folder.path("a.splv").exists());
+}
+
+/// An escape sequence that sets a terminal's title, one of C1, DEL, and a change of direction.
+const HOSTILE: &str = "\u{1b}]0;title\u{7}\u{1b}[31m\u{9b}32m\u{7f}\u{202e}";
+
+fn hostile_files(folder: &Folder) {
+    let elements = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float s\n\
+        property float t\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    let rows = "0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n";
+    for (name, text) in [
+        ("name.ply", format!("ply\nformat ascii 1.0\nelement vertex {HOSTILE}\nend_header\n")),
+        ("comment.ply", format!("ply\nformat ascii 1.0\ncomment TextureFile {HOSTILE}.png\n{elements}{rows}")),
+        ("a.pcd", format!("{HOSTILE} x y z\n")),
+        ("a.obj", format!("v 0 0 {HOSTILE}\n")),
+        ("b.obj", format!("mtllib {HOSTILE}.mtl\n{OBJ}")),
+        ("a.nrrd", format!("NRRD0004\ntype: {HOSTILE}\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n\n12345678")),
+        ("a.csv", format!("x,y,z,value\n1,2,3,{HOSTILE}\n")),
+        ("a.vtk", format!("# vtk DataFile Version 3.0\n\nASCII\nDATASET STRUCTURED_POINTS\n{HOSTILE} 1 2 3\n")),
+        ("a.vti", "<VTKFile type=\"\u{9b}31m\u{7f}\u{202e}\"></VTKFile>".into()),
+        ("a.gltf", r#"{"asset": {"version": "2.0"}, "extensionsRequired": ["\u001b[31m\u009b32m"]}"#.into()),
+        ("a.json", r#"{"color": [], "opacity": [], "\u001b[31m\u009b32m": 1}"#.into()),
+    ] {
+        folder.put(name, text);
+    }
+    folder.put("ball.nrrd", nrrd("uint8", &ball()));
+}
+
+/// What a file says is shown, and does nothing to the terminal that shows it.
+#[test]
+fn no_text_of_a_file_commands_the_terminal() {
+    let folder = Folder::new("terminal");
+    hostile_files(&folder);
+    let is_quiet = |run: &Run, what: &str| {
+        let printed = run.printed();
+        let found = printed.chars().find(|&c| (c.is_control() && c != '\n') || ('\u{202a}'..='\u{202e}').contains(&c));
+        assert_eq!(found, None, "{what}: {printed:?}");
+        printed
+    };
+    let mut warned = 0;
+    for name in ["name.ply", "comment.ply", "a.pcd", "a.obj", "b.obj", "a.nrrd", "a.csv", "a.vtk", "a.vti", "a.gltf"] {
+        let run = folder.run(&format!("info {name}"));
+        let printed = is_quiet(&run, name);
+        assert!(printed.contains(r"\u{9b}3"), "{name}: {printed}");
+        warned += usize::from(run.code() == Some(0));
+    }
+    assert_eq!(warned, 2, "warnings of missing pictures and materials");
+    let run = folder.run("render ball.nrrd --transfer a.json -o out.png");
+    assert!(is_quiet(&run, "a.json").contains(r"\u{1b}[31m\u{9b}32m"));
+    // Log lines stay as they are otherwise.
+    folder.put("points.xyz", "1 2 3\n4 5 6\n7 8 10\n");
+    let log = folder.run("-vv convert points.xyz -o points.splk").stderr();
+    assert!(log.contains(": close time.busy="), "{log}");
+    // Names of files, of flags, and in results.
+    let name = format!("{}.nrrd", HOSTILE.replace('/', ""));
+    folder.put(&name, nrrd("uint8", &ball()));
+    for arguments in [&["info", &name][..], &["info", "--json", &name], &["info", "-vv", &name]] {
+        let run = folder.run_with(arguments);
+        let printed = is_quiet(&run, "name");
+        assert!(run.code() == Some(0) && printed.contains("title"), "{printed}");
+        if arguments.contains(&"--json") {
+            let value: serde_json::Value = serde_json::from_str(&run.stdout()).unwrap();
+            assert_eq!(value["file"], name.as_str());
+        }
+    }
+    is_quiet(&folder.run_with(&["info", &format!("none{name}")]), "missing");
+    let run = folder.run_with(&["info", &format!("--{HOSTILE}")]);
+    assert_eq!(run.code(), Some(2));
+    is_quiet(&run, "flag");
+}
+
+/// Messages are lines that other programs read, where no terminal does; texts of files in them have an end.
+#[test]
+fn messages_are_whole_lines_and_not_too_long() {
+    let folder = Folder::new("lines");
+    folder.put(
+        "a.gltf",
+        format!(r#"{{"asset": {{"version": "2.0"}}, "extensionsRequired": ["{}"]}}"#, "long ".repeat(50)),
+    );
+    let run = folder.run("info a.gltf");
+    assert!(run.printed().lines().next().unwrap().ends_with("long  is not supported"), "{}", run.printed());
+    folder.put(
+        "b.gltf",
+        format!(r#"{{"asset": {{"version": "2.0"}}, "extensionsRequired": ["{}"]}}"#, "x".repeat(1 << 20)),
+    );
+    let run = folder.run("info b.gltf");
+    assert!(run.printed().len() < 4096 && run.printed().contains("characters left out"), "{}", run.printed().len());
+    run.fails(3, &["b.gltf: extensionsRequired: the extension xxx", "is not supported"]);
+}
+
+#[test]
+fn points_at_one_place_draw() {
+    let folder = Folder::new("place");
+    folder.put("one.xyz", "1 2 3\n");
+    folder.put("three.xyz", "1 2 3\n1 2 3\n1 2 3\n");
+    folder.put("far.xyz", "1e8 2e8 3e8\n1e8 2e8 3e8\n");
+    folder.put("one.nrrd", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1 1 1\nencoding: raw\n\n\x07");
+    for name in ["one.xyz", "three.xyz", "far.xyz", "one.nrrd"] {
+        let found = folder.json(&format!("render {name} -o out.png --overwrite --json --size 32x24 --reference"));
+        let number = |vector: &serde_json::Value, axis: usize| vector[axis].as_f64().unwrap();
+        let camera = &found["camera"];
+        let way = (0..3).map(|axis| (number(&camera["position"], axis) - number(&camera["focal_point"], axis)).powi(2));
+        let distance = way.sum::<f64>().sqrt();
+        assert!((1.0..100.0).contains(&distance), "{name}: {found}");
+        let file = std::fs::read(folder.path("out.png")).unwrap();
+        assert!(file.len() > 100, "{name}: an empty picture");
+    }
+    folder
+        .run("render one.xyz -o out.png --overwrite --camera-position 1,2,3 --focal-point 1,2,3")
+        .fails(2, &["the camera stands in its own focal point"]);
+}
+
+#[test]
+fn trained_gaussians_are_told() {
+    let folder = Folder::new("gaussians");
+    folder.put("a.ply", PLY);
+    folder.run("convert a.ply -o gaussians.ply").ok();
+    let warning = "gaussians.ply: holds trained 3D Gaussians, whose shapes and colours are not read yet; their centres are \
+        drawn as points";
+    for arguments in ["info gaussians.ply", "convert gaussians.ply -o a.splk"] {
+        let run = folder.run(arguments);
+        assert!(run.code() == Some(0) && run.stderr().matches(warning).count() == 1, "{arguments}: {}", run.stderr());
+    }
+    assert!(!folder.run("info a.ply").stderr().contains("Gaussians"));
+}
+
+/// A result that nobody got is no success, whatever it is.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_fails_what_is_printed() {
+    let folder = Folder::new("full");
+    folder.put("a.ply", PLY);
+    for arguments in
+        ["help", "--help", "--version", "help info", "render --help", "info a.ply", "info --json a.ply", "check a.ply"]
+    {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_splatkit"));
+        command.args(arguments.split(' ')).current_dir(folder.path("")).env("NO_COLOR", "1");
+        let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+        let output = command.stdout(full).output().unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{arguments}: {message}");
+        assert!(message.contains("stdout: cannot be written: No space left on device"), "{arguments}: {message}");
+    }
+    for arguments in ["help", "--version", "render --help"] {
+        let run = folder.run(arguments);
+        assert!(run.code() == Some(0) && run.stdout().contains("splatkit"), "{arguments}: {}", run.printed());
+    }
+}
+
+/// Headers of two gigabytes, all but a few bytes of them zeros that take no room on the disk.
+#[cfg(unix)]
+#[test]
+fn headers_of_two_gigabytes_are_refused_soon() {
+    let folder = Folder::new("headers");
+    for (name, start, message) in [
+        (
+            "a.ply",
+            &b"ply\nformat ascii 1.0\ncomment "[..],
+            "a.ply: header line 3: the header is longer than 1048576 bytes",
+        ),
+        ("a.nrrd", b"NRRD0004\n# ", "a.nrrd: line 2: the header is longer than 67108864 bytes"),
+        ("a.pcd", b"FIELDS x", "a.pcd: line 1: the line is longer than 1048576 bytes"),
+        ("a.vtk", b"# vtk DataFile Version 3.0\n", "a.vtk: byte 27: the line is longer than 1048576 bytes"),
+        ("b.vtk", b"# vtk DataFile Version 3.0\n\nASCII\n", "b.vtk: byte 34: the line is longer than 1048576 bytes"),
+        ("a.npy", b"\x93NUMPY\x02\x00\xf0\xff\xff\x7f", "a.npy: header: is cut off, is longer than 1 MiB"),
+    ] {
+        folder.put(name, start);
+        std::fs::File::options().write(true).open(folder.path(name)).unwrap().set_len(2 << 30).unwrap();
+        let begun = std::time::Instant::now();
+        let run = folder.run(&format!("info {name}"));
+        assert!(begun.elapsed().as_secs() < 8, "{name}: {:?}", begun.elapsed());
+        assert!(!run.stderr().contains("raise --limit"), "{name}: {}", run.stderr());
+        run.fails(3, &[message]);
+        std::fs::remove_file(folder.path(name)).unwrap();
+    }
+    // No limit helps a file of a few bytes that claims many points; one helps that has them.
+    folder.put("many.ply", PLY.replace("vertex 4", "vertex 4000000000"));
+    folder.run("info many.ply").fails(3, &["over the limit", "cannot hold that: it is cut or damaged"]);
 }

@@ -97,6 +97,7 @@ pub fn convert(
         let stream = Stream::open(file, limits)?.ok_or_else(|| {
             Error::Argument(format!("{}: a file of this kind can only be read as a whole", file.display()))
         })?;
+        stream.warn();
         let input = survey::survey(stream, most, options, watch)?;
         tracing::info!(file = %file.display(), regions = input.regions(), "cut in regions");
         inputs.push(distribute::distribute(input, [most, options.memory], path, watch)?);

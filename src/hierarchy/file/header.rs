@@ -6,6 +6,7 @@ use super::{
 };
 use crate::{
     hierarchy::validate::{fault_of_box, fault_of_extent},
+    io::copy,
     math::Bounds,
 };
 use glam::DVec3;
@@ -136,7 +137,7 @@ impl Stored {
             3 => Some(UpAxis::Z),
             _ => return Some(Err(Refusal::Damaged("it names an axis that there is not"))),
         };
-        let (Ok(unit), Ok(source)) = (std::str::from_utf8(&texts[..unit]), std::str::from_utf8(&texts[unit..])) else {
+        let (Ok(unit), Ok(source)) = (copy::text(&texts[..unit]), copy::text(&texts[unit..])) else {
             return Some(Err(Refusal::Damaged("its texts are not UTF-8")));
         };
         let sound = flags < 16
@@ -160,8 +161,8 @@ impl Stored {
             leaves,
             nodes,
             up,
-            unit: unit.into(),
-            source: source.into(),
+            unit,
+            source,
         };
         Some(Ok(Self { header, file_bytes, blocks, pages }))
     }

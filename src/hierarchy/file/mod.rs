@@ -4,6 +4,8 @@
 //! [`write`](write()) and [`Writer`] make it, [`Hierarchy`] reads it page by page or as a whole, [`check`](check()) looks for
 //! damage.
 
+#![deny(clippy::disallowed_methods)]
+
 mod bounds;
 mod bytes;
 mod check;

@@ -165,7 +165,7 @@ fn no_changed_description_does_harm() {
             let content = file(&scans(), |xml| {
                 let mut bytes = xml.into_bytes();
                 bytes[at] = byte;
-                String::from_utf8_lossy(&bytes).into_owned()
+                crate::io::copy::lossy(&bytes)
             });
             if let Err(error) = load(&content) {
                 assert!(matches!(error, Error::Input { .. } | Error::Limit { .. }), "{at}: {error}");

@@ -1,7 +1,10 @@
 //! The files of a detached header: one, a list, or a pattern with a number.
 
 use super::shown;
-use crate::{Result, io::Source};
+use crate::{
+    Result,
+    io::{Source, copy},
+};
 
 /// Whether a field tells that the names of files follow in the lines below.
 pub fn is_list(field: &str) -> bool {
@@ -23,9 +26,11 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
         let (parts, None) = (words.next(), words.next()) else {
             return Err(wrong(format!("“{}” is not “LIST” with the axes of a file", shown(field))));
         };
-        source.spend("the size of the names of files in bytes", 4 * rest.len() as u64)?;
-        let text = std::str::from_utf8(rest)
-            .map_err(|e| wrong(format!("byte {} of the list of files is not text", e.valid_up_to())))?;
+        if rest.len() > super::LONGEST {
+            return Err(wrong(format!("the list of files is longer than {} bytes", super::LONGEST)));
+        }
+        source.spend("the size of the names of files in bytes", 5 * rest.len() as u64)?;
+        let text = copy::text(rest).map_err(|at| wrong(format!("byte {at} of the list of files is not text")))?;
         let names = text.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned);
         (names.collect(), parts)
     } else if let Some(pattern) = Pattern::of(field) {

@@ -1,7 +1,7 @@
 //! MTL libraries. tobj's own reader panics on a colour of fewer than three numbers and knows no texture options, so
 //! the few statements that matter are read here, into tobj's types.
 
-use super::super::{Source, texture};
+use super::super::{Source, copy, texture};
 use crate::{
     Result,
     surface::{Material, Texture},
@@ -36,7 +36,7 @@ impl<'a, 'b> Library<'a, 'b> {
         }
         let Some(path) = texture::find(self.source, "mtllib", name)? else { return Ok((materials, index_of)) };
         let file = self.source.open_beside(&path)?;
-        let text = String::from_utf8_lossy(file.bytes()).into_owned();
+        let text = copy::lossy(file.bytes());
         file.intact()?;
         for (line, number) in text.lines().zip(1..) {
             let line = line.trim();

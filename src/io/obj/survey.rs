@@ -243,6 +243,7 @@ impl BufRead for Feed<'_> {
     }
 
     // The served lines have lost their line ends, so each is one whole line here.
+    #[expect(clippy::disallowed_methods, reason = "the text is a copy of the file's")]
     fn read_line(&mut self, out: &mut String) -> std::io::Result<usize> {
         let line = std::str::from_utf8(self.fill_buf()?).unwrap_or("");
         let length = line.len();

@@ -1,6 +1,9 @@
 //! The header of a PCD file: lines of text, of which `DATA` is the last.
 
-use crate::{Result, io::Source};
+use crate::{
+    Result,
+    io::{Source, copy},
+};
 use glam::DVec3;
 
 /// What the header says.
@@ -88,9 +91,12 @@ pub fn read(source: &Source) -> Result<Header> {
         }
         let window = &bytes[at..bytes.len().min(at + LONGEST)];
         let Some(length) = window.iter().position(|&b| b == b'\n') else {
+            if at + window.len() < bytes.len() {
+                return Err(source.error(place(), format!("the line is longer than {LONGEST} bytes")));
+            }
             return Err(source.error(place(), "the header ends before its line “DATA”"));
         };
-        let line = String::from_utf8_lossy(&bytes[at..at + length]);
+        let line = copy::lossy(&bytes[at..at + length]);
         at += length + 1;
         let mut parts = line.split_ascii_whitespace();
         let Some(name) = parts.next().filter(|name| !name.starts_with('#')) else { continue };

@@ -2,9 +2,11 @@
 //! vertex each with place, normal, colour as the constant spherical harmonic, opacity, logarithms of the standard
 //! deviations, and a quaternion.
 
+use super::header::Element;
 use crate::{
     Error, Result, disk,
     hierarchy::Tree,
+    io::Source,
     math::eigen,
     splat::{Payload, Splat, SplatSet, decode_normal},
 };
@@ -53,6 +55,19 @@ fn write_all<'a>(count: u64, splats: impl Iterator<Item = &'a Splat>, origin: DV
     })
 }
 
+/// Whether a vertex has what trainers of 3D Gaussian scenes write.
+pub(super) fn are_gaussians(element: &Element) -> bool {
+    ["f_dc_0", "opacity", "scale_0", "rot_0"].iter().all(|name| element.column(&[name]).is_some())
+}
+
+/// Warns of a file of 3D Gaussians: what a reader of points makes of them does not look like the scene.
+pub(in super::super) fn warn(source: &Source) {
+    tracing::warn!(
+        "{}: holds trained 3D Gaussians, whose shapes and colours are not read yet; their centres are drawn as points",
+        source.path.display()
+    );
+}
+
 /// The numbers of one splat, in the order of [`PROPERTIES`].
 fn gaussian(splat: &Splat, origin: DVec3) -> [f64; PROPERTIES.len()] {
     let center = origin + DVec3::from(splat.center.map(f64::from));
@@ -84,7 +99,7 @@ mod tests {
         write_gaussians(&set, &path).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
-        let header = std::str::from_utf8(&bytes[..end]).unwrap();
+        let header = crate::io::copy::text(&bytes[..end]).unwrap();
         assert!(header.contains(&format!("element vertex {}\n", set.splats.len())));
         let rows: Vec<[f32; 17]> = bytes[end..]
             .chunks_exact(68)

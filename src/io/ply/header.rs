@@ -4,7 +4,7 @@
 //! property named `scalar.x`) and merges properties of one name, so it is given a cleaned copy with the same lines
 //! but plain, unique names, and the names are put back afterwards.
 
-use super::super::Source;
+use super::super::{Source, copy};
 use crate::Result;
 use ply_rs::{
     parser::Parser,
@@ -87,9 +87,13 @@ pub(super) fn read(source: &Source) -> Result<Header> {
         let rest = bytes.get(at..).unwrap_or(&[]);
         let window = &rest[..rest.len().min(LONGEST.saturating_sub(at))];
         let Some(end) = window.iter().position(|b| matches!(b, b'\n' | b'\r')) else {
+            if window.len() < rest.len() {
+                let message = format!("the header is longer than {LONGEST} bytes, with no line “end_header” in them");
+                return Err(source.error(place(), message));
+            }
             return Err(source.error(place(), "the header has no “end_header” line; the file is cut or is no PLY"));
         };
-        let line = String::from_utf8_lossy(&rest[..end]).into_owned();
+        let line = copy::lossy(&rest[..end]);
         // A lone carriage return ends a line too (old Macintosh files).
         at += end + if rest[end..].starts_with(b"\r\n") { 2 } else { 1 };
         let words: Vec<&str> = line.split_whitespace().collect();

@@ -2,7 +2,7 @@
 
 use super::{
     super::{Source, positions, stream::Found},
-    COLOR, ColorKind, NORMAL, POSITION, ROLES, UV, color, color_kind, color_scale,
+    COLOR, ColorKind, NORMAL, POSITION, ROLES, UV, color, color_kind, color_scale, gaussians,
     header::{self, Element, width},
     rows::{cut, list_place, number, triangle_stride},
 };
@@ -21,6 +21,8 @@ pub struct Pieces {
     pub has_normals: bool,
     pub has_colors: bool,
     pub has_uvs: bool,
+    /// Whether the points are the centres of trained 3D Gaussians.
+    pub are_gaussians: bool,
 }
 
 /// Rows that are all of one length.
@@ -95,10 +97,11 @@ impl Pieces {
             Some((offset?, kind.clone()))
         };
         let (has_normals, has_colors) = (has(NORMAL, 3), has(COLOR, 3));
+        let are_gaussians = gaussians::are_gaussians(element);
         let color_kind = color_kind(element, &columns);
         let fields = columns.map(|column| column.and_then(field));
         let vertices = Vertices { rows, fields, color_kind, color_scale: [None; 4] };
-        Ok(Some(Self { vertices, faces, has_normals, has_colors, has_uvs }))
+        Ok(Some(Self { vertices, faces, has_normals, has_colors, has_uvs, are_gaussians }))
     }
 
     /// Whether all colours have to be known before any of them is.

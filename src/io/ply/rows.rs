@@ -4,7 +4,7 @@
 //! in text, and build a map per row, many times slower than the plain strides read here.
 
 use super::{
-    super::Source,
+    super::{Source, copy},
     header::{Element, width},
 };
 use crate::{Error, Result};
@@ -162,8 +162,8 @@ impl<'a> Rows<'a> {
                     if !parse {
                         return Ok(0.0);
                     }
-                    std::str::from_utf8(word).ok().and_then(|word| word.parse().ok()).ok_or_else(|| {
-                        let word = String::from_utf8_lossy(word).chars().take(40).collect::<String>();
+                    copy::number(word).ok_or_else(|| {
+                        let word = copy::excerpt(word);
                         source.error(place(), format!("“{word}” is not a number (for “{name}”)"))
                     })
                 };

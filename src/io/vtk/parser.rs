@@ -1,10 +1,13 @@
 //! The lines and the arrays of legacy VTK files.
 
-use super::super::{Endian, SampleType, Source, vtk_xml::Part};
+use super::super::{Endian, SampleType, Source, copy, vtk_xml::Part};
 use crate::{Error, Result};
 
 /// Bytes that an array of a field takes beside its name and its numbers.
 const FIELD: u64 = 256;
+
+/// No line of a real file comes near this many bytes. Arrays are no lines.
+const LONGEST: usize = 1 << 20;
 
 /// A place in a file.
 pub(super) struct Parser<'a> {
@@ -23,7 +26,7 @@ impl<'a> Parser<'a> {
         }
         // The title may be empty, and in any encoding.
         for _ in 0..2 {
-            parser.raw_line().ok_or_else(|| cut(&parser))?;
+            parser.raw_line()?.ok_or_else(|| cut(&parser))?;
         }
         let (place, encoding) = parser.line()?.ok_or_else(|| cut(&parser))?;
         parser.binary = match encoding.to_ascii_uppercase().as_str() {
@@ -50,7 +53,7 @@ impl<'a> Parser<'a> {
                         parser.field()?;
                     }
                 }
-                [keyword, ..] if keyword.eq_ignore_ascii_case("METADATA") => parser.skip_to_blank(),
+                [keyword, ..] if keyword.eq_ignore_ascii_case("METADATA") => parser.skip_to_blank()?,
                 _ => return Err(source.error(place, "is not the line “DATASET …” that was expected")),
             }
         }
@@ -66,25 +69,27 @@ impl<'a> Parser<'a> {
     }
 
     /// The next line as it stands; none at the end of the file.
-    fn raw_line(&mut self) -> Option<&'a [u8]> {
+    fn raw_line(&mut self) -> Result<Option<&'a [u8]>> {
         let rest = self.rest();
-        let line = rest.split_inclusive(|&b| b == b'\n').next()?;
+        let window = &rest[..rest.len().min(LONGEST)];
+        let Some(line) = window.split_inclusive(|&b| b == b'\n').next() else { return Ok(None) };
+        if line.len() == LONGEST && line.len() < rest.len() && !line.ends_with(b"\n") {
+            return Err(self.source.error(self.place(), format!("the line is longer than {LONGEST} bytes")));
+        }
         self.at += line.len();
-        Some(line.trim_ascii())
+        Ok(Some(line.trim_ascii()))
     }
 
     /// The next line that is not empty, and its place.
-    pub fn line(&mut self) -> Result<Option<(String, &'a str)>> {
+    pub fn line(&mut self) -> Result<Option<(String, String)>> {
         loop {
             let place = self.place();
-            match self.raw_line() {
+            match self.raw_line()? {
                 None => return Ok(None),
                 Some([]) => {}
                 Some(line) => {
-                    let text = std::str::from_utf8(line);
-                    return text
-                        .map(|text| Some((place.clone(), text)))
-                        .map_err(|_| self.source.error(place, "is not text"));
+                    let text = copy::text(line).map_err(|_| self.source.error(&place, "is not text"))?;
+                    return Ok(Some((place, text)));
                 }
             }
         }
@@ -99,8 +104,9 @@ impl<'a> Parser<'a> {
     }
 
     /// Passes over lines up to an empty one.
-    pub fn skip_to_blank(&mut self) {
-        while self.raw_line().is_some_and(|line| !line.is_empty()) {}
+    pub fn skip_to_blank(&mut self) -> Result<()> {
+        while self.raw_line()?.is_some_and(|line| !line.is_empty()) {}
+        Ok(())
     }
 
     /// A count from a keyword's line, within the limits of points.
@@ -144,10 +150,10 @@ impl<'a> Parser<'a> {
             let length = length_of_words(rest, count).map_err(|found| {
                 wrong(format!("there are {found} numbers where {count} were expected: the file ends"))
             })?;
-            let text =
-                std::str::from_utf8(&rest[..length]).map_err(|_| wrong("is followed by what is not text".into()))?;
+            self.source.room::<u8>("the text", length)?;
+            let text = copy::text(&rest[..length]).map_err(|_| wrong("is followed by what is not text".into()))?;
             self.source.spend("the size of the numbers in bytes", (count * kind.bytes()) as u64)?;
-            (kind.parse(text, count).map_err(wrong)?.into(), Endian::Little, length)
+            (kind.parse(&text, count).map_err(wrong)?.into(), Endian::Little, length)
         };
         self.at += length;
         Ok(Part { kind, endian, bytes })
@@ -161,9 +167,10 @@ impl<'a> Parser<'a> {
             && let Some(kind) = line.strip_prefix("OFFSETS")
         {
             let mut ends = self.array(&place, count, kind.trim())?.doubles(self.source)?;
-            let next = self.line()?.and_then(|(place, line)| Some((place, line.strip_prefix("CONNECTIVITY")?.trim())));
+            let next = self.line()?;
+            let next = next.as_ref().and_then(|(place, line)| Some((place, line.strip_prefix("CONNECTIVITY")?.trim())));
             let (place, kind) = next.ok_or_else(|| self.source.error(place, "offsets without their CONNECTIVITY"))?;
-            let corners = self.array(&place, size, kind)?.doubles(self.source)?;
+            let corners = self.array(place, size, kind)?.doubles(self.source)?;
             if ends.first().is_some_and(|&first| first != 0.0) {
                 return Err(self.source.error(place, format!("the first offset is {}, not 0", ends[0])));
             }
@@ -194,7 +201,7 @@ impl<'a> Parser<'a> {
             return Err(self.source.error(self.place(), "the file ends inside a FIELD"));
         };
         if line.starts_with("METADATA") {
-            self.skip_to_blank();
+            self.skip_to_blank()?;
             let next = self.line()?;
             (place, line) = next.ok_or_else(|| self.source.error(place, "the file ends inside a FIELD"))?;
         }
@@ -231,10 +238,10 @@ pub(super) fn unescaped(name: &str) -> String {
     let mut bytes = Vec::new();
     let mut rest = name.as_bytes();
     while let [first, after @ ..] = rest {
-        let code = after.get(..2).and_then(|digits| std::str::from_utf8(digits).ok());
-        let code = code.filter(|_| *first == b'%').and_then(|digits| u8::from_str_radix(digits, 16).ok());
+        let digit = |at: usize| after.get(at).and_then(|&digit| char::from(digit).to_digit(16));
+        let code = digit(0).zip(digit(1)).filter(|_| *first == b'%').map(|(high, low)| (16 * high + low) as u8);
         bytes.push(code.unwrap_or(*first));
         rest = if code.is_some() { &after[2..] } else { after };
     }
-    String::from_utf8_lossy(&bytes).into_owned()
+    copy::lossy(&bytes)
 }

@@ -66,6 +66,11 @@ impl Run {
         text.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
+    /// All that was printed, as it was printed.
+    pub fn printed(&self) -> String {
+        format!("{}{}", self.stdout(), String::from_utf8_lossy(&self.1.stderr))
+    }
+
     pub fn stdout(&self) -> String {
         String::from_utf8_lossy(&self.1.stdout).into_owned()
     }

@@ -3,6 +3,7 @@
 use super::{MAGIC, VERSION};
 use crate::{
     hierarchy::file::{Cursor, Put},
+    io::copy,
     volume::{
         Lattice, Scalar,
         bricks::{Header, REACH, SIDE, level},
@@ -100,7 +101,7 @@ impl Stored {
             let scalar = *Scalar::ALL.get(scalar as usize).ok_or_else(|| wrong("type of samples"))?;
             let [Ok(nx), Ok(ny), Ok(nz)] = dims.map(usize::try_from) else { return Err(wrong("size")) };
             let lattice = Lattice::cartesian([nx, ny, nz], origin, axes);
-            let text = |bytes| std::str::from_utf8(bytes).map(str::to_owned).map_err(|_| "its texts are not UTF-8");
+            let text = |bytes| copy::text(bytes).map_err(|_| "its texts are not UTF-8");
             let (unit, source) = (text(&texts[..unit])?, text(&texts[unit..])?);
             let header = Header { lattice, scalar, range, unit, source };
             header.validate()?;

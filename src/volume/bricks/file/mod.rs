@@ -1,6 +1,8 @@
 //! The file of a bricked volume, `.splv`: bricks, coarse levels first, behind a directory that tells how large each is and
 //! what its values range over. docs/splv.md describes it byte by byte.
 
+#![deny(clippy::disallowed_methods)]
+
 mod brick;
 mod check;
 mod directory;
