@@ -31,6 +31,7 @@ mod scan;
 mod scene;
 mod show;
 mod suite;
+mod threads;
 mod timing;
 
 use clap::{Parser, Subcommand};
@@ -84,6 +85,9 @@ fn main() -> ExitCode {
     let command = Command::parse();
     start_log(&command);
     interrupt::answer();
+    if let Err(failure) = threads::start() {
+        return failure.report();
+    }
     let progress = Progress::new(!command.quiet);
     let result = match command.task {
         Task::Render(task) => task.run(&progress),
