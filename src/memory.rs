@@ -32,12 +32,20 @@ pub(crate) fn check(what: &str, bytes: u64) -> std::result::Result<(), String> {
 /// # Errors
 /// [`Error::Memory`].
 pub(crate) fn room(what: &str, bytes: u64) -> Result<()> {
-    let mut probe: Vec<u8> = Vec::new();
-    let is_there = usize::try_from(bytes).is_ok_and(|bytes| probe.try_reserve_exact(bytes).is_ok());
-    // Memory that nobody looks at need not be asked for at all.
-    std::hint::black_box(&mut probe);
-    if is_there { Ok(()) } else { Err(Error::Memory { what: what.into(), bytes }) }
+    let ask = |bytes: usize| {
+        let mut probe: Vec<u8> = Vec::new();
+        let is_there = probe.try_reserve_exact(bytes).is_ok();
+        // Otherwise a compiler may leave out an allocation that nothing uses.
+        std::hint::black_box(&mut probe);
+        is_there.then_some(probe)
+    };
+    let probe = usize::try_from(bytes).ok().and_then(ask);
+    let reserve: Option<Vec<Vec<u8>>> = (0..RESERVE.0).map(|_| ask(RESERVE.1)).collect();
+    if probe.is_some() && reserve.is_some() { Ok(()) } else { Err(Error::Memory { what: what.into(), bytes }) }
 }
+
+/// Blocks, and bytes of a block, that must be left for the small lists of all threads.
+const RESERVE: (usize, usize) = (32, 128 << 10);
 
 /// Makes room in a list for more items.
 ///

@@ -255,7 +255,8 @@ mod tests {
 
     #[test]
     fn building_keeps_to_the_deadline() {
-        let set = surface(500, 1);
+        let splats = surface(500, 1);
+        let set = SplatSet { origin: glam::DVec3::ZERO, payload: Payload::Radiance, splats, extent: 3.0, overlap: 1.0 };
         let options = BuildOptions { deadline: Deadline::after(0), ..BuildOptions::default() };
         let built = [
             Tree::build(&set, &options, &|_, _| ()).map(drop),

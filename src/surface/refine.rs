@@ -100,7 +100,7 @@ fn steps_after(failed: u32) -> i32 {
     1 << failed.saturating_sub(SINGLE_STEPS).min(9)
 }
 
-const SINGLE_STEPS: u32 = 6;
+const SINGLE_STEPS: u32 = 24;
 
 /// Why cutting ended early.
 #[derive(Debug)]

@@ -81,7 +81,7 @@ fn texture_coordinates_do_not_keep_it_busy() {
 #[test]
 fn a_far_vertex_is_named_at_once() {
     let folder = Folder::new("far");
-    for x in [1e9, 1e12, 1e15, 1e17] {
+    for x in [1e13, 1e15, 1e17] {
         folder.put("a.ply", with_far_vertex(x));
         let begin = Instant::now();
         let words = ["a.ply", &format!("vertex 5 at ({x:e}, "), "remove it"];

@@ -423,10 +423,10 @@ fn a_far_texture_coordinate_is_soon_done() {
     }
 }
 
-/// Attempts to keep to a budget are few, however wrong the estimates are.
+/// Before anything is cut.
 #[test]
 fn a_far_vertex_is_named() {
-    for x in [1e9, 1e10, 1e12, 1e15, 1e17] {
+    for x in [1e13, 1e15, 1e17] {
         let mut mesh = textured(glam::Vec2::ONE);
         mesh.materials.clear();
         mesh.triangle_materials.clear();
@@ -435,7 +435,7 @@ fn a_far_vertex_is_named() {
         let begin = std::time::Instant::now();
         let error = mesh.surfels(&SurfelOptions::default()).unwrap_err().to_string();
         assert!(error.contains(&format!("vertex 5 at ({x:e}, ")), "{error}");
-        assert!(mesh.triangles_once_cut(&SurfelOptions::default(), usize::MAX).is_err() || x < 1e12);
+        assert!(mesh.triangles_once_cut(&SurfelOptions::default(), usize::MAX).is_err());
         assert!(begin.elapsed().as_secs() < 10, "{x}: {:?}", begin.elapsed());
     }
     let line =
