@@ -28,6 +28,14 @@ pub enum Error {
     #[error("{0}")]
     Argument(String),
 
+    /// Work on an input that takes longer than its [`Deadline`](crate::Deadline) allows.
+    #[error("{what} takes longer than the limit of {limit} s")]
+    Timeout { what: String, limit: u64 },
+
+    /// Memory that the operating system refuses. It was asked for before the work began, so nothing is half done.
+    #[error("{what} needs {bytes} bytes of memory, which the system does not give")]
+    Memory { what: String, bytes: u64 },
+
     /// The scene holds nothing that could be seen.
     #[error("nothing to draw: {0}")]
     NothingToDraw(String),
@@ -59,6 +67,18 @@ impl Error {
     /// An [`Error::Output`].
     pub fn output(file: &Path, source: std::io::Error) -> Self {
         Self::Output { file: file.to_owned(), source }
+    }
+
+    /// Names the file that an error is about, where the error does not know it.
+    #[must_use]
+    pub fn in_file(self, file: &Path) -> Self {
+        let named = |what: String| format!("{}: {what}", file.display());
+        match self {
+            Self::NothingToDraw(what) => Self::NothingToDraw(named(what)),
+            Self::Timeout { what, limit } => Self::Timeout { what: named(what), limit },
+            Self::Memory { what, bytes } => Self::Memory { what: named(what), bytes },
+            other => other,
+        }
     }
 
     /// Adds what the user can do about an [`Error::Input`]; other errors pass unchanged.

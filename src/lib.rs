@@ -5,6 +5,7 @@
 //! ([`splat`]) → [`engine`] (one pass, one Rust file, one shader) → a [`Picture`](picture::Picture).
 
 pub mod compare;
+pub mod deadline;
 pub mod disk;
 pub mod engine;
 pub mod error;
@@ -20,4 +21,5 @@ pub mod splat;
 pub mod surface;
 pub mod volume;
 
+pub use deadline::Deadline;
 pub use error::{Error, Result};

@@ -1,5 +1,6 @@
 //! How much memory there is.
 
+use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 
@@ -14,13 +15,45 @@ pub fn most() -> Option<u64> {
 
 /// Says in words where something takes more bytes than a process should: asked before it is allocated, because what cannot be
 /// allocated ends the process.
-pub(crate) fn check(what: &str, bytes: u64) -> Result<(), String> {
+pub(crate) fn check(what: &str, bytes: u64) -> std::result::Result<(), String> {
     // Nothing that is allocated is larger than that.
     let most = most().unwrap_or(u64::MAX).min(isize::MAX as u64);
     if bytes > most {
         return Err(format!("{what} takes {bytes} bytes of memory, more than the {most} that may be taken here"));
     }
     Ok(())
+}
+
+/// Asks the system for memory that `what` is about to take, and gives it back at once.
+///
+/// Allocations that fail end the process. Where all of a step's memory is asked for before it begins, the step returns an
+/// error instead.
+///
+/// # Errors
+/// [`Error::Memory`].
+pub(crate) fn room(what: &str, bytes: u64) -> Result<()> {
+    let ask = |bytes: usize| {
+        let mut probe: Vec<u8> = Vec::new();
+        let is_there = probe.try_reserve_exact(bytes).is_ok();
+        // Otherwise a compiler may leave out an allocation that nothing uses.
+        std::hint::black_box(&mut probe);
+        is_there.then_some(probe)
+    };
+    let probe = usize::try_from(bytes).ok().and_then(ask);
+    let reserve: Option<Vec<Vec<u8>>> = (0..RESERVE.0).map(|_| ask(RESERVE.1)).collect();
+    if probe.is_some() && reserve.is_some() { Ok(()) } else { Err(Error::Memory { what: what.into(), bytes }) }
+}
+
+/// Blocks, and bytes of a block, that must be left for the small lists of all threads.
+const RESERVE: (usize, usize) = (32, 128 << 10);
+
+/// Makes room in a list for more items.
+///
+/// # Errors
+/// [`Error::Memory`].
+pub(crate) fn reserve<T>(list: &mut Vec<T>, more: usize, what: &str) -> Result<()> {
+    let bytes = (more as u64).saturating_mul(size_of::<T>() as u64);
+    list.try_reserve(more).map_err(|_| Error::Memory { what: what.into(), bytes })
 }
 
 /// The files that may tell the limit of the process's control group, or of one that it is in: of version 2, and of version 1.

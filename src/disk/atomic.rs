@@ -14,8 +14,14 @@ use std::{
 
 /// A file on its way: written beside the one that is wanted, whose name it takes by [`commit`](Self::commit). Dropped before,
 /// it is removed.
+///
+/// Where the wanted file is a symbolic link, the link stays: the file that it leads to is the one that is written, beside
+/// which the new one is made. A link that leads nowhere is an error.
 pub struct AtomicFile {
+    /// The name that errors use.
     wanted: PathBuf,
+    /// The file that it leads to.
+    target: PathBuf,
     part: Part,
 }
 
@@ -23,7 +29,8 @@ impl AtomicFile {
     /// Begins a file.
     ///
     /// # Errors
-    /// [`Error::Output`] where nothing can be written beside `wanted`, and where `wanted` is something else than a file.
+    /// [`Error::Output`] where nothing can be written beside `wanted`, and where `wanted` is something else than a file, or
+    /// leads nowhere.
     pub fn create(wanted: &Path) -> Result<Self> {
         let fail = |e| Error::output(wanted, e);
         if wanted.metadata().is_ok_and(|found| !found.is_file()) {
@@ -32,7 +39,9 @@ impl AtomicFile {
                 "there is something of that name that is no file",
             )));
         }
-        Ok(Self { wanted: wanted.to_owned(), part: Part::create(wanted).map_err(fail)? })
+        let target = target(wanted).map_err(fail)?;
+        let part = Part::create(&target).map_err(fail)?;
+        Ok(Self { wanted: wanted.to_owned(), target, part })
     }
 
     /// Gives the file its name, once all of it is on the disk.
@@ -40,21 +49,34 @@ impl AtomicFile {
     /// # Errors
     /// [`Error::Output`]; then nothing is left of the file.
     pub fn commit(self) -> Result<()> {
-        let Self { wanted, part } = self;
+        let Self { wanted, target, part } = self;
         let fail = |e| Error::output(&wanted, e);
-        // Who may read a file does not change because its content does.
-        if let Ok(old) = wanted.metadata() {
+        // Who may read a file does not change because its content does; it may have changed since the part was made.
+        if let Ok(old) = target.metadata() {
             part.file().set_permissions(old.permissions()).map_err(fail)?;
         }
         // A name that gets to the disk before the content would, after a power cut, be that of a file with holes.
         sync(part.file(), Step::Sync).map_err(fail)?;
-        part.rename(&wanted).map_err(fail)?;
+        part.rename(&target).map_err(fail)?;
         // The name, too, must get there. Where a folder cannot be synced, the system sees to it.
-        if let Ok(folder) = File::open(folder(&wanted)) {
+        if let Ok(folder) = File::open(folder(&target)) {
             sync(&folder, Step::SyncFolder).ok();
         }
         Ok(())
     }
+}
+
+/// The file that a name leads to: itself, but for symbolic links.
+fn target(wanted: &Path) -> io::Result<PathBuf> {
+    if !wanted.is_symlink() {
+        return Ok(wanted.to_owned());
+    }
+    wanted.canonicalize().map_err(|error| match error.kind() {
+        io::ErrorKind::NotFound => {
+            io::Error::new(io::ErrorKind::InvalidInput, "it is a symbolic link to a file that does not exist")
+        }
+        _ => error,
+    })
 }
 
 /// Waits until something is on the disk. Tests pull no plugs, and do it a thousand times.

@@ -7,7 +7,7 @@ use super::{
 };
 use std::{
     collections::BTreeMap,
-    fs::{File, TryLockError},
+    fs::{File, Metadata, Permissions, TryLockError},
     io,
     path::{Path, PathBuf},
     sync::{
@@ -56,27 +56,35 @@ pub struct Part {
 }
 
 impl Part {
-    /// Makes one beside the file that is wanted.
+    /// Makes one beside the file that is wanted. Nobody may read it who may not read the file that it replaces.
     pub fn create(wanted: &Path) -> io::Result<Self> {
         // Names may be too long already.
         let name: String = wanted.file_name().unwrap_or_default().to_string_lossy().chars().take(50).collect();
+        let permissions = wanted.metadata().ok().map(|found| found.permissions());
         let mut live = live();
         step(Step::Create)?;
         for try_number in 0..MOST {
             let path = folder(wanted).join(format!(".{name}.{try_number}.{EXTENSION}"));
             remove_stale(&path);
             // Never one that is there, nor one that a link leads to.
-            match File::options().read(true).write(true).create_new(true).open(&path) {
+            match create_new(&path, permissions.as_ref()) {
                 Ok(file) => {
+                    race("created", &path);
                     // Where files cannot be locked, none is taken for stale.
-                    if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) || !path.exists() {
-                        // Another process held it for stale before it was locked.
+                    if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) || !names(&path, &file) {
+                        // Another process held it for stale before it was locked, and may have made its own.
                         continue;
                     }
                     static NEXT: AtomicU64 = AtomicU64::new(0);
                     let number = NEXT.fetch_add(1, Ordering::Relaxed);
                     live.insert(number, path.clone());
-                    return Ok(Self { number, path, file });
+                    let part = Self { number, path, file };
+                    drop(live);
+                    // Not all systems take permissions as a file is made, and some take fewer than were asked for.
+                    if let Some(permissions) = permissions {
+                        part.file.set_permissions(permissions)?;
+                    }
+                    return Ok(part);
                 }
                 Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(e) => return Err(e),
@@ -93,6 +101,10 @@ impl Part {
     pub fn rename(self, wanted: &Path) -> io::Result<()> {
         let mut live = live();
         step(Step::Rename)?;
+        if !names(&self.path, &self.file) {
+            let message = format!("{} was removed or replaced by another program", self.path.display());
+            return Err(io::Error::other(message));
+        }
         std::fs::rename(&self.path, wanted)?;
         live.remove(&self.number);
         Ok(())
@@ -103,10 +115,25 @@ impl Drop for Part {
     fn drop(&mut self) {
         let mut live = live();
         // What was renamed or abandoned is not listed, and whatever has the name now is not this one.
-        if live.remove(&self.number).is_some() && step(Step::Remove).is_ok() {
+        if live.remove(&self.number).is_some() && step(Step::Remove).is_ok() && names(&self.path, &self.file) {
             std::fs::remove_file(&self.path).ok();
         }
     }
+}
+
+/// Makes a file that is not there yet, with no more permissions than these from its first moment on.
+fn create_new(path: &Path, permissions: Option<&Permissions>) -> io::Result<File> {
+    let mut options = File::options();
+    options.read(true).write(true).create_new(true);
+    #[cfg(unix)]
+    if let Some(permissions) = permissions {
+        use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
+        // Its owner must be able to write it.
+        options.mode(permissions.mode() & 0o777 | 0o600);
+    }
+    #[cfg(not(unix))]
+    let _ = permissions;
+    options.open(path)
 }
 
 /// Removes a temporary file that no living process holds.
@@ -115,6 +142,37 @@ fn remove_stale(path: &Path) {
         && let Ok(file) = File::open(path)
         && file.try_lock().is_ok()
     {
-        std::fs::remove_file(path).ok();
+        race("locked", path);
+        // While it was not locked, its writer may have finished it, and another one may have made a new file of its name. Once
+        // it is locked, nobody else removes it or takes it for its own.
+        if names(path, &file) {
+            std::fs::remove_file(path).ok();
+        }
     }
 }
+
+/// Whether a path is the name of an open file.
+fn names(path: &Path, file: &File) -> bool {
+    match (path.symlink_metadata(), file.metadata()) {
+        (Ok(named), Ok(open)) => is_same(&named, &open),
+        _ => false,
+    }
+}
+
+#[cfg(unix)]
+fn is_same(a: &Metadata, b: &Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    (a.dev(), a.ino()) == (b.dev(), b.ino())
+}
+
+/// Elsewhere an open file keeps its name: it can be neither removed nor replaced.
+#[cfg(not(unix))]
+fn is_same(a: &Metadata, b: &Metadata) -> bool {
+    a.is_file() && b.is_file()
+}
+
+#[cfg(not(test))]
+fn race(_: &str, _: &Path) {}
+
+#[cfg(test)]
+use super::step::faults::race;

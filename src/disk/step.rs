@@ -45,7 +45,7 @@ pub(super) fn write_step(mut file: &File, bytes: &[u8]) -> io::Result<usize> {
 #[cfg(test)]
 pub(crate) mod faults {
     use super::Step;
-    use std::{cell::RefCell, io};
+    use std::{cell::RefCell, io, path::Path};
 
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     pub(crate) enum Fault {
@@ -54,6 +54,9 @@ pub(crate) mod faults {
         /// The process is killed: neither that step nor any after it is done.
         Killed,
     }
+
+    /// What another process does at a moment when it can do harm.
+    type Race = Box<dyn FnMut(&str, &Path)>;
 
     #[derive(Default)]
     struct Plan {
@@ -64,6 +67,20 @@ pub(crate) mod faults {
 
     thread_local! {
         static PLAN: RefCell<Plan> = RefCell::default();
+        static RACE: RefCell<Option<Race>> = const { RefCell::new(None) };
+    }
+
+    /// Lets another process act: after a file was “created”, or “locked” because it looks stale.
+    pub(in crate::disk) fn race(moment: &str, path: &Path) {
+        RACE.with_borrow_mut(|race| race.iter_mut().for_each(|race| race(moment, path)));
+    }
+
+    /// Runs something while another process acts at those moments.
+    pub(crate) fn against<T>(other: impl FnMut(&str, &Path) + 'static, run: impl FnOnce() -> T) -> T {
+        RACE.set(Some(Box::new(other)));
+        let found = run();
+        RACE.set(None);
+        found
     }
 
     pub(in crate::disk) fn step(step: Step) -> io::Result<()> {

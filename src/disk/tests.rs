@@ -209,3 +209,146 @@ fn what_is_there_is_left_as_it_is() {
     write(&long, b"new").unwrap();
     assert_eq!(std::fs::read(&long).unwrap(), b"new");
 }
+
+/// Two processes take the same leftover for stale: the slower one locks it when the faster one has made its own of that name.
+#[cfg(unix)]
+#[test]
+fn a_new_part_is_not_taken_for_the_leftover_before_it() {
+    let folder = Folder::new();
+    let path = folder.path().join("a.txt");
+    let part = folder.write(".a.txt.0.splatkit-part", OLD);
+    let mut is_first = true;
+    let (name, wanted) = (part.clone(), path.clone());
+    faults::against(
+        move |moment, at| {
+            if moment == "locked" && at == name && std::mem::take(&mut is_first) {
+                std::fs::remove_file(at).unwrap();
+                let file = std::fs::File::options().write(true).create_new(true).open(at).unwrap();
+                file.lock().unwrap();
+                (&file).write_all(b"of another process").unwrap();
+                // Its lock is held as long as this process lives.
+                std::mem::forget(file);
+            }
+            assert!(at.starts_with(wanted.parent().unwrap()));
+        },
+        || write(&path, b"new").unwrap(),
+    );
+    assert_eq!(std::fs::read(&part).unwrap(), b"of another process");
+    assert_eq!(std::fs::read(&path).unwrap(), b"new");
+}
+
+/// A part that another process took for stale before it was locked, and replaced by its own, is not written to by its name.
+#[cfg(unix)]
+#[test]
+fn a_part_that_was_replaced_is_not_used() {
+    let folder = Folder::new();
+    let path = folder.path().join("a.txt");
+    let part = folder.path().join(".a.txt.0.splatkit-part");
+    let name = part.clone();
+    faults::against(
+        move |moment, at| {
+            if moment == "created" && at == name {
+                std::fs::remove_file(at).unwrap();
+                std::fs::write(at, b"of another process").unwrap();
+            }
+        },
+        || write(&path, b"new").unwrap(),
+    );
+    assert_eq!(std::fs::read(&part).unwrap(), b"of another process");
+    assert_eq!(std::fs::read(&path).unwrap(), b"new");
+}
+
+/// What is renamed is what was written: a part that another program replaced meanwhile is an error.
+#[cfg(unix)]
+#[test]
+fn a_part_that_is_replaced_while_it_is_written_is_an_error() {
+    let folder = Folder::new();
+    let path = folder.write("a.txt", OLD);
+    let part = folder.path().join(".a.txt.0.splatkit-part");
+    let mut file = AtomicFile::create(&path).unwrap();
+    file.write_all(b"new").unwrap();
+    std::fs::remove_file(&part).unwrap();
+    std::fs::write(&part, b"half").unwrap();
+    let error = file.commit().unwrap_err().to_string();
+    assert!(error.contains("a.txt.0.splatkit-part was removed or replaced by another program"), "{error}");
+    assert_eq!(std::fs::read(&path).unwrap(), OLD);
+}
+
+#[cfg(unix)]
+#[test]
+fn nobody_reads_a_part_who_may_not_read_the_file() {
+    use std::os::unix::fs::{MetadataExt, PermissionsExt};
+    let folder = Folder::new();
+    let path = folder.write("a.txt", OLD);
+    let part = folder.path().join(".a.txt.0.splatkit-part");
+    for mode in [0o600, 0o640, 0o400, 0o664] {
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(mode)).unwrap();
+        // From its first moment on.
+        let at = part.clone();
+        let first = std::rc::Rc::new(std::cell::Cell::new(0));
+        let seen = first.clone();
+        let file = faults::against(
+            move |moment, path| {
+                if moment == "created" {
+                    assert_eq!(path, at);
+                    seen.set(path.metadata().unwrap().mode() & 0o777);
+                }
+            },
+            || AtomicFile::create(&path).unwrap(),
+        );
+        assert_eq!(first.get() & !(mode | 0o600), 0, "{mode:o}: {:o}", first.get());
+        assert_eq!(part.metadata().unwrap().mode() & 0o777, mode, "{mode:o}");
+        file.commit().unwrap();
+        assert_eq!(path.metadata().unwrap().mode() & 0o777, mode, "{mode:o}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn links_stay_and_what_they_lead_to_is_written() {
+    use std::os::unix::fs::symlink;
+    let (folder, other) = (Folder::new(), Folder::new());
+    let target = other.write("target.txt", OLD);
+    let [one, two, nowhere, round] =
+        ["one.txt", "two.txt", "nowhere.txt", "round.txt"].map(|name| folder.path().join(name));
+    symlink(&target, &one).unwrap();
+    symlink("one.txt", &two).unwrap();
+    symlink(other.path().join("none.txt"), &nowhere).unwrap();
+    symlink("round.txt", &round).unwrap();
+    for (link, content) in [(&one, "first"), (&two, "second")] {
+        let file = AtomicFile::create(link).unwrap();
+        // Where it can be renamed: beside the target, which may be on another disk than the link.
+        assert_eq!(names(&folder).len(), 4);
+        assert_eq!(names(&other), [".target.txt.0.splatkit-part", "target.txt"]);
+        drop(file);
+        write(link, content.as_bytes()).unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(std::fs::read_to_string(&target).unwrap(), content);
+    }
+    for link in [&nowhere, &round] {
+        let error = write(link, b"new").unwrap_err().to_string();
+        assert!(error.contains(&*link.to_string_lossy()), "{error}");
+        assert!(link == &round || error.contains("a symbolic link to a file that does not exist"), "{error}");
+        assert!(link.is_symlink());
+    }
+    assert_eq!(names(&other), ["target.txt"]);
+}
+
+/// Several writers of one file, some of which begin where others are killed: each ends well, and the file is a whole one.
+#[test]
+fn writers_at_once_leave_a_whole_file() {
+    let folder = Folder::new();
+    let path = folder.path().join("a.bin");
+    std::thread::scope(|scope| {
+        for writer in 0..8u8 {
+            let path = &path;
+            scope.spawn(move || (0..50).for_each(|_| write(path, &vec![writer; 5000]).unwrap()));
+        }
+        for _ in 0..200 {
+            if let Ok(found) = std::fs::read(&path) {
+                assert!(found.len() == 5000 && found.iter().all(|&byte| byte == found[0]));
+            }
+        }
+    });
+    assert_eq!(names(&folder), ["a.bin"]);
+}

@@ -9,7 +9,7 @@ use super::{
     sphere::{Sphere, enclosing, nest, raise},
 };
 use crate::{
-    Error, Result,
+    Deadline, Error, Result, memory,
     splat::{Payload, Splat, SplatSet},
 };
 use rayon::prelude::*;
@@ -39,11 +39,19 @@ pub struct BuildOptions {
     pub source_points: Option<u64>,
     /// Splats of a block; larger sets become several blocks.
     pub block_splats: usize,
+    /// When the hierarchy must be built.
+    pub deadline: Deadline,
 }
 
 impl Default for BuildOptions {
     fn default() -> Self {
-        Self { preset: Preset::default(), closed: false, source_points: None, block_splats: 1 << 14 }
+        Self {
+            preset: Preset::default(),
+            closed: false,
+            source_points: None,
+            block_splats: 1 << 14,
+            deadline: Deadline::NEVER,
+        }
     }
 }
 
@@ -54,22 +62,27 @@ impl Tree {
     /// Builds the tree of a set of splats that carry radiance. The same set gives the same tree.
     ///
     /// # Errors
-    /// Those of [`check_splats`].
+    /// Those of [`check_splats`]; [`Error::Timeout`] after the deadline; [`Error::Memory`] where there is too little.
     pub fn build(set: &SplatSet, options: &BuildOptions, watch: Watch<'_>) -> Result<Self> {
         let _span = tracing::info_span!("build").entered();
         check_splats(set)?;
+        // A set has up to a fourth more nodes than leaves.
+        let nodes = (set.splats.len() * size_of::<Node>()) as u64 / 4 * 5;
+        memory::room(WORK, nodes + order_bytes(set) + at_work(options.block_splats))?;
         let parts = partition::blocks(&set.splats, options.block_splats.max(64));
         let outer = enclosing(&set.splats, set.extent);
         let built = AtomicU64::new(0);
-        let mut blocks: Vec<Block> = parts
+        let blocks: Result<Vec<Block>> = parts
             .into_par_iter()
             .map(|part| {
+                options.deadline.check(WORK)?;
                 let block = block_of(set, &part, options.preset, outer);
                 let count = part.len() as u64;
                 watch(built.fetch_add(count, Ordering::Relaxed) + count, set.splats.len() as u64);
-                block
+                Ok(block)
             })
             .collect();
+        let mut blocks = blocks?;
         if blocks.len() > 1 {
             let roots: Vec<Node> = blocks.iter().map(|block| block.nodes[0]).collect();
             let (top, portals) = join(&roots, options.preset, outer);
@@ -102,11 +115,17 @@ pub fn build_file(
 ) -> Result<()> {
     let _span = tracing::info_span!("build").entered();
     check_splats(set)?;
+    memory::room(WORK, order_bytes(set) + at_work(build.block_splats))?;
     let parts = partition::blocks(&set.splats, build.block_splats.max(64));
     let mut builder = Builder::new(path, set.extent, enclosing(&set.splats, set.extent), build.preset, write)?;
     let mut built = 0;
     for parts in parts.chunks(2 * rayon::current_num_threads()) {
-        builder.add(parts.par_iter().map(|part| block_of(set, part, build.preset, builder.outer)).collect())?;
+        let block = |part: &Vec<u32>| {
+            build.deadline.check(WORK)?;
+            Ok(block_of(set, part, build.preset, builder.outer))
+        };
+        let blocks: Result<Vec<Block>> = parts.par_iter().map(block).collect();
+        builder.add(blocks?)?;
         built += parts.iter().map(|part| part.len() as u64).sum::<u64>();
         watch(built, set.splats.len() as u64);
     }
@@ -116,6 +135,21 @@ pub fn build_file(
         closed: build.closed,
         source_points: build.source_points.unwrap_or(set.splats.len() as u64),
     })
+}
+
+/// What errors call the work of this module.
+pub(crate) const WORK: &str = "building the hierarchy";
+
+/// Bytes in which splats are put in order.
+fn order_bytes(set: &SplatSet) -> u64 {
+    24 * set.splats.len() as u64
+}
+
+/// Bytes of the blocks at work at once: for each splat its box, the pairs above it, nodes, and what is written of them.
+pub(crate) fn at_work(block_splats: usize) -> u64 {
+    const OF_SPLAT: u64 = 600;
+    let blocks = 2 * rayon::current_num_threads() as u64;
+    blocks.saturating_mul(OF_SPLAT).saturating_mul(block_splats.max(64) as u64)
 }
 
 /// Writes blocks as they come, and joins them at the end.
@@ -212,4 +246,25 @@ pub fn check_splats(set: &SplatSet) -> Result<()> {
         )));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{hierarchy::testing::surface, io::testing::Folder};
+
+    #[test]
+    fn building_keeps_to_the_deadline() {
+        let splats = surface(500, 1);
+        let set = SplatSet { origin: glam::DVec3::ZERO, payload: Payload::Radiance, splats, extent: 3.0, overlap: 1.0 };
+        let options = BuildOptions { deadline: Deadline::after(0), ..BuildOptions::default() };
+        let built = [
+            Tree::build(&set, &options, &|_, _| ()).map(drop),
+            build_file(&set, &Folder::new().path().join("a.splk"), &options, &WriteOptions::default(), &|_, _| ()),
+        ];
+        for built in built {
+            let message = built.unwrap_err().to_string();
+            assert_eq!(message, "building the hierarchy takes longer than the limit of 0 s");
+        }
+    }
 }

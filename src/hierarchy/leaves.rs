@@ -2,7 +2,7 @@
 
 use super::Hierarchy;
 use crate::{
-    Result,
+    Result, memory,
     splat::{Payload, Splat, SplatSet},
 };
 use rayon::prelude::*;
@@ -11,9 +11,11 @@ impl Hierarchy {
     /// The splats of the finest level, page by page: what the hierarchy was built of, as its file keeps them.
     ///
     /// # Errors
-    /// Those of [`read_tree`](Self::read_tree).
+    /// Those of [`read_tree`](Self::read_tree), and [`Error::Memory`](crate::Error::Memory).
     pub fn leaves(&self) -> Result<SplatSet> {
         self.check_size()?;
+        // Page by page, and as a whole.
+        memory::room("reading the splats of the finest level", 2 * size_of::<Splat>() as u64 * self.header().leaves)?;
         let of_page = |page: u32| {
             let page = self.read_page(page)?;
             let nodes = page.nodes.iter().filter(|node| node.is_leaf() && !page.has_portals);

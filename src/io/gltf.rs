@@ -197,6 +197,10 @@ impl Builder<'_> {
                         *uv = (turn * scaled + Vec2::from_array(shift.offset.0)).to_array();
                     }
                 }
+                if let Some(vertex) = uvs.iter().position(|uv| !Vec2::from_array(*uv).is_finite()) {
+                    let place = format!("{place}: vertex {vertex}");
+                    return Err(super::uv_error(self.source, place, Vec2::from_array(uvs[vertex])));
+                }
                 self.mesh.uvs.resize(base, Vec2::ZERO);
                 self.mesh.uvs.extend(uvs.iter().map(|&uv| Vec2::from_array(uv)));
             }

@@ -1,6 +1,6 @@
 //! What a reader may spend on one input. Allocation follows the bytes present, not the counts claimed.
 
-use crate::{Error, Result};
+use crate::{Deadline, Error, Result};
 use std::path::Path;
 
 /// Bounds for every reader. The defaults take the largest scans and volumes that a workstation handles and stop
@@ -16,7 +16,8 @@ pub struct Limits {
     pub depth: usize,
     /// Pixels of one picture.
     pub texels: u64,
-    /// Seconds that reading may take; of a file that is read in pieces, those that a batch of pieces may take.
+    /// Seconds that reading may take. Of a file that is read in pieces, those that a batch of pieces may take. The steps
+    /// that follow reading take a [`deadline`](Self::deadline).
     pub seconds: u64,
 }
 
@@ -37,6 +38,11 @@ pub enum LimitKind {
 }
 
 impl Limits {
+    /// The deadline of work that begins now and may take [`seconds`](Self::seconds).
+    pub fn deadline(&self) -> Deadline {
+        Deadline::after(self.seconds)
+    }
+
     /// For what was never a file.
     pub(crate) fn none() -> Self {
         Self { points: u64::MAX, bytes: u64::MAX, depth: usize::MAX, texels: u64::MAX, seconds: u64::MAX }

@@ -23,7 +23,7 @@ use survey::Survey;
 /// coordinates. A file of vertices only is a cloud. Lines and points are passed over.
 ///
 /// # Errors
-/// [`Error::Input`] for malformed numbers, positions that are not finite, indices without a vertex, and references to
+/// [`Error::Input`] for malformed numbers, positions, and texture coordinates in pictures, that are not finite, indices without a vertex, and references to
 /// files outside the file's folder. Missing material files and pictures are warnings.
 pub fn read(source: &Source) -> Result<Mesh> {
     source.room::<u8>("the text", source.bytes().len())?;
@@ -63,7 +63,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
     for model in models {
         let id = model.mesh.material_id;
         let with_uv = id.is_some_and(|id| textured.get(id) == Some(&true));
-        corners.add(source, model.mesh, with_uv, textured.contains(&true))?;
+        corners.add(source, &text, model.mesh, with_uv, textured.contains(&true))?;
         if has_materials {
             let id = id.unwrap_or(mesh.materials.len());
             if id == mesh.materials.len() {
@@ -113,11 +113,15 @@ struct Corners {
 
 impl Corners {
     /// Adds a model. `with_uv`: its texture coordinates matter; `any_uv`: those of some model do.
-    fn add(&mut self, source: &Source, mut mesh: tobj::Mesh, with_uv: bool, any_uv: bool) -> Result<()> {
+    fn add(&mut self, source: &Source, text: &str, mut mesh: tobj::Mesh, with_uv: bool, any_uv: bool) -> Result<()> {
         let mut corners = std::mem::take(&mut mesh.indices);
         let split = (with_uv && !mesh.texcoord_indices.is_empty()) || !mesh.normal_indices.is_empty();
         if split {
+            let first = self.uvs.len();
             self.add_split(&mesh, &mut corners, with_uv, any_uv);
+            if let Some(&uv) = self.uvs[first..].iter().find(|uv| !uv.is_finite()) {
+                return Err(super::uv_error(source, survey::place_of_wide_uv(text), uv));
+            }
         } else {
             let base = self.positions.len() as u32;
             self.positions.extend(mesh.positions.chunks_exact(3).map(DVec3::from_slice));

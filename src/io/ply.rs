@@ -89,6 +89,10 @@ pub fn read(source: &Source) -> Result<Mesh> {
         );
         return Ok(mesh);
     }
+    // Those of vertices that were split stand behind those of the file's rows.
+    if let Some(vertex) = mesh.uvs.par_iter().position_first(|uv| !uv.is_finite()) {
+        return Err(super::uv_error(source, format!("vertex {vertex}"), mesh.uvs[vertex]));
+    }
     // Coordinates of vertices are those in the first picture.
     let shown = if of_corners { header.textures.len() } else { 1 };
     for name in header.textures.into_iter().take(shown) {

@@ -2,7 +2,7 @@
 //! and gives errors that name the file.
 
 use super::{LimitKind, Limits, budget::Budget, copy, mapping::Mapping};
-use crate::{Error, Result};
+use crate::{Error, Result, memory};
 use std::{
     fs::File,
     io::Read,
@@ -12,6 +12,9 @@ use std::{
 
 /// Bytes that are unpacked between two looks at the clock.
 const PORTION: u64 = 16 << 20;
+
+/// The system is not asked for less than this many bytes.
+const SMALL: u64 = 64 << 10;
 
 /// Where the bytes of an input are.
 enum Content<'a> {
@@ -172,9 +175,15 @@ impl<'a> Source<'a> {
         self.budget.restart();
     }
 
-    /// Takes so many bytes from what this input may occupy ([`Limits::bytes`]).
+    /// Takes so many bytes from what this input may occupy ([`Limits::bytes`]), and asks the system whether they are there.
     pub(super) fn spend(&self, what: &str, bytes: u64) -> Result<()> {
-        self.budget.spend(self.limits, self.path, what, bytes)
+        self.budget.spend(self.limits, self.path, what, bytes)?;
+        // Readers take small amounts for each item.
+        if bytes < SMALL {
+            return Ok(());
+        }
+        let what = what.strip_prefix("the size of ").and_then(|what| what.strip_suffix(" in bytes")).unwrap_or(what);
+        memory::room(&format!("reading {what}"), bytes).map_err(|error| error.in_file(self.path))
     }
 
     /// As [`spend`](Self::spend), for an array: `what` names what it holds.
@@ -191,7 +200,8 @@ impl<'a> Source<'a> {
     /// Unpacks a stream whose unpacked size is known. A stream that ends early or holds more than `expected` is an
     /// error; memory grows with what was really unpacked, so a lying size allocates nothing.
     pub fn unpack(&self, place: &str, mut stream: impl Read, expected: usize) -> Result<Vec<u8>> {
-        self.spend("the unpacked size in bytes", expected as u64)?;
+        // The list grows with what is unpacked, and reading to its end gives an error where there is no memory.
+        self.budget.spend(self.limits, self.path, "the unpacked size in bytes", expected as u64)?;
         let mut out = Vec::new();
         loop {
             self.check_time()?;

@@ -2,7 +2,7 @@
 
 use super::{composite::Composite, composite::Medium, picture, ray::Ray, shade};
 use crate::{
-    Error, Result,
+    Deadline, Error, Result,
     math::{Bounds, Camera, View},
     picture::Picture,
     scene::{Scene, Settings},
@@ -49,7 +49,7 @@ pub fn trace(
     if let Some([min, max]) = mesh.bounds() {
         view.validate_for(&Bounds { min, max })?;
     }
-    let traced = Traced::new(mesh, crease_angle_degrees, &view, settings);
+    let traced = Traced::new(mesh, crease_angle_degrees, &view, settings)?;
     let [width, height] = settings.size;
     let row = |row: u32| {
         let pixel = |column: u32| {
@@ -98,7 +98,7 @@ impl Boundable for Around {
 }
 
 impl<'a> Traced<'a> {
-    fn new(mesh: &'a Mesh, crease_angle_degrees: f32, view: &View, settings: &'a Settings) -> Self {
+    fn new(mesh: &'a Mesh, crease_angle_degrees: f32, view: &View, settings: &'a Settings) -> Result<Self> {
         let eye = view.position - mesh.origin;
         let size = mesh.positions.iter().fold(0.0f32, |size, p| size.max(p.abs().max_element()));
         // Boxes are met in 32 bits: a margin for what that rounds.
@@ -108,15 +108,15 @@ impl<'a> Traced<'a> {
             Around(Aabb::new(a.min(b).min(c) - margin, a.max(b).max(c) + margin))
         };
         let around: Vec<Around> = mesh.triangles.par_iter().map(around).collect();
-        Self {
+        Ok(Self {
             mesh,
-            normals: corner_normals(mesh, crease_angle_degrees),
+            normals: corner_normals(mesh, crease_angle_degrees, Deadline::NEVER)?,
             boxes: build_bvh2(&around, BvhBuildParams::fast_build(), &mut Duration::default()),
             settings,
             rotation: view.rotation,
             eye,
             size: f64::from(size),
-        }
+        })
     }
 
     /// All that a ray meets.

@@ -1,7 +1,11 @@
 //! What the nearest neighbours of a sample tell: how much room it has, and how the values change around it.
 
 use super::Points;
-use crate::math::{eigen, neighbours::Neighbours};
+use crate::{
+    Deadline, Result,
+    deadline::Clock,
+    math::{eigen, neighbours::Neighbours},
+};
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -14,7 +18,7 @@ pub(super) const MOST: usize = 64;
 const FLAT: f64 = 1e-4;
 
 /// A place that holds one sample, or several at exactly the same position.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Place {
     /// The samples at it.
     pub samples: u32,
@@ -28,7 +32,10 @@ pub(super) struct Place {
 
 /// The places of all samples, and for each sample the index of its own. Coincident samples share a place: the tree is
 /// asked about different positions only, so that a distance is never 0 and no number of copies takes up all neighbours.
-pub(super) fn places(points: &Points, neighbours: usize) -> (Vec<Place>, Vec<u32>) {
+///
+/// # Errors
+/// [`Error::Timeout`](crate::Error::Timeout).
+pub(super) fn places(points: &Points, neighbours: usize, deadline: Deadline) -> Result<(Vec<Place>, Vec<u32>)> {
     let first = Neighbours::first_of_equals(&points.positions);
     let mut place_of = vec![0; points.len()];
     let mut positions = Vec::new();
@@ -48,12 +55,18 @@ pub(super) fn places(points: &Points, neighbours: usize) -> (Vec<Place>, Vec<u32
     let tree = Neighbours::new(&positions);
     let around = Surroundings { tree: &tree, positions: &positions, values: &values, neighbours };
     let order = tree.order();
-    let found: Vec<Place> = order.par_iter().map(|&index| around.place(index, sums[index as usize].1)).collect();
+    let clock = Clock::new(deadline);
+    let place = |at: usize| {
+        let is_over = clock.is_over(at);
+        if is_over { Place::default() } else { around.place(order[at], sums[order[at] as usize].1) }
+    };
+    let found: Vec<Place> = (0..order.len()).into_par_iter().map(place).collect();
+    clock.finish("finding the neighbours of samples")?;
     let mut places = found.clone();
     for (index, place) in order.into_iter().zip(found) {
         places[index as usize] = place;
     }
-    (places, place_of)
+    Ok((places, place_of))
 }
 
 struct Surroundings<'a> {

@@ -5,7 +5,7 @@ use super::{
     neighbourhood::{MOST, Place, places},
 };
 use crate::{
-    Error, Result,
+    Deadline, Error, Result, memory,
     splat::{Payload, Splat, SplatSet},
 };
 use glam::{DVec3, Vec3};
@@ -25,6 +25,9 @@ const LARGEST_RISE: f64 = 2.5;
 /// What 16 bits hold of a slope.
 pub(super) const LARGEST_SLOPE: f64 = 65_504.0;
 
+/// Bytes that a sample takes meanwhile: the tree, what its neighbours tell twice, its kernel and its splat.
+const OF_SAMPLE: u64 = 350;
+
 /// How scattered samples become splats.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampleOptions {
@@ -36,11 +39,13 @@ pub struct SampleOptions {
     pub deviations: f64,
     /// Whether samples carry slopes. Without, values stay inside the samples' range but show steps (Shepard 1968).
     pub slopes: bool,
+    /// When the splats must be ready.
+    pub deadline: Deadline,
 }
 
 impl Default for SampleOptions {
     fn default() -> Self {
-        Self { neighbours: 16, radius: None, deviations: 2.0, slopes: true }
+        Self { neighbours: 16, radius: None, deviations: 2.0, slopes: true, deadline: Deadline::NEVER }
     }
 }
 
@@ -67,11 +72,13 @@ impl Points {
     ///
     /// # Errors
     /// [`Error::Argument`] for what [`validate`](Self::validate) finds, for options out of their ranges, and for values that
-    /// change by more than 65,504 within a kernel (without slopes they are no trouble).
+    /// change by more than 65,504 within a kernel (without slopes they are no trouble); [`Error::Timeout`] after the deadline;
+    /// [`Error::Memory`] where there is too little.
     pub fn to_splats(&self, options: &SampleOptions) -> Result<SplatSet> {
         self.validate().map_err(Error::Argument)?;
         options.validate()?;
-        let (places, place_of) = places(self, options.neighbours);
+        memory::room("making splats of samples", OF_SAMPLE.saturating_mul(self.len() as u64))?;
+        let (places, place_of) = places(self, options.neighbours, options.deadline)?;
         let place = |index: usize| places[place_of[index] as usize];
         // 32-bit coordinates cannot tell distances below this: a kernel so narrow would only hide in rounding.
         let [low, high] = self.bounds();
@@ -96,6 +103,7 @@ impl Points {
             Splat::sample(self.positions[index], self.values[index], factor, *weight as f32, slope(index).as_vec3())
         };
         let splats: Vec<Splat> = (0..self.len()).into_par_iter().map(splat).collect();
+        options.deadline.check("comparing kernels")?;
         let overlap = overlap(&splats);
         Ok(SplatSet { origin: self.origin, payload: Payload::Scalar, splats, extent: EXTENT, overlap })
     }

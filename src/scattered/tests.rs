@@ -310,3 +310,10 @@ fn a_million_samples() {
     let set = splats(&samples);
     println!("{} splats in {:?}", set.splats.len(), start.elapsed());
 }
+
+#[test]
+fn neighbours_keep_to_the_deadline() {
+    let options = SampleOptions { deadline: crate::Deadline::after(0), ..SampleOptions::default() };
+    let error = random(100, |_| 1.0).to_splats(&options).unwrap_err().to_string();
+    assert_eq!(error, "finding the neighbours of samples takes longer than the limit of 0 s");
+}

@@ -1,7 +1,7 @@
 //! Which triangle corners meet at each vertex.
 
 use super::Mesh;
-use crate::math::weld::first_of_equals;
+use crate::{Result, math::weld::first_of_equals, memory};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -82,7 +82,14 @@ pub(super) struct Connected<'a> {
 
 impl<'a> Connected<'a> {
     /// With `is_split`, vertices at one place are one; but not where the file has normals, which may be split to be seen.
-    pub fn new(mesh: &'a Mesh, is_split: bool) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Memory`](crate::Error::Memory).
+    pub fn new(mesh: &'a Mesh, is_split: bool) -> Result<Self> {
+        // The corners and where those of each vertex begin; with `is_split`, the order of the places and the triangles by them.
+        let [vertices, triangles] = [mesh.positions.len(), mesh.triangles.len()].map(|count| count as u64);
+        let (of_vertex, of_triangle) = if is_split { (12, 24) } else { (4, 12) };
+        memory::room("finding the triangles at each vertex", of_vertex * vertices + of_triangle * triangles)?;
         let places: Cow<[[u32; 3]]> = if is_split {
             let first = first_of_equals(&mesh.positions);
             mesh.triangles.par_iter().map(|t| t.map(|i| first[i as usize])).collect()
@@ -91,7 +98,7 @@ impl<'a> Connected<'a> {
         };
         let joined: &[[u32; 3]] = if mesh.normals.is_empty() { &places } else { &mesh.triangles };
         let adjacency = Adjacency::new(joined, mesh.positions.len());
-        Self { places, adjacency }
+        Ok(Self { places, adjacency })
     }
 }
 

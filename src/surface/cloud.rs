@@ -7,7 +7,10 @@ use super::{
     paint::{pack, point_color},
 };
 use crate::{
+    Deadline, Result,
+    deadline::Clock,
     math::{eigen, neighbours::Neighbours},
+    memory,
     splat::{NO_NORMAL, Splat, encode_normal},
 };
 use glam::{DMat3, DVec3, Vec3};
@@ -27,10 +30,17 @@ const LONE: f32 = 4.0;
 /// coarsely than what is near.
 const LARGEST: f32 = 16.0;
 
+/// What errors call the work of this module.
+const WORK: &str = "finding the neighbours of points";
+/// Bytes that a point takes meanwhile: the tree, what is found of its neighbours, the edges along which sides spread, and its
+/// surfel.
+const OF_POINT: u64 = 330;
+
 /// The neighbours of a point; itself where there are fewer.
 type Nearest = [u32; COUNT];
 
 /// The neighbourhood of a point.
+#[derive(Default)]
 struct Surroundings {
     /// Median distance to the neighbours; 0 without any.
     distance: f32,
@@ -42,9 +52,12 @@ struct Surroundings {
 }
 
 /// Surfels in the order of the points; for those that coincide, of the first one.
-pub(super) fn surfels(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
-    let judged = Judged::new(mesh, Known::default());
-    judged.places.par_iter().map(|&place| judged.surfel(place as usize, options)).collect()
+///
+/// # Errors
+/// [`Error::Timeout`](crate::Error::Timeout) and [`Error::Memory`](crate::Error::Memory).
+pub(super) fn surfels(mesh: &Mesh, options: &SurfelOptions) -> Result<Vec<Splat>> {
+    let judged = Judged::new(mesh, Known::default(), options.deadline)?;
+    Ok(judged.places.par_iter().map(|&place| judged.surfel(place as usize, options)).collect())
 }
 
 /// The surfels of those points that are wanted, with their indices. What is `known` is named by index.
@@ -53,11 +66,11 @@ pub(super) fn some_surfels(
     options: &SurfelOptions,
     known: Known,
     is_wanted: impl Fn(usize) -> bool + Sync,
-) -> Vec<(u32, Splat)> {
-    let judged = Judged::new(mesh, known);
+) -> Result<Vec<(u32, Splat)>> {
+    let judged = Judged::new(mesh, known, options.deadline)?;
     let wanted = judged.places.par_iter().map(|&place| place as usize);
     let wanted = wanted.filter(|&place| is_wanted(judged.kept[place] as usize));
-    wanted.map(|place| (judged.kept[place], judged.surfel(place, options))).collect()
+    Ok(wanted.map(|place| (judged.kept[place], judged.surfel(place, options))).collect())
 }
 
 /// What has been found out of the points at different places, in an order in which neighbours are near each other.
@@ -76,18 +89,26 @@ struct Judged<'a> {
 }
 
 impl<'a> Judged<'a> {
-    fn new(mesh: &'a Mesh, mut known: Known) -> Self {
+    fn new(mesh: &'a Mesh, mut known: Known, deadline: Deadline) -> Result<Self> {
+        memory::room(WORK, OF_POINT.saturating_mul(mesh.positions.len() as u64))?;
         let first = Neighbours::first_of_equals(&mesh.positions);
         let kept: Vec<u32> =
             (0..).zip(first).filter(|&(index, first)| index == first).map(|(index, _)| index).collect();
         let points: Vec<Vec3> = kept.par_iter().map(|&index| mesh.positions[index as usize]).collect();
+        deadline.check(WORK)?;
         let tree = Neighbours::new(&points);
         // All that follows is in the tree's order, where neighbours are near each other in memory too.
         let order = tree.order();
         let mut places = vec![0u32; points.len()];
         order.iter().zip(0..).for_each(|(&point, place)| places[point as usize] = place);
+        let clock = Clock::new(deadline);
+        let surroundings = |place: usize| {
+            let is_over = clock.is_over(place);
+            if is_over { Default::default() } else { surroundings(&points, &tree, order[place], &places) }
+        };
         let (nearest, around): (Vec<Nearest>, Vec<Surroundings>) =
-            order.par_iter().map(|&point| surroundings(&points, &tree, point, &places)).unzip();
+            (0..order.len()).into_par_iter().map(surroundings).unzip();
+        clock.finish(WORK)?;
         drop(tree);
         let points: Vec<Vec3> = order.par_iter().map(|&point| points[point as usize]).collect();
         // Points that coincide with another are not known.
@@ -101,9 +122,11 @@ impl<'a> Judged<'a> {
         let mut normals: Vec<Vec3> = around.par_iter().map(|around| around.normal).collect();
         let free = settle_known(mesh, &kept, &mut normals);
         if free.par_iter().any(|&free| free) {
+            deadline.check(WORK)?;
             orient(&points, &spacing, &nearest, &free, &known, &mut normals);
         }
-        Self { mesh, places, kept, points, around, spacing, lone, normals, free }
+        deadline.check(WORK)?;
+        Ok(Self { mesh, places, kept, points, around, spacing, lone, normals, free })
     }
 
     /// The surfel of the point at a place in the order.

@@ -8,7 +8,10 @@ use super::{
     refine::Origin,
     smooth::Groups,
 };
-use crate::splat::{STEP_BACK, Splat, encode_normal};
+use crate::{
+    deadline::Clock,
+    splat::{STEP_BACK, Splat, encode_normal},
+};
 use glam::{DVec3, Vec2, Vec3};
 
 /// A surfel stands for triangles whose normals differ from the first one's by no more (degrees).
@@ -29,7 +32,9 @@ const CORNER: f32 = 5.0;
 /// The thickness of a surfel, in its smaller standard deviation.
 const THICKNESS: f32 = 0.12;
 /// The square of twice an area, in units, below which products of moments are lost in 32 bits: edges of less than a millionth.
-const LEAST_SQUARE: f32 = 1e-26;
+pub(super) const LEAST_SQUARE: f32 = 1e-26;
+/// A triangle whose height is less than the root of this part of its longest edge is a line at the precision of 32 bits.
+pub(super) const LEAST_RATIO_SQUARED: f32 = 1e-12;
 /// How high above its vertex a surfel lies, of the mean height of the triangles around a vertex.
 const SAG: f32 = 0.4;
 
@@ -100,9 +105,12 @@ impl Made {
 }
 
 impl Maker<'_> {
-    /// Adds the surfels of some vertices.
-    pub fn vertices(&self, vertices: &[usize], made: &mut Made) {
+    /// Adds the surfels of some vertices, unless time is up.
+    pub fn vertices(&self, vertices: &[usize], made: &mut Made, clock: &Clock) {
         for few in vertices.chunks(TOGETHER) {
+            if clock.is_over(0) {
+                return;
+            }
             let mut rows = std::mem::take(&mut made.rows);
             rows.clear();
             for &vertex in few {
@@ -160,8 +168,8 @@ impl Maker<'_> {
         let cross = a.cross(b);
         let (square, longer) = (cross.length_squared(), a.length_squared().max(b.length_squared()));
         *longest = longest.max(longer);
-        // No more than a line, at the precision of 32 bits, or no more than a point beside the whole.
-        if square <= (longer * longer * 1e-12).max(LEAST_SQUARE) {
+        // No more than a line, or no more than a point beside the whole.
+        if square <= (longer * longer * LEAST_RATIO_SQUARED).max(LEAST_SQUARE) {
             return None;
         }
         let twice_area = square.sqrt();

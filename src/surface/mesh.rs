@@ -30,6 +30,20 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// Bytes of its arrays; textures are shared and do not count.
+    pub(crate) fn bytes(&self) -> u64 {
+        let Self { positions, normals, colors, uvs, triangles, triangle_materials, .. } = self;
+        let arrays = [
+            size_of_val(&positions[..]),
+            size_of_val(&normals[..]),
+            size_of_val(&colors[..]),
+            size_of_val(&uvs[..]),
+            size_of_val(&triangles[..]),
+            size_of_val(&triangle_materials[..]),
+        ];
+        arrays.iter().map(|&bytes| bytes as u64).sum()
+    }
+
     /// The unit normal that the file gives at a vertex.
     pub(super) fn given_normal(&self, vertex: usize) -> Option<Vec3> {
         self.normals.get(vertex).copied().and_then(given)

@@ -10,7 +10,7 @@ use super::{
     surfels::{largest_edge, of_part},
     survey::{edge, edge_of_places},
 };
-use crate::{Result, splat::Splat};
+use crate::{Deadline, Result, splat::Splat};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -70,7 +70,7 @@ impl Triangles {
     }
 
     /// Counts what those with long edges are cut into, where there is room for so many.
-    fn count_long(&mut self, length: f32, room: usize) {
+    fn count_long(&mut self, length: f32, room: usize, deadline: Deadline) -> Result<()> {
         let mut vertices: Vec<u32> = self.names.as_flattened().to_vec();
         vertices.par_sort_unstable();
         vertices.dedup();
@@ -80,7 +80,9 @@ impl Triangles {
         for (triangle, corners) in triangles.iter().zip(&self.long) {
             triangle.iter().zip(corners).for_each(|(&vertex, corner)| positions[vertex as usize] = *corner);
         }
-        self.cut = count_once_cut(&Mesh { positions, triangles, ..Mesh::default() }, length, room);
+        let long = Mesh { positions, triangles, ..Mesh::default() };
+        self.cut = count_once_cut(&long, length, room, deadline)?;
+        Ok(())
     }
 }
 
@@ -134,8 +136,8 @@ impl MeshPieces {
             |seen, length| {
                 let others = triangles.saturating_sub(seen.long.len());
                 let [room, budget] = [room, budget].map(|all| all.saturating_sub(others));
-                seen.count_long(length, room.min(budget));
-                seen.cut <= budget || room < budget
+                seen.count_long(length, room.min(budget), options.deadline)?;
+                Ok(seen.cut <= budget || room < budget)
             },
         )?;
         let closing = if seen.edges[0] == 0 {
@@ -159,7 +161,7 @@ impl MeshPieces {
         part.check(options)?;
         let is_wanted = |vertex: usize| owned.get(vertex).is_none_or(|&owned| owned);
         let cut = is_long.then_some(self.length);
-        Ok(of_part(part, self.is_split, options, [self.unit, self.outward], self.is_coarse, cut, is_wanted))
+        of_part(part, self.is_split, options, [self.unit, self.outward], self.is_coarse, cut, is_wanted)
     }
 }
 
@@ -171,7 +173,7 @@ pub(crate) fn cloud_piece(
     options: &SurfelOptions,
 ) -> Result<Vec<(u32, Splat)>> {
     part.check(options)?;
-    Ok(cloud::some_surfels(part, options, known, |point| owned[point]))
+    cloud::some_surfels(part, options, known, |point| owned[point])
 }
 
 #[cfg(test)]
@@ -206,7 +208,7 @@ mod tests {
             MeshPieces::new(counts, [false; 2], [Vec3::splat(-1.0), Vec3::ONE], &options, usize::MAX, look).unwrap();
         assert!(pieces.unit < 0.1 && told.cut > counts[1] / 20, "{} and {}", pieces.unit, told.cut);
         assert!(looks < 8, "{looks} looks");
-        let fine = mesh.triangles_once_cut(&options, usize::MAX);
+        let fine = mesh.triangles_once_cut(&options, usize::MAX).unwrap();
         assert_eq!(fine, counts[1] - told.long.len() + told.cut);
     }
 
@@ -232,7 +234,8 @@ mod tests {
                 };
                 let (pieces_of_all, told) = pieces(usize::MAX).unwrap();
                 let count = mesh.triangles.len() - told.long.len() + told.cut;
-                assert_eq!(count, count_of_refined(&mesh, pieces_of_all.unit, most_triangles, usize::MAX));
+                let whole = count_of_refined(&mesh, pieces_of_all.unit, most_triangles, usize::MAX, Deadline::NEVER);
+                assert_eq!(count, whole.unwrap());
                 assert!(count <= options.most_once_cut(mesh.triangles.len()), "{count} of {most_triangles}");
                 let (_, told) = pieces(count - 1).unwrap();
                 assert!(mesh.triangles.len() - told.long.len() + told.cut >= count);

@@ -4,8 +4,9 @@
 //! beside them cut in two, three or four. Both neighbours of an edge see it halved, so no gap opens between them.
 //! Halving would also multiply needles (two long edges and a short one) across, so these are cut in slabs.
 
-use super::{Mesh, smooth::corner_normals};
-use glam::{DVec3, Vec2, Vec3};
+use super::{Mesh, Texture, smooth::corner_normals};
+use crate::{Deadline, Result, memory};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -13,6 +14,12 @@ use std::borrow::Cow;
 const TEXELS: f32 = 1.5;
 /// … but no closer than this part of the longest edge that is allowed.
 const FINEST: f32 = 1.0 / 8.0;
+
+/// A texture that repeats this often between two of its finest samples cannot be resolved: its triangle is not cut for it.
+const MOST_REPEATS: f64 = 16.0;
+
+/// What errors call the work of this module.
+const WORK: &str = "cutting long triangles";
 
 /// Where there would be too many triangles, lengths grow by whole steps of this factor: two that look at the same triangles, in
 /// whatever order they add them up, take the same number of steps.
@@ -27,6 +34,8 @@ struct Wanted<'a> {
     /// Factor on [`TEXELS`] and [`FINEST`] that keeps to the budget.
     coarser: f32,
     steps: i32,
+    /// Triangles whose texture cannot be resolved; empty where no mesh has a texture.
+    is_blurred: Vec<bool>,
 }
 
 /// A mesh of small triangles.
@@ -38,15 +47,20 @@ pub(super) struct Refined<'a> {
 
 /// The mesh with no edge longer than `length` (in its unit), and textured triangles cut to about the size of the texels.
 /// Lengths grow where there would be more triangles than the [`budget`].
-pub(super) fn refine(mesh: &Mesh, length: f32, most: usize) -> Refined<'_> {
-    let Ok(Some(mut fine)) = refined(mesh, length, most, usize::MAX) else {
-        return Refined { mesh: Cow::Borrowed(mesh), sources: None };
+///
+/// # Errors
+/// [`Error::Timeout`](crate::Error::Timeout) and [`Error::Memory`](crate::Error::Memory).
+pub(super) fn refine(mesh: &Mesh, length: f32, most: usize, deadline: Deadline) -> Result<Refined<'_>> {
+    let mut fine = match refined(mesh, length, most, usize::MAX, deadline) {
+        Ok(Some(fine)) => fine,
+        Ok(None) | Err(Stop::TooMany(_)) => return Ok(Refined { mesh: Cow::Borrowed(mesh), sources: None }),
+        Err(Stop::Failed(error)) => return Err(error),
     };
     let sources = std::mem::take(&mut fine.triangle_materials);
     if !mesh.triangle_materials.is_empty() {
         fine.triangle_materials = sources.par_iter().map(|&source| mesh.triangle_materials[source as usize]).collect();
     }
-    Refined { mesh: Cow::Owned(fine), sources: Some(sources) }
+    Ok(Refined { mesh: Cow::Owned(fine), sources: Some(sources) })
 }
 
 /// How many triangles cutting may lead to: `most`, or an eighth more than there are, so that the few long ones of a large scan are
@@ -80,32 +94,66 @@ impl Expected {
     }
 }
 
-/// That triangles would be cut into more than there may be.
-struct TooMany;
+/// The steps to take after so many attempts led to too many triangles. The first are single ones, because estimates are
+/// nearly right for what scanners and artists make. Later ones double: whatever the input is, there are few attempts.
+fn steps_after(failed: u32) -> i32 {
+    1 << failed.saturating_sub(SINGLE_STEPS).min(9)
+}
+
+const SINGLE_STEPS: u32 = 24;
+
+/// Why cutting ended early.
+#[derive(Debug)]
+enum Stop {
+    /// There would be more triangles than allowed: about so many.
+    TooMany(usize),
+    Failed(crate::Error),
+}
+
+impl From<crate::Error> for Stop {
+    fn from(error: crate::Error) -> Self {
+        Self::Failed(error)
+    }
+}
 
 /// As [`refine`], with the number of the triangle that each was cut from in its material's place; `None` where nothing is to be
 /// cut.
 ///
 /// # Errors
-/// For more than `room`, before there are as many: about how many they would be.
-fn refined(mesh: &Mesh, length: f32, most: usize, room: usize) -> Result<Option<Mesh>, usize> {
+/// [`Stop::TooMany`] for more than `room`, before there are as many.
+fn refined(
+    mesh: &Mesh,
+    length: f32,
+    most: usize,
+    room: usize,
+    deadline: Deadline,
+) -> std::result::Result<Option<Mesh>, Stop> {
     let mut wanted = Wanted::new(mesh, length);
     if wanted.are_small() {
         return Ok(None);
     }
     let budget = budget(most, mesh.triangles.len());
+    let mut failed = 0;
     loop {
+        deadline.check(WORK)?;
         let expected = wanted.expected();
         if expected.all() > budget as f64 {
             wanted.coarsen(expected.steps(budget));
             continue;
         }
         // A triangle is also cut where its neighbours are, so that only cutting tells how many there are.
+        memory::room(WORK, mesh.bytes().saturating_add(4 * mesh.triangles.len() as u64))?;
         let mut fine = Mesh { triangle_materials: (0..mesh.triangles.len() as u32).collect(), ..mesh.clone() };
-        match cut_all(&mut fine, &wanted, budget.min(room)) {
+        match cut_all(&mut fine, &wanted, budget.min(room), deadline) {
             Ok(()) => return Ok(Some(fine)),
-            Err(TooMany) if room < budget => return Err((expected.all() as usize).max(room + 1)),
-            Err(TooMany) => wanted.coarsen(1),
+            Err(Stop::TooMany(_)) if room < budget => {
+                return Err(Stop::TooMany((expected.all() as usize).max(room + 1)));
+            }
+            Err(Stop::TooMany(_)) => {
+                wanted.coarsen(steps_after(failed));
+                failed += 1;
+            }
+            Err(error) => return Err(error),
         }
     }
 }
@@ -118,8 +166,8 @@ pub(super) struct Origin<'a> {
 }
 
 impl<'a> Origin<'a> {
-    pub fn new(mesh: &'a Mesh, sources: Vec<u32>, crease_angle_degrees: f32) -> Self {
-        Self { mesh, sources, normals: corner_normals(mesh, crease_angle_degrees) }
+    pub fn new(mesh: &'a Mesh, sources: Vec<u32>, crease_angle_degrees: f32, deadline: Deadline) -> Result<Self> {
+        Ok(Self { mesh, sources, normals: corner_normals(mesh, crease_angle_degrees, deadline)? })
     }
 
     /// The normal at a corner of the `fine` mesh, interpolated between those of the whole triangle; of any length.
@@ -135,7 +183,17 @@ impl<'a> Origin<'a> {
 }
 
 /// How many triangles there are once the mesh is refined; about how many, where they are more than `room`.
-pub(super) fn count_of_refined(mesh: &Mesh, length: f32, most: usize, room: usize) -> usize {
+///
+/// # Errors
+/// Those of [`refine`].
+pub(super) fn count_of_refined(
+    mesh: &Mesh,
+    length: f32,
+    most: usize,
+    room: usize,
+    deadline: Deadline,
+) -> Result<usize> {
+    memory::room(WORK, mesh.bytes())?;
     let Mesh { positions, uvs, triangles, triangle_materials, materials, .. } = mesh;
     let bare = Mesh {
         positions: positions.clone(),
@@ -145,16 +203,20 @@ pub(super) fn count_of_refined(mesh: &Mesh, length: f32, most: usize, room: usiz
         materials: materials.clone(),
         ..Mesh::default()
     };
-    match refined(&bare, length, most, room) {
-        Ok(fine) => fine.unwrap_or(bare).triangles.len(),
-        Err(about) => about,
+    match refined(&bare, length, most, room, deadline) {
+        Ok(fine) => Ok(fine.unwrap_or(bare).triangles.len()),
+        Err(Stop::TooMany(about)) => Ok(about),
+        Err(Stop::Failed(error)) => Err(error),
     }
 }
 
 /// How many triangles there are once those of a mesh without texture are cut until no edge is longer than `length`; about how
 /// many, where they are more than `room`.
-pub(super) fn count_once_cut(mesh: &Mesh, length: f32, room: usize) -> usize {
-    count_of_refined(mesh, length, usize::MAX, room)
+///
+/// # Errors
+/// Those of [`refine`].
+pub(super) fn count_once_cut(mesh: &Mesh, length: f32, room: usize, deadline: Deadline) -> Result<usize> {
+    count_of_refined(mesh, length, usize::MAX, room, deadline)
 }
 
 /// The length that edges without texture may have where there is a budget of triangles, which are no more already: `length`, or
@@ -163,21 +225,22 @@ pub(super) fn count_once_cut(mesh: &Mesh, length: f32, room: usize) -> usize {
 pub(super) fn affordable<S, E>(
     length: f32,
     budget: usize,
-    mut look: impl FnMut(f32) -> Result<S, E>,
+    mut look: impl FnMut(f32) -> std::result::Result<S, E>,
     expected: impl Fn(&S) -> Expected,
-    mut fits: impl FnMut(&mut S, f32) -> bool,
-) -> Result<(f32, S), E> {
-    let mut taken = 0;
+    mut fits: impl FnMut(&mut S, f32) -> std::result::Result<bool, E>,
+) -> std::result::Result<(f32, S), E> {
+    let (mut taken, mut failed) = (0, 0);
     loop {
         let length = length * coarser(taken).max(1.0);
         let mut seen = look(length)?;
         let expected = expected(&seen);
         if expected.all() > budget as f64 {
             taken += expected.steps(budget);
-        } else if fits(&mut seen, length) {
+        } else if fits(&mut seen, length)? {
             return Ok((length, seen));
         } else {
-            taken += 1;
+            taken += steps_after(failed);
+            failed += 1;
         }
     }
 }
@@ -190,12 +253,16 @@ fn coarser(steps: i32) -> f32 {
 /// Cuts until every edge may stay.
 ///
 /// # Errors
-/// [`TooMany`] for more than `most` triangles, before there are as many.
-fn cut_all(fine: &mut Mesh, wanted: &Wanted, most: usize) -> Result<(), TooMany> {
+/// [`Stop::TooMany`] for more than `most` triangles, before there are as many.
+fn cut_all(fine: &mut Mesh, wanted: &Wanted, most: usize, deadline: Deadline) -> std::result::Result<(), Stop> {
     // Triangles before `settled` have no long edge.
     let mut settled = 0;
     loop {
+        deadline.check(WORK)?;
         slice_needles(fine, wanted, settled, most)?;
+        // Three edges at most are marked, in parts and as a whole.
+        let open = (fine.triangles.len() - settled) as u64;
+        memory::room(WORK, open.saturating_mul(6 * size_of::<(u32, u32)>() as u64))?;
         let mut marked = marked_edges(fine, wanted, settled);
         if marked.is_empty() || fine.positions.len() + marked.len() > u32::MAX as usize {
             return Ok(());
@@ -208,9 +275,35 @@ fn cut_all(fine: &mut Mesh, wanted: &Wanted, most: usize) -> Result<(), TooMany>
 
 impl<'a> Wanted<'a> {
     fn new(mesh: &'a Mesh, length: f32) -> Self {
-        let mut wanted = Self { mesh, asked: length, length, coarser: 1.0, steps: 0 };
+        let mut wanted = Self { mesh, asked: length, length, coarser: 1.0, steps: 0, is_blurred: Vec::new() };
         wanted.coarsen(0);
+        if wanted.is_textured() {
+            let triangles = mesh.triangles.par_iter().enumerate();
+            wanted.is_blurred = triangles.map(|(index, t)| wanted.is_blurred(index, t)).collect();
+        }
         wanted
+    }
+
+    /// Whether the texture of a triangle runs too fast along an edge to be resolved, however much it is cut.
+    fn is_blurred(&self, triangle: usize, t: &[u32; 3]) -> bool {
+        let Some(texture) = self.texture(triangle) else { return false };
+        let size = DVec2::new(texture.width.into(), texture.height.into());
+        let finest = f64::from(self.asked * FINEST);
+        [(0, 1), (1, 2), (2, 0)].iter().any(|&(i, j)| {
+            let ends = [t[i] as usize, t[j] as usize];
+            let [a, b] = ends.map(|vertex| self.mesh.positions[vertex].as_dvec3());
+            let [Some(from), Some(to)] = ends.map(|vertex| self.mesh.uvs.get(vertex)) else { return false };
+            let texels = ((from.as_dvec2() - to.as_dvec2()) * size).length();
+            // Shorter edges are not cut anyway.
+            let parts = a.distance(b) / finest;
+            parts > 1.0 && texels > MOST_REPEATS * size.max_element() * parts
+        })
+    }
+
+    /// The texture of a triangle of the mesh.
+    fn texture(&self, triangle: usize) -> Option<&Texture> {
+        let &material = self.mesh.triangle_materials.get(triangle)?;
+        self.mesh.materials[material as usize].texture.as_deref()
     }
 
     fn is_textured(&self) -> bool {
@@ -227,8 +320,7 @@ impl<'a> Wanted<'a> {
 
     /// The size of a texel along an edge, in texels: how long it is in its triangle's texture; 0 without one.
     fn texels(&self, mesh: &Mesh, source: usize, a: u32, b: u32) -> f32 {
-        let material = self.mesh.triangle_materials.get(source).map(|&index| &self.mesh.materials[index as usize]);
-        let Some(texture) = material.and_then(|material| material.texture.as_ref()) else { return 0.0 };
+        let Some(texture) = self.texture(source).filter(|_| !self.is_blurred[source]) else { return 0.0 };
         let (Some(&a), Some(&b)) = (mesh.uvs.get(a as usize), mesh.uvs.get(b as usize)) else { return 0.0 };
         ((a - b) * Vec2::new(texture.width as f32, texture.height as f32)).length()
     }
@@ -308,8 +400,8 @@ struct Needle {
 /// Cuts the triangles with two long edges and a short one in slabs across, each as long as it may be.
 ///
 /// # Errors
-/// [`TooMany`] for more than `most` triangles, before there are as many.
-fn slice_needles(mesh: &mut Mesh, wanted: &Wanted, settled: usize, most: usize) -> Result<(), TooMany> {
+/// [`Stop::TooMany`] for more than `most` triangles, before there are as many.
+fn slice_needles(mesh: &mut Mesh, wanted: &Wanted, settled: usize, most: usize) -> std::result::Result<(), Stop> {
     let needle = |(index, &t): (usize, &[u32; 3])| {
         let triangle = settled + index;
         let source = mesh.triangle_materials[triangle] as usize;
@@ -323,11 +415,15 @@ fn slice_needles(mesh: &mut Mesh, wanted: &Wanted, settled: usize, most: usize) 
         let corners = [t[(short + 2) % 3], t[short], t[(short + 1) % 3]];
         is_needle.then(|| Needle { triangle, corners, parts: (longest / step).ceil().min(1e6) as u32 })
     };
+    // A list in parts, and as a whole; then the edges of each needle.
+    let open = (mesh.triangles.len() - settled) as u64;
+    memory::room(WORK, open.saturating_mul(2 * size_of::<Needle>() as u64))?;
     let needles: Vec<Needle> = mesh.triangles[settled..].par_iter().enumerate().filter_map(needle).collect();
     if needles.is_empty() {
         return Ok(());
     }
     // The long edges with the parts that the more demanding neighbour asks for, and where each one's new vertices begin.
+    memory::room(WORK, needles.len() as u64 * 4 * size_of::<((u32, u32), u32)>() as u64)?;
     let mut edges: Vec<((u32, u32), u32)> =
         needles.iter().flat_map(|n| [1, 2].map(|i| (sorted((n.corners[0], n.corners[i])), n.parts))).collect();
     edges.par_sort_unstable_by_key(|&(edge, parts)| (edge, std::cmp::Reverse(parts)));
@@ -337,12 +433,17 @@ fn slice_needles(mesh: &mut Mesh, wanted: &Wanted, settled: usize, most: usize) 
         let [tip, a, b] = needle.corners;
         [a, b].map(|corner| u64::from(edges[rank(sorted((tip, corner)))].1) - 1).iter().sum::<u64>()
     };
-    if mesh.triangles.len() as u64 + needles.iter().map(slabs).sum::<u64>() > most as u64 {
-        return Err(TooMany);
+    let more = needles.iter().map(slabs).sum::<u64>();
+    if mesh.triangles.len() as u64 + more > most as u64 {
+        return Err(Stop::TooMany(most));
     }
     let mut next = mesh.positions.len() as u64;
-    let mut starts = Vec::with_capacity(edges.len());
-    let mut new = Vec::new();
+    let added = edges.iter().map(|&(_, parts)| u64::from(parts) - 1).sum::<u64>() as usize;
+    let (mut starts, mut new) = (Vec::new(), Vec::new());
+    memory::reserve(&mut starts, edges.len(), WORK)?;
+    memory::reserve(&mut new, added, WORK)?;
+    memory::reserve(&mut mesh.triangles, more as usize, WORK)?;
+    memory::reserve(&mut mesh.triangle_materials, more as usize, WORK)?;
     for &((a, b), parts) in &edges {
         starts.push(next as u32);
         next += u64::from(parts) - 1;
@@ -351,7 +452,7 @@ fn slice_needles(mesh: &mut Mesh, wanted: &Wanted, settled: usize, most: usize) 
     if next > u64::from(u32::MAX) {
         return Ok(());
     }
-    add_vertices(mesh, &new);
+    add_vertices(mesh, &new)?;
     // Vertex `i` of `parts` from `from` to `to`, and `parts`.
     let chain = |from: u32, to: u32| {
         let edge = sorted((from, to));
@@ -408,26 +509,37 @@ fn sorted((a, b): (u32, u32)) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
+/// The pieces of a triangle, how many they are, and what they were cut from.
+type Pieces = (([[u32; 3]; 4], usize), u32);
+
 /// Halves the marked edges of the triangles from `settled` on. The triangles without any come first afterwards; gives
 /// the number of all that are settled.
 ///
 /// # Errors
-/// [`TooMany`] for more than `most` triangles, before there are as many.
-fn cut(mesh: &mut Mesh, marked: &[(u32, u32)], settled: usize, most: usize) -> Result<usize, TooMany> {
+/// [`Stop::TooMany`] for more than `most` triangles, before there are as many.
+fn cut(mesh: &mut Mesh, marked: &[(u32, u32)], settled: usize, most: usize) -> std::result::Result<usize, Stop> {
     let base = mesh.positions.len() as u32;
     let halves = |t: [u32; 3]| {
         [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]
             .map(|edge| marked.binary_search(&sorted(edge)).ok().map(|rank| base + rank as u32))
     };
     let count = |&t: &[u32; 3]| 1 + halves(t).iter().flatten().count();
-    if settled + mesh.triangles[settled..].par_iter().map(count).sum::<usize>() > most {
-        return Err(TooMany);
+    let all = settled + mesh.triangles[settled..].par_iter().map(count).sum::<usize>();
+    if all > most {
+        return Err(Stop::TooMany(most));
     }
-    let middles: Vec<_> = marked.iter().map(|&(a, b)| (a, b, 0.5)).collect();
-    add_vertices(mesh, &middles);
+    let mut middles = Vec::new();
+    memory::reserve(&mut middles, marked.len(), WORK)?;
+    middles.extend(marked.iter().map(|&(a, b)| (a, b, 0.5)));
+    add_vertices(mesh, &middles)?;
+    drop(middles);
+    let more = all - mesh.triangles.len();
+    memory::reserve(&mut mesh.triangles, more, WORK)?;
+    memory::reserve(&mut mesh.triangle_materials, more, WORK)?;
     let positions = &mesh.positions;
     let open = mesh.triangles[settled..].par_iter().zip(&mesh.triangle_materials[settled..]);
-    let parts: Vec<_> = open.map(|(&t, &source)| (split(t, halves(t), positions), source)).collect();
+    memory::room(WORK, open.len() as u64 * size_of::<Pieces>() as u64)?;
+    let parts: Vec<Pieces> = open.map(|(&t, &source)| (split(t, halves(t), positions), source)).collect();
     mesh.triangles.truncate(settled);
     mesh.triangle_materials.truncate(settled);
     let mut now_settled = settled;
@@ -446,25 +558,28 @@ fn cut(mesh: &mut Mesh, marked: &[(u32, u32)], settled: usize, most: usize) -> R
 }
 
 /// Appends vertices between pairs of others, each at a part of the way.
-fn add_vertices(mesh: &mut Mesh, new: &[(u32, u32, f32)]) {
+fn add_vertices(mesh: &mut Mesh, new: &[(u32, u32, f32)]) -> Result<()> {
     fn extend<T: Copy + Send + Sync>(
         values: &mut Vec<T>,
         new: &[(u32, u32, f32)],
         mix: impl Fn(T, T, f32) -> T + Sync,
-    ) {
+    ) -> Result<()> {
         if !values.is_empty() {
+            memory::reserve(values, new.len(), WORK)?;
+            memory::room(WORK, size_of_val(new) as u64)?;
             let between = |&(a, b, part): &(u32, u32, f32)| mix(values[a as usize], values[b as usize], part);
             let more: Vec<T> = new.par_iter().map(between).collect();
             values.extend(more);
         }
+        Ok(())
     }
     // Written so that the middle is the same from either end: vertices that coincide go on doing so.
-    extend(&mut mesh.positions, new, |a: Vec3, b, part| a * (1.0 - part) + b * part);
-    extend(&mut mesh.normals, new, |a: Vec3, b, part| a.lerp(b, part).normalize_or_zero());
-    extend(&mut mesh.uvs, new, |a: Vec2, b, part| a.lerp(b, part));
+    extend(&mut mesh.positions, new, |a: Vec3, b, part| a * (1.0 - part) + b * part)?;
+    extend(&mut mesh.normals, new, |a: Vec3, b, part| a.lerp(b, part).normalize_or_zero())?;
+    extend(&mut mesh.uvs, new, |a: Vec2, b, part| a.lerp(b, part))?;
     extend(&mut mesh.colors, new, |a: [u8; 4], b, part| {
         std::array::from_fn(|i| (f32::from(a[i]) * (1.0 - part) + f32::from(b[i]) * part).round() as u8)
-    });
+    })
 }
 
 /// The pieces of a triangle whose edges (0–1, 1–2, 2–0) have these midpoints.
@@ -499,6 +614,8 @@ fn split(t: [u32; 3], halves: [Option<u32>; 3], positions: &[Vec3]) -> ([[u32; 3
 mod tests {
     use super::*;
 
+    const NEVER: Deadline = Deadline::NEVER;
+
     fn area(mesh: &Mesh) -> f32 {
         let corner = |i: u32| mesh.positions[i as usize];
         mesh.triangles.iter().map(|t| (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).z * 0.5).sum()
@@ -512,7 +629,7 @@ mod tests {
     fn no_edge_stays_long_and_the_area_is_kept() {
         for apex in [Vec3::new(0.3, 0.8, 0.0), Vec3::new(0.5, 1e-3, 0.0), Vec3::new(0.0, 3.0, 0.0)] {
             let mesh = one(apex);
-            let fine = refine(&mesh, 0.1, 1 << 20).mesh;
+            let fine = refine(&mesh, 0.1, 1 << 20, NEVER).unwrap().mesh;
             for t in &fine.triangles {
                 for (i, j) in [(0, 1), (1, 2), (2, 0)] {
                     assert!(fine.positions[t[i] as usize].distance(fine.positions[t[j] as usize]) <= 0.1001);
@@ -525,7 +642,7 @@ mod tests {
     #[test]
     fn a_sliver_is_cut_along_its_length_only() {
         let mesh = one(Vec3::new(0.5, 1e-3, 0.0));
-        assert!(refine(&mesh, 0.01, 1 << 20).mesh.triangles.len() < 400);
+        assert!(refine(&mesh, 0.01, 1 << 20, NEVER).unwrap().mesh.triangles.len() < 400);
     }
 
     /// Whatever the triangles are like, and however little there is too much of.
@@ -536,25 +653,25 @@ mod tests {
         for (number, mesh) in meshes.chain([Mesh::sphere(2), Mesh::cube(1.0)]).enumerate() {
             let most = 2_000 + mesh.triangles.len();
             for length in [0.1, 0.05, 0.03, 0.025, 0.02, 0.015, 1e-2, 1e-3, 1e-4, 1e-9] {
-                let fine = refine(&mesh, length, most).mesh;
+                let fine = refine(&mesh, length, most, NEVER).unwrap().mesh;
                 let count = fine.triangles.len();
                 assert!(count <= most && (length > 1e-3 || count > most / 6), "{number}, {length}: {count}");
-                assert_eq!(count_of_refined(&mesh, length, most, usize::MAX), count);
-                assert!(count_of_refined(&mesh, length, most, count - 1) >= count);
+                assert_eq!(count_of_refined(&mesh, length, most, usize::MAX, NEVER).unwrap(), count);
+                assert!(count_of_refined(&mesh, length, most, count - 1, NEVER).unwrap() >= count);
             }
         }
     }
 
     #[test]
     fn small_triangles_are_borrowed() {
-        assert!(refine(&one(Vec3::Y), 2.0, 100).sources.is_none());
+        assert!(refine(&one(Vec3::Y), 2.0, 100, NEVER).unwrap().sources.is_none());
     }
 
     #[test]
     fn normals_are_those_of_the_whole_triangles() {
         let sphere = Mesh::sphere(1);
-        let fine = refine(&sphere, 0.1, 1 << 20);
-        let origin = Origin::new(&sphere, fine.sources.unwrap(), 60.0);
+        let fine = refine(&sphere, 0.1, 1 << 20, NEVER).unwrap();
+        let origin = Origin::new(&sphere, fine.sources.unwrap(), 60.0, NEVER).unwrap();
         for (index, triangle) in fine.mesh.triangles.iter().enumerate() {
             for (corner, &vertex) in triangle.iter().enumerate() {
                 // Normals that change linearly over a triangle, as its places do, go on being the same.

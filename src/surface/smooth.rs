@@ -4,11 +4,15 @@ use super::{
     Mesh,
     adjacency::{Connected, is_split},
 };
+use crate::{Deadline, Result, deadline::Clock, memory};
 use glam::Vec3;
 use rayon::prelude::*;
 
 /// Creases sharper than this stay creases, whatever the options say (degrees): surfels lie in the plane of their group.
 const SHARPEST: f32 = 60.0;
+
+/// What errors call the work of this module.
+const WORK: &str = "finding the normals of the triangles' corners";
 
 /// The smooth groups of the triangles around one vertex.
 ///
@@ -52,13 +56,21 @@ impl Groups {
 
 /// The normal that each triangle has at its corners: the file's at the vertex, or the mean of the corner's smooth group,
 /// weighted by angle. Triangles without area have their vertices' normals alone, or zero.
-pub(crate) fn corner_normals(mesh: &Mesh, crease_angle_degrees: f32) -> Vec<[Vec3; 3]> {
-    let adjacency = Connected::new(mesh, is_split(mesh)).adjacency;
+///
+/// # Errors
+/// [`Error::Timeout`](crate::Error::Timeout) and [`Error::Memory`](crate::Error::Memory).
+pub(crate) fn corner_normals(mesh: &Mesh, crease_angle_degrees: f32, deadline: Deadline) -> Result<Vec<[Vec3; 3]>> {
+    let adjacency = Connected::new(mesh, is_split(mesh))?.adjacency;
+    memory::room(WORK, 48 * mesh.positions.len() as u64 + 120 * mesh.triangles.len() as u64)?;
+    let clock = Clock::new(deadline);
     let own: Vec<Vec<(u32, Vec3)>> = (0..mesh.positions.len())
         .into_par_iter()
         .map_init(
             || Groups::new(crease_angle_degrees),
             |groups, vertex| {
+                if clock.is_over(vertex) {
+                    return Vec::new();
+                }
                 groups.clear();
                 let corners = adjacency.corners(vertex).iter();
                 let around: Vec<(u32, usize, Vec3)> = corners
@@ -73,6 +85,7 @@ pub(crate) fn corner_normals(mesh: &Mesh, crease_angle_degrees: f32) -> Vec<[Vec
             },
         )
         .collect();
+    clock.finish(WORK)?;
     let mut normals = vec![[Vec3::ZERO; 3]; mesh.triangles.len()];
     for (at, normal) in own.into_iter().flatten() {
         normals[at as usize / 3][at as usize % 3] = normal;
@@ -84,7 +97,7 @@ pub(crate) fn corner_normals(mesh: &Mesh, crease_angle_degrees: f32) -> Vec<[Vec
             }
         });
     }
-    normals
+    Ok(normals)
 }
 
 /// A triangle's unit normal, and its angle (radians) at a corner; none where it has no area.
@@ -113,13 +126,14 @@ mod tests {
     #[test]
     fn corners_have_the_normals_of_their_side() {
         let cube = Mesh::cube(2.0);
-        for (triangle, normals) in cube.triangles.iter().zip(corner_normals(&cube, 75.0)) {
+        for (triangle, normals) in cube.triangles.iter().zip(corner_normals(&cube, 75.0, Deadline::NEVER).unwrap()) {
             let [a, b, c] = triangle.map(|vertex| cube.positions[vertex as usize]);
             let flat = (b - a).cross(c - a).normalize();
             assert!(normals.iter().all(|normal| normal.dot(flat) > 0.9999));
         }
         let sphere = Mesh::sphere(3);
-        for (triangle, normals) in sphere.triangles.iter().zip(corner_normals(&sphere, 75.0)) {
+        for (triangle, normals) in sphere.triangles.iter().zip(corner_normals(&sphere, 75.0, Deadline::NEVER).unwrap())
+        {
             for (normal, &vertex) in normals.iter().zip(triangle) {
                 assert!(normal.dot(sphere.positions[vertex as usize].normalize()) > 0.999);
             }

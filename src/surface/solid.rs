@@ -4,6 +4,7 @@
 //! into it, what faces away is its front. Which side of a part is out is told by the sign of the volume within.
 
 use super::{Mesh, fan::Sums, mesh::given, parts::Joining, survey::Closing};
+use crate::memory;
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -137,6 +138,12 @@ impl Mesh {
     pub fn is_solid(&self) -> bool {
         let Some(closing) = self.closing() else { return false };
         if !self.has_opaque_materials() || u32::try_from(self.triangles.len()).is_err() {
+            return false;
+        }
+        // The part of each triangle, and the edges at which others are to come. Where they do not fit, nothing is left out of
+        // pictures.
+        if memory::room("joining the parts of a mesh", 40 * self.triangles.len() as u64).is_err() {
+            tracing::warn!("too little memory to tell whether all parts are turned outward: backs will be drawn");
             return false;
         }
         let name = |vertex: u32| match &closing {

@@ -10,11 +10,14 @@ use super::{
     Mesh,
     adjacency::{Connected, is_split},
     cloud,
-    fan::{Made, Maker, Sums},
+    fan::{LEAST_RATIO_SQUARED, LEAST_SQUARE, Made, Maker, Sums},
     refine::{Origin, budget, count_of_refined, refine},
+    survey::has_area,
 };
 use crate::{
-    Error, Result,
+    Deadline, Error, Result,
+    deadline::Clock,
+    memory,
     splat::{Payload, Splat, SplatSet},
 };
 use glam::{DVec3, Vec3};
@@ -34,6 +37,8 @@ pub struct SurfelOptions {
     pub largest_spacing: f32,
     /// The most triangles that cutting may lead to, or an eighth more than there are already; spacing grows to keep to it.
     pub most_triangles: usize,
+    /// When the surfels must be ready.
+    pub deadline: Deadline,
 }
 
 impl SurfelOptions {
@@ -56,12 +61,16 @@ impl Default for SurfelOptions {
             crease_angle_degrees: 75.0,
             largest_spacing: 1.0 / 128.0,
             most_triangles: 1 << 23,
+            deadline: Deadline::NEVER,
         }
     }
 }
 
 /// Where footprints end, in standard deviations.
 pub(crate) const EXTENT: f32 = 3.0;
+
+/// What errors call the work of this module.
+const WORK: &str = "making surfels";
 
 /// Vertices of one parallel task.
 const CHUNK: usize = 1 << 12;
@@ -77,18 +86,18 @@ impl Mesh {
     /// nothing; nor do points that coincide with another.
     ///
     /// # Errors
-    /// [`Error::NothingToDraw`] where nothing is left; [`Error::Argument`] for options that are no positive numbers, or beyond
+    /// [`Error::NothingToDraw`] where nothing is left; [`Error::Timeout`] after the deadline; [`Error::Memory`] where there is
+    /// too little; [`Error::Argument`] for options that are no positive numbers, or beyond
     /// [`RADIUS_SCALES`](SurfelOptions::RADIUS_SCALES), [`SPACINGS`](SurfelOptions::SPACINGS) and
-    /// [`MOST_OPTICAL_DEPTH`](Splat::MOST_OPTICAL_DEPTH), and for a mesh whose origin or positions are not finite, or whose
-    /// indices or attributes do not fit its positions.
+    /// [`MOST_OPTICAL_DEPTH`](Splat::MOST_OPTICAL_DEPTH), and for a mesh whose origin, positions or texture coordinates are not
+    /// finite, or whose indices or attributes do not fit its positions.
     pub fn surfels(&self, options: &SurfelOptions) -> Result<SplatSet> {
         let _span = tracing::info_span!("surfels").entered();
         self.check(options)?;
         let splats =
-            if self.triangles.is_empty() { cloud::surfels(self, options) } else { of_triangles(self, options) };
+            if self.triangles.is_empty() { cloud::surfels(self, options)? } else { of_triangles(self, options)? };
         if splats.is_empty() {
-            let what = if self.positions.is_empty() { "there are no points" } else { "no triangle has an area" };
-            return Err(Error::NothingToDraw(what.into()));
+            return Err(self.nothing());
         }
         Ok(SplatSet { origin: self.origin, payload: Payload::Radiance, splats, extent: EXTENT, overlap: 1.0 })
     }
@@ -124,14 +133,16 @@ impl Mesh {
     }
 
     /// How many triangles surfels are made of, once large ones are cut; about how many, where they are more than there is
-    /// `room` for, which takes no more memory to find out. 0 where a triangle refers beyond the positions.
-    pub fn triangles_once_cut(&self, options: &SurfelOptions, room: usize) -> usize {
-        if self.check(options).is_err() {
-            return 0;
-        }
-        let count =
-            |bounds| count_of_refined(self, largest_edge(bounds, self.area(), options), options.most_triangles, room);
-        self.local_bounds().map_or(0, count)
+    /// `room` for, which takes no more memory to find out.
+    ///
+    /// # Errors
+    /// Those of [`surfels`](Self::surfels).
+    pub fn triangles_once_cut(&self, options: &SurfelOptions, room: usize) -> Result<usize> {
+        self.check(options)?;
+        let Some(bounds) = self.local_bounds() else { return Ok(0) };
+        let largest = largest_edge(bounds, self.area(), options);
+        self.check_extent(largest)?;
+        count_of_refined(self, largest, options.most_triangles, room, options.deadline)
     }
 
     pub(super) fn check(&self, options: &SurfelOptions) -> Result<()> {
@@ -195,7 +206,56 @@ impl Mesh {
                 format!("the position {} of vertex {vertex} is not finite, or beyond 1e18", self.positions[vertex]);
             return Err(Error::Argument(message));
         }
+        let is_textured = self.materials.iter().any(|material| material.texture.is_some());
+        let not_finite = || self.uvs.par_iter().position_first(|uv| !uv.is_finite());
+        if let Some(vertex) = is_textured.then(not_finite).flatten() {
+            let uv = self.uvs[vertex];
+            return Err(Error::Argument(format!("the texture coordinates {uv} of vertex {vertex} are not finite")));
+        }
         Ok(())
+    }
+
+    /// Refuses a mesh of whose triangles nothing would be left once they are measured in `unit`, the longest edge that stays.
+    /// This is known before any is cut.
+    fn check_extent(&self, unit: f32) -> Result<()> {
+        let unit = f64::from(unit);
+        let [least_area, least_ratio] = [LEAST_SQUARE, LEAST_RATIO_SQUARED].map(|square| f64::from(square).sqrt());
+        // What cutting leaves of an edge, in units; for a texture it cuts into finer ones.
+        let is_textured = self.materials.iter().any(|material| material.texture.is_some());
+        let finest = if is_textured { 1.0 / 32.0 } else { 0.3 };
+        let is_left = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|vertex| self.positions[vertex as usize].as_dvec3() / unit);
+            let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared()).sqrt();
+            // Cutting keeps the height of a needle. Surfels ask for twice these bounds.
+            let height = (b - a).cross(c - a).length() / longest;
+            let edge = longest.min(1.0);
+            height > 0.5 * least_ratio * edge.min(finest) && height * edge > 0.5 * least_area
+        };
+        if self.triangles.is_empty() || self.triangles.par_iter().any(is_left) { Ok(()) } else { Err(self.nothing()) }
+    }
+
+    /// The error of a mesh or cloud of which nothing is left to draw.
+    fn nothing(&self) -> Error {
+        if self.positions.is_empty() {
+            return Error::NothingToDraw("there are no points".into());
+        }
+        let used = || self.triangles.par_iter().flatten().copied();
+        let place = |vertex: u32| self.positions[vertex as usize].as_dvec3();
+        let center = used().map(place).sum::<DVec3>() / (3 * self.triangles.len()).max(1) as f64;
+        let distance = |vertex: &u32| place(*vertex).distance_squared(center);
+        let farthest = used().max_by(|a, b| distance(a).total_cmp(&distance(b)).then(b.cmp(a)));
+        let what = match farthest.filter(|_| self.triangles.par_iter().any(|&triangle| has_area(self, triangle))) {
+            Some(vertex) => {
+                let at = (self.origin + place(vertex)).as_vec3();
+                format!(
+                    "vertex {vertex} at ({:e}, {:e}, {:e}) is so far from the others that their triangles are points beside it; \
+                     remove it, or the triangles that use it",
+                    at.x, at.y, at.z
+                )
+            }
+            None => "no triangle has an area".into(),
+        };
+        Error::NothingToDraw(what)
     }
 }
 
@@ -213,11 +273,12 @@ pub(super) fn largest_edge([low, high]: [Vec3; 2], area: f64, options: &SurfelOp
     (diagonal.min(longest) as f32 * options.largest_spacing.min(1.0)).max(f32::MIN_POSITIVE)
 }
 
-fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
-    let Some(bounds) = mesh.local_bounds() else { return Vec::new() };
+fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Result<Vec<Splat>> {
+    let Some(bounds) = mesh.local_bounds() else { return Ok(Vec::new()) };
     let largest = largest_edge(bounds, mesh.area(), options);
+    mesh.check_extent(largest)?;
     // Most large meshes are fine enough, and right side out. One look at the triangles finds that out and makes the surfels.
-    let parts = make(mesh, None, is_split(mesh), options, [largest, 1.0], |_| true);
+    let parts = make(mesh, None, is_split(mesh), options, [largest, 1.0], |_| true)?;
     let is_coarse = parts.iter().any(|part| part.longest > 1.0);
     let is_textured = !mesh.uvs.is_empty() && mesh.materials.iter().any(|material| material.texture.is_some());
     let sums = parts.iter().fold(Sums::default(), |sums, part| sums.with(part.sums));
@@ -226,9 +287,14 @@ fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Vec<Splat> {
         return joined(parts);
     }
     drop(parts);
-    let fine = refine(mesh, largest, options.most_triangles);
-    let origin = fine.sources.map(|sources| Origin::new(mesh, sources, options.crease_angle_degrees));
-    joined(make(&fine.mesh, origin.as_ref(), is_split(mesh), options, [largest, outward], |_| true))
+    let fine = refine(mesh, largest, options.most_triangles, options.deadline)?;
+    let origin = fine.sources.map(|sources| origin_of(mesh, sources, options)).transpose()?;
+    joined(make(&fine.mesh, origin.as_ref(), is_split(mesh), options, [largest, outward], |_| true)?)
+}
+
+/// What the triangles of a refined mesh were cut from.
+fn origin_of<'a>(mesh: &'a Mesh, sources: Vec<u32>, options: &SurfelOptions) -> Result<Origin<'a>> {
+    Origin::new(mesh, sources, options.crease_angle_degrees, options.deadline)
 }
 
 /// The surfels of the wanted vertices of a part of a mesh, as they are in the whole: `largest` is the length that edges are
@@ -243,16 +309,16 @@ pub(super) fn of_part(
     is_coarse: bool,
     cut: Option<f32>,
     is_wanted: impl Fn(usize) -> bool + Sync,
-) -> Vec<Splat> {
+) -> Result<Vec<Splat>> {
     let Some(length) = cut else {
         let sources = (0..part.triangles.len() as u32).collect();
-        let origin = is_coarse.then(|| Origin::new(part, sources, options.crease_angle_degrees));
-        return joined(make(part, origin.as_ref(), is_split, options, [largest, outward], is_wanted));
+        let origin = is_coarse.then(|| origin_of(part, sources, options)).transpose()?;
+        return joined(make(part, origin.as_ref(), is_split, options, [largest, outward], is_wanted)?);
     };
     // Whoever chose the length has kept to the budget.
-    let fine = refine(part, length, usize::MAX >> 1);
-    let origin = fine.sources.map(|sources| Origin::new(part, sources, options.crease_angle_degrees));
-    joined(make(&fine.mesh, origin.as_ref(), is_split, options, [largest, outward], is_wanted))
+    let fine = refine(part, length, usize::MAX >> 1, options.deadline)?;
+    let origin = fine.sources.map(|sources| origin_of(part, sources, options)).transpose()?;
+    joined(make(&fine.mesh, origin.as_ref(), is_split, options, [largest, outward], is_wanted)?)
 }
 
 /// The surfels of all wanted vertices, in parts.
@@ -263,25 +329,32 @@ fn make(
     options: &SurfelOptions,
     [unit, outward]: [f32; 2],
     is_wanted: impl Fn(usize) -> bool + Sync,
-) -> Vec<Made> {
-    let connected = Connected::new(mesh, is_split);
+) -> Result<Vec<Made>> {
+    options.deadline.check(WORK)?;
+    let connected = Connected::new(mesh, is_split)?;
+    memory::room(WORK, (size_of::<Splat>() * mesh.positions.len()) as u64)?;
+    let clock = Clock::new(options.deadline);
     let plain = mesh.materials.is_empty() && (mesh.colors.is_empty() || matches!(connected.places, Cow::Borrowed(_)));
     let maker = Maker { mesh, connected: &connected, options, origin, unit, outward, plain };
-    (0..mesh.positions.len().div_ceil(CHUNK))
+    let made = (0..mesh.positions.len().div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| {
             let vertices = chunk * CHUNK..((chunk + 1) * CHUNK).min(mesh.positions.len());
             let wanted: Vec<usize> = vertices.filter(|&vertex| is_wanted(vertex)).collect();
             let mut made = Made::new(options, wanted.len());
-            maker.vertices(&wanted, &mut made);
+            maker.vertices(&wanted, &mut made, &clock);
             made
         })
-        .collect()
+        .collect();
+    clock.finish(WORK)?;
+    Ok(made)
 }
 
 /// The surfels of all parts, in order.
-fn joined(parts: Vec<Made>) -> Vec<Splat> {
-    let mut splats = bytemuck::zeroed_vec(parts.iter().map(|part| part.splats.len()).sum());
+fn joined(parts: Vec<Made>) -> Result<Vec<Splat>> {
+    let count = parts.iter().map(|part| part.splats.len()).sum();
+    memory::room(WORK, (size_of::<Splat>() * count) as u64)?;
+    let mut splats = bytemuck::zeroed_vec(count);
     let mut rest = &mut splats[..];
     let mut pairs = Vec::with_capacity(parts.len());
     for part in parts {
@@ -290,7 +363,7 @@ fn joined(parts: Vec<Made>) -> Vec<Splat> {
         rest = after;
     }
     pairs.into_par_iter().for_each(|(place, part)| place.copy_from_slice(&part));
-    splats
+    Ok(splats)
 }
 
 #[cfg(test)]

@@ -85,7 +85,7 @@ impl Mesh {
 }
 
 /// Whether a triangle is more than a line, at the precision of its coordinates.
-fn has_area(mesh: &Mesh, triangle: [u32; 3]) -> bool {
+pub(super) fn has_area(mesh: &Mesh, triangle: [u32; 3]) -> bool {
     let [Some(a), Some(b), Some(c)] = triangle.map(|index| mesh.positions.get(index as usize)) else { return false };
     let [a, b, c] = [a, b, c].map(|place| place.as_dvec3());
     let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());

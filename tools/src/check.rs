@@ -5,11 +5,13 @@ use crate::{
     load::{Input, LoadFlags},
     output,
     progress::Progress,
+    scene::in_file,
     terminal::safe,
 };
 use clap::Args;
 use serde_json::json;
 use splatkit::{
+    Deadline, Error,
     hierarchy::{Finding, Severity, file},
     io::Kind,
     surface::{Mesh, SurfelOptions},
@@ -32,6 +34,7 @@ impl Check {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
         progress.stage(format!("Checking {}", self.file.display()));
         let limits = self.load.limits();
+        let deadline = limits.deadline();
         let findings = match self.load.kind(&self.file)? {
             Kind::Hierarchy => file::check(&self.file, &limits).findings,
             Kind::Bricks => {
@@ -40,7 +43,7 @@ impl Check {
                 bricks::check(&self.file, &limits, &watch).findings
             }
             _ => match self.load.open(&self.file)? {
-                Input::Mesh(mesh) => of_mesh(&mesh),
+                Input::Mesh(mesh) => of_mesh(&mesh, deadline).map_err(|error| in_file(&self.file, error))?,
                 // What is wrong with others is an error on reading.
                 _ => Vec::new(),
             },
@@ -79,7 +82,7 @@ fn as_json(finding: &Finding) -> serde_json::Value {
 }
 
 /// What a mesh or cloud has that gives nothing to draw, or draws otherwise than meant.
-fn of_mesh(mesh: &Mesh) -> Vec<Finding> {
+fn of_mesh(mesh: &Mesh, deadline: Deadline) -> splatkit::Result<Vec<Finding>> {
     let mut findings = Vec::new();
     let mut warn = |code, place: &str, message: String| {
         findings.push(Finding { code, severity: Severity::Warning, place: place.into(), message });
@@ -102,9 +105,14 @@ fn of_mesh(mesh: &Mesh) -> Vec<Finding> {
     if triangles > 0 && !mesh.is_closed() {
         warn("open", "triangles", "the surface has borders; its back can be seen through them".into());
     }
-    if let Err(error) = mesh.surfels(&SurfelOptions::default()) {
-        let message = error.to_string();
-        findings.push(Finding { code: "nothing", severity: Severity::Error, place: "content".into(), message });
+    match mesh.surfels(&SurfelOptions { deadline, ..SurfelOptions::default() }) {
+        // These say nothing about the file.
+        Err(error @ (Error::Timeout { .. } | Error::Memory { .. })) => return Err(error),
+        Err(error) => {
+            let message = error.to_string();
+            findings.push(Finding { code: "nothing", severity: Severity::Error, place: "content".into(), message });
+        }
+        Ok(_) => {}
     }
-    findings
+    Ok(findings)
 }

@@ -22,6 +22,8 @@ pub enum Failure {
     Usage(String),
     /// A result that could not be written.
     Output { file: PathBuf, message: String, hint: Option<&'static str> },
+    /// Threads that the system does not give.
+    Threads(String),
     /// A file that `check` found damaged; what is wrong has been told.
     Damaged { file: PathBuf, findings: usize },
     /// Cases of a suite that were not measured, each told with its reason, and the file that therefore was not written.
@@ -38,12 +40,16 @@ impl Failure {
 
     fn code(&self) -> u8 {
         match self {
-            Self::Output { .. } | Self::Library(Error::Output { .. }) | Self::Incomplete { .. } => 1,
+            Self::Output { .. } | Self::Library(Error::Output { .. }) | Self::Incomplete { .. } | Self::Threads(_) => 1,
             Self::Usage(_) | Self::Library(Error::Argument(_)) => 2,
-            Self::Library(Error::NoAdapter(_) | Error::Gpu(_) | Error::DeviceLost(_)) => 4,
-            Self::Library(Error::Input { .. } | Error::Limit { .. } | Error::File { .. } | Error::NothingToDraw(_)) => {
-                3
-            }
+            Self::Library(Error::NoAdapter(_) | Error::Gpu(_) | Error::DeviceLost(_) | Error::Memory { .. }) => 4,
+            Self::Library(
+                Error::Input { .. }
+                | Error::Limit { .. }
+                | Error::Timeout { .. }
+                | Error::File { .. }
+                | Error::NothingToDraw(_),
+            ) => 3,
             Self::Damaged { .. } => 3,
             Self::Comparison(_) => 5,
         }
@@ -56,6 +62,10 @@ impl Failure {
             Self::Library(Error::Limit { file, kind, found, .. }) => {
                 return Some(limits::hint(file, *kind, *found).into());
             }
+            Self::Library(Error::Timeout { .. }) => Some("raise --limit-seconds"),
+            Self::Library(Error::Memory { .. }) => Some(
+                "close other programs, raise the process's limits (`ulimit -v`), or convert the file to .splk with less --memory",
+            ),
             Self::Library(Error::NoAdapter(_)) => {
                 Some("`splatkit gpus` lists what there is; `--reference` needs no GPU")
             }
@@ -78,6 +88,7 @@ impl Failure {
             Self::Library(Error::Argument(_)) | Self::Usage(_) => Some("`splatkit help` lists the options"),
             Self::Library(Error::File { .. }) | Self::Comparison(_) => None,
             Self::Damaged { .. } => Some("make it again from its source, or fetch it again"),
+            Self::Threads(_) => Some("end other programs, raise `ulimit -u`, or set RAYON_NUM_THREADS=1"),
             Self::Incomplete { .. } => Some("the tables tell the reason of each"),
             Self::Output { hint, .. } => *hint,
         };
@@ -156,6 +167,7 @@ impl fmt::Display for Failure {
         match self {
             Self::Library(error) => error.fmt(out),
             Self::Usage(message) | Self::Comparison(message) => out.write_str(message),
+            Self::Threads(reason) => write!(out, "no threads can be started: {reason}"),
             Self::Damaged { file, findings } => write!(out, "{}: {findings} findings", file.display()),
             Self::Incomplete { failed, kept } => {
                 write!(out, "{failed} of the suite's cases could not be drawn")?;

@@ -1,5 +1,6 @@
 //! Ctrl-C, and the signals by which a system asks a process to end or ends it.
 
+use crate::threads;
 use splatkit::disk;
 use std::io::Write;
 
@@ -9,6 +10,11 @@ const INTERRUPTED: i32 = 130;
 /// From now on these leave no file that is not whole: the handler, which runs on a thread of its own, removes what is on its
 /// way and ends the process, whatever that is at.
 pub fn answer() {
+    // Without a thread to run on, a handler would only keep the signal from ending the process.
+    if !threads::is_available() {
+        tracing::warn!("the system gives no thread to answer Ctrl-C on: it may leave files that are not whole");
+        return survive_large_files();
+    }
     let set = ctrlc::set_handler(|| {
         let _abandoned = disk::abandon();
         // Who reads stderr may be gone already.

@@ -21,7 +21,8 @@ pub struct LimitFlags {
     /// Pixels that a picture may have [default: 268435456]
     #[arg(long, value_name = "COUNT")]
     limit_texels: Option<u64>,
-    /// Seconds that reading an input may take [default: 600]
+    /// Seconds that reading an input and making its splats may take together; building a hierarchy of them may take as many
+    /// again. In regions, this limits each region [default: 600]
     #[arg(long, value_name = "SECONDS")]
     limit_seconds: Option<u64>,
 }

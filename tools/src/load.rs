@@ -4,7 +4,7 @@ use crate::{failure::Failure, limits::LimitFlags, parse};
 use clap::Args;
 use glam::DVec3;
 use splatkit::{
-    Error,
+    Deadline, Error,
     hierarchy::Hierarchy,
     io::{self, Endian, Kind, Limits, RawLayout, SampleType, Source, VolumeStream},
     memory,
@@ -120,12 +120,13 @@ impl LoadFlags {
     }
 
     /// How scattered samples become splats.
-    pub fn sample_options(&self) -> SampleOptions {
+    pub fn sample_options(&self, deadline: Deadline) -> SampleOptions {
         let default = SampleOptions::default();
         SampleOptions {
             neighbours: self.neighbours.unwrap_or(default.neighbours),
             radius: self.radius,
             slopes: !self.no_slopes,
+            deadline,
             ..default
         }
     }

@@ -33,6 +33,7 @@ mod scene;
 mod show;
 mod suite;
 mod terminal;
+mod threads;
 mod timing;
 
 use clap::{Parser, Subcommand};
@@ -94,6 +95,9 @@ fn main() -> ExitCode {
     };
     start_log(&command);
     interrupt::answer();
+    if let Err(failure) = threads::start() {
+        return failure.report();
+    }
     let progress = Progress::new(!command.quiet);
     let result = match command.task {
         Task::Render(task) => task.run(&progress),

@@ -1,6 +1,7 @@
 //! What the command is doing, on a terminal's stderr; nothing anywhere else.
 
 use crate::terminal::safe;
+use crate::threads;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{io::IsTerminal, sync::Mutex, time::Duration};
 
@@ -13,7 +14,10 @@ impl Progress {
             return Self(ProgressBar::hidden());
         }
         let bar = ProgressBar::new_spinner();
-        bar.enable_steady_tick(Duration::from_millis(100));
+        // The line turns on a thread of its own, which cannot be asked for without a panic.
+        if threads::is_available() {
+            bar.enable_steady_tick(Duration::from_millis(100));
+        }
         let progress = Self(bar);
         progress.spin();
         progress

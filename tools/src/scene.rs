@@ -65,11 +65,13 @@ impl SceneFlags {
         let (mut is_scaled, mut unscaled) = (false, None);
         for path in &self.inputs {
             progress.stage(format!("Reading {}", path.display()));
+            // Reading and what follows share the time.
+            let deadline = self.load.limits().deadline();
             match self.load.open_within(path, memory::most(), &mut loaded.read)? {
                 Input::Mesh(mesh) => {
                     is_scaled = true;
                     progress.stage(format!("Making surfels of {}", path.display()));
-                    let mut options = SurfelOptions::default();
+                    let mut options = SurfelOptions { deadline, ..SurfelOptions::default() };
                     options.radius_scale *= self.show.radius_scale.unwrap_or(1.0);
                     let splats = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
                     let bounds = mesh.bounds().map_or(splats.bounds(), |[min, max]| Bounds { min, max });
@@ -117,7 +119,7 @@ impl SceneFlags {
                     let automatic = || TransferFunction::automatic_for_points(&points);
                     let transfer = show.transfer(path, points.range(), automatic)?;
                     progress.stage(format!("Making splats of {}", path.display()));
-                    let splats = points.to_splats(&self.load.sample_options()).map_err(|e| in_file(path, e))?;
+                    let splats = points.to_splats(&self.load.sample_options(deadline)).map_err(|e| in_file(path, e))?;
                     let [min, max] = points.bounds();
                     loaded.add(Bounds { min, max }.union(splats.bounds()), points.len());
                     loaded.scene = loaded.scene.with_samples(splats, transfer);
@@ -184,8 +186,7 @@ fn overview(bricks: &Bricks) -> usize {
 /// Names the file in errors that do not know it.
 pub fn in_file(path: &Path, error: Error) -> Error {
     match error {
-        Error::NothingToDraw(what) => Error::NothingToDraw(format!("{}: {what}", path.display())),
         Error::Argument(what) => Error::input(path, "content", what),
-        other => other,
+        other => other.in_file(path),
     }
 }

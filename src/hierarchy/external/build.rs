@@ -2,21 +2,23 @@
 
 use super::{
     super::{
-        build::{Builder, block_of, check_splats},
+        Block,
+        build::{Builder, WORK, block_of, check_splats},
         partition,
         sphere::Sphere,
     },
-    ExternalOptions, Stage, StageWatch,
+    ExternalOptions, OF_POINT, Stage, StageWatch,
     bins::Bins,
     distribute::Distributed,
     survey::Triangulated,
 };
 use crate::{
-    Error, Result,
+    Deadline, Error, Result,
     io::StreamPoint,
     math::Bounds,
+    memory,
     splat::{Payload, Splat, SplatSet, decode_normal},
-    surface::{EXTENT, Known, Mesh, cloud_piece},
+    surface::{EXTENT, Known, Mesh, SurfelOptions, cloud_piece},
 };
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -38,6 +40,9 @@ pub struct Work<'a> {
     pub built: u64,
     pub splats: u64,
     pub watch: StageWatch<'a>,
+    /// Seconds that a region may take, and when the one at work must be done.
+    pub seconds: u64,
+    pub deadline: Deadline,
 }
 
 /// A point's number, and its normal as surfels have it.
@@ -67,10 +72,13 @@ impl Work<'_> {
         };
         (self.watch)(Stage::Building, self.built, self.points);
         for region in 0..regions {
+            self.deadline = Deadline::after(self.seconds);
+            let surfels = SurfelOptions { deadline: self.deadline, ..self.options.surfels.clone() };
+            memory::room(WORK, OF_POINT.saturating_mul(input.points.count(region) as u64))?;
             let part = Part::read(&mut input, region)?;
             let splats = match &input.input.mesh {
-                Some(mesh) => part.of_mesh(mesh, Some(region) == input.input.long_region(), self.options)?,
-                None => part.of_cloud(&input, sides.as_mut(), region, self.options)?,
+                Some(mesh) => part.of_mesh(mesh, Some(region) == input.input.long_region(), &surfels)?,
+                None => part.of_cloud(&input, sides.as_mut(), region, &surfels)?,
             };
             let owned = part.owned.iter().filter(|owned| **owned).count() as u64;
             drop(part);
@@ -97,9 +105,12 @@ impl Work<'_> {
         self.bounds = self.bounds.union(set.bounds());
         let parts = partition::blocks(&set.splats, self.options.block_splats.max(64));
         for parts in parts.chunks(2 * rayon::current_num_threads()) {
-            let block = |part: &Vec<u32>| block_of(&set, part, self.options.preset, self.builder.outer);
-            let blocks = parts.par_iter().map(block).collect();
-            self.builder.add(blocks)?;
+            let block = |part: &Vec<u32>| {
+                self.deadline.check(WORK)?;
+                Ok(block_of(&set, part, self.options.preset, self.builder.outer))
+            };
+            let blocks: Result<Vec<Block>> = parts.par_iter().map(block).collect();
+            self.builder.add(blocks?)?;
         }
         Ok(())
     }
@@ -140,11 +151,11 @@ impl Part {
         Ok(Self { mesh, indices, owned })
     }
 
-    fn of_mesh(&self, mesh: &Triangulated, is_long: bool, options: &ExternalOptions) -> Result<Vec<Splat>> {
+    fn of_mesh(&self, mesh: &Triangulated, is_long: bool, options: &SurfelOptions) -> Result<Vec<Splat>> {
         if self.mesh.triangles.is_empty() {
             return Ok(Vec::new());
         }
-        mesh.pieces.surfels(&self.mesh, &self.owned, is_long, &options.surfels)
+        mesh.pieces.surfels(&self.mesh, &self.owned, is_long, options)
     }
 
     /// Sides that other regions told are followed, and what is near others told to those that come later.
@@ -153,16 +164,16 @@ impl Part {
         input: &Distributed,
         sides: Option<&mut Bins<Side>>,
         region: u32,
-        options: &ExternalOptions,
+        options: &SurfelOptions,
     ) -> Result<Vec<Splat>> {
         let spacing = Some(input.input.regions.spacing);
         let mut known = Known { spacing, center: Some(input.input.center), normals: Vec::new() };
         let Some(sides) = sides else {
-            let splats = cloud_piece(&self.mesh, &self.owned, known, &options.surfels)?;
+            let splats = cloud_piece(&self.mesh, &self.owned, known, options)?;
             return Ok(splats.into_iter().map(|(_, splat)| splat).collect());
         };
         known.normals = sides.read(region)?.into_iter().filter_map(|side| self.known(side)).collect();
-        let splats = cloud_piece(&self.mesh, &self.owned, known, &options.surfels)?;
+        let splats = cloud_piece(&self.mesh, &self.owned, known, options)?;
         let mut around = Vec::new();
         for (point, splat) in &splats {
             input.input.regions.around(Vec3::from(splat.center), &mut around);

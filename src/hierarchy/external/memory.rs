@@ -49,13 +49,16 @@ pub fn memory_of_splats(splats: usize) -> u64 {
 
 /// About how many bytes making a hierarchy of a mesh or cloud takes, but for the [`BLOCKS`] at work; less where that is not more
 /// than `enough` anyway.
-pub fn memory_of_mesh(mesh: &Mesh, options: &SurfelOptions, enough: u64) -> u64 {
+///
+/// # Errors
+/// Those of [`Mesh::triangles_once_cut`].
+pub fn memory_of_mesh(mesh: &Mesh, options: &SurfelOptions, enough: u64) -> Result<u64> {
     let counts = Counts { points: mesh.positions.len() as u64, triangles: mesh.triangles.len() as u64 };
     let [least, most] = memory_between(counts, options);
     if least > enough || most <= enough {
-        return least;
+        return Ok(least);
     }
-    of_counts(once_cut(counts, mesh.triangles_once_cut(options, room(counts, enough)) as u64))
+    Ok(of_counts(once_cut(counts, mesh.triangles_once_cut(options, room(counts, enough))? as u64)))
 }
 
 /// About how many bytes making a hierarchy of a file takes where all of it is in memory, but for the [`BLOCKS`] at work: it is
@@ -110,7 +113,9 @@ pub fn check(files: &[PathBuf], limits: &Limits, options: &ExternalOptions, watc
         let points = stream.counts().points;
         stream.settle(&|done| watch(Stage::Reading, done, points))?;
         if stream.counts().triangles > 0 {
-            look_at_long(&stream, options, watch)?;
+            let surfels = SurfelOptions { deadline: limits.deadline(), ..options.surfels.clone() };
+            let options = ExternalOptions { surfels, ..options.clone() };
+            look_at_long(&stream, &options, watch).map_err(|error| error.in_file(file))?;
         }
     }
     Ok(())

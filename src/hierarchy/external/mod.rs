@@ -81,7 +81,8 @@ const FEWEST_POINTS: u64 = 1 << 10;
 /// Those of [`Stream::open`] and of reading on; [`Error::Argument`] for a file that can only be read as a whole, and for
 /// options of [`Mesh::surfels`](crate::surface::Mesh::surfels) that are no positive numbers; [`Error::Input`] for a mesh
 /// of so many long triangles, which are cut together, that the memory does not suffice; [`Error::NothingToDraw`] where
-/// nothing is left; [`Error::Output`] where something cannot be written. Then nothing is left of the file.
+/// nothing is left; [`Error::Timeout`] where counting long triangles, or a region, takes longer than
+/// [`Limits::seconds`]; [`Error::Memory`] where there is too little; [`Error::Output`] where something cannot be written. Then nothing is left of the file.
 pub fn convert(
     files: &[PathBuf],
     limits: &Limits,
@@ -98,7 +99,10 @@ pub fn convert(
             Error::Argument(format!("{}: a file of this kind can only be read as a whole", file.display()))
         })?;
         stream.warn();
-        let input = survey::survey(stream, most, options, watch)?;
+        // Long triangles are cut once to be counted, and once to be drawn.
+        let surfels = SurfelOptions { deadline: limits.deadline(), ..options.surfels.clone() };
+        let options = &ExternalOptions { surfels, ..options.clone() };
+        let input = survey::survey(stream, most, options, watch).map_err(|error| error.in_file(file))?;
         tracing::info!(file = %file.display(), regions = input.regions(), "cut in regions");
         inputs.push(distribute::distribute(input, [most, options.memory], path, watch)?);
     }
@@ -121,9 +125,11 @@ pub fn convert(
         built: 0,
         splats: 0,
         watch,
+        seconds: limits.seconds,
+        deadline: limits.deadline(),
     };
-    for input in inputs {
-        work.input(input, path)?;
+    for (input, file) in inputs.into_iter().zip(files) {
+        work.input(input, path).map_err(|error| error.in_file(file))?;
     }
     if work.splats == 0 {
         return Err(Error::NothingToDraw("no point is left, or no triangle has an area".into()));

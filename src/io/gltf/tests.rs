@@ -411,3 +411,21 @@ fn hostile_files_are_refused_with_a_reason() {
         load("a.glb", file).expect_err("broken");
     }
 }
+
+#[test]
+fn texture_coordinates_are_finite() {
+    for (at, value) in [(0, f32::NAN), (5, f32::INFINITY)] {
+        let mut binary = square_bytes();
+        binary[48 + 4 * at..][..4].copy_from_slice(&value.to_le_bytes());
+        let picture = png(1, 1, &[[9; 4]]);
+        let scene = changed(&[
+            ("/buffers/0/uri", json!(data_uri(&binary))),
+            ("/images", json!([{"uri": data_uri(&picture)}])),
+            ("/textures", json!([{"source": 0}])),
+            ("/materials/0", json!({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})),
+        ]);
+        let error = load_json(&scene).unwrap_err().to_string();
+        let vertex = format!("vertex {}: the texture coordinates [", at / 2);
+        assert!(error.contains(&vertex) && error.contains("are not finite"), "{error}");
+    }
+}

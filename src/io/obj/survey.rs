@@ -144,6 +144,17 @@ impl Survey {
     }
 }
 
+/// The place of the first texture coordinates that are not finite in 32 bits.
+pub(super) fn place_of_wide_uv(text: &str) -> String {
+    let is_wide = |word: &str| word.parse::<f64>().is_ok_and(|value| !(value as f32).is_finite());
+    let has_wide = |line: &str| {
+        let mut words = line.split_whitespace();
+        words.next() == Some("vt") && words.take(2).any(is_wide)
+    };
+    let line = text.lines().position(has_wide);
+    line.map_or_else(|| "texture coordinates".into(), |line| format!("line {}", line + 1))
+}
+
 const WHAT: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
 fn wrong(index: i64, kind: usize, count: i64) -> String {

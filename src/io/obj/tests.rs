@@ -219,3 +219,23 @@ fn large_coordinates_keep_their_precision() {
     let mesh = mesh.expect("loads");
     assert_eq!(mesh.origin + mesh.positions[2].as_dvec3(), DVec3::new(4_500_000.125, 5_600_001.5, 1.0));
 }
+
+/// Coordinates in a picture that are none, or that 32 bits do not hold; elsewhere nobody asks for them.
+#[test]
+fn texture_coordinates_are_finite() {
+    let folder = Folder::new();
+    folder.write("t.png", png(1, 1, &[[9; 4]]));
+    folder.write("m.mtl", "newmtl a\nmap_Kd t.png\nnewmtl b\n");
+    let obj = |uv: &str, material: &str| {
+        let text = format!(
+            "mtllib m.mtl\nusemtl {material}\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt {uv}\nvt 1 1\nf 1/1 2/2 3/3\n"
+        );
+        load_mesh(&folder.write("a.obj", text), &Limits::default())
+    };
+    for uv in ["inf 0", "0 NaN", "-inf nan", "1e39 0", "0 -1e400"] {
+        let error = obj(uv, "a").unwrap_err().to_string();
+        assert!(error.contains("a.obj: line 7: the texture coordinates [") && error.contains("not finite"), "{error}");
+        assert!(obj(uv, "b").is_ok());
+    }
+    assert!(obj("3e38 -1e38", "a").is_ok());
+}

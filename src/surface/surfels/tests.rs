@@ -266,7 +266,7 @@ fn a_fine_texture_on_coarse_triangles_is_averaged() {
 #[test]
 fn textures_keep_to_the_budget() {
     let texture = Some(Arc::new(Texture { width: 1024, height: 1024, texels: vec![[99; 4]; 1024 * 1024] }));
-    for far in [1.0, 5.0, 1e5, 1e20, f32::NAN, f32::INFINITY] {
+    for far in [1.0, 5.0, 1e3, 1e5, 1e20, f32::MAX] {
         for across in [0.0, 0.01, far] {
             let mesh = Mesh {
                 positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
@@ -277,7 +277,7 @@ fn textures_keep_to_the_budget() {
                 ..Mesh::default()
             };
             let options = SurfelOptions { most_triangles: 30_000, ..SurfelOptions::default() };
-            let (told, made) = (mesh.triangles_once_cut(&options, usize::MAX), surfels_of(&mesh, &options));
+            let (told, made) = (mesh.triangles_once_cut(&options, usize::MAX).unwrap(), surfels_of(&mesh, &options));
             // The least that its size asks for is 35,000.
             assert!(made < 100_000 && 2 * told > made, "{far} {across}: {made} surfels, {told} triangles told");
         }
@@ -321,7 +321,10 @@ fn a_far_origin_changes_nothing() {
             let splats = surfels(&far).splats;
             assert!(splats.len() == near.splats.len() && splats.iter().zip(&near.splats).all(|(a, b)| a == b));
             let options = SurfelOptions::default();
-            assert_eq!(far.triangles_once_cut(&options, usize::MAX), mesh.triangles_once_cut(&options, usize::MAX));
+            assert_eq!(
+                far.triangles_once_cut(&options, usize::MAX).unwrap(),
+                mesh.triangles_once_cut(&options, usize::MAX).unwrap()
+            );
         }
         for origin in [DVec3::X * f64::NAN, DVec3::Y * f64::INFINITY] {
             let error = Mesh { origin, ..mesh.clone() }.surfels(&SurfelOptions::default()).unwrap_err().to_string();
@@ -383,4 +386,77 @@ fn a_triangle_far_off_takes_nothing_away() {
         let count = surfels(&both).splats.len();
         assert!(count >= mesh.positions.len() + 3, "{far:e}: {count} surfels");
     }
+}
+
+/// A sheet of squares with a picture of 8 × 8 texels; vertex 7 has other coordinates in it.
+fn textured(uv: glam::Vec2) -> Mesh {
+    const SIDE: u32 = 12;
+    let texture = Some(Arc::new(Texture { width: 8, height: 8, texels: vec![[99; 4]; 64] }));
+    let places = (0..(SIDE + 1).pow(2)).map(|vertex| [vertex % (SIDE + 1), vertex / (SIDE + 1)].map(|v| v as f32));
+    let corners = (0..SIDE * SIDE).map(|square| square / SIDE * (SIDE + 1) + square % SIDE);
+    let mut mesh = Mesh {
+        positions: places.clone().map(|[x, y]| Vec3::new(x, y, (x + y).sin())).collect(),
+        uvs: places.map(|place| glam::Vec2::from(place) / SIDE as f32).collect(),
+        triangles: corners.flat_map(|a| [[a, a + 1, a + SIDE + 2], [a, a + SIDE + 2, a + SIDE + 1]]).collect(),
+        materials: vec![Material { name: String::new(), color: [1.0; 4], texture }],
+        ..Mesh::default()
+    };
+    mesh.triangle_materials = vec![0; mesh.triangles.len()];
+    mesh.uvs[7] = uv;
+    mesh
+}
+
+/// One texture coordinate that is far off costs no more than the triangles around it.
+#[test]
+fn a_far_texture_coordinate_is_soon_done() {
+    let options = SurfelOptions { deadline: Deadline::after(60), ..SurfelOptions::default() };
+    let usual = surfels_of(&textured(glam::Vec2::ONE), &options);
+    for far in [1e2, 1e3, 1e4, 1e6, 1e12, 1.8e19, f32::MAX] {
+        for uv in [glam::Vec2::new(far, 0.5), glam::Vec2::new(far, -far)] {
+            let made = surfels_of(&textured(uv), &options);
+            assert!(made < usual + 1_000_000, "{uv}: {made} surfels, {usual} without");
+        }
+    }
+    for value in [f32::NAN, f32::INFINITY] {
+        let error = textured(glam::Vec2::new(0.5, value)).surfels(&options).unwrap_err().to_string();
+        assert!(error.contains("of vertex 7 are not finite"), "{error}");
+    }
+}
+
+/// Before anything is cut.
+#[test]
+fn a_far_vertex_is_named() {
+    for x in [1e13, 1e15, 1e17] {
+        let mut mesh = textured(glam::Vec2::ONE);
+        mesh.materials.clear();
+        mesh.triangle_materials.clear();
+        mesh.positions.iter_mut().for_each(|place| *place *= 0.1);
+        mesh.positions[5].x = x;
+        let begin = std::time::Instant::now();
+        let error = mesh.surfels(&SurfelOptions::default()).unwrap_err().to_string();
+        assert!(error.contains(&format!("vertex 5 at ({x:e}, ")), "{error}");
+        assert!(mesh.triangles_once_cut(&SurfelOptions::default(), usize::MAX).is_err());
+        assert!(begin.elapsed().as_secs() < 10, "{x}: {:?}", begin.elapsed());
+    }
+    let line =
+        Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::X * 2.0], triangles: vec![[0, 1, 2]], ..Mesh::default() };
+    let error = line.surfels(&SurfelOptions::default()).unwrap_err().to_string();
+    assert!(error.contains("no triangle has an area"), "{error}");
+}
+
+#[test]
+fn every_step_keeps_to_the_deadline() {
+    let options = SurfelOptions { deadline: Deadline::after(0), ..SurfelOptions::default() };
+    let fine = Mesh::sphere(5);
+    let cloud = Mesh { triangles: Vec::new(), ..Mesh::sphere(3) };
+    for mesh in [Mesh::cube(1.0), fine, cloud, textured(glam::Vec2::ONE)] {
+        let error = mesh.surfels(&options).unwrap_err();
+        assert!(matches!(error, Error::Timeout { limit: 0, .. }), "{error}");
+    }
+    let error = Mesh::cube(1.0).triangles_once_cut(&options, usize::MAX).unwrap_err();
+    assert!(error.to_string().contains("cutting long triangles takes longer"), "{error}");
+    // Each step by itself.
+    let mesh = Mesh::cube(1.0);
+    assert!(super::refine(&mesh, 0.1, 1 << 20, options.deadline).is_err());
+    assert!(super::super::corner_normals(&mesh, 60.0, options.deadline).is_err());
 }

@@ -4,7 +4,7 @@ use super::{Convert, memory::Need, surface::Frame};
 use crate::{failure::Failure, output, progress::Progress, render::milliseconds};
 use serde_json::json;
 use splatkit::{
-    Error,
+    Deadline, Error,
     hierarchy::{
         BuildOptions,
         external::{BLOCKS, ExternalOptions, Stage, check, convert},
@@ -35,7 +35,8 @@ impl Convert {
             memory: most,
             preset: self.surface.preset(),
             block_splats: BuildOptions::default().block_splats,
-            surfels: self.surface.surfel_options(),
+            // Each region has a deadline of its own.
+            surfels: self.surface.surfel_options(Deadline::NEVER),
         };
         let stages = progress.stages();
         let watch = |stage: Stage, done: u64, total: u64| {

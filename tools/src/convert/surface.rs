@@ -5,7 +5,7 @@ use crate::{failure::Failure, load::Input, output, parse, progress::Progress, re
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use splatkit::{
-    Error,
+    Deadline, Error,
     hierarchy::{
         self, BuildOptions,
         external::{memory_of_mesh, memory_of_splats},
@@ -90,7 +90,8 @@ impl Convert {
             return Err(Failure::Usage("--lattice is for volumes written as .nrrd".into()));
         }
         let most = self.most_memory();
-        let need = memory::need(&self.files, &self.load.limits(), &self.surface.surfel_options(), most);
+        let limits = self.load.limits();
+        let need = memory::need(&self.files, &limits, &self.surface.surfel_options(limits.deadline()), most);
         if need.bytes > most {
             return self.in_regions(extension, need, most, progress);
         }
@@ -105,9 +106,12 @@ impl Convert {
         } else {
             let bar = progress.bar("Building the hierarchy", gathered.set.splats.len() as u64);
             let watch = |done: u64, _: u64| bar.set(done);
-            let (build, write) =
-                (self.surface.build_options(&gathered), self.surface.write_options(&self.files, &gathered.frame));
-            hierarchy::build_file(&gathered.set, &self.output, &build, &write, &watch)?;
+            let (build, write) = (
+                self.surface.build_options(&gathered, limits.deadline()),
+                self.surface.write_options(&self.files, &gathered.frame),
+            );
+            let built = hierarchy::build_file(&gathered.set, &self.output, &build, &write, &watch);
+            built.map_err(|error| error.in_file(&self.files[0]))?;
         }
         progress.clear();
         let build_ms = milliseconds(start);
@@ -154,6 +158,8 @@ impl Convert {
     fn splats_of(&self, path: &Path, taken: u64, progress: &Progress) -> Result<Gathered, Failure> {
         progress.stage(format!("Reading {}", path.display()));
         let start = Instant::now();
+        // Reading and what follows share the time.
+        let deadline = self.load.limits().deadline();
         let most = self.most_memory();
         let mut read = Vec::new();
         let input = self.load.open_within(path, Some(most), &mut read)?;
@@ -163,8 +169,9 @@ impl Convert {
         let (set, closed, frame, points) = match input {
             Input::Mesh(mesh) => {
                 progress.stage(format!("Making splats of {} points", mesh.positions.len()));
-                let options = self.surface.surfel_options();
-                memory::check(path, memory_of_mesh(&mesh, &options, most.saturating_sub(taken)), taken, most)?;
+                let options = self.surface.surfel_options(deadline);
+                let need = memory_of_mesh(&mesh, &options, most.saturating_sub(taken));
+                memory::check(path, need.map_err(|e| in_file(path, e))?, taken, most)?;
                 let closed = mesh.is_solid();
                 let set = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
                 let frame = Frame { up: mesh.z_is_up.then_some(UpAxis::Z), ..Frame::default() };
@@ -200,10 +207,12 @@ impl Convert {
         let first = (splats.len() - count) / 2;
         let SplatSet { origin, payload, extent, overlap, .. } = gathered.set;
         let part = SplatSet { origin, payload, splats: splats[first..first + count].to_vec(), extent, overlap };
+        let deadline = self.load.limits().deadline();
         let (build, write) =
-            (self.surface.build_options(gathered), self.surface.write_options(&self.files, &gathered.frame));
+            (self.surface.build_options(gathered, deadline), self.surface.write_options(&self.files, &gathered.frame));
         let start = Instant::now();
-        let tree = hierarchy::Tree::build(&part, &build, &|_, _| ())?;
+        let built = hierarchy::Tree::build(&part, &build, &|_, _| ());
+        let tree = built.map_err(|error| error.in_file(&self.files[0]))?;
         let bytes = hierarchy::file::to_bytes(&tree, &write)?.len() as f64;
         let share = splats.len() as f64 / count as f64;
         let build_ms = milliseconds(start) * share;
@@ -282,15 +291,16 @@ impl SurfaceFlags {
         self.radius_scale.unwrap_or(1.0)
     }
 
-    pub(super) fn surfel_options(&self) -> SurfelOptions {
-        SurfelOptions { radius_scale: self.radius_scale(), ..SurfelOptions::default() }
+    pub(super) fn surfel_options(&self, deadline: Deadline) -> SurfelOptions {
+        SurfelOptions { radius_scale: self.radius_scale(), deadline, ..SurfelOptions::default() }
     }
 
-    fn build_options(&self, gathered: &Gathered) -> BuildOptions {
+    fn build_options(&self, gathered: &Gathered, deadline: Deadline) -> BuildOptions {
         BuildOptions {
             preset: self.preset(),
             closed: gathered.closed,
             source_points: Some(gathered.points),
+            deadline,
             ..BuildOptions::default()
         }
     }

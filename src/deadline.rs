@@ -1,0 +1,96 @@
+//! The time that work on an input may take.
+
+use crate::{Error, Result};
+use std::{
+    sync::atomic::{AtomicBool, Ordering::Relaxed},
+    time::{Duration, Instant},
+};
+
+/// The moment by which work on an input must be done. By default there is none.
+///
+/// The options of every step between a file and its splats carry one, so that a file of a few bytes cannot keep a program
+/// busy. The steps look at the clock every few thousand items, and end with [`Error::Timeout`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Deadline {
+    end: Option<Instant>,
+    seconds: u64,
+}
+
+impl Deadline {
+    /// No deadline.
+    pub const NEVER: Self = Self { end: None, seconds: u64::MAX };
+
+    /// A deadline this many seconds from now.
+    pub fn after(seconds: u64) -> Self {
+        Self { end: Instant::now().checked_add(Duration::from_secs(seconds)), seconds }
+    }
+
+    /// Whether the deadline has passed.
+    pub fn is_over(&self) -> bool {
+        self.end.is_some_and(|end| Instant::now() >= end)
+    }
+
+    /// Refuses to go on once the deadline has passed; `what` names the work in the error.
+    ///
+    /// # Errors
+    /// [`Error::Timeout`].
+    pub fn check(&self, what: &str) -> Result<()> {
+        if self.is_over() { Err(self.error(what)) } else { Ok(()) }
+    }
+
+    fn error(&self, what: &str) -> Error {
+        Error::Timeout { what: what.into(), limit: self.seconds }
+    }
+}
+
+impl Default for Deadline {
+    fn default() -> Self {
+        Self::NEVER
+    }
+}
+
+/// Items between two looks at the clock.
+const ITEMS: usize = 1 << 8;
+
+/// A deadline that many threads watch in one loop. Once it has passed, each of them skips the rest of its items.
+pub(crate) struct Clock {
+    deadline: Deadline,
+    is_over: AtomicBool,
+}
+
+impl Clock {
+    pub fn new(deadline: Deadline) -> Self {
+        Self { deadline, is_over: AtomicBool::new(false) }
+    }
+
+    /// Whether to skip the item of this number. The system's clock is read for a few items only.
+    pub fn is_over(&self, item: usize) -> bool {
+        if item.is_multiple_of(ITEMS) && self.deadline.is_over() {
+            self.is_over.store(true, Relaxed);
+        }
+        self.is_over.load(Relaxed)
+    }
+
+    /// Ends the loop. Its result is incomplete where this is an error.
+    pub fn finish(self, what: &str) -> Result<()> {
+        if self.is_over.into_inner() { Err(self.deadline.error(what)) } else { Ok(()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_runs_out() {
+        let over = Deadline::after(0);
+        assert!(over.is_over() && !Deadline::after(1000).is_over() && !Deadline::after(u64::MAX).is_over());
+        assert!(Deadline::default().check("nothing").is_ok());
+        let message = over.check("cutting triangles").unwrap_err().to_string();
+        assert_eq!(message, "cutting triangles takes longer than the limit of 0 s");
+        let clock = Clock::new(over);
+        assert!(!clock.is_over(1) && clock.is_over(ITEMS) && clock.is_over(1));
+        assert!(clock.finish("work").is_err());
+        assert!(Clock::new(over).finish("no work").is_ok());
+    }
+}

@@ -1,0 +1,75 @@
+//! The threads that the library computes on.
+
+use crate::failure::Failure;
+use std::{num::NonZero, sync::mpsc, thread};
+
+/// More threads than this many for each processor only take memory.
+const OF_PROCESSOR: usize = 4;
+const MOST: usize = 1024;
+
+/// Starts as many threads as there are processors, or as `RAYON_NUM_THREADS` asks for. Where the system does not give them,
+/// everything runs on the calling thread.
+///
+/// # Errors
+/// [`Failure::Threads`] where there are threads at first, and then none.
+pub fn start() -> Result<(), Failure> {
+    let processors = thread::available_parallelism().map_or(1, NonZero::get);
+    let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.trim().parse().ok());
+    let count = count(asked, processors);
+    if let Some(asked) = asked.filter(|&asked| asked > count) {
+        tracing::warn!("RAYON_NUM_THREADS={asked} is more than {processors} processors can use: {count} threads work");
+    }
+    // A pool that cannot be built cannot be tried again.
+    let had = available(count);
+    let builder = rayon::ThreadPoolBuilder::new();
+    let built = if had == count {
+        builder.num_threads(count).build_global()
+    } else {
+        tracing::warn!(
+            "the system gives {had} of {count} threads (`ulimit -u`, `ulimit -v`): one thread does all the work"
+        );
+        builder.num_threads(1).use_current_thread().build_global()
+    };
+    built.map_err(|error| Failure::Threads(error.to_string()))
+}
+
+/// The number of threads to work with.
+fn count(asked: Option<usize>, processors: usize) -> usize {
+    let most = processors.saturating_mul(OF_PROCESSOR).min(MOST);
+    asked.filter(|&asked| asked > 0).unwrap_or(processors).clamp(1, most)
+}
+
+/// Whether the system gives another thread.
+pub fn is_available() -> bool {
+    available(1) == 1
+}
+
+/// How many threads of `count` the system gives at once.
+fn available(count: usize) -> usize {
+    let (hold, wait) = mpsc::channel::<()>();
+    let wait = std::sync::Arc::new(std::sync::Mutex::new(wait));
+    let spawn = |_| {
+        let wait = wait.clone();
+        // Each waits until all are there, and ends when the channel closes.
+        let body = move || drop(wait.lock().map(|wait| wait.recv()));
+        thread::Builder::new().spawn(body).ok()
+    };
+    let threads: Vec<_> = (0..count).map_while(spawn).collect();
+    drop(hold);
+    let had = threads.len();
+    threads.into_iter().for_each(|thread| drop(thread.join()));
+    had
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_threads_are_sensible() {
+        assert_eq!([None, Some(0), Some(3), Some(100_000)].map(|asked| count(asked, 2)), [2, 2, 3, 8]);
+        assert_eq!([None, Some(1), Some(usize::MAX)].map(|asked| count(asked, 1000)), [1000, 1, 1024]);
+        assert_eq!(count(None, 2000), 1024);
+        assert_eq!(available(4), 4);
+    }
+}
