@@ -182,7 +182,7 @@ fn any_scene_draws_at_any_size() {
         .map(|tile_entries| Renderer::with_budget(&gpu, Budget { tile_entries, ..Budget::default() }))
         .into();
     let mut prepared: Vec<_> = scenes.iter().map(|(_, scene)| renderers[0].prepare(scene).expect("prepares")).collect();
-    let mut random = Random(0x5eed_0f_512e5);
+    let mut random = Random(0x0005_eed0_f512_e5aa);
     let start = Instant::now();
     let (mut pictures, mut longest) = (0, Duration::ZERO);
     while start.elapsed().as_secs_f64() < seconds {
