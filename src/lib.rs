@@ -5,6 +5,7 @@
 //! ([`splat`]) → [`engine`] (one pass, one Rust file, one shader) → a [`Picture`](picture::Picture).
 
 pub mod compare;
+pub mod cpu;
 pub mod deadline;
 pub mod disk;
 pub mod engine;

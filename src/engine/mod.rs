@@ -45,10 +45,10 @@ mod select;
 mod shaders;
 mod source;
 mod stage;
-mod tables;
+pub(crate) mod tables;
 mod tiles;
 mod timestamps;
-mod uniforms;
+pub(crate) mod uniforms;
 mod upload;
 
 pub use frame::Budget;

@@ -4,10 +4,11 @@ use crate::{clip::ClipFlags, failure::Failure, method::MethodFlags, parse, sampl
 use clap::{Args, ValueEnum};
 use splatkit::{
     Error,
+    cpu::CpuRenderer,
     engine::{AdapterChoice, Budget, Gpu, Renderer},
     hierarchy::Detail,
     picture::Picture,
-    scene::{self, Item, Settings},
+    scene::{self, Item, Scene, Settings},
 };
 use std::time::Duration;
 
@@ -21,6 +22,10 @@ pub struct EngineFlags {
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "1280x720")]
     pub size: [u32; 2],
+    /// What draws: the engine for GPUs, or that for processors, which needs no driver and draws a single volume on a Cartesian
+    /// lattice; auto takes the first where there is an adapter.
+    #[arg(long, value_enum, default_value_t = Engine::Auto)]
+    engine: Engine,
     /// The adapter: its number in `splatkit gpus`, a part of its name, or `software`. By default the fastest.
     #[arg(long, value_name = "N|NAME|software")]
     gpu: Option<String>,
@@ -76,6 +81,14 @@ pub struct EngineFlags {
     clip: ClipFlags,
 }
 
+/// The engines, and the choice of one by what there is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Engine {
+    Auto,
+    Gpu,
+    Cpu,
+}
+
 /// [`scene::Gradient`] as a flag.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Gradient {
@@ -84,6 +97,18 @@ enum Gradient {
 }
 
 impl EngineFlags {
+    /// Opens the adapter; `None` where the processor draws the scene.
+    pub fn device(&self, scene: &Scene) -> splatkit::Result<Option<Gpu>> {
+        match self.engine {
+            Engine::Cpu => Ok(None),
+            Engine::Gpu => self.gpu().map(Some),
+            Engine::Auto => match self.gpu() {
+                Err(Error::NoAdapter(_)) if self.gpu.is_none() && CpuRenderer::new(scene).is_ok() => Ok(None),
+                gpu => gpu.map(Some),
+            },
+        }
+    }
+
     /// Opens the adapter.
     pub fn gpu(&self) -> splatkit::Result<Gpu> {
         // Any text is a choice: the conversion cannot fail.

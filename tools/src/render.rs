@@ -13,7 +13,9 @@ use crate::{
 };
 use clap::Args;
 use splatkit::{
-    Error, disk,
+    Error,
+    cpu::CpuRenderer,
+    disk,
     engine::{FrameStats, Gpu, PreparedScene, Renderer},
     math::Camera,
     picture::Picture,
@@ -54,7 +56,7 @@ pub struct Render {
     #[command(flatten)]
     engine: EngineFlags,
     /// Draws by the reference on the CPU: exact, and slow beyond small scenes.
-    #[arg(long, help_heading = "Engine", conflicts_with_all = ["gpu", "budget"])]
+    #[arg(long, help_heading = "Engine", conflicts_with_all = ["gpu", "budget", "engine"])]
     reference: bool,
     /// Writes what was done to stdout, as JSON.
     #[arg(long)]
@@ -64,6 +66,7 @@ pub struct Render {
 /// What draws.
 pub enum Drawer {
     Engine { gpu: Gpu, renderer: Box<Renderer>, prepared: Box<PreparedScene> },
+    Cpu(Box<CpuRenderer>),
     Reference,
 }
 
@@ -71,7 +74,10 @@ impl Drawer {
     /// The engine with a scene uploaded.
     pub fn engine(flags: &EngineFlags, loaded: &Loaded, progress: &Progress) -> Result<Self, Failure> {
         progress.stage("Opening the GPU");
-        let gpu = flags.gpu()?;
+        let Some(gpu) = flags.device(&loaded.scene)? else {
+            progress.stage("Preparing");
+            return Ok(Self::Cpu(Box::new(CpuRenderer::new(&loaded.scene)?)));
+        };
         progress.stage("Uploading");
         let renderer = Box::new(flags.renderer(&gpu));
         let prepared = Box::new(renderer.prepare(&loaded.scene)?);
@@ -81,11 +87,12 @@ impl Drawer {
     pub fn adapter(&self) -> &str {
         match self {
             Self::Engine { gpu, .. } => &gpu.info.name,
+            Self::Cpu(_) => "CPU",
             Self::Reference => "reference",
         }
     }
 
-    /// Draws a picture; the reference has no statistics.
+    /// Draws a picture; the reference and the CPU engine have no statistics.
     pub fn draw(
         &mut self,
         loaded: &Loaded,
@@ -103,6 +110,7 @@ impl Drawer {
                 }
                 done => done,
             },
+            Self::Cpu(renderer) => Ok((renderer.render(camera, settings)?, FrameStats::default())),
             Self::Reference => Ok((reference::render(&loaded.scene, camera, settings)?, FrameStats::default())),
         }
     }

@@ -1,0 +1,78 @@
+//! Functions of eight numbers at once that the vector library lacks.
+
+use fearless_simd::{Simd, f32x8, i32x8, prelude::*};
+
+/// Eight numbers.
+pub type Lanes<S> = f32x8<S>;
+
+/// 2 to the power x, within 2·10⁻⁷ of it, for x from −126 to 126; beyond as at these ends.
+#[inline(always)]
+pub fn exp2<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
+    let x = x.max(Lanes::splat(simd, -126.0)).min(Lanes::splat(simd, 126.0));
+    let whole = (x + 0.5).floor();
+    let part = x - whole;
+    // The Taylor series of 2^part for |part| ≤ ½.
+    let mut sum = Lanes::splat(simd, 1.540_353e-4);
+    for term in [1.333_355_8e-3, 9.618_129e-3, 5.550_411e-2, 2.402_265e-1, 6.931_472e-1, 1.0] {
+        sum = sum.mul_add(part, Lanes::splat(simd, term));
+    }
+    let exponent = (i32x8::truncate_from(whole) + 127) << 23;
+    sum * exponent.bitcast::<Lanes<S>>()
+}
+
+/// e to the power x.
+#[inline(always)]
+pub fn exp<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
+    exp2(simd, x * std::f32::consts::LOG2_E)
+}
+
+/// The logarithm of x > 0 to the base 2, within 10⁻⁵.
+#[inline(always)]
+pub fn log2<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
+    let bits = x.bitcast::<i32x8<S>>();
+    let exponent = Lanes::float_from((bits >> 23) - 127);
+    let mantissa = ((bits & 0x007f_ffff) | 0x3f80_0000).bitcast::<Lanes<S>>();
+    // log₂ m = 2/ln 2 · artanh((m − 1)/(m + 1)), m from 1 to 2.
+    let z = (mantissa - 1.0) / (mantissa + 1.0);
+    let z2 = z * z;
+    let mut sum = Lanes::splat(simd, 2.0 / 9.0);
+    for term in [2.0 / 7.0, 2.0 / 5.0, 2.0 / 3.0, 2.0] {
+        sum = sum.mul_add(z2, Lanes::splat(simd, term));
+    }
+    exponent + z * sum * std::f32::consts::LOG2_E
+}
+
+/// The product of the parts of two vectors, summed.
+#[inline(always)]
+pub fn dot<S: Simd>(a: [Lanes<S>; 3], b: [Lanes<S>; 3]) -> Lanes<S> {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// The same with one vector for all lanes.
+#[inline(always)]
+pub fn dot_with<S: Simd>(a: [f32; 4], b: [Lanes<S>; 3]) -> Lanes<S> {
+    b[0] * a[0] + b[1] * a[1] + b[2] * a[2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fearless_simd::{Level, dispatch};
+
+    #[test]
+    fn powers_and_logarithms_are_near() {
+        let numbers: Vec<f32> = (0..8000).map(|i| (i as f32 - 4000.0) * 0.01).collect();
+        for eight in numbers.chunks_exact(8) {
+            let x: [f32; 8] = std::array::from_fn(|i| eight[i]);
+            let found: [f32; 8] = dispatch!(Level::new(), simd => exp2(simd, x.simd_into(simd)).into());
+            for (x, found) in x.iter().zip(found) {
+                let truth = f64::from(*x).exp2();
+                assert!((f64::from(found) / truth - 1.0).abs() < 4e-7, "2^{x}: {found}");
+            }
+            let back: [f32; 8] = dispatch!(Level::new(), simd => log2(simd, found.simd_into(simd)).into());
+            for (x, back) in x.iter().zip(back) {
+                assert!((x - back).abs() < 2e-5, "{x} {back}");
+            }
+        }
+    }
+}
