@@ -1,7 +1,7 @@
 //! Closes a sheet at eight pixels: the field in it, a parabola along each ray, is classified, lit and composited front to back.
 //! The definition is that of `src/reference`; shaders/sheet.wgsl does the same.
 
-use super::vector::{Lanes, dot, exp, exp2, log2};
+use super::vector::{Lanes, dot, exp, exp2, four, log2, three};
 use crate::{
     engine::{tables::Tables, uniforms::Frame},
     scene::Optics,
@@ -98,8 +98,9 @@ impl Visible {
         // over NARROW entries.
         let slack = (high - low) * 0.125 + (0.5 * NARROW + 1.0);
         let [_, _, last, place] = look.frame.transfer;
-        let entry = |value: Lanes<S>| (value + place).max(Lanes::splat(simd, 0.0)).min(Lanes::splat(simd, last));
-        let [low, high]: [[f32; 8]; 2] = [entry(low - slack).into(), entry(high + slack).into()];
+        let (none, last) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, last));
+        let low: [f32; 8] = (low - slack + place).max(none).min(last).into();
+        let high: [f32; 8] = (high + slack + place).max(none).min(last).into();
         low.iter().zip(high).any(|(low, high)| self.0[high as usize + 1] > self.0[*low as usize])
     }
 }
@@ -125,12 +126,12 @@ impl Look<'_> {
                 own[lane] = to[part] - from[part];
             }
         }
-        let within: [Lanes<S>; 4] = differences.map(|row| row.simd_into(simd));
+        let within: [Lanes<S>; 4] = four!(I => differences[I].simd_into(simd));
         // Values before and behind the table are those of its ends.
         let before = (high.min(none) - low.min(none)) * inverse;
         let behind = (high.max(all) - low.max(all)) * inverse;
         let [first, last] = self.frame.beyond;
-        [0, 1, 2, 3].map(|part| within[part] * inverse + before * first[part] + behind * last[part])
+        four!(I => within[I] * inverse + before * first[I] + behind * last[I])
     }
 
     /// Extinction times colour, and extinction, of one value.
@@ -147,7 +148,7 @@ impl Look<'_> {
                 own[lane] = a[channel] + (b[channel] - a[channel]) * part;
             }
         }
-        let [red, green, blue, extinction]: [Lanes<S>; 4] = found.map(|row| row.simd_into(simd));
+        let [red, green, blue, extinction]: [Lanes<S>; 4] = four!(I => found[I].simd_into(simd));
         [red * extinction, green * extinction, blue * extinction, extinction]
     }
 
@@ -177,7 +178,7 @@ impl Look<'_> {
         let highlight = exp2(simd, log2(simd, facing.max(Lanes::splat(simd, 1e-6))) * power) * specular;
         let highlight = has_direction.select(highlight, Lanes::splat(simd, 0.0));
         let share = facing * diffuse + ambient;
-        color.map(|part| part.mul_add(share, highlight).min(one))
+        three!(I => color[I].mul_add(share, highlight).min(one))
     }
 
     /// Adds a sheet to the picture, at the pixels of `mask`.
@@ -215,7 +216,7 @@ impl Look<'_> {
             }
             if self.has_gradient_opacity {
                 let factor = self.gradient_factor(simd, dot(normal, normal).sqrt());
-                shown = shown.map(|channel| channel * factor);
+                shown = four!(I => shown[I] * factor);
             }
             let depth = mask.select(shown[3].max(none) * step, none);
             if !(depth.simd_gt(0.0).any_true() || self.isosurfaces > 0) {
@@ -224,7 +225,7 @@ impl Look<'_> {
                 continue;
             }
             let inverse = one / shown[3].max(Lanes::splat(simd, 1e-20));
-            let mut color = [0, 1, 2].map(|channel| (shown[channel] * inverse).max(none).min(one));
+            let mut color = three!(I => (shown[I] * inverse).max(none).min(one));
             if self.is_lit {
                 color = self.lit(simd, color, normal, along);
             }
@@ -281,7 +282,7 @@ impl Look<'_> {
         let depth = medium.depth.min(Lanes::splat(simd, MOST_DEPTH));
         if self.optics == Optics::XRay {
             let share = before * taken(simd, depth);
-            pixels.color = pixels.color.map(|channel| channel + share);
+            pixels.color = three!(I => pixels.color[I] + share);
             pixels.through = before - share;
         } else {
             for (sum, channel) in pixels.color.iter_mut().zip(medium.color) {
@@ -304,10 +305,8 @@ impl Look<'_> {
         let (a, b, c) = (sheet.front.value, sheet.middle, sheet.back.value);
         let slope = a * (u * 4.0 - 3.0) + b * (4.0 - u * 8.0) + c * (u * 4.0 - 1.0);
         let along = slope * (self.frame.gradients[2] / sheet.thickness);
-        let normal = [0, 1, 2].map(|axis| {
-            let (front, back) = (sheet.front.across[axis], sheet.back.across[axis]);
-            (back - front).mul_add(u, front) + along * sheet.direction[axis]
-        });
+        let (front, back) = (sheet.front.across, sheet.back.across);
+        let normal = three!(I => (back[I] - front[I]).mul_add(u, front[I]) + along * sheet.direction[I]);
         (normal, along)
     }
 }

@@ -3,7 +3,7 @@
 //! A Gaussian on a lattice is a product of Gaussians along its axes. So the mean over 64 samples takes four weights an axis,
 //! and the gradient follows from the first moments: ∂/∂p E[f] = (E[n·f] − E[n]·E[f])/σ², n the sample's index along the axis.
 
-use super::vector::{Lanes, exp};
+use super::vector::{Lanes, exp, four, three};
 use crate::{
     math::{Kernel, Profile},
     volume::{Samples, Volume},
@@ -46,8 +46,7 @@ impl Sample for u8 {
             word(places[7]),
         ];
         let words: u32x8<S> = words.simd_into(simd);
-        let byte = |words: u32x8<S>| Lanes::float_from((words & 0xff).bitcast::<i32x8<S>>());
-        [byte(words), byte(words >> 8), byte(words >> 16), Lanes::float_from((words >> 24).bitcast::<i32x8<S>>())]
+        four!(I => Lanes::float_from(((words >> (8 * I as u32)) & 0xff).bitcast::<i32x8<S>>()))
     }
 
     #[inline(always)]
@@ -69,7 +68,7 @@ macro_rules! one_by_one {
                         row[lane] = *sample as f32;
                     }
                 }
-                four.map(|row| row.simd_into(simd))
+                four!(I => four[I].simd_into(simd))
             }
 
             #[inline(always)]
@@ -161,21 +160,55 @@ impl<'a, T: Sample> Field<'a, T> {
     /// Where all samples in reach lie in the lattice.
     #[inline(always)]
     fn within<S: Simd>(&self, simd: S, place: [Lanes<S>; 3], first: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
-        let [x, y, z]: [Weights<S>; 3] = [0, 1, 2].map(|axis| self.weights(simd, place[axis] - first[axis]));
-        let [ix, iy, iz]: [[i32; 8]; 3] = first.map(|first| i32x8::truncate_from(first).into());
+        let weights: [Weights<S>; 3] = three!(I => self.weights(simd, place[I] - first[I]));
+        let [ix, iy, iz]: [[i32; 8]; 3] = three!(I => i32x8::truncate_from(first[I]).into());
         let [nx, ny, _] = self.dims;
         let mut places = [0; 8];
         for (lane, own) in places.iter_mut().enumerate() {
             *own = ((iz[lane] - 1) as usize * ny + (iy[lane] - 1) as usize) * nx + (ix[lane] - 1) as usize;
         }
+        self.sums(simd, &weights, &Inside { samples: self.samples, places, row: nx, slice: nx * ny })
+    }
+
+    /// At the border: samples outside the lattice have no weight.
+    #[inline(always)]
+    fn beside<S: Simd>(&self, simd: S, place: [Lanes<S>; 3], first: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
+        let none = Lanes::splat(simd, 0.0);
+        let mut weights: [Weights<S>; 3] = three!(I => self.weights(simd, place[I] - first[I]));
+        let mut taps = [[[0; 4]; 8]; 3];
+        for axis in 0..3 {
+            let last = Lanes::splat(simd, self.dims[axis] as f32 - 1.0);
+            let own = &mut weights[axis];
+            let mut sum = none;
+            for tap in 0..4 {
+                let index = first[axis] + (tap as f32 - 1.0);
+                let inside = index.max(none).min(last);
+                own.weights[tap] = inside.simd_eq(index).select(own.weights[tap], none);
+                sum += own.weights[tap];
+                let indices: [f32; 8] = inside.into();
+                for (own, index) in taps[axis].iter_mut().zip(indices) {
+                    own[tap] = index as usize;
+                }
+            }
+            let inverse = Lanes::splat(simd, 1.0) / sum;
+            own.weights = four!(I => own.weights[I] * inverse);
+            own.moment = own.weights[2] - own.weights[0] + own.weights[3] * 2.0;
+        }
+        let [nx, ny, _] = self.dims;
+        self.sums(simd, &weights, &Border { samples: self.samples, taps, row: nx, slice: nx * ny })
+    }
+
+    /// The mean of the samples in reach and its gradient.
+    #[inline(always)]
+    fn sums<S: Simd>(&self, simd: S, [x, y, z]: &[Weights<S>; 3], samples: &impl Rows<S>) -> (Lanes<S>, [Lanes<S>; 3]) {
         let none = Lanes::splat(simd, 0.0);
         let (mut sum, mut sum_x, mut sum_y, mut sum_z) = (none, none, none, none);
         for k in 0..4 {
             let (mut slice, mut slice_x, mut slice_y) = (none, none, none);
             for j in 0..4 {
-                let mut four = T::four(simd, self.samples, &places, (k * ny + j) * nx);
+                let mut four = samples.four(simd, j, k);
                 if self.zero != 0.0 {
-                    four = four.map(|value| value - self.zero);
+                    four = four!(I => four[I] - self.zero);
                 }
                 let before = x.weights[0] * four[0];
                 let after = x.weights[2] * four[2];
@@ -190,54 +223,51 @@ impl<'a, T: Sample> Field<'a, T> {
             sum_y = z.weights[k].mul_add(slice_y, sum_y);
             sum_z = (z.weights[k] * (k as f32 - 1.0)).mul_add(slice, sum_z);
         }
-        let slope = |moments: Lanes<S>, moment: Lanes<S>| (moments - moment * sum) * self.per_variance;
-        (sum, [slope(sum_x, x.moment), slope(sum_y, y.moment), slope(sum_z, z.moment)])
+        let (moments, means) = ([sum_x, sum_y, sum_z], [x.moment, y.moment, z.moment]);
+        (sum, three!(I => (moments[I] - means[I] * sum) * self.per_variance))
     }
+}
 
-    /// At the border: samples outside the lattice have no weight.
-    fn beside<S: Simd>(&self, simd: S, place: [Lanes<S>; 3], first: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
-        let [place, first]: [[[f32; 8]; 3]; 2] = [place, first].map(|three| three.map(Into::into));
+/// The rows of four samples around eight places, in the four rows of four slices.
+trait Rows<S: Simd> {
+    fn four(&self, simd: S, row: usize, slice: usize) -> [Lanes<S>; 4];
+}
+
+/// Rows that lie in the lattice.
+struct Inside<'a, T> {
+    samples: &'a [T],
+    /// The first sample of each lane.
+    places: [usize; 8],
+    row: usize,
+    slice: usize,
+}
+
+impl<S: Simd, T: Sample> Rows<S> for Inside<'_, T> {
+    #[inline(always)]
+    fn four(&self, simd: S, row: usize, slice: usize) -> [Lanes<S>; 4] {
+        T::four(simd, self.samples, &self.places, slice * self.slice + row * self.row)
+    }
+}
+
+/// Rows that reach beyond the lattice: samples at its border stand for those outside.
+struct Border<'a, T> {
+    samples: &'a [T],
+    /// Along each axis, for each lane, the four indices.
+    taps: [[[usize; 4]; 8]; 3],
+    row: usize,
+    slice: usize,
+}
+
+impl<S: Simd, T: Sample> Rows<S> for Border<'_, T> {
+    #[inline(always)]
+    fn four(&self, simd: S, row: usize, slice: usize) -> [Lanes<S>; 4] {
         let mut found = [[0.0f32; 8]; 4];
         for lane in 0..8 {
-            let own = |of: &[[f32; 8]; 3]| [0, 1, 2].map(|axis| of[axis][lane]);
-            let all = self.beside_one(own(&place), own(&first));
-            (0..4).for_each(|part| found[part][lane] = all[part]);
-        }
-        let [value, x, y, z] = found.map(|row| row.simd_into(simd));
-        (value, [x, y, z])
-    }
-
-    fn beside_one(&self, place: [f32; 3], first: [f32; 3]) -> [f32; 4] {
-        let mut weights = [[0.0f32; 4]; 3];
-        let mut moments = [0.0; 3];
-        for axis in 0..3 {
-            let inside = 0..self.dims[axis] as i32;
-            for (tap, weight) in weights[axis].iter_mut().enumerate() {
-                let index = first[axis] as i32 + tap as i32 - 1;
-                let distance = index as f32 - place[axis];
-                if inside.contains(&index) {
-                    *weight = (-0.5 * distance * distance * self.per_variance).exp();
-                }
-            }
-            let sum: f32 = weights[axis].iter().sum();
-            weights[axis].iter_mut().for_each(|weight| *weight /= sum);
-            moments[axis] = (0u8..).zip(weights[axis]).map(|(tap, weight)| f32::from(tap) * weight).sum();
-        }
-        let [nx, ny, _] = self.dims;
-        let mut sums = [0.0f32; 4];
-        for (k, z) in weights[2].iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-            for (j, y) in weights[1].iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-                for (i, x) in weights[0].iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-                    let index = |axis: usize, tap: usize| (first[axis] as i32 + tap as i32 - 1) as usize;
-                    let sample = self.samples[(index(2, k) * ny + index(1, j)) * nx + index(0, i)];
-                    let part = x * y * z * (sample.value() - self.zero);
-                    for (sum, factor) in sums.iter_mut().zip([1.0, i as f32, j as f32, k as f32]) {
-                        *sum += part * factor;
-                    }
-                }
+            let start = self.taps[2][lane][slice] * self.slice + self.taps[1][lane][row] * self.row;
+            for (own, x) in found.iter_mut().zip(self.taps[0][lane]) {
+                own[lane] = self.samples[start + x].value();
             }
         }
-        let slope = |axis: usize| (sums[axis + 1] - moments[axis] * sums[0]) * self.per_variance;
-        [sums[0], slope(0), slope(1), slope(2)]
+        four!(I => found[I].simd_into(simd))
     }
 }

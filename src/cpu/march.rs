@@ -4,7 +4,7 @@ use super::{
     close::{Face, Look, Pixels, Sheet, Visible},
     field::{Field, Sample},
     skip::{Shown, TILE},
-    vector::{Lanes, dot, dot_with},
+    vector::{Lanes, dot, dot_with, three},
 };
 use crate::{math::View, scene::Optics};
 use fearless_simd::{Simd, mask32x8, prelude::*};
@@ -54,7 +54,7 @@ impl<T: Sample> March<'_, T> {
                 let rays = self.rays(simd, [column * TILE + x, row * TILE + y]);
                 let pixels = self.walk(simd, &rays, sheets);
                 let through: [f32; 8] = pixels.through.into();
-                let [red, green, blue]: [[f32; 8]; 3] = pixels.color.map(Into::into);
+                let [red, green, blue]: [[f32; 8]; 3] = three!(I => pixels.color[I].into());
                 let hit: [f32; 8] = pixels.hit.into();
                 for lane in 0..8 {
                     let own = &mut tile[(y + lane / 4) * TILE + x + lane % 4];
@@ -79,15 +79,12 @@ impl<T: Sample> March<'_, T> {
         } else {
             ([right, down, none], [none, none, one])
         };
-        let in_steps = |v: [Lanes<S>; 3]| frame.field_axes.map(|axis| dot_with(axis, v));
-        let [from, way] = [origin, direction].map(in_steps);
-        let start = [0, 1, 2].map(|axis| from[axis] + frame.field_origin[axis]);
+        let from: [Lanes<S>; 3] = three!(I => dot_with(frame.field_axes[I], origin));
+        let way = three!(I => dot_with(frame.field_axes[I], direction));
+        let start = three!(I => from[I] + frame.field_origin[I]);
         let (mut enter, mut leave) = part_in_box(simd, frame.field_low, frame.field_high, start, way);
-        let in_world = |v: [Lanes<S>; 3]| {
-            [0, 1, 2]
-                .map(|axis| v[0] * frame.world[0][axis] + v[1] * frame.world[1][axis] + v[2] * frame.world[2][axis])
-        };
-        let [origin, toward] = [origin, direction].map(in_world);
+        let rows: [[f32; 4]; 3] = three!(I => [frame.world[0][I], frame.world[1][I], frame.world[2][I], 0.0]);
+        let (origin, toward) = (three!(I => dot_with(rows[I], origin)), three!(I => dot_with(rows[I], direction)));
         for [low, high] in &frame.clips[..self.clips] {
             let (from, to) = if high[3] > 0.0 {
                 part_in_box(simd, *low, *high, origin, toward)
@@ -150,7 +147,7 @@ impl<T: Sample> March<'_, T> {
 
     #[inline(always)]
     fn place<S: Simd>(rays: &Rays<S>, distance: f32) -> [Lanes<S>; 3] {
-        [0, 1, 2].map(|axis| rays.way[axis] * distance + rays.start[axis])
+        three!(I => rays.way[I] * distance + rays.start[I])
     }
 
     #[inline(always)]
@@ -165,13 +162,13 @@ impl<T: Sample> March<'_, T> {
         let per_value = frame.transfer[1];
         let (value, slopes) = self.field.at(simd, Self::place(rays, distance));
         // From steps of the lattice to view space.
-        let gradient = [0, 1, 2].map(|axis| {
-            let [x, y, z] = frame.field_axes.map(|own| own[axis]);
-            (slopes[0] * x + slopes[1] * y + slopes[2] * z) * per_value
+        let axes = &frame.field_axes;
+        let gradient = three!(I => {
+            (slopes[0] * axes[0][I] + slopes[1] * axes[1][I] + slopes[2] * axes[2][I]) * per_value
         });
         let along = dot(gradient, rays.direction);
         let length = frame.gradients[2];
-        let across = [0, 1, 2].map(|axis| (gradient[axis] - along * rays.direction[axis]) * length);
+        let across = three!(I => (gradient[I] - along * rays.direction[I]) * length);
         (Face { value: value * per_value, across }, along)
     }
 
@@ -182,9 +179,9 @@ impl<T: Sample> March<'_, T> {
         let mut shows = [false; 8];
         for distance in [start, 0.5 * (start + stop), stop] {
             let place = Self::place(rays, distance);
-            let [x, y, z]: [[f32; 8]; 3] = [0, 1, 2].map(|axis| {
-                let last = Lanes::splat(simd, self.dims[axis] as f32 - 1.0);
-                (place[axis] + 0.5).floor().max(Lanes::splat(simd, 0.0)).min(last).into()
+            let [x, y, z]: [[f32; 8]; 3] = three!(I => {
+                let last = Lanes::splat(simd, self.dims[I] as f32 - 1.0);
+                (place[I] + 0.5).floor().max(Lanes::splat(simd, 0.0)).min(last).into()
             });
             for lane in 0..8 {
                 let sample = (z[lane] as usize * ny + y[lane] as usize) * nx + x[lane] as usize;

@@ -2,6 +2,30 @@
 
 use fearless_simd::{Simd, f32x8, i32x8, prelude::*};
 
+/// An array of an expression for each index. A closure would do, but the compiler may leave it a function of its own, in which
+/// every operation on vectors is a call: functions know only the processor's instructions that the caller's attributes name.
+macro_rules! each {
+    ([$($number:literal),+], $index:ident => $value:expr) => {
+        [$({
+            const $index: usize = $number;
+            $value
+        }),+]
+    };
+}
+/// The same for three axes or channels.
+macro_rules! three {
+    ($index:ident => $value:expr) => {
+        $crate::cpu::vector::each!([0, 1, 2], $index => $value)
+    };
+}
+/// The same for colours with extinction.
+macro_rules! four {
+    ($index:ident => $value:expr) => {
+        $crate::cpu::vector::each!([0, 1, 2, 3], $index => $value)
+    };
+}
+pub(super) use {each, four, three};
+
 /// Eight numbers.
 pub type Lanes<S> = f32x8<S>;
 
