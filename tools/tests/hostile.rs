@@ -111,10 +111,10 @@ fn seconds_are_limited_after_reading() {
         "convert cloud.xyz -o a.splk --limit-seconds 0",
         "check fine.obj --limit-seconds 1",
         "convert fine.obj -o a.splk --dry-run --limit-seconds 1",
-        "convert fine.obj -o a.splk --limit-seconds 1",
+        "convert fine.obj -o b.splk --limit-seconds 1",
         "render fine.obj -o a.png --reference --size 16x16 --limit-seconds 1",
         "check cloud.xyz --limit-seconds 1",
-        "convert cloud.xyz -o a.splk --limit-seconds 1",
+        "convert cloud.xyz -o c.splk --limit-seconds 1",
     ] {
         let begin = Instant::now();
         let run = folder.run(command);
