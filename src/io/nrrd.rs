@@ -30,8 +30,8 @@ pub use write::{write, write_bytes};
 /// a pattern with a number (`slice%03d.raw 1 90 1`).
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) with the field that is missing or wrong, for data that are cut off and for
-/// samples that are not finite; [`Error::Limit`](crate::Error::Limit) for sizes over the limits.
+/// [`Error::Input`] with the field that is missing or wrong, for data that are cut off and for
+/// samples that are not finite; [`Error::Limit`] for sizes over the limits.
 pub fn read(source: &Source) -> Result<Volume> {
     let (header, body) = Header::read(source)?;
     let dims = header.dims()?;
