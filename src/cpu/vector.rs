@@ -29,7 +29,7 @@ pub(super) use {each, four, three};
 /// Eight numbers.
 pub type Lanes<S> = f32x8<S>;
 
-/// 2 to the power x, within 2·10⁻⁷ of it, for x from −126 to 126; beyond as at these ends.
+/// 2 to the power x, within 4·10⁻⁷ of it, for x from −126 to 126; beyond as at these ends.
 #[inline(always)]
 pub fn exp2<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
     let x = x.max(Lanes::splat(simd, -126.0)).min(Lanes::splat(simd, 126.0));

@@ -111,6 +111,9 @@ impl EngineFlags {
 
     /// Opens the adapter.
     pub fn gpu(&self) -> splatkit::Result<Gpu> {
+        if self.engine == Engine::Cpu {
+            return Err(Error::Argument("bench measures the engine for GPUs; leave out --engine cpu".into()));
+        }
         // Any text is a choice: the conversion cannot fail.
         let choice = self.gpu.as_deref().map_or(AdapterChoice::Automatic, |text| text.parse().unwrap_or_default());
         let mut gpu = Gpu::headless(&choice)?;
@@ -133,6 +136,10 @@ impl EngineFlags {
 
     /// What is wrong whatever the scene.
     pub fn check(&self) -> Result<(), Failure> {
+        let asks_gpu = self.gpu.is_some() || self.gpu_timeout.is_some() || self.gpu_memory.is_some();
+        if self.engine == Engine::Cpu && asks_gpu {
+            return Err(Failure::Usage("--engine cpu takes none of --gpu, --gpu-timeout and --gpu-memory".into()));
+        }
         self.method.check()?;
         self.clip.check()
     }

@@ -176,6 +176,14 @@ fn pictures_are_compared() {
 }
 
 #[test]
+fn what_the_cpu_engine_does_not_do_is_told() {
+    let folder = Folder::new("cpu");
+    folder.put("a.ply", PLY);
+    folder.run("render a.ply -o a.png --engine cpu").fails(2, &["does not draw", "the GPU engine does"]);
+    folder.run("bench a.ply --engine cpu").fails(2, &["leave out --engine cpu"]);
+}
+
+#[test]
 fn wrong_usage_is_told() {
     let folder = Folder::new("usage");
     for arguments in [
@@ -185,6 +193,7 @@ fn wrong_usage_is_told() {
         "render a.ply",
         "render a.ply -o a.png --size 10",
         "render a.ply -o a.png --samples 3",
+        "render a.ply -o a.png --engine cpu --gpu 0",
         "render a.ply -o a.png --background red",
         "render a.ply -o a.png --view-angle 180",
         "render a.ply -o a.png --dims 2x2x2",
