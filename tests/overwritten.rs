@@ -79,6 +79,15 @@ fn overwrite(file: &File, sound: &[u8], stop: &AtomicBool) {
     }
 }
 
+/// Ends the thread that writes, also where a reader panics: the scope would wait for the thread for ever.
+struct StopAtEnd<'a>(&'a AtomicBool);
+
+impl Drop for StopAtEnd<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Relaxed);
+    }
+}
+
 #[test]
 fn files_that_are_written_to_while_they_are_read() {
     let (folder, limits) = (Folder::new(), Limits::default());
@@ -90,11 +99,11 @@ fn files_that_are_written_to_while_they_are_read() {
         let file = File::options().write(true).open(&path).unwrap();
         let (stop, begun, mut refused) = (AtomicBool::new(false), Instant::now(), 0);
         std::thread::scope(|scope| {
+            let _stop = StopAtEnd(&stop);
             scope.spawn(|| overwrite(&file, &bytes, &stop));
             while begun.elapsed() < TIME {
                 refused += usize::from(inputs::load(&path, &limits).is_err());
             }
-            stop.store(true, Relaxed);
         });
         assert!(refused > 0, "{name}: what changed was never refused");
     }

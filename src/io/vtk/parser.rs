@@ -84,13 +84,11 @@ impl<'a> Parser<'a> {
     pub fn line(&mut self) -> Result<Option<(String, String)>> {
         loop {
             let place = self.place();
-            match self.raw_line()? {
-                None => return Ok(None),
-                Some([]) => {}
-                Some(line) => {
-                    let text = copy::text(line).map_err(|_| self.source.error(&place, "is not text"))?;
-                    return Ok(Some((place, text)));
-                }
+            let Some(line) = self.raw_line()? else { return Ok(None) };
+            let text = copy::text(line).map_err(|_| self.source.error(&place, "is not text"))?;
+            // The copy is asked: what is mapped may have become blank since the line was found.
+            if text.split_ascii_whitespace().next().is_some() {
+                return Ok(Some((place, text)));
             }
         }
     }
