@@ -1,11 +1,12 @@
-//! Closes a sheet at eight pixels: the field in it, a parabola along each ray, is classified, lit and composited front to back.
-//! The definition is that of `src/reference`; shaders/sheet.wgsl does the same.
+//! Closes a sheet at eight pixels: the field in it, a parabola along each ray, is classified and lit, and composited front to
+//! back together with the radiance in it. The definition is that of `src/reference`; shaders/sheet.wgsl does the same.
 
-use super::vector::{Lanes, dot, exp, exp2, four, log2, three};
-use crate::{
-    engine::{tables::Tables, uniforms::Frame},
-    scene::Optics,
+use super::{
+    plan::Plan,
+    rays::Rays,
+    vector::{Lanes, dot, exp, exp2, four, log2, three},
 };
+use crate::scene::Optics;
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
 /// Parts of a sheet in which the transfer function is integrated.
@@ -16,27 +17,31 @@ const NARROW: f32 = 8.0;
 const NARROW_AFAR: f32 = 1e-6;
 /// Optical depth that counts as opaque.
 const MOST_DEPTH: f32 = 20.0;
+/// Optical depths are divided by from here on.
+const LEAST_DIVISOR: f32 = 1e-20;
 /// A gradient shorter than this has no direction.
 const LEAST_GRADIENT: f32 = 1e-20;
-
-/// What decides how sheets are closed, the same for all of a picture.
-pub struct Look<'a> {
-    pub frame: &'a Frame,
-    pub tables: &'a Tables,
-    pub optics: Optics,
-    pub is_lit: bool,
-    pub has_gradient_opacity: bool,
-    /// The transfer function is integrated between values, instead of looked up at the mean of a sheet.
-    pub is_integrated: bool,
-    pub isosurfaces: usize,
-}
+/// A pixel that lets less light through is finished.
+pub const OPAQUE: f32 = 0.0005;
+/// No value yet.
+pub const NO_VALUE: f32 = -3e38;
 
 /// Eight pixels of the picture so far.
+#[derive(Clone, Copy)]
 pub struct Pixels<S: Simd> {
     pub color: [Lanes<S>; 3],
     pub through: Lanes<S>,
     /// The distance at which half of the light is taken, or the largest value.
     pub hit: Lanes<S>,
+}
+
+impl<S: Simd> Pixels<S> {
+    #[inline(always)]
+    pub fn new(simd: S, plan: &Plan) -> Self {
+        let none = Lanes::splat(simd, 0.0);
+        let hit = if plan.optics == Optics::Maximum { Lanes::splat(simd, NO_VALUE) } else { none };
+        Self { color: [none; 3], through: Lanes::splat(simd, 1.0), hit }
+    }
 }
 
 /// The field on a plane between two sheets: its value, in entries of the table, and its change across the ray.
@@ -46,17 +51,19 @@ pub struct Face<S: Simd> {
     pub across: [Lanes<S>; 3],
 }
 
-/// One sheet at eight pixels.
-pub struct Sheet<S: Simd> {
+/// The field of a sheet at eight pixels.
+pub struct Layer<S: Simd> {
     pub front: Face<S>,
     pub back: Face<S>,
     /// The value in the middle.
     pub middle: Lanes<S>,
-    /// Where it begins, how thick it is, and the part of the rays that counts.
+    /// Where the sheet begins, how thick it is, and the part of the rays that counts.
     pub start: f32,
     pub thickness: f32,
     pub begin: Lanes<S>,
     pub end: Lanes<S>,
+    /// How much of the sheet is filled.
+    pub filling: Lanes<S>,
     pub direction: [Lanes<S>; 3],
 }
 
@@ -65,17 +72,24 @@ struct Medium<S: Simd> {
     through: Lanes<S>,
     depth: Lanes<S>,
     color: [Lanes<S>; 3],
+    /// The distance at which an isosurface took the half of the light.
     hit: Lanes<S>,
+    has_hit: mask32x8<S>,
+    /// The largest value.
+    peak: Lanes<S>,
 }
 
 /// How many entries of the transfer function's table up to each show something.
 pub struct Visible(Vec<u32>);
 
 impl Visible {
-    pub fn new(look: &Look) -> Self {
-        let [_, _, last, place] = look.frame.transfer;
-        let mut shows: Vec<bool> = look.tables.entries[..=last as usize].iter().map(|entry| entry[3] > 0.0).collect();
-        for surface in &look.frame.isosurfaces[..look.isosurfaces] {
+    pub fn new(plan: &Plan) -> Self {
+        if !plan.has_field {
+            return Self(Vec::new());
+        }
+        let [_, _, last, place] = plan.frame.transfer;
+        let mut shows: Vec<bool> = plan.tables.entries[..=last as usize].iter().map(|entry| entry[3] > 0.0).collect();
+        for surface in &plan.frame.isosurfaces[..plan.isosurfaces] {
             let at = (surface[0][0] + place).clamp(0.0, last) as usize;
             let end = (at + 2).min(shows.len());
             shows[at..end].fill(true);
@@ -91,13 +105,13 @@ impl Visible {
 
     /// Whether any of the values that a sheet may have show something.
     #[inline(always)]
-    pub fn may_show<S: Simd>(&self, simd: S, look: &Look, sheet: &Sheet<S>) -> bool {
-        let (a, b, c) = (sheet.front.value, sheet.middle, sheet.back.value);
+    pub fn may_show<S: Simd>(&self, simd: S, plan: &Plan, layer: &Layer<S>) -> bool {
+        let (a, b, c) = (layer.front.value, layer.middle, layer.back.value);
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
         // A parabola leaves the range of its values at both ends and the middle by an eighth of it at most; integrals are taken
         // over NARROW entries.
         let slack = (high - low) * 0.125 + (0.5 * NARROW + 1.0);
-        let [_, _, last, place] = look.frame.transfer;
+        let [_, _, last, place] = plan.frame.transfer;
         let (none, last) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, last));
         let low: [f32; 8] = (low - slack + place).max(none).min(last).into();
         let high: [f32; 8] = (high + slack + place).max(none).min(last).into();
@@ -105,7 +119,7 @@ impl Visible {
     }
 }
 
-impl Look<'_> {
+impl Plan<'_> {
     /// Means over the values between two: extinction times colour, and extinction.
     #[inline(always)]
     fn between<S: Simd>(&self, simd: S, a: Lanes<S>, b: Lanes<S>) -> [Lanes<S>; 4] {
@@ -166,14 +180,20 @@ impl Look<'_> {
         at.map(factor).simd_into(simd)
     }
 
-    /// Light at the eye, on both sides (Blinn 1977).
+    /// Light at the eye, on both sides (Blinn 1977). A normal may have any length.
     #[inline(always)]
-    fn lit<S: Simd>(&self, simd: S, color: [Lanes<S>; 3], normal: [Lanes<S>; 3], along: Lanes<S>) -> [Lanes<S>; 3] {
-        let [ambient, diffuse, specular, power] = self.frame.volume_shade;
+    pub fn lit<S: Simd>(
+        &self,
+        simd: S,
+        color: [Lanes<S>; 3],
+        normal: [Lanes<S>; 3],
+        direction: [Lanes<S>; 3],
+        [ambient, diffuse, specular, power]: [f32; 4],
+    ) -> [Lanes<S>; 3] {
         let one = Lanes::splat(simd, 1.0);
         let size = dot(normal, normal).sqrt();
         let has_direction = size.simd_gt(LEAST_GRADIENT);
-        let facing = (along.abs() / size.max(Lanes::splat(simd, LEAST_GRADIENT))).min(one);
+        let facing = (dot(normal, direction).abs() / size.max(Lanes::splat(simd, LEAST_GRADIENT))).min(one);
         let facing = has_direction.select(facing, one);
         let highlight = exp2(simd, log2(simd, facing.max(Lanes::splat(simd, 1e-6))) * power) * specular;
         let highlight = has_direction.select(highlight, Lanes::splat(simd, 0.0));
@@ -181,44 +201,150 @@ impl Look<'_> {
         three!(I => color[I].mul_add(share, highlight).min(one))
     }
 
-    /// Adds a sheet to the picture, at the pixels of `mask`.
+    /// Adds a sheet to the picture: the field in it at the pixels of a mask, and radiance (colour times optical depth, and
+    /// optical depth).
     #[inline(always)]
-    pub fn close<S: Simd>(&self, simd: S, sheet: &Sheet<S>, mask: mask32x8<S>, pixels: &mut Pixels<S>) {
+    pub fn close<S: Simd>(
+        &self,
+        simd: S,
+        sheet: usize,
+        rays: &Rays<S>,
+        field: Option<(&Layer<S>, mask32x8<S>)>,
+        radiance: Option<[Lanes<S>; 4]>,
+        pixels: &mut Pixels<S>,
+    ) {
         let none = Lanes::splat(simd, 0.0);
         let one = Lanes::splat(simd, 1.0);
-        let length = (sheet.end - sheet.begin).max(none);
-        let parts = if self.is_integrated || self.isosurfaces > 0 { PARTS } else { 1 };
+        let before = pixels.through;
+        let [red, green, blue, mut depth] = radiance.unwrap_or([none; 4]);
+        let mut premultiplied = [red, green, blue];
+        let mut has_hit = mask32x8::splat(simd, false);
+        if let Some((layer, mask)) = field {
+            let medium = self.pass(simd, layer, rays, mask, before);
+            if self.optics == Optics::Maximum {
+                pixels.hit = pixels.hit.max(medium.peak);
+                return;
+            }
+            has_hit = medium.has_hit;
+            pixels.hit = has_hit.select(medium.hit, pixels.hit);
+            let own = medium.depth.min(Lanes::splat(simd, MOST_DEPTH));
+            // Optical depth for opacity, τ / (1 − e^−τ), of which little is left where τ is small.
+            let ratio = own.simd_lt(1e-2).select(own * 0.5 + 1.0, own / (one - exp(simd, -own)));
+            premultiplied = three!(I => ratio.mul_add(medium.color[I], premultiplied[I]));
+            depth += own;
+        }
+        if self.optics == Optics::XRay {
+            premultiplied = [depth; 3];
+        }
+        let counts = depth.simd_gt(LEAST_DIVISOR);
+        if !counts.any_true() {
+            return;
+        }
+        let share = counts.select(before * taken(simd, depth), none);
+        let per_depth = share / depth.max(Lanes::splat(simd, LEAST_DIVISOR));
+        pixels.color = three!(I => per_depth.mul_add(premultiplied[I], pixels.color[I]));
+        pixels.through = before - share;
+        let passes = before.simd_gt(0.5) & pixels.through.simd_le(0.5) & !has_hit;
+        if passes.any_true() {
+            // Inside the sheet, optical depth counts as evenly spread.
+            let part = log2(simd, before * 2.0) * std::f32::consts::LN_2 / depth.max(Lanes::splat(simd, LEAST_DIVISOR));
+            let [start, stop] = [self.planes[sheet], self.planes[sheet + 1]];
+            pixels.hit = passes.select(part * (stop - start) + start, pixels.hit);
+        }
+    }
+
+    /// What the field of a sheet does to light, in all of it that the lattice's box and the clips leave.
+    #[inline(always)]
+    fn pass<S: Simd>(
+        &self,
+        simd: S,
+        layer: &Layer<S>,
+        rays: &Rays<S>,
+        mask: mask32x8<S>,
+        before: Lanes<S>,
+    ) -> Medium<S> {
+        let none = Lanes::splat(simd, 0.0);
+        let mut medium = Medium {
+            through: Lanes::splat(simd, 1.0),
+            depth: none,
+            color: [none; 3],
+            hit: none,
+            has_hit: mask32x8::splat(simd, false),
+            peak: Lanes::splat(simd, NO_VALUE),
+        };
+        if self.holes == 0 {
+            let mask = mask & layer.begin.simd_lt(layer.end);
+            self.pass_piece(simd, layer, [layer.begin, layer.end], mask, before, &mut medium);
+            return medium;
+        }
+        let holes = &rays.holes[..self.holes];
+        let mut begin = layer.begin;
+        for _ in 0..=self.holes {
+            // Out of the holes that `begin` lies in; leaving one may lead into another.
+            for _ in 0..self.holes {
+                for [from, to] in holes {
+                    let is_inside = from.simd_le(begin) & begin.simd_lt(*to);
+                    begin = is_inside.select(*to, begin);
+                }
+            }
+            let mut end = layer.end;
+            for [from, to] in holes {
+                let is_ahead = from.simd_gt(begin) & from.simd_lt(*to);
+                end = is_ahead.select(end.min(*from), end);
+            }
+            let own = mask & begin.simd_lt(end);
+            if own.any_true() {
+                self.pass_piece(simd, layer, [begin, end], own, before, &mut medium);
+            }
+            begin = begin.max(end);
+        }
+        medium
+    }
+
+    /// The part of a sheet between two distances.
+    #[inline(always)]
+    fn pass_piece<S: Simd>(
+        &self,
+        simd: S,
+        layer: &Layer<S>,
+        [begin, end]: [Lanes<S>; 2],
+        mask: mask32x8<S>,
+        before: Lanes<S>,
+        medium: &mut Medium<S>,
+    ) {
+        let none = Lanes::splat(simd, 0.0);
+        let one = Lanes::splat(simd, 1.0);
+        let length = (end - begin).max(none);
+        let is_curved = self.is_integrated || self.isosurfaces > 0;
+        let parts = if is_curved { PARTS } else { 1 };
         let step = length * (1.0 / parts as f32);
-        let per_thickness = 1.0 / sheet.thickness;
-        let mut place = (sheet.begin - sheet.start) * per_thickness;
-        let mut value = sheet.parabola(place);
+        let per_thickness = 1.0 / layer.thickness;
+        let mut place = (begin - layer.start) * per_thickness;
+        let mut value = if is_curved { layer.parabola(place) } else { layer.mean() };
         if self.optics == Optics::Maximum {
             let mut peak = value;
             for _ in 0..parts {
                 place += step * per_thickness;
-                peak = peak.max(sheet.parabola(place));
+                peak = peak.max(if is_curved { layer.parabola(place) } else { value });
             }
-            pixels.hit = mask.select(pixels.hit.max(peak), pixels.hit);
+            medium.peak = mask.select(medium.peak.max(peak), medium.peak);
             return;
         }
-        let before = pixels.through;
-        let mut medium = Medium { through: one, depth: none, color: [none; 3], hit: pixels.hit };
-        let mut has_hit = mask32x8::splat(simd, false);
         for part in 0..parts {
-            let near = sheet.begin + step * part as f32;
+            let near = begin + step * part as f32;
             let next_place = place + step * per_thickness;
-            let next = sheet.parabola(next_place);
+            let next = if is_curved { layer.parabola(next_place) } else { value };
             let mut shown =
-                if self.is_integrated { self.between(simd, value, next) } else { self.one(simd, sheet.mean()) };
-            let (mut normal, mut along) = ([none; 3], none);
+                if self.is_integrated { self.between(simd, value, next) } else { self.one(simd, layer.mean()) };
+            let mut normal = [none; 3];
             if self.is_lit || self.has_gradient_opacity {
-                (normal, along) = self.gradient(sheet, (place + next_place) * 0.5);
+                normal = self.gradient(layer, (place + next_place) * 0.5);
             }
             if self.has_gradient_opacity {
                 let factor = self.gradient_factor(simd, dot(normal, normal).sqrt());
                 shown = four!(I => shown[I] * factor);
             }
-            let depth = mask.select(shown[3].max(none) * step, none);
+            let depth = mask.select(shown[3].max(none) * step * layer.filling, none);
             if !(depth.simd_gt(0.0).any_true() || self.isosurfaces > 0) {
                 place = next_place;
                 value = next;
@@ -227,7 +353,7 @@ impl Look<'_> {
             let inverse = one / shown[3].max(Lanes::splat(simd, 1e-20));
             let mut color = three!(I => (shown[I] * inverse).max(none).min(one));
             if self.is_lit {
-                color = self.lit(simd, color, normal, along);
+                color = self.lit(simd, color, normal, layer.direction, self.frame.volume_shade);
             }
             let mut done = none;
             for number in 0..self.isosurfaces {
@@ -252,11 +378,11 @@ impl Look<'_> {
                 medium.depth += crosses.select(own(0, 2), none);
                 let hits = outside.simd_gt(0.5) & (before * medium.through).simd_le(0.5) & crosses;
                 medium.hit = hits.select(near + step * share, medium.hit);
-                has_hit |= hits;
+                medium.has_hit |= hits;
                 let mut surface = [0, 1, 2].map(|channel| own(1, channel));
                 if self.is_lit {
-                    let (normal, along) = self.gradient(sheet, place + (next_place - place) * share);
-                    surface = self.lit(simd, surface, normal, along);
+                    let normal = self.gradient(layer, place + (next_place - place) * share);
+                    surface = self.lit(simd, surface, normal, layer.direction, self.frame.volume_shade);
                 }
                 for (sum, channel) in medium.color.iter_mut().zip(surface) {
                     *sum = taken.mul_add(channel, *sum);
@@ -266,52 +392,20 @@ impl Look<'_> {
             place = next_place;
             value = next;
         }
-        self.composite(simd, sheet, medium, has_hit, pixels);
     }
 
+    /// The gradient in view space, in entries per thickness of a sheet.
     #[inline(always)]
-    fn composite<S: Simd>(
-        &self,
-        simd: S,
-        sheet: &Sheet<S>,
-        medium: Medium<S>,
-        has_hit: mask32x8<S>,
-        pixels: &mut Pixels<S>,
-    ) {
-        let before = pixels.through;
-        let depth = medium.depth.min(Lanes::splat(simd, MOST_DEPTH));
-        if self.optics == Optics::XRay {
-            let share = before * taken(simd, depth);
-            pixels.color = three!(I => pixels.color[I] + share);
-            pixels.through = before - share;
-        } else {
-            for (sum, channel) in pixels.color.iter_mut().zip(medium.color) {
-                *sum = before.mul_add(channel, *sum);
-            }
-            pixels.through = before * (Lanes::splat(simd, 1.0) - taken(simd, depth));
-        }
-        let passes = before.simd_gt(0.5) & pixels.through.simd_le(0.5) & !has_hit;
-        pixels.hit = has_hit.select(medium.hit, pixels.hit);
-        if passes.any_true() {
-            // Inside the sheet, optical depth counts as evenly spread.
-            let share = log2(simd, before * 2.0) * std::f32::consts::LN_2 / depth.max(Lanes::splat(simd, 1e-20));
-            pixels.hit = passes.select(share * sheet.thickness + sheet.start, pixels.hit);
-        }
-    }
-
-    /// The gradient in view space, in entries per thickness of a sheet, and its part along the ray.
-    #[inline(always)]
-    fn gradient<S: Simd>(&self, sheet: &Sheet<S>, u: Lanes<S>) -> ([Lanes<S>; 3], Lanes<S>) {
-        let (a, b, c) = (sheet.front.value, sheet.middle, sheet.back.value);
+    fn gradient<S: Simd>(&self, layer: &Layer<S>, u: Lanes<S>) -> [Lanes<S>; 3] {
+        let (a, b, c) = (layer.front.value, layer.middle, layer.back.value);
         let slope = a * (u * 4.0 - 3.0) + b * (4.0 - u * 8.0) + c * (u * 4.0 - 1.0);
-        let along = slope * (self.frame.gradients[2] / sheet.thickness);
-        let (front, back) = (sheet.front.across, sheet.back.across);
-        let normal = three!(I => (back[I] - front[I]).mul_add(u, front[I]) + along * sheet.direction[I]);
-        (normal, along)
+        let along = slope * (self.frame.gradients[2] / layer.thickness);
+        let (front, back) = (layer.front.across, layer.back.across);
+        three!(I => (back[I] - front[I]).mul_add(u, front[I]) + along * layer.direction[I])
     }
 }
 
-impl<S: Simd> Sheet<S> {
+impl<S: Simd> Layer<S> {
     #[inline(always)]
     fn parabola(&self, u: Lanes<S>) -> Lanes<S> {
         let v = 1.0 - u;

@@ -1,232 +1,252 @@
-//! Walks the rays of a tile through the sheets of a lattice's field, eight pixels at a time.
+//! Walks the sheets of a tile front to back: splats and the lattice add to a sheet, then it is closed.
 
 use super::{
-    close::{Face, Look, Pixels, Sheet, Visible},
-    field::{Field, Sample},
-    skip::{Shown, TILE},
-    vector::{Lanes, dot, dot_with, three},
+    bins::Entry,
+    close::{OPAQUE, Pixels, Visible},
+    footprint::Record,
+    gather::{Gather, Last},
+    plan::{Plan, TILE},
+    rays::{HIGH, PACKETS, Rays, WIDE},
+    scatter::{Packet, Window, add},
+    sums::{Sums, WINDOW, differences},
+    vector::{each, three},
 };
-use crate::{math::View, scene::Optics};
-use fearless_simd::{Simd, mask32x8, prelude::*};
-
-/// A pixel that lets less light through is finished.
-const OPAQUE: f32 = 0.0005;
-/// No value yet.
-const NO_VALUE: f32 = -3e38;
-
-/// What the tiles of a picture share.
-pub struct March<'a, T> {
-    pub look: Look<'a>,
-    pub visible: Visible,
-    pub field: Field<'a, T>,
-    pub shown: &'a Shown,
-    pub dims: [usize; 3],
-    pub view: &'a View,
-    pub planes: Vec<f32>,
-    /// Convex parts that are kept.
-    pub clips: usize,
-}
+use crate::scene::{Mode, Optics, Order};
+use fearless_simd::{Simd, prelude::*};
 
 /// A tile's pixels, row by row: premultiplied colour and opacity, and the distance of the hit or the largest value.
 pub type Tile = [([f32; 4], f32); TILE * TILE];
 
-/// Eight rays: four pixels beside each other in two rows.
-struct Rays<S: Simd> {
-    direction: [Lanes<S>; 3],
-    /// In steps of the lattice: where they start, and their way a world unit.
-    start: [Lanes<S>; 3],
-    way: [Lanes<S>; 3],
-    /// The distances between which they are in the lattice's box and in what the clips keep.
-    enter: Lanes<S>,
-    leave: Lanes<S>,
+/// A tile without anything in it.
+pub const EMPTY: Tile = [([0.0; 4], 0.0); TILE * TILE];
+
+/// What tiles are drawn from.
+pub struct March<'a> {
+    pub plan: &'a Plan<'a>,
+    pub gather: Option<Gather<'a>>,
+    pub visible: &'a Visible,
+    pub records: &'a [Vec<Record>],
 }
 
-impl<T: Sample> March<'_, T> {
-    /// Draws the tile at a column and a row; `sheets`: in which it may show something.
+/// The splats whose next window begins at each of the sheets ahead.
+type Ahead = [Vec<u32>; WINDOW];
+
+impl March<'_> {
+    /// Draws a tile. `entries` are its splats by their first sheets; `marks` the sheets in which the lattice may show
+    /// something, a bit each.
     #[inline(always)]
-    pub fn tile<S: Simd>(&self, simd: S, [column, row]: [usize; 2], sheets: &[u64]) -> Tile {
-        let mut tile = [([0.0; 4], 0.0); TILE * TILE];
-        if sheets.iter().all(|word| *word == 0) {
-            return tile;
+    pub fn tile<S: Simd>(&self, simd: S, at: [usize; 2], entries: &[Entry], marks: &[u64], drawn: &mut u64) -> Tile {
+        if entries.is_empty() && marks.iter().all(|word| *word == 0) {
+            return EMPTY;
         }
-        for y in (0..TILE).step_by(2) {
-            for x in (0..TILE).step_by(4) {
-                let rays = self.rays(simd, [column * TILE + x, row * TILE + y]);
-                let pixels = self.walk(simd, &rays, sheets);
-                let through: [f32; 8] = pixels.through.into();
-                let [red, green, blue]: [[f32; 8]; 3] = three!(I => pixels.color[I].into());
-                let hit: [f32; 8] = pixels.hit.into();
-                for lane in 0..8 {
-                    let own = &mut tile[(y + lane / 4) * TILE + x + lane % 4];
-                    *own = ([red[lane], green[lane], blue[lane], 1.0 - through[lane]], hit[lane]);
+        let plan = self.plan;
+        let corner = plan.corner(at);
+        let mut packets: [Packet<S>; PACKETS] = each!([0, 1, 2, 3, 4, 5, 6, 7], I => {
+            let first = [corner[0] + (I % 2 * WIDE) as i32, corner[1] + (I / 2 * HIGH) as i32];
+            Packet { rays: Rays::new(simd, plan, first), pixels: Pixels::new(simd, plan), is_done: false }
+        });
+        match plan.single() {
+            Some(order) => self.one_by_one(simd, corner, entries, order, &mut packets, drawn),
+            None => self.sheets(simd, corner, entries, marks, &mut packets, drawn),
+        }
+        self.finished(simd, &packets)
+    }
+
+    /// Adds each splat by itself.
+    #[inline(always)]
+    fn one_by_one<S: Simd>(
+        &self,
+        simd: S,
+        corner: [i32; 2],
+        entries: &[Entry],
+        order: Order,
+        packets: &mut [Packet<S>; PACKETS],
+        drawn: &mut u64,
+    ) {
+        let mut sums = Sums::new(simd);
+        for entry in entries {
+            let window = Window { front: usize::from(entry.sheet), is_continued: false };
+            add(simd, self.plan, record_of(self.records, entry.record), window, corner, packets, &mut sums);
+            *drawn += 1;
+            if order == Order::FrontToBack {
+                for packet in packets.iter_mut() {
+                    packet.is_done = !packet.pixels.through.simd_ge(OPAQUE).any_true();
                 }
+                if packets.iter().all(|packet| packet.is_done) {
+                    return;
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn sheets<S: Simd>(
+        &self,
+        simd: S,
+        corner: [i32; 2],
+        entries: &[Entry],
+        marks: &[u64],
+        packets: &mut [Packet<S>; PACKETS],
+        drawn: &mut u64,
+    ) {
+        let mut sums = Sums::new(simd);
+        let mut ahead: Ahead = std::array::from_fn(|_| Vec::new());
+        let mut last = [Last::new(simd); PACKETS];
+        let mut next = 0;
+        let mut sheet = 0;
+        // Sheets from `sheet` on that hold sums.
+        let mut open = 0;
+        while sheet <= self.plan.sheets {
+            if open == 0 {
+                let entry = entries.get(next).map_or(usize::MAX, |entry| usize::from(entry.sheet));
+                let Some(first) = entry.min(next_mark(marks, sheet)).checked_add(1) else { return };
+                sheet = first - 1;
+            }
+            let continued = std::mem::take(&mut ahead[sheet % WINDOW]);
+            let added = self.add(simd, sheet, entries, &mut next, continued, corner, packets, &mut sums, &mut ahead);
+            *drawn += added;
+            if added > 0 {
+                open = WINDOW;
+            }
+            if sheet > 0 {
+                self.close(simd, sheet, is_marked(marks, sheet), packets, &mut sums, &mut last);
+                let is_done = packets.iter().all(|packet| packet.is_done);
+                if is_done && self.plan.optics != Optics::Maximum {
+                    return;
+                }
+            }
+            sums.clear(sheet);
+            open = open.saturating_sub(1);
+            sheet += 1;
+        }
+    }
+
+    /// Adds the windows that begin at a sheet; returns how many.
+    #[expect(clippy::too_many_arguments, reason = "the state of one tile's walk")]
+    #[inline(always)]
+    fn add<S: Simd>(
+        &self,
+        simd: S,
+        sheet: usize,
+        entries: &[Entry],
+        next: &mut usize,
+        mut continued: Vec<u32>,
+        corner: [i32; 2],
+        packets: &mut [Packet<S>; PACKETS],
+        sums: &mut Sums<S>,
+        ahead: &mut Ahead,
+    ) -> u64 {
+        let first = *next;
+        while entries.get(*next).is_some_and(|entry| usize::from(entry.sheet) <= sheet) {
+            *next += 1;
+        }
+        let begun = entries[first..*next].iter().map(|entry| (entry.record, false));
+        let mut added = 0;
+        for (number, is_continued) in continued.iter().map(|number| (*number, true)).chain(begun) {
+            let record = record_of(self.records, number);
+            add(simd, self.plan, record, Window { front: sheet, is_continued }, corner, packets, sums);
+            added += 1;
+            if usize::from(record.sheets[1]) >= sheet + WINDOW && !self.plan.is_whole() {
+                ahead[(sheet + WINDOW - 1) % WINDOW].push(number);
+            }
+        }
+        // The slot of this sheet is that of the one four further on: its memory is used again.
+        continued.clear();
+        if ahead[sheet % WINDOW].is_empty() {
+            ahead[sheet % WINDOW] = continued;
+        }
+        added
+    }
+
+    #[inline(always)]
+    fn close<S: Simd>(
+        &self,
+        simd: S,
+        sheet: usize,
+        has_lattice: bool,
+        packets: &mut [Packet<S>; PACKETS],
+        sums: &mut Sums<S>,
+        last: &mut [Last<S>; PACKETS],
+    ) {
+        let plan = self.plan;
+        let has_sums = plan.has_field && sums.has_field[sheet % WINDOW] != 0;
+        let values =
+            (plan.central && has_sums).then(|| [sums.values_on(simd, plan, sheet), sums.values_on(simd, plan, sheet + 1)]);
+        for (number, packet) in packets.iter_mut().enumerate() {
+            if packet.is_done {
+                continue;
+            }
+            let rays = &packet.rays;
+            let radiance = sums.take_radiance(simd, plan, rays, sheet, number);
+            let field = match &self.gather {
+                Some(gather) if has_lattice => gather.layer(simd, plan, rays, sheet, &mut last[number]),
+                Some(_) => None,
+                None if has_sums => {
+                    let slopes = values.as_ref().map(|values| values.each_ref().map(|on| differences(simd, on, number)));
+                    let layer = sums.resolve(simd, plan, rays, sheet, number, slopes);
+                    let is_maximum = plan.optics == Optics::Maximum;
+                    layer.filter(|(layer, _)| is_maximum || self.visible.may_show(simd, plan, layer))
+                }
+                None => None,
+            };
+            if field.is_none() && radiance.is_none() {
+                continue;
+            }
+            let field = field.as_ref().map(|(layer, mask)| (layer, *mask));
+            plan.close(simd, sheet, rays, field, radiance, &mut packet.pixels);
+            packet.is_done = plan.optics != Optics::Maximum && !packet.pixels.through.simd_ge(OPAQUE).any_true();
+        }
+    }
+
+    #[inline(always)]
+    fn finished<S: Simd>(&self, simd: S, packets: &[Packet<S>; PACKETS]) -> Tile {
+        let mut tile = EMPTY;
+        for (number, Packet { rays, pixels, .. }) in packets.iter().enumerate() {
+            let through: [f32; 8] = pixels.through.into();
+            let [red, green, blue]: [[f32; 8]; 3] = three!(I => pixels.color[I].into());
+            let mut hit = pixels.hit;
+            if self.plan.mode == Mode::AxisSheets {
+                // From the place along the sheets' normal to the distance along the ray.
+                let normal = self.plan.frame.sheet_normal;
+                let slope = super::vector::dot_with(normal, rays.direction);
+                hit = if self.plan.view.perspective {
+                    hit / slope.abs().max(fearless_simd::f32x8::splat(simd, 1e-6))
+                } else {
+                    (hit - rays.aside[0] * normal[0] - rays.aside[1] * normal[1]) / slope
+                };
+            }
+            let hit: [f32; 8] = hit.into();
+            for lane in 0..8 {
+                let own = &mut tile[(number / 2 * HIGH + lane / WIDE) * TILE + number % 2 * WIDE + lane % WIDE];
+                *own = ([red[lane], green[lane], blue[lane], 1.0 - through[lane]], hit[lane]);
             }
         }
         tile
     }
-
-    #[inline(always)]
-    fn rays<S: Simd>(&self, simd: S, [x, y]: [usize; 2]) -> Rays<S> {
-        let frame = self.look.frame;
-        let columns: Lanes<S> = [0.5, 1.5, 2.5, 3.5, 0.5, 1.5, 2.5, 3.5].simd_into(simd);
-        let rows: Lanes<S> = [0.5, 0.5, 0.5, 0.5, 1.5, 1.5, 1.5, 1.5].simd_into(simd);
-        let right = (columns + (x as f32 - frame.center[0])) * (1.0 / frame.scale);
-        let down = (rows + (y as f32 - frame.center[1])) * (1.0 / frame.scale);
-        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
-        let (origin, direction) = if self.view.perspective {
-            let cosine = one / (right * right + down * down + 1.0).sqrt();
-            ([none; 3], [right * cosine, down * cosine, cosine])
-        } else {
-            ([right, down, none], [none, none, one])
-        };
-        let from: [Lanes<S>; 3] = three!(I => dot_with(frame.field_axes[I], origin));
-        let way = three!(I => dot_with(frame.field_axes[I], direction));
-        let start = three!(I => from[I] + frame.field_origin[I]);
-        let (mut enter, mut leave) = part_in_box(simd, frame.field_low, frame.field_high, start, way);
-        let rows: [[f32; 4]; 3] = three!(I => [frame.world[0][I], frame.world[1][I], frame.world[2][I], 0.0]);
-        let (origin, toward) = (three!(I => dot_with(rows[I], origin)), three!(I => dot_with(rows[I], direction)));
-        for [low, high] in &frame.clips[..self.clips] {
-            let (from, to) = if high[3] > 0.0 {
-                part_in_box(simd, *low, *high, origin, toward)
-            } else {
-                part_in_half_space(simd, *low, high[0], origin, toward)
-            };
-            (enter, leave) = (enter.max(from), leave.min(to));
-        }
-        Rays { direction, start, way, enter, leave }
-    }
-
-    /// Walks the sheets front to back.
-    #[inline(always)]
-    fn walk<S: Simd>(&self, simd: S, rays: &Rays<S>, sheets: &[u64]) -> Pixels<S> {
-        let none = Lanes::splat(simd, 0.0);
-        let is_maximum = self.look.optics == Optics::Maximum;
-        let hit = if is_maximum { Lanes::splat(simd, NO_VALUE) } else { none };
-        let mut pixels = Pixels { color: [none; 3], through: Lanes::splat(simd, 1.0), hit };
-        // The face behind the last sheet that was closed.
-        let mut last = (usize::MAX, Face { value: none, across: [none; 3] }, none);
-        for (word, bits) in sheets.iter().enumerate() {
-            let mut bits = *bits;
-            while bits != 0 {
-                let number = word * 64 + bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                let (start, stop) = (self.planes[number], self.planes[number + 1]);
-                let begin = rays.enter.max(Lanes::splat(simd, start));
-                let end = rays.leave.min(Lanes::splat(simd, stop));
-                let mask = begin.simd_lt(end) & self.may_show(simd, rays, [start, stop]);
-                if !mask.any_true() {
-                    continue;
-                }
-                if last.0 != number {
-                    let (front, along) = self.face(simd, rays, start);
-                    last = (number, front, along);
-                }
-                let (front, front_along) = (last.1, last.2);
-                let (back, back_along) = self.face(simd, rays, stop);
-                last = (number + 1, back, back_along);
-                let thickness = stop - start;
-                let sum = front.value + back.value;
-                // Hermite: the mean of the ends and an eighth of how much the slopes there differ.
-                let bend = (front_along - back_along) * thickness;
-                let middle = sum * 0.5 + bend * 0.125;
-                let mut sheet = Sheet { front, back, middle, start, thickness, begin, end, direction: rays.direction };
-                if is_maximum || self.visible.may_show(simd, &self.look, &sheet) {
-                    // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with slopes).
-                    let inside = self.value(simd, rays, 0.5 * (start + stop));
-                    let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
-                    sheet.middle = mean * 1.5 - sum * 0.25;
-                    self.look.close(simd, &sheet, mask, &mut pixels);
-                    if !is_maximum && !pixels.through.simd_ge(OPAQUE).any_true() {
-                        return pixels;
-                    }
-                }
-            }
-        }
-        pixels
-    }
-
-    #[inline(always)]
-    fn place<S: Simd>(rays: &Rays<S>, distance: f32) -> [Lanes<S>; 3] {
-        three!(I => rays.way[I] * distance + rays.start[I])
-    }
-
-    #[inline(always)]
-    fn value<S: Simd>(&self, simd: S, rays: &Rays<S>, distance: f32) -> Lanes<S> {
-        self.field.at(simd, Self::place(rays, distance)).0 * self.look.frame.transfer[1]
-    }
-
-    /// The field on the plane at a distance, and its change along the ray a world unit.
-    #[inline(always)]
-    fn face<S: Simd>(&self, simd: S, rays: &Rays<S>, distance: f32) -> (Face<S>, Lanes<S>) {
-        let frame = self.look.frame;
-        let per_value = frame.transfer[1];
-        let (value, slopes) = self.field.at(simd, Self::place(rays, distance));
-        // From steps of the lattice to view space.
-        let axes = &frame.field_axes;
-        let gradient = three!(I => {
-            (slopes[0] * axes[0][I] + slopes[1] * axes[1][I] + slopes[2] * axes[2][I]) * per_value
-        });
-        let along = dot(gradient, rays.direction);
-        let length = frame.gradients[2];
-        let across = three!(I => (gradient[I] - along * rays.direction[I]) * length);
-        (Face { value: value * per_value, across }, along)
-    }
-
-    /// Whether something may show around three places of each ray in a sheet.
-    #[inline(always)]
-    fn may_show<S: Simd>(&self, simd: S, rays: &Rays<S>, [start, stop]: [f32; 2]) -> mask32x8<S> {
-        let [nx, ny, _] = self.dims;
-        let mut shows = [false; 8];
-        for distance in [start, 0.5 * (start + stop), stop] {
-            let place = Self::place(rays, distance);
-            let [x, y, z]: [[f32; 8]; 3] = three!(I => {
-                let last = Lanes::splat(simd, self.dims[I] as f32 - 1.0);
-                (place[I] + 0.5).floor().max(Lanes::splat(simd, 0.0)).min(last).into()
-            });
-            for lane in 0..8 {
-                let sample = (z[lane] as usize * ny + y[lane] as usize) * nx + x[lane] as usize;
-                shows[lane] |= self.shown.samples[sample];
-            }
-        }
-        let bits = shows.iter().rev().fold(0, |bits, shows| bits << 1 | u64::from(*shows));
-        mask32x8::from_bitmask(simd, bits)
-    }
 }
 
-/// The distances between which rays are in a box.
-#[inline(always)]
-fn part_in_box<S: Simd>(
-    simd: S,
-    low: [f32; 4],
-    high: [f32; 4],
-    origin: [Lanes<S>; 3],
-    direction: [Lanes<S>; 3],
-) -> (Lanes<S>, Lanes<S>) {
-    let (mut enter, mut leave) = (Lanes::splat(simd, -3e38), Lanes::splat(simd, 3e38));
-    for axis in 0..3 {
-        // A ray along a face would divide 0 by 0.
-        let own = direction[axis];
-        let safe = own.abs().simd_lt(1e-20).select(Lanes::splat(simd, 1e-20), own);
-        let a = (low[axis] - origin[axis]) / safe;
-        let b = (high[axis] - origin[axis]) / safe;
-        (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
-    }
-    (enter, leave)
+/// The record of a number that [`super::bins`] gave it.
+fn record_of(records: &[Vec<Record>], number: u32) -> &Record {
+    let (batch, own) = super::bins::place_of(number);
+    &records[batch][own]
 }
 
-/// The distances between which rays are where normal·x ≤ offset.
-#[inline(always)]
-fn part_in_half_space<S: Simd>(
-    simd: S,
-    normal: [f32; 4],
-    offset: f32,
-    origin: [Lanes<S>; 3],
-    direction: [Lanes<S>; 3],
-) -> (Lanes<S>, Lanes<S>) {
-    let slope = dot_with(normal, direction);
-    let safe = slope.abs().simd_lt(1e-20).select(Lanes::splat(simd, 1e-20), slope);
-    let (far, behind) = (Lanes::splat(simd, 3e38), Lanes::splat(simd, -3e38));
-    let at = ((offset - dot_with(normal, origin)) / safe).max(behind).min(far);
-    let is_outward = safe.simd_gt(0.0);
-    (is_outward.select(behind, at), is_outward.select(at, far))
+fn is_marked(marks: &[u64], sheet: usize) -> bool {
+    let bit = sheet - 1;
+    marks.get(bit / 64).is_some_and(|word| word >> (bit % 64) & 1 != 0)
+}
+
+/// The first marked sheet from one on.
+fn next_mark(marks: &[u64], sheet: usize) -> usize {
+    let bit = sheet.max(1) - 1;
+    let mut word = bit / 64;
+    let mut rest = marks.get(word).map_or(0, |own| own & u64::MAX << (bit % 64));
+    while rest == 0 {
+        word += 1;
+        match marks.get(word) {
+            Some(own) => rest = *own,
+            None => return usize::MAX,
+        }
+    }
+    word * 64 + rest.trailing_zeros() as usize + 1
 }

@@ -1,45 +1,68 @@
-//! The engine for processors: draws the field of a lattice without a GPU.
+//! The engine for processors: draws scenes without a GPU, by the same sheets.
 //!
-//! The engine of `src/engine` scatters: each splat is added to the pixels that it covers. This one gathers: each pixel asks
-//! which kernels reach the planes between its sheets. A Gaussian on a lattice is a product of Gaussians along the axes, so the
-//! sum of the 64 kernels in reach, and its gradient, take sixteen rows of four samples (`field`). Sheets, classification, light
-//! and compositing are the same; pictures agree (tests/cpu_equals_reference.rs).
+//! A tile of 8 × 8 pixels is walked front to back. *Splats* scatter: each adds its sections to the sheets that it meets
+//! (`scatter`). The field of a Gaussian on a lattice is *gathered* where that is exact: each pixel asks which kernels reach the
+//! planes between its sheets (`gather`). Then the sheet is classified, lit and composited (`close`). The GPU engine does the same
+//! in shaders; tests/cpu_equals_reference.rs compares both with the reference.
 //!
 //! | module | does |
 //! |---|---|
-//! | `skip` | which sheets may show something in which tiles |
-//! | `march` | walks the rays of a tile, front to back |
-//! | `field` | the field at a place, and its gradient |
+//! | `plan` | what all tiles of a picture share |
+//! | `items`, `page_cache`, `brick_cache` | which splats of the scene a view takes |
+//! | `footprint` | where a splat lies in the picture and in the sheets |
+//! | `bins` | which splats meet which tiles |
+//! | `skip` | in which tiles and sheets a lattice may show something |
+//! | `march` | walks the sheets of a tile |
+//! | `rays` | the rays of eight pixels |
+//! | `scatter`, `sums` | adds splats to the open sheets |
+//! | `gather`, `field` | the field of a lattice at a place, and its gradient |
 //! | `close` | classifies, lights and composites a sheet |
 //! | `vector` | functions of eight numbers at once |
 
+mod bins;
+mod brick_cache;
 mod close;
 mod field;
+mod footprint;
+mod gather;
+mod items;
 mod march;
+mod page_cache;
+mod plan;
+mod rays;
+mod scatter;
 mod skip;
+mod sums;
 mod vector;
 
 use crate::{
-    Error, Result,
-    engine::{
-        tables::Tables,
-        uniforms::{Frame, clip_counts},
-    },
-    math::{Camera, Kernel, Sheets, View},
+    Result,
+    engine::{FrameStats, pace::Pace, uniforms::Frame},
+    hierarchy::Detail,
+    math::{Camera, Sheets, View},
     picture::Picture,
-    scene::{Classification, Gradient, Item, Mode, Optics, Scene, Settings},
+    scene::{Gradient, Item, Mode, Optics, Scene, Settings},
     volume::{
-        Arrangement, TransferFunction, Volume,
+        Arrangement, TransferFunction,
+        bricks::Choice,
         reach::{EVERYTHING, first_visible},
     },
 };
-use close::{Look, Visible};
+use bins::{BLOCK, Bins, Entry};
+use close::{NO_VALUE, Visible};
 use fearless_simd::{Level, dispatch};
-use field::{Field, Sample, Typed};
-use march::{March, Tile};
+use field::Typed;
+use footprint::Record;
+use gather::Gather;
+use items::Prepared;
+use march::{EMPTY, March, Tile};
+use plan::{Plan, TILE};
 use rayon::prelude::*;
-use skip::{Shown, TILE};
-use std::sync::Arc;
+use skip::Shown;
+use std::{
+    sync::atomic::{AtomicU64, Ordering::Relaxed},
+    time::Instant,
+};
 
 /// Sheets thicker than this many of a sample's least steps hold more than a parabola tells.
 const THICKEST: f64 = 2.2;
@@ -48,175 +71,296 @@ const THICKEST: f64 = 2.2;
 #[derive(Debug)]
 pub struct CpuRenderer {
     scene: Scene,
-    volume: Arc<Volume>,
-    kernel: Kernel,
-    ranges: Vec<[u8; 2]>,
-    /// What shows, for the transfer function's table of that.
+    prepared: Vec<Prepared>,
+    /// What shows of a lattice that is gathered, for the transfer function's table of that.
     shown: Option<([u16; 256], Shown)>,
+    pace: Pace,
     level: Level,
+}
+
+/// What is drawn of a scene in a picture, found before it is drawn.
+struct Outline {
+    /// The cut of hierarchies, in pixels.
+    cut_pixels: f64,
+    choice: Option<Choice>,
+    sheets: Sheets,
+    /// The ranges of values that show something.
+    shown: [u16; 256],
+}
+
+/// The times of a picture's steps.
+struct Clock {
+    last: Instant,
+    steps: Vec<(&'static str, f64)>,
+}
+
+impl Clock {
+    fn step(&mut self, name: &'static str) {
+        let now = Instant::now();
+        self.steps.push((name, (now - self.last).as_secs_f64() * 1e3));
+        self.last = now;
+    }
 }
 
 impl CpuRenderer {
     /// Prepares a scene.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a scene that [`Scene::validate`] refuses, and for one that only the other engine draws: the
-    /// message names what it is.
+    /// [`Error::Argument`](crate::Error::Argument) for a scene that [`Scene::validate`] refuses.
     pub fn new(scene: &Scene) -> Result<Self> {
         scene.validate()?;
-        let (volume, kernel, _) = volume_of(scene)?;
-        if !matches!(volume.lattice.arrangement, Arrangement::Cartesian) {
-            return Err(not_drawn("body-centred and rectilinear lattices"));
-        }
-        if volume.coefficients.is_some() {
-            return Err(not_drawn("sharp volumes"));
-        }
-        if field::deviation(kernel).is_none() {
-            return Err(not_drawn("kernels other than Gaussians that reach two samples"));
-        }
-        let ranges = volume.drawn_ranges(kernel).into_owned();
-        let (volume, kernel) = (volume.clone(), kernel.clone());
-        Ok(Self { scene: scene.clone(), volume, kernel, ranges, shown: None, level: Level::new() })
+        Ok(Self {
+            scene: scene.clone(),
+            prepared: scene.items.iter().map(Prepared::new).collect(),
+            shown: None,
+            pace: Pace::default(),
+            level: Level::new(),
+        })
     }
 
-    /// Draws a picture.
+    /// Shows the scene's volume or sample set by another transfer function.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a camera or settings that make no picture of this scene, and for settings that only the other
-    /// engine draws.
-    pub fn render(&mut self, camera: &Camera, settings: &Settings) -> Result<Picture> {
+    /// [`Error::Argument`](crate::Error::Argument) for one that [`CpuRenderer::new`] would refuse; the scene is then shown as before.
+    pub fn set_transfer(&mut self, transfer: &TransferFunction) -> Result<()> {
+        self.scene = self.scene.shown_by(transfer)?;
+        Ok(())
+    }
+
+    /// Draws a picture. The statistics hold the milliseconds of each step.
+    ///
+    /// # Errors
+    /// [`Error::Argument`](crate::Error::Argument) for a camera or settings that make no picture of this scene; those of reading,
+    /// for scenes that are read as they are drawn.
+    pub fn render(&mut self, camera: &Camera, settings: &Settings) -> Result<(Picture, FrameStats)> {
+        let start = Instant::now();
         self.scene.validate_settings(settings)?;
         let view = camera.view(settings.size)?;
         let bounds = self.scene.bounds();
         view.validate_for(&bounds)?;
-        let sheets = self.scene.sheets_of(&view, settings, None, &bounds);
-        check_settings(settings)?;
-        let least = self.volume.lattice.least_kernel_spacing();
-        if sheets.step > THICKEST * least {
-            return Err(not_drawn("sheets thicker than two samples"));
+        let mut clock = Clock { last: start, steps: Vec::new() };
+        let outline = self.outline(&view, settings)?;
+        let plan = Plan::new(&self.scene, &view, &outline.sheets, settings, outline.choice.as_ref());
+        clock.step("plan");
+        let gathers = self.gathers(settings, &outline.sheets);
+        let before: u64 = self.brick_reads();
+        let mut records = Vec::new();
+        for (item, prepared) in self.scene.items.iter().zip(&mut self.prepared) {
+            if !(gathers && matches!(item, Item::Volume(..))) {
+                let Outline { cut_pixels, choice, shown, .. } = &outline;
+                records.extend(prepared.records(&plan, settings, *cut_pixels, choice.as_ref(), shown)?);
+            }
         }
-        let (_, _, transfer) = volume_of(&self.scene)?;
-        let first = match settings.optics {
-            Optics::Maximum => EVERYTHING,
-            _ => first_visible(transfer, self.volume.range),
-        };
-        if self.shown.as_ref().is_none_or(|(own, _)| *own != first) {
-            self.shown = Some((first, Shown::new(&self.volume, &self.ranges, &first)));
+        items::check_count(&records)?;
+        clock.step("project");
+        let (picture, mut stats) = self.draw(&plan, &outline, &records, gathers, &mut clock);
+        if let Detail::Milliseconds(wanted) = settings.detail {
+            self.pace.took(start.elapsed().as_secs_f64() * 1e3, wanted);
         }
-        let Some((_, shown)) = &self.shown else { return Err(not_drawn("this")) };
-        let tables = Tables::new(transfer, self.volume.range, Some(&self.kernel));
-        let mut frame = Frame::new(&self.scene, &view, &sheets, settings, None);
-        frame.set_tables(&tables, transfer, &view, &sheets);
-        let is_lit = settings.optics == Optics::EmissionAbsorption;
-        let look = Look {
-            frame: &frame,
-            tables: &tables,
-            optics: settings.optics,
-            is_lit: is_lit && settings.shade_of(transfer).is_some(),
-            has_gradient_opacity: !transfer.gradient.is_empty() && settings.optics != Optics::Maximum,
-            is_integrated: settings.classification == Classification::PreIntegrated,
-            isosurfaces: if is_lit { transfer.isosurfaces.len() } else { 0 },
-        };
-        let Some(sigma) = field::deviation(&self.kernel) else { return Err(not_drawn("this kernel")) };
-        let planes = Planes { view: &view, sheets: &sheets, settings };
-        Ok(match Typed::new(&self.volume, sigma, tables.values[0]) {
-            Typed::U8(field) => self.draw(field, look, shown, &planes, transfer),
-            Typed::U16(field) => self.draw(field, look, shown, &planes, transfer),
-            Typed::I16(field) => self.draw(field, look, shown, &planes, transfer),
-            Typed::I32(field) => self.draw(field, look, shown, &planes, transfer),
-            Typed::F32(field) => self.draw(field, look, shown, &planes, transfer),
-        })
+        stats.cut_pixels = outline.cut_pixels;
+        stats.read_bricks = self.brick_reads() - before;
+        if let Some(choice) = &outline.choice {
+            (stats.lambda, stats.bricks) = (choice.lambda, choice.bricks.len() as u64);
+        }
+        for prepared in &self.prepared {
+            match prepared {
+                Prepared::Hierarchy(pages) => stats.missing_pages += pages.missing as u64,
+                Prepared::Bricks(bricks) => stats.brick_bytes += bricks.bytes(),
+                Prepared::Set { .. } | Prepared::Volume { .. } => {}
+            }
+        }
+        stats.steps = clock.steps;
+        Ok((picture, stats))
     }
 
-    fn draw<T: Sample>(
-        &self,
-        field: Field<T>,
-        look: Look,
-        shown: &Shown,
-        planes: &Planes,
-        transfer: &TransferFunction,
-    ) -> Picture {
-        let &Planes { view, sheets, settings } = planes;
-        let marks = shown.sheets_of_tiles(&self.volume, view, sheets);
-        let march = March {
-            visible: Visible::new(&look),
-            look,
-            field,
-            shown,
-            dims: self.volume.lattice.dims,
-            view,
-            planes: sheets.planes.iter().map(|plane| *plane as f32).collect(),
-            clips: clip_counts(settings)[0] as usize,
+    fn brick_reads(&self) -> u64 {
+        let reads = |prepared: &Prepared| if let Prepared::Bricks(bricks) = prepared { bricks.reads } else { 0 };
+        self.prepared.iter().map(reads).sum()
+    }
+
+    fn outline(&mut self, view: &View, settings: &Settings) -> Result<Outline> {
+        let detail = match settings.detail {
+            Detail::Milliseconds(_) => Detail::Pixels(self.pace.next(view)),
+            detail => detail,
         };
-        let columns = (view.size[0] as usize).div_ceil(TILE);
-        let tiles: Vec<Tile> = marks
-            .par_iter()
-            .enumerate()
-            .map(|(number, own)| {
-                let at = [number % columns, number / columns];
-                dispatch!(self.level, simd => march.tile(simd, at, own))
-            })
+        let mut pages: Vec<_> = self
+            .prepared
+            .iter_mut()
+            .filter_map(|prepared| if let Prepared::Hierarchy(pages) = prepared { Some(pages.as_mut()) } else { None })
             .collect();
-        let is_maximum = settings.optics == Optics::Maximum;
-        let pixel = |index: usize| {
-            let [x, y] = [index % view.size[0] as usize, index / view.size[0] as usize];
-            let (color, hit) = tiles[y / TILE * columns + x / TILE][y % TILE * TILE + x % TILE];
-            if is_maximum {
-                return (of_largest(hit, transfer, march.look.frame), f32::INFINITY);
-            }
-            if color[3] < 0.5 {
-                return (color, f32::INFINITY);
-            }
-            let at = glam::DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-            (color, hit * view.ray(at).1.z as f32)
+        let cut_pixels = match detail {
+            _ if pages.is_empty() => 0.0,
+            Detail::Pixels(pixels) => pixels,
+            Detail::Splats(most) => page_cache::finest_within(&mut pages, view, settings, most)?,
+            Detail::Milliseconds(_) => Detail::PIXELS,
         };
-        let pixels = view.size[0] as usize * view.size[1] as usize;
-        let (color, depth) = (0..pixels).into_par_iter().map(pixel).unzip();
-        Picture { width: view.size[0], height: view.size[1], color, depth }
+        let pixels = if let Detail::Pixels(pixels) = detail { pixels } else { Detail::PIXELS };
+        self.prepared.iter_mut().try_for_each(|prepared| prepared.update_levels(view, pixels))?;
+        let bounds = self.scene.bounds();
+        let choice = self.scene.choice(view, settings, detail, usize::MAX, &bounds);
+        let sheets = self.scene.sheets_of(view, settings, choice.as_ref(), &bounds);
+        let mut shown = EVERYTHING;
+        if let Some(Item::Volume(volume, _, transfer)) = self.scene.items.iter().find(|i| matches!(i, Item::Volume(..)))
+            && !self.scene.mixes_afar(settings, &sheets, choice.as_ref())
+        {
+            shown = first_visible(transfer, volume.range);
+        }
+        Ok(Outline { cut_pixels, choice, sheets, shown })
+    }
+
+    /// Whether the field of the scene's volume is gathered: it lies on a Cartesian lattice with Gaussian kernels of which four
+    /// weights an axis hold all, in sheets thin enough for a parabola.
+    fn gathers(&self, settings: &Settings, sheets: &Sheets) -> bool {
+        let is_plain = settings.mode == Mode::Sheets
+            && !settings.classifies_samples()
+            && settings.gradient == Gradient::Analytic;
+        is_plain
+            && self.scene.items.iter().any(|item| match item {
+                Item::Volume(volume, kernel, _) => {
+                    volume.lattice.arrangement == Arrangement::Cartesian
+                        && volume.coefficients.is_none()
+                        && field::deviation(kernel).is_some()
+                        && sheets.step <= THICKEST * volume.lattice.least_kernel_spacing()
+                }
+                _ => false,
+            })
+    }
+
+    fn draw(
+        &mut self,
+        plan: &Plan,
+        outline: &Outline,
+        records: &[Vec<Record>],
+        gathers: bool,
+        clock: &mut Clock,
+    ) -> (Picture, FrameStats) {
+        let visible = Visible::new(plan);
+        let mut marks = Vec::new();
+        let mut gather = None;
+        if gathers {
+            for (item, prepared) in self.scene.items.iter().zip(&self.prepared) {
+                let (Item::Volume(volume, kernel, transfer), Prepared::Volume { ranges, .. }) = (item, prepared) else {
+                    continue;
+                };
+                let Some(sigma) = field::deviation(kernel) else { continue };
+                let first = match plan.optics {
+                    Optics::Maximum => EVERYTHING,
+                    _ => first_visible(transfer, volume.range),
+                };
+                self.shown.take_if(|(own, _)| *own != first);
+                let (_, shown) = self.shown.get_or_insert_with(|| (first, Shown::new(volume, ranges, &first)));
+                let shown: &Shown = shown;
+                marks = shown.sheets_of_tiles(volume, plan.view, &outline.sheets);
+                let field = Typed::new(volume, sigma, plan.tables.values[0]);
+                gather = Some(Gather { field, shown, visible: &visible, dims: volume.lattice.dims });
+            }
+            clock.step("skip");
+        }
+        let march = March { plan, gather, visible: &visible, records };
+        let bins = Bins::new(plan, records);
+        clock.step("bin");
+        let tiles = plan.tiles();
+        let drawn = AtomicU64::new(0);
+        let mut blocks: Vec<Vec<Tile>> = Vec::new();
+        for part in bins.parts() {
+            let lists = bins.lists(&part);
+            clock.step("bin");
+            let block = |block: usize| {
+                let entries = lists.sorted(plan, block);
+                draw_block(self.level, &march, bins.place(block), tiles, &entries, &marks, &drawn)
+            };
+            blocks.par_extend(part.into_par_iter().map(block));
+            clock.step("march");
+        }
+        let picture = assembled(&self.scene, plan, &blocks);
+        clock.step("write");
+        let stats = FrameStats {
+            splats: records.iter().map(|batch| batch.len() as u64).sum(),
+            entries: drawn.into_inner(),
+            passes: 1,
+            gpu_bytes: self.prepared.iter().map(Prepared::bytes).sum::<u64>() + record_bytes(records),
+            ..FrameStats::default()
+        };
+        (picture, stats)
     }
 }
 
-/// Where the sheets of a picture lie.
-struct Planes<'a> {
-    view: &'a View,
-    sheets: &'a Sheets,
-    settings: &'a Settings,
+fn record_bytes(records: &[Vec<Record>]) -> u64 {
+    records.iter().map(|batch| size_of_val(batch.as_slice()) as u64).sum()
+}
+
+/// The tiles of a block, row by row.
+fn draw_block(
+    level: Level,
+    march: &March,
+    [column, row]: [usize; 2],
+    tiles: [usize; 2],
+    entries: &[u32],
+    marks: &[Vec<u64>],
+    drawn: &AtomicU64,
+) -> Vec<Tile> {
+    let first = [column * BLOCK, row * BLOCK];
+    let mut own: [Vec<Entry>; BLOCK * BLOCK] = std::array::from_fn(|_| Vec::new());
+    for &number in entries {
+        let (batch, place) = bins::place_of(number);
+        let record = &march.records[batch][place];
+        let [low, high] = bins::tiles_of(march.plan, record);
+        let along = |axis: usize| {
+            let from = low[axis].max(first[axis]) - first[axis];
+            from..=(high[axis] - first[axis]).min(BLOCK - 1)
+        };
+        for y in along(1) {
+            for x in along(0) {
+                own[y * BLOCK + x].push(Entry { sheet: record.sheets[0], record: number });
+            }
+        }
+    }
+    let mut found = vec![EMPTY; BLOCK * BLOCK];
+    let mut count = 0;
+    for (number, (tile, entries)) in found.iter_mut().zip(&own).enumerate() {
+        let at = [first[0] + number % BLOCK, first[1] + number / BLOCK];
+        if at[0] < tiles[0] && at[1] < tiles[1] {
+            let marks = marks.get(at[1] * tiles[0] + at[0]).map_or(&[][..], Vec::as_slice);
+            *tile = dispatch!(level, simd => march.tile(simd, at, entries, marks, &mut count));
+        }
+    }
+    drawn.fetch_add(count, Relaxed);
+    found
+}
+
+/// The picture of all blocks.
+fn assembled(scene: &Scene, plan: &Plan, blocks: &[Vec<Tile>]) -> Picture {
+    let [width, height] = plan.view.size;
+    let (step, apron) = (plan.tile_step(), plan.apron() as usize);
+    let columns = plan.tiles()[0].div_ceil(BLOCK);
+    let transfer = items::transfer_of(scene);
+    let pixel = |index: usize| {
+        let [x, y] = [index % width as usize, index / width as usize];
+        let [tile_x, tile_y] = [x / step, y / step];
+        let block = &blocks[tile_y / BLOCK * columns + tile_x / BLOCK];
+        let tile = &block[tile_y % BLOCK * BLOCK + tile_x % BLOCK];
+        let (color, hit) = tile[(y % step + apron) * TILE + x % step + apron];
+        if plan.optics == Optics::Maximum {
+            return (transfer.map_or([0.0; 4], |transfer| of_largest(hit, transfer, &plan.frame)), f32::INFINITY);
+        }
+        if color[3] < 0.5 {
+            return (color, f32::INFINITY);
+        }
+        let at = glam::DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+        (color, hit * plan.view.ray(at).1.z as f32)
+    };
+    let pixels = width as usize * height as usize;
+    let (color, depth) = (0..pixels).into_par_iter().map(pixel).unzip();
+    Picture { width, height, color, depth }
 }
 
 /// The colour of a pixel by the largest value on its ray: its opacity is that of a unit of length.
 fn of_largest(value: f32, transfer: &TransferFunction, frame: &Frame) -> [f32; 4] {
-    if value <= -3e38 {
+    if value <= NO_VALUE {
         return [0.0; 4];
     }
     let value = f64::from(frame.transfer[0]) + f64::from(value) / f64::from(frame.transfer[1]);
     let opacity = 1.0 - (-transfer.extinction(value) * transfer.unit).exp();
     let [red, green, blue] = transfer.color(value);
     [red, green, blue, 1.0].map(|part| (part * opacity) as f32)
-}
-
-fn volume_of(scene: &Scene) -> Result<(&Arc<Volume>, &Kernel, &TransferFunction)> {
-    match scene.items.as_slice() {
-        [Item::Volume(volume, kernel, transfer)] => Ok((volume, kernel, transfer)),
-        _ => Err(not_drawn("anything but a single volume")),
-    }
-}
-
-fn check_settings(settings: &Settings) -> Result<()> {
-    if settings.classifies_samples() {
-        return Err(not_drawn("samples that are classified before interpolation"));
-    }
-    if settings.mode != Mode::Sheets {
-        return Err(not_drawn("modes other than image-aligned sheets"));
-    }
-    if settings.gradient == Gradient::Central {
-        return Err(not_drawn("gradients from neighbouring pixels"));
-    }
-    if clip_counts(settings)[1] > 0 {
-        return Err(not_drawn("boxes that are cut out"));
-    }
-    Ok(())
-}
-
-fn not_drawn(what: &str) -> Error {
-    Error::Argument(format!("the CPU engine does not draw {what} yet; the GPU engine does"))
 }

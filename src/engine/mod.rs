@@ -35,7 +35,7 @@ mod measure;
 mod nodes;
 mod occlusion;
 mod order;
-mod pace;
+pub(crate) mod pace;
 mod plan;
 mod project;
 mod renderer;

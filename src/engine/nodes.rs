@@ -12,13 +12,13 @@ use crate::{
     Result,
     hierarchy::{
         self, CutSphere, Hierarchy,
-        file::{PAGE_NODES, Page, PageEntry},
+        file::{PAGE_NODES, Page},
+        needed::{Needed, parents_around},
     },
     math::View,
     scene::Settings,
 };
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::{
     Arc,
@@ -153,8 +153,7 @@ pub struct Forest {
     slots: Vec<Option<(u32, u64)>>,
     /// The slot of each page.
     slot_of: Vec<Option<u32>>,
-    /// All pages, the coarse ones first.
-    order: Vec<u32>,
+    needed: Needed,
     frame: u64,
     /// Pages that the last view needed and that found no room.
     pub missing: usize,
@@ -169,7 +168,7 @@ impl Forest {
             cut: super::buffer(gpu, "cut", size_of::<GpuCut>() as u64, Usage::UNIFORM),
             slots: Vec::new(),
             slot_of: vec![None; pages],
-            order: hierarchy.coarse_first(),
+            needed: Needed::new(hierarchy),
             frame: 0,
             missing: 0,
         }
@@ -184,37 +183,12 @@ impl Forest {
 
     /// The pages that a cut may need, the coarse ones first, with all pages above them.
     pub fn needed(&self, cut: &hierarchy::Cut) -> Vec<u32> {
-        let pages = self.hierarchy.pages();
-        let test = |(page, entry): (usize, &PageEntry)| {
-            self.hierarchy.is_present(page as u32) && (page == 0 || cut.may_refine(&parents_of(entry)))
-        };
-        let mut needed: Vec<bool> = pages.par_iter().enumerate().with_min_len(1 << 10).map(test).collect();
-        for index in (0..pages.len()).rev() {
-            if needed[index] {
-                for parent in pages[index].parent_pages.clone() {
-                    needed[parent as usize] = true;
-                }
-            }
-        }
-        self.order.iter().copied().filter(|&page| needed[page as usize]).collect()
+        self.needed.of(&self.hierarchy, cut)
     }
 
     /// The finest cut, in pixels, whose pages hold no more than `most` nodes.
     pub fn finest_within(&self, view: &View, settings: &Settings, most: u64) -> f64 {
-        let pages = self.hierarchy.pages();
-        let nodes = |pixels: f64| {
-            let needed = self.needed(&self.cut(view, settings, pixels));
-            needed.iter().map(|&page| u64::from(pages[page as usize].nodes)).sum::<u64>()
-        };
-        if nodes(0.0) <= most {
-            return 0.0;
-        }
-        let (mut fine, mut coarse) = (-10.0f64, 16.0f64);
-        for _ in 0..12 {
-            let middle = (fine + coarse) * 0.5;
-            *(if nodes(middle.exp2()) <= most { &mut coarse } else { &mut fine }) = middle;
-        }
-        coarse.exp2()
+        self.needed.finest_within(&self.hierarchy, most, |pixels| self.cut(view, settings, pixels))
     }
 
     /// Sets the cut without changing what is at hand.
@@ -327,7 +301,8 @@ impl Forest {
                 let place = (slot as usize - slots.first_slot) as u64;
                 let nodes: Vec<GpuNode> = (0..content.nodes.len()).map(|index| gpu_node(content, index)).collect();
                 let own: Vec<crate::splat::Splat> = content.nodes.iter().map(|node| node.splat).collect();
-                let bounds: Vec<GpuBounds> = nodes.chunks(RUN_NODES as usize).map(parents_around).collect();
+                let runs = (0..content.nodes.len()).step_by(RUN_NODES as usize);
+                let bounds: Vec<GpuBounds> = runs.map(|first| run_bounds(content, first)).collect();
                 gpu.queue.write_buffer(&slots.nodes, place * SLOT_HALF, bytemuck::cast_slice(&nodes));
                 gpu.queue.write_buffer(&slots.bounds, place * SLOT_BOUNDS, bytemuck::cast_slice(&bounds));
                 gpu.queue.write_buffer(splats, place * SLOT_HALF, bytemuck::cast_slice(&own));
@@ -364,33 +339,15 @@ impl Forest {
     }
 }
 
-/// A sphere that holds the spheres of all parents of a page's nodes, and the largest of their sizes.
-fn parents_of(entry: &PageEntry) -> CutSphere {
-    CutSphere { center: entry.parents_center, radius: entry.parents_radius, size: entry.largest_parent_size }
-}
-
 fn grown_slots(grown: &[Growth]) -> usize {
     grown.iter().map(|growth| growth.slots.count).sum()
 }
 
-/// What holds the spheres and sizes of the parents of a run of nodes, with room for rounding, so that none is refined where this
-/// is not.
-fn parents_around(nodes: &[GpuNode]) -> GpuBounds {
-    const ROOM: f32 = 1.00001;
-    if nodes.iter().any(|node| node.parent_size < 0.0) {
-        // A root is always looked at.
-        return GpuBounds { size: -1.0, ..GpuBounds::default() };
-    }
-    let centers = || nodes.iter().map(|node| Vec3::from(node.parent_center));
-    let low = centers().fold(Vec3::INFINITY, Vec3::min);
-    let high = centers().fold(Vec3::NEG_INFINITY, Vec3::max);
-    let center = low.midpoint(high);
-    let reach = |node: &GpuNode| Vec3::from(node.parent_center).distance(center) + node.parent_radius;
-    GpuBounds {
-        center: center.to_array(),
-        radius: nodes.iter().map(reach).fold(0.0, f32::max) * ROOM,
-        size: (nodes.iter().map(|node| node.parent_size).fold(0.0, f32::max) * ROOM).min(f32::MAX),
-        unused: [0.0; 3],
+/// What bounds the parents of a run of nodes, as the shader reads it.
+fn run_bounds(page: &Page, first: usize) -> GpuBounds {
+    match parents_around(page, first, RUN_NODES as usize) {
+        None => GpuBounds { size: -1.0, ..GpuBounds::default() },
+        Some(CutSphere { center, radius, size }) => GpuBounds { center, radius, size, unused: [0.0; 3] },
     }
 }
 

@@ -72,7 +72,7 @@ pub struct FrameStats {
     pub entries: u64,
     /// Depth passes.
     pub passes: u32,
-    /// GPU memory held by the scene and by the frame.
+    /// Memory of the device that draws, or of the CPU engine, held by the scene and by the frame.
     pub gpu_bytes: u64,
     /// Hierarchies: the cut, in pixels.
     pub cut_pixels: f64,

@@ -21,9 +21,9 @@ const LEAST_PART: f64 = 1.0 / 1048576.0;
 /// Entries of the gradient's factor.
 const GRADIENTS: usize = 1024;
 /// Entries of the kernel along its radius.
-const RADII: usize = 1024;
+pub const RADII: usize = 1024;
 /// Cells of the sections' table along each side.
-const SECTIONS: usize = 128;
+pub const SECTIONS: usize = 128;
 
 /// The constants that tables.wgsl reads them by.
 pub fn constants() -> String {

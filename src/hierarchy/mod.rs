@@ -9,6 +9,7 @@ pub mod file;
 mod leaves;
 mod levels;
 mod merge;
+pub(crate) mod needed;
 mod node;
 mod partition;
 mod sphere;

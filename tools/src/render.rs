@@ -92,7 +92,7 @@ impl Drawer {
         }
     }
 
-    /// Draws a picture; the reference and the CPU engine have no statistics.
+    /// Draws a picture; the reference has no statistics.
     pub fn draw(
         &mut self,
         loaded: &Loaded,
@@ -110,7 +110,7 @@ impl Drawer {
                 }
                 done => done,
             },
-            Self::Cpu(renderer) => Ok((renderer.render(camera, settings)?, FrameStats::default())),
+            Self::Cpu(renderer) => renderer.render(camera, settings),
             Self::Reference => Ok((reference::render(&loaded.scene, camera, settings)?, FrameStats::default())),
         }
     }

@@ -1,0 +1,281 @@
+//! The footprint of a splat: where it lies in the picture and in the sheets (shaders/footprint.wgsl), and the record of it that
+//! tiles read.
+
+use super::plan::Plan;
+use crate::{
+    engine::uniforms::{ENDS, ISOTROPIC, RADIANCE, Source},
+    scene::Mode,
+    scene::Order,
+    splat::{FOOTPRINT_BLUR, STEP_BACK, Splat, decode_normal},
+};
+use glam::{Mat3, Vec3};
+
+/// How far beyond the ellipsoid the windows of a splat reach, as of the shader.
+const SECTION_OVERREACH: f32 = 1.25;
+/// Shorter gradients have no direction.
+const LEAST_GRADIENT: f32 = 1e-20;
+
+/// What a splat adds to a picture.
+#[derive(Debug, Clone, Copy)]
+pub enum Carried {
+    /// Colour and a normal, or a length of 0 for none; `strength` is an optical depth.
+    Radiance { color: [f32; 3], normal: Vec3 },
+    /// A value of the field; how much it counts, and the change of its value a world unit.
+    Scalar { weight: f32, gradient: Vec3 },
+}
+
+/// A splat in view space.
+#[derive(Debug, Clone, Copy)]
+pub struct Candidate {
+    pub center: Vec3,
+    pub covariance: Mat3,
+    pub extent: f32,
+    pub strength: f32,
+    pub carried: Carried,
+}
+
+/// What a splat's strength and payload stand for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Optical depth through the centre; payload: 1, what faces the eye, and times that colour and normal.
+    Radiance,
+    /// The same of a classified sample, whose strength is an extinction.
+    Classified,
+    /// A value; payload: weight and slope in whitened space.
+    Scalar,
+}
+
+/// All that tiles need to know of a splat.
+#[derive(Debug, Clone, Copy)]
+pub struct Record {
+    pub center: [f32; 3],
+    pub strength: f32,
+    /// The whitening M = L⁻¹ of the covariance L·Lᵀ: m00, m10, m20, m11, m21, m22.
+    pub whitening: [f32; 6],
+    /// The squared radius of the footprint in whitened space.
+    pub extent2: f32,
+    pub kind: Kind,
+    pub payload: [f32; 8],
+    /// The first and the last pixel that it covers, and the same of the sheets.
+    pub pixels: [[i32; 2]; 2],
+    pub sheets: [u16; 2],
+}
+
+/// Where a footprint lies.
+struct Place {
+    pixels: [[i32; 2]; 2],
+    sheets: [usize; 2],
+}
+
+/// A splat of a set or a hierarchy in view space, widened so that it does not fall between pixels (shaders/splats.wgsl).
+pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
+    let to_view = to_view(source);
+    let mut center = to_view * Vec3::from(splat.center) + origin(source);
+    let [b00, b10, b11, b20, b21, b22] = splat.factor;
+    let factor = Mat3::from_cols(Vec3::new(b00, b10, b20), Vec3::new(0.0, b11, b21), Vec3::new(0.0, 0.0, b22));
+    let turned = to_view * factor;
+    let pixel = if plan.view.perspective { center.length() } else { 1.0 } / plan.frame.scale;
+    let blur2 = (FOOTPRINT_BLUR as f32 * pixel).powi(2);
+    let covariance = turned * turned.transpose() + Mat3::from_diagonal(Vec3::splat(blur2));
+    let mut strength = splat.strength;
+    let carried = if source.flags & RADIANCE != 0 {
+        let [red, green, blue, opacity] = splat.color.to_le_bytes().map(|part| f32::from(part) / 255.0);
+        strength *= opacity;
+        let normal = decode_normal(splat.normal).map_or(Vec3::ZERO, |normal| to_view * normal);
+        if normal != Vec3::ZERO {
+            // Opaque splats must not grow by the widening: they step back.
+            let own2 = (turned.transpose() * normal).length_squared();
+            center -= normal * (STEP_BACK as f32 * ((own2 + blur2).sqrt() - own2.sqrt()));
+        }
+        Carried::Radiance { color: [red, green, blue], normal }
+    } else {
+        let (weight, slope) = splat.weight_and_slope();
+        // Widened, a sample still counts as much over space. Both determinants are in units of its size, where they fit 32 bits.
+        let trace = covariance.x_axis.x + covariance.y_axis.y + covariance.z_axis.z;
+        let unit = 1.0 / trace.max(1e-37).sqrt();
+        let before = (b00 * unit * b11 * unit * b22 * unit).abs();
+        let after = (covariance * (unit * unit)).determinant().max(1e-37).sqrt();
+        // The slope is in the splat's whitened space: B⁻ᵀ takes it to the set's.
+        let slope_z = slope.z / b22;
+        let slope_y = (slope.y - b21 * slope_z) / b11;
+        let slope_x = (slope.x - b10 * slope_y - b20 * slope_z) / b00;
+        let gradient = to_view * Vec3::new(slope_x, slope_y, slope_z) * plan.frame.transfer[1];
+        strength = counted(plan, strength);
+        Carried::Scalar { weight: weight * before / after, gradient }
+    };
+    Candidate { center, covariance, extent: source.extent, strength, carried }
+}
+
+/// A value in entries of the transfer function's table; finite, however far.
+pub fn counted(plan: &Plan, value: f32) -> f32 {
+    ((value - plan.frame.transfer[0]) * plan.frame.transfer[1]).clamp(-1e30, 1e30)
+}
+
+pub fn to_view(source: &Source) -> Mat3 {
+    let [x, y, z] = source.axes.map(|axis| Vec3::new(axis[0], axis[1], axis[2]));
+    Mat3::from_cols(x, y, z)
+}
+
+pub fn origin(source: &Source) -> Vec3 {
+    Vec3::new(source.origin[0], source.origin[1], source.origin[2])
+}
+
+/// The record of a splat; none where it meets no pixel or no sheet.
+pub fn record(plan: &Plan, source: &Source, splat: &Candidate) -> Option<Record> {
+    let ends = source.flags & (ISOTROPIC | ENDS) != 0;
+    let Place { pixels, sheets } = locate(plan, splat, ends)?;
+    let s = &splat.covariance;
+    // The floors keep discs far thinner than wide invertible in 32 bits.
+    let least = 1e-7 * s.x_axis.x.max(s.y_axis.y.max(s.z_axis.z)) + 1e-37;
+    let l00 = s.x_axis.x.max(least).sqrt();
+    let (l10, l20) = (s.x_axis.y / l00, s.x_axis.z / l00);
+    let l11 = (s.y_axis.y - l10 * l10).max(least).sqrt();
+    let l21 = (s.y_axis.z - l10 * l20) / l11;
+    let l22 = (s.z_axis.z - l20 * l20 - l21 * l21).max(least).sqrt();
+    let (m00, m11, m22) = (1.0 / l00, 1.0 / l11, 1.0 / l22);
+    let (m10, m21) = (-l10 * m00 * m11, -l21 * m11 * m22);
+    let m20 = -(l20 * m00 + l21 * m10) * m22;
+    let mut strength = splat.strength;
+    let radiance = |color: [f32; 3], normal: Vec3| {
+        let facing = if plan.single().is_some() { 1.0 } else { facing_weight(plan, normal, splat.center) };
+        let [red, green, blue] = color;
+        [1.0, 1.0, red, green, blue, normal.x, normal.y, normal.z].map(|part| part * facing)
+    };
+    let (kind, mut payload) = match splat.carried {
+        Carried::Radiance { color, normal } => (Kind::Radiance, radiance(color, normal)),
+        Carried::Scalar { weight, gradient } if plan.is_classified => {
+            let [red, green, blue, extinction] = classify(plan, splat.strength);
+            strength = extinction * weight * plan.frame.kernel[2];
+            let size = gradient.length();
+            // What a value falls towards is outside.
+            let has_direction = plan.lit_surfaces && size > LEAST_GRADIENT;
+            let normal = if has_direction { -gradient / size } else { Vec3::ZERO };
+            (Kind::Classified, radiance([red, green, blue], normal))
+        }
+        Carried::Scalar { weight, gradient: g } => {
+            // Lᵀ·g: the slope in whitened space.
+            let slope = [l00 * g.x + l10 * g.y + l20 * g.z, l11 * g.y + l21 * g.z, l22 * g.z];
+            (Kind::Scalar, [weight, slope[0], slope[1], slope[2], 0.0, 0.0, 0.0, 0.0])
+        }
+    };
+    if kind != Kind::Scalar {
+        payload[0] = 1.0;
+    }
+    Some(Record {
+        center: splat.center.to_array(),
+        strength,
+        whitening: [m00, m10, m20, m11, m21, m22],
+        extent2: splat.extent * splat.extent,
+        kind,
+        payload,
+        pixels,
+        sheets: sheets.map(|sheet| sheet as u16),
+    })
+}
+
+/// Colour and extinction of one value, looked up.
+fn classify(plan: &Plan, value: f32) -> [f32; 4] {
+    let [_, _, end, place] = plan.frame.transfer;
+    let at = (value + place).clamp(0.0, end);
+    let (low, part) = (at as usize, at.fract());
+    let (a, b) = (plan.tables.entries[low], plan.tables.entries[low + 1]);
+    std::array::from_fn(|channel| a[channel] + (b[channel] - a[channel]) * part)
+}
+
+/// Within a sheet, what faces the eye hides what faces away. Far sides alone keep a little weight, so that they have a colour.
+fn facing_weight(plan: &Plan, normal: Vec3, center: Vec3) -> f32 {
+    if normal == Vec3::ZERO {
+        return 1.0;
+    }
+    let away =
+        if plan.view.perspective { normal.dot(center) / center.length().max(1e-30) } else { normal.z };
+    (0.5 - 4.0 * away).clamp(1.0 / 255.0, 1.0)
+}
+
+/// Bounds of x/z over an ellipsoid in front of the eye: tangents of its outline, exact in perspective.
+fn tangent_bounds(x: f32, z: f32, xx: f32, xz: f32, zz: f32) -> [f32; 2] {
+    let p = x / z;
+    let (a, b, c) = (xx / z / z, xz / z / z, zz / z / z);
+    let denominator = 1.0 / (1.0 - c);
+    let middle = (p - b) * denominator;
+    let square = a - 2.0 * b * p + c * p * p - (a * c - b * b);
+    let half = square.max(0.0).sqrt() * denominator.abs();
+    [middle - half, middle + half]
+}
+
+/// Bounds of x/z over the part of a box beyond the nearest visible z.
+fn box_bounds(x: f32, reach: f32, z_low: f32, z_high: f32) -> [f32; 2] {
+    let (low, high) = (x - reach, x + reach);
+    [low / if low < 0.0 { z_low } else { z_high }, high / if high < 0.0 { z_high } else { z_low }]
+}
+
+fn locate(plan: &Plan, splat: &Candidate, ends: bool) -> Option<Place> {
+    let frame = &plan.frame;
+    let (c, s, extent) = (splat.center, &splat.covariance, splat.extent);
+    let e2 = extent * extent;
+    let reaches = extent * Vec3::new(s.x_axis.x.sqrt(), s.y_axis.y.sqrt(), s.z_axis.z.sqrt());
+    let (mut distance, mut reach, mut far) = (c.z, reaches.z, c.z + reaches.z);
+    let bounds: [[f32; 2]; 2];
+    if plan.view.perspective {
+        if c.z + reaches.z <= frame.z_near {
+            return None;
+        }
+        distance = c.length();
+        let toward = c / distance.max(1e-30);
+        reach = extent * toward.dot(*s * toward).max(0.0).sqrt();
+        let across = e2 * (s.x_axis.x + s.y_axis.y + s.z_axis.z);
+        far = ((distance + reach) * (distance + reach) + across).sqrt();
+        bounds = if c.z - reaches.z > frame.z_near {
+            let (xz, yz, zz) = (e2 * s.x_axis.z, e2 * s.y_axis.z, e2 * s.z_axis.z);
+            [tangent_bounds(c.x, c.z, e2 * s.x_axis.x, xz, zz), tangent_bounds(c.y, c.z, e2 * s.y_axis.y, yz, zz)]
+        } else {
+            let high = c.z + reaches.z;
+            [box_bounds(c.x, reaches.x, frame.z_near, high), box_bounds(c.y, reaches.y, frame.z_near, high)]
+        };
+    } else {
+        bounds = [[c.x - reaches.x, c.x + reaches.x], [c.y - reaches.y, c.y + reaches.y]];
+    }
+    // Near the rim of a footprint the sections reach beyond the ellipsoid, because a ray keeps a kernel whole.
+    let overreach = if ends { 1.0 } else { SECTION_OVERREACH };
+    far = distance + overreach * (far - distance);
+    let near = distance - overreach * reach;
+    let last_plane = plan.planes[plan.sheets + 1];
+    // Written so that NaN fails.
+    let meets = far > plan.planes[1] && near < last_plane;
+    if !plan.is_whole() && !meets {
+        return None;
+    }
+    let apron = plan.apron() as f32;
+    let mut pixels = [[0; 2]; 2];
+    for axis in 0..2 {
+        // Pixels whose centres lie in the box, with a margin for rounding.
+        let limit = frame.size[axis] as f32 + apron;
+        let [low, high] = bounds[axis].map(|bound| frame.center[axis] + frame.scale * bound);
+        let first = (low - 0.51).clamp(-apron, limit).ceil();
+        let last = (high - 0.49).clamp(-apron - 1.0, limit - 1.0).floor();
+        let is_some = first <= last;
+        if !is_some {
+            return None;
+        }
+        (pixels[0][axis], pixels[1][axis]) = (first as i32, last as i32);
+    }
+    if plan.is_whole() {
+        // All of it belongs to the sheet of its centre.
+        let mut key = distance;
+        if plan.mode == Mode::AxisSheets {
+            let [x, y, z, _] = frame.sheet_normal;
+            key = Vec3::new(x, y, z).dot(c);
+            key = if plan.view.perspective { key.abs() } else { key };
+        }
+        let is_within = key >= plan.planes[1] && key < last_plane;
+        let mut sheet = plan.sheet_of(key).min(plan.sheets);
+        if plan.single() == Some(Order::BackToFront) {
+            sheet = plan.sheets + 1 - sheet;
+        }
+        return is_within.then_some(Place { pixels, sheets: [sheet; 2] });
+    }
+    // Beside the eye, rays leave the kernel's middle behind them: the part in front of the first plane must be cut off.
+    let is_beside = plan.view.perspective && distance < 2.0 * reach;
+    let first = if is_beside { 0 } else { plan.sheet_of(near) };
+    Some(Place { pixels, sheets: [first, plan.sheet_of(far).max(1)] })
+}

@@ -1,0 +1,132 @@
+//! The field of a lattice in a sheet, gathered: each ray asks which kernels reach the planes of the sheet.
+
+use super::{
+    close::{Face, Layer, Visible},
+    field::Typed,
+    plan::Plan,
+    rays::Rays,
+    skip::Shown,
+    vector::{Lanes, dot, three},
+};
+use crate::scene::Optics;
+use fearless_simd::{Simd, mask32x8, prelude::*};
+
+/// A lattice whose field is gathered.
+pub struct Gather<'a> {
+    pub field: Typed<'a>,
+    pub shown: &'a Shown,
+    pub visible: &'a Visible,
+    pub dims: [usize; 3],
+}
+
+/// The last plane that a packet asked for.
+#[derive(Clone, Copy)]
+pub struct Last<S: Simd> {
+    plane: usize,
+    face: Face<S>,
+    along: Lanes<S>,
+}
+
+impl<S: Simd> Last<S> {
+    #[inline(always)]
+    pub fn new(simd: S) -> Self {
+        let none = Lanes::splat(simd, 0.0);
+        Self { plane: usize::MAX, face: Face { value: none, across: [none; 3] }, along: none }
+    }
+}
+
+impl Gather<'_> {
+    /// The field of a sheet and the rays on which it counts; nothing where it cannot be seen.
+    #[inline(always)]
+    pub fn layer<S: Simd>(
+        &self,
+        simd: S,
+        plan: &Plan,
+        rays: &Rays<S>,
+        sheet: usize,
+        last: &mut Last<S>,
+    ) -> Option<(Layer<S>, mask32x8<S>)> {
+        let (start, stop) = (plan.planes[sheet], plan.planes[sheet + 1]);
+        let begin = rays.inside[0].max(Lanes::splat(simd, start));
+        let end = rays.inside[1].min(Lanes::splat(simd, stop));
+        let mask = begin.simd_lt(end) & self.may_show(simd, rays, [start, stop]);
+        if !mask.any_true() {
+            return None;
+        }
+        if last.plane != sheet {
+            *last = self.face(simd, plan, rays, sheet);
+        }
+        let (front, front_along) = (last.face, last.along);
+        *last = self.face(simd, plan, rays, sheet + 1);
+        let (back, back_along) = (last.face, last.along);
+        let thickness = stop - start;
+        let sum = front.value + back.value;
+        // Hermite: the mean of the ends and an eighth of how much the slopes there differ.
+        let bend = (front_along - back_along) * thickness;
+        let middle = sum * 0.5 + bend * 0.125;
+        let filling = Lanes::splat(simd, 1.0);
+        let direction = rays.direction;
+        let mut layer = Layer { front, back, middle, start, thickness, begin, end, filling, direction };
+        if plan.optics != Optics::Maximum && !self.visible.may_show(simd, plan, &layer) {
+            return None;
+        }
+        // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with slopes).
+        let inside = self.at(simd, rays.place(0.5 * (start + stop))).0 * plan.frame.transfer[1];
+        let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
+        layer.middle = mean * 1.5 - sum * 0.25;
+        Some((layer, mask))
+    }
+
+    /// The field at places in steps of the lattice, and its change a step along each axis.
+    #[inline(always)]
+    fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
+        // A function of its own for each type of samples, else each would be compiled wherever this one is called.
+        simd.vectorize(
+            #[inline(always)]
+            || match &self.field {
+                Typed::U8(field) => field.at(simd, place),
+                Typed::U16(field) => field.at(simd, place),
+                Typed::I16(field) => field.at(simd, place),
+                Typed::I32(field) => field.at(simd, place),
+                Typed::F32(field) => field.at(simd, place),
+            },
+        )
+    }
+
+    /// The field on a plane, and its change along the rays a world unit.
+    #[inline(always)]
+    fn face<S: Simd>(&self, simd: S, plan: &Plan, rays: &Rays<S>, plane: usize) -> Last<S> {
+        let frame = &plan.frame;
+        let per_value = frame.transfer[1];
+        let (value, slopes) = self.at(simd, rays.place(plan.planes[plane]));
+        // From steps of the lattice to view space.
+        let axes = &frame.field_axes;
+        let gradient = three!(I => {
+            (slopes[0] * axes[0][I] + slopes[1] * axes[1][I] + slopes[2] * axes[2][I]) * per_value
+        });
+        let along = dot(gradient, rays.direction);
+        let length = frame.gradients[2];
+        let across = three!(I => (gradient[I] - along * rays.direction[I]) * length);
+        Last { plane, face: Face { value: value * per_value, across }, along }
+    }
+
+    /// Whether something may show around three places of each ray in a sheet.
+    #[inline(always)]
+    fn may_show<S: Simd>(&self, simd: S, rays: &Rays<S>, [start, stop]: [f32; 2]) -> mask32x8<S> {
+        let [nx, ny, _] = self.dims;
+        let mut shows = [false; 8];
+        for distance in [start, 0.5 * (start + stop), stop] {
+            let place = rays.place(distance);
+            let [x, y, z]: [[f32; 8]; 3] = three!(I => {
+                let last = Lanes::splat(simd, self.dims[I] as f32 - 1.0);
+                (place[I] + 0.5).floor().max(Lanes::splat(simd, 0.0)).min(last).into()
+            });
+            for lane in 0..8 {
+                let sample = (z[lane] as usize * ny + y[lane] as usize) * nx + x[lane] as usize;
+                shows[lane] |= self.shown.samples[sample];
+            }
+        }
+        let bits = shows.iter().rev().fold(0, |bits, shows| bits << 1 | u64::from(*shows));
+        mask32x8::from_bitmask(simd, bits)
+    }
+}

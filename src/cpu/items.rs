@@ -1,0 +1,332 @@
+//! The splats of a scene's items in a view: which of them a picture takes, and the records of these.
+
+use super::{
+    bins::BATCH,
+    brick_cache::BrickCache,
+    footprint::{Candidate, Carried, Record, counted, origin, record, to_view, widened},
+    page_cache::PageCache,
+    plan::Plan,
+};
+use crate::{
+    Error, Result,
+    engine::uniforms::Source,
+    hierarchy::{Cut, Levels},
+    math::{Kernel, View},
+    scene::{Item, Scene, Settings},
+    splat::{Payload, Splat, SplatSet},
+    volume::{
+        Arrangement, Lattice, Samples, Scalar, TransferFunction, Volume,
+        bricks::{BLOCK, BLOCKS, Choice, SIDE},
+    },
+};
+use glam::{Mat3, Vec3};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Samples along each side of a block, which are listed together: neighbours in the list are neighbours in space.
+const LIST_BLOCK: usize = 4;
+
+/// What is kept of an item between pictures.
+#[derive(Debug)]
+pub enum Prepared {
+    /// The levels of detail of a set of splats, and what stands for it in the last view.
+    Set { levels: Option<Box<Levels>>, drawn: Arc<SplatSet> },
+    Hierarchy(Box<PageCache>),
+    /// A volume, the extremes around each sample, and those that show under a transfer function.
+    Volume { volume: Arc<Volume>, kernel: Kernel, ranges: Vec<[u8; 2]>, listed: Option<([u16; 256], Vec<u32>)> },
+    Bricks(Box<BrickCache>),
+}
+
+impl Prepared {
+    pub fn new(item: &Item) -> Self {
+        match item {
+            Item::Radiance(set) | Item::Scalar(set, _) => {
+                Self::Set { levels: Levels::new(set).map(Box::new), drawn: set.clone() }
+            }
+            Item::Hierarchy(hierarchy) => Self::Hierarchy(Box::new(PageCache::new(hierarchy))),
+            Item::Volume(volume, kernel, _) => Self::Volume {
+                ranges: volume.drawn_ranges(kernel).into_owned(),
+                volume: volume.clone(),
+                kernel: kernel.clone(),
+                listed: None,
+            },
+            Item::Bricks(bricks, kernel, _) => Self::Bricks(Box::new(BrickCache::new(bricks, kernel))),
+        }
+    }
+
+    /// The levels of detail of a set for a view; `pixels` as of [`crate::hierarchy::Detail::Pixels`].
+    pub fn update_levels(&mut self, view: &View, pixels: f64) -> Result<()> {
+        if let Self::Set { levels: Some(levels), drawn } = self {
+            *drawn = levels.drawn(&Cut::new(view, levels.origin(), pixels, false))?;
+        }
+        Ok(())
+    }
+
+    /// Bytes of memory that are held for pictures, besides the scene's own.
+    pub fn bytes(&self) -> u64 {
+        match self {
+            Self::Set { .. } => 0,
+            Self::Hierarchy(pages) => pages.bytes(),
+            Self::Volume { ranges, listed, .. } => {
+                (2 * ranges.len() + 4 * listed.as_ref().map_or(0, |(_, list)| list.len())) as u64
+            }
+            Self::Bricks(bricks) => bricks.bytes(),
+        }
+    }
+
+    /// The records of all splats that meet the picture, in batches of [`BATCH`] candidates.
+    pub fn records(&mut self, plan: &Plan, settings: &Settings, pixels: f64, choice: Option<&Choice>, shown: &[u16; 256]) -> Result<Vec<Vec<Record>>> {
+        let view = plan.view;
+        match self {
+            Self::Set { drawn, .. } => {
+                let source = Source::of_splats(view, drawn, drawn.payload == Payload::Radiance);
+                Ok(batches(&drawn.splats, |splat: &Splat| record(plan, &source, &widened(plan, &source, splat))))
+            }
+            Self::Hierarchy(pages) => {
+                pages.update(view, settings, pixels)?;
+                let header = pages.hierarchy.header();
+                let source = Source::of_radiance(view, header.origin, header.extent);
+                let drawn = pages.drawn(view, settings, pixels);
+                Ok(batches(&drawn, |splat: &Splat| record(plan, &source, &widened(plan, &source, splat))))
+            }
+            Self::Volume { volume, kernel, ranges, listed } => {
+                if listed.as_ref().is_none_or(|(own, _)| own != shown) {
+                    *listed = Some((*shown, list(volume.drawn_lattice().dims, ranges, shown)));
+                }
+                let Some((_, list)) = listed else { return Ok(Vec::new()) };
+                let lattice = LatticeSource::new(plan, volume, kernel);
+                Ok(batches(list, |index: &u32| lattice.record(plan, *index as usize)))
+            }
+            Self::Bricks(cache) => {
+                let Some(choice) = choice else { return Ok(Vec::new()) };
+                cache.update(choice)?;
+                Ok(brick_records(plan, cache, choice))
+            }
+        }
+    }
+}
+
+/// The records of some candidates.
+fn batches<T: Sync>(candidates: &[T], record: impl Fn(&T) -> Option<Record> + Sync) -> Vec<Vec<Record>> {
+    candidates.par_chunks(BATCH).map(|batch| batch.iter().filter_map(&record).collect()).collect()
+}
+
+/// The samples that show something, block by block.
+fn list(dims: [usize; 3], ranges: &[[u8; 2]], shown: &[u16; 256]) -> Vec<u32> {
+    let shows = |[low, high]: [u8; 2]| u16::from(high) >= shown[usize::from(low)];
+    let layer = |layer: usize| {
+        let mut list = Vec::new();
+        let along = |block: usize, axis: usize| block * LIST_BLOCK..((block + 1) * LIST_BLOCK).min(dims[axis]);
+        for row in 0..dims[1].div_ceil(LIST_BLOCK) {
+            for column in 0..dims[0].div_ceil(LIST_BLOCK) {
+                for z in along(layer, 2) {
+                    for y in along(row, 1) {
+                        let start = (z * dims[1] + y) * dims[0];
+                        let own = along(column, 0).map(|x| start + x);
+                        list.extend(own.filter(|index| shows(ranges[*index])).map(|index| index as u32));
+                    }
+                }
+            }
+        }
+        list
+    };
+    let layers: Vec<Vec<u32>> = (0..dims[2].div_ceil(LIST_BLOCK)).into_par_iter().map(layer).collect();
+    layers.concat()
+}
+
+/// A lattice in view space.
+struct LatticeSource<'a> {
+    volume: &'a Volume,
+    lattice: &'a Lattice,
+    source: Source,
+    to_view: Mat3,
+    origin: Vec3,
+    /// From steps of the lattice to gradients in view space.
+    field_axes: Mat3,
+}
+
+impl<'a> LatticeSource<'a> {
+    fn new(plan: &Plan, volume: &'a Volume, kernel: &Kernel) -> Self {
+        let lattice = volume.drawn_lattice();
+        let source = Source::of_lattice(plan.view, lattice, kernel, false);
+        let [x, y, z] = plan.frame.field_axes.map(|axis| Vec3::new(axis[0], axis[1], axis[2]));
+        Self {
+            volume,
+            lattice,
+            to_view: to_view(&source),
+            origin: origin(&source),
+            field_axes: Mat3::from_cols(x, y, z),
+            source,
+        }
+    }
+
+    fn value(&self, plan: &Plan, index: usize) -> f32 {
+        match (&self.volume.coefficients, &self.volume.samples) {
+            // 32 bits of a float do not hold the whole.
+            (None, Samples::I32(values)) => {
+                let low = values[index] & 0xffff;
+                let [zero, per_value, ..] = plan.frame.transfer;
+                ((((values[index] - low) as f32 - zero) + low as f32) * per_value).clamp(-1e30, 1e30)
+            }
+            _ => counted(plan, self.volume.drawn_value(index) as f32),
+        }
+    }
+
+    fn record(&self, plan: &Plan, number: usize) -> Option<Record> {
+        let [nx, ny, _] = self.lattice.dims;
+        let index = [number % nx, number / nx % ny, number / (nx * ny)];
+        let mut steps = Vec3::from_array(index.map(|n| n as f32));
+        let mut covariance = symmetric(&self.source.covariance);
+        match &self.lattice.arrangement {
+            Arrangement::Cartesian => {}
+            Arrangement::BodyCentred => {
+                let displaced = 0.5 * (index[2] % 2) as f32;
+                steps = Vec3::new(steps.x + displaced, steps.y + displaced, 0.5 * steps.z);
+            }
+            Arrangement::Rectilinear(coordinates) => {
+                steps = Vec3::from_array(std::array::from_fn(|axis| {
+                    (coordinates[axis][index[axis]] - coordinates[axis][0]) as f32
+                }));
+                let unit = self.lattice.unit(index).as_vec3() * self.source.covariance[1][3];
+                let own = self.to_view * Mat3::from_diagonal(unit);
+                covariance = own * own.transpose();
+            }
+        }
+        let value = self.value(plan, number);
+        let mut gradient = Vec3::ZERO;
+        if plan.has_slopes || (plan.is_classified && plan.lit_surfaces) {
+            let slopes: [f32; 3] = std::array::from_fn(|axis| self.slope(plan, axis, index, value));
+            gradient = self.field_axes * Vec3::from_array(slopes);
+        }
+        let candidate = Candidate {
+            center: self.origin + self.to_view * steps,
+            covariance,
+            extent: self.source.extent,
+            strength: value,
+            carried: Carried::Scalar { weight: 1.0, gradient },
+        };
+        record(plan, &self.source, &candidate)
+    }
+
+    /// The derivative along an axis, per step or per coordinate: central where there are neighbours on both sides.
+    fn slope(&self, plan: &Plan, axis: usize, index: [usize; 3], value: f32) -> f32 {
+        let dims = self.lattice.dims;
+        // Layers of one kind of a body-centred lattice lie two apart.
+        let stride = if axis == 2 && self.lattice.arrangement == Arrangement::BodyCentred { 2 } else { 1 };
+        let place = |at: usize| match &self.lattice.arrangement {
+            Arrangement::Rectilinear(coordinates) => (coordinates[axis][at] - coordinates[axis][0]) as f32,
+            _ => at as f32 / stride as f32,
+        };
+        let beside = |at: usize| {
+            let mut other = index;
+            other[axis] = at;
+            let sample = (other[2] * dims[1] + other[1]) * dims[0] + other[0];
+            (self.value(plan, sample), place(at))
+        };
+        let here = place(index[axis]);
+        let before = index[axis].checked_sub(stride).map(|at| {
+            let (other, there) = beside(at);
+            ((value - other) / (here - there).max(1e-30), here - there)
+        });
+        let after = (index[axis] + stride < dims[axis]).then(|| {
+            let (other, there) = beside(index[axis] + stride);
+            ((other - value) / (there - here).max(1e-30), there - here)
+        });
+        match (before, after) {
+            (Some((before, to_before)), Some((after, to_after))) => {
+                (after * to_before + before * to_after) / (to_before + to_after)
+            }
+            (Some((slope, _)), None) | (None, Some((slope, _))) => slope,
+            (None, None) => 0.0,
+        }
+    }
+}
+
+fn symmetric([[xx, xy, xz, yy], [yz, zz, ..]]: &[[f32; 4]; 2]) -> Mat3 {
+    Mat3::from_cols(Vec3::new(*xx, *xy, *xz), Vec3::new(*xy, *yy, *yz), Vec3::new(*xz, *yz, *zz))
+}
+
+/// The records of the samples in bricks.
+fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Record>> {
+    let sources: Vec<Source> = choice
+        .levels
+        .iter()
+        .map(|(level, _)| Source::of_lattice(plan.view, &cache.bricks.lattice(*level), &cache.kernel, false))
+        .collect();
+    // A batch is a quarter of a brick.
+    const QUARTER: usize = BATCH / (SIDE * SIDE);
+    let mut bricks = choice.bricks.clone();
+    bricks.sort_unstable();
+    let batches: Vec<(usize, u32, usize)> = bricks
+        .iter()
+        .flat_map(|&(level, brick)| (0..SIDE / QUARTER).map(move |quarter| (level, brick, quarter)))
+        .collect();
+    let scalar = cache.bricks.header().scalar;
+    let batch = |&(level, brick, quarter): &(usize, u32, usize)| {
+        let Some(part) = choice.levels.iter().position(|(own, _)| *own == level) else { return Vec::new() };
+        let Some(held) = cache.get(level, brick) else { return Vec::new() };
+        let (source, weight) = (&sources[part], choice.levels[part].1 as f32);
+        let (to_view, origin, covariance) = (to_view(source), origin(source), symmetric(&source.covariance));
+        let dims = cache.bricks.level(level).dims;
+        let first = cache.bricks.level(level).place(brick).map(|at| at * SIDE);
+        let mut records = Vec::new();
+        for z in quarter * QUARTER..(quarter + 1) * QUARTER {
+            for y in 0..SIDE {
+                for x in 0..SIDE {
+                    let within = [x, y, z];
+                    let block = within.map(|at| at / BLOCK);
+                    let [low, high] = held.blocks[(block[2] * BLOCKS + block[1]) * BLOCKS + block[0]];
+                    let is_inside = (0..3).all(|axis| first[axis] + within[axis] < dims[axis]);
+                    if u16::from(high) < choice.shown[usize::from(low)] || !is_inside {
+                        continue;
+                    }
+                    let steps = Vec3::from_array(std::array::from_fn(|axis| (first[axis] + within[axis]) as f32));
+                    let candidate = Candidate {
+                        center: origin + to_view * steps,
+                        covariance,
+                        extent: source.extent,
+                        strength: sample(plan, scalar, &held.samples, (z * SIDE + y) * SIDE + x),
+                        carried: Carried::Scalar { weight, gradient: Vec3::ZERO },
+                    };
+                    records.extend(record(plan, source, &candidate));
+                }
+            }
+        }
+        records
+    };
+    batches.par_iter().map(batch).collect()
+}
+
+/// A sample of a brick, in entries of the transfer function's table.
+fn sample(plan: &Plan, scalar: Scalar, bytes: &[u8], index: usize) -> f32 {
+    let two = || [bytes[2 * index], bytes[2 * index + 1]];
+    let four = || [0, 1, 2, 3].map(|byte| bytes[4 * index + byte]);
+    match scalar {
+        Scalar::U8 => counted(plan, f32::from(bytes[index])),
+        Scalar::U16 => counted(plan, f32::from(u16::from_ne_bytes(two()))),
+        Scalar::I16 => counted(plan, f32::from(i16::from_ne_bytes(two()))),
+        Scalar::F32 => counted(plan, f32::from_ne_bytes(four())),
+        Scalar::I32 => {
+            let value = i32::from_ne_bytes(four());
+            let low = value & 0xffff;
+            let [zero, per_value, ..] = plan.frame.transfer;
+            ((((value - low) as f32 - zero) + low as f32) * per_value).clamp(-1e30, 1e30)
+        }
+    }
+}
+
+/// The transfer function of a scene's field, and the range of its values; none without a field.
+pub fn transfer_of(scene: &Scene) -> Option<&TransferFunction> {
+    scene.items.iter().find_map(|item| match item {
+        Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => Some(transfer),
+        Item::Radiance(_) | Item::Hierarchy(_) => None,
+    })
+}
+
+/// Refuses more records than their numbers tell apart.
+pub fn check_count(records: &[Vec<Record>]) -> Result<()> {
+    if records.len() <= u32::MAX as usize / BATCH {
+        return Ok(());
+    }
+    Err(Error::Argument("the picture takes more splats than 4,294,967,295; take a coarser cut".into()))
+}

@@ -1,0 +1,200 @@
+//! What all tiles of a picture share: the view, the sheets, the tables, and which methods draw.
+
+use crate::{
+    engine::{
+        tables::Tables,
+        uniforms::{Frame, clip_counts},
+    },
+    math::{Kernel, Profile, Sheets, View},
+    scene::{Classification, Gradient, Item, Mode, Optics, Order, Scene, Settings},
+    volume::{Arrangement, TransferFunction, bricks::Choice},
+};
+
+/// Pixels along each side of a tile.
+pub const TILE: usize = 8;
+/// The place of a plane that is before or behind all others.
+const NOWHERE: f32 = 3e38;
+
+/// The plan of a picture. Sheets count from 1 and lie between the planes of their number and the next one; sheet 0 is all
+/// that lies before the first plane and is not drawn.
+pub struct Plan<'a> {
+    pub view: &'a View,
+    pub frame: Frame,
+    pub tables: Tables,
+    pub planes: Vec<f32>,
+    /// The number of the last sheet.
+    pub sheets: usize,
+    pub mode: Mode,
+    pub optics: Optics,
+    /// The scene holds a field that is classified after interpolation.
+    pub has_field: bool,
+    /// It holds one whose samples are classified before.
+    pub is_classified: bool,
+    /// The field's samples lie on a lattice and fill its box.
+    pub on_lattice: bool,
+    /// The samples of the field carry slopes.
+    pub has_slopes: bool,
+    /// The field's kernel is looked up in tables.
+    pub table_kernel: bool,
+    pub is_lit: bool,
+    pub has_gradient_opacity: bool,
+    /// Gradients across the picture are differences of neighbouring pixels.
+    pub central: bool,
+    /// The transfer function is integrated between values, instead of looked up at the mean of a sheet.
+    pub is_integrated: bool,
+    pub isosurfaces: usize,
+    /// The scene holds splats that carry colour.
+    pub has_radiance: bool,
+    pub lit_surfaces: bool,
+    /// Convex parts that are kept, and boxes that are cut out.
+    pub clips: usize,
+    pub holes: usize,
+}
+
+impl<'a> Plan<'a> {
+    pub fn new(scene: &Scene, view: &'a View, sheets: &Sheets, settings: &Settings, choice: Option<&Choice>) -> Self {
+        let mut planes = vec![-NOWHERE];
+        planes.extend(sheets.planes.iter().map(|plane| *plane as f32));
+        planes.extend([NOWHERE; 4]);
+        let [clips, holes] = clip_counts(settings).map(|count| count as usize);
+        let empty = Tables {
+            entries: Vec::new(),
+            starts: [0; 4],
+            values: [0.0; 4],
+            gradients: [0.0; 2],
+            beyond: [[0.0; 4]; 2],
+        };
+        let mut plan = Self {
+            view,
+            frame: Frame::new(scene, view, sheets, settings, choice),
+            tables: empty,
+            planes,
+            sheets: sheets.count(),
+            mode: settings.mode,
+            optics: settings.optics,
+            has_field: false,
+            is_classified: false,
+            on_lattice: false,
+            has_slopes: false,
+            table_kernel: false,
+            is_lit: false,
+            has_gradient_opacity: false,
+            central: false,
+            is_integrated: settings.classification == Classification::PreIntegrated,
+            isosurfaces: 0,
+            has_radiance: false,
+            lit_surfaces: false,
+            clips,
+            holes,
+        };
+        // Light is seen in emission alone.
+        let emits = settings.optics == Optics::EmissionAbsorption;
+        for item in &scene.items {
+            match item {
+                Item::Radiance(_) | Item::Hierarchy(_) => {
+                    plan.has_radiance = true;
+                    plan.lit_surfaces |= emits && settings.surface_shade.is_some();
+                }
+                Item::Scalar(set, transfer) => {
+                    plan.has_slopes = true;
+                    plan.set_field(sheets, settings, transfer, set.value_range(), None);
+                }
+                Item::Volume(volume, kernel, transfer) => {
+                    plan.on_lattice = true;
+                    plan.has_slopes = matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_));
+                    plan.set_field(sheets, settings, transfer, volume.range, Some(kernel));
+                }
+                Item::Bricks(bricks, kernel, transfer) => {
+                    plan.on_lattice = true;
+                    plan.set_field(sheets, settings, transfer, bricks.header().range, Some(kernel));
+                }
+            }
+        }
+        plan
+    }
+
+    fn set_field(
+        &mut self,
+        sheets: &Sheets,
+        settings: &Settings,
+        transfer: &TransferFunction,
+        range: [f64; 2],
+        kernel: Option<&Kernel>,
+    ) {
+        self.tables = Tables::new(transfer, range, kernel);
+        self.frame.set_tables(&self.tables, transfer, self.view, sheets);
+        self.table_kernel = kernel.is_some_and(|kernel| !matches!(kernel.profile, Profile::Gaussian(_)));
+        let emits = settings.optics == Optics::EmissionAbsorption;
+        let is_shaded = emits && settings.shade_of(transfer).is_some();
+        if settings.classifies_samples() {
+            self.is_classified = true;
+            self.has_slopes = false;
+            self.lit_surfaces |= is_shaded;
+            return;
+        }
+        self.has_field = true;
+        self.is_lit = is_shaded;
+        self.has_gradient_opacity = !transfer.gradient.is_empty() && settings.optics != Optics::Maximum;
+        self.isosurfaces = if emits { transfer.isosurfaces.len() } else { 0 };
+        self.central = self.has_gradients() && settings.gradient == Gradient::Central;
+    }
+
+    /// Whether the field's gradient is looked at.
+    pub fn has_gradients(&self) -> bool {
+        self.has_field && (self.is_lit || self.has_gradient_opacity)
+    }
+
+    /// Whether splats are drawn whole, in the sheet of their centre.
+    pub fn is_whole(&self) -> bool {
+        self.mode != Mode::Sheets
+    }
+
+    /// Whether splats are composited one by one.
+    pub fn single(&self) -> Option<Order> {
+        if let Mode::Splats(order) = self.mode { Some(order) } else { None }
+    }
+
+    /// Pixels that tiles share with each neighbour.
+    pub fn apron(&self) -> i32 {
+        i32::from(self.central)
+    }
+
+    /// Pixels from a tile to the next one.
+    pub fn tile_step(&self) -> usize {
+        TILE - 2 * usize::from(self.central)
+    }
+
+    /// Tiles beside and below each other.
+    pub fn tiles(&self) -> [usize; 2] {
+        self.view.size.map(|side| (side as usize).div_ceil(self.tile_step()))
+    }
+
+    /// The first pixel of a tile, which may lie beside the picture.
+    pub fn corner(&self, tile: [usize; 2]) -> [i32; 2] {
+        tile.map(|at| (at * self.tile_step()) as i32 - self.apron())
+    }
+
+    /// The sheet that a distance lies in.
+    pub fn sheet_of(&self, distance: f32) -> usize {
+        let frame = &self.frame;
+        let near = self.planes[1];
+        if distance < near {
+            return 0;
+        }
+        let geometric = frame.geometric_sheets as usize;
+        let turn = self.planes[1 + geometric];
+        let estimate = if distance < turn {
+            1.0 + ((distance / near).log2() * frame.ratio_log2_inverse).floor()
+        } else {
+            1.0 + geometric as f32 + ((distance - turn) * frame.step_inverse).floor()
+        };
+        let mut sheet = estimate.clamp(1.0, self.sheets as f32) as usize;
+        // The closed form is off by one at most, where rounding meets a plane. The list decides.
+        if distance < self.planes[sheet] {
+            sheet -= 1;
+        } else if distance >= self.planes[sheet + 1] && sheet < self.sheets {
+            sheet += 1;
+        }
+        sheet
+    }
+}

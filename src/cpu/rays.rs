@@ -1,0 +1,127 @@
+//! The rays of eight pixels: four beside each other in two rows.
+
+use super::{
+    plan::{Plan, TILE},
+    vector::{Lanes, dot_with, three},
+};
+use crate::scene::Settings;
+use fearless_simd::{Simd, prelude::*};
+
+/// Packets of a tile.
+pub const PACKETS: usize = TILE * TILE / 8;
+/// Pixels that a packet is wide and high.
+pub const WIDE: usize = 4;
+pub const HIGH: usize = 2;
+
+/// A place before or behind all others.
+const BEFORE: f32 = -3e38;
+const BEHIND: f32 = 3e38;
+
+/// A part of each ray, from one distance to another; empty where the first is the larger one.
+pub type Part<S> = [Lanes<S>; 2];
+
+/// Eight rays in view space.
+pub struct Rays<S: Simd> {
+    /// Pixel coordinates of their centres.
+    pub pixel: [Lanes<S>; 2],
+    /// Place in the picture plane, at distance 1 in perspective.
+    pub aside: [Lanes<S>; 2],
+    pub direction: [Lanes<S>; 3],
+    /// The cosine to the optical axis; 1 in orthographic views.
+    pub cosine: Lanes<S>,
+    /// In steps of the lattice: where they start, and their way a world unit.
+    pub start: [Lanes<S>; 3],
+    pub way: [Lanes<S>; 3],
+    /// What clips keep, and what of that lies in the lattice's box.
+    pub kept: Part<S>,
+    pub inside: Part<S>,
+    /// What boxes cut out.
+    pub holes: [Part<S>; Settings::MAX_CLIPS],
+}
+
+impl<S: Simd> Rays<S> {
+    /// The rays of the packet whose first pixel is at a place.
+    #[inline(always)]
+    pub fn new(simd: S, plan: &Plan, [x, y]: [i32; 2]) -> Self {
+        let frame = &plan.frame;
+        let columns: Lanes<S> = [0.5, 1.5, 2.5, 3.5, 0.5, 1.5, 2.5, 3.5].simd_into(simd);
+        let rows: Lanes<S> = [0.5, 0.5, 0.5, 0.5, 1.5, 1.5, 1.5, 1.5].simd_into(simd);
+        let pixel = [columns + x as f32, rows + y as f32];
+        let right = (columns + (x as f32 - frame.center[0])) * (1.0 / frame.scale);
+        let down = (rows + (y as f32 - frame.center[1])) * (1.0 / frame.scale);
+        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let (origin, direction) = if plan.view.perspective {
+            let cosine = one / (right * right + down * down + 1.0).sqrt();
+            ([none; 3], [right * cosine, down * cosine, cosine])
+        } else {
+            ([right, down, none], [none, none, one])
+        };
+        let rows: [[f32; 4]; 3] = three!(I => [frame.world[0][I], frame.world[1][I], frame.world[2][I], 0.0]);
+        let (from, toward) = (three!(I => dot_with(rows[I], origin)), three!(I => dot_with(rows[I], direction)));
+        let mut kept = [Lanes::splat(simd, BEFORE), Lanes::splat(simd, BEHIND)];
+        for [low, high] in &frame.clips[..plan.clips] {
+            let part = if high[3] > 0.0 {
+                part_in_box(simd, *low, *high, from, toward)
+            } else {
+                part_in_half_space(simd, *low, high[0], from, toward)
+            };
+            kept = [kept[0].max(part[0]), kept[1].min(part[1])];
+        }
+        let mut holes = [[none; 2]; Settings::MAX_CLIPS];
+        for (own, [low, high]) in holes.iter_mut().zip(&frame.holes[..plan.holes]) {
+            *own = part_in_box(simd, *low, *high, from, toward);
+        }
+        let start = three!(I => dot_with(frame.field_axes[I], origin) + frame.field_origin[I]);
+        let way = three!(I => dot_with(frame.field_axes[I], direction));
+        let mut inside = kept;
+        if plan.has_field && plan.on_lattice {
+            let part = part_in_box(simd, frame.field_low, frame.field_high, start, way);
+            inside = [kept[0].max(part[0]), kept[1].min(part[1])];
+        }
+        Self { pixel, aside: [right, down], direction, cosine: direction[2], start, way, kept, inside, holes }
+    }
+
+    /// The place at a distance, in steps of the lattice.
+    #[inline(always)]
+    pub fn place(&self, distance: f32) -> [Lanes<S>; 3] {
+        three!(I => self.way[I] * distance + self.start[I])
+    }
+}
+
+/// The distances between which rays are in a box.
+#[inline(always)]
+fn part_in_box<S: Simd>(
+    simd: S,
+    low: [f32; 4],
+    high: [f32; 4],
+    origin: [Lanes<S>; 3],
+    direction: [Lanes<S>; 3],
+) -> Part<S> {
+    let (mut enter, mut leave) = (Lanes::splat(simd, BEFORE), Lanes::splat(simd, BEHIND));
+    for axis in 0..3 {
+        // A ray along a face would divide 0 by 0.
+        let own = direction[axis];
+        let safe = own.abs().simd_lt(1e-20).select(Lanes::splat(simd, 1e-20), own);
+        let a = (low[axis] - origin[axis]) / safe;
+        let b = (high[axis] - origin[axis]) / safe;
+        (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
+    }
+    [enter, leave]
+}
+
+/// The distances between which rays are where normal·x ≤ offset.
+#[inline(always)]
+fn part_in_half_space<S: Simd>(
+    simd: S,
+    normal: [f32; 4],
+    offset: f32,
+    origin: [Lanes<S>; 3],
+    direction: [Lanes<S>; 3],
+) -> Part<S> {
+    let slope = dot_with(normal, direction);
+    let safe = slope.abs().simd_lt(1e-20).select(Lanes::splat(simd, 1e-20), slope);
+    let (before, behind) = (Lanes::splat(simd, BEFORE), Lanes::splat(simd, BEHIND));
+    let at = ((offset - dot_with(normal, origin)) / safe).max(before).min(behind);
+    let is_outward = safe.simd_gt(0.0);
+    [is_outward.select(before, at), is_outward.select(at, behind)]
+}

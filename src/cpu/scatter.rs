@@ -1,0 +1,472 @@
+//! Adds splats to the pixels of a tile: their sections in a window of sheets, and their kernels on the planes between these.
+//! shaders/kernels.wgsl does the same; docs/engine.md tells the mathematics.
+
+use super::{
+    close::Pixels,
+    footprint::{Kind, Record},
+    plan::Plan,
+    rays::{HIGH, PACKETS, Rays, WIDE},
+    sums::{Sums, WINDOW},
+    vector::{Lanes, dot, exp, three},
+};
+use crate::scene::{Optics, Order};
+use fearless_simd::{Simd, mask32x8, prelude::*};
+
+/// The integral of exp(−x²/2).
+const SQRT_TAU: f32 = 2.506_628_3;
+/// Planes farther from a kernel than this, in its standard deviations, count as that far: nothing of it is left there.
+const FAR: f32 = 12.0;
+/// Less optical depth than this is not added: thousands of such sums cannot be seen.
+const LEAST_ADDED: f32 = 1e-7;
+/// Entries of the kernel along its radius, and cells of its sections' table along each side (engine/tables.rs).
+const RADII: usize = crate::engine::tables::RADII;
+const SECTIONS: usize = crate::engine::tables::SECTIONS;
+
+/// A packet of a tile: its rays, and its pixels of the picture.
+pub struct Packet<S: Simd> {
+    pub rays: Rays<S>,
+    pub pixels: Pixels<S>,
+    /// No light gets through any of its pixels.
+    pub is_done: bool,
+}
+
+/// A splat's window of four sheets in a tile.
+#[derive(Clone, Copy)]
+pub struct Window {
+    /// The first sheet.
+    pub front: usize,
+    /// It follows another window of the same splat.
+    pub is_continued: bool,
+}
+
+/// Where a kernel lies on the rays of a packet.
+struct Along<S: Simd> {
+    /// The squared distance of the closest approach, in whitened space, and where the kernel counts.
+    rho2: Lanes<S>,
+    inside: mask32x8<S>,
+    /// Planes, in whitened lengths from the closest approach; β = M·b, its length's inverse, and L (docs/engine.md).
+    t: [Lanes<S>; 3],
+    v: [Lanes<S>; 3],
+    beta: [Lanes<S>; 3],
+    inverse: Lanes<S>,
+    l: Lanes<S>,
+}
+
+/// What of a record is the same for all pixels.
+struct Projected {
+    at: [f32; 2],
+    whitened: [f32; 3],
+    m: [[f32; 3]; 3],
+    v: [[f32; 3]; 2],
+}
+
+impl Projected {
+    #[inline(always)]
+    fn new(plan: &Plan, record: &Record) -> Self {
+        let scale = plan.frame.scale;
+        let [m00, m10, m20, m11, m21, m22] = record.whitening;
+        let m = [[m00, m10, m20].map(|part| part / scale), [0.0, m11 / scale, m21 / scale], [0.0, 0.0, m22]];
+        let [x, y, z] = record.center;
+        let mut at = [plan.frame.center[0] + scale * x, plan.frame.center[1] + scale * y];
+        let mut whitened = [0.0, 0.0, m22 * z];
+        let mut v = [cross(m[2], m[0]), cross(m[2], m[1])];
+        if plan.view.perspective {
+            // A centre beside the eye projects to infinity. It is moved by a thousandth of its distance.
+            let least = 1e-3 * (x * x + y * y + z * z).sqrt();
+            let z = if z.abs() < least { least.copysign(z) } else { z };
+            at = [plan.frame.center[0] + scale * x / z, plan.frame.center[1] + scale * y / z];
+            whitened = std::array::from_fn(|i| (m[0][i] * x + m[1][i] * y) * scale + m[2][i] * z);
+            v = [cross(whitened, m[0]), cross(whitened, m[1])];
+        }
+        Self { at, whitened, m, v }
+    }
+
+    /// Where the kernel lies on the rays of a packet, and `count` planes from one on.
+    #[inline(always)]
+    fn along<S: Simd>(
+        &self,
+        simd: S,
+        plan: &Plan,
+        record: &Record,
+        rays: &Rays<S>,
+        planes: &[f32],
+        count: usize,
+    ) -> Along<S> {
+        let [m0, m1, m2] = &self.m;
+        let [v0, v1] = &self.v;
+        let dx = rays.pixel[0] - self.at[0];
+        let dy = rays.pixel[1] - self.at[1];
+        let v = three!(I => dx * v0[I] + dy * v1[I]);
+        let (beta, l);
+        if plan.view.perspective {
+            let x = rays.pixel[0] - plan.frame.center[0];
+            let y = rays.pixel[1] - plan.frame.center[1];
+            beta = [x * m0[0], x * m0[1] + y * m1[1], x * m0[2] + y * m1[2] + m2[2]];
+            l = beta[0] * self.whitened[0] + beta[1] * self.whitened[1] + beta[2] * self.whitened[2];
+        } else {
+            let none = Lanes::splat(simd, 0.0);
+            beta = [none, none, Lanes::splat(simd, m2[2])];
+            l = (self.whitened[2] - dx * m0[2] - dy * m1[2]) * m2[2];
+        }
+        let size2 = dot(beta, beta);
+        let inverse = Lanes::splat(simd, 1.0) / size2.max(Lanes::splat(simd, 1e-37)).sqrt();
+        let rho2 = dot(v, v) * inverse * inverse;
+        let inside = rho2.simd_le(record.extent2);
+        let far = Lanes::splat(simd, FAR);
+        let mut t = [far; 3];
+        for (t, plane) in t.iter_mut().zip(planes).take(count) {
+            *t = ((size2 * (rays.cosine * *plane) - l) * inverse).max(-far).min(far);
+        }
+        Along { rho2, inside, t, v, beta, inverse, l }
+    }
+}
+
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// The normal distribution function, within 2·10⁻⁷ (Abramowitz & Stegun 1964, 26.2.19). Its tails must be right: what they
+/// get wrong is multiplied by the strength of an opaque splat and lies in front of it.
+#[inline(always)]
+fn normal_cdf<S: Simd>(simd: S, t: Lanes<S>) -> Lanes<S> {
+    let x = t.abs().min(Lanes::splat(simd, 8.0));
+    let one = Lanes::splat(simd, 1.0);
+    let mut p = Lanes::splat(simd, 5.382_975e-6);
+    for term in [4.889_063_6e-5, 3.800_357_5e-5, 3.277_626_3e-3, 2.114_100_6e-2, 4.986_735e-2, 1.0] {
+        p = p.mul_add(x, Lanes::splat(simd, term));
+    }
+    p = p * p;
+    p = p * p;
+    p = p * p;
+    p = p * p;
+    let tail = Lanes::splat(simd, 0.5) / p;
+    t.simd_ge(0.0).select(one - tail, tail)
+}
+
+/// The same within 2.3·10⁻⁴, without a division: an odd polynomial that is level at 3.55. For surfaces alone, where an error
+/// moves optical depth from one sheet to the next, both of the same splat's colour, and takes none away.
+#[inline(always)]
+fn near_normal_cdf<S: Simd>(simd: S, t: Lanes<S>) -> Lanes<S> {
+    let x = t.max(Lanes::splat(simd, -3.55)).min(Lanes::splat(simd, 3.55));
+    let y = x * x;
+    let mut p = Lanes::splat(simd, -6.913_499e-7);
+    for term in [3.451_519e-5, -7.243_616_8e-4, 8.523_511_8e-3, -6.442_941_4e-2, 3.980_850_4e-1] {
+        p = p.mul_add(y, Lanes::splat(simd, term));
+    }
+    x.mul_add(p, Lanes::splat(simd, 0.5))
+}
+
+/// Adds a splat's window to all packets of a tile that it meets.
+#[inline(always)]
+pub fn add<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    record: &Record,
+    window: Window,
+    corner: [i32; 2],
+    packets: &mut [Packet<S>; PACKETS],
+    sums: &mut Sums<S>,
+) {
+    let projected = Projected::new(plan, record);
+    let [first, last] = record.pixels;
+    let from: [usize; 2] = [0, 1].map(|axis| (first[axis] - corner[axis]).max(0) as usize);
+    let to: [usize; 2] = [0, 1].map(|axis| (last[axis] - corner[axis]).min(super::plan::TILE as i32 - 1) as usize);
+    for row in from[1] / HIGH..=to[1] / HIGH {
+        for column in from[0] / WIDE..=to[0] / WIDE {
+            let number = row * 2 + column;
+            let packet = &mut packets[number];
+            // Neighbours of a pixel need its value, however opaque it is.
+            if packet.is_done && !plan.central {
+                continue;
+            }
+            if record.kind == Kind::Scalar {
+                add_scalar(simd, plan, record, &projected, window, number, packet, sums);
+            } else {
+                add_radiance(simd, plan, record, &projected, window, number, packet, sums);
+            }
+        }
+    }
+}
+
+/// The part of a kernel between planes: `count` of them lie in the window, and what is behind the last one belongs to the last
+/// sheet.
+#[inline(always)]
+fn sections<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    along: &Along<S>,
+    from_table: bool,
+    count: usize,
+    window: Window,
+) -> [Lanes<S>; WINDOW] {
+    let none = Lanes::splat(simd, 0.0);
+    let before = |whole: Lanes<S>| if window.is_continued { whole } else { none };
+    let mut sections = [none; WINDOW];
+    if from_table {
+        let half = kernel_integral(simd, plan, along.rho2.sqrt(), Lanes::splat(simd, 3e38));
+        let mut last = before(half * 2.0) - half;
+        for (section, t) in sections.iter_mut().zip(along.t).take(count) {
+            let next = kernel_integral(simd, plan, along.rho2.sqrt(), t);
+            *section = next - last;
+            last = next;
+        }
+        sections[count] = half - last;
+        return sections;
+    }
+    let one = Lanes::splat(simd, 1.0);
+    let mut last = before(one);
+    for (section, t) in sections.iter_mut().zip(along.t).take(count) {
+        let next =
+            if plan.has_field || plan.is_classified { normal_cdf(simd, t) } else { near_normal_cdf(simd, t) };
+        *section = next - last;
+        last = next;
+    }
+    sections[count] = one - last;
+    sections
+}
+
+/// Planes of a window that its splat reaches. One more is looked at than its last sheet needs: near the rim of a footprint,
+/// sections reach further.
+#[inline(always)]
+fn planes_of(plan: &Plan, record: &Record, window: Window) -> usize {
+    let ahead = (usize::from(record.sheets[1]) + 1).saturating_sub(window.front);
+    if plan.is_whole() { 0 } else { ahead.min(WINDOW - 1) }
+}
+
+#[expect(clippy::too_many_arguments, reason = "all of them are one splat, one packet or the picture")]
+#[inline(always)]
+fn add_radiance<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    record: &Record,
+    projected: &Projected,
+    window: Window,
+    number: usize,
+    packet: &mut Packet<S>,
+    sums: &mut Sums<S>,
+) {
+    let count = planes_of(plan, record, window);
+    let planes = &plan.planes[window.front + 1..];
+    let rays = &packet.rays;
+    let along = projected.along(simd, plan, record, rays, planes, count);
+    if !along.inside.any_true() {
+        return;
+    }
+    let none = Lanes::splat(simd, 0.0);
+    let from_table = plan.table_kernel && record.kind == Kind::Classified;
+    let mut strength = Lanes::splat(simd, record.strength);
+    if !from_table {
+        strength *= exp(simd, along.rho2 * -0.5);
+    }
+    if record.kind == Kind::Classified {
+        // Whitened length to world length along the ray.
+        strength = strength * along.inverse / rays.cosine;
+        if !from_table {
+            strength *= SQRT_TAU;
+        }
+    }
+    let mut counts = along.inside;
+    if plan.clips + plan.holes > 0 {
+        counts &= is_kept(plan, rays, along.l * along.inverse * along.inverse / rays.cosine);
+    }
+    if plan.is_whole() && plan.view.perspective {
+        // Its middle is in front of the eye.
+        counts &= along.l.simd_gt(0.0);
+    }
+    let strength = counts.select(strength, none);
+    let sections = sections(simd, plan, &along, from_table, count, window);
+    if let Some(order) = plan.single() {
+        single(simd, plan, record, strength * sections[0], order, packet);
+        return;
+    }
+    let payload: Lanes<S> = record.payload.simd_into(simd);
+    for (own, section) in sections.iter().enumerate().take(count + 1) {
+        let depth = strength * *section;
+        let adds = depth.abs().simd_gt(LEAST_ADDED);
+        let mut bits = adds.to_bitmask();
+        if bits == 0 {
+            continue;
+        }
+        let slot = (window.front + own) % WINDOW;
+        sums.has_radiance[slot] |= 1 << number;
+        let depths: [f32; 8] = depth.into();
+        let cells = &mut sums.radiance[slot][number];
+        while bits != 0 {
+            let pixel = bits.trailing_zeros() as usize & 7;
+            bits &= bits - 1;
+            let cell = &mut cells[pixel];
+            let sum = payload.mul_add(Lanes::splat(simd, depths[pixel]), Lanes::from_slice(simd, cell));
+            sum.store_slice(cell);
+        }
+    }
+}
+
+/// Composites a splat by itself, before or behind what is there.
+#[inline(always)]
+fn single<S: Simd>(simd: S, plan: &Plan, record: &Record, depth: Lanes<S>, order: Order, packet: &mut Packet<S>) {
+    let [_, _, red, green, blue, x, y, z] = record.payload;
+    let normal = [x, y, z].map(|part| Lanes::splat(simd, part));
+    let mut color = [red, green, blue].map(|part| Lanes::splat(simd, part));
+    if plan.lit_surfaces && [x, y, z] != [0.0; 3] {
+        color = plan.lit(simd, color, normal, packet.rays.direction, plan.frame.surface_shade);
+    }
+    let one = Lanes::splat(simd, 1.0);
+    let left = exp(simd, -depth);
+    let pixels = &mut packet.pixels;
+    let before = pixels.through;
+    let counts = depth.simd_gt(0.0);
+    let left = counts.select(left, one);
+    let takes_half = match order {
+        Order::BackToFront => {
+            pixels.color = three!(I => pixels.color[I] * left + (one - left) * color[I]);
+            left.simd_le(0.5)
+        }
+        Order::FrontToBack => {
+            let share = before * (one - left);
+            pixels.color = three!(I => share.mul_add(color[I], pixels.color[I]));
+            before.simd_gt(0.5) & (before * left).simd_le(0.5)
+        }
+    };
+    pixels.through = before * left;
+    let [x, y, z] = record.center;
+    let distance = if plan.view.perspective { (x * x + y * y + z * z).sqrt() } else { z };
+    pixels.hit = takes_half.select(Lanes::splat(simd, distance), pixels.hit);
+}
+
+/// Whether the clips keep a place of each ray.
+#[inline(always)]
+fn is_kept<S: Simd>(plan: &Plan, rays: &Rays<S>, distance: Lanes<S>) -> mask32x8<S> {
+    let mut kept = distance.simd_ge(rays.kept[0]) & distance.simd_le(rays.kept[1]);
+    for [from, to] in &rays.holes[..plan.holes] {
+        kept &= !(distance.simd_gt(*from) & distance.simd_lt(*to));
+    }
+    kept
+}
+
+#[expect(clippy::too_many_arguments, reason = "all of them are one splat, one packet or the picture")]
+#[inline(always)]
+fn add_scalar<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    record: &Record,
+    projected: &Projected,
+    window: Window,
+    number: usize,
+    packet: &Packet<S>,
+    sums: &mut Sums<S>,
+) {
+    let count = planes_of(plan, record, window);
+    let planes = &plan.planes[window.front + 1..];
+    let rays = &packet.rays;
+    let along = projected.along(simd, plan, record, rays, planes, count);
+    if !along.inside.any_true() {
+        return;
+    }
+    let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+    let [weight, slope @ ..] = record.payload;
+    let slope = [slope[0], slope[1], slope[2]];
+    let kernel = if plan.table_kernel { one } else { exp(simd, along.rho2 * -0.5) };
+    let kernel = along.inside.select(kernel, none) * weight;
+    let closest = if plan.table_kernel { one } else { Lanes::splat(simd, SQRT_TAU) };
+    let length_of = along.inverse / rays.cosine;
+    let sections = sections(simd, plan, &along, plan.table_kernel, count, window);
+    let nearest = three!(I => {
+        let (a, b) = ((I + 1) % 3, (I + 2) % 3);
+        (along.v[a] * along.beta[b] - along.v[b] * along.beta[a]) * (along.inverse * along.inverse)
+    });
+    let unit = three!(I => along.beta[I] * along.inverse);
+    let mut value = Lanes::splat(simd, record.strength);
+    let mut slope_along = none;
+    if plan.has_slopes {
+        value += nearest[0] * slope[0] + nearest[1] * slope[1] + nearest[2] * slope[2];
+        slope_along = unit[0] * slope[0] + unit[1] * slope[1] + unit[2] * slope[2];
+    }
+    let section_kernel = kernel * closest * length_of;
+    // The kernel on the planes before and behind a sheet: what the slope carries from one to the other.
+    let mut before = none;
+    for own in 0..=count {
+        let slot = (window.front + own) % WINDOW;
+        sums.has_field[slot] |= 1 << number;
+        let weight = section_kernel * sections[own];
+        let field = &mut sums.field[slot][number];
+        field.weight += weight;
+        field.value = weight.mul_add(value, field.value);
+        if own == count {
+            if plan.has_slopes {
+                field.value += before * slope_along * length_of;
+            }
+            break;
+        }
+        let t = along.t[own];
+        let (on_plane, steep) = if plan.table_kernel {
+            let [on_plane, steep] = kernel_at(simd, plan, (along.rho2 + t * t).sqrt());
+            (on_plane * kernel, steep * kernel)
+        } else {
+            let on_plane = exp(simd, t * t * -0.5) * kernel;
+            (on_plane, on_plane)
+        };
+        if plan.has_slopes {
+            field.value += (before - on_plane) * slope_along * length_of;
+        }
+        before = on_plane;
+        let here = t.mul_add(slope_along, value);
+        let face = &mut sums.faces[(window.front + own + 1) % WINDOW][number];
+        face.weight += on_plane;
+        face.value = on_plane.mul_add(here, face.value);
+        if plan.has_gradients() && !plan.central {
+            let size = if plan.view.perspective { rays.cosine * planes[own] } else { one };
+            for axis in 0..2 {
+                // How the whitened place moves on the plane per pixel to the right or down.
+                let mut across = three!(I => Lanes::splat(simd, projected.m[axis][I]));
+                if plan.view.perspective {
+                    let k = rays.cosine * rays.cosine * rays.aside[axis] * (1.0 / plan.frame.scale);
+                    across = three!(I => across[I] - along.beta[I] * k);
+                }
+                let moved = size * (dot(nearest, across) + t * dot(unit, across));
+                face.weight_slope[axis] += steep * moved;
+                face.value_slope[axis] = (steep * moved).mul_add(here, face.value_slope[axis]);
+                if plan.has_slopes {
+                    let change = across[0] * slope[0] + across[1] * slope[1] + across[2] * slope[2];
+                    face.value_slope[axis] -= on_plane * size * change;
+                }
+            }
+        }
+    }
+    debug_assert!(plan.optics != Optics::Maximum || plan.has_field);
+}
+
+/// The kernel, and −h′(r)/r, at radii in kernel space; nothing beyond its extent.
+#[inline(always)]
+fn kernel_at<S: Simd>(simd: S, plan: &Plan, radius: Lanes<S>) -> [Lanes<S>; 2] {
+    let [length, per_length, ..] = plan.frame.kernel;
+    let last = (RADII - 1) as f32;
+    let start = plan.tables.starts[2] as usize;
+    let radii: [f32; 8] = radius.into();
+    let mut found = [[0.0f32; 8]; 2];
+    for (lane, radius) in radii.into_iter().enumerate() {
+        if radius <= length {
+            let at = (radius * per_length * last).min(last);
+            let [a, b, c, d] = plan.tables.entries[start + at as usize];
+            let part = at.fract();
+            (found[0][lane], found[1][lane]) = (a + (c - a) * part, b + (d - b) * part);
+        }
+    }
+    [found[0].simd_into(simd), found[1].simd_into(simd)]
+}
+
+/// The kernel's integral along lines at distances `rho` from its centre, from the closest approach to t.
+#[inline(always)]
+fn kernel_integral<S: Simd>(simd: S, plan: &Plan, rho: Lanes<S>, t: Lanes<S>) -> Lanes<S> {
+    let per_length = plan.frame.kernel[1];
+    let cells = SECTIONS as f32;
+    let start = plan.tables.starts[3] as usize;
+    let ([rhos, ts], mut found): ([[f32; 8]; 2], _) = ([rho.into(), t.into()], [0.0f32; 8]);
+    for lane in 0..8 {
+        let place = |value: f32| (value * per_length * cells).min(cells - 1e-3);
+        let (x, y) = (place(rhos[lane]), place(ts[lane].abs()));
+        let [a, b, c, d] = plan.tables.entries[start + x as usize * SECTIONS + y as usize];
+        let (low, high) = (a + (b - a) * y.fract(), c + (d - c) * y.fract());
+        found[lane] = (low + (high - low) * x.fract()).copysign(if ts[lane] >= 0.0 { 1.0 } else { -1.0 });
+    }
+    found.simd_into(simd)
+}

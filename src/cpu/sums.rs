@@ -1,0 +1,229 @@
+//! The sums of the sheets that are open in a tile: what splats have added to them so far.
+//!
+//! A splat adds to a window of four sheets, and to the three planes between them. Sheet and plane n lie in the slot n mod 4.
+
+use super::{
+    close::{Face, Layer},
+    plan::{Plan, TILE},
+    rays::{PACKETS, Rays},
+    vector::{Lanes, each, three},
+};
+use fearless_simd::{Simd, mask32x8, prelude::*};
+
+/// Sheets of a window.
+pub const WINDOW: usize = 4;
+/// A sheet with less optical depth than this has no colour: the sum may be what rounding left.
+const LEAST_DEPTH: f32 = 1e-5;
+
+/// What a pixel sums up of colour: optical depth; what faces the eye of it, and times that colour and normal.
+pub type Radiance = [f32; 8];
+
+/// Sums of a field in a sheet at eight pixels: weights and weighted values.
+#[derive(Clone, Copy)]
+pub struct FieldSums<S: Simd> {
+    pub weight: Lanes<S>,
+    pub value: Lanes<S>,
+}
+
+/// The same on a plane, with the negated derivatives of both per pixel to the right and down.
+#[derive(Clone, Copy)]
+pub struct FaceSums<S: Simd> {
+    pub weight: Lanes<S>,
+    pub value: Lanes<S>,
+    pub weight_slope: [Lanes<S>; 2],
+    pub value_slope: [Lanes<S>; 2],
+}
+
+pub struct Sums<S: Simd> {
+    pub radiance: [[[Radiance; 8]; PACKETS]; WINDOW],
+    /// The packets that radiance was added to, as bits.
+    pub has_radiance: [u8; WINDOW],
+    pub field: [[FieldSums<S>; PACKETS]; WINDOW],
+    pub faces: [[FaceSums<S>; PACKETS]; WINDOW],
+    pub has_field: [u8; WINDOW],
+    none: Lanes<S>,
+}
+
+/// A value on a plane, and where there is one.
+struct Resolved<S: Simd> {
+    face: Face<S>,
+    has_value: mask32x8<S>,
+}
+
+impl<S: Simd> Sums<S> {
+    #[inline(always)]
+    pub fn new(simd: S) -> Self {
+        let none = Lanes::splat(simd, 0.0);
+        Self {
+            radiance: [[[[0.0; 8]; 8]; PACKETS]; WINDOW],
+            has_radiance: [0; WINDOW],
+            field: [[FieldSums { weight: none, value: none }; PACKETS]; WINDOW],
+            faces: [[FaceSums { weight: none, value: none, weight_slope: [none; 2], value_slope: [none; 2] }; PACKETS];
+                WINDOW],
+            has_field: [0; WINDOW],
+            none,
+        }
+    }
+
+    /// Radiance of a sheet at a packet: colour times optical depth, and optical depth. Nothing where none was added.
+    #[inline(always)]
+    pub fn take_radiance(&mut self, simd: S, plan: &Plan, rays: &Rays<S>, sheet: usize, packet: usize) -> Option<[Lanes<S>; 4]> {
+        let slot = sheet % WINDOW;
+        if self.has_radiance[slot] & (1 << packet) == 0 {
+            return None;
+        }
+        self.has_radiance[slot] &= !(1 << packet);
+        let own = &mut self.radiance[slot][packet];
+        let mut turned = [[0.0f32; 8]; 8];
+        for (pixel, sums) in own.iter_mut().enumerate() {
+            for (channel, sum) in sums.iter_mut().enumerate() {
+                turned[channel][pixel] = std::mem::take(sum);
+            }
+        }
+        let [depth, facing, red, green, blue, x, y, z]: [Lanes<S>; 8] =
+            each!([0, 1, 2, 3, 4, 5, 6, 7], I => turned[I].simd_into(simd));
+        let one = Lanes::splat(simd, 1.0);
+        // Where next to nothing faces the eye, rounding may have left a weight of any sign.
+        let inverse = one / facing.max(Lanes::splat(simd, 1e-12));
+        let sum = [red, green, blue];
+        let mut color = three!(I => (sum[I] * inverse).max(self.none).min(one));
+        if plan.lit_surfaces {
+            let normal = [x, y, z];
+            let lit = plan.lit(simd, color, normal, rays.direction, plan.frame.surface_shade);
+            let has_normal = (x * x + y * y + z * z).simd_gt(0.0);
+            color = three!(I => has_normal.select(lit[I], color[I]));
+        }
+        let counts = depth.simd_ge(LEAST_DEPTH);
+        let depth = counts.select(depth, self.none);
+        Some([color[0] * depth, color[1] * depth, color[2] * depth, depth])
+    }
+
+    /// The field of a sheet at a packet. Nothing where none was added. `slopes`: those a pixel to the right and down on the
+    /// planes before and behind the sheet, where they are differences of neighbouring pixels.
+    #[inline(always)]
+    pub fn resolve(
+        &self,
+        simd: S,
+        plan: &Plan,
+        rays: &Rays<S>,
+        sheet: usize,
+        packet: usize,
+        slopes: Option<[[Lanes<S>; 2]; 2]>,
+    ) -> Option<(Layer<S>, mask32x8<S>)> {
+        let slot = sheet % WINDOW;
+        if self.has_field[slot] & (1 << packet) == 0 {
+            return None;
+        }
+        let [start, stop] = [plan.planes[sheet], plan.planes[sheet + 1]];
+        let thickness = stop - start;
+        let own = &self.field[slot][packet];
+        let has_value = own.weight.simd_gt(plan.frame.isotropic[3] * thickness);
+        let value = own.value / own.weight.max(Lanes::splat(simd, 1e-37));
+        let one = Lanes::splat(simd, 1.0);
+        let filling = if plan.on_lattice { one } else { (own.weight * (1.0 / thickness)).min(one) };
+        let front = self.face(simd, plan, rays, sheet, packet, slopes.map(|[front, _]| front));
+        let back = self.face(simd, plan, rays, sheet + 1, packet, slopes.map(|[_, back]| back));
+        let either = |a: &Resolved<S>, b: &Resolved<S>| {
+            let across = three!(I => a.has_value.select(a.face.across[I], b.has_value.select(b.face.across[I], self.none)));
+            Face { value: a.has_value.select(a.face.value, value), across }
+        };
+        let (front, back) = (either(&front, &back), either(&back, &front));
+        let middle = value * 1.5 - (front.value + back.value) * 0.25;
+        let begin = rays.inside[0].max(Lanes::splat(simd, start));
+        let end = rays.inside[1].min(Lanes::splat(simd, stop));
+        let layer = Layer { front, back, middle, start, thickness, begin, end, filling, direction: rays.direction };
+        Some((layer, has_value))
+    }
+
+    #[inline(always)]
+    fn face(
+        &self,
+        simd: S,
+        plan: &Plan,
+        rays: &Rays<S>,
+        plane: usize,
+        packet: usize,
+        differences: Option<[Lanes<S>; 2]>,
+    ) -> Resolved<S> {
+        let own = &self.faces[plane % WINDOW][packet];
+        let has_value = own.weight.simd_gt(plan.frame.isotropic[3]);
+        let inverse = Lanes::splat(simd, 1.0) / own.weight.max(Lanes::splat(simd, 1e-37));
+        let value = own.value * inverse;
+        let mut across = [self.none; 3];
+        if plan.has_gradients() {
+            let of = |axis: usize| (value * own.weight_slope[axis] - own.value_slope[axis]) * inverse;
+            let slopes = differences.unwrap_or([of(0), of(1)]);
+            across = across_of(simd, plan, rays, slopes, plan.planes[plane]);
+        }
+        Resolved { face: Face { value, across }, has_value }
+    }
+
+    /// Values on a plane for differences between neighbouring pixels: those of a tile row by row, NaN where there is none.
+    #[inline(always)]
+    pub fn values_on(&self, simd: S, plan: &Plan, plane: usize) -> [[f32; TILE]; TILE] {
+        let mut values = [[f32::NAN; TILE]; TILE];
+        for (packet, own) in self.faces[plane % WINDOW].iter().enumerate() {
+            let has_value = own.weight.simd_gt(plan.frame.isotropic[3]);
+            let value = own.value / own.weight.max(Lanes::splat(simd, 1e-37));
+            let value: [f32; 8] = has_value.select(value, Lanes::splat(simd, f32::NAN)).into();
+            for (lane, value) in value.into_iter().enumerate() {
+                values[packet / 2 * 2 + lane / 4][packet % 2 * 4 + lane % 4] = value;
+            }
+        }
+        values
+    }
+
+    /// Frees the slots of a sheet and of the plane before it, for those four further on.
+    #[inline(always)]
+    pub fn clear(&mut self, sheet: usize) {
+        let slot = sheet % WINDOW;
+        if self.has_radiance[slot] != 0 {
+            // What was not taken: the sheet is not drawn, or a packet is done.
+            self.radiance[slot] = [[[0.0; 8]; 8]; PACKETS];
+            self.has_radiance[slot] = 0;
+        }
+        if self.has_field[slot] != 0 {
+            let none = self.none;
+            self.field[slot] = [FieldSums { weight: none, value: none }; PACKETS];
+            self.faces[slot] =
+                [FaceSums { weight: none, value: none, weight_slope: [none; 2], value_slope: [none; 2] }; PACKETS];
+            self.has_field[slot] = 0;
+        }
+    }
+}
+
+/// The part of the gradient across the ray from the slopes a pixel to the right and down, on the plane at a distance.
+#[inline(always)]
+fn across_of<S: Simd>(simd: S, plan: &Plan, rays: &Rays<S>, slopes: [Lanes<S>; 2], distance: f32) -> [Lanes<S>; 3] {
+    let [.., to_world] = plan.frame.gradients;
+    let scale = if plan.view.perspective {
+        Lanes::splat(simd, to_world) / (rays.cosine * distance)
+    } else {
+        Lanes::splat(simd, to_world)
+    };
+    let [x, y] = [slopes[0] * scale, slopes[1] * scale];
+    let [along_x, along_y, along_z] = rays.direction;
+    [x, y, -(x * along_x + y * along_y) / along_z]
+}
+
+/// Slopes of the values around the pixels of a packet: central differences, one-sided where a neighbour has no value.
+#[inline(always)]
+pub fn differences<S: Simd>(simd: S, values: &[[f32; TILE]; TILE], packet: usize) -> [Lanes<S>; 2] {
+    let mut slopes = [[0.0f32; 8]; 2];
+    for lane in 0..8 {
+        let (row, column) = (packet / 2 * 2 + lane / 4, packet % 2 * 4 + lane % 4);
+        let own = values[row][column];
+        let last = TILE - 1;
+        let pairs = [
+            [values[row][column.max(1) - 1], values[row][(column + 1).min(last)]],
+            [values[row.max(1) - 1][column], values[(row + 1).min(last)][column]],
+        ];
+        for (slopes, [before, after]) in slopes.iter_mut().zip(pairs) {
+            let span = f32::from(u8::from(!before.is_nan()) + u8::from(!after.is_nan()));
+            let or_own = |value: f32| if value.is_nan() { own } else { value };
+            slopes[lane] = (or_own(after) - or_own(before)) / span.max(1.0);
+        }
+    }
+    let [x, y] = slopes;
+    [x.simd_into(simd), y.simd_into(simd)]
+}
