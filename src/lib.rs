@@ -1,8 +1,8 @@
-//! splatkit draws volumes and surfaces as elliptic splats, by one engine on wgpu.
+//! splatkit draws volumes and surfaces as elliptic splats, on a GPU or on the processor.
 //!
-//! The way of the data: a file → [`io`] (what it says) → [`volume`] / [`scattered`] /
-//! [`surface`] (what it means) → splats
-//! ([`splat`]) → [`engine`] (one pass, one Rust file, one shader) → a [`Picture`](picture::Picture).
+//! The way of the data: a file → [`io`] (what it says) → [`volume`] / [`scattered`] / [`surface`] (what it means) → splats
+//! ([`splat`]) in a [`Scene`](scene::Scene) → a [`Renderer`], which draws with the [`engine`] on wgpu (one pass, one Rust file, one
+//! shader) or with that for processors ([`cpu`]) → a [`Picture`](picture::Picture).
 
 pub mod compare;
 pub mod cpu;
@@ -16,6 +16,7 @@ pub mod math;
 pub mod memory;
 pub mod picture;
 pub mod reference;
+mod renderer;
 pub mod scattered;
 pub mod scene;
 pub mod splat;
@@ -24,3 +25,4 @@ pub mod volume;
 
 pub use deadline::Deadline;
 pub use error::{Error, Result};
+pub use renderer::{Device, Renderer};

@@ -157,7 +157,8 @@ fn mixed_scenes() {
 fn whole_kernels() {
     let mut in_sheets = methods::single_ellipsoids();
     in_sheets.settings.mode = Mode::AxisSheets;
-    let inside = [methods::single_splats(Order::FrontToBack), methods::single_ellipsoids(), methods::axis_sheets(), in_sheets];
+    let inside =
+        [methods::single_splats(Order::FrontToBack), methods::single_ellipsoids(), methods::axis_sheets(), in_sheets];
     let outside = [
         methods::axis_sheets(),
         methods::axis_sheets_body_centred_orthographic(),

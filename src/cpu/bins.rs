@@ -119,7 +119,8 @@ impl Lists {
     pub fn sorted(&self, plan: &Plan, block: usize) -> Vec<u32> {
         let own = block - self.first;
         let start = if own == 0 { 0 } else { self.ends[own - 1] };
-        let mut sorted: Vec<u64> = self.entries[start..self.ends[own]].iter().map(|entry| entry.load(Relaxed)).collect();
+        let mut sorted: Vec<u64> =
+            self.entries[start..self.ends[own]].iter().map(|entry| entry.load(Relaxed)).collect();
         sorted.sort_unstable();
         let turn = turn_of(plan);
         sorted.into_iter().map(|key| key as u32 ^ turn).collect()

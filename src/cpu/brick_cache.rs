@@ -43,8 +43,12 @@ impl BrickCache {
                 *last = self.update;
             }
         }
-        let mut others: Vec<(u64, Key)> =
-            self.held.iter().filter(|(_, (_, last))| *last < self.update).map(|(key, (_, last))| (*last, *key)).collect();
+        let mut others: Vec<(u64, Key)> = self
+            .held
+            .iter()
+            .filter(|(_, (_, last))| *last < self.update)
+            .map(|(key, (_, last))| (*last, *key))
+            .collect();
         others.sort_unstable();
         for (_, key) in others.iter().take(others.len().saturating_sub(choice.bricks.len())) {
             self.held.remove(key);

@@ -187,8 +187,7 @@ fn facing_weight(plan: &Plan, normal: Vec3, center: Vec3) -> f32 {
     if normal == Vec3::ZERO {
         return 1.0;
     }
-    let away =
-        if plan.view.perspective { normal.dot(center) / center.length().max(1e-30) } else { normal.z };
+    let away = if plan.view.perspective { normal.dot(center) / center.length().max(1e-30) } else { normal.z };
     (0.5 - 4.0 * away).clamp(1.0 / 255.0, 1.0)
 }
 

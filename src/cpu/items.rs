@@ -30,10 +30,18 @@ const LIST_BLOCK: usize = 4;
 #[derive(Debug)]
 pub enum Prepared {
     /// The levels of detail of a set of splats, and what stands for it in the last view.
-    Set { levels: Option<Box<Levels>>, drawn: Arc<SplatSet> },
+    Set {
+        levels: Option<Box<Levels>>,
+        drawn: Arc<SplatSet>,
+    },
     Hierarchy(Box<PageCache>),
     /// A volume, the extremes around each sample, and those that show under a transfer function.
-    Volume { volume: Arc<Volume>, kernel: Kernel, ranges: Vec<[u8; 2]>, listed: Option<([u16; 256], Vec<u32>)> },
+    Volume {
+        volume: Arc<Volume>,
+        kernel: Kernel,
+        ranges: Vec<[u8; 2]>,
+        listed: Option<([u16; 256], Vec<u32>)>,
+    },
     Bricks(Box<BrickCache>),
 }
 
@@ -75,7 +83,14 @@ impl Prepared {
     }
 
     /// The records of all splats that meet the picture, in batches of [`BATCH`] candidates.
-    pub fn records(&mut self, plan: &Plan, settings: &Settings, pixels: f64, choice: Option<&Choice>, shown: &[u16; 256]) -> Result<Vec<Vec<Record>>> {
+    pub fn records(
+        &mut self,
+        plan: &Plan,
+        settings: &Settings,
+        pixels: f64,
+        choice: Option<&Choice>,
+        shown: &[u16; 256],
+    ) -> Result<Vec<Vec<Record>>> {
         let view = plan.view;
         match self {
             Self::Set { drawn, .. } => {

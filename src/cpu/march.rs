@@ -170,8 +170,8 @@ impl March<'_> {
     ) {
         let plan = self.plan;
         let has_sums = plan.has_field && sums.has_field[sheet % WINDOW] != 0;
-        let values =
-            (plan.central && has_sums).then(|| [sums.values_on(simd, plan, sheet), sums.values_on(simd, plan, sheet + 1)]);
+        let values = (plan.central && has_sums)
+            .then(|| [sums.values_on(simd, plan, sheet), sums.values_on(simd, plan, sheet + 1)]);
         for (number, packet) in packets.iter_mut().enumerate() {
             if packet.is_done {
                 continue;
@@ -182,7 +182,8 @@ impl March<'_> {
                 Some(gather) if has_lattice => gather.layer(simd, plan, rays, sheet, &mut last[number]),
                 Some(_) => None,
                 None if has_sums => {
-                    let slopes = values.as_ref().map(|values| values.each_ref().map(|on| differences(simd, on, number)));
+                    let slopes =
+                        values.as_ref().map(|values| values.each_ref().map(|on| differences(simd, on, number)));
                     let layer = sums.resolve(simd, plan, rays, sheet, number, slopes);
                     let is_maximum = plan.optics == Optics::Maximum;
                     layer.filter(|(layer, _)| is_maximum || self.visible.may_show(simd, plan, layer))

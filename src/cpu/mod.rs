@@ -211,9 +211,8 @@ impl CpuRenderer {
     /// Whether the field of the scene's volume is gathered: it lies on a Cartesian lattice with Gaussian kernels of which four
     /// weights an axis hold all, in sheets thin enough for a parabola.
     fn gathers(&self, settings: &Settings, sheets: &Sheets) -> bool {
-        let is_plain = settings.mode == Mode::Sheets
-            && !settings.classifies_samples()
-            && settings.gradient == Gradient::Analytic;
+        let is_plain =
+            settings.mode == Mode::Sheets && !settings.classifies_samples() && settings.gradient == Gradient::Analytic;
         is_plain
             && self.scene.items.iter().any(|item| match item {
                 Item::Volume(volume, kernel, _) => {
@@ -256,6 +255,7 @@ impl CpuRenderer {
             }
             clock.step("skip");
         }
+        let gathered = gather.as_ref().map_or(0, |gather| gather.shown.count);
         let march = March { plan, gather, visible: &visible, records };
         let bins = Bins::new(plan, records);
         clock.step("bin");
@@ -275,7 +275,7 @@ impl CpuRenderer {
         let picture = assembled(&self.scene, plan, &blocks);
         clock.step("write");
         let stats = FrameStats {
-            splats: records.iter().map(|batch| batch.len() as u64).sum(),
+            splats: records.iter().map(|batch| batch.len() as u64).sum::<u64>() + gathered,
             entries: drawn.into_inner(),
             passes: 1,
             gpu_bytes: self.prepared.iter().map(Prepared::bytes).sum::<u64>() + record_bytes(records),

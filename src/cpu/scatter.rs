@@ -216,8 +216,7 @@ fn sections<S: Simd>(
     let one = Lanes::splat(simd, 1.0);
     let mut last = before(one);
     for (section, t) in sections.iter_mut().zip(along.t).take(count) {
-        let next =
-            if plan.has_field || plan.is_classified { normal_cdf(simd, t) } else { near_normal_cdf(simd, t) };
+        let next = if plan.has_field || plan.is_classified { normal_cdf(simd, t) } else { near_normal_cdf(simd, t) };
         *section = next - last;
         last = next;
     }

@@ -1,5 +1,6 @@
 //! Which sheets may show something in which tiles: blocks of samples that show something, projected.
 
+use super::plan::TILE;
 use crate::{
     math::{Bounds, Sheets, View},
     volume::Volume,
@@ -7,8 +8,6 @@ use crate::{
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-/// Pixels along each side of a tile.
-pub const TILE: usize = 8;
 /// Samples along each side of a block.
 const BLOCK: usize = 4;
 
@@ -16,8 +15,9 @@ const BLOCK: usize = 4;
 #[derive(Debug)]
 pub struct Shown {
     dims: [usize; 3],
-    /// Whether something may show nearer to this sample than to any other.
+    /// Whether something may show nearer to this sample than to any other, and how many of these there are.
     pub samples: Vec<bool>,
+    pub count: u64,
     blocks: [usize; 3],
     any: Vec<bool>,
 }
@@ -34,7 +34,9 @@ impl Shown {
             let along = |axis: usize| at[axis] * BLOCK..((at[axis] + 1) * BLOCK).min(dims[axis]);
             along(2).any(|z| along(1).any(|y| samples[(z * dims[1] + y) * dims[0]..][along(0)].contains(&true)))
         });
-        Self { dims, any: any.collect(), samples, blocks }
+        let any = any.collect();
+        let count = samples.par_iter().filter(|shows| **shows).count() as u64;
+        Self { dims, any, samples, count, blocks }
     }
 
     /// For each tile, row by row, the sheets in which it may show something, as bits.

@@ -67,7 +67,14 @@ impl<S: Simd> Sums<S> {
 
     /// Radiance of a sheet at a packet: colour times optical depth, and optical depth. Nothing where none was added.
     #[inline(always)]
-    pub fn take_radiance(&mut self, simd: S, plan: &Plan, rays: &Rays<S>, sheet: usize, packet: usize) -> Option<[Lanes<S>; 4]> {
+    pub fn take_radiance(
+        &mut self,
+        simd: S,
+        plan: &Plan,
+        rays: &Rays<S>,
+        sheet: usize,
+        packet: usize,
+    ) -> Option<[Lanes<S>; 4]> {
         let slot = sheet % WINDOW;
         if self.has_radiance[slot] & (1 << packet) == 0 {
             return None;
@@ -124,7 +131,8 @@ impl<S: Simd> Sums<S> {
         let front = self.face(simd, plan, rays, sheet, packet, slopes.map(|[front, _]| front));
         let back = self.face(simd, plan, rays, sheet + 1, packet, slopes.map(|[_, back]| back));
         let either = |a: &Resolved<S>, b: &Resolved<S>| {
-            let across = three!(I => a.has_value.select(a.face.across[I], b.has_value.select(b.face.across[I], self.none)));
+            let across =
+                three!(I => a.has_value.select(a.face.across[I], b.has_value.select(b.face.across[I], self.none)));
             Face { value: a.has_value.select(a.face.value, value), across }
         };
         let (front, back) = (either(&front, &back), either(&back, &front));

@@ -48,8 +48,8 @@ impl std::str::FromStr for AdapterChoice {
 }
 
 /// What the user can do where no adapter is found.
-const NO_ADAPTER_HELP: &str = "install a Vulkan driver; without a GPU, Mesa's software driver serves \
-    (Debian and Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1)";
+const NO_ADAPTER_HELP: &str = "install a Vulkan driver; without a GPU, the CPU engine draws the same pictures, and Mesa's \
+    software driver serves too (Debian and Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1)";
 
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
@@ -84,6 +84,14 @@ impl Gpu {
     /// The adapters that can run the engine, fastest first, with their limits.
     pub fn adapters() -> Vec<(wgpu::AdapterInfo, wgpu::Limits)> {
         usable_adapters().iter().map(|a| (a.get_info(), a.limits())).collect()
+    }
+
+    /// Opens the fastest adapter that does not run on the processor, or the one that the environment's `WGPU_ADAPTER_NAME`
+    /// names; none where there is none or it cannot be opened.
+    pub fn hardware() -> Option<Self> {
+        let is_named = std::env::var("WGPU_ADAPTER_NAME").is_ok_and(|name| !name.is_empty());
+        let gpu = Self::headless(&AdapterChoice::Automatic).ok()?;
+        (is_named || !gpu.is_software()).then_some(gpu)
     }
 
     /// Opens a device without a window.

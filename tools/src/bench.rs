@@ -14,7 +14,7 @@ use crate::{
     timing::{self, Times},
 };
 use clap::Args;
-use splatkit::Error;
+use splatkit::{Error, Renderer};
 use std::time::Instant;
 
 /// Degrees between frames, as VTK's benchmark in the same view has.
@@ -52,20 +52,18 @@ impl Bench {
         let frames = self.frames.unwrap_or(FRAMES);
         let loaded = self.scene.load(progress)?;
         let settings = self.engine.settings(&loaded, Samples::Factor(1))?;
-        progress.stage("Opening the GPU");
-        let gpu = self.engine.gpu()?;
-        progress.stage("Uploading");
+        progress.stage("Opening the device");
+        let device = self.engine.device()?;
+        progress.stage("Preparing the scene");
         let start = Instant::now();
-        let mut renderer = self.engine.renderer(&gpu);
-        let mut prepared = renderer.prepare(&loaded.scene)?;
-        gpu.wait()?;
+        let mut renderer = Renderer::new(&device, &loaded.scene)?;
         let upload_ms = milliseconds(start);
         let camera = |frame: u32| self.camera.turned(&loaded.subject, settings.size, STEP * f64::from(frame));
 
         let mut frame = |number: u32| {
             progress.stage(format!("Frame {number} of {frames}"));
             let start = Instant::now();
-            let stats = renderer.draw(&mut prepared, &camera(number), &settings)?;
+            let stats = renderer.draw(&camera(number), &settings)?;
             Ok::<_, Error>((milliseconds(start), stats))
         };
         let (first_ms, stats) = frame(0)?;
@@ -77,7 +75,7 @@ impl Bench {
             times.push(frame(number)?.0);
         }
         progress.stage("Measuring the passes");
-        let profile = renderer.profile(&mut prepared, &camera(0), &settings)?;
+        let profile = renderer.profile(&camera(0), &settings)?;
         progress.clear();
 
         let Times { min, median, max } = Times::of(times);
@@ -86,7 +84,7 @@ impl Bench {
         if self.json {
             return output::json(&serde_json::json!({
                 "scene": self.scene.name(),
-                "adapter": gpu.info.name,
+                "adapter": device.name(),
                 "width": width,
                 "height": height,
                 "frames": frames,
@@ -106,7 +104,7 @@ impl Bench {
                 "settings": describe::settings(&loaded.scene, &settings),
             }));
         }
-        output::line(format_args!("{} at {width}x{height} on {}", self.scene.name(), gpu.info.name))?;
+        output::line(format_args!("{} at {width}x{height} on {}", self.scene.name(), device.name()))?;
         output::line(format_args!("load      {:10.1} ms", loaded.load_ms))?;
         output::line(format_args!("upload    {upload_ms:10.1} ms"))?;
         output::line(format_args!("first     {first_ms:10.1} ms"))?;
@@ -115,7 +113,7 @@ impl Bench {
             output::line(format_args!("  {name:<10}{ms:8.1} ms"))?;
         }
         output::line(format_args!(
-            "{} splats drawn, {} hidden, {culled} culled, {} entries in {} passes, {} MiB on the GPU",
+            "{} splats drawn, {} hidden, {culled} culled, {} entries in {} passes, {} MiB held",
             stats.splats - stats.hidden.min(stats.splats),
             stats.hidden,
             stats.entries,

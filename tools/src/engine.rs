@@ -3,12 +3,11 @@
 use crate::{clip::ClipFlags, failure::Failure, method::MethodFlags, parse, samples::Samples, scene::Loaded};
 use clap::{Args, ValueEnum};
 use splatkit::{
-    Error,
-    cpu::CpuRenderer,
-    engine::{AdapterChoice, Budget, Gpu, Renderer},
+    Device, Error,
+    engine::{AdapterChoice, Budget, Gpu},
     hierarchy::Detail,
     picture::Picture,
-    scene::{self, Item, Scene, Settings},
+    scene::{self, Item, Settings},
 };
 use std::time::Duration;
 
@@ -22,8 +21,8 @@ pub struct EngineFlags {
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "1280x720")]
     pub size: [u32; 2],
-    /// What draws: the engine for GPUs, or that for processors, which needs no driver and draws a single volume on a Cartesian
-    /// lattice; auto takes the first where there is an adapter.
+    /// What draws: the engine for GPUs, or the one for processors, which needs no driver. auto takes the first where
+    /// there is a GPU or one of the --gpu options is set.
     #[arg(long, value_enum, default_value_t = Engine::Auto)]
     engine: Engine,
     /// The adapter: its number in `splatkit gpus`, a part of its name, or `software`. By default the fastest.
@@ -97,23 +96,20 @@ enum Gradient {
 }
 
 impl EngineFlags {
-    /// Opens the adapter; `None` where the processor draws the scene.
-    pub fn device(&self, scene: &Scene) -> splatkit::Result<Option<Gpu>> {
+    /// Opens what draws.
+    pub fn device(&self) -> splatkit::Result<Device> {
         match self.engine {
-            Engine::Cpu => Ok(None),
-            Engine::Gpu => self.gpu().map(Some),
-            Engine::Auto => match self.gpu() {
-                Err(Error::NoAdapter(_)) if self.gpu.is_none() && CpuRenderer::new(scene).is_ok() => Ok(None),
-                gpu => gpu.map(Some),
-            },
+            Engine::Cpu => Ok(Device::Cpu),
+            Engine::Auto if !self.asks_gpu() => Ok(match Device::automatic() {
+                Device::Gpu(gpu, _) => Device::Gpu(gpu, self.passes()),
+                Device::Cpu => Device::Cpu,
+            }),
+            Engine::Auto | Engine::Gpu => Ok(Device::Gpu(self.gpu()?, self.passes())),
         }
     }
 
     /// Opens the adapter.
-    pub fn gpu(&self) -> splatkit::Result<Gpu> {
-        if self.engine == Engine::Cpu {
-            return Err(Error::Argument("bench measures the engine for GPUs; leave out --engine cpu".into()));
-        }
+    fn gpu(&self) -> splatkit::Result<Gpu> {
         // Any text is a choice: the conversion cannot fail.
         let choice = self.gpu.as_deref().map_or(AdapterChoice::Automatic, |text| text.parse().unwrap_or_default());
         let mut gpu = Gpu::headless(&choice)?;
@@ -126,19 +122,25 @@ impl EngineFlags {
         Ok(gpu)
     }
 
-    pub fn renderer(&self, gpu: &Gpu) -> Renderer {
+    /// The room of depth passes.
+    fn passes(&self) -> Budget {
         let mut budget = Budget::default();
         if let Some(entries) = self.pass_entries {
             budget.entries = entries;
         }
-        Renderer::with_budget(gpu, budget)
+        budget
+    }
+
+    /// Whether an option of the GPU engine alone is set.
+    fn asks_gpu(&self) -> bool {
+        self.gpu.is_some() || self.gpu_timeout.is_some() || self.gpu_memory.is_some() || self.pass_entries.is_some()
     }
 
     /// What is wrong whatever the scene.
     pub fn check(&self) -> Result<(), Failure> {
-        let asks_gpu = self.gpu.is_some() || self.gpu_timeout.is_some() || self.gpu_memory.is_some();
-        if self.engine == Engine::Cpu && asks_gpu {
-            return Err(Failure::Usage("--engine cpu takes none of --gpu, --gpu-timeout and --gpu-memory".into()));
+        if self.engine == Engine::Cpu && self.asks_gpu() {
+            let message = "--engine cpu takes none of --gpu, --gpu-timeout, --gpu-memory and --pass-entries";
+            return Err(Failure::Usage(message.into()));
         }
         self.method.check()?;
         self.clip.check()

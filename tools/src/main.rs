@@ -1,7 +1,7 @@
 //! The `splatkit` command: one file per subcommand, the flags that they share in modules of their own. All drawing is the
 //! library's.
 
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 mod bench;
 mod camera;
@@ -62,6 +62,10 @@ struct Command {
     /// Tells nothing but errors.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
+
+    /// Compute on this many threads [default: RAYON_NUM_THREADS, or as many as there are processors]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    threads: Option<u32>,
 }
 
 #[derive(Subcommand)]
@@ -89,13 +93,14 @@ enum Task {
 }
 
 fn main() -> ExitCode {
+    quiet_drivers();
     let command = match Command::try_parse() {
         Ok(command) => command,
         Err(answer) => return tell(&answer),
     };
     start_log(&command);
     interrupt::answer();
-    if let Err(failure) = threads::start() {
+    if let Err(failure) = threads::start(command.threads) {
         return failure.report();
     }
     let progress = Progress::new(!command.quiet);
@@ -115,6 +120,17 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
+    }
+}
+
+/// Mesa's drivers complain on stderr where the folder for a user's sockets is not set, as on servers. They need none.
+#[cfg_attr(unix, expect(unsafe_code, reason = "the environment may be changed while there is one thread"))]
+fn quiet_drivers() {
+    #[cfg(unix)]
+    if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+        let folder = std::env::temp_dir();
+        // SAFETY: this is the first thing that the process does; no other thread reads the environment.
+        unsafe { std::env::set_var("XDG_RUNTIME_DIR", folder) };
     }
 }
 

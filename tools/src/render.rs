@@ -12,16 +12,7 @@ use crate::{
     scene::{Loaded, SceneFlags},
 };
 use clap::Args;
-use splatkit::{
-    Error,
-    cpu::CpuRenderer,
-    disk,
-    engine::{FrameStats, Gpu, PreparedScene, Renderer},
-    math::Camera,
-    picture::Picture,
-    reference,
-    scene::Settings,
-};
+use splatkit::{Renderer, disk, engine::FrameStats, math::Camera, picture::Picture, reference, scene::Settings};
 use std::{
     path::{Path, PathBuf},
     time::Instant,
@@ -65,29 +56,22 @@ pub struct Render {
 
 /// What draws.
 pub enum Drawer {
-    Engine { gpu: Gpu, renderer: Box<Renderer>, prepared: Box<PreparedScene> },
-    Cpu(Box<CpuRenderer>),
+    Engine(Box<Renderer>),
     Reference,
 }
 
 impl Drawer {
-    /// The engine with a scene uploaded.
+    /// An engine with a scene prepared.
     pub fn engine(flags: &EngineFlags, loaded: &Loaded, progress: &Progress) -> Result<Self, Failure> {
-        progress.stage("Opening the GPU");
-        let Some(gpu) = flags.device(&loaded.scene)? else {
-            progress.stage("Preparing");
-            return Ok(Self::Cpu(Box::new(CpuRenderer::new(&loaded.scene)?)));
-        };
-        progress.stage("Uploading");
-        let renderer = Box::new(flags.renderer(&gpu));
-        let prepared = Box::new(renderer.prepare(&loaded.scene)?);
-        Ok(Self::Engine { gpu, renderer, prepared })
+        progress.stage("Opening the device");
+        let device = flags.device()?;
+        progress.stage("Preparing the scene");
+        Ok(Self::Engine(Box::new(Renderer::new(&device, &loaded.scene)?)))
     }
 
     pub fn adapter(&self) -> &str {
         match self {
-            Self::Engine { gpu, .. } => &gpu.info.name,
-            Self::Cpu(_) => "CPU",
+            Self::Engine(renderer) => renderer.device().name(),
             Self::Reference => "reference",
         }
     }
@@ -100,17 +84,7 @@ impl Drawer {
         settings: &Settings,
     ) -> splatkit::Result<(Picture, FrameStats)> {
         match self {
-            Self::Engine { gpu, renderer, prepared } => match renderer.render(prepared, camera, settings) {
-                Err(Error::DeviceLost(reason)) => {
-                    tracing::warn!("{reason}; drawing again on a device opened anew");
-                    *gpu = gpu.reopened()?;
-                    **renderer = renderer.on(gpu);
-                    **prepared = renderer.prepare(&loaded.scene)?;
-                    renderer.render(prepared, camera, settings)
-                }
-                done => done,
-            },
-            Self::Cpu(renderer) => renderer.render(camera, settings),
+            Self::Engine(renderer) => renderer.render(camera, settings),
             Self::Reference => Ok((reference::render(&loaded.scene, camera, settings)?, FrameStats::default())),
         }
     }

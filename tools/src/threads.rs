@@ -7,17 +7,19 @@ use std::{num::NonZero, sync::mpsc, thread};
 const OF_PROCESSOR: usize = 4;
 const MOST: usize = 1024;
 
-/// Starts as many threads as there are processors, or as `RAYON_NUM_THREADS` asks for. Where the system does not give them,
+/// Starts as many threads as are asked for, as `RAYON_NUM_THREADS` says, or as there are processors. Where the system does not give them,
 /// everything runs on the calling thread.
 ///
 /// # Errors
 /// [`Failure::Threads`] where there are threads at first, and then none.
-pub fn start() -> Result<(), Failure> {
+pub fn start(threads: Option<u32>) -> Result<(), Failure> {
     let processors = thread::available_parallelism().map_or(1, NonZero::get);
-    let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.trim().parse().ok());
+    let variable = || std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.trim().parse().ok());
+    let asked = threads.map(|threads| threads as usize).or_else(variable);
     let count = count(asked, processors);
     if let Some(asked) = asked.filter(|&asked| asked > count) {
-        tracing::warn!("RAYON_NUM_THREADS={asked} is more than {processors} processors can use: {count} threads work");
+        let name = if threads.is_some() { "--threads " } else { "RAYON_NUM_THREADS=" };
+        tracing::warn!("{name}{asked} is more than {processors} processors can use: {count} threads work");
     }
     // A pool that cannot be built cannot be tried again.
     let had = available(count);

@@ -1,29 +1,39 @@
 //! What the suite ran on.
 
 use serde_json::{Value, json};
-use splatkit::engine::Gpu;
+use splatkit::Device;
 use std::{fmt, num::NonZero, thread::available_parallelism};
 
 pub struct Machine {
     adapter: String,
     driver: String,
     cores: usize,
-    /// Passes are timed by the GPU's clock; else by waiting for each.
-    has_clock: bool,
+    /// Passes are timed by the GPU's clock, or by waiting for each; none on the CPU.
+    has_clock: Option<bool>,
 }
 
 impl Machine {
-    pub fn of(gpu: &Gpu) -> Self {
-        let info = &gpu.info;
-        let driver = [info.backend.to_str(), &info.driver, &info.driver_info].map(str::trim);
-        let driver: Vec<_> = driver.into_iter().filter(|part| !part.is_empty()).collect();
+    pub fn of(device: &Device) -> Self {
         let cores = available_parallelism().map_or(1, NonZero::get);
-        Self { adapter: info.name.clone(), driver: driver.join(" "), cores, has_clock: gpu.has_clock() }
+        match device {
+            Device::Cpu => Self { adapter: device.name().to_owned(), driver: String::new(), cores, has_clock: None },
+            Device::Gpu(gpu, _) => {
+                let info = &gpu.info;
+                let driver = [info.backend.to_str(), &info.driver, &info.driver_info].map(str::trim);
+                let driver: Vec<_> = driver.into_iter().filter(|part| !part.is_empty()).collect();
+                let has_clock = Some(gpu.has_clock());
+                Self { adapter: info.name.clone(), driver: driver.join(" "), cores, has_clock }
+            }
+        }
     }
 
-    /// How passes are timed.
+    /// How steps are timed.
     pub fn timing(&self) -> &'static str {
-        if self.has_clock { "by the GPU's clock" } else { "by waiting for each" }
+        match self.has_clock {
+            None => "as they follow one another",
+            Some(true) => "by the GPU's clock",
+            Some(false) => "by waiting for each",
+        }
     }
 
     pub fn json(&self) -> Value {
@@ -34,6 +44,7 @@ impl Machine {
 impl fmt::Display for Machine {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
         let Self { adapter, driver, cores, .. } = self;
-        write!(out, "{adapter}; {driver}; {cores} cores")
+        let driver = if driver.is_empty() { String::new() } else { format!("; {driver}") };
+        write!(out, "{adapter}{driver}; {cores} cores")
     }
 }

@@ -5,11 +5,7 @@ use super::{
     memory,
 };
 use crate::{bench::STEP, progress::Progress, render::milliseconds, timing::Times};
-use splatkit::{
-    Error, Result,
-    engine::{FrameStats, Gpu, Renderer},
-    picture::Picture,
-};
+use splatkit::{Device, Error, Renderer, Result, engine::FrameStats, picture::Picture};
 use std::time::Instant;
 
 /// A case that was planned, and what it took, or why it was not drawn.
@@ -42,12 +38,13 @@ pub struct Counts {
 }
 
 /// Measures one plan after another.
-pub fn outcomes(plans: Vec<Plan>, gpu: &mut Gpu, counts: Counts, progress: &Progress) -> Vec<Outcome> {
+pub fn outcomes(plans: Vec<Plan>, device: &mut Device, counts: Counts, progress: &Progress) -> Vec<Outcome> {
     let mut outcomes = Vec::new();
     for plan in plans {
-        let outcome = outcome(plan, gpu, counts, progress);
+        let outcome = outcome(plan, device, counts, progress);
         // On a lost device all later cases would fail too. Where it does not open, the next one tells of it and tries again.
         if matches!(outcome.result, Err(Error::DeviceLost(_)))
+            && let Device::Gpu(gpu, _) = device
             && let Ok(anew) = gpu.reopened()
         {
             *gpu = anew;
@@ -58,23 +55,22 @@ pub fn outcomes(plans: Vec<Plan>, gpu: &mut Gpu, counts: Counts, progress: &Prog
 }
 
 /// Makes the scene of a plan, draws it and lets it go.
-fn outcome(plan: Plan, gpu: &Gpu, counts: Counts, progress: &Progress) -> Outcome {
+fn outcome(plan: Plan, device: &Device, counts: Counts, progress: &Progress) -> Outcome {
     let Plan { name, make } = plan;
     progress.stage(format!("Making {name}"));
     let result = make().and_then(|case| {
         progress.stage(format!("Drawing {name}"));
-        measure(case, gpu, counts)
+        measure(case, device, counts)
     });
     Outcome { name, result }
 }
 
-fn measure(case: Case, gpu: &Gpu, counts: Counts) -> Result<Measured> {
+fn measure(case: Case, device: &Device, counts: Counts) -> Result<Measured> {
     memory::reset_peak();
     // A renderer of its own: one that has drawn before keeps the largest buffers that it has needed.
-    let mut renderer = Renderer::new(gpu);
-    let mut prepared = renderer.prepare(&case.scene)?;
+    let mut renderer = Renderer::new(device, &case.scene)?;
     let settings = &case.settings;
-    let stats = renderer.draw(&mut prepared, &case.camera(0.0), settings)?;
+    let stats = renderer.draw(&case.camera(0.0), settings)?;
     if stats.splats == 0 {
         return Err(Error::NothingToDraw("the camera sees no splat that has opacity".into()));
     }
@@ -82,13 +78,13 @@ fn measure(case: Case, gpu: &Gpu, counts: Counts) -> Result<Measured> {
     for frame in 1..=counts.frames {
         let camera = case.camera(STEP * f64::from(frame));
         let start = Instant::now();
-        renderer.draw(&mut prepared, &camera, settings)?;
+        renderer.draw(&camera, settings)?;
         times.push(milliseconds(start));
     }
-    let steps = renderer.profile(&mut prepared, &case.camera(0.0), settings)?.steps;
+    let steps = renderer.profile(&case.camera(0.0), settings)?.steps;
     let cpu_peak = memory::peak();
-    drop((prepared, renderer));
-    let same_bytes = if counts.runs > 1 { Some(same_bytes(&case, gpu, counts.runs)?) } else { None };
+    drop(renderer);
+    let same_bytes = if counts.runs > 1 { Some(same_bytes(&case, device, counts.runs)?) } else { None };
     Ok(Measured {
         drawn: case.drawn,
         size: case.settings.size,
@@ -104,11 +100,10 @@ fn measure(case: Case, gpu: &Gpu, counts: Counts) -> Result<Measured> {
 }
 
 /// Draws a case anew so many times and compares the pictures, bit by bit.
-fn same_bytes(case: &Case, gpu: &Gpu, runs: u32) -> Result<bool> {
+fn same_bytes(case: &Case, device: &Device, runs: u32) -> Result<bool> {
     let draw = || {
-        let mut renderer = Renderer::new(gpu);
-        let mut prepared = renderer.prepare(&case.scene)?;
-        Ok(renderer.render(&mut prepared, &case.camera(0.0), &case.settings)?.0)
+        let mut renderer = Renderer::new(device, &case.scene)?;
+        Ok(renderer.render(&case.camera(0.0), &case.settings)?.0)
     };
     let first = draw()?;
     for _ in 1..runs {

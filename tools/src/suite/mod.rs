@@ -177,8 +177,8 @@ impl SuiteFlags {
         progress: &Progress,
     ) -> Result<(), Failure> {
         let block = self.write.as_deref().map(|path| Block::open(path, "suite", "bench --suite")).transpose()?;
-        let mut gpu = engine.gpu()?;
-        let machine = Machine::of(&gpu);
+        let mut device = engine.device()?;
+        let machine = Machine::of(&device);
         if let Some(block) = &block {
             self.check_parts(&section_of(&block.inside()?, &machine))?;
         }
@@ -186,7 +186,7 @@ impl SuiteFlags {
         let mut chapters = Vec::new();
         for part in Part::value_variants().iter().filter(|part| self.measures(**part)) {
             let [name, title, note] = part.told();
-            let outcomes = measure::outcomes(part.plans(self)?, &mut gpu, counts, progress);
+            let outcomes = measure::outcomes(part.plans(self)?, &mut device, counts, progress);
             chapters.push(Chapter { name, title, note, outcomes });
         }
         progress.clear();
