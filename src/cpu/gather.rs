@@ -11,12 +11,15 @@ use super::{
 use crate::scene::Optics;
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
+/// Where slopes at the ends of a sheet differ by fewer entries of the table a sheet, a cubic between them is as good as one more
+/// sample.
+const STRAIGHT: f32 = 64.0;
+
 /// A lattice whose field is gathered.
 pub struct Gather<'a> {
     pub field: Typed<'a>,
     pub shown: &'a Shown,
     pub visible: &'a Visible,
-    pub dims: [usize; 3],
 }
 
 /// The last plane that a packet asked for.
@@ -25,13 +28,17 @@ pub struct Last<S: Simd> {
     plane: usize,
     face: Face<S>,
     along: Lanes<S>,
+    /// The last plane at which it was asked what may show, and the rays on which something may.
+    shown_on: usize,
+    shows: u64,
 }
 
 impl<S: Simd> Last<S> {
     #[inline(always)]
     pub fn new(simd: S) -> Self {
         let none = Lanes::splat(simd, 0.0);
-        Self { plane: usize::MAX, face: Face { value: none, across: [none; 3] }, along: none }
+        let face = Face { value: none, across: [none; 3] };
+        Self { plane: usize::MAX, face, along: none, shown_on: usize::MAX, shows: 0 }
     }
 }
 
@@ -49,15 +56,26 @@ impl Gather<'_> {
         let (start, stop) = (plan.planes[sheet], plan.planes[sheet + 1]);
         let begin = rays.inside[0].max(Lanes::splat(simd, start));
         let end = rays.inside[1].min(Lanes::splat(simd, stop));
-        let mask = begin.simd_lt(end) & self.may_show(simd, rays, [start, stop]);
+        let mask = begin.simd_lt(end);
+        if !mask.any_true() {
+            return None;
+        }
+        // What may show is looked up in the middle and on both planes.
+        if last.shown_on != sheet {
+            last.shows = self.shown.at(simd, rays.place(start));
+        }
+        let front_shows = last.shows;
+        (last.shown_on, last.shows) = (sheet + 1, self.shown.at(simd, rays.place(stop)));
+        let shows = front_shows | self.shown.at(simd, rays.place(0.5 * (start + stop))) | last.shows;
+        let mask = mask & mask32x8::from_bitmask(simd, shows);
         if !mask.any_true() {
             return None;
         }
         if last.plane != sheet {
-            *last = self.face(simd, plan, rays, sheet);
+            self.face(simd, plan, rays, sheet, last);
         }
         let (front, front_along) = (last.face, last.along);
-        *last = self.face(simd, plan, rays, sheet + 1);
+        self.face(simd, plan, rays, sheet + 1, last);
         let (back, back_along) = (last.face, last.along);
         let thickness = stop - start;
         let sum = front.value + back.value;
@@ -69,6 +87,9 @@ impl Gather<'_> {
         let mut layer = Layer { front, back, middle, start, thickness, begin, end, filling, direction };
         if plan.optics != Optics::Maximum && !self.visible.may_show(simd, plan, &layer) {
             return None;
+        }
+        if !bend.abs().simd_gt(STRAIGHT).any_true() {
+            return Some((layer, mask));
         }
         // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with slopes).
         let inside = self.at(simd, rays.place(0.5 * (start + stop))).0 * plan.frame.transfer[1];
@@ -93,9 +114,9 @@ impl Gather<'_> {
         )
     }
 
-    /// The field on a plane, and its change along the rays a world unit.
+    /// Finds the field on a plane, and its change along the rays a world unit.
     #[inline(always)]
-    fn face<S: Simd>(&self, simd: S, plan: &Plan, rays: &Rays<S>, plane: usize) -> Last<S> {
+    fn face<S: Simd>(&self, simd: S, plan: &Plan, rays: &Rays<S>, plane: usize, last: &mut Last<S>) {
         let frame = &plan.frame;
         let per_value = frame.transfer[1];
         let (value, slopes) = self.at(simd, rays.place(plan.planes[plane]));
@@ -107,26 +128,7 @@ impl Gather<'_> {
         let along = dot(gradient, rays.direction);
         let length = frame.gradients[2];
         let across = three!(I => (gradient[I] - along * rays.direction[I]) * length);
-        Last { plane, face: Face { value: value * per_value, across }, along }
-    }
-
-    /// Whether something may show around three places of each ray in a sheet.
-    #[inline(always)]
-    fn may_show<S: Simd>(&self, simd: S, rays: &Rays<S>, [start, stop]: [f32; 2]) -> mask32x8<S> {
-        let [nx, ny, _] = self.dims;
-        let mut shows = [false; 8];
-        for distance in [start, 0.5 * (start + stop), stop] {
-            let place = rays.place(distance);
-            let [x, y, z]: [[f32; 8]; 3] = three!(I => {
-                let last = Lanes::splat(simd, self.dims[I] as f32 - 1.0);
-                (place[I] + 0.5).floor().max(Lanes::splat(simd, 0.0)).min(last).into()
-            });
-            for lane in 0..8 {
-                let sample = (z[lane] as usize * ny + y[lane] as usize) * nx + x[lane] as usize;
-                shows[lane] |= self.shown.samples[sample];
-            }
-        }
-        let bits = shows.iter().rev().fold(0, |bits, shows| bits << 1 | u64::from(*shows));
-        mask32x8::from_bitmask(simd, bits)
+        (last.plane, last.along) = (plane, along);
+        last.face = Face { value: value * per_value, across };
     }
 }

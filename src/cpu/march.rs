@@ -14,7 +14,7 @@ use super::{
 use crate::scene::{Mode, Optics, Order};
 use fearless_simd::{Simd, prelude::*};
 
-/// A tile's pixels, row by row: premultiplied colour and opacity, and the distance of the hit or the largest value.
+/// A tile's pixels, row by row: premultiplied colour and opacity, and the depth of the hit or the largest value.
 pub type Tile = [([f32; 4], f32); TILE * TILE];
 
 /// A tile without anything in it.
@@ -215,6 +215,10 @@ impl March<'_> {
                 } else {
                     (hit - rays.aside[0] * normal[0] - rays.aside[1] * normal[1]) / slope
                 };
+            }
+            if self.plan.optics != Optics::Maximum {
+                // From the distance to the view's z.
+                hit *= rays.cosine;
             }
             let hit: [f32; 8] = hit.into();
             for lane in 0..8 {

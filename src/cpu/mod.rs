@@ -251,11 +251,11 @@ impl CpuRenderer {
                 let shown: &Shown = shown;
                 marks = shown.sheets_of_tiles(volume, plan.view, &outline.sheets);
                 let field = Typed::new(volume, sigma, plan.tables.values[0]);
-                gather = Some(Gather { field, shown, visible: &visible, dims: volume.lattice.dims });
+                gather = Some(Gather { field, shown, visible: &visible });
             }
             clock.step("skip");
         }
-        let gathered = gather.as_ref().map_or(0, |gather| gather.shown.count);
+        let gathered = gather.as_ref().map_or(0, |gather| gather.shown.count());
         let march = March { plan, gather, visible: &visible, records };
         let bins = Bins::new(plan, records);
         clock.step("bin");
@@ -334,23 +334,27 @@ fn assembled(scene: &Scene, plan: &Plan, blocks: &[Vec<Tile>]) -> Picture {
     let (step, apron) = (plan.tile_step(), plan.apron() as usize);
     let columns = plan.tiles()[0].div_ceil(BLOCK);
     let transfer = items::transfer_of(scene);
-    let pixel = |index: usize| {
-        let [x, y] = [index % width as usize, index / width as usize];
-        let [tile_x, tile_y] = [x / step, y / step];
-        let block = &blocks[tile_y / BLOCK * columns + tile_x / BLOCK];
-        let tile = &block[tile_y % BLOCK * BLOCK + tile_x % BLOCK];
-        let (color, hit) = tile[(y % step + apron) * TILE + x % step + apron];
-        if plan.optics == Optics::Maximum {
-            return (transfer.map_or([0.0; 4], |transfer| of_largest(hit, transfer, &plan.frame)), f32::INFINITY);
+    let mut color = vec![[0.0f32; 4]; width as usize * height as usize];
+    let mut depth = vec![f32::INFINITY; color.len()];
+    let rows = color.par_chunks_mut(width as usize).zip(depth.par_chunks_mut(width as usize));
+    rows.enumerate().for_each(|(y, (color, depth))| {
+        let tile_y = y / step;
+        let parts = color.chunks_mut(step).zip(depth.chunks_mut(step));
+        for (tile_x, (color, depth)) in parts.enumerate() {
+            let block = &blocks[tile_y / BLOCK * columns + tile_x / BLOCK];
+            let row = &block[tile_y % BLOCK * BLOCK + tile_x % BLOCK][(y % step + apron) * TILE + apron..];
+            for ((color, depth), (own, hit)) in color.iter_mut().zip(depth).zip(row) {
+                if plan.optics == Optics::Maximum {
+                    *color = transfer.map_or([0.0; 4], |transfer| of_largest(*hit, transfer, &plan.frame));
+                    continue;
+                }
+                *color = *own;
+                if own[3] >= 0.5 {
+                    *depth = *hit;
+                }
+            }
         }
-        if color[3] < 0.5 {
-            return (color, f32::INFINITY);
-        }
-        let at = glam::DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-        (color, hit * plan.view.ray(at).1.z as f32)
-    };
-    let pixels = width as usize * height as usize;
-    let (color, depth) = (0..pixels).into_par_iter().map(pixel).unzip();
+    });
     Picture { width, height, color, depth }
 }
 

@@ -1,42 +1,73 @@
 //! Which sheets may show something in which tiles: blocks of samples that show something, projected.
 
-use super::plan::TILE;
+use super::{
+    plan::TILE,
+    vector::{Lanes, three},
+};
 use crate::{
     math::{Bounds, Sheets, View},
     volume::Volume,
 };
+use fearless_simd::{Simd, i32x8, prelude::*};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 /// Samples along each side of a block.
 const BLOCK: usize = 4;
 
-/// The samples of a volume around which something shows, and blocks of them.
+/// The samples of a volume around which something shows: for each block of 4 × 4 × 4 samples a word with a bit for each.
 #[derive(Debug)]
 pub struct Shown {
     dims: [usize; 3],
-    /// Whether something may show nearer to this sample than to any other, and how many of these there are.
-    pub samples: Vec<bool>,
-    pub count: u64,
     blocks: [usize; 3],
-    any: Vec<bool>,
+    words: Vec<u64>,
 }
 
 impl Shown {
     /// `ranges`: the extremes around each sample; `first`: the least largest one that shows, for each smallest one.
     pub fn new(volume: &Volume, ranges: &[[u8; 2]], first: &[u16; 256]) -> Self {
         let dims = volume.lattice.dims;
-        let shows = |[low, high]: &[u8; 2]| u16::from(*high) >= first[usize::from(*low)];
-        let samples: Vec<bool> = ranges.par_iter().map(shows).collect();
+        let shows = |[low, high]: [u8; 2]| u16::from(high) >= first[usize::from(low)];
         let blocks = dims.map(|n| n.div_ceil(BLOCK));
-        let any = (0..blocks.iter().product::<usize>()).into_par_iter().map(|block| {
+        let word = |block: usize| {
             let at = [block % blocks[0], block / blocks[0] % blocks[1], block / blocks[0] / blocks[1]];
             let along = |axis: usize| at[axis] * BLOCK..((at[axis] + 1) * BLOCK).min(dims[axis]);
-            along(2).any(|z| along(1).any(|y| samples[(z * dims[1] + y) * dims[0]..][along(0)].contains(&true)))
+            let mut word = 0;
+            for z in along(2) {
+                for y in along(1) {
+                    let row = &ranges[(z * dims[1] + y) * dims[0]..][along(0)];
+                    for (x, range) in row.iter().enumerate() {
+                        word |= u64::from(shows(*range)) << bit_of([x, y, z]);
+                    }
+                }
+            }
+            word
+        };
+        let words = (0..blocks.iter().product::<usize>()).into_par_iter().map(word).collect();
+        Self { dims, blocks, words }
+    }
+
+    /// How many samples something shows around.
+    pub fn count(&self) -> u64 {
+        self.words.iter().map(|word| u64::from(word.count_ones())).sum()
+    }
+
+    /// Where something may show nearer to the sample beside a place than to any other, a bit for each lane; places in steps.
+    #[inline(always)]
+    pub fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> u64 {
+        let [x, y, z]: [i32x8<S>; 3] = three!(I => {
+            let last = Lanes::splat(simd, self.dims[I] as f32 - 1.0);
+            i32x8::truncate_from((place[I] + 0.5).max(Lanes::splat(simd, 0.0)).min(last))
         });
-        let any = any.collect();
-        let count = samples.par_iter().filter(|shows| **shows).count() as u64;
-        Self { dims, any, samples, count, blocks }
+        let [columns, rows, _] = self.blocks.map(|n| n as i32);
+        let block = ((z >> 2) * rows + (y >> 2)) * columns + (x >> 2);
+        let bit = ((z & 3) << 4) | ((y & 3) << 2) | (x & 3);
+        let (blocks, bits): ([i32; 8], [i32; 8]) = (block.into(), bit.into());
+        let mut shows = 0;
+        for lane in 0..8 {
+            shows |= (self.words[blocks[lane] as usize] >> bits[lane] & 1) << lane;
+        }
+        shows
     }
 
     /// For each tile, row by row, the sheets in which it may show something, as bits.
@@ -47,7 +78,7 @@ impl Shown {
         let slice = |layer: usize| {
             let mut own = vec![0u64; tiles[0] * tiles[1] * words];
             for block in 0..columns * rows {
-                if self.any[layer * columns * rows + block] {
+                if self.words[layer * columns * rows + block] != 0 {
                     let at = [block % columns, block / columns, layer];
                     self.mark(volume, view, sheets, at, &mut own);
                 }
@@ -115,4 +146,9 @@ impl Shown {
             }
         }
     }
+}
+
+/// The bit of a sample in the word of its block.
+fn bit_of([x, y, z]: [usize; 3]) -> usize {
+    (z % BLOCK * BLOCK + y % BLOCK) * BLOCK + x % BLOCK
 }
