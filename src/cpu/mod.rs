@@ -14,9 +14,9 @@
 //! | `vector` | functions of eight numbers at once |
 
 mod close;
-mod field;
+pub(crate) mod field;
 mod march;
-mod skip;
+pub(crate) mod skip;
 mod vector;
 
 use crate::{
@@ -42,7 +42,7 @@ use skip::{Shown, TILE};
 use std::sync::Arc;
 
 /// Sheets thicker than this many of a sample's least steps hold more than a parabola tells.
-const THICKEST: f64 = 2.2;
+pub(crate) const THICKEST: f64 = 2.2;
 
 /// A scene and what was made of it to draw it. Cameras and settings may change from picture to picture.
 #[derive(Debug)]
