@@ -50,6 +50,12 @@ struct Frame {
     levels: vec4<f32>,
     // Axis-aligned sheets: their normal in view space.
     sheet_normal: vec4<f32>,
+    // A gathered lattice: samples along x, y and z; one over the kernel's variance in squared steps,
+    // its weights one and two steps from its centre; where the parts of `shown` start: what the transfer function shows, the tiles' sheets, the list of tiles, and the
+    // words that a tile's sheets take.
+    lattice: vec4<u32>,
+    taps: vec4<f32>,
+    shown: vec4<u32>,
     // Columns of the turn from view space to the world's axes.
     world_x: vec4<f32>,
     world_y: vec4<f32>,

@@ -33,7 +33,7 @@ const FAR: vec3<f32> = vec3(12.0);
 // The four sections of a window, from the distribution function at its three inner planes.
 fn sections(t: vec3<f32>, base: f32) -> vec4<f32> {
     var f: vec3<f32>;
-    if SCALAR || CLASSIFIED {
+    if SUMS || CLASSIFIED {
         f = normal_cdf(t);
     } else {
         f = near_normal_cdf(t);
@@ -174,7 +174,7 @@ fn load(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
     splat.weight = 1.0;
     splat.facing = 1.0;
     // The sign of the squared extent tells the payloads apart.
-    splat.is_radiance = RADIANCE_PAYLOAD && (!(SCALAR || CLASSIFIED) || c.z > 0.0);
+    splat.is_radiance = RADIANCE_PAYLOAD && (!(SUMS || CLASSIFIED) || c.z > 0.0);
     if RADIANCE_PAYLOAD {
         splat.color = unpack4x8unorm(bitcast<u32>(d.x)).xyz;
         let packed = bitcast<u32>(d.y);
@@ -190,10 +190,10 @@ fn load(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
     if RADIANCE_PAYLOAD && any(splat.normal != vec3(0.0)) {
         splat.facing = facing_weight(splat.normal, a.xyz);
     }
-    if SCALAR && WEIGHTS {
+    if SUMS && WEIGHTS {
         splat.weight = d.w;
     }
-    if SCALAR && SLOPES {
+    if SUMS && SLOPES {
         splat.slope = d.xyz;
     }
     return splat;
@@ -291,7 +291,7 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
                 strength = 0.0;
             }
             add_radiance(r, along * strength, splat);
-        } else if SCALAR {
+        } else if SUMS {
             var value = vec3(splat.strength);
             var section = along * (length_of * splat.weight);
             pixels[r].weight += section;

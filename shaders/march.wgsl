@@ -26,10 +26,6 @@
 // See progress.wgsl.
 @group(0) @binding(9) var<storage, read_write> progress: array<atomic<u32>>;
 
-// The largest value, stored for a pixel that has none, and for one where it is 0.
-const STORED_NONE: f32 = 0.0;
-const STORED_ZERO: f32 = 1e-37;
-
 // Face values of the sheet that is being closed, for differences between neighbouring pixels.
 var<workgroup> neighbours: array<f32, 64>;
 // Whether an invocation of the tile stopped, and the tile's slot.
@@ -47,6 +43,7 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     let column = tile % frame.tiles.x;
     let row = tile / frame.tiles.x;
     let resumed = atomicLoad(&progress[tile]);
+    begin_field(tile);
     // All lanes have seen where the tile stands before one of them changes it, and that before another does again.
     storageBarrier();
     if resumed == FINISHED {
@@ -61,13 +58,7 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     for (var r = 0u; r < ROWS; r++) {
         let at = first_pixel + vec2(0, i32(r));
         if all(at >= vec2(0)) && all(at < vec2<i32>(frame.size)) {
-            let stored = colors[u32(at.y) * frame.size.x + u32(at.x)];
-            pixels[r].color = stored.xyz;
-            pixels[r].transmittance = 1.0 - stored.w;
-            pixels[r].hit = depths[u32(at.y) * frame.size.x + u32(at.x)];
-            if MAXIMUM && pixels[r].hit == STORED_NONE {
-                pixels[r].hit = NO_VALUE;
-            }
+            load_pixel(r, u32(at.y) * frame.size.x + u32(at.x));
         } else {
             pixels[r].transmittance = select(0.0, 1.0, CENTRAL);
         }
@@ -111,8 +102,8 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
         let sheet = origin + ((bin - tile_bins) << stage.group_shift) + entry_sheet;
         if open > 0u {
             let closed = min(sheet - front, open);
-            close(front, closed, lane.xy);
-            entries_left -= min(entries_left, closed * CLOSING_ENTRIES);
+            let sheets = closed + close(front, closed, lane.xy);
+            entries_left -= min(entries_left, sheets * CLOSING_ENTRIES);
             open -= closed;
         }
         front = sheet;
@@ -153,6 +144,9 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
         // Sheets behind the pass's last are the next pass's.
         close(front, min(open, stage.end_sheet - front), lane.xy);
         open = 0u;
+        if GATHER {
+            pass_field_before(stage.end_sheet);
+        }
     }
     if CAN_STOP {
         if stopped {
@@ -180,28 +174,14 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
         }
     }
 
+    if all(lane.xy == vec2(0u)) {
+        end_field(tile);
+    }
     for (var r = 0u; r < ROWS; r++) {
         let own = vec2<i32>(lane.xy) + vec2(0, i32(lane.y * (ROWS - 1u) + r));
         let pixel = first_pixel + vec2(0, i32(r));
         if all(own >= vec2(APRON)) && all(own < vec2(8 - APRON)) && all(pixel < vec2<i32>(frame.size)) {
-            let index = u32(pixel.y) * frame.size.x + u32(pixel.x);
-            var color = vec4(pixels[r].color, 1.0 - pixels[r].transmittance);
-            var hit = pixels[r].hit;
-            if MAXIMUM {
-                color = vec4(0.0);
-                if hit == NO_VALUE {
-                    hit = STORED_NONE;
-                } else {
-                    let shown = classify(hit);
-                    // The opacity of a unit of length, as the transfer function says it.
-                    color = vec4(shown.xyz, 1.0) * (1.0 - exp(-shown.w * frame.kernel.w));
-                    hit = select(hit, STORED_ZERO, hit == 0.0);
-                }
-            } else if AXIS_SHEETS && hit != depths[index] {
-                hit = distance_at(r, hit);
-            }
-            colors[index] = color;
-            depths[index] = hit;
+            store_pixel(r, u32(pixel.y) * frame.size.x + u32(pixel.x));
         }
     }
 }
@@ -216,21 +196,15 @@ fn bin_end(bin: u32) -> u32 {
     return min(bins[bin], frame.entry_capacity);
 }
 
-// The distance along a pixel's ray of a place along the normal of axis-aligned sheets.
-fn distance_at(r: u32, place: f32) -> f32 {
-    let slope = dot(frame.sheet_normal.xyz, direction_of(r));
-    let start = dot(frame.sheet_normal.xyz, origin_of(r));
-    return select((place - start) / slope, place / max(abs(slope), 1e-6), PERSPECTIVE);
-}
-
-// Closes `count` sheets from `front` on.
-fn close(front: u32, count: u32, lane: vec2<u32>) {
+// Closes `count` sheets from `front` on. Gives the number of sheets before and between them that hold of a gathered field alone.
+fn close(front: u32, count: u32, lane: vec2<u32>) -> u32 {
     if SINGLE_SPLATS {
-        return;
+        return 0u;
     }
     if count == 0u {
-        return;
+        return 0u;
     }
+    var others = 0u;
     // The condition stands at the end: a driver that only masks what a condition leaves out (Mesa's software Vulkan) walks
     // through a loop once more than its condition holds if that stands at the beginning.
     var sheet = front;
@@ -238,12 +212,15 @@ fn close(front: u32, count: u32, lane: vec2<u32>) {
         if CENTRAL {
             share_faces(lane);
         }
+        others += open_field(sheet);
         for (var r = 0u; r < ROWS; r++) {
             var own = resolve(r, sheet);
             if CENTRAL {
                 own.back.slope = slope_on_plane(r, difference(lane, r), planes[sheet + 1u]);
             }
-            pixels[r].front = own.back;
+            if SUMS {
+                pixels[r].front = own.back;
+            }
             composite(r, sheet, own);
         }
         if CENTRAL {
@@ -254,6 +231,7 @@ fn close(front: u32, count: u32, lane: vec2<u32>) {
             break;
         }
     }
+    return others;
 }
 
 // Tells the neighbouring pixels of the tile the values on the plane behind the sheet that is being closed.
@@ -276,4 +254,24 @@ fn difference(lane: vec2<u32>, r: u32) -> vec2<f32> {
     let has_after = after > vec2(NO_VALUE);
     let span = vec2<f32>(vec2<u32>(has_before) + vec2<u32>(has_after));
     return (select(vec2(own), after, has_after) - select(vec2(own), before, has_before)) / max(span, vec2(1.0));
+}
+
+// Adds one splat, without sheets, before or behind what is there.
+fn composite_single(r: u32, depth: f32, splat: Loaded) {
+    var color = splat.color;
+    if SURFACE_SHADED && any(splat.normal != vec3(0.0)) {
+        color = lit(color, splat.normal, direction_of(r), frame.surface_shade);
+    }
+    let left = exp(-depth);
+    let before = pixels[r].transmittance;
+    if BACK_TO_FRONT {
+        pixels[r].color = pixels[r].color * left + (1.0 - left) * color;
+    } else {
+        pixels[r].color += before * (1.0 - left) * color;
+    }
+    pixels[r].transmittance = before * left;
+    // From behind, what those in front will take is not known: there, the nearest that takes half of the light alone counts.
+    if select(before > 0.5 && before * left <= 0.5, left <= 0.5, BACK_TO_FRONT) {
+        pixels[r].hit = select(splat.center.z, length(splat.center), PERSPECTIVE);
+    }
 }

@@ -5,6 +5,8 @@ struct Face {
     has_value: bool,
     value: f32,
     slope: vec2<f32>,
+    // A lattice that is gathered: its change along the ray, in world units.
+    along: f32,
 }
 
 // One sheet at one pixel.
@@ -33,6 +35,8 @@ struct Pixel {
     value_y: vec3<f32>,
     // The plane before the first open sheet.
     front: Face,
+    // A lattice that is gathered: the plane behind the sheet that was looked at last.
+    behind: Face,
     // Optical depth; and colour and normal, weighted by how much of it faces the eye, with that weight.
     depth: vec4<f32>,
     facing: vec4<f32>,

@@ -1,6 +1,7 @@
 // How far the tiles of a pass have come. For each tile: 0, or one more than the slot that holds its sums (saved.wgsl), or
 // FINISHED. Behind the tiles: whether any is unfinished, how often one stopped, which slots are taken, and how many tiles have
-// entries, with the list of these.
+// entries, with the list of these. Of a lattice that is gathered: how many tiles gather.wgsl has drawn, and for each tile the first
+// sheet whose field is not drawn yet.
 
 // A tile that needs no more work.
 const FINISHED: u32 = 0xffffffffu;
@@ -19,4 +20,12 @@ fn progress_word(word: u32) -> u32 {
 // Where a listed tile stands.
 fn listed_tile(number: u32) -> u32 {
     return progress_word(LISTED) + 1u + number;
+}
+
+fn gathered_word() -> u32 {
+    return listed_tile(frame.tiles.x * frame.tiles.y);
+}
+
+fn next_of(tile: u32) -> u32 {
+    return gathered_word() + 1u + tile;
 }

@@ -1,10 +1,5 @@
 // The samples of a lattice chunk, in the type of their file, packed in 32-bit words.
 
-const SAMPLE_U8: u32 = 0u;
-const SAMPLE_U16: u32 = 1u;
-const SAMPLE_I16: u32 = 2u;
-const SAMPLE_I32: u32 = 3u;
-
 fn sample_value(index: u32, kind: u32) -> f32 {
     if kind == SAMPLE_U8 {
         return counted(f32((samples[index >> 2u] >> (8u * (index & 3u))) & 0xffu));

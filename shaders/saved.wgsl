@@ -39,13 +39,13 @@ fn save(slot: u32, lane: vec2<u32>, walk: vec4<u32>) {
         let at = saved_at(slot, lane, r);
         colors[at] = bitcast<vec4<f32>>(walk);
         let front = pixels[r].front;
-        if SCALAR {
+        if SUMS {
             colors[at + 1u] = pixels[r].weight;
             colors[at + 2u] = pixels[r].value;
             colors[at + 3u] = vec4(pixels[r].face_weight, front.value);
             colors[at + 4u] = vec4(pixels[r].face_value, select(0.0, 1.0, front.has_value));
         }
-        if GRADIENTS {
+        if SUMS && GRADIENTS {
             colors[at + 5u] = vec4(pixels[r].weight_x, front.slope.x);
             colors[at + 6u] = vec4(pixels[r].weight_y, front.slope.y);
             colors[at + 7u] = vec4(pixels[r].value_x, 0.0);
@@ -69,7 +69,7 @@ fn save(slot: u32, lane: vec2<u32>, walk: vec4<u32>) {
 fn restore(slot: u32, lane: vec2<u32>) -> vec4<u32> {
     for (var r = 0u; r < ROWS; r++) {
         let at = saved_at(slot, lane, r);
-        if SCALAR {
+        if SUMS {
             let face_weight = colors[at + 3u];
             let face_value = colors[at + 4u];
             pixels[r].weight = colors[at + 1u];
@@ -79,7 +79,7 @@ fn restore(slot: u32, lane: vec2<u32>) -> vec4<u32> {
             pixels[r].front.value = face_weight.w;
             pixels[r].front.has_value = face_value.w > 0.0;
         }
-        if GRADIENTS {
+        if SUMS && GRADIENTS {
             let weight_x = colors[at + 5u];
             let weight_y = colors[at + 6u];
             pixels[r].weight_x = weight_x.xyz;

@@ -33,44 +33,11 @@ fn shift(sums: vec4<f32>) -> vec4<f32> {
     return vec4(sums.yzw, 0.0);
 }
 
-fn shift_faces(sums: vec3<f32>) -> vec3<f32> {
-    return vec3(sums.yz, 0.0);
-}
-
-// The field on the plane behind a sheet, from the first of the three open planes, which it shifts out.
-fn resolve_face(r: u32, sheet: u32) -> Face {
-    var face: Face;
-    let weight = pixels[r].face_weight.x;
-    let inverse = 1.0 / max(weight, 1e-37);
-    face.has_value = weight > frame.isotropic.w;
-    face.value = pixels[r].face_value.x * inverse;
-    if GRADIENTS && !CENTRAL {
-        let slope = face.value * vec2(pixels[r].weight_x.x, pixels[r].weight_y.x)
-            - vec2(pixels[r].value_x.x, pixels[r].value_y.x);
-        face.slope = slope_on_plane(r, slope * inverse, planes[sheet + 1u]);
-        pixels[r].weight_x = shift_faces(pixels[r].weight_x);
-        pixels[r].weight_y = shift_faces(pixels[r].weight_y);
-        pixels[r].value_x = shift_faces(pixels[r].value_x);
-        pixels[r].value_y = shift_faces(pixels[r].value_y);
-    }
-    pixels[r].face_weight = shift_faces(pixels[r].face_weight);
-    pixels[r].face_value = shift_faces(pixels[r].face_value);
-    return face;
-}
-
 // Resolves the front lane to a sheet and shifts it out.
 fn resolve(r: u32, sheet: u32) -> Sheet {
     var own: Sheet;
     if SCALAR {
-        let thickness = planes[sheet + 1u] - planes[sheet];
-        let weight = pixels[r].weight.x;
-        own.has_value = weight > frame.isotropic.w * thickness;
-        own.value = pixels[r].value.x / max(weight, 1e-37);
-        own.filling = min(weight / thickness, 1.0);
-        own.front = pixels[r].front;
-        own.back = resolve_face(r, sheet);
-        pixels[r].weight = shift(pixels[r].weight);
-        pixels[r].value = shift(pixels[r].value);
+        resolve_field(r, sheet, &own);
     }
     if RADIANCE_PAYLOAD && !SINGLE_SPLATS {
         let depth = pixels[r].depth.x;
@@ -259,11 +226,14 @@ fn pass_field(r: u32, sheet: u32, own: Sheet) -> Medium {
 
 // Adds a sheet to the picture.
 fn composite(r: u32, sheet: u32, own: Sheet) {
-    if sheet < stage.first_sheet || sheet >= stage.end_sheet {
+    let in_pass = sheet >= stage.first_sheet && sheet < stage.end_sheet;
+    // What is gathered may be left from sheets before the pass.
+    if !GATHER && !in_pass {
         return;
     }
-    var premultiplied = own.radiance.xyz;
-    var depth = own.radiance.w;
+    let radiance = select(vec4(0.0), own.radiance, in_pass);
+    var premultiplied = radiance.xyz;
+    var depth = radiance.w;
     let before = pixels[r].transmittance;
     var has_hit = false;
     if SCALAR && own.has_value {
@@ -291,25 +261,5 @@ fn composite(r: u32, sheet: u32, own: Sheet) {
             pixels[r].hit = mix(planes[sheet], planes[sheet + 1u], log(2.0 * before) / depth);
         }
         pixels[r].transmittance = left;
-    }
-}
-
-// Adds one splat, without sheets, before or behind what is there.
-fn composite_single(r: u32, depth: f32, splat: Loaded) {
-    var color = splat.color;
-    if SURFACE_SHADED && any(splat.normal != vec3(0.0)) {
-        color = lit(color, splat.normal, direction_of(r), frame.surface_shade);
-    }
-    let left = exp(-depth);
-    let before = pixels[r].transmittance;
-    if BACK_TO_FRONT {
-        pixels[r].color = pixels[r].color * left + (1.0 - left) * color;
-    } else {
-        pixels[r].color += before * (1.0 - left) * color;
-    }
-    pixels[r].transmittance = before * left;
-    // From behind, what those in front will take is not known: there, the nearest that takes half of the light alone counts.
-    if select(before > 0.5 && before * left <= 0.5, left <= 0.5, BACK_TO_FRONT) {
-        pixels[r].hit = select(splat.center.z, length(splat.center), PERSPECTIVE);
     }
 }

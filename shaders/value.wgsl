@@ -11,3 +11,12 @@ fn counted(value: f32) -> f32 {
 fn counted_sum(large: f32, small: f32) -> f32 {
     return clamp(((large - frame.transfer.x) + small) * frame.transfer.y, -1e30, 1e30);
 }
+
+// The types of samples.
+const SAMPLE_U8: u32 = 0u;
+const SAMPLE_U16: u32 = 1u;
+const SAMPLE_I16: u32 = 2u;
+const SAMPLE_I32: u32 = 3u;
+const SAMPLE_F32: u32 = 4u;
+// Of a gathered lattice alone: a word for each sample, of this byte and the three behind it.
+const SAMPLE_FOUR: u32 = 5u;

@@ -535,6 +535,19 @@ pub enum Gradient {
     Central,
 }
 
+/// How a sheet of a lattice's field is filled. The pictures agree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Evaluate {
+    /// Gathers what can be gathered, and scatters the rest.
+    #[default]
+    Auto,
+    /// Each pixel adds up the kernels that reach its ray. Takes one volume on a Cartesian lattice with a Gaussian kernel, and
+    /// whatever surfaces are in the same scene; other scenes are an error. It is the faster way.
+    Gather,
+    /// Each splat is added to the pixels that it covers.
+    Scatter,
+}
+
 /// The settings of a picture.
 #[derive(Debug, Clone)]
 pub struct Settings {
@@ -546,6 +559,8 @@ pub struct Settings {
     /// All of them cut, at most [`Settings::MAX_CLIPS`].
     pub clips: Vec<Clip>,
     pub gradient: Gradient,
+    /// How a sheet of a lattice's field is filled.
+    pub evaluate: Evaluate,
     /// Light on volumes, instead of the transfer function's own; `Some(None)` for none.
     pub volume_shade: Option<Option<Shade>>,
     /// Light on splats with normals; `None` draws their colours as they are.
@@ -584,6 +599,7 @@ impl Settings {
             optics: Optics::default(),
             clips: Vec::new(),
             gradient: Gradient::default(),
+            evaluate: Evaluate::default(),
             volume_shade: None,
             surface_shade: Some(Shade { ambient: 0.2, diffuse: 0.75, specular: 0.15, power: 24.0 }),
             sheet_thickness: None,

@@ -10,7 +10,7 @@ use splatkit::{
     math::{Camera, Kernel, Projection},
     picture::Picture,
     reference,
-    scene::{Classification, Scene, Settings},
+    scene::{Classification, Evaluate, Scene, Settings},
     volume::{
         Lattice, Samples, TransferFunction, Volume,
         bricks::{self, Bricks, WriteOptions},
@@ -73,7 +73,9 @@ fn renderer() -> Renderer {
 
 /// With steps between samples of so many pixels at most.
 fn settings(pixels: f64) -> Settings {
-    Settings { detail: Detail::Pixels(2.0 * pixels), ..Settings::new([96, 96]) }
+    // Bricks are scattered, and pictures of whole volumes agree with theirs closest if these are too.
+    let (detail, evaluate) = (Detail::Pixels(2.0 * pixels), Evaluate::Scatter);
+    Settings { detail, evaluate, ..Settings::new([96, 96]) }
 }
 
 fn draw(renderer: &mut Renderer, scene: &Scene, camera: &Camera, settings: &Settings) -> (Picture, FrameStats) {

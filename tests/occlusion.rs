@@ -10,7 +10,7 @@ use splatkit::{
     engine::{AdapterChoice, Budget, FrameStats, Gpu, Renderer},
     math::{Camera, Kernel, Projection},
     picture::Picture,
-    scene::{Order, Scene, Settings},
+    scene::{Evaluate, Order, Scene, Settings},
     surface::{Mesh, SurfelOptions},
     volume::{Shade, TransferFunction, phantoms::Phantom},
 };
@@ -37,7 +37,9 @@ fn turned(camera: &Camera, step: u32) -> Camera {
 
 fn case(name: &'static str, scene: Scene) -> Case {
     let camera = Camera::framing(&scene.bounds(), DVec3::new(0.4, -0.3, -1.0), DVec3::Y, 1.2);
-    Case { name, scene, camera, settings: Settings::new([96, 80]) }
+    // What is gathered has no splats that could be hidden.
+    let settings = Settings { evaluate: Evaluate::Scatter, ..Settings::new([96, 80]) };
+    Case { name, scene, camera, settings }
 }
 
 /// A solid of rind, flesh and stones, of which an opacity shows all.
@@ -121,7 +123,11 @@ fn scenes_of_all_kinds_are_the_same() {
         methods::clipped_surface_in_a_volume,
         methods::gradient_opacity,
     ] {
-        hidden_in(&make(), 3);
+        for evaluate in [Evaluate::Auto, Evaluate::Scatter] {
+            let case = make();
+            let settings = Settings { evaluate, ..case.settings.clone() };
+            hidden_in(&Case { settings, ..case }, 3);
+        }
     }
 }
 

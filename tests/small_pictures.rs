@@ -10,7 +10,7 @@ use splatkit::{
     picture::Picture,
     reference,
     scattered::{Points, SampleOptions},
-    scene::{Scene, Settings},
+    scene::{Evaluate, Scene, Settings},
     splat::SplatSet,
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, Volume, bricks::Bricks, phantoms::Phantom},
@@ -47,12 +47,11 @@ fn samples(count: u32) -> Scene {
     Scene::new().with_samples(set, transfer)
 }
 
-fn drawn(scene: &Scene, size: [u32; 2], budget: Budget, detail: Detail) -> Picture {
+fn drawn(scene: &Scene, settings: &Settings, budget: Budget) -> Picture {
     let gpu = gpu();
     let mut renderer = Renderer::with_budget(&gpu, budget);
     let mut prepared = renderer.prepare(scene).expect("prepares");
-    let settings = Settings { detail, ..Settings::new(size) };
-    renderer.render(&mut prepared, &camera(scene, size), &settings).expect("draws").0
+    renderer.render(&mut prepared, &camera(scene, settings.size), settings).expect("draws").0
 }
 
 fn camera(scene: &Scene, [width, height]: [u32; 2]) -> Camera {
@@ -71,11 +70,15 @@ fn thousands_of_splats_in_a_pixel_agree_with_the_reference() {
     let transfer = TransferFunction::automatic(&volume);
     let volume = Scene::new().with_volume(volume, Kernel::default(), transfer);
     let surface = Scene::new().with_splats(hills(300));
-    for (name, scene) in [("surface", surface), ("samples", samples(60_000)), ("volume", volume)] {
+    for (name, scene, evaluate) in [
+        ("surface", surface, Evaluate::Auto),
+        ("samples", samples(60_000), Evaluate::Auto),
+        ("gathered volume", volume.clone(), Evaluate::Gather),
+        ("scattered volume", volume, Evaluate::Scatter),
+    ] {
         for size in [[1, 1], [5, 3], [16, 24]] {
-            let settings = Settings::new(size);
-            let draw =
-                |tile_entries| drawn(&scene, size, Budget { tile_entries, ..Budget::default() }, settings.detail);
+            let settings = Settings { evaluate, ..Settings::new(size) };
+            let draw = |tile_entries| drawn(&scene, &settings, Budget { tile_entries, ..Budget::default() });
             let whole = draw(None);
             let stopped = psnr(&draw(Some(700)), &whole);
             let truth = reference::render(&scene, &camera(&scene, size), &settings).expect("the reference draws");

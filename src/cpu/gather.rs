@@ -2,18 +2,62 @@
 
 use super::{
     close::{Face, Layer, Visible},
-    field::Typed,
+    field::{self, Typed},
     plan::Plan,
     rays::Rays,
     skip::Shown,
     vector::{Lanes, dot, three},
 };
-use crate::scene::Optics;
+use crate::{
+    math::{Kernel, Sheets},
+    scene::{Gradient, Item, Mode, Optics, Scene, Settings},
+    volume::{Arrangement, Volume},
+};
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
 /// Where slopes at the ends of a sheet differ by fewer entries of the table a sheet, a cubic between them is as good as one more
 /// sample.
 const STRAIGHT: f32 = 64.0;
+
+/// Sheets thicker than this many of a sample's least steps hold more than a parabola tells.
+const THICKEST: f64 = 2.2;
+
+/// The least standard deviation of a kernel, in steps, whose weights 32 bits hold.
+const LEAST_DEVIATION: f64 = 0.3;
+
+/// Why the field of a scene can't be gathered; none where it can: samples on a Cartesian lattice, kernels of which four weights
+/// an axis hold all, sheets thin enough for a parabola.
+pub fn obstacle(scene: &Scene, settings: &Settings, sheets: &Sheets) -> Option<&'static str> {
+    let fields = scene.items.iter().filter(|item| !matches!(item, Item::Radiance(_) | Item::Hierarchy(_)));
+    let [Item::Volume(volume, kernel, _)] = fields.collect::<Vec<_>>()[..] else {
+        return Some("a scene without a volume on a lattice in memory");
+    };
+    if let Some(what) = unsuited(volume, kernel) {
+        return Some(what);
+    }
+    if settings.mode != Mode::Sheets || settings.classifies_samples() {
+        return Some("samples that are classified before interpolation");
+    }
+    if settings.gradient == Gradient::Central {
+        return Some("gradients from neighbouring pixels");
+    }
+    (sheets.step > THICKEST * volume.lattice.least_kernel_spacing()).then_some("sheets thicker than two samples")
+}
+
+/// Why a volume can't be gathered, whatever the settings.
+pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
+    if volume.lattice.arrangement != Arrangement::Cartesian {
+        return Some("body-centred and rectilinear lattices");
+    }
+    if volume.coefficients.is_some() {
+        return Some("sharp volumes");
+    }
+    match field::deviation(kernel) {
+        None => Some("kernels other than Gaussians that reach two samples"),
+        Some(sigma) if sigma < LEAST_DEVIATION => Some("kernels much narrower than a sample"),
+        Some(_) => None,
+    }
+}
 
 /// A lattice whose field is gathered.
 pub struct Gather<'a> {

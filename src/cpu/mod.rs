@@ -22,28 +22,28 @@
 mod bins;
 mod brick_cache;
 mod close;
-mod field;
+pub(crate) mod field;
 mod footprint;
-mod gather;
+pub(crate) mod gather;
 mod items;
 mod march;
 mod page_cache;
 mod plan;
 mod rays;
 mod scatter;
-mod skip;
+pub(crate) mod skip;
 mod sums;
 mod vector;
 
 use crate::{
-    Result,
+    Error, Result,
     engine::{FrameStats, pace::Pace, uniforms::Frame},
     hierarchy::Detail,
     math::{Camera, Sheets, View},
     picture::Picture,
-    scene::{Gradient, Item, Mode, Optics, Scene, Settings},
+    scene::{Evaluate, Item, Optics, Scene, Settings},
     volume::{
-        Arrangement, TransferFunction,
+        TransferFunction,
         bricks::Choice,
         reach::{EVERYTHING, first_visible},
     },
@@ -63,9 +63,6 @@ use std::{
     sync::atomic::{AtomicU64, Ordering::Relaxed},
     time::Instant,
 };
-
-/// Sheets thicker than this many of a sample's least steps hold more than a parabola tells.
-const THICKEST: f64 = 2.2;
 
 /// A scene and what was made of it to draw it. Cameras and settings may change from picture to picture.
 #[derive(Debug)]
@@ -142,7 +139,7 @@ impl CpuRenderer {
         let outline = self.outline(&view, settings)?;
         let plan = Plan::new(&self.scene, &view, &outline.sheets, settings, outline.choice.as_ref());
         clock.step("plan");
-        let gathers = self.gathers(settings, &outline.sheets);
+        let gathers = self.gathers(settings, &outline.sheets)?;
         let before: u64 = self.brick_reads();
         let mut records = Vec::new();
         for (item, prepared) in self.scene.items.iter().zip(&mut self.prepared) {
@@ -208,21 +205,17 @@ impl CpuRenderer {
         Ok(Outline { cut_pixels, choice, sheets, shown })
     }
 
-    /// Whether the field of the scene's volume is gathered: it lies on a Cartesian lattice with Gaussian kernels of which four
-    /// weights an axis hold all, in sheets thin enough for a parabola.
-    fn gathers(&self, settings: &Settings, sheets: &Sheets) -> bool {
-        let is_plain =
-            settings.mode == Mode::Sheets && !settings.classifies_samples() && settings.gradient == Gradient::Analytic;
-        is_plain
-            && self.scene.items.iter().any(|item| match item {
-                Item::Volume(volume, kernel, _) => {
-                    volume.lattice.arrangement == Arrangement::Cartesian
-                        && volume.coefficients.is_none()
-                        && field::deviation(kernel).is_some()
-                        && sheets.step <= THICKEST * volume.lattice.least_kernel_spacing()
-                }
-                _ => false,
-            })
+    /// Whether the field of the scene's volume is gathered.
+    fn gathers(&self, settings: &Settings, sheets: &Sheets) -> Result<bool> {
+        if settings.evaluate == Evaluate::Scatter {
+            return Ok(false);
+        }
+        match gather::obstacle(&self.scene, settings, sheets) {
+            Some(what) if settings.evaluate == Evaluate::Gather => {
+                Err(Error::Argument(format!("{what} can't be gathered; scatter instead, or leave it to the engine")))
+            }
+            obstacle => Ok(obstacle.is_none()),
+        }
     }
 
     fn draw(
@@ -255,7 +248,8 @@ impl CpuRenderer {
             }
             clock.step("skip");
         }
-        let gathered = gather.as_ref().map_or(0, |gather| gather.shown.count());
+        let marked = |own: &Vec<u64>| own.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
+        let gathered = marks.iter().map(marked).sum();
         let march = March { plan, gather, visible: &visible, records };
         let bins = Bins::new(plan, records);
         clock.step("bin");
@@ -275,9 +269,10 @@ impl CpuRenderer {
         let picture = assembled(&self.scene, plan, &blocks);
         clock.step("write");
         let stats = FrameStats {
-            splats: records.iter().map(|batch| batch.len() as u64).sum::<u64>() + gathered,
+            splats: records.iter().map(|batch| batch.len() as u64).sum(),
+            gathered,
             entries: drawn.into_inner(),
-            passes: 1,
+            passes: u32::from(!records.is_empty()),
             gpu_bytes: self.prepared.iter().map(Prepared::bytes).sum::<u64>() + record_bytes(records),
             ..FrameStats::default()
         };

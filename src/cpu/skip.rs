@@ -47,9 +47,20 @@ impl Shown {
         Self { dims, blocks, words }
     }
 
-    /// How many samples something shows around.
-    pub fn count(&self) -> u64 {
-        self.words.iter().map(|word| u64::from(word.count_ones())).sum()
+    /// A bit for each sample in the order of the volume, 32 a word, the first in the lowest bit.
+    pub fn bits(&self) -> Vec<u32> {
+        let [nx, ny, _] = self.dims;
+        let [columns, rows, _] = self.blocks;
+        let count = self.dims.iter().product::<usize>();
+        let word = |word: usize| {
+            let own = (32 * word..count.min(32 * word + 32)).map(|sample| {
+                let at = [sample % nx, sample / nx % ny, sample / (nx * ny)];
+                let block = (at[2] / BLOCK * rows + at[1] / BLOCK) * columns + at[0] / BLOCK;
+                (self.words[block] >> bit_of(at) & 1) as u32
+            });
+            own.enumerate().fold(0, |word, (place, bit)| word | bit << place)
+        };
+        (0..count.div_ceil(32)).into_par_iter().map(word).collect()
     }
 
     /// Where something may show nearer to the sample beside a place than to any other, a bit for each lane; places in steps.

@@ -6,6 +6,7 @@ use super::{
     clear::Clear,
     cull::Cull,
     cut::Cut,
+    gather::{Gather, Gathered},
     large::Large,
     march::March,
     measure::Measure,
@@ -106,6 +107,7 @@ pub fn variant(
     settings: &Settings,
     budget: Budget,
     choice: Option<&Choice>,
+    gather: bool,
 ) -> Variant {
     let mut variant = Variant {
         perspective: view.perspective,
@@ -117,6 +119,8 @@ pub fn variant(
         lattice: false,
         body_centred: false,
         rectilinear: false,
+        gather,
+        sample_kind: 0,
         two_levels: false,
         radiance: false,
         isotropic: false,
@@ -170,7 +174,8 @@ pub fn variant(
             variant.rectilinear = matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_));
             variant.table_kernel = !matches!(kernel.profile, Profile::Gaussian(_));
             let alike = !variant.rectilinear && !variant.table_kernel && !classified;
-            variant.isotropic = alike && are_flat(&volume.lattice, kernel, view, item);
+            variant.isotropic = alike && !gather && are_flat(&volume.lattice, kernel, view, item);
+            variant.sample_kind = prepared.field.as_ref().filter(|_| gather).map_or(0, |field| field.kind);
         }
         if let (Item::Bricks(bricks, kernel, _), Some(choice)) = (item, choice) {
             variant.lattice = true;
@@ -182,6 +187,11 @@ pub fn variant(
     // Where a pass ends, march meets splats again and closes sheets twice: of a field that costs more than of a surface.
     variant.least_share = budget.least_share.unwrap_or(if variant.scalar { 1 << 21 } else { 1 << 18 });
     variant.central = variant.gradients() && settings.gradient == Gradient::Central;
+    if gather && variant.rows > 1 {
+        // Each pixel looks at the samples around its own ray, so pixels of an invocation would share nothing.
+        variant.rows = GATHERED_ROWS;
+        variant.most_entries = variant.most_entries.min(GATHERED_ENTRIES);
+    }
     variant
 }
 
@@ -197,6 +207,10 @@ pub fn most_slot_bytes(gpu: &Gpu) -> u64 {
 /// Mesa's software driver ends all loops of an invocation after 65,535 iterations together. In march an entry takes up to
 /// six: its own, and those that find its sheet and close the sheets before it.
 const SOFTWARE_ENTRIES: u32 = 10_000;
+/// The same beside a field that is gathered: all sheets may lie between two entries.
+const GATHERED_ENTRIES: u32 = 5_000;
+/// Pixels of an invocation of march on such a driver, beside a field that is gathered.
+const GATHERED_ROWS: u32 = 1;
 
 /// Beyond this many footprint radii the sections of an isotropic kernel count as the same for all pixels. The error is at
 /// most a hundredth of the radius, at the footprint's rim; tests/engine_equals_reference.rs bounds the picture's.
@@ -218,9 +232,15 @@ fn is_isotropic(axes: glam::DMat3) -> bool {
     difference.to_cols_array().iter().all(|d| d.abs() <= 1e-4 * size)
 }
 
-/// The pipelines of a variant.
+/// The pipelines of a variant: those that scatter splats, and that which gathers a lattice.
 #[derive(Debug)]
 pub struct Pipelines {
+    scatter: Option<Scatter>,
+    gather: Option<Gather>,
+}
+
+#[derive(Debug)]
+struct Scatter {
     measure: Measure,
     plan: Plan,
     project: Project,
@@ -234,6 +254,15 @@ pub struct Pipelines {
 
 impl Pipelines {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        Self {
+            scatter: variant.scatters().then(|| Scatter::new(gpu, variant)),
+            gather: variant.gather.then(|| Gather::new(gpu, variant)),
+        }
+    }
+}
+
+impl Scatter {
+    fn new(gpu: &Gpu, variant: &Variant) -> Self {
         Self {
             measure: Measure::new(gpu, variant),
             plan: Plan::new(gpu, variant),
@@ -278,6 +307,8 @@ pub struct Targets {
     pub progress: wgpu::Buffer,
     pub colors: wgpu::Buffer,
     pub depths: wgpu::Buffer,
+    /// What is gathered.
+    pub gathered: Option<Gathered>,
     pub run_total: u32,
     pub tiles: [u32; 2],
 }
@@ -323,7 +354,7 @@ impl Pool {
 pub fn targets(
     gpu: &Gpu,
     pool: &mut Pool,
-    prepared: &PreparedScene,
+    prepared: &mut PreparedScene,
     variant: &Variant,
     view: &View,
     sheets: &Sheets,
@@ -347,6 +378,8 @@ pub fn targets(
         )));
     }
     let budget = budget.within(gpu);
+    let scatters = variant.scatters();
+    let room = |count: u64| if scatters { count } else { 0 };
     let step = variant.tile_step();
     let tiles = [width.div_ceil(step), height.div_ceil(step)];
     let tile_count = tiles[0] * tiles[1];
@@ -358,9 +391,9 @@ pub fn targets(
         )));
     }
     let slots = (u64::from(tile_count) * SLOT_BYTES).min(most_slot_bytes(gpu));
-    let slots = if variant.can_stop() { slots } else { 0 };
+    let slots = if variant.can_stop() { room(slots) } else { 0 };
     // The number of entries stands behind the last bin.
-    let bin_count = (groups(0) * u64::from(tile_count)).min(u64::from(MOST_BINS)) + 1;
+    let bin_count = room((groups(0) * u64::from(tile_count)).min(u64::from(MOST_BINS)) + 1);
     let most_tiles = tiles[0].max(tiles[1]);
 
     let mut frame = Frame::new(&prepared.scene, view, sheets, settings, choice);
@@ -369,6 +402,12 @@ pub fn targets(
     frame.entry_capacity = budget.entries;
     frame.record_capacity = budget.record_words;
     let table = tables_of(prepared, view, sheets, &mut frame);
+    let field = prepared.field.as_mut().filter(|_| variant.gather);
+    let before = field.as_ref().map_or(0, |field| field.bytes());
+    let gathered = field.and_then(|field| field.list(gpu, view, sheets, variant, &table, &mut frame));
+    if gathered.is_some() {
+        prepared.bytes += prepared.field.as_ref().map_or(0, |field| field.bytes()) - before;
+    }
 
     // The sheet before the first reaches back, the one after the last forward, without end.
     let mut planes = vec![-3e38f32];
@@ -376,8 +415,8 @@ pub fn targets(
     planes.extend([3e38; 4]);
 
     let uniform = |label, bytes: &[u8]| super::filled_buffer(gpu, label, bytes, Usage::UNIFORM);
-    let words = u64::from(budget.record_words);
-    let runs = u64::from(prepared.runs);
+    let words = room(u64::from(budget.record_words));
+    let runs = room(u64::from(prepared.runs));
     Ok(Targets {
         frame: uniform("frame", bytemuck::bytes_of(&frame)),
         planes: upload(gpu, "planes", bytemuck::cast_slice(&planes)),
@@ -385,30 +424,36 @@ pub fn targets(
         run_count: uniform("run count", bytemuck::bytes_of(&[prepared.runs, 0, 0, 0])),
         run_spans: pool.take(gpu, "run spans", RUN_BYTES * runs),
         needs: pool.take(gpu, "needs", RUN_BYTES * runs),
-        census: pool.take(gpu, "census", plan::census_bytes(sheets.count())),
+        census: pool.take(gpu, "census", room(plan::census_bytes(sheets.count()))),
         state: pool.take(gpu, "state", size_of::<State>() as u64),
         pass: pool.take(gpu, "pass", PASS_BYTES),
         arguments: pool.take(gpu, "arguments", ARGUMENT_BYTES),
         bin_size: pool.take(gpu, "bin size", 16),
-        map: pool.take(gpu, "map", map_bytes(tiles)),
+        map: pool.take(gpu, "map", room(map_bytes(tiles))),
         runs: pool.take(gpu, "runs", 4 * (runs + 1)),
         active: pool.take(gpu, "active", 8 * runs),
         records: pool.take(gpu, "records", 16 * words),
         boxes: pool.take(gpu, "boxes", 12 * words),
         bins: pool.take(gpu, "bins", 4 * bin_count),
-        entries: pool.take(gpu, "entries", 4 * u64::from(budget.entries)),
+        entries: pool.take(gpu, "entries", room(4 * u64::from(budget.entries))),
         bin_arguments: pool.take(gpu, "bin arguments", 12),
         large: pool.take(gpu, "large", 4 * (words + 1)),
         large_arguments: pool.take(gpu, "large arguments", 12),
         long_bins: pool.take(gpu, "long bins", 4 * bin_count),
         long_count: pool.take(gpu, "long count", 4),
         long_arguments: pool.take(gpu, "long arguments", 12),
-        progress: pool.take(gpu, "progress", 4 * (2 * u64::from(tile_count) + SLOTS / 32 + 3)),
+        progress: pool.take(gpu, "progress", 4 * (gathered_word(tile_count) + 1 + u64::from(tile_count))),
         colors: pool.take(gpu, "colors", 16 * pixels + slots),
         depths: pool.take(gpu, "depths", 4 * pixels),
+        gathered,
         run_total: prepared.runs,
         tiles,
     })
+}
+
+/// The word of `progress` that counts tiles that gather has drawn (progress.wgsl).
+pub fn gathered_word(tiles: u32) -> u64 {
+    2 * u64::from(tiles) + SLOTS / 32 + 3
 }
 
 /// The tables of the scene's field; a frame without one gets some of no meaning.
@@ -447,6 +492,15 @@ impl<'a> Work<'a> {
     pub fn opening(self) -> Vec<Step<'a>> {
         let Self { gpu, cut, scan, pipelines, targets, prepared, .. } = self;
         let mut steps: Vec<Step<'a>> = Vec::new();
+        if targets.gathered.is_some() {
+            let clear = |encoder: &mut wgpu::CommandEncoder| {
+                for buffer in [&targets.colors, &targets.depths, &targets.progress] {
+                    encoder.clear_buffer(buffer, 0, None);
+                }
+            };
+            steps.push(("clear", Box::new(clear)));
+        }
+        let Some(scatter) = &pipelines.scatter else { return steps };
         for chunk in &prepared.chunks {
             if let Origin::Nodes { slots, .. } = &chunk.origin {
                 let own = slots.chunk(&chunk.uniform, &chunk.data);
@@ -460,48 +514,49 @@ impl<'a> Work<'a> {
                     encoder.clear_buffer(buffer, 0, None);
                 }
                 for chunk in &prepared.chunks {
-                    pipelines.measure.encode(gpu, encoder, targets, chunk);
+                    scatter.measure.encode(gpu, encoder, targets, chunk);
                 }
             }),
         ));
-        steps.push(("plan", Box::new(move |encoder| pipelines.plan.encode(gpu, encoder, targets))));
+        steps.push(("plan", Box::new(move |encoder| scatter.plan.encode(gpu, encoder, targets))));
         steps
     }
 
     /// The steps of the next depth pass; they do nothing where the frame is done.
     pub fn depth_pass(self) -> Vec<Step<'a>> {
         let Self { gpu, scan, clear, resume, tiles, pipelines, targets, prepared, .. } = self;
+        let Some(scatter) = &pipelines.scatter else { return Vec::new() };
         let chunks = prepared.chunks.as_slice();
         let mut steps: Vec<Step<'a>> = vec![
             (
                 "cull",
                 Box::new(move |encoder| {
-                    pipelines.plan.encode_advance(gpu, encoder, targets);
-                    pipelines.cull.encode(gpu, encoder, targets, chunks);
+                    scatter.plan.encode_advance(gpu, encoder, targets);
+                    scatter.cull.encode(gpu, encoder, targets, chunks);
                     scan.encode(gpu, encoder, &targets.runs, targets.run_total + 1);
                 }),
             ),
-            ("project", Box::new(move |encoder| pipelines.project.encode(gpu, encoder, targets, chunks))),
+            ("project", Box::new(move |encoder| scatter.project.encode(gpu, encoder, targets, chunks))),
             (
                 "bin",
                 Box::new(move |encoder| {
                     clear.encode(gpu, encoder, targets);
-                    pipelines.bin.encode_count(gpu, encoder, targets);
-                    pipelines.large.encode_count(gpu, encoder, targets);
+                    scatter.bin.encode_count(gpu, encoder, targets);
+                    scatter.large.encode_count(gpu, encoder, targets);
                     let arguments = (&targets.arguments, SCAN_ARGUMENTS);
                     scan.encode_indirect(gpu, encoder, &targets.bins, &targets.bin_size, arguments);
-                    pipelines.bin.encode_fill(gpu, encoder, targets);
-                    pipelines.large.encode_fill(gpu, encoder, targets);
+                    scatter.bin.encode_fill(gpu, encoder, targets);
+                    scatter.large.encode_fill(gpu, encoder, targets);
                     tiles.encode(gpu, encoder, targets);
                 }),
             ),
-            ("order", Box::new(move |encoder| pipelines.order.encode(gpu, encoder, targets))),
+            ("order", Box::new(move |encoder| scatter.order.encode(gpu, encoder, targets))),
             (
                 "march",
                 Box::new(move |encoder| {
-                    pipelines.march.encode(gpu, encoder, targets, MARCH_ARGUMENTS);
+                    scatter.march.encode(gpu, encoder, targets, MARCH_ARGUMENTS);
                     resume.encode_again(gpu, encoder, targets);
-                    pipelines.march.encode(gpu, encoder, targets, AGAIN_ARGUMENTS);
+                    scatter.march.encode(gpu, encoder, targets, AGAIN_ARGUMENTS);
                     resume.encode_hold(gpu, encoder, targets);
                 }),
             ),
@@ -515,14 +570,15 @@ impl<'a> Work<'a> {
         // Each march that finds nothing left is empty.
         const MARCHES: usize = 8;
         let Self { gpu, resume, pipelines, targets, .. } = self;
+        let Some(scatter) = &pipelines.scatter else { return Vec::new() };
         let march: Step<'a> = (
             "march",
             Box::new(move |encoder| {
                 resume.encode_resume(gpu, encoder, targets);
-                pipelines.march.encode(gpu, encoder, targets, MARCH_ARGUMENTS);
+                scatter.march.encode(gpu, encoder, targets, MARCH_ARGUMENTS);
                 for _ in 1..MARCHES {
                     resume.encode_again(gpu, encoder, targets);
-                    pipelines.march.encode(gpu, encoder, targets, AGAIN_ARGUMENTS);
+                    scatter.march.encode(gpu, encoder, targets, AGAIN_ARGUMENTS);
                 }
                 resume.encode_hold(gpu, encoder, targets);
             }),
@@ -530,9 +586,16 @@ impl<'a> Work<'a> {
         [march].into_iter().chain(self.occlusion()).collect()
     }
 
+    /// The step that gathers what is left of a lattice's field.
+    pub fn gathered(self) -> Vec<Step<'a>> {
+        let Self { gpu, pipelines, targets, .. } = self;
+        let Some(gather) = &pipelines.gather else { return Vec::new() };
+        vec![("gather", Box::new(move |encoder| gather.encode(gpu, encoder, targets)))]
+    }
+
     fn occlusion(self) -> Option<Step<'a>> {
         let Self { gpu, pipelines, targets, .. } = self;
-        let occlusion = pipelines.occlusion.as_ref()?;
+        let occlusion = pipelines.scatter.as_ref()?.occlusion.as_ref()?;
         Some(("occlusion", Box::new(move |encoder| occlusion.encode(gpu, encoder, targets))))
     }
 }

@@ -173,8 +173,11 @@ impl Gpu {
     }
 
     fn open(adapter: &wgpu::Adapter) -> Result<Self> {
-        // WebGPU's defaults are what the engine is built for; larger bindings only save passes.
+        // WebGPU's defaults are what the engine is built for; larger bindings only save passes, and with two more of them a volume
+        // among surfaces can be gathered.
+        let buffers = adapter.limits().max_storage_buffers_per_shader_stage.clamp(8, super::gather::MOST_BUFFERS);
         let limits = wgpu::Limits {
+            max_storage_buffers_per_shader_stage: buffers,
             max_storage_buffer_binding_size: adapter.limits().max_storage_buffer_binding_size,
             max_buffer_size: adapter.limits().max_buffer_size,
             ..wgpu::Limits::default()

@@ -17,6 +17,7 @@
 //! | `order` | sorts each bin, for the same bytes each time |
 //! | `march` | per tile: adds up sections, closes sheets, composites front to back |
 //! | `resume` | goes on with tiles that march has stopped |
+//! | `gather` | the field of a lattice that is not scattered, pixel by pixel |
 //! | `occlusion` | which tiles have become opaque |
 //!
 //! docs/engine.md tells the mathematics.
@@ -28,6 +29,7 @@ mod cull;
 mod cut;
 mod fault;
 mod frame;
+mod gather;
 mod gpu;
 mod large;
 mod march;

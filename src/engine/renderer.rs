@@ -6,6 +6,7 @@ use super::{
     clear::Clear,
     cut::{Cut, finest_within, tally_bytes},
     frame::{self, Pipelines, Pool, Step, Targets, Work},
+    gather,
     nodes::Forest,
     pace::Pace,
     resume::Resume,
@@ -22,7 +23,7 @@ use crate::{
     hierarchy::Detail,
     math::{Camera, Sheets, View},
     picture::Picture,
-    scene::{Optics, Scene, Settings},
+    scene::{Evaluate, Optics, Scene, Settings},
     volume::bricks::{Choice, slot_bytes},
 };
 use std::{collections::HashMap, time::Instant};
@@ -59,19 +60,23 @@ struct Outline {
     /// Those of them that were read for it.
     read_bricks: u64,
     sheets: Sheets,
+    /// Whether the field is gathered.
+    gather: bool,
 }
 
 /// What a frame took.
 #[derive(Debug, Clone, Default)]
 pub struct FrameStats {
-    /// Splats that meet the picture.
+    /// Splats that meet the picture. Samples of a lattice that is gathered are none.
     pub splats: u64,
     /// Those of them that were left out because what lies before them is opaque.
     pub hidden: u64,
     /// (splat, tile, window) triples that were drawn.
     pub entries: u64,
-    /// Depth passes.
+    /// Depth passes; none where nothing is scattered.
     pub passes: u32,
+    /// A lattice that is gathered: (tile, sheet) pairs in which it may show something, so that rays look for it there.
+    pub gathered: u64,
     /// Memory of the device that draws, or of the CPU engine, held by the scene and by the frame.
     pub gpu_bytes: u64,
     /// Hierarchies: the cut, in pixels.
@@ -227,9 +232,27 @@ impl Renderer {
         prepared.update_forests(&self.gpu, view, settings, cut_pixels)?;
         let choice = self.bring_bricks(prepared, view, settings, detail)?;
         let sheets = prepared.scene.sheets_of(view, settings, choice.as_ref(), &prepared.bounds);
-        let all = prepared.scene.mixes_afar(settings, &sheets, choice.as_ref());
-        prepared.update_selections(&self.gpu, &self.select, &self.scan, view, all)?;
-        Ok(Outline { cut_pixels, choice, read_bricks: reads(prepared) - before, sheets })
+        let gather = self.gathers(prepared, settings, &sheets)?;
+        if gather {
+            prepared.update_field(&self.gpu, settings)?;
+        } else {
+            let all = prepared.scene.mixes_afar(settings, &sheets, choice.as_ref());
+            prepared.update_selections(&self.gpu, &self.select, &self.scan, view, all)?;
+        }
+        Ok(Outline { cut_pixels, choice, read_bricks: reads(prepared) - before, sheets, gather })
+    }
+
+    /// Whether a scene's field is gathered.
+    fn gathers(&self, prepared: &PreparedScene, settings: &Settings, sheets: &Sheets) -> Result<bool> {
+        if settings.evaluate == Evaluate::Scatter {
+            return Ok(false);
+        }
+        match gather::obstacle(&prepared.scene, settings, sheets, &self.gpu) {
+            Some(what) if settings.evaluate == Evaluate::Gather => {
+                Err(Error::Argument(format!("{what} can't be gathered; scatter instead, or leave it to the engine")))
+            }
+            obstacle => Ok(obstacle.is_none()),
+        }
     }
 
     /// A detail asked for in milliseconds, in pixels; others as they are.
@@ -315,9 +338,9 @@ impl Renderer {
         view.validate_for(&prepared.bounds)?;
         let _span = tracing::debug_span!("frame", width = view.size[0], height = view.size[1]).entered();
         let gpu = &self.gpu;
-        let Outline { cut_pixels, choice, sheets, .. } = outline;
+        let Outline { cut_pixels, choice, sheets, gather, .. } = outline;
         let choice = choice.as_ref();
-        let variant = frame::variant(gpu, prepared, view, settings, self.budget, choice);
+        let variant = frame::variant(gpu, prepared, view, settings, self.budget, choice, *gather);
         let pool = &mut self.pool;
         let targets = frame::targets(gpu, pool, prepared, &variant, view, sheets, settings, self.budget, choice)?;
         let pipelines = self.pipelines.entry(variant).or_insert_with(|| Pipelines::new(gpu, &variant));
@@ -338,50 +361,33 @@ impl Renderer {
             targets: &targets,
             prepared,
         };
+        let mut state = State::default();
         let mut steps = work.opening();
-        let mut state: State;
-        let mut advanced = 0;
-        let start = Instant::now();
-        loop {
+        if variant.scatters() {
             // As many passes as the last frame took; what is too many does nothing.
             let passes = if profile { 1 } else { self.passes };
-            steps.extend((0..passes).flat_map(|_| work.depth_pass()));
+            state = draw_passes(work, std::mem::take(&mut steps), passes, self.budget, profile.then_some(&mut times))?;
+        }
+        if let Some(gathered) = &targets.gathered {
+            steps.extend(work.gathered());
             submit(gpu, std::mem::take(&mut steps), profile.then_some(&mut times))?;
-            state = bytemuck::pod_read_unaligned(&gpu.read(&targets.state, 0, size_of::<State>() as u64)?);
-            let is_done = state.done != 0 && state.stalled == 0;
-            if std::mem::replace(&mut advanced, state.advanced) == state.advanced && !is_done {
-                // The caller puts in place of this what the device complains of.
-                return Err(Error::Gpu(format!("{} did nothing of what it was asked to", gpu.info.name)));
-            }
-            if state.overflow != 0 {
-                return Err(Error::Gpu(format!(
-                    "the scene needs more room in one sheet of the picture than the budget of {} entries gives; \
-                     raise the budget",
-                    self.budget.entries
-                )));
-            }
-            if is_done {
-                break;
-            }
-            if start.elapsed() >= gpu.patience {
-                return Err(Error::Gpu(format!(
-                    "{} did not finish the picture within {} s",
-                    gpu.info.name,
-                    gpu.patience.as_secs_f64()
-                )));
-            }
-            if state.stalled != 0 {
-                steps = work.resumed();
+            let word = 4 * frame::gathered_word(targets.tiles[0] * targets.tiles[1]);
+            let drawn: u32 = bytemuck::pod_read_unaligned(&gpu.read(&targets.progress, word, 4)?);
+            if drawn != gathered.workgroups() {
+                return Err(did_nothing(gpu));
             }
         }
         drop(steps);
         // The last pass finds that there is nothing left.
-        self.passes = (state.passes + 1).min(MOST_PASSES);
+        if variant.scatters() {
+            self.passes = (state.passes + 1).min(MOST_PASSES);
+        }
         let stats = FrameStats {
             splats: u64::from(state.splats),
             hidden: u64::from(state.hidden),
             entries: u64::from(state.binned),
             passes: state.passes,
+            gathered: targets.gathered.as_ref().map_or(0, |gathered| gathered.pairs),
             gpu_bytes: prepared.bytes + targets.bytes(),
             cut_pixels: *cut_pixels,
             missing_pages: prepared.forests.iter().map(|forest| forest.missing as u64).sum(),
@@ -445,6 +451,7 @@ impl FrameStats {
         self.hidden = self.hidden.max(other.hidden);
         self.entries += other.entries;
         self.passes += other.passes;
+        self.gathered += other.gathered;
         self.gpu_bytes = self.gpu_bytes.max(other.gpu_bytes);
         self.cut_pixels = self.cut_pixels.max(other.cut_pixels);
         self.missing_pages = self.missing_pages.max(other.missing_pages);
@@ -457,6 +464,53 @@ impl FrameStats {
                 Some(step) => step.1 += time,
                 None => self.steps.push((name, time)),
             }
+        }
+    }
+}
+
+fn did_nothing(gpu: &Gpu) -> Error {
+    // The caller puts in place of this what the device complains of.
+    Error::Gpu(format!("{} did nothing of what it was asked to", gpu.info.name))
+}
+
+/// Scatters: submits `passes` depth passes at a time, behind the steps that open the frame, until all is drawn.
+fn draw_passes<'a>(
+    work: Work<'a>,
+    mut steps: Vec<Step<'a>>,
+    passes: u32,
+    budget: Budget,
+    mut times: Option<&mut Vec<(&'static str, f64)>>,
+) -> Result<State> {
+    let Work { gpu, targets, .. } = work;
+    let mut advanced = 0;
+    let start = Instant::now();
+    loop {
+        steps.extend((0..passes).flat_map(|_| work.depth_pass()));
+        submit(gpu, std::mem::take(&mut steps), times.as_deref_mut())?;
+        let state: State = bytemuck::pod_read_unaligned(&gpu.read(&targets.state, 0, size_of::<State>() as u64)?);
+        let is_done = state.done != 0 && state.stalled == 0;
+        if std::mem::replace(&mut advanced, state.advanced) == state.advanced && !is_done {
+            return Err(did_nothing(gpu));
+        }
+        if state.overflow != 0 {
+            return Err(Error::Gpu(format!(
+                "the scene needs more room in one sheet of the picture than the budget of {} entries gives; \
+                 raise the budget",
+                budget.entries
+            )));
+        }
+        if is_done {
+            return Ok(state);
+        }
+        if start.elapsed() >= gpu.patience {
+            return Err(Error::Gpu(format!(
+                "{} did not finish the picture within {} s",
+                gpu.info.name,
+                gpu.patience.as_secs_f64()
+            )));
+        }
+        if state.stalled != 0 {
+            steps = work.resumed();
         }
     }
 }

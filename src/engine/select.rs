@@ -50,6 +50,16 @@ impl Selection {
         self.shown.as_ref() == Some(shown)
     }
 
+    /// Lets go of the list; tells whether there was one.
+    pub fn forget(&mut self, gpu: &Gpu) -> bool {
+        if self.shown.take().is_none() {
+            return false;
+        }
+        self.selected = super::buffer(gpu, "selected", 4, Usage::STORAGE);
+        self.count = 0;
+        true
+    }
+
     pub fn bytes(&self) -> u64 {
         self.ranges.size() + self.blocks.size() + self.selected.size()
     }

@@ -43,6 +43,11 @@ pub const TABLES: &str = include_str!("../../shaders/tables.wgsl");
 pub const PIXEL: &str = include_str!("../../shaders/pixel.wgsl");
 pub const KERNELS: &str = include_str!("../../shaders/kernels.wgsl");
 pub const SHEET: &str = include_str!("../../shaders/sheet.wgsl");
+pub const FIELD_SUMS: &str = include_str!("../../shaders/field_sums.wgsl");
+pub const FIELD_LATTICE: &str = include_str!("../../shaders/field_lattice.wgsl");
+pub const MARCH_LATTICE: &str = include_str!("../../shaders/march_lattice.wgsl");
+pub const GATHER: &str = include_str!("../../shaders/gather.wgsl");
+pub const PICTURE: &str = include_str!("../../shaders/picture.wgsl");
 pub const MARCH: &str = include_str!("../../shaders/march.wgsl");
 
 /// What a picture needs of the shaders. Each combination is compiled when it first occurs; what it does not need (the
@@ -60,6 +65,10 @@ pub struct Variant {
     pub lattice: bool,
     pub body_centred: bool,
     pub rectilinear: bool,
+    /// The lattice is gathered; else its samples are scattered as splats are.
+    pub gather: bool,
+    /// The type of a gathered lattice's samples (sample.wgsl).
+    pub sample_kind: u32,
     /// Two levels of a volume in bricks are drawn together, each with its share.
     pub two_levels: bool,
     pub radiance: bool,
@@ -90,6 +99,8 @@ pub struct Variant {
 
 /// Parts of a sheet in which the transfer function is integrated. Figures are in docs/engine.md.
 const PARTS: u32 = 3;
+/// Iterations that an entry takes at most.
+const ENTRY_ITERATIONS: u32 = 6;
 
 impl Variant {
     /// Pixels that a tile is wide and high, without the edge that it shares with its neighbours.
@@ -100,6 +111,19 @@ impl Variant {
     /// Whether a field's gradient is looked at.
     pub fn gradients(&self) -> bool {
         self.scalar && (self.volume_shaded || self.gradient_opacity)
+    }
+
+    /// Sheets that one dispatch of gather draws: as many as a driver's bound on iterations allows.
+    pub fn gathered_sheets(&self) -> u32 {
+        // Those that find the sheet and look at its planes, and those that close it.
+        let pieces = PARTS * (1 + self.isosurfaces) * (1 + self.holes) + (1 + self.holes) * self.holes * self.holes;
+        let most = self.most_entries.saturating_mul(ENTRY_ITERATIONS);
+        if self.can_stop() { (most / (6 + pieces)).max(1) } else { u32::MAX }
+    }
+
+    /// Whether splats are scattered.
+    pub fn scatters(&self) -> bool {
+        !self.gather || self.radiance
     }
 
     /// Whether march may stop a tile among its entries.
@@ -120,6 +144,8 @@ impl Variant {
         let flags = [
             ("PERSPECTIVE", self.perspective),
             ("SCALAR", self.scalar),
+            ("GATHER", self.gather),
+            ("SUMS", self.scalar && !self.gather),
             ("CLASSIFIED", self.classified),
             ("LATTICE", self.lattice),
             ("BODY_CENTRED", self.body_centred),
@@ -151,7 +177,8 @@ impl Variant {
             ("CAN_STOP", self.can_stop()),
         ];
         // What closing a sheet takes of the iterations that a driver allows, in entries (see docs/engine.md).
-        let closing = (2 + self.rows * parts * (1 + self.isosurfaces) * (1 + self.holes)).div_ceil(6);
+        let closing = (2 + self.rows * parts * (1 + self.isosurfaces) * (1 + self.holes)).div_ceil(ENTRY_ITERATIONS);
+        let closing = closing + u32::from(self.gather);
         let counts = [
             ("ISOSURFACES", self.isosurfaces),
             ("PARTS", parts),
@@ -163,6 +190,7 @@ impl Variant {
             ("MOST_GROUP_SHIFT", super::frame::MOST_GROUP_SHIFT),
             ("MOST_ENTRIES", self.most_entries),
             ("CLOSING_ENTRIES", closing),
+            ("SAMPLE_KIND", self.sample_kind),
             ("ROWS", self.rows),
             ("LANE_ROWS", 8 / self.rows),
         ];

@@ -9,6 +9,8 @@ pub enum Binding {
     Uniform,
     Read,
     Write,
+    /// A three-dimensional texture of 32-bit words.
+    Texture,
 }
 
 /// A compute pipeline and the layouts of its bind groups.
@@ -78,6 +80,15 @@ impl Stage {
         })
     }
 
+    /// Binds a texture as the only one of group `group`.
+    pub fn bind_texture(&self, gpu: &Gpu, group: usize, texture: &wgpu::TextureView) -> wgpu::BindGroup {
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(self.label),
+            layout: &self.layouts[group],
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(texture) }],
+        })
+    }
+
     /// Encodes a dispatch of a fixed number of workgroups. More than fit one dimension go on in the second, so that
     /// workgroup (x, y) is number x + y · `MOST_WORKGROUPS`, and a few of the last row may be too many.
     pub fn dispatch(&self, encoder: &mut wgpu::CommandEncoder, groups: &[&wgpu::BindGroup], workgroups: u32) {
@@ -109,19 +120,21 @@ impl Stage {
 }
 
 fn layout(device: &wgpu::Device, label: &str, bindings: &[Binding]) -> wgpu::BindGroupLayout {
+    let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let entries: Vec<_> = (0..)
         .zip(bindings)
         .map(|(binding, kind)| wgpu::BindGroupLayoutEntry {
             binding,
             visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer {
-                ty: match kind {
-                    Binding::Uniform => wgpu::BufferBindingType::Uniform,
-                    Binding::Read => wgpu::BufferBindingType::Storage { read_only: true },
-                    Binding::Write => wgpu::BufferBindingType::Storage { read_only: false },
+            ty: match kind {
+                Binding::Uniform => buffer(wgpu::BufferBindingType::Uniform),
+                Binding::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
+                Binding::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
+                Binding::Texture => wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Uint,
+                    view_dimension: wgpu::TextureViewDimension::D3,
+                    multisampled: false,
                 },
-                has_dynamic_offset: false,
-                min_binding_size: None,
             },
             count: None,
         })

@@ -41,12 +41,15 @@ pub struct Frame {
     pub kernel: [f32; 4],
     pub levels: [f32; 4],
     pub sheet_normal: [f32; 4],
+    pub lattice: [u32; 4],
+    pub taps: [f32; 4],
+    pub shown: [u32; 4],
     pub world: [[f32; 4]; 3],
     pub clips: [[[f32; 4]; 2]; Settings::MAX_CLIPS],
     pub holes: [[[f32; 4]; 2]; Settings::MAX_CLIPS],
     pub isosurfaces: [[[f32; 4]; 2]; TransferFunction::MAX_ISOSURFACES],
 }
-const _: () = assert!(size_of::<Frame>() == 64 + (20 + 3 * 16) * 16);
+const _: () = assert!(size_of::<Frame>() == 64 + (23 + 3 * 16) * 16);
 
 /// `Source` in frame.wgsl.
 #[repr(C)]

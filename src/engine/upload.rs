@@ -3,6 +3,7 @@
 use super::{
     Gpu,
     bricks::{Listed, Room, SelectBricks, Shelf, Slab},
+    gather::{Field, kind_of, texture_bytes},
     nodes::{Forest, Growth, Slots},
     scan::Scan,
     select::{Select, Selection},
@@ -12,7 +13,7 @@ use crate::{
     Error, Result,
     hierarchy::{Cut, Levels},
     math::{Bounds, Kernel, View},
-    scene::{Item, Scene, Settings},
+    scene::{Item, Optics, Scene, Settings},
     splat::{Payload, Splat, SplatSet},
     volume::{
         Arrangement, Lattice, Samples, Scalar, TransferFunction, Volume,
@@ -102,6 +103,8 @@ pub struct PreparedScene {
     pub(super) forests: Vec<Forest>,
     /// The bricks at hand of the scene's volume in bricks.
     pub(super) shelf: Option<Shelf>,
+    /// What it takes to gather the scene's volume, from the first picture on that does.
+    pub(super) field: Option<Field>,
     /// Runs of candidates in all chunks.
     pub(super) runs: u32,
     /// Bytes of GPU memory that the scene holds.
@@ -124,6 +127,7 @@ impl PreparedScene {
             levels: Vec::new(),
             forests: Vec::new(),
             shelf: None,
+            field: None,
             runs: 0,
             bytes: 0,
             broken: false,
@@ -142,7 +146,11 @@ impl PreparedScene {
                 Item::Radiance(set) => prepared.add_splats(gpu, set, true, number),
                 Item::Hierarchy(hierarchy) => prepared.forests.push(Forest::new(gpu, hierarchy)),
                 Item::Scalar(set, _) => prepared.add_splats(gpu, set, false, number),
-                Item::Volume(volume, kernel, _) => prepared.add_volume(gpu, volume, kernel.clone())?,
+                // Others go the one way or the other when they are drawn.
+                Item::Volume(volume, kernel, _) if unsuited(volume, kernel).is_some() => {
+                    prepared.add_volume(gpu, volume, kernel.clone())?;
+                }
+                Item::Volume(..) => {}
                 Item::Bricks(bricks, kernel, _) => prepared.shelf = Some(Shelf::new(bricks, kernel)),
             }
         }
@@ -178,6 +186,64 @@ impl PreparedScene {
         Ok(())
     }
 
+    /// Makes the scene's volume ready to be gathered, and takes its samples from those that are scattered.
+    pub(super) fn update_field(&mut self, gpu: &Gpu, settings: &Settings) -> Result<()> {
+        let volume = self.scene.items.iter().find_map(|item| match item {
+            Item::Volume(volume, kernel, transfer) => Some((volume, kernel, transfer)),
+            _ => None,
+        });
+        let Some((volume, kernel, transfer)) = volume else { return Ok(()) };
+        let first = match settings.optics {
+            Optics::Maximum => EVERYTHING,
+            _ => first_visible(transfer, volume.range),
+        };
+        let field = match &mut self.field {
+            Some(field) => field,
+            None => {
+                let bytes = texture_bytes(gpu, volume);
+                gpu.check_memory(self.bytes + bytes)?;
+                self.bytes += bytes;
+                self.field.insert(Field::new(gpu, volume, kernel))
+            }
+        };
+        field.show(&first);
+        for chunk in &mut self.chunks {
+            let before = chunk.list_bytes();
+            let Origin::Lattice { selection, .. } = &mut chunk.origin else { continue };
+            if selection.forget(gpu) {
+                chunk.candidates = 0;
+                chunk.spans = spans(gpu, 0);
+                self.bytes = self.bytes - before + chunk.list_bytes();
+            }
+        }
+        self.number_runs();
+        Ok(())
+    }
+
+    /// Brings the samples of a volume that is scattered for the first time.
+    fn bring_lattice(&mut self, gpu: &Gpu) -> Result<()> {
+        if self.chunks.iter().any(|chunk| matches!(chunk.origin, Origin::Lattice { .. })) {
+            return Ok(());
+        }
+        for item in self.scene.items.clone() {
+            if let Item::Volume(volume, kernel, _) = &item {
+                gpu.check_memory(self.bytes + bytes_of(&item))?;
+                self.add_volume(gpu, volume, kernel.clone())?;
+            }
+        }
+        self.order_chunks();
+        Ok(())
+    }
+
+    /// Sums depend on the order of the splats, which must not depend on the views before.
+    fn order_chunks(&mut self) {
+        self.chunks.sort_by_key(|chunk| match &chunk.origin {
+            Origin::Splats { item, .. } => *item,
+            Origin::Lattice { .. } => usize::MAX - 1,
+            _ => usize::MAX,
+        });
+    }
+
     /// Lists the samples of lattices anew where others show something than did, or all of them are asked for.
     pub(super) fn update_selections(
         &mut self,
@@ -193,6 +259,7 @@ impl PreparedScene {
             _ => None,
         });
         let Some(shown) = shown else { return Ok(()) };
+        self.bring_lattice(gpu)?;
         for chunk in &mut self.chunks {
             let (source, before) = (chunk.source(view, false, &self.forests), chunk.list_bytes());
             let Origin::Lattice { selection, .. } = &mut chunk.origin else { continue };
@@ -324,11 +391,7 @@ impl PreparedScene {
         let mut levels = std::mem::take(&mut self.levels);
         let done = levels.iter_mut().try_for_each(|own| self.update_level(gpu, own, view, pixels));
         self.levels = levels;
-        // Sums depend on the order of the splats, which must not depend on the views before.
-        self.chunks.sort_by_key(|chunk| match &chunk.origin {
-            Origin::Splats { item, .. } => *item,
-            _ => usize::MAX,
-        });
+        self.order_chunks();
         self.number_runs();
         done
     }
@@ -504,13 +567,7 @@ impl Chunk {
             Origin::Bricks { bricks, kernel, slab, level } => {
                 let lattice = bricks.lattice(*level);
                 let [width, height, depth] = lattice.dims.map(|n| n as u32);
-                let kind = match bricks.header().scalar {
-                    Scalar::U8 => 0,
-                    Scalar::U16 => 1,
-                    Scalar::I16 => 2,
-                    Scalar::I32 => 3,
-                    Scalar::F32 => 4,
-                };
+                let kind = kind_of(bricks.header().scalar);
                 let source = Source::of_lattice(view, &lattice, kernel, isotropic);
                 let flags = source.flags | if slab.part == 1 { COARSE } else { 0 };
                 Source { lattice: [width, height, depth, kind], flags, ..source }
@@ -518,13 +575,7 @@ impl Chunk {
             Origin::Lattice { volume, kernel, slices: [first, low, high], .. } => {
                 let lattice = volume.drawn_lattice();
                 let [width, height, depth] = lattice.dims.map(|n| n as u32);
-                let kind = match (&volume.coefficients, &volume.samples) {
-                    (Some(_), _) | (None, Samples::F32(_)) => 4,
-                    (None, Samples::U8(_)) => 0,
-                    (None, Samples::U16(_)) => 1,
-                    (None, Samples::I16(_)) => 2,
-                    (None, Samples::I32(_)) => 3,
-                };
+                let kind = kind_of(volume.coefficients.as_ref().map_or(volume.samples.scalar(), |_| Scalar::F32));
                 Source {
                     lattice: [width, height, depth, kind],
                     slices: [*first, *low, *high, 0],

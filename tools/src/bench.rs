@@ -67,7 +67,7 @@ impl Bench {
             Ok::<_, Error>((milliseconds(start), stats))
         };
         let (first_ms, stats) = frame(0)?;
-        if stats.splats == 0 {
+        if stats.splats == 0 && stats.gathered == 0 {
             return Err(Error::NothingToDraw("the camera sees no splat that has opacity".into()).into());
         }
         let mut times = Vec::new();
@@ -80,7 +80,9 @@ impl Bench {
 
         let Times { min, median, max } = Times::of(times);
         let [width, height] = self.engine.size;
-        let culled = loaded.count.saturating_sub(stats.splats);
+        let is_gathered = stats.gathered > 0;
+        // Samples that are gathered are neither drawn as splats nor culled.
+        let culled = if is_gathered { 0 } else { loaded.count.saturating_sub(stats.splats) };
         if self.json {
             return output::json(&serde_json::json!({
                 "scene": self.scene.name(),
@@ -98,6 +100,7 @@ impl Bench {
                 "hidden": stats.hidden,
                 "bricks": describe::bricks(&stats),
                 "entries": stats.entries,
+                "gathered": stats.gathered,
                 "culled": culled,
                 "gpu_bytes": stats.gpu_bytes,
                 "camera": crate::camera::to_json(&camera(0)),
@@ -120,6 +123,9 @@ impl Bench {
             stats.passes,
             stats.gpu_bytes >> 20
         ))?;
+        if is_gathered {
+            output::line(format_args!("gathered in {} pairs of a tile and a sheet", stats.gathered))?;
+        }
         if stats.bricks > 0 {
             let (drawn, read, level, mib) = (stats.bricks, stats.read_bricks, stats.lambda, stats.brick_bytes >> 20);
             output::line(format_args!(

@@ -38,6 +38,9 @@ pub struct EngineFlags {
     /// How a volume's gradient across the picture is found.
     #[arg(long, value_enum, default_value_t = Gradient::Analytic)]
     gradient: Gradient,
+    /// How a volume's field is summed up; the picture is the same.
+    #[arg(long, value_enum, default_value_t = Evaluate::Auto)]
+    evaluate: Evaluate,
     /// Lights volumes, also where the transfer function has no light.
     #[arg(long, overrides_with = "no_shade")]
     shade: bool,
@@ -93,6 +96,17 @@ enum Engine {
 enum Gradient {
     Analytic,
     Central,
+}
+
+/// [`scene::Evaluate`] as a flag.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Evaluate {
+    /// Gather what can be gathered, scatter the rest.
+    Auto,
+    /// Sum up, for each pixel, the samples around its ray: for a volume on a Cartesian lattice, also among surfaces.
+    Gather,
+    /// Add each sample to the pixels that its splat covers.
+    Scatter,
 }
 
 impl EngineFlags {
@@ -159,6 +173,11 @@ impl EngineFlags {
         settings.gradient = match self.gradient {
             Gradient::Analytic => scene::Gradient::Analytic,
             Gradient::Central => scene::Gradient::Central,
+        };
+        settings.evaluate = match self.evaluate {
+            Evaluate::Auto => scene::Evaluate::Auto,
+            Evaluate::Gather => scene::Evaluate::Gather,
+            Evaluate::Scatter => scene::Evaluate::Scatter,
         };
         if self.no_shade {
             settings.volume_shade = Some(None);

@@ -138,6 +138,7 @@ impl Render {
             hidden = stats.hidden,
             entries = stats.entries,
             passes = stats.passes,
+            gathered = stats.gathered,
             "drawn"
         );
         if self.json {
@@ -151,6 +152,7 @@ impl Render {
                 "hidden": stats.hidden,
                 "bricks": describe::bricks(&stats),
                 "entries": stats.entries,
+                "gathered": stats.gathered,
                 "passes": stats.passes,
                 "gpu_bytes": stats.gpu_bytes,
                 "frame_ms": frame_ms,

@@ -3,7 +3,7 @@
 use crate::camera::{CameraFlags, Subject};
 use splatkit::{
     math::{Camera, Kernel},
-    scene::{Scene, Settings},
+    scene::{Evaluate, Scene, Settings},
     volume::{TransferFunction, Volume, reach::first_visible},
 };
 use std::sync::Arc;
@@ -53,6 +53,8 @@ pub struct Series {
 
 impl Case {
     pub fn new(drawn: impl Into<String>, scene: Scene, subject: Subject, settings: Settings, effective: u64) -> Self {
+        // The tables count splats.
+        let settings = Settings { evaluate: Evaluate::Scatter, ..settings };
         Self { drawn: drawn.into(), scene, subject, settings, distance: 1.0, effective, seed: None, series: None }
     }
 

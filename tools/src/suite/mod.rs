@@ -38,6 +38,7 @@ const OTHERS: &[&str] = &[
     "CameraFlags",
     "size",
     "gradient",
+    "evaluate",
     "shade",
     "no_shade",
     "sheet_thickness",

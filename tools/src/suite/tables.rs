@@ -143,6 +143,7 @@ fn case_json(Outcome { name, result }: &Outcome) -> Value {
         "splats": stats.splats,
         "hidden": stats.hidden,
         "entries": stats.entries,
+        "gathered": stats.gathered,
         "depth_passes": stats.passes,
         "frame_ms": times.json(),
         "fps": found.fps(),
