@@ -68,11 +68,11 @@ impl CpuRenderer {
         if !matches!(volume.lattice.arrangement, Arrangement::Cartesian) {
             return Err(not_drawn("body-centred and rectilinear lattices"));
         }
-        if volume.coefficients.is_some() {
-            return Err(not_drawn("sharp volumes"));
+        if volume.coefficients.is_some() && kernel.as_tensor().is_none() {
+            return Err(not_drawn("sharp volumes of radial kernels"));
         }
-        if field::deviation(kernel).is_none() {
-            return Err(not_drawn("kernels other than Gaussians that reach two samples"));
+        if field::weighting(kernel).is_none() {
+            return Err(not_drawn("kernels other than tensor products and Gaussians that reach two samples"));
         }
         let ranges = volume.drawn_ranges(kernel).into_owned();
         let (volume, kernel) = (volume.clone(), kernel.clone());
@@ -117,9 +117,9 @@ impl CpuRenderer {
             is_integrated: settings.classification == Classification::PreIntegrated,
             isosurfaces: if is_lit { transfer.isosurfaces.len() } else { 0 },
         };
-        let Some(sigma) = field::deviation(&self.kernel) else { return Err(not_drawn("this kernel")) };
+        let Some(weighting) = field::weighting(&self.kernel) else { return Err(not_drawn("this kernel")) };
         let planes = Planes { view: &view, sheets: &sheets, settings };
-        Ok(match Typed::new(&self.volume, sigma, tables.values[0]) {
+        Ok(match Typed::new(&self.volume, weighting, tables.values[0]) {
             Typed::U8(field) => self.draw(field, look, shown, &planes, transfer),
             Typed::U16(field) => self.draw(field, look, shown, &planes, transfer),
             Typed::I16(field) => self.draw(field, look, shown, &planes, transfer),

@@ -23,7 +23,7 @@ pub struct EngineFlags {
     #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "1280x720")]
     pub size: [u32; 2],
     /// What draws: the engine for GPUs, or that for processors, which needs no driver and draws a single volume on a Cartesian
-    /// lattice; auto takes the first where there is an adapter.
+    /// lattice; auto takes the first where there is an adapter, but for kernels that the second alone draws.
     #[arg(long, value_enum, default_value_t = Engine::Auto)]
     engine: Engine,
     /// The adapter: its number in `splatkit gpus`, a part of its name, or `software`. By default the fastest.
@@ -102,6 +102,8 @@ impl EngineFlags {
         match self.engine {
             Engine::Cpu => Ok(None),
             Engine::Gpu => self.gpu().map(Some),
+            // The GPU engine draws no tensor products; where an adapter is named, it says so.
+            Engine::Auto if self.gpu.is_none() && scene.tensor().is_some() => Ok(None),
             Engine::Auto => match self.gpu() {
                 Err(Error::NoAdapter(_)) if self.gpu.is_none() && CpuRenderer::new(scene).is_ok() => Ok(None),
                 gpu => gpu.map(Some),
