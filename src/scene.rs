@@ -267,7 +267,7 @@ impl Scene {
     }
 
     /// The sheets of a picture of this scene: 4/3 of a sample's spacing for volumes (a kernel of extent 2 meets at most four),
-    /// half of that where they pass through the samples, a few pixels for surfaces, the finer of both where the scene holds both. Of a volume
+    /// half of that where they pass through the samples, half a spacing where the kernel is linear, a few pixels for surfaces, the finer of both where the scene holds both. Of a volume
     /// in bricks the spacing is that of the levels drawn, between two of them in between.
     pub fn sheets(&self, view: &View, settings: &Settings) -> Sheets {
         let bounds = self.bounds();
@@ -304,9 +304,13 @@ impl Scene {
             match item {
                 Item::Volume(volume, kernel, _) if settings.sheet_thickness.is_none() => {
                     // Fields turn within few samples, whatever the kernel's extent; sharp ones within fewer.
-                    let is_sharp =
-                        volume.coefficients.is_some() || kernel.as_tensor().is_some_and(Tensor::interpolates);
-                    let most: f64 = if is_sharp { 2.0 / 3.0 } else { 4.0 / 3.0 };
+                    let most: f64 = match kernel.as_tensor() {
+                        // A kink at every plane of samples.
+                        Some(Tensor::Linear) => 0.5,
+                        Some(Tensor::CatmullRom) => 2.0 / 3.0,
+                        _ if volume.coefficients.is_some() => 2.0 / 3.0,
+                        _ => 4.0 / 3.0,
+                    };
                     let step = most.min(2.0 / 3.0 * kernel.extent) * volume.lattice.kernel_spacing();
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
                 }

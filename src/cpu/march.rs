@@ -2,7 +2,7 @@
 
 use super::{
     close::{Face, Look, Pixels, Sheet, Visible},
-    field::{Field, Sample},
+    field::{Field, Sample, offsets},
     skip::{Shown, TILE},
     vector::{Lanes, dot, dot_with, three},
 };
@@ -113,7 +113,11 @@ impl<T: Sample> March<'_, T> {
                 let (start, stop) = (self.planes[number], self.planes[number + 1]);
                 let begin = rays.enter.max(Lanes::splat(simd, start));
                 let end = rays.leave.min(Lanes::splat(simd, stop));
-                let mask = begin.simd_lt(end) & self.may_show(simd, rays, [start, stop]);
+                let inside = begin.simd_lt(end);
+                if !inside.any_true() {
+                    continue;
+                }
+                let mask = inside & self.may_show(simd, rays, [start, stop]);
                 if !mask.any_true() {
                     continue;
                 }
@@ -172,20 +176,24 @@ impl<T: Sample> March<'_, T> {
         (Face { value: value * per_value, across }, along)
     }
 
-    /// Whether something may show around three places of each ray in a sheet.
+    /// Whether something may show around three places of each ray in a sheet. Where the sheet is no thicker than the lattice's
+    /// steps, its middle alone is looked up: all of the sheet lies within half a step of there.
     #[inline(always)]
     fn may_show<S: Simd>(&self, simd: S, rays: &Rays<S>, [start, stop]: [f32; 2]) -> mask32x8<S> {
-        let [nx, ny, _] = self.dims;
+        let distances = [0.5 * (start + stop), start, stop];
+        let is_thin = self.look.frame.field_axes.iter().all(|axis| {
+            let [x, y, z, _] = *axis;
+            (x * x + y * y + z * z) * (stop - start) * (stop - start) <= 1.0
+        });
         let mut shows = [false; 8];
-        for distance in [start, 0.5 * (start + stop), stop] {
-            let place = Self::place(rays, distance);
-            let [x, y, z]: [[f32; 8]; 3] = three!(I => {
+        for distance in &distances[..if is_thin { 1 } else { 3 }] {
+            let place = Self::place(rays, *distance);
+            let nearest = three!(I => {
                 let last = Lanes::splat(simd, self.dims[I] as f32 - 1.0);
-                (place[I] + 0.5).floor().max(Lanes::splat(simd, 0.0)).min(last).into()
+                (place[I] + 0.5).floor().max(Lanes::splat(simd, 0.0)).min(last)
             });
-            for lane in 0..8 {
-                let sample = (z[lane] as usize * ny + y[lane] as usize) * nx + x[lane] as usize;
-                shows[lane] |= self.shown.samples[sample];
+            for (shows, sample) in shows.iter_mut().zip(offsets(self.dims, nearest)) {
+                *shows |= self.shown.samples[sample];
             }
         }
         let bits = shows.iter().rev().fold(0, |bits, shows| bits << 1 | u64::from(*shows));

@@ -38,7 +38,12 @@ impl<'a> Product<'a> {
 
     /// The value at a point of view space, and the gradient there.
     pub fn at(&self, point: DVec3) -> (f64, DVec3) {
-        let steps = self.to_steps * (point - self.origin);
+        let (value, slopes) = self.at_steps(self.to_steps * (point - self.origin));
+        (value, self.to_steps.transpose() * slopes)
+    }
+
+    /// The value at a place in steps, and its change a step along each axis.
+    pub fn at_steps(&self, steps: DVec3) -> (f64, DVec3) {
         let [nx, ny, _] = self.volume.lattice.dims;
         let [x, y, z] = [0, 1, 2].map(|axis| self.taps(steps[axis], axis));
         let (mut value, mut slopes) = (0.0, DVec3::ZERO);
@@ -51,7 +56,7 @@ impl<'a> Product<'a> {
                 }
             }
         }
-        (value, self.to_steps.transpose() * slopes)
+        (value, slopes)
     }
 
     /// The samples around a place along an axis, beyond the lattice's ends their mirror images.

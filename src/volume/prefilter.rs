@@ -13,6 +13,8 @@ use rayon::prelude::*;
 const POLE: f32 = -0.267_949_2;
 /// One over the product of the filter's middle weights.
 const GAIN: f32 = 6.0;
+/// Rows that are filtered side by side.
+const LINES: usize = 8;
 /// Samples from which the first forward term is summed. Of what lies beyond, 10⁻¹⁰ would be left.
 const HORIZON: usize = 18;
 
@@ -21,7 +23,9 @@ pub fn cubic(samples: &Samples, dims: [usize; 3]) -> Vec<f32> {
     let [nx, ny, nz] = dims;
     let mut values: Vec<f32> = each_type!(samples, own => own.par_iter().map(|value| *value as f32).collect());
     values.par_chunks_mut(nx * ny).for_each(|slice| {
-        slice.chunks_mut(nx).for_each(along_row);
+        let mut rows = slice.chunks_exact_mut(LINES * nx);
+        rows.by_ref().for_each(|rows| along_rows::<LINES>(rows, nx));
+        rows.into_remainder().chunks_mut(nx).for_each(|row| along_rows::<1>(row, nx));
         across_rows(&mut slice.chunks_mut(nx).collect::<Vec<_>>());
     });
     // The rows of all slices that lie behind each other.
@@ -45,23 +49,33 @@ fn turn() -> f32 {
     POLE / (POLE * POLE - 1.0)
 }
 
-/// Filters a row along itself.
-fn along_row(row: &mut [f32]) {
-    let count = row.len();
-    if count < 2 {
+/// Filters rows of `count` values along themselves. A term waits for the one before it; those of several rows do not.
+fn along_rows<const ROWS: usize>(values: &mut [f32], count: usize) {
+    let mut rows: [&mut [f32]; ROWS] = std::array::from_fn(|_| Default::default());
+    rows.iter_mut().zip(values.chunks_exact_mut(count)).for_each(|(own, row)| *own = row);
+    if count < 2 || rows.iter().any(|row| row.len() != count) {
         return;
     }
-    let mut last: f32 = first_terms(count).map(|(at, factor)| factor * row[at]).sum();
-    row[0] = last;
-    for value in &mut row[1..] {
-        last = POLE * last + GAIN * *value;
-        *value = last;
+    let mut last = [0f32; ROWS];
+    for (last, row) in last.iter_mut().zip(&mut rows) {
+        *last = first_terms(count).map(|(at, factor)| factor * row[at]).sum();
+        row[0] = *last;
     }
-    last = turn() * (last + POLE * row[count - 2]);
-    row[count - 1] = last;
-    for value in row[..count - 1].iter_mut().rev() {
-        last = POLE * (last - *value);
-        *value = last;
+    for at in 1..count {
+        for (last, row) in last.iter_mut().zip(&mut rows) {
+            *last = POLE * *last + GAIN * row[at];
+            row[at] = *last;
+        }
+    }
+    for (last, row) in last.iter_mut().zip(&mut rows) {
+        *last = turn() * (*last + POLE * row[count - 2]);
+        row[count - 1] = *last;
+    }
+    for at in (0..count - 1).rev() {
+        for (last, row) in last.iter_mut().zip(&mut rows) {
+            *last = POLE * (*last - row[at]);
+            row[at] = *last;
+        }
     }
 }
 

@@ -46,7 +46,7 @@ pub struct EngineFlags {
     #[arg(long, overrides_with = "shade")]
     no_shade: bool,
     /// Largest thickness of a sheet, in world units; by default 4/3 of a volume's sample spacing, half of that where it is
-    /// sharp.
+    /// sharp or its kernel catmull-rom, half a spacing where the kernel is linear.
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     sheet_thickness: Option<f64>,
     /// Hierarchies, volumes in bricks: the most pixels that a splat may be wide at half its height, but for those of the
