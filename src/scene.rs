@@ -5,7 +5,7 @@ mod numbers;
 use crate::{
     Error, Result,
     hierarchy::{Detail, Hierarchy},
-    math::{Bounds, Kernel, Profile, Sheets, View},
+    math::{Bounds, Kernel, Profile, Sheets, Tensor, View},
     splat::{FOOTPRINT_BLUR, Payload, STEP_BACK, SplatSet},
     volume::{
         Arrangement, Lattice, Shade, TransferFunction, Volume,
@@ -93,6 +93,14 @@ impl Scene {
         Ok(scene)
     }
 
+    /// The function along the axes of a lattice, where a kernel of the scene is a product of them. The GPU engine draws none.
+    pub fn tensor(&self) -> Option<Tensor> {
+        self.items.iter().find_map(|item| match item {
+            Item::Volume(_, kernel, _) | Item::Bricks(_, kernel, _) => kernel.as_tensor(),
+            Item::Radiance(_) | Item::Hierarchy(_) | Item::Scalar(..) => None,
+        })
+    }
+
     /// The box around everything that can be seen, footprints included.
     pub fn bounds(&self) -> Bounds {
         self.items.iter().fold(Bounds::EMPTY, |all, item| all.union(item.bounds()))
@@ -161,6 +169,9 @@ impl Scene {
                 Item::Radiance(_) | Item::Hierarchy(_) => {}
                 Item::Volume(volume, kernel, _) => {
                     let is_gaussian = matches!(kernel.profile, Profile::Gaussian(_));
+                    if let Some(tensor) = kernel.as_tensor() {
+                        check_tensor(tensor, &volume.lattice, before).map_err(Error::Argument)?;
+                    }
                     if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_)) && !is_gaussian && !before {
                         return wrong(
                             "a rectilinear volume takes a Gaussian kernel, unless it is classified before".into(),
@@ -256,7 +267,7 @@ impl Scene {
     }
 
     /// The sheets of a picture of this scene: 4/3 of a sample's spacing for volumes (a kernel of extent 2 meets at most four),
-    /// half of that where they are sharp, a few pixels for surfaces, the finer of both where the scene holds both. Of a volume
+    /// half of that where they pass through the samples, half a spacing where the kernel is linear, a few pixels for surfaces, the finer of both where the scene holds both. Of a volume
     /// in bricks the spacing is that of the levels drawn, between two of them in between.
     pub fn sheets(&self, view: &View, settings: &Settings) -> Sheets {
         let bounds = self.bounds();
@@ -293,7 +304,13 @@ impl Scene {
             match item {
                 Item::Volume(volume, kernel, _) if settings.sheet_thickness.is_none() => {
                     // Fields turn within few samples, whatever the kernel's extent; sharp ones within fewer.
-                    let most: f64 = if volume.coefficients.is_some() { 2.0 / 3.0 } else { 4.0 / 3.0 };
+                    let most: f64 = match kernel.as_tensor() {
+                        // A kink at every plane of samples.
+                        Some(Tensor::Linear) => 0.5,
+                        Some(Tensor::CatmullRom) => 2.0 / 3.0,
+                        _ if volume.coefficients.is_some() => 2.0 / 3.0,
+                        _ => 4.0 / 3.0,
+                    };
                     let step = most.min(2.0 / 3.0 * kernel.extent) * volume.lattice.kernel_spacing();
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
                 }
@@ -310,6 +327,19 @@ impl Scene {
         }
         Sheets::new(view, [near, far], thickness, pixels)
     }
+}
+
+/// Says in words why a tensor product cannot be the kernel of a lattice's samples, where these are classified `before` they are
+/// interpolated or after.
+fn check_tensor(tensor: Tensor, lattice: &Lattice, before: bool) -> Result<(), String> {
+    let name = tensor.name();
+    if lattice.arrangement != Arrangement::Cartesian {
+        return Err(format!("the kernel {name} takes a Cartesian lattice: it is a product along the lattice's axes"));
+    }
+    if before {
+        return Err(format!("the kernel {name} is classified after interpolation, in image-aligned sheets"));
+    }
+    Ok(())
 }
 
 /// The width of a sample's footprint at half its height, in steps between samples: that of a B-spline is 1.8, of the usual

@@ -10,6 +10,7 @@ use glam::DVec3;
 use scenes::{Case, methods};
 use splatkit::{
     engine::{AdapterChoice, Budget, Gpu, Renderer},
+    math::{Kernel, Tensor},
     picture::Picture,
     reference,
     scene::{Classification, Evaluate, Item, Mode, Optics, Order, Scene, Settings},
@@ -658,6 +659,19 @@ fn thousands_of_splats_in_one_bin() {
     let agreement = psnr(&drawn(&case, Budget::default()), &expected);
     println!("{}: {agreement:.1} dB", case.name);
     assert!(agreement > 50.0, "{agreement:.1} dB");
+}
+
+/// Tensor products are for the CPU engine.
+#[test]
+fn kernels_that_are_not_drawn_are_named() {
+    let case = scenes::blobs_analytic();
+    let splatkit::scene::Item::Volume(volume, _, transfer) = &case.scene.items[0] else { panic!("a volume") };
+    let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
+    for tensor in Tensor::ALL {
+        let scene = Scene::new().with_volume(volume.clone(), Kernel::tensor(tensor), transfer.clone());
+        let error = Renderer::new(&gpu).prepare(&scene).expect_err("no such kernels").to_string();
+        assert!(error.contains(tensor.name()) && error.contains("the CPU engine does"), "{error}");
+    }
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::{
     close::{Face, Layer, Visible},
-    field::{self, Typed},
+    field::{self, Typed, Weighting},
     plan::Plan,
     rays::Rays,
     skip::Shown,
@@ -49,12 +49,12 @@ pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
     if volume.lattice.arrangement != Arrangement::Cartesian {
         return Some("body-centred and rectilinear lattices");
     }
-    if volume.coefficients.is_some() {
-        return Some("sharp volumes");
+    if volume.coefficients.is_some() && kernel.as_tensor().is_none() {
+        return Some("sharp volumes of radial kernels");
     }
-    match field::deviation(kernel) {
-        None => Some("kernels other than Gaussians that reach two samples"),
-        Some(sigma) if sigma < LEAST_DEVIATION => Some("kernels much narrower than a sample"),
+    match field::weighting(kernel) {
+        None => Some("kernels other than tensor products and Gaussians that reach two samples"),
+        Some(Weighting::Gaussian(sigma)) if sigma < LEAST_DEVIATION => Some("kernels much narrower than a sample"),
         Some(_) => None,
     }
 }
@@ -63,6 +63,8 @@ pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
 pub struct Gather<'a> {
     pub field: Typed<'a>,
     pub shown: &'a Shown,
+    /// Sheets are no thicker than the lattice's steps: all of one lies within half a step of its middle.
+    pub is_thin: bool,
     pub visible: &'a Visible,
 }
 
@@ -104,13 +106,16 @@ impl Gather<'_> {
         if !mask.any_true() {
             return None;
         }
-        // What may show is looked up in the middle and on both planes.
-        if last.shown_on != sheet {
-            last.shows = self.shown.at(simd, rays.place(start));
+        let mut shows = self.shown.at(simd, rays.place(0.5 * (start + stop)));
+        if !self.is_thin {
+            // Thicker sheets are looked up on both planes too.
+            if last.shown_on != sheet {
+                last.shows = self.shown.at(simd, rays.place(start));
+            }
+            shows |= last.shows;
+            (last.shown_on, last.shows) = (sheet + 1, self.shown.at(simd, rays.place(stop)));
+            shows |= last.shows;
         }
-        let front_shows = last.shows;
-        (last.shown_on, last.shows) = (sheet + 1, self.shown.at(simd, rays.place(stop)));
-        let shows = front_shows | self.shown.at(simd, rays.place(0.5 * (start + stop))) | last.shows;
         let mask = mask & mask32x8::from_bitmask(simd, shows);
         if !mask.any_true() {
             return None;

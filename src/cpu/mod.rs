@@ -214,6 +214,10 @@ impl CpuRenderer {
             Some(what) if settings.evaluate == Evaluate::Gather => {
                 Err(Error::Argument(format!("{what} can't be gathered; scatter instead, or leave it to the engine")))
             }
+            // Sections of tensor products are not known.
+            Some(what) if let Some(tensor) = self.scene.tensor() => {
+                Err(Error::Argument(format!("the kernel {} does not draw {what}", tensor.name())))
+            }
             obstacle => Ok(obstacle.is_none()),
         }
     }
@@ -234,7 +238,7 @@ impl CpuRenderer {
                 let (Item::Volume(volume, kernel, transfer), Prepared::Volume { ranges, .. }) = (item, prepared) else {
                     continue;
                 };
-                let Some(sigma) = field::deviation(kernel) else { continue };
+                let Some(weighting) = field::weighting(kernel) else { continue };
                 let first = match plan.optics {
                     Optics::Maximum => EVERYTHING,
                     _ => first_visible(transfer, volume.range),
@@ -243,8 +247,13 @@ impl CpuRenderer {
                 let (_, shown) = self.shown.get_or_insert_with(|| (first, Shown::new(volume, ranges, &first)));
                 let shown: &Shown = shown;
                 marks = shown.sheets_of_tiles(volume, plan.view, &outline.sheets);
-                let field = Typed::new(volume, sigma, plan.tables.values[0]);
-                gather = Some(Gather { field, shown, visible: &visible });
+                let field = Typed::new(volume, weighting, plan.tables.values[0]);
+                let is_thin = plan
+                    .frame
+                    .field_axes
+                    .iter()
+                    .all(|[x, y, z, _]| f64::from(x * x + y * y + z * z).sqrt() * outline.sheets.step <= 1.0);
+                gather = Some(Gather { field, shown, is_thin, visible: &visible });
             }
             clock.step("skip");
         }

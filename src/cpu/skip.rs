@@ -163,3 +163,23 @@ impl Shown {
 fn bit_of([x, y, z]: [usize; 3]) -> usize {
     (z % BLOCK * BLOCK + y % BLOCK) * BLOCK + x % BLOCK
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volume::{Lattice, Samples};
+
+    #[test]
+    fn bits_are_in_the_order_of_the_samples() {
+        let (dims, odd) = ([5, 3, 6], |sample: usize| sample * sample % 7 == 2);
+        let volume = Volume::new(Lattice::with_spacing(dims, DVec3::ONE), Samples::U8(vec![0; 90])).unwrap();
+        let ranges: Vec<[u8; 2]> = (0..90).map(|sample| [0, if odd(sample) { 200 } else { 10 }]).collect();
+        let shown = Shown::new(&volume, &ranges, &[100; 256]);
+        for (word, bits) in shown.bits().into_iter().enumerate() {
+            for bit in 0..32 {
+                let sample = 32 * word + bit;
+                assert_eq!(bits >> bit & 1 != 0, sample < 90 && odd(sample), "{sample}");
+            }
+        }
+    }
+}

@@ -14,6 +14,7 @@ use crate::{
     scene::{Item, Scene, Settings},
     volume::{Scalar, Volume},
 };
+use rayon::prelude::*;
 use std::sync::Arc;
 use wgpu::BufferUsages as Usage;
 
@@ -354,10 +355,4 @@ mod tests {
         assert_eq!(found, [1, 32, 64, 95]);
     }
 
-    #[test]
-    fn samples_are_packed_first_to_last() {
-        let mut samples = vec![false; 40];
-        (samples[0], samples[31], samples[33]) = (true, true, true);
-        assert_eq!(packed(&samples), [1 | 1 << 31, 2]);
-    }
 }

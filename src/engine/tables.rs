@@ -60,7 +60,8 @@ impl Tables {
         starts[1] = entries.len() as u32;
         let (first, per_magnitude) = factors(transfer, &mut entries);
         starts[2] = entries.len() as u32;
-        if let Some(kernel) = kernel.filter(|kernel| !matches!(kernel.profile, Profile::Gaussian(_))) {
+        let is_radial_table = |kernel: &&Kernel| !matches!(kernel.profile, Profile::Gaussian(_) | Profile::Tensor(_));
+        if let Some(kernel) = kernel.filter(is_radial_table) {
             entries.extend(radial(kernel));
             starts[3] = entries.len() as u32;
             entries.extend(sections(kernel));

@@ -11,6 +11,7 @@ use super::{
 };
 use crate::{
     Error, Result,
+    cpu::gather::unsuited,
     hierarchy::{Cut, Levels},
     math::{Bounds, Kernel, View},
     scene::{Item, Optics, Scene, Settings},
@@ -121,6 +122,12 @@ impl PreparedScene {
     /// Uploads a scene. The scene's splats and samples are shared with the caller's, not copied.
     pub(super) fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
         scene.validate()?;
+        if let Some(tensor) = scene.tensor() {
+            let name = tensor.name();
+            return Err(Error::Argument(format!(
+                "the GPU engine does not draw the kernel {name} yet; the CPU engine does"
+            )));
+        }
         let mut prepared = Self {
             scene: scene.clone(),
             chunks: Vec::new(),

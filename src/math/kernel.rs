@@ -1,4 +1,5 @@
-//! The reconstruction kernel of lattice samples: a radial function, in units of the sample spacing.
+//! The reconstruction kernel of lattice samples: a radial function in units of the sample spacing, or a product of functions
+//! along the lattice's axes.
 
 use crate::{Error, Result};
 use std::{f64::consts::PI, sync::Arc};
@@ -15,13 +16,15 @@ pub enum Profile {
     Hann,
     /// Values at evenly spaced radii from 0 to the extent, linear in between.
     Table(Arc<[f64]>),
+    /// A product of three functions, one of the steps along each axis of a Cartesian lattice.
+    Tensor(Tensor),
 }
 
-/// A radial kernel that ends at `extent`.
+/// A kernel that ends at `extent`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kernel {
     pub profile: Profile,
-    /// Radius of the footprint, in sample spacings.
+    /// Radius of the footprint, in sample spacings; of a tensor product, half its width along each axis.
     pub extent: f64,
 }
 
@@ -76,6 +79,19 @@ impl Kernel {
         Ok(kernel)
     }
 
+    /// A tensor-product kernel, whose extent is its own.
+    pub fn tensor(tensor: Tensor) -> Self {
+        Self { profile: Profile::Tensor(tensor), extent: tensor.extent() }
+    }
+
+    /// The function along the axes, where the kernel is a product of them.
+    pub fn as_tensor(&self) -> Option<Tensor> {
+        match self.profile {
+            Profile::Tensor(tensor) => Some(tensor),
+            _ => None,
+        }
+    }
+
     fn with_extent(profile: Profile, extent: f64) -> Result<Self> {
         // Below 0.71 samples (half the diagonal of a face) a ray can pass between the samples of a lattice.
         if !(0.71..=Self::MAX_EXTENT).contains(&extent) {
@@ -92,6 +108,10 @@ impl Kernel {
         match &self.profile {
             Profile::Gaussian(sigma) => Self::gaussian(*sigma, self.extent),
             Profile::Table(values) => Self::table(values.to_vec(), self.extent),
+            Profile::Tensor(tensor) if self.extent != tensor.extent() => {
+                let (name, own, found) = (tensor.name(), tensor.extent(), self.extent);
+                Err(Error::Argument(format!("the extent of the kernel {name} is {own} samples, found {found}")))
+            }
             profile => Self::with_extent(profile.clone(), self.extent),
         }
         .map(|_| ())
@@ -110,7 +130,8 @@ impl Kernel {
         self.extent / self.unit()
     }
 
-    /// The value at distance `r`, in sample spacings; 0 beyond the extent, 1 at the sample unless a table says otherwise.
+    /// The value at distance `r`, in sample spacings; 0 beyond the extent, 1 at the sample unless a table says otherwise. Of a
+    /// tensor product this is the function along one axis.
     pub fn value(&self, r: f64) -> f64 {
         if r > self.extent {
             return 0.0;
@@ -133,6 +154,7 @@ impl Kernel {
                 let low = (at as usize).min(last.saturating_sub(1));
                 values[low] + (values[last.min(low + 1)] - values[low]) * (at - low as f64)
             }
+            Profile::Tensor(tensor) => tensor.value(r),
         }
     }
 
@@ -142,13 +164,14 @@ impl Kernel {
             Profile::Gaussian(_) | Profile::BSpline => false,
             Profile::Hann => self.extent > 1.43, // the filter's first zero
             Profile::Table(values) => values.iter().any(|value| *value < 0.0),
+            Profile::Tensor(tensor) => *tensor == Tensor::CatmullRom,
         }
     }
 
     /// What kernels must add up to at a point for it to have a value: where lobes of both signs all but cancel, at the edge
-    /// of what is drawn, their mean would be of any size.
+    /// of what is drawn, their mean would be of any size. Tensor products add up to 1 everywhere.
     pub fn least_sum(&self) -> f64 {
-        if self.is_signed() { 0.3 * self.integral() } else { 1e-4 }
+        if self.is_signed() && self.as_tensor().is_none() { 0.3 * self.integral() } else { 1e-4 }
     }
 
     /// ∫ of the kernel over space, in cubed sample spacings: what its copies at every sample of a Cartesian lattice sum to
@@ -156,6 +179,9 @@ impl Kernel {
     pub fn integral(&self) -> f64 {
         if let Profile::Gaussian(sigma) = self.profile {
             return (2.0 * PI).powf(1.5) * sigma.powi(3) * -(-0.5 * self.radius().powi(2)).exp_m1();
+        }
+        if self.as_tensor().is_some() {
+            return 1.0;
         }
         // Simpson's rule over the radius.
         let parts = 4096;
@@ -169,9 +195,125 @@ impl Kernel {
     }
 }
 
+/// A function of the steps along one axis of a Cartesian lattice. The kernel is the product of three of them; its copies at
+/// all samples add up to 1 everywhere.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Tensor {
+    /// 1 − |x|: trilinear interpolation, of two samples along each axis.
+    Linear,
+    /// The cubic of Catmull and Rom ("A class of local interpolating splines", 1974), which is that of Keys ("Cubic convolution
+    /// interpolation for digital image processing", 1981) with a = −½. It passes through the samples; its slope is continuous.
+    CatmullRom,
+    /// The uniform cubic B-spline: its curvature is continuous. It smooths the samples, unless the volume is made sharp for it
+    /// ([`Volume::sharpened`](crate::volume::Volume::sharpened)).
+    CubicBSpline,
+}
+
+impl Tensor {
+    pub const ALL: [Self; 3] = [Self::Linear, Self::CatmullRom, Self::CubicBSpline];
+
+    /// The name, as the command spells it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::CatmullRom => "catmull-rom",
+            Self::CubicBSpline => "cubic-b-spline",
+        }
+    }
+
+    /// Where the function ends, in steps.
+    pub fn extent(self) -> f64 {
+        if self == Self::Linear { 1.0 } else { 2.0 }
+    }
+
+    /// Whether the field passes through the samples.
+    pub fn interpolates(self) -> bool {
+        self != Self::CubicBSpline
+    }
+
+    /// The largest sum of the weights' magnitudes at a place in space: how much further than the samples the field may reach.
+    pub fn lebesgue(self) -> f64 {
+        // Half-way between samples the cubic of Catmull and Rom has the weights −1/16, 9/16, 9/16 and −1/16.
+        if self == Self::CatmullRom { 1.25f64.powi(3) } else { 1.0 }
+    }
+
+    /// The function at x steps from the sample.
+    pub fn value(self, x: f64) -> f64 {
+        let x = x.abs();
+        match self {
+            Self::Linear => (1.0 - x).max(0.0),
+            Self::CatmullRom if x < 1.0 => (1.5 * x - 2.5) * x * x + 1.0,
+            Self::CatmullRom if x < 2.0 => ((2.5 - 0.5 * x) * x - 4.0) * x + 2.0,
+            Self::CubicBSpline if x < 1.0 => (0.5 * x - 1.0) * x * x + 2.0 / 3.0,
+            Self::CubicBSpline if x < 2.0 => (2.0 - x).powi(3) / 6.0,
+            Self::CatmullRom | Self::CubicBSpline => 0.0,
+        }
+    }
+
+    /// The derivative of the function at x steps from the sample; where it has a kink, that of the side of larger x.
+    pub fn slope(self, x: f64) -> f64 {
+        let (r, sign) = (x.abs(), 1f64.copysign(x));
+        match self {
+            Self::Linear if (0.0..1.0).contains(&x) => -1.0,
+            Self::Linear if (-1.0..0.0).contains(&x) => 1.0,
+            Self::CatmullRom if r < 1.0 => sign * (4.5 * r - 5.0) * r,
+            Self::CatmullRom if r < 2.0 => sign * ((5.0 - 1.5 * r) * r - 4.0),
+            Self::CubicBSpline if r < 1.0 => sign * (1.5 * r - 2.0) * r,
+            Self::CubicBSpline if r < 2.0 => sign * -0.5 * (2.0 - r).powi(2),
+            Self::Linear | Self::CatmullRom | Self::CubicBSpline => 0.0,
+        }
+    }
+
+    /// The weights of four successive samples at a place that lies t (0 to 1) steps behind the second of them, as polynomials:
+    /// for each sample the factors of 1, t, t² and t³.
+    pub fn polynomials(self) -> [[f64; 4]; 4] {
+        match self {
+            Self::Linear => [[0.0; 4], [1.0, -1.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0; 4]],
+            Self::CatmullRom => {
+                [[0.0, -0.5, 1.0, -0.5], [1.0, 0.0, -2.5, 1.5], [0.0, 0.5, 2.0, -1.5], [0.0, 0.0, -0.5, 0.5]]
+            }
+            Self::CubicBSpline => {
+                [[1.0, -3.0, 3.0, -1.0], [4.0, 0.0, -6.0, 3.0], [1.0, 3.0, 3.0, -3.0], [0.0, 0.0, 0.0, 1.0]]
+                    .map(|row| row.map(|factor| factor / 6.0))
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn functions_along_an_axis_add_up_to_one_and_slopes_are_theirs() {
+        for tensor in Tensor::ALL {
+            for step in 0..=64 {
+                let t = f64::from(step) / 64.0;
+                let own = tensor.polynomials().map(|[a, b, c, d]| ((d * t + c) * t + b) * t + a);
+                let by_value = [t + 1.0, t, t - 1.0, t - 2.0].map(|x| tensor.value(x));
+                assert!((own.iter().sum::<f64>() - 1.0).abs() < 1e-15, "{tensor:?} at {t}: {own:?}");
+                for (own, value) in own.iter().zip(by_value) {
+                    assert!((own - value).abs() < 1e-15, "{tensor:?} at {t}: {own} {value}");
+                }
+                assert!(own.iter().map(|weight| weight.abs()).sum::<f64>().powi(3) <= tensor.lebesgue() + 1e-12);
+            }
+            for x in [-2.3, -1.7, -1.2, -0.6, -0.1, 0.2, 0.5, 0.9, 1.1, 1.8, 2.1] {
+                let step = 1e-6;
+                let expected = (tensor.value(x + step) - tensor.value(x - step)) / (2.0 * step);
+                assert!((tensor.slope(x) - expected).abs() < 1e-8, "{tensor:?} at {x}: {expected}");
+            }
+            // The field passes through the samples: 1 at its own, 0 at the others.
+            let at_samples = [0.0, 1.0, 2.0].map(|x| tensor.value(x));
+            assert_eq!(at_samples == [1.0, 0.0, 0.0], tensor.interpolates());
+            let kernel = Kernel::tensor(tensor);
+            kernel.validate().unwrap();
+            assert!(kernel.integral() == 1.0 && kernel.least_sum() < 1e-3);
+            assert!(Kernel { extent: 1.5, ..kernel }.validate().unwrap_err().to_string().contains(tensor.name()));
+        }
+        // By hand: ⅔ and ⅙; 9/16 and −1/16.
+        assert_eq!([0.0, 1.0].map(|x| Tensor::CubicBSpline.value(x)), [2.0 / 3.0, 1.0 / 6.0]);
+        assert_eq!([0.5, 1.5].map(|x| Tensor::CatmullRom.value(x)), [0.5625, -0.0625]);
+    }
 
     #[test]
     fn values_by_hand() {

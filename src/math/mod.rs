@@ -10,5 +10,5 @@ pub(crate) mod weld;
 
 pub use camera::{Bounds, Camera, Projection, View};
 pub(crate) use eigen::eigen;
-pub use kernel::{Kernel, Profile};
+pub use kernel::{Kernel, Profile, Tensor};
 pub use sheets::Sheets;

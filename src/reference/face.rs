@@ -18,6 +18,11 @@ pub(super) struct Face {
 }
 
 impl Face {
+    /// A field that is known there.
+    pub fn new(value: f64, gradient: DVec3) -> Self {
+        Self { weight: 1.0, value, weight_gradient: DVec3::ZERO, value_gradient: gradient }
+    }
+
     /// Adds a kernel at a distance along the ray.
     pub fn add(&mut self, sample: &Sample, center: DVec3, crossing: &Crossing, ray: &Ray, s: f64) {
         let (h, gradient) = crossing.at(s);

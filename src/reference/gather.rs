@@ -33,6 +33,8 @@ pub(super) fn gather<'a>(scene: &'a Scene, view: &View, before: Option<Before>) 
                 let before = before.map(|before| (before, transfer));
                 kernels.extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, before, view)));
             }
+            // No radial functions: its field is asked for point by point.
+            Item::Volume(_, kernel, _) if kernel.as_tensor().is_some() => {}
             Item::Volume(volume, kernel, transfer) => {
                 let before = before.map(|before| (before, transfer));
                 from_volume(&mut kernels, volume, kernel, before, view);

@@ -67,6 +67,9 @@ impl Frame<'_> {
         if self.field.is_none() {
             return faces;
         }
+        if let Some(product) = &self.product {
+            return self.planes.iter().map(|&plane| product.face(ray, plane)).collect();
+        }
         for kernel in kernels {
             let Load::Sample(sample) = &kernel.load else { continue };
             let Some(crossing) = kernel.cross(ray) else { continue };
@@ -108,7 +111,11 @@ impl Frame<'_> {
         let layer = |k: usize| {
             let [from, to] = self.span(k);
             let pieces = clip::intersection(&held, Some([from, to]));
-            let mean = &sheets[k].mean;
+            let mean = match &self.product {
+                Some(_) if pieces.is_empty() => return None,
+                Some(product) => product.mean(ray, [from, to]),
+                None => sheets[k].mean,
+            };
             let filling = if field.lattice.is_some() { 1.0 } else { (mean.weight / (to - from)).min(1.0) };
             let layer = Layer {
                 span: [from, to],

@@ -31,6 +31,11 @@
 //! sample. Scattered samples have their own w and slope, which is g in kernel space as it is before splats are widened
 //! (Franke & Nielson 1980: nodal functions blended by weights). A flat one, whose slope has no meaning in space, has g = 0.
 //!
+//! **Tensor products** ([`Tensor`](crate::math::Tensor)). On Cartesian lattices the field may instead be
+//! f(x) = Σ t(p₁ − i)·t(p₂ − j)·t(p₃ − k)·f_ijk, p the place of x in steps of the lattice and t a function of one number: linear, that of
+//! Catmull & Rom (1974), or the cubic B-spline. Weights add up to 1. The samples go on mirrored at the outermost ones, without end
+//! (those of an axis of one sample all are that one). Such a field is classified after interpolation.
+//!
 //! # Sheets ([`Mode::Sheets`])
 //! Kernels are cut at the faces, as by Mueller & Crawfis (1998), and the field is classified after interpolation (Mueller,
 //! Möller & Crawfis 1999), inside the sheets.
@@ -40,7 +45,8 @@
 //! Q/P; none where P ≤ 10⁻⁴ (likewise). A face without a value takes f̄. The gradient at a face is that of Q/P in space,
 //! (∇Q − (Q/P)·∇P)/P, derived without regard to the footprints' rims. With central differences its parts across the picture
 //! are instead half the difference of the face's values in the neighbouring pixels: one-sided where a neighbour has none, 0
-//! where neither has one. A face without a value has no gradient.
+//! where neither has one. A face without a value has no gradient. A tensor product has f̄ = ∫f ds over the sheet's thickness, and at
+//! faces f and ∇f.
 //!
 //! **Values.** u counts from 0 at the front face to 1 at the back. [`Classification::PreIntegrated`]: f(u) is the parabola with
 //! the faces' values and the mean f̄. [`Classification::Post`]: f̄. The gradient g(u) across the ray is linear between the
@@ -104,6 +110,7 @@ mod gather;
 mod images;
 mod kernel;
 mod mesh;
+mod product;
 mod profile;
 mod quadrature;
 mod ray;
@@ -131,6 +138,7 @@ use field::Field;
 use gather::Before;
 use glam::{DVec2, DVec3};
 use kernel::Kernel;
+use product::Product;
 use ray::Ray;
 use rayon::prelude::*;
 use sheet::Light;
@@ -215,6 +223,8 @@ struct Frame<'a> {
     kernels: Vec<Kernel<'a>>,
     /// A field that is classified after interpolation.
     field: Option<Field<'a>>,
+    /// The same where its kernels are tensor products.
+    product: Option<Product<'a>>,
     /// Where the samples of a volume lie.
     lattice: Option<&'a Lattice>,
     /// The light on radiance.
@@ -256,6 +266,7 @@ impl<'a> Frame<'a> {
             near: nearest(scene, &view, settings),
             kernels: gather::gather(flat, &view, before.then_some(Before { lit: shade.is_some() })),
             field,
+            product: Product::of(flat, &view),
             lattice: samples.and_then(|(_, lattice)| lattice),
             shade: if before && samples.is_some() { shade } else { settings.surface_shade },
             view,

@@ -64,6 +64,8 @@ impl<'a> Profile<'a> {
                 let low = ((r * scale) as usize).min(values.len() - 2);
                 if r > 0.0 { (values[low + 1] - values[low]) * scale / r } else { 0.0 }
             }
+            // No radial function (product.rs).
+            math::Profile::Tensor(_) => 0.0,
         }
     }
 
@@ -114,7 +116,7 @@ impl<'a> Profile<'a> {
 /// The radii inside a kernel's extent at which it is not smooth.
 fn kinks(kernel: &math::Kernel) -> Vec<f64> {
     match &kernel.profile {
-        math::Profile::Gaussian(_) | math::Profile::Hann => Vec::new(),
+        math::Profile::Gaussian(_) | math::Profile::Hann | math::Profile::Tensor(_) => Vec::new(),
         math::Profile::BSpline => vec![0.5 * kernel.extent],
         math::Profile::Table(values) => {
             let parts = values.len() - 1;

@@ -53,6 +53,11 @@ pub(super) struct Mean {
 }
 
 impl Mean {
+    /// A field of which the integral over a length is known.
+    pub fn new(length: f64, integral: f64) -> Self {
+        Self { weight: length, value: integral }
+    }
+
     /// Adds the part of a kernel that lies between two distances along the ray.
     pub fn add(&mut self, sample: &Sample, center: DVec3, crossing: &Crossing, ray: &Ray, part: [f64; 2]) {
         let [length, first] = crossing.moments(part);

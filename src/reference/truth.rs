@@ -5,6 +5,7 @@ use super::{
     clip,
     composite::{Composite, Medium},
     nearest, picture,
+    product::Product,
     profile::Profile,
     ray::Ray,
     shade,
@@ -82,6 +83,8 @@ struct Pointwise<'a> {
     volume: &'a Volume,
     lattice: &'a Lattice,
     profile: Profile<'a>,
+    /// The field where kernels are tensor products; kernel space then counts in steps.
+    product: Option<Product<'a>>,
     /// Radius of the footprint in kernel space.
     radius: f64,
     /// How far kernels reach along a ray at most, in kernel space.
@@ -131,6 +134,7 @@ impl<'a> Pointwise<'a> {
             volume,
             lattice,
             profile,
+            product: Product::new(volume, kernel, view),
             radius: kernel.radius(),
             tail: if matches!(profile, Profile::Gaussian) { TAIL } else { kernel.radius() },
             unit,
@@ -240,6 +244,13 @@ impl<'a> Pointwise<'a> {
         [start, end]: [usize; 2],
         points: &mut Points,
     ) {
+        if let Some(product) = &self.product {
+            for i in start..=end {
+                let (value, slopes) = product.at_steps(origin + (at + i as f64 * step) * direction);
+                (points.sums[i], points.slopes[i]) = ([1.0, value], [DVec3::ZERO, slopes]);
+            }
+            return;
+        }
         let density = direction.length();
         let along = direction / density;
         // Counted in kernel space from the ray's origin.

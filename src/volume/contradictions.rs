@@ -7,7 +7,7 @@ use super::{
 use crate::{
     Error, Result,
     io::{nrrd, testing::Folder},
-    math::{Kernel, Profile},
+    math::{Kernel, Profile, Tensor},
     scene::Scene,
 };
 use glam::DVec3;
@@ -140,8 +140,9 @@ fn coefficients_are_looked_at() {
 #[test]
 fn kernels_are_refused_where_they_come_in() {
     let profiles = [Profile::Gaussian(0.6), Profile::BSpline, Profile::Hann, Profile::Table([1.0, 0.0].into())];
+    let profiles = profiles.into_iter().chain(Tensor::ALL.map(Profile::Tensor));
     let extents = [0.0, -1.0, f64::NAN, f64::INFINITY, 1e9];
-    let kernels = profiles.iter().flat_map(|profile| extents.map(|extent| Kernel { profile: profile.clone(), extent }));
+    let kernels = profiles.flat_map(|profile| extents.map(|extent| Kernel { profile: profile.clone(), extent }));
     let odd = [
         Profile::Gaussian(0.0),
         Profile::Gaussian(f64::NAN),

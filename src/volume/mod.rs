@@ -8,6 +8,7 @@ mod head;
 mod lattice;
 mod overshoot;
 pub mod phantoms;
+mod prefilter;
 mod presets;
 pub mod reach;
 mod reconstruct;

@@ -1,7 +1,10 @@
 //! The field between the samples, as the engine's splats draw it, at single positions.
 
 use super::{Arrangement, Lattice, Volume, grid::weight};
-use crate::{Error, Result, math::Kernel};
+use crate::{
+    Error, Result,
+    math::{Kernel, Tensor, cosine::mirrored},
+};
 use glam::{DMat3, DVec3};
 
 /// The normalised kernel sum Σ c·h / Σ h over what a volume draws: its samples, or where it is sharp its coefficients.
@@ -26,6 +29,9 @@ impl<'a> Reconstruction<'a> {
         if volume.coefficients.as_ref().is_some_and(|coefficients| coefficients.kernel != *kernel) {
             return Err(Error::Argument("the volume was made sharp for another kernel".into()));
         }
+        if kernel.as_tensor().is_some() && volume.lattice.arrangement != Arrangement::Cartesian {
+            return Err(Error::Argument("tensor products are kernels of Cartesian lattices".into()));
+        }
         Ok(Self { volume, kernel, inverse: volume.lattice.axes.inverse() })
     }
 
@@ -33,6 +39,9 @@ impl<'a> Reconstruction<'a> {
     pub fn value_at(&self, position: DVec3) -> Option<f64> {
         let lattice = self.volume.drawn_lattice();
         let steps = self.inverse * (position - lattice.origin);
+        if let Some(tensor) = self.kernel.as_tensor() {
+            return self.product_at(tensor, steps);
+        }
         let body_centred = lattice.arrangement == Arrangement::BodyCentred;
         // Layers to the step along the third axis; layers in turn displaced; a kernel unit in steps.
         let (layers, unit) = if body_centred { (2.0, lattice.unit([0; 3]).x) } else { (1.0, 1.0) };
@@ -51,6 +60,33 @@ impl<'a> Reconstruction<'a> {
             }
         }
         (weights != 0.0).then(|| sum / weights)
+    }
+
+    /// The value of a tensor product at some steps, in the box of the samples.
+    fn product_at(&self, tensor: Tensor, steps: DVec3) -> Option<f64> {
+        let lattice = &self.volume.lattice;
+        let [_, last] = lattice.step_range();
+        // An axis of one sample counts half a step to either side.
+        let margin = DVec3::select(last.cmpgt(DVec3::ZERO), DVec3::splat(1e-9), DVec3::splat(0.5));
+        if !(steps.cmpge(-margin).all() && steps.cmple(last + margin).all()) {
+            return None;
+        }
+        let taps = [0, 1, 2].map(|axis| {
+            let first = steps[axis].floor() as isize - 1;
+            [0, 1, 2, 3].map(|tap| {
+                let index = first + tap;
+                (mirrored(index, lattice.dims[axis]), tensor.value(steps[axis] - index as f64))
+            })
+        });
+        let mut sum = 0.0;
+        for (k, z) in taps[2] {
+            for (j, y) in taps[1] {
+                for (i, x) in taps[0] {
+                    sum += x * y * z * self.volume.drawn_value(offset(lattice, [i, j, k]));
+                }
+            }
+        }
+        Some(sum)
     }
 }
 

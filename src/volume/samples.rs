@@ -1,7 +1,10 @@
 //! The values of a volume, in the type of their file.
 
-use super::{Lattice, Scalar, reach::neighbourhood_ranges};
-use crate::{Error, Result, math::Kernel};
+use super::{Lattice, Scalar, overshoot::Overshoot, reach::neighbourhood_ranges};
+use crate::{
+    Error, Result,
+    math::{Kernel, Tensor},
+};
 use rayon::prelude::*;
 use std::{borrow::Cow, sync::Arc};
 
@@ -129,7 +132,7 @@ pub struct Volume {
 /// Values for kernels on a lattice, such that their normalised sum passes through a volume's samples.
 #[derive(Debug, Clone)]
 pub struct Coefficients {
-    /// The volume's lattice, continued on all sides as far as the kernel reaches.
+    /// The volume's lattice, continued on all sides as far as the kernel reaches; of a tensor product the volume's own.
     pub lattice: Lattice,
     /// A value per sample of that lattice; of either sign, and beyond the range of the samples.
     pub values: Vec<f32>,
@@ -212,6 +215,16 @@ impl Volume {
     pub fn drawn_ranges(&self, kernel: &Kernel) -> Cow<'_, [[u8; 2]]> {
         match &self.coefficients {
             Some(coefficients) => Cow::Borrowed(&coefficients.ranges),
+            None if kernel.as_tensor().is_some() => {
+                let mut ranges = neighbourhood_ranges(self, self.lattice.reach(kernel.extent));
+                // Weights of both signs leave the range of the samples in reach by a known factor.
+                let lebesgue = kernel.as_tensor().map_or(1.0, Tensor::lebesgue);
+                if lebesgue > 1.0 {
+                    let overshoot = Overshoot { lebesgue, tails: Vec::new() };
+                    ranges.par_iter_mut().for_each(|range| *range = overshoot.widen([*range].into_iter()));
+                }
+                Cow::Owned(ranges)
+            }
             // Signed kernels overshoot, and what is left out beside them must not be missed: twice their reach.
             None => {
                 let extent = if kernel.is_signed() { 2.0 * kernel.extent } else { kernel.extent };

@@ -5,14 +5,15 @@
 //! after Theußl, Möller and Gröller, "Optimal regular volume sampling", 2001).
 
 use super::{
-    Coefficients, Lattice, Volume,
+    Arrangement, Coefficients, Lattice, Samples, Volume,
     grid::{Grid, Response},
     overshoot::Overshoot,
+    prefilter,
     reach::neighbourhood_ranges,
 };
 use crate::{
     Error, Result,
-    math::{Kernel, Profile},
+    math::{Kernel, Profile, Tensor},
     memory,
 };
 use glam::DVec3;
@@ -29,19 +30,26 @@ impl Volume {
     /// coefficients with it as far as the kernel reaches, so that sums are whole at the border too. The kernel is radial
     /// in index space.
     ///
+    /// A tensor product that passes through the samples by itself takes none. The cubic B-spline's coefficients come of an exact
+    /// recursive filter, far faster than those of radial kernels; they lie on the volume's own lattice, mirrored with it.
+    ///
     /// Besides the volume and the result this takes some 16 bytes a sample, on a body-centred lattice 40.
     ///
     /// # Errors
     /// [`Error::Argument`] where the kernel takes some wave of the samples away (a Gaussian's sigma too large), for values near
     /// the largest of 32 bits, on rectilinear lattices, and on body-centred ones of one layer; for a volume or a kernel that was
-    /// put together by hand and contradicts itself, and where memory cannot hold the result.
+    /// put together by hand and contradicts itself, and where memory cannot hold the result. Of a tensor product on other lattices
+    /// than Cartesian ones.
     pub fn sharpened(self, kernel: &Kernel) -> Result<Self> {
         // Those of another kernel are replaced, whatever they are.
         let volume = Self { coefficients: None, ..self };
         volume.validate().map_err(Error::Argument)?;
         kernel.validate()?;
+        if let Some(tensor) = kernel.as_tensor() {
+            return volume.prefiltered(tensor);
+        }
         let grid = Grid::of(&volume.lattice)?;
-        let (lattice, margin) = continued(&volume.lattice, kernel.extent);
+        let (lattice, margin) = continued(&volume.lattice, kernel);
         let (points, drawn) = (grid.len() as u64, lattice.len() as u64);
         memory::check("a sharp volume", points.saturating_mul(8).saturating_add(drawn.saturating_mul(14)))
             .map_err(Error::Argument)?;
@@ -90,6 +98,39 @@ impl Volume {
         let coefficients = Coefficients { lattice, values, ranges, kernel: kernel.clone() };
         Ok(Self { coefficients: Some(Arc::new(coefficients)), ..volume })
     }
+
+    /// The volume, sharp for a tensor product.
+    fn prefiltered(self, tensor: Tensor) -> Result<Self> {
+        if self.lattice.arrangement != Arrangement::Cartesian {
+            let name = tensor.name();
+            return Err(Error::Argument(format!(
+                "the kernel {name} is a product along the axes of a Cartesian lattice"
+            )));
+        }
+        if tensor.interpolates() {
+            return Ok(self);
+        }
+        memory::check("a sharp volume", (self.len() as u64).saturating_mul(6)).map_err(Error::Argument)?;
+        let largest = self.range[0].abs().max(self.range[1].abs());
+        // The filter leaves a third of the finest detail along each axis.
+        if largest * 27.0 > f64::from(f32::MAX) {
+            return Err(Error::Argument(format!(
+                "values as large as {largest:.1e} cannot be made sharp: take another unit"
+            )));
+        }
+        let kernel = Kernel::tensor(tensor);
+        // The spline lies within the coefficients in reach, whose range is told in steps of the samples'.
+        let drawn = Self {
+            samples: Samples::F32(prefilter::cubic(&self.samples, self.lattice.dims)),
+            range: self.range,
+            lattice: self.lattice.clone(),
+            coefficients: None,
+        };
+        let ranges = neighbourhood_ranges(&drawn, self.lattice.reach(kernel.extent));
+        let Samples::F32(values) = drawn.samples else { return Ok(self) };
+        let coefficients = Coefficients { lattice: drawn.lattice, values, ranges, kernel };
+        Ok(Self { coefficients: Some(Arc::new(coefficients)), ..self })
+    }
 }
 
 impl Coefficients {
@@ -98,7 +139,7 @@ impl Coefficients {
         const REMEDY: &str = "make the volume sharp again";
         Grid::of(lattice).map_err(|error| error.to_string())?;
         self.kernel.validate().map_err(|error| format!("the kernel of the coefficients: {error}"))?;
-        let (wanted, _) = continued(lattice, self.kernel.extent);
+        let (wanted, _) = continued(lattice, &self.kernel);
         // Where both have been moved or turned, by the same, they may differ by roundings.
         let step = lattice.edges().max_element();
         let fits = self.lattice.dims == wanted.dims
@@ -123,11 +164,14 @@ impl Coefficients {
     }
 }
 
-/// A lattice continued on all sides as far as a kernel of some extent reaches, and by how many samples.
-fn continued(lattice: &Lattice, extent: f64) -> (Lattice, [usize; 3]) {
-    let mut margin = lattice.reach(extent);
+/// A lattice continued on all sides as far as a kernel reaches, and by how many samples. Tensor products have their own mirrors.
+fn continued(lattice: &Lattice, kernel: &Kernel) -> (Lattice, [usize; 3]) {
+    if kernel.as_tensor().is_some() {
+        return (lattice.clone(), [0; 3]);
+    }
+    let mut margin = lattice.reach(kernel.extent);
     let mut before = DVec3::from_array(margin.map(|n| n as f64));
-    if lattice.arrangement == super::Arrangement::BodyCentred {
+    if lattice.arrangement == Arrangement::BodyCentred {
         // Whole cells, so that the first layer is one without displacement again.
         margin[2] = margin[2].next_multiple_of(2);
         before.z = 0.5 * margin[2] as f64;
@@ -139,7 +183,6 @@ fn continued(lattice: &Lattice, extent: f64) -> (Lattice, [usize; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::volume::{Arrangement, Samples};
     use glam::DMat3;
 
     fn volume(lattice: Lattice) -> Volume {

@@ -63,7 +63,7 @@ fn set(payload: Payload, extent: f32, splats: Vec<Splat>) -> SplatSet {
     SplatSet { origin: ORIGIN, payload, splats, extent, overlap: 1.0 }
 }
 
-const ORIGIN: DVec3 = DVec3::new(10.0, -20.0, 30.0);
+pub const ORIGIN: DVec3 = DVec3::new(10.0, -20.0, 30.0);
 
 /// Looks at the scenes' middle from `from` (relative to it).
 fn camera(from: DVec3, projection: Projection) -> Camera {

@@ -53,7 +53,7 @@ impl Bench {
         let loaded = self.scene.load(progress)?;
         let settings = self.engine.settings(&loaded, Samples::Factor(1))?;
         progress.stage("Opening the device");
-        let device = self.engine.device()?;
+        let device = self.engine.device(&loaded.scene)?;
         progress.stage("Preparing the scene");
         let start = Instant::now();
         let mut renderer = Renderer::new(&device, &loaded.scene)?;

@@ -76,6 +76,7 @@ fn kernel(kernel: &Kernel) -> Value {
         Profile::BSpline => ("b-spline", None),
         Profile::Hann => ("hann", None),
         Profile::Table(_) => ("table", None),
+        Profile::Tensor(tensor) => (tensor.name(), None),
     };
     json!({ "profile": name, "sigma": sigma, "extent": kernel.extent })
 }

@@ -7,7 +7,7 @@ use splatkit::{
     engine::{AdapterChoice, Budget, Gpu},
     hierarchy::Detail,
     picture::Picture,
-    scene::{self, Item, Settings},
+    scene::{self, Item, Scene, Settings},
 };
 use std::time::Duration;
 
@@ -48,7 +48,7 @@ pub struct EngineFlags {
     #[arg(long, overrides_with = "shade")]
     no_shade: bool,
     /// Largest thickness of a sheet, in world units; by default 4/3 of a volume's sample spacing, half of that where it is
-    /// sharp.
+    /// sharp or its kernel catmull-rom, half a spacing where the kernel is linear.
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     sheet_thickness: Option<f64>,
     /// Hierarchies, volumes in bricks: the most pixels that a splat may be wide at half its height, but for those of the
@@ -111,9 +111,11 @@ enum Evaluate {
 
 impl EngineFlags {
     /// Opens what draws.
-    pub fn device(&self) -> splatkit::Result<Device> {
+    pub fn device(&self, scene: &Scene) -> splatkit::Result<Device> {
         match self.engine {
             Engine::Cpu => Ok(Device::Cpu),
+            // The GPU engine draws no tensor products; where an adapter is named, it says so.
+            Engine::Auto if !self.asks_gpu() && scene.tensor().is_some() => Ok(Device::Cpu),
             Engine::Auto if !self.asks_gpu() => Ok(match Device::automatic() {
                 Device::Gpu(gpu, _) => Device::Gpu(gpu, self.passes()),
                 Device::Cpu => Device::Cpu,

@@ -4,7 +4,7 @@ use crate::{failure::Failure, parse, scene::in_file};
 use clap::Args;
 use splatkit::{
     io::{Limits, Source},
-    math::Kernel,
+    math::{Kernel, Tensor},
 };
 use std::path::{Path, PathBuf};
 
@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Kernel")]
 pub struct KernelFlags {
-    /// gaussian, b-spline, hann, or a file of values at even distances from 0 to --extent: a JSON array, or one number in
-    /// a line [default: gaussian]
+    /// gaussian, b-spline, hann; linear, catmull-rom, cubic-b-spline (products along the axes of a Cartesian lattice); or a file of
+    /// values at even distances from 0 to --extent: a JSON array, or one number in a line [default: gaussian]
     #[arg(long, value_name = "NAME|FILE")]
     kernel: Option<String>,
     /// Standard deviation of the Gaussian [default: 0.6]
@@ -22,12 +22,13 @@ pub struct KernelFlags {
     /// Radius of a footprint [default: 2 for gaussian and b-spline, 3 for hann]
     #[arg(long, value_name = "SAMPLES", value_parser = parse::positive)]
     extent: Option<f64>,
-    /// Makes kernels pass through the samples, which they smooth otherwise.
+    /// Makes kernels pass through the samples, which they smooth otherwise. Fast with --kernel cubic-b-spline; linear and
+    /// catmull-rom do so by themselves.
     #[arg(long)]
     sharp: bool,
 }
 
-const NAMES: [&str; 3] = ["gaussian", "b-spline", "hann"];
+const NAMES: [&str; 6] = ["gaussian", "b-spline", "hann", "linear", "catmull-rom", "cubic-b-spline"];
 
 /// A table of this many bytes is no kernel.
 const MOST_BYTES: usize = 4 << 20;
@@ -37,6 +38,14 @@ impl KernelFlags {
         let name = self.kernel.as_deref().unwrap_or("gaussian");
         if self.sigma.is_some() && name != "gaussian" {
             return Err(Failure::Usage(format!("--sigma is the Gaussian's; the kernel {name} has none")));
+        }
+        if let Some(tensor) = Tensor::ALL.into_iter().find(|tensor| tensor.name() == name) {
+            return match self.extent {
+                Some(_) => {
+                    Err(Failure::Usage(format!("the kernel {name} has an extent of its own; leave out --extent")))
+                }
+                None => Ok(Kernel::tensor(tensor)),
+            };
         }
         Ok(match name {
             "gaussian" => self.gaussian()?,

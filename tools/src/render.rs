@@ -64,7 +64,7 @@ impl Drawer {
     /// An engine with a scene prepared.
     pub fn engine(flags: &EngineFlags, loaded: &Loaded, progress: &Progress) -> Result<Self, Failure> {
         progress.stage("Opening the device");
-        let device = flags.device()?;
+        let device = flags.device(&loaded.scene)?;
         progress.stage("Preparing the scene");
         Ok(Self::Engine(Box::new(Renderer::new(&device, &loaded.scene)?)))
     }

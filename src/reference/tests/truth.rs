@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::{
+    math::Tensor,
     scene::Classification,
     volume::{Arrangement, Isosurface, phantoms::Phantom},
 };
@@ -95,6 +96,26 @@ fn sheets_converge_to_the_rays() {
             println!("{name}: post {post:.1} → {post_thin:.1} dB, inside {inside:.1} → {inside_thin:.1} dB");
             assert!(post_thin > post + 15.0 && inside_thin > inside + 15.0);
             assert!(inside > post + better);
+        }
+    }
+}
+
+#[test]
+fn sheets_of_tensor_products_converge_too() {
+    for tensor in Tensor::ALL {
+        for shade in [None, Some(Shade::default())] {
+            let scene = blobs(Shape::tensor(tensor), shade);
+            for projection in PROJECTIONS {
+                let camera = camera(projection);
+                let usual = scene.sheets(&camera.view([24, 20]).unwrap(), &small(Classification::Post, None)).step;
+                let truth = integrate(&scene, &camera, &small(Classification::Post, None), 0.0005).unwrap();
+                let [usual, thin] = [1.0, 0.125].map(|share| {
+                    let settings = small(Classification::PreIntegrated, Some(usual * share));
+                    decibels(&render(&scene, &camera, &settings).unwrap(), &truth)
+                });
+                println!("{tensor:?}, lit {}: {usual:.1} → {thin:.1} dB", shade.is_some());
+                assert!(usual > 40.0 && thin > usual + 15.0);
+            }
         }
     }
 }

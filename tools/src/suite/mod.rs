@@ -178,7 +178,7 @@ impl SuiteFlags {
         progress: &Progress,
     ) -> Result<(), Failure> {
         let block = self.write.as_deref().map(|path| Block::open(path, "suite", "bench --suite")).transpose()?;
-        let mut device = engine.device()?;
+        let mut device = engine.device(&splatkit::scene::Scene::new())?;
         let machine = Machine::of(&device);
         if let Some(block) = &block {
             self.check_parts(&section_of(&block.inside()?, &machine))?;

@@ -1,0 +1,174 @@
+//! The field of a volume whose kernel is a product of functions along the axes of its lattice.
+
+use super::{face::Face, quadrature::quadrature, ray::Ray, sheet::Mean};
+use crate::{
+    math::{Kernel, Tensor, View, cosine::mirrored},
+    scene::{Item, Scene},
+    volume::{Lattice, Volume},
+};
+use glam::{DMat3, DVec3};
+
+/// Such a field, in view space.
+pub(super) struct Product<'a> {
+    volume: &'a Volume,
+    tensor: Tensor,
+    /// Steps from view space, and the place of the first sample there.
+    to_steps: DMat3,
+    origin: DVec3,
+}
+
+/// What the samples along one axis count: their indices, weights and derivatives.
+type Taps = [(usize, f64, f64); 4];
+
+impl<'a> Product<'a> {
+    /// The field of a volume; none of another kernel.
+    pub fn new(volume: &'a Volume, kernel: &Kernel, view: &View) -> Option<Self> {
+        let Lattice { axes, origin, .. } = volume.lattice;
+        let to_steps = (view.rotation * axes).inverse();
+        Some(Self { volume, tensor: kernel.as_tensor()?, to_steps, origin: view.to_view(origin) })
+    }
+
+    /// The field of a scene.
+    pub fn of(scene: &'a Scene, view: &View) -> Option<Self> {
+        scene.items.iter().find_map(|item| match item {
+            Item::Volume(volume, kernel, _) => Self::new(volume, kernel, view),
+            _ => None,
+        })
+    }
+
+    /// The value at a point of view space, and the gradient there.
+    pub fn at(&self, point: DVec3) -> (f64, DVec3) {
+        let (value, slopes) = self.at_steps(self.to_steps * (point - self.origin));
+        (value, self.to_steps.transpose() * slopes)
+    }
+
+    /// The value at a place in steps, and its change a step along each axis.
+    pub fn at_steps(&self, steps: DVec3) -> (f64, DVec3) {
+        let [nx, ny, _] = self.volume.lattice.dims;
+        let [x, y, z] = [0, 1, 2].map(|axis| self.taps(steps[axis], axis));
+        let (mut value, mut slopes) = (0.0, DVec3::ZERO);
+        for (k, wz, dz) in z {
+            for (j, wy, dy) in y {
+                for (i, wx, dx) in x {
+                    let sample = self.volume.drawn_value((k * ny + j) * nx + i);
+                    value += wx * wy * wz * sample;
+                    slopes += sample * DVec3::new(dx * wy * wz, wx * dy * wz, wx * wy * dz);
+                }
+            }
+        }
+        (value, slopes)
+    }
+
+    /// The samples around a place along an axis, beyond the lattice's ends their mirror images.
+    fn taps(&self, place: f64, axis: usize) -> Taps {
+        let count = self.volume.lattice.dims[axis];
+        let first = place.floor() - 1.0;
+        [0.0, 1.0, 2.0, 3.0].map(|tap| {
+            let index = first + tap;
+            let away = place - index;
+            (mirrored(index as isize, count), self.tensor.value(away), self.tensor.slope(away))
+        })
+    }
+
+    /// The field at a distance along a ray.
+    pub fn face(&self, ray: &Ray, s: f64) -> Face {
+        let (value, gradient) = self.at(ray.point(s));
+        Face::new(value, gradient)
+    }
+
+    /// ∫ of the field over a part of a ray. The field is a polynomial between planes of samples, of the ninth degree at most.
+    pub fn mean(&self, ray: &Ray, [from, to]: [f64; 2]) -> Mean {
+        let (start, way) = (self.to_steps * (ray.origin - self.origin), self.to_steps * ray.direction);
+        let mut cuts = vec![from, to];
+        for axis in 0..3 {
+            let ends = [from, to].map(|s| start[axis] + s * way[axis]);
+            let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+            let planes = low.floor() as i64 + 1..high.ceil() as i64;
+            cuts.extend(planes.map(|plane| (plane as f64 - start[axis]) / way[axis]).filter(|s| from < *s && *s < to));
+        }
+        cuts.sort_by(f64::total_cmp);
+        let parts = cuts.windows(2).map(|part| quadrature([part[0], part[1]], |s| [self.at(ray.point(s)).0])[0]);
+        Mean::new(to - from, parts.sum())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::ray::tests::views, *};
+    use crate::volume::Samples;
+    use glam::DVec2;
+
+    /// Three lattices: sheared, of two samples along an axis, and of one.
+    fn volumes() -> [Volume; 3] {
+        [[5, 4, 6], [2, 5, 3], [4, 1, 3]].map(|dims| {
+            let axes =
+                DMat3::from_cols(DVec3::new(0.3, 0.1, 0.0), DVec3::new(0.0, 0.2, 0.1), DVec3::new(0.05, 0.0, 0.4));
+            let lattice = Lattice::cartesian(dims, DVec3::new(0.1, 0.2, 0.3), axes);
+            let values = (0..lattice.len()).map(|at| ((at * at) as f32).sin()).collect();
+            Volume::new(lattice, Samples::F32(values)).unwrap()
+        })
+    }
+
+    fn fields(volume: &Volume, view: &View, take: impl Fn(Tensor, &Product)) {
+        for tensor in Tensor::ALL {
+            let kernel = Kernel::tensor(tensor);
+            let sharp = volume.clone().sharpened(&kernel).unwrap();
+            take(tensor, &Product::new(&sharp, &kernel, view).unwrap());
+        }
+    }
+
+    #[test]
+    fn fields_pass_through_the_samples() {
+        for volume in volumes() {
+            for view in views() {
+                fields(&volume, &view, |tensor, field| {
+                    for at in 0..volume.len() {
+                        // Not quite at the sample, where rounding would choose a cell.
+                        let place = view.to_view(volume.lattice.sample_position(at));
+                        let (found, _) = field.at(place + DVec3::splat(1e-9));
+                        assert!((found - volume.value(at)).abs() < 2e-6, "{tensor:?} at {at}: {found}");
+                    }
+                });
+            }
+        }
+    }
+
+    #[test]
+    fn gradients_are_those_of_the_values() {
+        for volume in volumes() {
+            for view in views() {
+                fields(&volume, &view, |tensor, field| {
+                    for at in 0..20 {
+                        let place = |shift: f64| (f64::from(at) + shift).sin() * 0.4 + 0.5;
+                        // Also beyond the samples.
+                        let point = view.to_view(DVec3::new(place(0.3), place(1.7), place(4.0)) * 1.4);
+                        let (_, gradient) = field.at(point);
+                        let step = 1e-6;
+                        for axis in DVec3::AXES {
+                            let values = [-step, step].map(|by| field.at(point + by * axis).0);
+                            let expected = (values[1] - values[0]) / (2.0 * step);
+                            assert!((gradient.dot(axis) - expected).abs() < 1e-5, "{tensor:?}: {gradient} {expected}");
+                        }
+                    }
+                });
+            }
+        }
+    }
+
+    #[test]
+    fn means_are_what_many_points_sum_to() {
+        let [volume, ..] = volumes();
+        for view in views() {
+            let ray = Ray::new(&view, DVec2::new(21.3, 14.2));
+            fields(&volume, &view, |tensor, field| {
+                for part in [[3.0, 3.1], [3.2, 4.4], [2.0, 5.0]] {
+                    let steps = 20_000;
+                    let place = |i: i32| part[0] + (part[1] - part[0]) * (f64::from(i) + 0.5) / f64::from(steps);
+                    let sum: f64 = (0..steps).map(|i| field.at(ray.point(place(i))).0).sum();
+                    let found = field.mean(&ray, part).value(0.1, part[1] - part[0]).unwrap();
+                    assert!((found - sum / f64::from(steps)).abs() < 1e-6, "{tensor:?} {part:?}: {found}");
+                }
+            });
+        }
+    }
+}
