@@ -25,6 +25,11 @@ const MANY_ROUNDS: u32 = 16;
 const FITTED_HEIGHT: u32 = 3;
 /// How many levels below the children these descendants are.
 const LEVELS_BELOW: u32 = 1;
+/// Where leaves lie on a sphere themselves, nothing but nearly all of it lies in the smallest sphere around them and holds some of
+/// them. So the root of a block may reach this many times as far as what is around all blocks, where it would else be wider than
+/// it need be by more than the second factor.
+const ROOM: f64 = 1.04;
+const MOST_WIDER: f64 = 1.5;
 
 impl Sphere {
     pub fn of(node: &Node) -> Self {
@@ -112,7 +117,7 @@ pub(crate) fn raise(block: &mut Block) -> Vec<u32> {
 }
 
 /// Moves the spheres of a raised block into their parents', and makes those of higher nodes smaller. The root's lies in
-/// `outer`, or where that does not hold all leaves in one that does.
+/// `outer`, or where that does not hold all leaves in one that does; where leaves lie on `outer`, in one a little larger.
 pub(crate) fn nest(block: &mut Block, heights: &[u32], outer: Sphere) {
     let nodes = &mut block.nodes;
     let leaves = nodes.iter().filter(|node| node.is_leaf()).map(Sphere::of);
@@ -144,7 +149,13 @@ pub(crate) fn nest(block: &mut Block, heights: &[u32], outer: Sphere) {
                 levels += 1;
                 descendants(nodes, index, levels, &mut around);
             }
-            own = own.moved_inside(&outer, &around);
+            let moved = own.moved_inside(&outer, &around);
+            let roomy = Sphere { radius: outer.radius * ROOM, ..outer };
+            own = match () {
+                () if index > 0 || moved.radius <= MOST_WIDER * own.radius => moved,
+                () if roomy.holds(&own) => own,
+                () => own.moved_inside(&roomy, &around),
+            };
         }
         own.give(&mut nodes[index]);
     }
