@@ -15,8 +15,14 @@ use rayon::prelude::*;
 use std::{borrow::Cow, collections::HashMap};
 
 /// The block above leaves that have these boxes: every node but for its sphere. `leaf` makes the leaf of a box. There is at
-/// least one; the root is one only where it is the only one. Also tells which box is behind each leaf.
-pub(super) fn cluster(boxes: &[Aabb], leaf: impl Fn(u32) -> Node, preset: Preset) -> (Block, Vec<u32>) {
+/// least one; the root is one only where it is the only one. `mass` tells the mass of a leaf. Also tells which box is behind each
+/// leaf.
+pub(super) fn cluster(
+    boxes: &[Aabb],
+    leaf: impl Fn(u32) -> Node,
+    mass: impl Fn(u32) -> Mass,
+    preset: Preset,
+) -> (Block, Vec<u32>) {
     if boxes.len() == 1 {
         return (Block { nodes: vec![leaf(0)], portal: None }, vec![0]);
     }
@@ -55,11 +61,11 @@ pub(super) fn cluster(boxes: &[Aabb], leaf: impl Fn(u32) -> Node, preset: Preset
         }
         next += 1;
     }
-    let mut masses = vec![Mass::of(&blank.splat); nodes.len()];
+    let mut masses = vec![mass(0); nodes.len()];
     for index in (0..nodes.len()).rev() {
         let Node { first_child, children, .. } = nodes[index];
         if children == 0 {
-            masses[index] = Mass::of(&nodes[index].splat);
+            masses[index] = mass(sources[index]);
             continue;
         }
         let range = first_child as usize..(first_child + children) as usize;
@@ -215,7 +221,7 @@ mod tests {
                 first_child: 0,
                 children: 0,
             };
-            let (block, sources) = cluster(&vec![box_of(&splat); 8000], leaf, Preset::Balanced);
+            let (block, sources) = cluster(&vec![box_of(&splat); 8000], leaf, |_| Mass::of(&splat), Preset::Balanced);
             assert!(depth(&block.nodes) <= 16, "{} levels of 8000 at {at}", depth(&block.nodes));
             assert_eq!(sources.len(), block.nodes.len());
         }

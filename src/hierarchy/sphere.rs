@@ -9,6 +9,7 @@
 
 use super::{Block, Node, merge::leaf};
 use crate::splat::Splat;
+use fearless_simd::{Level, Simd, dispatch, f32x8, prelude::*};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -197,6 +198,65 @@ pub(super) const DIRECTIONS: [[f32; 3]; 13] = [
     [-1.0, 1.0, 1.0],
 ];
 
+/// The first of the splats that are farthest in each direction and in its opposite.
+fn extremes(splats: &[Splat]) -> Vec<usize> {
+    let chunks: Vec<&[Splat]> = splats.chunks(CHUNK).collect();
+    let found: Vec<[Ends; DIRECTIONS.len()]> =
+        chunks.par_iter().map(|chunk| dispatch!(Level::new(), simd => ends(simd, chunk))).collect();
+    let mut out = Vec::with_capacity(2 * DIRECTIONS.len());
+    for (number, direction) in DIRECTIONS.iter().enumerate() {
+        for side in [0, 1] {
+            let of = |chunk: usize| found[chunk][number][side];
+            let mut farthest = 0;
+            for chunk in 1..chunks.len() {
+                if of(chunk) > of(farthest) {
+                    farthest = chunk;
+                }
+            }
+            let sign = [1.0, -1.0][side];
+            let along = |splat: &Splat| Vec3::from(splat.center).dot(Vec3::from(*direction)) * sign;
+            let place = chunks[farthest].iter().position(|splat| along(splat) == of(farthest));
+            out.push(farthest * CHUNK + place.unwrap_or(0));
+        }
+    }
+    out
+}
+
+/// Splats whose extremes are found together.
+const CHUNK: usize = 1 << 14;
+
+/// How far something reaches in a direction, and in its opposite.
+type Ends = [f32; 2];
+
+/// How far centres lie in each direction, and in its opposite.
+#[inline(always)]
+fn ends<S: Simd>(simd: S, splats: &[Splat]) -> [Ends; DIRECTIONS.len()] {
+    let none = f32x8::splat(simd, f32::NEG_INFINITY);
+    let mut found = [[none; 2]; DIRECTIONS.len()];
+    let mut places = [[0.0f32; 8]; 3];
+    for eight in splats.chunks(8) {
+        for lane in 0..8 {
+            // What lacks to eight is the last once more.
+            let splat = eight.get(lane).unwrap_or(&eight[eight.len() - 1]);
+            for (places, place) in places.iter_mut().zip(splat.center) {
+                places[lane] = place;
+            }
+        }
+        let [x, y, z]: [f32x8<S>; 3] =
+            [places[0].simd_into(simd), places[1].simd_into(simd), places[2].simd_into(simd)];
+        for (ends, direction) in found.iter_mut().zip(DIRECTIONS) {
+            let along = x * direction[0] + y * direction[1] + z * direction[2];
+            *ends = [ends[0].max(along), ends[1].max(-along)];
+        }
+    }
+    let mut out = [[f32::NEG_INFINITY; 2]; DIRECTIONS.len()];
+    for (out, found) in out.iter_mut().zip(found) {
+        let farthest: [[f32; 8]; 2] = [found[0].into(), found[1].into()];
+        *out = [0, 1].map(|side| farthest[side].iter().copied().fold(f32::NEG_INFINITY, f32::max));
+    }
+    out
+}
+
 /// How often what lies farthest outside is taken in.
 const MOST_GROWTHS: usize = 12;
 /// What may lie outside before the sphere is grown to hold it, in parts of its radius.
@@ -207,28 +267,7 @@ const OUTSIDE: f64 = 0.005;
 /// `extent` standard deviations from their centres.
 pub(crate) fn enclosing(splats: &[Splat], extent: f32) -> Sphere {
     let sphere = |splat: &Splat| Sphere::of(&leaf(splat, extent));
-    let none = [[(f32::NEG_INFINITY, 0usize); 2]; DIRECTIONS.len()];
-    let farther = |a: (f32, usize), b: (f32, usize)| if b.0 > a.0 { b } else { a };
-    let extremes = splats
-        .par_chunks(1 << 14)
-        .enumerate()
-        .map(|(chunk, splats)| {
-            let mut found = none;
-            for (index, splat) in splats.iter().enumerate() {
-                let place = Vec3::from(splat.center);
-                for (ends, direction) in found.iter_mut().zip(DIRECTIONS) {
-                    let along = place.dot(Vec3::from(direction));
-                    for (end, along) in ends.iter_mut().zip([along, -along]) {
-                        if along > end.0 {
-                            *end = (along, (chunk << 14) + index);
-                        }
-                    }
-                }
-            }
-            found
-        })
-        .reduce(|| none, |a, b| std::array::from_fn(|i| std::array::from_fn(|j| farther(a[i][j], b[i][j]))));
-    let mut core: Vec<Sphere> = extremes.iter().flatten().map(|&(_, index)| sphere(&splats[index])).collect();
+    let mut core: Vec<Sphere> = extremes(splats).iter().map(|&index| sphere(&splats[index])).collect();
     let mut around = Sphere::around(&core, 1 << 12);
     for growth in 0.. {
         // Most splats lie so far inside that their size need not be known: a splat's largest standard deviation is at most
