@@ -11,7 +11,6 @@ use obvhs::{
     bvh2::Bvh2,
     ploc::{PlocBuilder, PlocSearchDistance, SortPrecision},
 };
-use rayon::prelude::*;
 use std::{borrow::Cow, collections::HashMap};
 
 /// The block above leaves that have these boxes: every node but for its sphere. `leaf` makes the leaf of a box. There is at
@@ -88,7 +87,17 @@ pub(super) fn box_of(splat: &Splat) -> Aabb {
 /// and would join one pair in a round, so that the hierarchy became a chain. In the row that they make, halves of halves are
 /// ever nearer to each other.
 fn apart(boxes: &[Aabb]) -> Cow<'_, [Aabb]> {
-    let mut keys: Vec<u64> = boxes.par_iter().map(|own| mixed(key(own))).collect();
+    let mut keys: Vec<u64> = boxes.iter().map(|own| mixed(key(own))).collect();
+    // Where few have the same first bits, fewer have all of them.
+    let mut counts = vec![0u8; 1 << BUCKET_BITS];
+    let most = keys.iter().fold(0, |most: u8, key| {
+        let count = &mut counts[(key >> (u64::BITS - BUCKET_BITS)) as usize];
+        *count = count.saturating_add(1);
+        most.max(*count)
+    });
+    if usize::from(most) <= MOST_ALIKE {
+        return Cow::Borrowed(boxes);
+    }
     keys.sort_unstable();
     if keys.len() <= MOST_ALIKE || !keys.windows(MOST_ALIKE + 1).any(|run| run[0] == run[MOST_ALIKE]) {
         return Cow::Borrowed(boxes);
@@ -109,6 +118,8 @@ fn apart(boxes: &[Aabb]) -> Cow<'_, [Aabb]> {
 
 /// So many equal boxes do no harm.
 const MOST_ALIKE: usize = 32;
+/// Buckets in which boxes are counted.
+const BUCKET_BITS: u32 = 15;
 
 /// All bits of a box.
 fn key(own: &Aabb) -> [u32; 6] {

@@ -78,9 +78,13 @@ impl Sphere {
     /// Whether this one holds another, with room for what rounding to 32 bits adds: to the radius, and to a centre that may be
     /// far from the origin.
     fn holds(&self, other: &Self) -> bool {
+        other.center.distance(self.center) + other.radius <= self.room()
+    }
+
+    /// How far what this one holds may reach.
+    fn room(&self) -> f64 {
         let rounded = 4.0 * self.radius + 2.0 * self.center.abs().max_element();
-        let room = self.radius - rounded * f64::from(f32::EPSILON);
-        other.center.distance(self.center) + other.radius <= room
+        self.radius - rounded * f64::from(f32::EPSILON)
     }
 
     /// A sphere around others that lies in `outer`, which holds them all, with a centre as near to `self`'s as can be on the
@@ -90,12 +94,27 @@ impl Sphere {
             let center = self.center.lerp(outer.center, part);
             Self { center, radius: Self::reach(center, spheres) }
         };
-        let (mut out, mut within) = (0.0, 1.0);
-        for _ in 0..12 {
-            let middle = (out + within) * 0.5;
-            *(if outer.holds(&at(middle)) { &mut within } else { &mut out }) = middle;
-        }
-        if within == 1.0 { *outer } else { at(within) }
+        // Without roots, and only up to the first sphere that sticks out.
+        let room = outer.room();
+        let fits = |part: f64| {
+            let center = self.center.lerp(outer.center, part);
+            let left = room - center.distance(outer.center);
+            spheres.iter().all(|s| {
+                let most = left - s.radius;
+                most >= 0.0 && s.center.distance_squared(center) <= most * most
+            })
+        };
+        let search = |fits: &dyn Fn(f64) -> bool| {
+            let (mut out, mut within) = (0.0, 1.0);
+            for _ in 0..12 {
+                let middle = (out + within) * 0.5;
+                *(if fits(middle) { &mut within } else { &mut out }) = middle;
+            }
+            (within < 1.0).then(|| at(within))
+        };
+        // Rounding may take what is only just inside for what is not.
+        let quick = search(&fits).filter(|found| outer.holds(found));
+        quick.or_else(|| search(&|part| outer.holds(&at(part)))).unwrap_or(*outer)
     }
 }
 
