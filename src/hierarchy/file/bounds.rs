@@ -57,6 +57,11 @@ pub fn leaf(node: &mut Node, shape: &Shape, extent: f32) {
     node.radius = (f64::from(extent) * largest * 1.000_001) as f32;
     node.size = (FULL_WIDTH * largest) as f32;
     node.cone = unpacked(node.splat.normal).map_or(-1.0, |normal| {
+        // The axis along which it is thinnest lies between the normal and the third one, if that is the thinnest.
+        let [first, second, third] = shape.sigma;
+        if third <= first && third <= second && shape.axes[2].dot(normal) > 0.999 {
+            return 1.0;
+        }
         // As of `merge::leaf`, by the axes themselves.
         let along = |i: usize| {
             let (thinner, axis) = (shape.sigma[2] / shape.sigma[i], shape.axes[i]);
