@@ -4,7 +4,8 @@ use super::{
     Block, Node, Tree,
     cluster::{box_of, cluster},
     file::{Top, Whole, WriteOptions, Writer},
-    merge::leaf,
+    measure::Measures,
+    merge::Mass,
     partition,
     sphere::{Sphere, enclosing, nest, raise},
 };
@@ -183,9 +184,12 @@ impl Builder {
 
 /// The block of some splats of a set; its root's sphere lies in `outer`.
 pub(crate) fn block_of(set: &SplatSet, part: &[u32], preset: Preset, outer: Sphere) -> Block {
-    let splat = |i: u32| &set.splats[i as usize];
-    let boxes: Vec<_> = part.iter().map(|&i| box_of(splat(i))).collect();
-    let (mut block, _) = cluster(&boxes, |i| leaf(splat(part[i as usize]), set.extent), preset);
+    let splat = |i: u32| &set.splats[part[i as usize] as usize];
+    let measures = Measures::of(&set.splats, part);
+    let boxes: Vec<_> = (0..).zip(&measures).map(|(i, own)| own.box_of(splat(i))).collect();
+    let leaf = |i: u32| measures[i as usize].leaf(splat(i), set.extent);
+    let mass = |i: u32| measures[i as usize].mass(splat(i));
+    let (mut block, _) = cluster(&boxes, leaf, mass, preset);
     let heights = raise(&mut block);
     nest(&mut block, &heights, outer);
     block
@@ -195,7 +199,8 @@ pub(crate) fn block_of(set: &SplatSet, part: &[u32], preset: Preset, outer: Sphe
 pub(crate) fn join(roots: &[Node], preset: Preset, outer: Sphere) -> (Block, Vec<u32>) {
     let boxes: Vec<_> = roots.iter().map(|root| box_of(&root.splat)).collect();
     let leaf = |i: u32| Node { children: 0, first_child: 0, ..roots[i as usize] };
-    let (mut block, sources) = cluster(&boxes, leaf, preset);
+    let mass = |i: u32| Mass::of(&roots[i as usize].splat);
+    let (mut block, sources) = cluster(&boxes, leaf, mass, preset);
     let heights = raise(&mut block);
     nest(&mut block, &heights, outer);
     let mut portals = vec![0; roots.len()];

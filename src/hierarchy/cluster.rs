@@ -11,12 +11,17 @@ use obvhs::{
     bvh2::Bvh2,
     ploc::{PlocBuilder, PlocSearchDistance, SortPrecision},
 };
-use rayon::prelude::*;
 use std::{borrow::Cow, collections::HashMap};
 
 /// The block above leaves that have these boxes: every node but for its sphere. `leaf` makes the leaf of a box. There is at
-/// least one; the root is one only where it is the only one. Also tells which box is behind each leaf.
-pub(super) fn cluster(boxes: &[Aabb], leaf: impl Fn(u32) -> Node, preset: Preset) -> (Block, Vec<u32>) {
+/// least one; the root is one only where it is the only one. `mass` tells the mass of a leaf. Also tells which box is behind each
+/// leaf.
+pub(super) fn cluster(
+    boxes: &[Aabb],
+    leaf: impl Fn(u32) -> Node,
+    mass: impl Fn(u32) -> Mass,
+    preset: Preset,
+) -> (Block, Vec<u32>) {
     if boxes.len() == 1 {
         return (Block { nodes: vec![leaf(0)], portal: None }, vec![0]);
     }
@@ -55,11 +60,11 @@ pub(super) fn cluster(boxes: &[Aabb], leaf: impl Fn(u32) -> Node, preset: Preset
         }
         next += 1;
     }
-    let mut masses = vec![Mass::of(&blank.splat); nodes.len()];
+    let mut masses = vec![mass(0); nodes.len()];
     for index in (0..nodes.len()).rev() {
         let Node { first_child, children, .. } = nodes[index];
         if children == 0 {
-            masses[index] = Mass::of(&nodes[index].splat);
+            masses[index] = mass(sources[index]);
             continue;
         }
         let range = first_child as usize..(first_child + children) as usize;
@@ -82,7 +87,17 @@ pub(super) fn box_of(splat: &Splat) -> Aabb {
 /// and would join one pair in a round, so that the hierarchy became a chain. In the row that they make, halves of halves are
 /// ever nearer to each other.
 fn apart(boxes: &[Aabb]) -> Cow<'_, [Aabb]> {
-    let mut keys: Vec<u64> = boxes.par_iter().map(|own| mixed(key(own))).collect();
+    let mut keys: Vec<u64> = boxes.iter().map(|own| mixed(key(own))).collect();
+    // Where few have the same first bits, fewer have all of them.
+    let mut counts = vec![0u8; 1 << BUCKET_BITS];
+    let most = keys.iter().fold(0, |most: u8, key| {
+        let count = &mut counts[(key >> (u64::BITS - BUCKET_BITS)) as usize];
+        *count = count.saturating_add(1);
+        most.max(*count)
+    });
+    if usize::from(most) <= MOST_ALIKE {
+        return Cow::Borrowed(boxes);
+    }
     keys.sort_unstable();
     if keys.len() <= MOST_ALIKE || !keys.windows(MOST_ALIKE + 1).any(|run| run[0] == run[MOST_ALIKE]) {
         return Cow::Borrowed(boxes);
@@ -103,6 +118,8 @@ fn apart(boxes: &[Aabb]) -> Cow<'_, [Aabb]> {
 
 /// So many equal boxes do no harm.
 const MOST_ALIKE: usize = 32;
+/// Buckets in which boxes are counted.
+const BUCKET_BITS: u32 = 15;
 
 /// All bits of a box.
 fn key(own: &Aabb) -> [u32; 6] {
@@ -215,7 +232,7 @@ mod tests {
                 first_child: 0,
                 children: 0,
             };
-            let (block, sources) = cluster(&vec![box_of(&splat); 8000], leaf, Preset::Balanced);
+            let (block, sources) = cluster(&vec![box_of(&splat); 8000], leaf, |_| Mass::of(&splat), Preset::Balanced);
             assert!(depth(&block.nodes) <= 16, "{} levels of 8000 at {at}", depth(&block.nodes));
             assert_eq!(sources.len(), block.nodes.len());
         }

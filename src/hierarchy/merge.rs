@@ -55,7 +55,7 @@ fn factor(m: &Moments) -> [f32; 6] {
 }
 
 /// cos(acos(r)/3) as a polynomial of √(1 + r), by rising powers: at most 3·10⁻⁶ off.
-const THIRD: [f32; 6] = [0.500_002_7, 0.408_164, -0.054_907_8, 0.016_816_5, -0.004_783_6, 0.000_734_3];
+pub(super) const THIRD: [f32; 6] = [0.500_002_7, 0.408_164, -0.054_907_8, 0.016_816_5, -0.004_783_6, 0.000_734_3];
 
 /// The mean variance along the axes, and the matrix in it: products of variances themselves are lost in 32 bits where a
 /// splat is smaller than 1e-10 or larger than 1e9. 0 where there is no variance.
@@ -108,7 +108,7 @@ pub(crate) fn leaf(splat: &Splat, extent: f32) -> Node {
 
 /// A surface is culled by its shading normals, but what faces away is the surface. Surfels lie across a normal that is this
 /// near that of their triangles (cosine of 20°), which the margin of culling covers.
-const ALIKE: f32 = 0.94;
+pub(super) const ALIKE: f32 = 0.94;
 
 /// The cone of a leaf that lies across an axis of this cosine with its normal.
 pub(crate) fn leaf_cone(cosine: f32) -> f32 {
@@ -137,7 +137,11 @@ impl Mass {
     /// Of a splat that is not merged, or whose parts are no longer known.
     pub fn of(splat: &Splat) -> Self {
         let covariance = covariance(&splat.factor);
-        let area = area(&covariance);
+        Self::with(splat, area(&covariance), covariance)
+    }
+
+    /// As [`of`](Self::of), where the area and the covariance are known.
+    pub fn with(splat: &Splat, area: f32, covariance: Moments) -> Self {
         let alpha = (splat.color >> 24) as f32 / 255.0;
         // What is fully transparent still has a place.
         let mass = (splat.strength.min(MOST_STRENGTH) * alpha * area).max(f32::MIN_POSITIVE);

@@ -8,6 +8,7 @@ pub mod external;
 pub mod file;
 mod leaves;
 mod levels;
+mod measure;
 mod merge;
 pub(crate) mod needed;
 mod node;

@@ -9,6 +9,7 @@
 
 use super::{Block, Node, merge::leaf};
 use crate::splat::Splat;
+use fearless_simd::{Level, Simd, dispatch, f32x8, prelude::*};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -25,6 +26,11 @@ const MANY_ROUNDS: u32 = 16;
 const FITTED_HEIGHT: u32 = 3;
 /// How many levels below the children these descendants are.
 const LEVELS_BELOW: u32 = 1;
+/// Where leaves lie on a sphere themselves, nothing but nearly all of it lies in the smallest sphere around them and holds some of
+/// them. So the root of a block may reach this many times as far as what is around all blocks, where it would else be wider than
+/// it need be by more than the second factor.
+const ROOM: f64 = 1.04;
+const MOST_WIDER: f64 = 1.5;
 
 impl Sphere {
     pub fn of(node: &Node) -> Self {
@@ -72,9 +78,13 @@ impl Sphere {
     /// Whether this one holds another, with room for what rounding to 32 bits adds: to the radius, and to a centre that may be
     /// far from the origin.
     fn holds(&self, other: &Self) -> bool {
+        other.center.distance(self.center) + other.radius <= self.room()
+    }
+
+    /// How far what this one holds may reach.
+    fn room(&self) -> f64 {
         let rounded = 4.0 * self.radius + 2.0 * self.center.abs().max_element();
-        let room = self.radius - rounded * f64::from(f32::EPSILON);
-        other.center.distance(self.center) + other.radius <= room
+        self.radius - rounded * f64::from(f32::EPSILON)
     }
 
     /// A sphere around others that lies in `outer`, which holds them all, with a centre as near to `self`'s as can be on the
@@ -84,12 +94,27 @@ impl Sphere {
             let center = self.center.lerp(outer.center, part);
             Self { center, radius: Self::reach(center, spheres) }
         };
-        let (mut out, mut within) = (0.0, 1.0);
-        for _ in 0..12 {
-            let middle = (out + within) * 0.5;
-            *(if outer.holds(&at(middle)) { &mut within } else { &mut out }) = middle;
-        }
-        if within == 1.0 { *outer } else { at(within) }
+        // Without roots, and only up to the first sphere that sticks out.
+        let room = outer.room();
+        let fits = |part: f64| {
+            let center = self.center.lerp(outer.center, part);
+            let left = room - center.distance(outer.center);
+            spheres.iter().all(|s| {
+                let most = left - s.radius;
+                most >= 0.0 && s.center.distance_squared(center) <= most * most
+            })
+        };
+        let search = |fits: &dyn Fn(f64) -> bool| {
+            let (mut out, mut within) = (0.0, 1.0);
+            for _ in 0..12 {
+                let middle = (out + within) * 0.5;
+                *(if fits(middle) { &mut within } else { &mut out }) = middle;
+            }
+            (within < 1.0).then(|| at(within))
+        };
+        // Rounding may take what is only just inside for what is not.
+        let quick = search(&fits).filter(|found| outer.holds(found));
+        quick.or_else(|| search(&|part| outer.holds(&at(part)))).unwrap_or(*outer)
     }
 }
 
@@ -112,7 +137,7 @@ pub(crate) fn raise(block: &mut Block) -> Vec<u32> {
 }
 
 /// Moves the spheres of a raised block into their parents', and makes those of higher nodes smaller. The root's lies in
-/// `outer`, or where that does not hold all leaves in one that does.
+/// `outer`, or where that does not hold all leaves in one that does; where leaves lie on `outer`, in one a little larger.
 pub(crate) fn nest(block: &mut Block, heights: &[u32], outer: Sphere) {
     let nodes = &mut block.nodes;
     let leaves = nodes.iter().filter(|node| node.is_leaf()).map(Sphere::of);
@@ -144,7 +169,13 @@ pub(crate) fn nest(block: &mut Block, heights: &[u32], outer: Sphere) {
                 levels += 1;
                 descendants(nodes, index, levels, &mut around);
             }
-            own = own.moved_inside(&outer, &around);
+            let moved = own.moved_inside(&outer, &around);
+            let roomy = Sphere { radius: outer.radius * ROOM, ..outer };
+            own = match () {
+                () if index > 0 || moved.radius <= MOST_WIDER * own.radius => moved,
+                () if roomy.holds(&own) => own,
+                () => own.moved_inside(&roomy, &around),
+            };
         }
         own.give(&mut nodes[index]);
     }
@@ -186,6 +217,65 @@ pub(super) const DIRECTIONS: [[f32; 3]; 13] = [
     [-1.0, 1.0, 1.0],
 ];
 
+/// The first of the splats that are farthest in each direction and in its opposite.
+fn extremes(splats: &[Splat]) -> Vec<usize> {
+    let chunks: Vec<&[Splat]> = splats.chunks(CHUNK).collect();
+    let found: Vec<[Ends; DIRECTIONS.len()]> =
+        chunks.par_iter().map(|chunk| dispatch!(Level::new(), simd => ends(simd, chunk))).collect();
+    let mut out = Vec::with_capacity(2 * DIRECTIONS.len());
+    for (number, direction) in DIRECTIONS.iter().enumerate() {
+        for side in [0, 1] {
+            let of = |chunk: usize| found[chunk][number][side];
+            let mut farthest = 0;
+            for chunk in 1..chunks.len() {
+                if of(chunk) > of(farthest) {
+                    farthest = chunk;
+                }
+            }
+            let sign = [1.0, -1.0][side];
+            let along = |splat: &Splat| Vec3::from(splat.center).dot(Vec3::from(*direction)) * sign;
+            let place = chunks[farthest].iter().position(|splat| along(splat) == of(farthest));
+            out.push(farthest * CHUNK + place.unwrap_or(0));
+        }
+    }
+    out
+}
+
+/// Splats whose extremes are found together.
+const CHUNK: usize = 1 << 14;
+
+/// How far something reaches in a direction, and in its opposite.
+type Ends = [f32; 2];
+
+/// How far centres lie in each direction, and in its opposite.
+#[inline(always)]
+fn ends<S: Simd>(simd: S, splats: &[Splat]) -> [Ends; DIRECTIONS.len()] {
+    let none = f32x8::splat(simd, f32::NEG_INFINITY);
+    let mut found = [[none; 2]; DIRECTIONS.len()];
+    let mut places = [[0.0f32; 8]; 3];
+    for eight in splats.chunks(8) {
+        for lane in 0..8 {
+            // What lacks to eight is the last once more.
+            let splat = eight.get(lane).unwrap_or(&eight[eight.len() - 1]);
+            for (places, place) in places.iter_mut().zip(splat.center) {
+                places[lane] = place;
+            }
+        }
+        let [x, y, z]: [f32x8<S>; 3] =
+            [places[0].simd_into(simd), places[1].simd_into(simd), places[2].simd_into(simd)];
+        for (ends, direction) in found.iter_mut().zip(DIRECTIONS) {
+            let along = x * direction[0] + y * direction[1] + z * direction[2];
+            *ends = [ends[0].max(along), ends[1].max(-along)];
+        }
+    }
+    let mut out = [[f32::NEG_INFINITY; 2]; DIRECTIONS.len()];
+    for (out, found) in out.iter_mut().zip(found) {
+        let farthest: [[f32; 8]; 2] = [found[0].into(), found[1].into()];
+        *out = [0, 1].map(|side| farthest[side].iter().copied().fold(f32::NEG_INFINITY, f32::max));
+    }
+    out
+}
+
 /// How often what lies farthest outside is taken in.
 const MOST_GROWTHS: usize = 12;
 /// What may lie outside before the sphere is grown to hold it, in parts of its radius.
@@ -196,28 +286,7 @@ const OUTSIDE: f64 = 0.005;
 /// `extent` standard deviations from their centres.
 pub(crate) fn enclosing(splats: &[Splat], extent: f32) -> Sphere {
     let sphere = |splat: &Splat| Sphere::of(&leaf(splat, extent));
-    let none = [[(f32::NEG_INFINITY, 0usize); 2]; DIRECTIONS.len()];
-    let farther = |a: (f32, usize), b: (f32, usize)| if b.0 > a.0 { b } else { a };
-    let extremes = splats
-        .par_chunks(1 << 14)
-        .enumerate()
-        .map(|(chunk, splats)| {
-            let mut found = none;
-            for (index, splat) in splats.iter().enumerate() {
-                let place = Vec3::from(splat.center);
-                for (ends, direction) in found.iter_mut().zip(DIRECTIONS) {
-                    let along = place.dot(Vec3::from(direction));
-                    for (end, along) in ends.iter_mut().zip([along, -along]) {
-                        if along > end.0 {
-                            *end = (along, (chunk << 14) + index);
-                        }
-                    }
-                }
-            }
-            found
-        })
-        .reduce(|| none, |a, b| std::array::from_fn(|i| std::array::from_fn(|j| farther(a[i][j], b[i][j]))));
-    let mut core: Vec<Sphere> = extremes.iter().flatten().map(|&(_, index)| sphere(&splats[index])).collect();
+    let mut core: Vec<Sphere> = extremes(splats).iter().map(|&index| sphere(&splats[index])).collect();
     let mut around = Sphere::around(&core, 1 << 12);
     for growth in 0.. {
         // Most splats lie so far inside that their size need not be known: a splat's largest standard deviation is at most

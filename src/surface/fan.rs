@@ -4,6 +4,7 @@ use super::{
     Mesh, SurfelOptions,
     adjacency::Connected,
     disc::{Ellipse, Moments},
+    eight::{Common, Fans, Found, MOST_CORNERS},
     paint::{NEUTRAL, corner_color, pack},
     refine::Origin,
     smooth::Groups,
@@ -12,31 +13,32 @@ use crate::{
     deadline::Clock,
     splat::{STEP_BACK, Splat, encode_normal},
 };
+use fearless_simd::{Level, Simd, dispatch};
 use glam::{DVec3, Vec2, Vec3};
 
 /// A surfel stands for triangles whose normals differ from the first one's by no more (degrees).
 const FLAT: f32 = 30.0;
 /// A surfel lies across its shading normal where that is no farther from its triangles' mean normal (cosine of 20°).
-const ALIKE: f32 = 0.94;
+pub(super) const ALIKE: f32 = 0.94;
 /// A triangle is steep where its normal's product with the surfel's is less.
-const STEEP: f32 = 0.95;
+pub(super) const STEEP: f32 = 0.95;
 /// Covariance of a surfel in that of the triangles around its vertex. On a mesh of equilateral triangles of side 1 the
 /// standard deviation is 0.35, and the surfels' sum is nowhere below 0.767 times the strength of one.
-const SPREAD: f32 = 0.35 * 0.35 * 24.0 / 5.0;
+pub(super) const SPREAD: f32 = 0.35 * 0.35 * 24.0 / 5.0;
 /// The most squared distances, in standard deviations, that a surfel may have from the middles of the edges at its vertex,
 /// from the centroids of the triangles, and from the vertex itself. Two surfels at the middle of an edge, and three at a
 /// centroid, then have 0.31 and 0.29 of the strength of one; narrower ones leave holes, wider ones reach over outlines.
-const MIDDLE: f32 = 3.8;
-const CENTROID: f32 = 4.7;
-const CORNER: f32 = 5.0;
+pub(super) const MIDDLE: f32 = 3.8;
+pub(super) const CENTROID: f32 = 4.7;
+pub(super) const CORNER: f32 = 5.0;
 /// The thickness of a surfel, in its smaller standard deviation.
-const THICKNESS: f32 = 0.12;
+pub(super) const THICKNESS: f32 = 0.12;
 /// The square of twice an area, in units, below which products of moments are lost in 32 bits: edges of less than a millionth.
 pub(super) const LEAST_SQUARE: f32 = 1e-26;
 /// A triangle whose height is less than the root of this part of its longest edge is a line at the precision of 32 bits.
 pub(super) const LEAST_RATIO_SQUARED: f32 = 1e-12;
 /// How high above its vertex a surfel lies, of the mean height of the triangles around a vertex.
-const SAG: f32 = 0.4;
+pub(super) const SAG: f32 = 0.4;
 
 /// Vertices whose triangles are read together. They may lie anywhere in memory: asked for one by one, each is waited for.
 const TOGETHER: usize = 64;
@@ -85,6 +87,8 @@ pub(super) struct Made {
     smooth: Groups,
     /// Normals of the smooth groups.
     normals: Vec<Vec3>,
+    /// Eight vertices, and what came of them.
+    fans: Box<(Fans, Found)>,
 }
 
 impl Made {
@@ -100,6 +104,7 @@ impl Made {
             flat: Groups::new(crease.min(FLAT)),
             smooth: Groups::new(crease),
             normals: Vec::new(),
+            fans: Box::default(),
         }
     }
 }
@@ -107,6 +112,7 @@ impl Made {
 impl Maker<'_> {
     /// Adds the surfels of some vertices, unless time is up.
     pub fn vertices(&self, vertices: &[usize], made: &mut Made, clock: &Clock) {
+        let by_eight = self.origin.is_none() && self.mesh.normals.is_empty() && self.plain;
         for few in vertices.chunks(TOGETHER) {
             if clock.is_over(0) {
                 return;
@@ -117,14 +123,85 @@ impl Maker<'_> {
                 let corners = self.connected.adjacency.corners(vertex);
                 rows.extend(corners.iter().map(|&at| self.mesh.triangles[at as usize / 3]));
             }
-            let mut rest = &rows[..];
-            for &vertex in few {
-                let (own, after) = rest.split_at(self.connected.adjacency.corners(vertex).len());
-                self.vertex(vertex, own, made);
-                rest = after;
+            if by_eight {
+                dispatch!(Level::new(), simd => self.by_eight(simd, few, &rows, made));
+            } else {
+                let mut rest = &rows[..];
+                for &vertex in few {
+                    let (own, after) = rest.split_at(self.connected.adjacency.corners(vertex).len());
+                    self.vertex(vertex, own, made);
+                    rest = after;
+                }
             }
             made.rows = rows;
         }
+    }
+
+    /// Adds the surfels of vertices, eight at once; `rows` are the triangles of their corners.
+    #[inline(always)]
+    fn by_eight<S: Simd>(&self, simd: S, vertices: &[usize], rows: &[[u32; 3]], made: &mut Made) {
+        let common = Common {
+            unit: self.unit,
+            outward: self.outward,
+            radius_scale: self.options.radius_scale,
+            flat: made.flat.crease(),
+        };
+        let mut fans = std::mem::take(&mut made.fans);
+        let mut rest = rows;
+        for eight in vertices.chunks(8) {
+            let (fan, found) = &mut *fans;
+            let all = rest;
+            fan.clear();
+            for (lane, &vertex) in eight.iter().enumerate() {
+                let corners = self.connected.adjacency.corners(vertex);
+                let (own, after) = rest.split_at(corners.len());
+                rest = after;
+                self.gather(fan, lane, vertex, corners, own);
+            }
+            fan.surfels(simd, &common, found);
+            let mut rest = all;
+            for (lane, &vertex) in eight.iter().enumerate() {
+                let (own, after) = rest.split_at(self.connected.adjacency.corners(vertex).len());
+                rest = after;
+                if found.is_made[lane] {
+                    self.take(found, lane, vertex, made);
+                } else {
+                    self.vertex(vertex, own, made);
+                }
+            }
+        }
+        made.fans = fans;
+    }
+
+    /// Puts a vertex in a lane, with the triangles of its corners; one of too many in none.
+    #[inline(always)]
+    fn gather(&self, fan: &mut Fans, lane: usize, vertex: usize, corners: &[u32], rows: &[[u32; 3]]) {
+        let here = self.mesh.positions[vertex];
+        let count = if corners.len() <= MOST_CORNERS { corners.len() } else { 0 };
+        fan.begin(lane, here, count);
+        for (at, (&corner, &row)) in corners.iter().zip(rows).enumerate().take(count) {
+            let [_, next, last] = turned(row, corner);
+            let [_, next_number, last_number] = turned(self.connected.places[corner as usize / 3], corner);
+            let places = [self.mesh.positions[next as usize], self.mesh.positions[last as usize]];
+            fan.put(lane, at, places, [next_number, last_number]);
+        }
+    }
+
+    /// Adds what was found of the vertex in a lane.
+    #[inline(always)]
+    fn take(&self, found: &Found, lane: usize, vertex: usize, made: &mut Made) {
+        let pack = |part: f32| u32::from(part as i16 as u16);
+        made.longest = made.longest.max(found.longest[lane]);
+        let cross = Vec3::new(found.cross[0][lane], found.cross[1][lane], found.cross[2][lane]);
+        made.sums.add(self.mesh.positions[vertex], found.area[lane], cross);
+        let [f0, f1, f2, f3, f4, f5] = &found.factor;
+        made.splats.push(Splat {
+            center: [found.center[0][lane], found.center[1][lane], found.center[2][lane]],
+            strength: self.options.optical_depth,
+            factor: [f0[lane], f1[lane], f2[lane], f3[lane], f4[lane], f5[lane]],
+            color: self.color(vertex, &[], 1.0),
+            normal: pack(found.normal[0][lane]) | pack(found.normal[1][lane]) << 16,
+        });
     }
 
     /// Adds the surfels of a vertex; `rows` are the triangles of its corners.
@@ -157,13 +234,7 @@ impl Maker<'_> {
 
     /// What the vertex of a corner of a triangle sees; `longest` grows to the square of the longest edge there.
     fn around(&self, at: u32, row: [u32; 3], per_unit: f32, longest: &mut f32) -> Option<Around> {
-        let (triangle, corner) = (at as usize / 3, at as usize % 3);
-        let turned = |[a, b, c]: [u32; 3]| match corner {
-            0 => [a, b, c],
-            1 => [b, c, a],
-            _ => [c, a, b],
-        };
-        let [here, next, last] = turned(row).map(|v| self.mesh.positions[v as usize]);
+        let [here, next, last] = turned(row, at).map(|v| self.mesh.positions[v as usize]);
         let (a, b) = ((next - here) * per_unit, (last - here) * per_unit);
         let cross = a.cross(b);
         let (square, longer) = (cross.length_squared(), a.length_squared().max(b.length_squared()));
@@ -173,7 +244,7 @@ impl Maker<'_> {
             return None;
         }
         let twice_area = square.sqrt();
-        let [_, next, last] = turned(self.connected.places[triangle]);
+        let [_, next, last] = turned(self.connected.places[at as usize / 3], at);
         Some(Around {
             at,
             normal: cross * (1.0 / twice_area),
@@ -279,6 +350,16 @@ impl Maker<'_> {
     }
 }
 
+/// The corners of a triangle, that of this number first.
+#[inline(always)]
+fn turned([a, b, c]: [u32; 3], corner: u32) -> [u32; 3] {
+    match corner % 3 {
+        0 => [a, b, c],
+        1 => [b, c, a],
+        _ => [c, a, b],
+    }
+}
+
 /// What tells whether a mesh is inside out, summed over the corners of its triangles.
 #[derive(Debug, Default, Clone, Copy)]
 pub(super) struct Sums {
@@ -345,7 +426,8 @@ impl Sums {
 }
 
 /// Spreads the bits of a number, so that exclusive sums of different numbers do not cancel by chance.
-fn mixed(place: u32) -> u64 {
+#[inline]
+pub(super) fn mixed(place: u32) -> u64 {
     let product = (u64::from(place) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     product ^ (product >> 29)
 }

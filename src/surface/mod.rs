@@ -3,6 +3,7 @@
 mod adjacency;
 mod cloud;
 mod disc;
+mod eight;
 mod ellipse;
 mod fan;
 mod mesh;

@@ -6,7 +6,7 @@ use super::{
     adjacency::may_be_split,
     cloud,
     fan::Sums,
-    refine::{Expected, affordable, count_once_cut, pieces},
+    refine::{Expected, STRETCH, affordable, count_once_cut, pieces, stretch},
     surfels::{largest_edge, of_part},
     survey::{edge, edge_of_places},
 };
@@ -31,6 +31,8 @@ pub(crate) struct Triangles {
     pub long: Vec<[Vec3; 3]>,
     names: Vec<[u32; 3]>,
     pub longest: f32,
+    /// How many times too long an edge is.
+    excess: f32,
 }
 
 impl Triangles {
@@ -45,10 +47,13 @@ impl Triangles {
         self.sums.add_triangle(corners);
         self.surround([p.min(q).min(r), p.max(q).max(r)]);
         let edges = [(p, q), (q, r), (r, p)].map(|(a, b)| (a - b).length());
+        // A narrow triangle counts as less long, for its edges may be longer.
+        let allowed = length * stretch(edges, length);
         let longest = edges[0].max(edges[1]).max(edges[2]);
         self.longest = self.longest.max(longest);
-        self.expected += pieces(edges.map(|edge| f64::from(edge / length)));
-        if longest / length > 1.0 {
+        self.excess = self.excess.max(longest / allowed);
+        self.expected += pieces(edges.map(|edge| f64::from(edge / allowed)));
+        if longest / allowed > 1.0 {
             self.long.push(corners);
             self.names.push([a, b, c]);
         }
@@ -67,6 +72,7 @@ impl Triangles {
         self.long.extend(other.long);
         self.names.extend(other.names);
         self.longest = self.longest.max(other.longest);
+        self.excess = self.excess.max(other.excess);
     }
 
     /// Counts what those with long edges are cut into, where there is room for so many.
@@ -95,7 +101,7 @@ pub(crate) struct MeshPieces {
     outward: f32,
     /// Whether any edge is cut.
     is_coarse: bool,
-    /// The longest that an edge may stay.
+    /// The longest that an edge may stay, where no triangle is narrow.
     pub length: f32,
     pub closing: Option<PiecesClosing>,
 }
@@ -147,12 +153,17 @@ impl MeshPieces {
             is_closed.then_some(PiecesClosing::Places)
         };
         let outward = if seen.sums.side(1.0) < 0 { -1.0 } else { 1.0 };
-        let is_coarse = seen.longest > length;
+        let is_coarse = seen.excess > 1.0;
         let closing = closing.filter(|_| triangles > 0);
         Ok((
             Self { is_coarse, is_split: may_be_split(has_uvs, points, triangles), unit, outward, length, closing },
             seen,
         ))
+    }
+
+    /// The longest edge that may stay.
+    pub fn longest(&self) -> f32 {
+        self.length * STRETCH
     }
 
     /// The surfels of those vertices of a part that are `owned`; all triangles at them must be in it. Where `is_long`, also

@@ -15,6 +15,12 @@ const TEXELS: f32 = 1.5;
 /// … but no closer than this part of the longest edge that is allowed.
 const FINEST: f32 = 1.0 / 8.0;
 
+/// A triangle is narrow where its shortest edge is no longer than this part of the longest that is allowed …
+const NARROW: f32 = 1.0 / 8.0;
+/// … and then its edges may be this many times as long: an ellipse can be as long and narrow as it, where cutting it across would give
+/// many.
+pub(super) const STRETCH: f32 = 2.5;
+
 /// A texture that repeats this often between two of its finest samples cannot be resolved: its triangle is not cut for it.
 const MOST_REPEATS: f64 = 16.0;
 
@@ -193,6 +199,10 @@ pub(super) fn count_of_refined(
     room: usize,
     deadline: Deadline,
 ) -> Result<usize> {
+    if is_fine(mesh, length) {
+        deadline.check(WORK)?;
+        return Ok(mesh.triangles.len());
+    }
     memory::room(WORK, mesh.bytes())?;
     let Mesh { positions, uvs, triangles, triangle_materials, materials, .. } = mesh;
     let bare = Mesh {
@@ -325,8 +335,9 @@ impl<'a> Wanted<'a> {
         ((a - b) * Vec2::new(texture.width as f32, texture.height as f32)).length()
     }
 
-    /// How many times too long an edge is; up to 1 it may stay. One that numbers of 32 bits have no middle for stays.
-    fn excess(&self, mesh: &Mesh, source: usize, a: u32, b: u32) -> f32 {
+    /// How many times too long an edge is in a triangle of this stretch; up to 1 it may stay. One that numbers of 32 bits have
+    /// no middle for stays.
+    fn excess(&self, mesh: &Mesh, source: usize, stretch: f32, [a, b]: [u32; 2]) -> f32 {
         let ends = [mesh.positions[a as usize], mesh.positions[b as usize]];
         if ends.contains(&(ends[0] * 0.5 + ends[1] * 0.5)) {
             return 0.0;
@@ -334,12 +345,19 @@ impl<'a> Wanted<'a> {
         let length = (ends[0] - ends[1]).length();
         let texels = self.texels(mesh, source, a, b) / (TEXELS * self.coarser);
         let finest = length / (self.length * FINEST * self.coarser).min(self.length);
-        (length / self.length).max(texels.min(finest))
+        (length / (self.length * stretch)).max(texels.min(finest))
+    }
+
+    /// How many times too long the edges of a triangle are, from its first corner on.
+    fn excesses(&self, mesh: &Mesh, source: usize, t: [u32; 3]) -> [f32; 3] {
+        let [a, b, c] = t.map(|vertex| mesh.positions[vertex as usize]);
+        let stretch = stretch([a - b, b - c, c - a].map(Vec3::length), self.length);
+        [(0, 1), (1, 2), (2, 0)].map(|(i, j)| self.excess(mesh, source, stretch, [t[i], t[j]]))
     }
 
     /// Whether a triangle of the mesh may stay whole.
     fn is_small(&self, triangle: usize, t: [u32; 3]) -> bool {
-        [(0, 1), (1, 2), (2, 0)].iter().all(|&(i, j)| self.excess(self.mesh, triangle, t[i], t[j]) <= 1.0)
+        self.excesses(self.mesh, triangle, t).iter().all(|excess| *excess <= 1.0)
     }
 
     /// Whether all triangles of the mesh may.
@@ -350,12 +368,11 @@ impl<'a> Wanted<'a> {
     /// About how many triangles there will be.
     fn expected(&self) -> Expected {
         let parts = |(source, t): (usize, &[u32; 3])| {
-            let edges = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| [t[i], t[j]]);
-            let excess = edges.map(|[a, b]| f64::from(self.excess(self.mesh, source, a, b)));
-            let plain = edges.map(|[a, b]| {
-                let [a, b] = [a, b].map(|vertex| self.mesh.positions[vertex as usize]);
-                f64::from((a - b).length() / self.length)
-            });
+            let excess = self.excesses(self.mesh, source, *t).map(f64::from);
+            let [a, b, c] = t.map(|vertex| self.mesh.positions[vertex as usize]);
+            let edges = [a - b, b - c, c - a].map(Vec3::length);
+            let stretch = stretch(edges, self.length);
+            let plain = edges.map(|edge| f64::from(edge / (self.length * stretch)));
             // Edges that texels make longer need not be those of any triangle: then two of them tell the most that there can be.
             if excess.iter().all(|excess| *excess <= 1.0) {
                 Expected { whole: 1.0, cut: 0.0 }
@@ -367,6 +384,17 @@ impl<'a> Wanted<'a> {
         };
         self.mesh.triangles.par_iter().enumerate().map(parts).reduce(Expected::default, Expected::with)
     }
+}
+
+/// How many times as long as others the edges of a triangle may be, that has edges of these lengths.
+pub(super) fn stretch(edges: [f32; 3], length: f32) -> f32 {
+    let shortest = edges[0].min(edges[1]).min(edges[2]);
+    if shortest <= length * NARROW { STRETCH } else { 1.0 }
+}
+
+/// Whether no edge of the mesh has to be cut where `length` is the longest that is allowed.
+pub(super) fn is_fine(mesh: &Mesh, length: f32) -> bool {
+    Wanted::new(mesh, length).are_small()
 }
 
 /// About how many triangles are made of one whose edges are so many times too long.
@@ -405,7 +433,7 @@ fn slice_needles(mesh: &mut Mesh, wanted: &Wanted, settled: usize, most: usize) 
     let needle = |(index, &t): (usize, &[u32; 3])| {
         let triangle = settled + index;
         let source = mesh.triangle_materials[triangle] as usize;
-        let excess = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| wanted.excess(mesh, source, t[i], t[j]));
+        let excess = wanted.excesses(mesh, source, t);
         let short = (0..3).min_by(|&i, &j| excess[i].total_cmp(&excess[j]))?;
         let longest = excess[(short + 1) % 3].max(excess[(short + 2) % 3]);
         let least = excess[(short + 1) % 3].min(excess[(short + 2) % 3]);
@@ -497,7 +525,7 @@ fn marked_edges(mesh: &Mesh, wanted: &Wanted, settled: usize) -> Vec<(u32, u32)>
         .flat_map_iter(|(index, &t)| {
             let edges = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
             let source = mesh.triangle_materials[settled + index] as usize;
-            let excess = edges.map(|(a, b)| wanted.excess(mesh, source, a, b));
+            let excess = wanted.excesses(mesh, source, t);
             // Only the longest, and those about as long: a flat triangle is cut along its length first.
             let least = (excess.iter().fold(0.0, |a: f32, &b| a.max(b)) * 0.7).max(1.0);
             edges.into_iter().zip(excess).filter_map(move |(edge, excess)| (excess > least).then_some(sorted(edge)))
@@ -631,9 +659,10 @@ mod tests {
             let mesh = one(apex);
             let fine = refine(&mesh, 0.1, 1 << 20, NEVER).unwrap().mesh;
             for t in &fine.triangles {
-                for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-                    assert!(fine.positions[t[i] as usize].distance(fine.positions[t[j] as usize]) <= 0.1001);
-                }
+                let edges = [(0, 1), (1, 2), (2, 0)]
+                    .map(|(i, j)| fine.positions[t[i] as usize].distance(fine.positions[t[j] as usize]));
+                let most = if edges.iter().any(|edge| *edge <= 0.1 / 8.0) { 0.25 } else { 0.1 };
+                assert!(edges.iter().all(|edge| *edge <= most * 1.001), "{edges:?}");
             }
             assert!((area(&fine) / area(&mesh) - 1.0).abs() < 1e-4);
         }

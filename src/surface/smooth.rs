@@ -29,6 +29,11 @@ impl Groups {
         Self { crease: crease_angle_degrees.min(SHARPEST).to_radians().cos(), seeds: Vec::new() }
     }
 
+    /// Cosine of the crease angle.
+    pub fn crease(&self) -> f32 {
+        self.crease
+    }
+
     /// Forgets the vertex before.
     pub fn clear(&mut self) {
         self.seeds.clear();

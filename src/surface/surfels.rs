@@ -11,7 +11,7 @@ use super::{
     adjacency::{Connected, is_split},
     cloud,
     fan::{LEAST_RATIO_SQUARED, LEAST_SQUARE, Made, Maker, Sums},
-    refine::{Origin, budget, count_of_refined, refine},
+    refine::{Origin, budget, count_of_refined, is_fine, refine},
     survey::has_area,
 };
 use crate::{
@@ -279,7 +279,7 @@ fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Result<Vec<Splat>> {
     mesh.check_extent(largest)?;
     // Most large meshes are fine enough, and right side out. One look at the triangles finds that out and makes the surfels.
     let parts = make(mesh, None, is_split(mesh), options, [largest, 1.0], |_| true)?;
-    let is_coarse = parts.iter().any(|part| part.longest > 1.0);
+    let is_coarse = parts.iter().any(|part| part.longest > 1.0) && !is_fine(mesh, largest);
     let is_textured = !mesh.uvs.is_empty() && mesh.materials.iter().any(|material| material.texture.is_some());
     let sums = parts.iter().fold(Sums::default(), |sums, part| sums.with(part.sums));
     let outward = if sums.side(largest) < 0 { -1.0 } else { 1.0 };

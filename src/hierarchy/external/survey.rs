@@ -130,7 +130,7 @@ pub fn look(
 
 fn triangulated(stream: &Stream, options: &ExternalOptions, watch: StageWatch<'_>) -> Result<Triangulated> {
     let (pieces, seen) = look_at_long(stream, options, watch)?;
-    let longest = seen.longest.min(pieces.length);
+    let longest = seen.longest.min(pieces.longest());
     let long = seen.long.into_iter().flatten().map(name).collect();
     let is_solid = match pieces.closing {
         Some(closing) => is_solid(stream, closing, options.memory, watch)?,

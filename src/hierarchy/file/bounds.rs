@@ -57,6 +57,11 @@ pub fn leaf(node: &mut Node, shape: &Shape, extent: f32) {
     node.radius = (f64::from(extent) * largest * 1.000_001) as f32;
     node.size = (FULL_WIDTH * largest) as f32;
     node.cone = unpacked(node.splat.normal).map_or(-1.0, |normal| {
+        // The axis along which it is thinnest lies between the normal and the third one, if that is the thinnest.
+        let [first, second, third] = shape.sigma;
+        if third <= first && third <= second && shape.axes[2].dot(normal) > 0.999 {
+            return 1.0;
+        }
         // As of `merge::leaf`, by the axes themselves.
         let along = |i: usize| {
             let (thinner, axis) = (shape.sigma[2] / shape.sigma[i], shape.axes[i]);
@@ -107,13 +112,22 @@ impl Code {
     pub fn encode(node: &mut Node, children: &[Node], shape: &Shape, extent: f32, fine: Option<f64>) -> Option<Self> {
         let largest = shape.largest();
         let own = f64::from(extent) * largest;
+        let around = |node: &Node| {
+            let center = node.center().as_dvec3();
+            children.iter().map(|child| reach(center, child)).fold(0.0, f64::max) * (1.0 + 1e-12)
+        };
         let mut code = Self::default();
         if let Some(step) = fine {
-            code.center = nearest_center(node, children, shape, step)?;
+            code.center = nearest_center(node, children, shape, step).unwrap_or_default();
         }
         code.decode(node, shape, extent, fine)?;
-        let center = node.center().as_dvec3();
-        let radius = children.iter().map(|child| reach(center, child)).fold(0.0, f64::max) * (1.0 + 1e-12);
+        let mut radius = around(node);
+        if fine.is_some_and(|step| radius > step * f64::from(MOST_POWER / RADIUS - 1)) {
+            // A sphere that lies in its parent's may be far wider than it need be; around the splat's centre it is not.
+            code.center = [0; 3];
+            code.decode(node, shape, extent, fine)?;
+            radius = around(node);
+        }
         let size = children.iter().map(|child| child.size).fold(0.0, f32::max);
         let cosine = children.iter().map(|child| joint_cosine(node, child)).fold(1.0, f64::min) - 1e-12;
         let narrow = |cone: &f32| *cone == -1.0 || f64::from(*cone) <= cosine;
