@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use splatkit::{
-    engine::{AdapterChoice, Gpu, Renderer},
+    Device, Renderer,
     math::{Camera, Kernel},
     scene::{Scene, Settings},
     volume::{TransferFunction, phantoms::Phantom},
@@ -13,17 +13,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let transfer = TransferFunction::automatic(&volume);
     let scene = Scene::new().with_volume(volume, Kernel::default(), transfer);
 
-    let gpu = Gpu::headless(&AdapterChoice::Automatic)?;
-    let mut renderer = Renderer::new(&gpu);
-    let mut prepared = renderer.prepare(&scene)?;
+    let mut renderer = Renderer::new(&Device::automatic(), &scene)?;
 
     let settings = Settings::new([640, 480]);
     let mut camera = Camera::framing(&scene.bounds(), DVec3::Y, DVec3::Z, 640.0 / 480.0);
     camera.azimuth(40.0);
     camera.elevation(30.0);
     camera.zoom(1.9);
-    let (picture, stats) = renderer.render(&mut prepared, &camera, &settings)?;
+    let (picture, stats) = renderer.render(&camera, &settings)?;
     picture.save("specimen.png".as_ref(), Some([0.0, 0.0, 0.0]))?;
-    println!("{} splats in {} passes on {}", stats.splats, stats.passes, gpu.info.name);
+    println!("{} bytes of memory on {}", stats.gpu_bytes, renderer.device().name());
     Ok(())
 }

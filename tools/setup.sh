@@ -1,4 +1,5 @@
-# What ./tools/demo and ./tools/test need beside the Rust toolchain: a linker and a Vulkan driver. Sourced, not run.
+# What ./tools/demo and ./tools/test need beside the Rust toolchain: a linker, and for the tests of the GPU engine a Vulkan driver.
+# Sourced, not run.
 
 say() { printf '\n== %s\n' "$*"; }
 fail() { printf 'error: %s\n' "$*" >&2; exit 1; }
@@ -35,7 +36,10 @@ has_vulkan() {
 command -v cargo >/dev/null || PATH="$PATH:$HOME/.cargo/bin"
 command -v cargo >/dev/null || fail "there is no cargo: install Rust as https://rustup.rs tells"
 command -v cc >/dev/null || install_packages gcc libc6-dev
-has_vulkan || install_packages mesa-vulkan-drivers libvulkan1
 
-# Mesa asks for it and complains where there is none.
-export XDG_RUNTIME_DIR="${XDG_RUNTIME_DIR:-${TMPDIR:-/tmp}}"
+# Installs a Vulkan driver where there is none.
+need_vulkan() {
+    has_vulkan || install_packages mesa-vulkan-drivers libvulkan1
+    # Mesa asks for it and complains where there is none.
+    export XDG_RUNTIME_DIR="${XDG_RUNTIME_DIR:-${TMPDIR:-/tmp}}"
+}
