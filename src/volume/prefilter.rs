@@ -21,7 +21,8 @@ const HORIZON: usize = 18;
 /// The coefficients of samples on a lattice of `dims`, first axis fastest.
 pub fn cubic(samples: &Samples, dims: [usize; 3]) -> Vec<f32> {
     let [nx, ny, nz] = dims;
-    let mut values: Vec<f32> = each_type!(samples, own => own.par_iter().map(|value| *value as f32).collect());
+    let mut values: Vec<f32> =
+        each_type!(samples, own => own.par_iter().map(|value| f64::from(*value) as f32).collect());
     values.par_chunks_mut(nx * ny).for_each(|slice| {
         let mut rows = slice.chunks_exact_mut(LINES * nx);
         rows.by_ref().for_each(|rows| along_rows::<LINES>(rows, nx));
