@@ -104,7 +104,6 @@ fn what_is_gathered_and_what_is_not() {
     for case in [
         scenes::blobs_analytic(),
         scenes::blobs_orthographic(),
-        scenes::sheared_lattice(),
         scenes::camera_inside_a_volume(),
         scenes::surface_in_a_volume(),
         scenes::surface_in_a_volume_orthographic(),
