@@ -4,10 +4,10 @@
 use super::{
     plan::Plan,
     rays::Rays,
-    vector::{Lanes, dot, exp, exp2, four, log2, three},
+    vector::{Lanes, dot, each, exp, exp2, four, log2, three},
 };
 use crate::scene::Optics;
-use fearless_simd::{Simd, mask32x8, prelude::*};
+use fearless_simd::{Simd, f32x4, mask32x8, prelude::*};
 
 /// Parts of a sheet in which the transfer function is integrated.
 const PARTS: usize = 3;
@@ -133,14 +133,14 @@ impl Plan<'_> {
         let (first, last) = (low.max(none).min(all), high.max(none).min(all));
         let [first_at, last_at]: [[f32; 8]; 2] = [first.into(), last.into()];
         let integrals = &self.tables.entries[self.tables.starts[0] as usize..];
-        let mut differences = [[0.0f32; 8]; 4];
-        for (lane, (first, last)) in first_at.into_iter().zip(last_at).enumerate() {
-            let (from, to) = (integrals[first as usize], integrals[last as usize]);
-            for (part, own) in differences.iter_mut().enumerate() {
-                own[lane] = to[part] - from[part];
-            }
-        }
-        let within: [Lanes<S>; 4] = four!(I => differences[I].simd_into(simd));
+        let within = columns(
+            simd,
+            each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
+                let from: f32x4<S> = integrals[first_at[L] as usize].simd_into(simd);
+                let to: f32x4<S> = integrals[last_at[L] as usize].simd_into(simd);
+                to - from
+            }),
+        );
         // Values before and behind the table are those of its ends.
         let before = (high.min(none) - low.min(none)) * inverse;
         let behind = (high.max(all) - low.max(all)) * inverse;
@@ -153,16 +153,16 @@ impl Plan<'_> {
     fn one<S: Simd>(&self, simd: S, value: Lanes<S>) -> [Lanes<S>; 4] {
         let [_, _, end, place] = self.frame.transfer;
         let at = (value + place).max(Lanes::splat(simd, 0.0)).min(Lanes::splat(simd, end));
-        let mut found = [[0.0f32; 8]; 4];
         let places: [f32; 8] = at.into();
-        for (lane, at) in places.into_iter().enumerate() {
-            let (low, part) = (at as usize, at.fract());
-            let (a, b) = (self.tables.entries[low], self.tables.entries[low + 1]);
-            for (channel, own) in found.iter_mut().enumerate() {
-                own[lane] = a[channel] + (b[channel] - a[channel]) * part;
-            }
-        }
-        let [red, green, blue, extinction]: [Lanes<S>; 4] = four!(I => found[I].simd_into(simd));
+        let [red, green, blue, extinction] = columns(
+            simd,
+            each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
+                let low = places[L] as usize;
+                let from: f32x4<S> = self.tables.entries[low].simd_into(simd);
+                let to: f32x4<S> = self.tables.entries[low + 1].simd_into(simd);
+                (to - from).mul_add(f32x4::splat(simd, places[L].fract()), from)
+            }),
+        );
         [red * extinction, green * extinction, blue * extinction, extinction]
     }
 
@@ -429,6 +429,17 @@ impl<S: Simd> Medium<S> {
         self.through -= share;
         self.depth += depth;
     }
+}
+
+/// Four channels of eight pixels from eight pixels of four channels.
+#[inline(always)]
+fn columns<S: Simd>(simd: S, rows: [f32x4<S>; 8]) -> [Lanes<S>; 4] {
+    let [low, high] = each!([0, 4], I => {
+        let (ac, bd) = (rows[I].zip_low(rows[I + 2]), rows[I + 1].zip_low(rows[I + 3]));
+        let (ac_high, bd_high) = (rows[I].zip_high(rows[I + 2]), rows[I + 1].zip_high(rows[I + 3]));
+        [ac.zip_low(bd), ac.zip_high(bd), ac_high.zip_low(bd_high), ac_high.zip_high(bd_high)]
+    });
+    four!(I => simd.combine_f32x4(low[I], high[I]))
 }
 
 /// The share of light that an optical depth takes; where it is small, the difference to 1 is lost in rounding.

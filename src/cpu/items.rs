@@ -35,11 +35,11 @@ pub enum Prepared {
         drawn: Arc<SplatSet>,
     },
     Hierarchy(Box<PageCache>),
-    /// A volume, the extremes around each sample, and those that show under a transfer function.
+    /// A volume; where its samples are scattered, the extremes around each and those that show under a transfer function.
     Volume {
         volume: Arc<Volume>,
         kernel: Kernel,
-        ranges: Vec<[u8; 2]>,
+        ranges: Option<Vec<[u8; 2]>>,
         listed: Option<([u16; 256], Vec<u32>)>,
     },
     Bricks(Box<BrickCache>),
@@ -52,12 +52,9 @@ impl Prepared {
                 Self::Set { levels: Levels::new(set).map(Box::new), drawn: set.clone() }
             }
             Item::Hierarchy(hierarchy) => Self::Hierarchy(Box::new(PageCache::new(hierarchy))),
-            Item::Volume(volume, kernel, _) => Self::Volume {
-                ranges: volume.drawn_ranges(kernel).into_owned(),
-                volume: volume.clone(),
-                kernel: kernel.clone(),
-                listed: None,
-            },
+            Item::Volume(volume, kernel, _) => {
+                Self::Volume { volume: volume.clone(), kernel: kernel.clone(), ranges: None, listed: None }
+            }
             Item::Bricks(bricks, kernel, _) => Self::Bricks(Box::new(BrickCache::new(bricks, kernel))),
         }
     }
@@ -75,9 +72,7 @@ impl Prepared {
         match self {
             Self::Set { .. } => 0,
             Self::Hierarchy(pages) => pages.bytes(),
-            Self::Volume { ranges, listed, .. } => {
-                (2 * ranges.len() + 4 * listed.as_ref().map_or(0, |(_, list)| list.len())) as u64
-            }
+            Self::Volume { listed, .. } => 4 * listed.as_ref().map_or(0, |(_, list)| list.len() as u64),
             Self::Bricks(bricks) => bricks.bytes(),
         }
     }
@@ -105,6 +100,7 @@ impl Prepared {
                 Ok(batches(&drawn, |splat: &Splat| record(plan, &source, &widened(plan, &source, splat))))
             }
             Self::Volume { volume, kernel, ranges, listed } => {
+                let ranges = ranges.get_or_insert_with(|| volume.drawn_ranges(kernel).into_owned());
                 if listed.as_ref().is_none_or(|(own, _)| own != shown) {
                     *listed = Some((*shown, list(volume.drawn_lattice().dims, ranges, shown)));
                 }

@@ -69,7 +69,9 @@ use std::{
 pub struct CpuRenderer {
     scene: Scene,
     prepared: Vec<Prepared>,
-    /// What shows of a lattice that is gathered, for the transfer function's table of that.
+    /// The ranges of the field around the samples of a lattice that is gathered.
+    ranges: Option<Vec<[u8; 2]>>,
+    /// What shows of it, for the transfer function's table of that.
     shown: Option<([u16; 256], Shown)>,
     pace: Pace,
     level: Level,
@@ -109,6 +111,7 @@ impl CpuRenderer {
         Ok(Self {
             scene: scene.clone(),
             prepared: scene.items.iter().map(Prepared::new).collect(),
+            ranges: None,
             shown: None,
             pace: Pace::default(),
             level: Level::new(),
@@ -234,15 +237,14 @@ impl CpuRenderer {
         let mut marks = Vec::new();
         let mut gather = None;
         if gathers {
-            for (item, prepared) in self.scene.items.iter().zip(&self.prepared) {
-                let (Item::Volume(volume, kernel, transfer), Prepared::Volume { ranges, .. }) = (item, prepared) else {
-                    continue;
-                };
+            for item in &self.scene.items {
+                let Item::Volume(volume, kernel, transfer) = item else { continue };
                 let Some(weighting) = field::weighting(kernel) else { continue };
                 let first = match plan.optics {
                     Optics::Maximum => EVERYTHING,
                     _ => first_visible(transfer, volume.range),
                 };
+                let ranges = self.ranges.get_or_insert_with(|| skip::field_ranges(volume, kernel));
                 self.shown.take_if(|(own, _)| *own != first);
                 let (_, shown) = self.shown.get_or_insert_with(|| (first, Shown::new(volume, ranges, &first)));
                 let shown: &Shown = shown;

@@ -1,12 +1,13 @@
 //! Which sheets may show something in which tiles: blocks of samples that show something, projected.
 
 use super::{
+    field::deviation,
     plan::TILE,
     vector::{Lanes, three},
 };
 use crate::{
-    math::{Bounds, Sheets, View},
-    volume::Volume,
+    math::{Bounds, Kernel, Sheets, View},
+    volume::{Volume, reach::neighbourhood_ranges},
 };
 use fearless_simd::{Simd, i32x8, prelude::*};
 use glam::{DMat3, DVec3};
@@ -21,6 +22,28 @@ pub struct Shown {
     dims: [usize; 3],
     blocks: [usize; 3],
     words: Vec<u64>,
+}
+
+/// The widest Gaussian, in steps, of which that holds.
+const WIDEST: f64 = 0.6;
+
+/// The part of a Gaussian's weight that samples two steps from the nearest one have together, with room for places that lie up
+/// to a third of a step beyond it: 0.085 at half a step for the usual kernel.
+const FAR_WEIGHT: f64 = 0.15;
+
+/// For each sample of a volume, the range of the field nearer to it than to any other. The samples around it weigh nearly all;
+/// those two steps away move the field by their share at most.
+pub fn field_ranges(volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
+    let mut ranges = volume.drawn_ranges(kernel).into_owned();
+    if deviation(kernel).is_some_and(|sigma| sigma <= WIDEST) && volume.coefficients.is_none() {
+        let near = neighbourhood_ranges(volume, [1; 3]);
+        ranges.par_iter_mut().zip(near).for_each(|([low, high], [near_low, near_high])| {
+            let share = |difference: u8| (f64::from(difference) * FAR_WEIGHT).ceil() as u8;
+            *low = near_low - share(near_low - *low);
+            *high = near_high + share(*high - near_high);
+        });
+    }
+    ranges
 }
 
 impl Shown {

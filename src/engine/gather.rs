@@ -9,7 +9,10 @@ use super::{
     uniforms::Frame,
 };
 use crate::{
-    cpu::{field::deviation, skip::Shown},
+    cpu::{
+        field::deviation,
+        skip::{Shown, field_ranges},
+    },
     math::{Kernel, Sheets, View},
     scene::{Item, Scene, Settings},
     volume::{Scalar, Volume},
@@ -191,7 +194,7 @@ impl Field {
             kind,
             volume: volume.clone(),
             sigma: deviation(kernel).unwrap_or(1.0),
-            ranges: volume.drawn_ranges(kernel).into_owned(),
+            ranges: field_ranges(volume, kernel),
             samples: texture(gpu, volume, kind),
             texture_bytes: texture_bytes(gpu, volume),
             shown: None,
@@ -354,5 +357,4 @@ mod tests {
         let found: Vec<usize> = (0..32 * words.len()).filter(|bit| words[bit / 32] >> (bit % 32) & 1 != 0).collect();
         assert_eq!(found, [1, 32, 64, 95]);
     }
-
 }
