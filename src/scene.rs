@@ -16,6 +16,9 @@ use crate::{
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
+/// A lattice is gathered in sheets of up to this many of its least steps; thicker ones hold more than a parabola tells.
+pub(crate) const MOST_GATHERED: f64 = 2.2;
+
 /// One thing in a scene.
 #[derive(Debug, Clone)]
 pub enum Item {
@@ -311,7 +314,11 @@ impl Scene {
                         _ if volume.coefficients.is_some() => 2.0 / 3.0,
                         _ => 4.0 / 3.0,
                     };
-                    let step = most.min(2.0 / 3.0 * kernel.extent) * volume.lattice.kernel_spacing();
+                    let mut step = most.min(2.0 / 3.0 * kernel.extent) * volume.lattice.kernel_spacing();
+                    if volume.lattice.arrangement == Arrangement::Cartesian {
+                        // Lattices with steps of very different lengths stay thin enough to be gathered.
+                        step = step.min(MOST_GATHERED * volume.lattice.least_kernel_spacing());
+                    }
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
                 }
                 Item::Bricks(bricks, kernel, _) if settings.sheet_thickness.is_none() => {

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     math::{Kernel, Sheets},
-    scene::{Gradient, Item, Mode, Optics, Scene, Settings},
+    scene::{Gradient, Item, MOST_GATHERED, Mode, Optics, Scene, Settings},
     volume::{Arrangement, Volume},
 };
 use fearless_simd::{Simd, mask32x8, prelude::*};
@@ -18,9 +18,6 @@ use fearless_simd::{Simd, mask32x8, prelude::*};
 /// Where slopes at the ends of a sheet differ by fewer entries of the table a sheet, a cubic between them is as good as one more
 /// sample.
 const STRAIGHT: f32 = 64.0;
-
-/// Sheets thicker than this many of a sample's least steps hold more than a parabola tells.
-const THICKEST: f64 = 2.2;
 
 /// The least standard deviation of a kernel, in steps, whose weights 32 bits hold.
 const LEAST_DEVIATION: f64 = 0.3;
@@ -41,7 +38,9 @@ pub fn obstacle(scene: &Scene, settings: &Settings, sheets: &Sheets) -> Option<&
     if settings.gradient == Gradient::Central {
         return Some("gradients from neighbouring pixels");
     }
-    (sheets.step > THICKEST * volume.lattice.least_kernel_spacing()).then_some("sheets thicker than two samples")
+    let most = MOST_GATHERED * volume.lattice.least_kernel_spacing();
+    // With room for rounding: default sheets may be as thick as that.
+    (sheets.step > most * (1.0 + 1e-9)).then_some("sheets thicker than two samples")
 }
 
 /// Why a volume can't be gathered, whatever the settings.
