@@ -19,7 +19,7 @@ use splatkit::{
 
 /// As the engine decides by itself.
 fn drawn(case: &Case, budget: Budget) -> Picture {
-    drawn_by(Evaluate::Auto, case, budget).expect(case.name)
+    drawn_by(case.settings.evaluate, case, budget).expect(case.name)
 }
 
 fn drawn_by(evaluate: Evaluate, case: &Case, budget: Budget) -> splatkit::Result<Picture> {

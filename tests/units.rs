@@ -6,7 +6,7 @@ use splatkit::{
     math::{Camera, Kernel, Projection},
     picture::Picture,
     reference,
-    scene::{Scene, Settings},
+    scene::{Evaluate, Scene, Settings},
     splat::{Payload, Splat, SplatSet, encode_normal},
     volume::{Isosurface, Lattice, Samples, Shade, TransferFunction, Volume},
 };
@@ -151,9 +151,13 @@ fn flat_surroundings_are_flat() {
     let scene = Scene::new().with_volume(volume, Kernel::default(), transfer);
     let camera = USUAL.camera(PERSPECTIVE, false);
     let expected = reference::render(&scene, &camera, &settings()).expect("a picture");
-    let agreement = psnr(&expected, &drawn(&scene, &camera, &settings()));
-    println!("flat surroundings: {agreement:.1} dB");
-    assert!(agreement > 40.0, "{agreement:.1} dB");
+    // Gathered, kernels are cut to a cube of four samples a side, not to the ball in it: at the edge of the ball of samples, which is
+    // as hard as can be, that costs two decibels.
+    for (evaluate, least) in [(Evaluate::Scatter, 40.0), (Evaluate::Gather, 38.0)] {
+        let agreement = psnr(&expected, &drawn(&scene, &camera, &Settings { evaluate, ..settings() }));
+        println!("flat surroundings, {evaluate:?}: {agreement:.1} dB");
+        assert!(agreement > least, "{evaluate:?}: {agreement:.1} dB");
+    }
 }
 
 #[test]

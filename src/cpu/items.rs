@@ -40,7 +40,7 @@ pub enum Prepared {
         volume: Arc<Volume>,
         kernel: Kernel,
         ranges: Option<Vec<[u8; 2]>>,
-        listed: Option<([u16; 256], Vec<u32>)>,
+        listed: Option<(Box<[u16; 256]>, Vec<u32>)>,
     },
     Bricks(Box<BrickCache>),
 }
@@ -72,7 +72,10 @@ impl Prepared {
         match self {
             Self::Set { .. } => 0,
             Self::Hierarchy(pages) => pages.bytes(),
-            Self::Volume { listed, .. } => 4 * listed.as_ref().map_or(0, |(_, list)| list.len() as u64),
+            Self::Volume { ranges, listed, .. } => {
+                let ranges = ranges.as_ref().map_or(0, |ranges| 2 * ranges.len() as u64);
+                ranges + 4 * listed.as_ref().map_or(0, |(_, list)| list.len() as u64)
+            }
             Self::Bricks(bricks) => bricks.bytes(),
         }
     }
@@ -101,8 +104,8 @@ impl Prepared {
             }
             Self::Volume { volume, kernel, ranges, listed } => {
                 let ranges = ranges.get_or_insert_with(|| volume.drawn_ranges(kernel).into_owned());
-                if listed.as_ref().is_none_or(|(own, _)| own != shown) {
-                    *listed = Some((*shown, list(volume.drawn_lattice().dims, ranges, shown)));
+                if listed.as_ref().is_none_or(|(own, _)| **own != *shown) {
+                    *listed = Some((Box::new(*shown), list(volume.drawn_lattice().dims, ranges, shown)));
                 }
                 let Some((_, list)) = listed else { return Ok(Vec::new()) };
                 let lattice = LatticeSource::new(plan, volume, kernel);

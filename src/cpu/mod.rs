@@ -96,7 +96,11 @@ struct Clock {
 impl Clock {
     fn step(&mut self, name: &'static str) {
         let now = Instant::now();
-        self.steps.push((name, (now - self.last).as_secs_f64() * 1e3));
+        let milliseconds = (now - self.last).as_secs_f64() * 1e3;
+        match self.steps.iter_mut().find(|step| step.0 == name) {
+            Some(step) => step.1 += milliseconds,
+            None => self.steps.push((name, milliseconds)),
+        }
         self.last = now;
     }
 }
@@ -171,6 +175,13 @@ impl CpuRenderer {
         }
         stats.steps = clock.steps;
         Ok((picture, stats))
+    }
+
+    /// Bytes of memory that are held for pictures, besides the scene's own.
+    fn bytes(&self) -> u64 {
+        let shown = self.shown.as_ref().map_or(0, |(_, shown)| shown.bytes());
+        let ranges = self.ranges.as_ref().map_or(0, |ranges| size_of_val(ranges.as_slice()) as u64);
+        shown + ranges + self.prepared.iter().map(Prepared::bytes).sum::<u64>()
     }
 
     fn brick_reads(&self) -> u64 {
@@ -284,7 +295,7 @@ impl CpuRenderer {
             gathered,
             entries: drawn.into_inner(),
             passes: u32::from(!records.is_empty()),
-            gpu_bytes: self.prepared.iter().map(Prepared::bytes).sum::<u64>() + record_bytes(records),
+            gpu_bytes: self.bytes() + record_bytes(records),
             ..FrameStats::default()
         };
         (picture, stats)

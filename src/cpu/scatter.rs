@@ -150,7 +150,7 @@ fn near_normal_cdf<S: Simd>(simd: S, t: Lanes<S>) -> Lanes<S> {
     let x = t.max(Lanes::splat(simd, -3.55)).min(Lanes::splat(simd, 3.55));
     let y = x * x;
     let mut p = Lanes::splat(simd, -6.913_499e-7);
-    for term in [3.451_519e-5, -7.243_616_8e-4, 8.523_511_8e-3, -6.442_941_4e-2, 3.980_850_4e-1] {
+    for term in [3.451_519e-5, -7.243_617e-4, 8.523_512e-3, -6.442_942e-2, 3.980_850_5e-1] {
         p = p.mul_add(y, Lanes::splat(simd, term));
     }
     x.mul_add(p, Lanes::splat(simd, 0.5))

@@ -70,6 +70,11 @@ impl Shown {
         Self { dims, blocks, words }
     }
 
+    /// Bytes of memory.
+    pub fn bytes(&self) -> u64 {
+        size_of_val(self.words.as_slice()) as u64
+    }
+
     /// A bit for each sample in the order of the volume, 32 a word, the first in the lowest bit.
     pub fn bits(&self) -> Vec<u32> {
         let [nx, ny, _] = self.dims;

@@ -176,11 +176,14 @@ fn pictures_are_compared() {
 }
 
 #[test]
-fn what_the_cpu_engine_does_not_do_is_told() {
+fn the_cpu_engine_needs_no_adapter() {
     let folder = Folder::new("cpu");
     folder.put("a.ply", PLY);
-    folder.run("render a.ply -o a.png --engine cpu").fails(2, &["does not draw", "the GPU engine does"]);
-    folder.run("bench a.ply --engine cpu").fails(2, &["leave out --engine cpu"]);
+    folder.run("render a.ply -o a.png --engine cpu --size 64x48").ok();
+    let found = folder.json("bench a.ply --engine cpu --size 64x48 --frames 1 --threads 1 --json");
+    assert_eq!(found["adapter"], "CPU");
+    assert!(found["splats"].as_u64() > Some(0) && found["entries"].as_u64() > Some(0), "{found}");
+    folder.run("render a.ply -o b.png --engine cpu --pass-entries 100").fails(2, &["--engine cpu takes none of"]);
 }
 
 #[test]

@@ -25,7 +25,8 @@ fn every_format_gives_a_picture() {
         assert!(is_png(&std::fs::read(folder.path("out.png")).unwrap(), 64, 48), "{input}");
         assert_eq!((found["width"].as_u64(), found["height"].as_u64()), (Some(64), Some(48)));
         assert_eq!(found["output"].as_str(), Some("out.png"));
-        assert!(found["splats"].as_u64() > Some(0) && found["entries"].as_u64() > Some(0), "{input}: {found}");
+        let shows = found["entries"].as_u64() > Some(0) || found["gathered"].as_u64() > Some(0);
+        assert!(shows && found["gpu_bytes"].as_u64() > Some(0), "{input}: {found}");
         assert!(found["frame_ms"].as_f64() > Some(0.0) && found["load_ms"].is_f64() && found["adapter"].is_string());
     }
     // The same bytes under a name that says nothing are known by their content.
@@ -160,7 +161,7 @@ fn adapters_are_listed_and_chosen() {
     folder.run(&format!("render a.ply -o a.png --gpu 0 --pass-entries 100000 {SMALL}")).ok();
     // The budget is told by the name of its flag.
     folder
-        .run(&format!("render a.nrrd -o b.png --pass-entries 16 {SMALL}"))
+        .run(&format!("render a.nrrd -o b.png --evaluate scatter --pass-entries 16 {SMALL}"))
         .fails(4, &["raise --pass-entries", "--size"]);
 }
 

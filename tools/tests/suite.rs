@@ -25,7 +25,8 @@ fn the_suite_measures_growth() {
         "page.md",
         "a\n<!-- suite: written by `splatkit bench --suite --write` -->\n### other\n\nkept\n<!-- end of suite -->\nb\n",
     );
-    let found = folder.json("bench --suite --effort quick --only growth --frames 1 --repeat 2 --json --write page.md");
+    let found = folder
+        .json("bench --suite --engine gpu --effort quick --only growth --frames 1 --repeat 2 --json --write page.md");
     assert!(!found["machine"]["adapter"].as_str().unwrap().is_empty() && found["machine"]["cores"].as_u64() > Some(0));
     let [growth] = &found["parts"].as_array().unwrap()[..] else { panic!("{found}") };
     let cases = growth["cases"].as_array().unwrap();
@@ -44,7 +45,7 @@ fn the_suite_measures_growth() {
     assert!(page.contains("| specimen, 16³ | generated: specimen, in bricks |"), "{page}");
     // Another part alone would take the place of this one.
     folder
-        .run("bench --suite --effort quick --only culling --write page.md")
+        .run("bench --suite --engine gpu --effort quick --only culling --write page.md")
         .fails(2, &["--write would remove", "“growth”", "--only"]);
     assert_eq!(std::fs::read_to_string(folder.path("page.md")).unwrap(), page);
 }
@@ -55,8 +56,9 @@ fn tables_with_failed_cases_are_not_written() {
     let page = "<!-- suite: written by `splatkit bench --suite --write` -->\nold\n<!-- end of suite -->\n";
     folder.put("page.md", page);
     // Every case loses its device, which is opened anew for the next.
-    let run =
-        folder.run("bench --suite --effort quick --only growth --frames 1 --gpu-timeout 0.000000001 --write page.md");
+    let run = folder.run(
+        "bench --suite --engine gpu --effort quick --only growth --frames 1 --gpu-timeout 0.000000001 --write page.md",
+    );
     assert_eq!(run.code(), Some(1), "{}", run.stderr());
     assert!(run.stderr().contains("cases could not be drawn; page.md is as it was"), "{}", run.stderr());
     assert!(run.stdout().contains("not drawn: GPU:"), "{}", run.stdout());
@@ -68,7 +70,7 @@ fn the_classic_table_takes_files() {
     let folder = Folder::new("suite-data");
     folder.put("aneurism.nrrd", nrrd("uint8", &ball()));
     folder.put("foot.nrrd", "no volume");
-    let run = folder.run("bench --suite --effort quick --only seed --data . --frames 1 --json");
+    let run = folder.run("bench --suite --engine gpu --effort quick --only seed --data . --frames 1 --json");
     assert_eq!(run.code(), Some(1), "{}", run.stderr());
     let found: Value = serde_json::from_str(&run.stdout()).unwrap();
     let cases = found["parts"][0]["cases"].as_array().unwrap();
@@ -97,7 +99,9 @@ fn the_suite_takes_no_scene() {
         "--memory 1GiB",
         "--shade",
     ] {
-        folder.run(&format!("bench --suite --effort quick {other}")).fails(2, &["--suite", "cannot be used with"]);
+        folder
+            .run(&format!("bench --suite --engine gpu --effort quick {other}"))
+            .fails(2, &["--suite", "cannot be used with"]);
     }
     folder.run("bench a.obj --data .").fails(2, &["--data", "SCENE"]);
     folder.run("bench --data .").fails(2, &["--suite"]);
