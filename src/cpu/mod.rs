@@ -109,7 +109,7 @@ impl CpuRenderer {
     /// Prepares a scene.
     ///
     /// # Errors
-    /// [`Error::Argument`](crate::Error::Argument) for a scene that [`Scene::validate`] refuses.
+    /// [`Error::Argument`] for a scene that [`Scene::validate`] refuses.
     pub fn new(scene: &Scene) -> Result<Self> {
         scene.validate()?;
         Ok(Self {
@@ -125,7 +125,7 @@ impl CpuRenderer {
     /// Shows the scene's volume or sample set by another transfer function.
     ///
     /// # Errors
-    /// [`Error::Argument`](crate::Error::Argument) for one that [`CpuRenderer::new`] would refuse; the scene is then shown as before.
+    /// [`Error::Argument`] for one that [`CpuRenderer::new`] would refuse; the scene is then shown as before.
     pub fn set_transfer(&mut self, transfer: &TransferFunction) -> Result<()> {
         self.scene = self.scene.shown_by(transfer)?;
         Ok(())
@@ -134,7 +134,7 @@ impl CpuRenderer {
     /// Draws a picture. The statistics hold the milliseconds of each step.
     ///
     /// # Errors
-    /// [`Error::Argument`](crate::Error::Argument) for a camera or settings that make no picture of this scene; those of reading,
+    /// [`Error::Argument`] for a camera or settings that make no picture of this scene; those of reading,
     /// for scenes that are read as they are drawn.
     pub fn render(&mut self, camera: &Camera, settings: &Settings) -> Result<(Picture, FrameStats)> {
         let start = Instant::now();
