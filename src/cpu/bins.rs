@@ -1,29 +1,66 @@
-//! Which splats meet which tiles. Blocks of tiles have lists of splats by their first sheets; a thread that draws a block hands
-//! them out to its tiles.
+//! Which splats meet which tiles. Blocks of tiles have lists of splats; a thread that draws a block sorts its list by the
+//! splats' first sheets and hands it out to the tiles.
 
-use super::{footprint::Record, plan::Plan};
+use super::{
+    footprint::Record,
+    plan::{Plan, TILE},
+};
 use crate::scene::Order;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
+use std::{
+    ops::Range,
+    sync::atomic::{AtomicU64, Ordering::Relaxed},
+};
 
 /// Tiles along each side of a block.
 pub const BLOCK: usize = 4;
 /// Candidates of a batch of records at most, as a power of two.
 const BATCH_BITS: u32 = 13;
 pub const BATCH: usize = 1 << BATCH_BITS;
-/// Entries of all blocks that are held at the same time (8 bytes each).
+/// Entries of all blocks that are held at the same time (8 bytes each), where a row of blocks has no more.
 const MOST_ENTRIES: u64 = 1 << 26;
+/// Groups of batches, which are counted and listed by a thread each: at most so many, and so many counts of all of them.
+const MOST_GROUPS: usize = 64;
+const MOST_COUNTS: usize = 1 << 20;
 
-/// A splat that meets a tile: the first sheet of its first window, and its record.
-#[derive(Debug, Clone, Copy)]
+/// A splat that meets a tile or a block: the first sheet of its first window, its record, and in a block the first and the last
+/// tile that it meets.
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Entry {
-    pub sheet: u16,
     pub record: u32,
+    pub sheet: u16,
+    within: Within,
 }
+
+/// Columns and rows of tiles in a block, two bits each: first and last column, first and last row.
+type Within = u8;
 
 /// The batch of a record, and its place there.
 pub fn place_of(number: u32) -> (usize, usize) {
     ((number >> BATCH_BITS) as usize, number as usize % BATCH)
+}
+
+/// The tiles that a record meets, and what it is sorted by.
+#[derive(Debug, Clone, Copy)]
+struct Span {
+    tiles: [[u16; 2]; 2],
+    order: u32,
+}
+
+/// Successive batches: the spans of their records, and how many of these meet each block.
+#[derive(Debug, Default)]
+struct Group {
+    batches: Range<usize>,
+    spans: Vec<Span>,
+    counts: Vec<u32>,
+}
+
+/// Memory of the bins of the picture before, which is used again: asking for it anew takes as long as filling it.
+#[derive(Debug, Default)]
+pub struct Spare {
+    groups: Vec<Group>,
+    /// First sheet or order above, record below.
+    entries: Vec<AtomicU64>,
 }
 
 /// How many splats meet each block of tiles.
@@ -31,99 +68,236 @@ pub struct Bins<'a> {
     plan: &'a Plan<'a>,
     records: &'a [Vec<Record>],
     blocks: [usize; 2],
-    counts: Vec<u32>,
+    groups: &'a mut [Group],
+    entries: &'a mut Vec<AtomicU64>,
 }
 
 /// The lists of some blocks, one behind the other.
-pub struct Lists {
+pub struct Lists<'a> {
+    plan: &'a Plan<'a>,
+    records: &'a [Vec<Record>],
     first: usize,
-    ends: Vec<usize>,
-    /// First sheet or order above, record below.
-    entries: Vec<AtomicU64>,
+    /// Where the list of each begins, and where the last one ends.
+    starts: Vec<usize>,
+    entries: &'a [AtomicU64],
+}
+
+/// The lists of a block's tiles, one behind the other.
+pub struct TileLists {
+    starts: [usize; BLOCK * BLOCK + 1],
+    entries: Vec<Entry>,
 }
 
 impl<'a> Bins<'a> {
-    pub fn new(plan: &'a Plan<'a>, records: &'a [Vec<Record>]) -> Self {
+    pub fn new(plan: &'a Plan<'a>, records: &'a [Vec<Record>], spare: &'a mut Spare) -> Self {
         let blocks = plan.tiles().map(|tiles| tiles.div_ceil(BLOCK));
-        let counts: Vec<AtomicU32> = (0..blocks[0] * blocks[1]).map(|_| AtomicU32::new(0)).collect();
-        records.par_iter().for_each(|batch| {
-            for record in batch {
-                let [first, last] = blocks_of(plan, blocks, record);
+        let count = blocks[0] * blocks[1];
+        let most_groups = (MOST_COUNTS / count).clamp(1, MOST_GROUPS).min(records.len());
+        spare.groups.resize_with(most_groups, Group::default);
+        for (number, group) in spare.groups.iter_mut().enumerate() {
+            let at = |number: usize| number * records.len() / most_groups;
+            group.batches = at(number)..at(number + 1);
+        }
+        spare.groups.par_iter_mut().for_each(|group| {
+            group.counts.clear();
+            group.counts.resize(count, 0);
+            group.spans.clear();
+            for record in records[group.batches.clone()].iter().flatten() {
+                let tiles = tiles_of(plan, record).map(|tile| tile.map(|at| at as u16));
+                let span = Span { tiles, order: order(plan, record) };
+                group.spans.push(span);
+                let [first, last] = span.blocks();
                 for row in first[1]..=last[1] {
                     for column in first[0]..=last[0] {
-                        counts[row * blocks[0] + column].fetch_add(1, Relaxed);
+                        group.counts[row * blocks[0] + column] += 1;
                     }
                 }
             }
         });
-        Self { plan, records, blocks, counts: counts.into_iter().map(AtomicU32::into_inner).collect() }
+        Self { plan, records, blocks, groups: &mut spare.groups, entries: &mut spare.entries }
     }
 
-    /// The place of a block.
-    pub fn place(&self, block: usize) -> [usize; 2] {
-        [block % self.blocks[0], block / self.blocks[0]]
+    /// Blocks beside each other.
+    pub fn columns(&self) -> usize {
+        self.blocks[0]
     }
 
-    /// Successive blocks whose lists are held together, so that memory is bounded.
-    pub fn parts(&self) -> Vec<std::ops::Range<usize>> {
+    fn count(&self, block: usize) -> usize {
+        self.groups.iter().map(|group| group.counts[block] as usize).sum()
+    }
+
+    /// Successive rows of blocks whose lists are held together, so that memory is bounded.
+    pub fn parts(&self) -> Vec<Range<usize>> {
         let mut parts = Vec::new();
         let (mut start, mut sum) = (0, 0);
-        for (block, count) in self.counts.iter().enumerate() {
-            if block > start && sum + u64::from(*count) > MOST_ENTRIES {
-                parts.push(start..block);
-                (start, sum) = (block, 0);
+        for row in 0..self.blocks[1] {
+            let count: usize = (row * self.blocks[0]..(row + 1) * self.blocks[0]).map(|block| self.count(block)).sum();
+            if row > start && sum + count as u64 > MOST_ENTRIES {
+                parts.push(start..row);
+                (start, sum) = (row, 0);
             }
-            sum += u64::from(*count);
+            sum += count as u64;
         }
-        parts.push(start..self.counts.len());
+        parts.push(start..self.blocks[1]);
         parts
     }
 
-    /// The lists of successive blocks.
-    pub fn lists(&self, part: &std::ops::Range<usize>) -> Lists {
-        let mut ends = Vec::with_capacity(part.len());
+    /// The lists of successive rows of blocks.
+    pub fn lists(&mut self, rows: &Range<usize>) -> Lists<'_> {
+        let (plan, columns) = (self.plan, self.blocks[0]);
+        let blocks = rows.start * columns..rows.end * columns;
+        let mut starts = Vec::with_capacity(blocks.len() + 1);
         let mut sum = 0;
-        for count in &self.counts[part.clone()] {
-            ends.push(sum);
-            sum += *count as usize;
+        for block in blocks.clone() {
+            starts.push(sum);
+            // From here on, counts tell where a group's part of a list begins.
+            for group in self.groups.iter_mut() {
+                let count = group.counts[block] as usize;
+                group.counts[block] = sum as u32;
+                sum += count;
+            }
         }
-        let turn = turn_of(self.plan);
-        let nexts: Vec<AtomicU32> = part.clone().map(|_| AtomicU32::new(0)).collect();
-        let entries: Vec<AtomicU64> = (0..sum).into_par_iter().map(|_| AtomicU64::new(0)).collect();
-        self.records.par_iter().enumerate().for_each(|(batch, records)| {
-            for (place, record) in records.iter().enumerate() {
-                let [first, last] = blocks_of(self.plan, self.blocks, record);
-                let number = (batch << BATCH_BITS | place) as u32 ^ turn;
-                let key = u64::from(order(self.plan, record)) << 32 | u64::from(number);
-                for row in first[1]..=last[1] {
+        starts.push(sum);
+        if self.entries.len() / 4 > sum {
+            self.entries.truncate(2 * sum);
+            self.entries.shrink_to_fit();
+        }
+        if self.entries.len() < sum {
+            self.entries.resize_with(sum, AtomicU64::default);
+        }
+        let entries = &*self.entries;
+        let turn = turn_of(plan);
+        let is_single = plan.single().is_some();
+        self.groups.par_iter_mut().for_each(|group| {
+            let batches = group.batches.clone().zip(&self.records[group.batches.clone()]);
+            let numbers = batches.flat_map(|(batch, own)| (0..own.len()).map(move |place| batch << BATCH_BITS | place));
+            for (span, number) in group.spans.iter().zip(numbers) {
+                let [first, last] = span.blocks();
+                let (key, order) = (number as u32, u64::from(span.order));
+                for row in first[1].max(rows.start)..=last[1].min(rows.end - 1) {
                     for column in first[0]..=last[0] {
-                        let block = row * self.blocks[0] + column;
-                        if part.contains(&block) {
-                            let own = block - part.start;
-                            let at = ends[own] + nexts[own].fetch_add(1, Relaxed) as usize;
-                            entries[at].store(key, Relaxed);
-                        }
+                        let next = &mut group.counts[row * columns + column];
+                        let entry = if is_single {
+                            order << 32 | u64::from(key ^ turn)
+                        } else {
+                            order << 40 | u64::from(key) << 8 | u64::from(span.within([column, row]))
+                        };
+                        entries[*next as usize].store(entry, Relaxed);
+                        *next += 1;
                     }
                 }
             }
         });
-        for (end, next) in ends.iter_mut().zip(nexts) {
-            *end += next.into_inner() as usize;
-        }
-        Lists { first: part.start, ends, entries }
+        Lists { plan, records: self.records, first: blocks.start, starts, entries }
     }
 }
 
-impl Lists {
-    /// The numbers of the records that meet a block, in the order in which they are added.
-    pub fn sorted(&self, plan: &Plan, block: usize) -> Vec<u32> {
-        let own = block - self.first;
-        let start = if own == 0 { 0 } else { self.ends[own - 1] };
-        let mut sorted: Vec<u64> =
-            self.entries[start..self.ends[own]].iter().map(|entry| entry.load(Relaxed)).collect();
+impl Span {
+    /// The first and the last block.
+    fn blocks(&self) -> [[usize; 2]; 2] {
+        self.tiles.map(|tile| tile.map(|at| usize::from(at) / BLOCK))
+    }
+
+    /// The tiles in a block.
+    fn within(&self, block: [usize; 2]) -> Within {
+        let [first, last] = self.tiles;
+        let [x, y] = [0, 1].map(|axis| {
+            let start = block[axis] * BLOCK;
+            let low = usize::from(first[axis]).saturating_sub(start);
+            let high = (usize::from(last[axis]) - start).min(BLOCK - 1);
+            low | high << 2
+        });
+        (x | y << 4) as Within
+    }
+}
+
+impl Lists<'_> {
+    /// The lists of a block's tiles: the splats in the order in which they are added.
+    pub fn of_tiles(&self, column: usize, row: usize, columns: usize) -> TileLists {
+        let own = row * columns + column - self.first;
+        let entries = &self.entries[self.starts[own]..self.starts[own + 1]];
+        let entries =
+            if self.plan.single().is_some() { self.by_order(entries, [column, row]) } else { by_sheet(entries) };
+        TileLists::new(&entries)
+    }
+
+    fn by_order(&self, entries: &[AtomicU64], block: [usize; 2]) -> Vec<Entry> {
+        let mut sorted: Vec<u64> = entries.iter().map(|entry| entry.load(Relaxed)).collect();
         sorted.sort_unstable();
-        let turn = turn_of(plan);
-        sorted.into_iter().map(|key| key as u32 ^ turn).collect()
+        let turn = turn_of(self.plan);
+        let entry = |key: u64| {
+            let number = key as u32 ^ turn;
+            let (batch, place) = place_of(number);
+            let record = &self.records[batch][place];
+            let tiles = tiles_of(self.plan, record).map(|tile| tile.map(|at| at as u16));
+            Entry { record: number, sheet: record.sheets[0], within: Span { tiles, order: 0 }.within(block) }
+        };
+        sorted.into_iter().map(entry).collect()
+    }
+}
+
+/// The entries of a block by their first sheets; what begins in the same one stays in its order.
+fn by_sheet(entries: &[AtomicU64]) -> Vec<Entry> {
+    let sheet = |key: u64| (key >> 40) as u16;
+    let mut ends = Vec::new();
+    let mut least = u16::MAX;
+    for entry in entries {
+        let own = sheet(entry.load(Relaxed));
+        least = least.min(own);
+        if usize::from(own) >= ends.len() {
+            ends.resize(usize::from(own) + 1, 0u32);
+        }
+        ends[usize::from(own)] += 1;
+    }
+    let mut sum = 0;
+    for end in ends.iter_mut().skip(least.into()) {
+        sum += std::mem::replace(end, sum);
+    }
+    let mut sorted = vec![Entry::default(); entries.len()];
+    for entry in entries {
+        let key = entry.load(Relaxed);
+        let end = &mut ends[usize::from(sheet(key))];
+        sorted[*end as usize] = Entry { record: (key >> 8) as u32, sheet: sheet(key), within: key as u8 };
+        *end += 1;
+    }
+    sorted
+}
+
+impl TileLists {
+    fn new(block: &[Entry]) -> Self {
+        let mut starts = [0; BLOCK * BLOCK + 1];
+        for entry in block {
+            entry.tiles(|tile| starts[tile + 1] += 1);
+        }
+        for tile in 0..BLOCK * BLOCK {
+            starts[tile + 1] += starts[tile];
+        }
+        let mut entries = vec![Entry::default(); starts[BLOCK * BLOCK]];
+        let mut nexts = starts;
+        for entry in block {
+            entry.tiles(|tile| {
+                entries[nexts[tile]] = *entry;
+                nexts[tile] += 1;
+            });
+        }
+        Self { starts, entries }
+    }
+
+    /// The splats of a tile of the block.
+    pub fn of(&self, tile: usize) -> &[Entry] {
+        &self.entries[self.starts[tile]..self.starts[tile + 1]]
+    }
+}
+
+impl Entry {
+    /// Names the tiles of the block that it meets.
+    fn tiles(&self, mut name: impl FnMut(usize)) {
+        let [left, right, top, bottom] = [0, 2, 4, 6].map(|shift| usize::from(self.within >> shift & 3));
+        for row in top..=bottom {
+            for column in left..=right {
+                name(row * BLOCK + column);
+            }
+        }
     }
 }
 
@@ -146,20 +320,16 @@ fn order(plan: &Plan, record: &Record) -> u32 {
     }
 }
 
-/// The first and the last block that a record meets.
-fn blocks_of(plan: &Plan, blocks: [usize; 2], record: &Record) -> [[usize; 2]; 2] {
-    let [first, last] = tiles_of(plan, record);
-    [first.map(|tile| tile / BLOCK), [0, 1].map(|axis| (last[axis] / BLOCK).min(blocks[axis] - 1))]
-}
-
 /// The first and the last tile that a record meets.
-pub fn tiles_of(plan: &Plan, record: &Record) -> [[usize; 2]; 2] {
+fn tiles_of(plan: &Plan, record: &Record) -> [[usize; 2]; 2] {
     let (step, apron) = (plan.tile_step() as i32, plan.apron());
     let tiles = plan.tiles();
     let [first, last] = record.pixels;
+    // Most pictures are spared a division.
+    let over = |place: i32| if step == TILE as i32 { place >> TILE.ilog2() } else { place / step };
     let at = |place: i32, axis: usize| (place.max(0) as usize).min(tiles[axis] - 1);
     [
-        [0, 1].map(|axis| at((first[axis] - apron + step) / step - 1, axis)),
-        [0, 1].map(|axis| at((last[axis] + apron) / step, axis)),
+        [0, 1].map(|axis| at(over(first[axis] - apron + step) - 1, axis)),
+        [0, 1].map(|axis| at(over(last[axis] + apron), axis)),
     ]
 }

@@ -11,7 +11,7 @@ use crate::{
 use glam::{Mat3, Vec3};
 
 /// How far beyond the ellipsoid the windows of a splat reach, as of the shader.
-const SECTION_OVERREACH: f32 = 1.25;
+pub const SECTION_OVERREACH: f32 = 1.25;
 /// Shorter gradients have no direction.
 const LEAST_GRADIENT: f32 = 1e-20;
 

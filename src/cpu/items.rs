@@ -6,6 +6,7 @@ use super::{
     footprint::{Candidate, Carried, Record, counted, origin, record, to_view, widened},
     page_cache::PageCache,
     plan::Plan,
+    project::Projector,
 };
 use crate::{
     Error, Result,
@@ -19,6 +20,7 @@ use crate::{
         bricks::{BLOCK, BLOCKS, Choice, SIDE},
     },
 };
+use fearless_simd::{Level, dispatch};
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -88,19 +90,24 @@ impl Prepared {
         pixels: f64,
         choice: Option<&Choice>,
         shown: &[u16; 256],
+        spare: &mut Spare,
     ) -> Result<Vec<Vec<Record>>> {
         let view = plan.view;
         match self {
+            Self::Set { drawn, .. } if drawn.payload == Payload::Radiance => {
+                let projector = Projector::new(plan, Source::of_splats(view, drawn, true));
+                Ok(batches(&drawn.splats, spare, |batch: &[Splat], records| {
+                    dispatch!(Level::new(), simd => projector.add(simd, batch.iter().map(|splat| (splat, 1.0)), records));
+                }))
+            }
             Self::Set { drawn, .. } => {
-                let source = Source::of_splats(view, drawn, drawn.payload == Payload::Radiance);
-                Ok(batches(&drawn.splats, |splat: &Splat| record(plan, &source, &widened(plan, &source, splat))))
+                let source = Source::of_splats(view, drawn, false);
+                let own = |splat: &Splat| record(plan, &source, &widened(plan, &source, splat));
+                Ok(batches(&drawn.splats, spare, |batch, records| records.extend(batch.iter().filter_map(own))))
             }
             Self::Hierarchy(pages) => {
                 pages.update(view, settings, pixels)?;
-                let header = pages.hierarchy.header();
-                let source = Source::of_radiance(view, header.origin, header.extent);
-                let drawn = pages.drawn(view, settings, pixels);
-                Ok(batches(&drawn, |splat: &Splat| record(plan, &source, &widened(plan, &source, splat))))
+                Ok(pages.records(plan, settings, pixels, spare))
             }
             Self::Volume { volume, kernel, ranges, listed } => {
                 let ranges = ranges.get_or_insert_with(|| volume.drawn_ranges(kernel).into_owned());
@@ -109,7 +116,8 @@ impl Prepared {
                 }
                 let Some((_, list)) = listed else { return Ok(Vec::new()) };
                 let lattice = LatticeSource::new(plan, volume, kernel);
-                Ok(batches(list, |index: &u32| lattice.record(plan, *index as usize)))
+                let own = |index: &u32| lattice.record(plan, *index as usize);
+                Ok(batches(list, spare, |batch, records| records.extend(batch.iter().filter_map(own))))
             }
             Self::Bricks(cache) => {
                 let Some(choice) = choice else { return Ok(Vec::new()) };
@@ -120,9 +128,31 @@ impl Prepared {
     }
 }
 
-/// The records of some candidates.
-fn batches<T: Sync>(candidates: &[T], record: impl Fn(&T) -> Option<Record> + Sync) -> Vec<Vec<Record>> {
-    candidates.par_chunks(BATCH).map(|batch| batch.iter().filter_map(&record).collect()).collect()
+/// The records of some candidates; `add` adds those of a batch.
+fn batches<T: Sync>(
+    candidates: &[T],
+    spare: &mut Spare,
+    add: impl Fn(&[T], &mut Vec<Record>) + Sync,
+) -> Vec<Vec<Record>> {
+    let mut records = spare_for(spare, candidates.len().div_ceil(BATCH));
+    records.par_iter_mut().zip(candidates.par_chunks(BATCH)).for_each(|(records, batch)| add(batch, records));
+    records
+}
+
+/// Records of the picture before, whose memory is used again: asking for it anew takes as long as filling it.
+pub type Spare = Vec<Vec<Record>>;
+
+/// Memory for some batches of records.
+pub fn spare_for(spare: &mut Spare, batches: usize) -> Vec<Vec<Record>> {
+    let mut own = spare.split_off(spare.len().saturating_sub(batches));
+    for records in &mut own {
+        if records.capacity() / 4 > records.len() {
+            records.shrink_to(2 * records.len());
+        }
+        records.clear();
+    }
+    own.resize_with(batches, Vec::new);
+    own
 }
 
 /// The samples that show something, block by block.

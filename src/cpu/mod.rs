@@ -8,8 +8,8 @@
 //! | module | does |
 //! |---|---|
 //! | `plan` | what all tiles of a picture share |
-//! | `items`, `page_cache`, `brick_cache` | which splats of the scene a view takes |
-//! | `footprint` | where a splat lies in the picture and in the sheets |
+//! | `items`, `page_cache`, `nodes`, `brick_cache` | which splats of the scene a view takes |
+//! | `footprint`, `project` | where a splat lies in the picture and in the sheets, one or eight at a time |
 //! | `bins` | which splats meet which tiles |
 //! | `skip` | in which tiles and sheets a lattice may show something |
 //! | `march` | walks the sheets of a tile |
@@ -27,8 +27,10 @@ mod footprint;
 pub(crate) mod gather;
 mod items;
 mod march;
+mod nodes;
 mod page_cache;
 mod plan;
+mod project;
 mod rays;
 mod scatter;
 pub(crate) mod skip;
@@ -48,13 +50,13 @@ use crate::{
         reach::{EVERYTHING, first_visible},
     },
 };
-use bins::{BLOCK, Bins, Entry};
+use bins::{BLOCK, Bins, TileLists};
 use close::{NO_VALUE, Visible};
 use fearless_simd::{Level, dispatch};
 use field::Typed;
 use footprint::Record;
 use gather::Gather;
-use items::Prepared;
+use items::{Prepared, Spare};
 use march::{EMPTY, March, Tile};
 use plan::{Plan, TILE};
 use rayon::prelude::*;
@@ -75,6 +77,9 @@ pub struct CpuRenderer {
     shown: Option<([u16; 256], Shown)>,
     pace: Pace,
     level: Level,
+    /// Memory that is used again.
+    spare: Spare,
+    spare_bins: bins::Spare,
 }
 
 /// What is drawn of a scene in a picture, found before it is drawn.
@@ -119,6 +124,8 @@ impl CpuRenderer {
             shown: None,
             pace: Pace::default(),
             level: Level::new(),
+            spare: Spare::new(),
+            spare_bins: bins::Spare::default(),
         })
     }
 
@@ -149,15 +156,18 @@ impl CpuRenderer {
         let gathers = self.gathers(settings, &outline.sheets)?;
         let before: u64 = self.brick_reads();
         let mut records = Vec::new();
+        let mut spare = std::mem::take(&mut self.spare);
         for (item, prepared) in self.scene.items.iter().zip(&mut self.prepared) {
             if !(gathers && matches!(item, Item::Volume(..))) {
                 let Outline { cut_pixels, choice, shown, .. } = &outline;
-                records.extend(prepared.records(&plan, settings, *cut_pixels, choice.as_ref(), shown)?);
+                let (choice, spare) = (choice.as_ref(), &mut spare);
+                records.extend(prepared.records(&plan, settings, *cut_pixels, choice, shown, spare)?);
             }
         }
         items::check_count(&records)?;
         clock.step("project");
         let (picture, mut stats) = self.draw(&plan, &outline, &records, gathers, &mut clock);
+        self.spare = records;
         if let Detail::Milliseconds(wanted) = settings.detail {
             self.pace.took(start.elapsed().as_secs_f64() * 1e3, wanted);
         }
@@ -273,23 +283,32 @@ impl CpuRenderer {
         let marked = |own: &Vec<u64>| own.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
         let gathered = marks.iter().map(marked).sum();
         let march = March { plan, gather, visible: &visible, records };
-        let bins = Bins::new(plan, records);
+        let mut spare = std::mem::take(&mut self.spare_bins);
+        let mut bins = Bins::new(plan, records, &mut spare);
         clock.step("bin");
-        let tiles = plan.tiles();
         let drawn = AtomicU64::new(0);
-        let mut blocks: Vec<Vec<Tile>> = Vec::new();
-        for part in bins.parts() {
-            let lists = bins.lists(&part);
+        let transfer = items::transfer_of(&self.scene);
+        let [width, height] = plan.view.size;
+        let mut color = vec![[0.0f32; 4]; width as usize * height as usize];
+        let mut depth = vec![0.0f32; color.len()];
+        let (columns, band) = (bins.columns(), width as usize * BLOCK * plan.tile_step());
+        for rows in bins.parts() {
+            let lists = bins.lists(&rows);
             clock.step("bin");
-            let block = |block: usize| {
-                let entries = lists.sorted(plan, block);
-                draw_block(self.level, &march, bins.place(block), tiles, &entries, &marks, &drawn)
-            };
-            blocks.par_extend(part.into_par_iter().map(block));
+            let from = rows.start * band;
+            let parts = color[from..].par_chunks_mut(band).zip(depth[from..].par_chunks_mut(band));
+            parts.zip(rows).for_each(|((color, depth), row)| {
+                let block = |column: usize| {
+                    let entries = lists.of_tiles(column, row, columns);
+                    draw_block(self.level, &march, [column, row], &entries, &marks, &drawn)
+                };
+                let blocks: Vec<Vec<Tile>> = (0..columns).into_par_iter().map(block).collect();
+                write_band(plan, transfer, &blocks, color, depth);
+            });
             clock.step("march");
         }
-        let picture = assembled(&self.scene, plan, &blocks);
-        clock.step("write");
+        self.spare_bins = spare;
+        let picture = Picture { width, height, color, depth };
         let stats = FrameStats {
             splats: records.iter().map(|batch| batch.len() as u64).sum(),
             gathered,
@@ -311,33 +330,18 @@ fn draw_block(
     level: Level,
     march: &March,
     [column, row]: [usize; 2],
-    tiles: [usize; 2],
-    entries: &[u32],
+    entries: &TileLists,
     marks: &[Vec<u64>],
     drawn: &AtomicU64,
 ) -> Vec<Tile> {
-    let first = [column * BLOCK, row * BLOCK];
-    let mut own: [Vec<Entry>; BLOCK * BLOCK] = std::array::from_fn(|_| Vec::new());
-    for &number in entries {
-        let (batch, place) = bins::place_of(number);
-        let record = &march.records[batch][place];
-        let [low, high] = bins::tiles_of(march.plan, record);
-        let along = |axis: usize| {
-            let from = low[axis].max(first[axis]) - first[axis];
-            from..=(high[axis] - first[axis]).min(BLOCK - 1)
-        };
-        for y in along(1) {
-            for x in along(0) {
-                own[y * BLOCK + x].push(Entry { sheet: record.sheets[0], record: number });
-            }
-        }
-    }
+    let tiles = march.plan.tiles();
     let mut found = vec![EMPTY; BLOCK * BLOCK];
     let mut count = 0;
-    for (number, (tile, entries)) in found.iter_mut().zip(&own).enumerate() {
-        let at = [first[0] + number % BLOCK, first[1] + number / BLOCK];
+    for (number, tile) in found.iter_mut().enumerate() {
+        let at = [column * BLOCK + number % BLOCK, row * BLOCK + number / BLOCK];
         if at[0] < tiles[0] && at[1] < tiles[1] {
-            let marks = marks.get(at[1] * tiles[0] + at[0]).map_or(&[][..], Vec::as_slice);
+            let (entries, marks) =
+                (entries.of(number), marks.get(at[1] * tiles[0] + at[0]).map_or(&[][..], Vec::as_slice));
             *tile = dispatch!(level, simd => march.tile(simd, at, entries, marks, &mut count));
         }
     }
@@ -345,34 +349,31 @@ fn draw_block(
     found
 }
 
-/// The picture of all blocks.
-fn assembled(scene: &Scene, plan: &Plan, blocks: &[Vec<Tile>]) -> Picture {
-    let [width, height] = plan.view.size;
+/// Writes the pixels of a row of blocks.
+fn write_band(
+    plan: &Plan,
+    transfer: Option<&TransferFunction>,
+    blocks: &[Vec<Tile>],
+    color: &mut [[f32; 4]],
+    depth: &mut [f32],
+) {
     let (step, apron) = (plan.tile_step(), plan.apron() as usize);
-    let columns = plan.tiles()[0].div_ceil(BLOCK);
-    let transfer = items::transfer_of(scene);
-    let mut color = vec![[0.0f32; 4]; width as usize * height as usize];
-    let mut depth = vec![f32::INFINITY; color.len()];
-    let rows = color.par_chunks_mut(width as usize).zip(depth.par_chunks_mut(width as usize));
-    rows.enumerate().for_each(|(y, (color, depth))| {
-        let tile_y = y / step;
+    let width = plan.view.size[0] as usize;
+    for (y, (color, depth)) in color.chunks_mut(width).zip(depth.chunks_mut(width)).enumerate() {
         let parts = color.chunks_mut(step).zip(depth.chunks_mut(step));
-        for (tile_x, (color, depth)) in parts.enumerate() {
-            let block = &blocks[tile_y / BLOCK * columns + tile_x / BLOCK];
-            let row = &block[tile_y % BLOCK * BLOCK + tile_x % BLOCK][(y % step + apron) * TILE + apron..];
-            for ((color, depth), (own, hit)) in color.iter_mut().zip(depth).zip(row) {
+        for (tile, (color, depth)) in parts.enumerate() {
+            let own = &blocks[tile / BLOCK][y / step * BLOCK + tile % BLOCK][(y % step + apron) * TILE + apron..];
+            for ((color, depth), (own, hit)) in color.iter_mut().zip(depth).zip(own) {
                 if plan.optics == Optics::Maximum {
                     *color = transfer.map_or([0.0; 4], |transfer| of_largest(*hit, transfer, &plan.frame));
+                    *depth = f32::INFINITY;
                     continue;
                 }
                 *color = *own;
-                if own[3] >= 0.5 {
-                    *depth = *hit;
-                }
+                *depth = if own[3] >= 0.5 { *hit } else { f32::INFINITY };
             }
         }
-    });
-    Picture { width, height, color, depth }
+    }
 }
 
 /// The colour of a pixel by the largest value on its ray: its opacity is that of a unit of length.

@@ -1,29 +1,30 @@
 //! The pages of a hierarchy that are at hand, and the nodes of them that a view draws.
 
+use super::{
+    footprint::Record,
+    items::{Spare, spare_for},
+    nodes::{Drawn, Nodes},
+    plan::Plan,
+    project::Projector,
+};
 use crate::{
     Result,
-    hierarchy::{
-        Cut, CutSphere, Hierarchy,
-        file::{NO_PAGE, Page},
-        needed::{Needed, parents_around},
-    },
+    engine::uniforms::Source,
+    hierarchy::{Cut, Hierarchy, SHARE_UNIT, needed::Needed},
     math::View,
     scene::Settings,
-    splat::Splat,
 };
+use fearless_simd::{Level, Simd, dispatch};
 use rayon::prelude::*;
 use std::{collections::HashMap, sync::Arc};
 
-/// Nodes whose parents are looked at together.
-const RUN: usize = 64;
 /// Cuts a factor of two apart are tried in so many steps where a number of splats is asked for.
 const STEPS: f64 = 8.0;
 
-/// A page, and for each run of its nodes what bounds their parents: where that is not refined, none of them is drawn.
+/// The nodes of a page, and the last picture that needed them.
 #[derive(Debug)]
 struct Held {
-    page: Page,
-    parents: Vec<Option<CutSphere>>,
+    nodes: Nodes,
     last_needed: u64,
 }
 
@@ -56,14 +57,8 @@ impl PageCache {
         Cut::new(view, header.origin, pixels, settings.culls(header.closed, &header.bounds, view))
     }
 
-    /// Bytes of a page's nodes at most.
-    fn page_bytes(page: &Page) -> u64 {
-        let nodes = page.nodes.len() as u64;
-        nodes * (size_of::<crate::hierarchy::Node>() as u64 + 8) + (page.parents.len() * size_of::<CutSphere>()) as u64
-    }
-
     pub fn bytes(&self) -> u64 {
-        self.held.values().map(|held| Self::page_bytes(&held.page)).sum()
+        self.held.values().map(|held| held.nodes.bytes()).sum()
     }
 
     /// Reads the pages that a cut needs, as many as the settings' memory holds; the coarse ones first.
@@ -72,7 +67,7 @@ impl PageCache {
         let cut = self.cut(view, settings, pixels);
         let mut needed = self.needed.of(&self.hierarchy, &cut);
         let entries = self.hierarchy.pages();
-        let bytes_of = |page: u32| u64::from(entries[page as usize].nodes) * size_of::<crate::hierarchy::Node>() as u64;
+        let bytes_of = |page: u32| Nodes::bytes_of(entries[page as usize].nodes as usize);
         let mut room = settings.page_memory;
         let mut most = 0;
         for &page in &needed {
@@ -88,10 +83,7 @@ impl PageCache {
         let absent: Vec<u32> = needed.iter().copied().filter(|page| !self.held.contains_key(page)).collect();
         self.make_room(&needed, absent.iter().map(|&page| bytes_of(page)).sum(), settings.page_memory);
         let read = |&page: &u32| {
-            let page_read = self.hierarchy.read_page(page)?;
-            let runs = 0..page_read.nodes.len().div_ceil(RUN);
-            let parents = runs.map(|run| parents_around(&page_read, run * RUN, RUN)).collect();
-            Ok((page, Held { page: page_read, parents, last_needed: self.frame }))
+            Ok((page, Held { nodes: Nodes::new(&self.hierarchy.read_page(page)?), last_needed: self.frame }))
         };
         let read: Vec<(u32, Held)> = absent.par_iter().map(read).collect::<Result<_>>()?;
         self.held.extend(read);
@@ -123,63 +115,38 @@ impl PageCache {
                 return;
             }
             if let Some(dropped) = self.held.remove(&page) {
-                held -= Self::page_bytes(&dropped.page);
+                held -= dropped.nodes.bytes();
             }
         }
     }
 
-    /// The splats that a cut draws, each with its share of its optical depth, in the order of the pages.
-    pub fn drawn(&self, view: &View, settings: &Settings, pixels: f64) -> Vec<Splat> {
-        let cut = self.cut(view, settings, pixels);
-        let own: Vec<Vec<Splat>> = self.active.par_iter().map(|page| self.drawn_of(&cut, *page)).collect();
-        own.concat()
-    }
-
-    fn drawn_of(&self, cut: &Cut, page: u32) -> Vec<Splat> {
-        let mut drawn = Vec::new();
-        self.shares_of(cut, page, |splat, share| {
-            let strength = splat.strength * (share as f32 / crate::hierarchy::SHARE_UNIT as f32);
-            drawn.push(Splat { strength, ..*splat });
+    /// The records of the splats that a cut draws, each with its share of its optical depth, page by page.
+    pub fn records(&self, plan: &Plan, settings: &Settings, pixels: f64, spare: &mut Spare) -> Vec<Vec<Record>> {
+        let (level, cut) = (Level::new(), self.cut(plan.view, settings, pixels));
+        let header = self.hierarchy.header();
+        let projector = Projector::new(plan, Source::of_radiance(plan.view, header.origin, header.extent));
+        let mut records = spare_for(spare, self.active.len());
+        records.par_iter_mut().zip(&self.active).for_each(|(records, page)| {
+            let Some(Held { nodes, .. }) = self.held.get(page) else { return };
+            dispatch!(level, simd => {
+                let splat = |(node, share): &Drawn| (&nodes.splats[*node as usize], *share * (1.0 / SHARE_UNIT as f32));
+                projector.add(simd, self.drawn_of(simd, &cut, nodes).iter().map(splat), records);
+            });
         });
-        drawn
+        records
     }
 
-    /// Hands on the splats of a page that a cut draws, with their shares.
-    fn shares_of(&self, cut: &Cut, page: u32, mut draw: impl FnMut(&Splat, u32)) {
-        let Some(Held { page, parents, .. }) = self.held.get(&page) else { return };
-        let is_active = |child: u32| child != NO_PAGE && self.active.binary_search(&child).is_ok();
-        let mut last_child = (NO_PAGE, false);
-        for (run, around) in parents.iter().enumerate() {
-            if around.as_ref().is_some_and(|around| cut.refinement(around) == 0) {
-                continue;
-            }
-            let nodes = run * RUN..((run + 1) * RUN).min(page.nodes.len());
-            for index in nodes {
-                let child = page.child_pages[index];
-                if child != last_child.0 {
-                    last_child = (child, is_active(child));
-                }
-                let parent = page.parents.get(page.parent[index] as usize);
-                let mut node = page.nodes[index];
-                if page.is_portal(index) {
-                    // It gives way to its block wherever that is at hand.
-                    node.size = f32::MAX;
-                }
-                let share = cut.share(&node, parent, last_child.1);
-                if share > 0 {
-                    draw(&page.nodes[index].splat, share);
-                }
-            }
-        }
+    #[inline(always)]
+    fn drawn_of<S: Simd>(&self, simd: S, cut: &Cut, nodes: &Nodes) -> Vec<Drawn> {
+        nodes.drawn(simd, cut, |page| self.active.binary_search(&page).is_ok())
     }
 
     /// How many splats a cut of what is at hand draws.
     pub fn count(&self, view: &View, settings: &Settings, pixels: f64) -> u64 {
-        let cut = self.cut(view, settings, pixels);
+        let (level, cut) = (Level::new(), self.cut(view, settings, pixels));
         let of = |page: &u32| {
-            let mut count = 0;
-            self.shares_of(&cut, *page, |_, _| count += 1);
-            count
+            let Some(Held { nodes, .. }) = self.held.get(page) else { return 0 };
+            dispatch!(level, simd => self.drawn_of(simd, &cut, nodes).len() as u64)
         };
         self.active.par_iter().map(of).sum()
     }

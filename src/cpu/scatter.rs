@@ -65,23 +65,25 @@ impl Projected {
     fn new(plan: &Plan, record: &Record) -> Self {
         let scale = plan.frame.scale;
         let [m00, m10, m20, m11, m21, m22] = record.whitening;
-        let m = [[m00, m10, m20].map(|part| part / scale), [0.0, m11 / scale, m21 / scale], [0.0, 0.0, m22]];
+        let inverse = 1.0 / scale;
+        let m = [[m00 * inverse, m10 * inverse, m20 * inverse], [0.0, m11 * inverse, m21 * inverse], [0.0, 0.0, m22]];
         let [x, y, z] = record.center;
         let mut at = [plan.frame.center[0] + scale * x, plan.frame.center[1] + scale * y];
         let mut whitened = [0.0, 0.0, m22 * z];
         let mut v = [cross(m[2], m[0]), cross(m[2], m[1])];
         if plan.view.perspective {
             // A centre beside the eye projects to infinity. It is moved by a thousandth of its distance.
-            let least = 1e-3 * (x * x + y * y + z * z).sqrt();
-            let z = if z.abs() < least { least.copysign(z) } else { z };
-            at = [plan.frame.center[0] + scale * x / z, plan.frame.center[1] + scale * y / z];
+            let least2 = 1e-6 * (x * x + y * y + z * z);
+            let z = if z * z < least2 { least2.sqrt().copysign(z) } else { z };
+            let per_z = scale / z;
+            at = [plan.frame.center[0] + x * per_z, plan.frame.center[1] + y * per_z];
             whitened = std::array::from_fn(|i| (m[0][i] * x + m[1][i] * y) * scale + m[2][i] * z);
             v = [cross(whitened, m[0]), cross(whitened, m[1])];
         }
         Self { at, whitened, m, v }
     }
 
-    /// Where the kernel lies on the rays of a packet, and `count` planes from one on.
+    /// Where the kernel lies on the rays of a packet, and `count` planes from one on; none where it misses all rays.
     #[inline(always)]
     fn along<S: Simd>(
         &self,
@@ -91,7 +93,7 @@ impl Projected {
         rays: &Rays<S>,
         planes: &[f32],
         count: usize,
-    ) -> Along<S> {
+    ) -> Option<Along<S>> {
         let [m0, m1, m2] = &self.m;
         let [v0, v1] = &self.v;
         let dx = rays.pixel[0] - self.at[0];
@@ -112,12 +114,15 @@ impl Projected {
         let inverse = Lanes::splat(simd, 1.0) / size2.max(Lanes::splat(simd, 1e-37)).sqrt();
         let rho2 = dot(v, v) * inverse * inverse;
         let inside = rho2.simd_le(record.extent2);
+        if !inside.any_true() {
+            return None;
+        }
         let far = Lanes::splat(simd, FAR);
         let mut t = [far; 3];
         for (t, plane) in t.iter_mut().zip(planes).take(count) {
             *t = ((size2 * (rays.cosine * *plane) - l) * inverse).max(-far).min(far);
         }
-        Along { rho2, inside, t, v, beta, inverse, l }
+        Some(Along { rho2, inside, t, v, beta, inverse, l })
     }
 }
 
@@ -247,10 +252,7 @@ fn add_radiance<S: Simd>(
     let count = planes_of(plan, record, window);
     let planes = &plan.planes[window.front + 1..];
     let rays = &packet.rays;
-    let along = projected.along(simd, plan, record, rays, planes, count);
-    if !along.inside.any_true() {
-        return;
-    }
+    let Some(along) = projected.along(simd, plan, record, rays, planes, count) else { return };
     let none = Lanes::splat(simd, 0.0);
     let from_table = plan.table_kernel && record.kind == Kind::Classified;
     let mut strength = Lanes::splat(simd, record.strength);
@@ -278,24 +280,21 @@ fn add_radiance<S: Simd>(
         single(simd, plan, record, strength * sections[0], order, packet);
         return;
     }
-    let payload: Lanes<S> = record.payload.simd_into(simd);
+    let [_, payload @ ..] = record.payload;
     for (own, section) in sections.iter().enumerate().take(count + 1) {
         let depth = strength * *section;
         let adds = depth.abs().simd_gt(LEAST_ADDED);
-        let mut bits = adds.to_bitmask();
-        if bits == 0 {
+        if !adds.any_true() {
             continue;
         }
+        let depth = adds.select(depth, none);
         let slot = (window.front + own) % WINDOW;
         sums.has_radiance[slot] |= 1 << number;
-        let depths: [f32; 8] = depth.into();
-        let cells = &mut sums.radiance[slot][number];
-        while bits != 0 {
-            let pixel = bits.trailing_zeros() as usize & 7;
-            bits &= bits - 1;
-            let cell = &mut cells[pixel];
-            let sum = payload.mul_add(Lanes::splat(simd, depths[pixel]), Lanes::from_slice(simd, cell));
-            sum.store_slice(cell);
+        // The first part of the payload is 1.
+        let [whole, parts @ ..] = &mut sums.radiance[slot][number];
+        *whole += depth;
+        for (sum, part) in parts.iter_mut().zip(payload) {
+            *sum = depth.mul_add(Lanes::splat(simd, part), *sum);
         }
     }
 }
@@ -357,10 +356,7 @@ fn add_scalar<S: Simd>(
     let count = planes_of(plan, record, window);
     let planes = &plan.planes[window.front + 1..];
     let rays = &packet.rays;
-    let along = projected.along(simd, plan, record, rays, planes, count);
-    if !along.inside.any_true() {
-        return;
-    }
+    let Some(along) = projected.along(simd, plan, record, rays, planes, count) else { return };
     let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
     let [weight, slope @ ..] = record.payload;
     let slope = [slope[0], slope[1], slope[2]];

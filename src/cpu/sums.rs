@@ -6,7 +6,7 @@ use super::{
     close::{Face, Layer},
     plan::{Plan, TILE},
     rays::{PACKETS, Rays},
-    vector::{Lanes, each, three},
+    vector::{Lanes, three},
 };
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
@@ -15,8 +15,8 @@ pub const WINDOW: usize = 4;
 /// A sheet with less optical depth than this has no colour: the sum may be what rounding left.
 const LEAST_DEPTH: f32 = 1e-5;
 
-/// What a pixel sums up of colour: optical depth; what faces the eye of it, and times that colour and normal.
-pub type Radiance = [f32; 8];
+/// What eight pixels sum up of colour: optical depth; what faces the eye of it, and times that colour and normal.
+pub type Radiance<S> = [Lanes<S>; 8];
 
 /// Sums of a field in a sheet at eight pixels: weights and weighted values.
 #[derive(Clone, Copy)]
@@ -35,7 +35,7 @@ pub struct FaceSums<S: Simd> {
 }
 
 pub struct Sums<S: Simd> {
-    pub radiance: [[[Radiance; 8]; PACKETS]; WINDOW],
+    pub radiance: [[Radiance<S>; PACKETS]; WINDOW],
     /// The packets that radiance was added to, as bits.
     pub has_radiance: [u8; WINDOW],
     pub field: [[FieldSums<S>; PACKETS]; WINDOW],
@@ -55,7 +55,7 @@ impl<S: Simd> Sums<S> {
     pub fn new(simd: S) -> Self {
         let none = Lanes::splat(simd, 0.0);
         Self {
-            radiance: [[[[0.0; 8]; 8]; PACKETS]; WINDOW],
+            radiance: [[[none; 8]; PACKETS]; WINDOW],
             has_radiance: [0; WINDOW],
             field: [[FieldSums { weight: none, value: none }; PACKETS]; WINDOW],
             faces: [[FaceSums { weight: none, value: none, weight_slope: [none; 2], value_slope: [none; 2] }; PACKETS];
@@ -80,15 +80,8 @@ impl<S: Simd> Sums<S> {
             return None;
         }
         self.has_radiance[slot] &= !(1 << packet);
-        let own = &mut self.radiance[slot][packet];
-        let mut turned = [[0.0f32; 8]; 8];
-        for (pixel, sums) in own.iter_mut().enumerate() {
-            for (channel, sum) in sums.iter_mut().enumerate() {
-                turned[channel][pixel] = std::mem::take(sum);
-            }
-        }
-        let [depth, facing, red, green, blue, x, y, z]: [Lanes<S>; 8] =
-            each!([0, 1, 2, 3, 4, 5, 6, 7], I => turned[I].simd_into(simd));
+        let [depth, facing, red, green, blue, x, y, z] =
+            std::mem::replace(&mut self.radiance[slot][packet], [self.none; 8]);
         let one = Lanes::splat(simd, 1.0);
         // Where next to nothing faces the eye, rounding may have left a weight of any sign.
         let inverse = one / facing.max(Lanes::splat(simd, 1e-12));
@@ -187,7 +180,11 @@ impl<S: Simd> Sums<S> {
         let slot = sheet % WINDOW;
         if self.has_radiance[slot] != 0 {
             // What was not taken: the sheet is not drawn, or a packet is done.
-            self.radiance[slot] = [[[0.0; 8]; 8]; PACKETS];
+            for (packet, own) in self.radiance[slot].iter_mut().enumerate() {
+                if self.has_radiance[slot] & (1 << packet) != 0 {
+                    *own = [self.none; 8];
+                }
+            }
             self.has_radiance[slot] = 0;
         }
         if self.has_field[slot] != 0 {

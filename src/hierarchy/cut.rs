@@ -50,7 +50,7 @@ pub const SHARE_UNIT: u32 = 1023;
 
 /// Sizes in pixels are kept between these, so that their quotients are finite.
 const LEAST_PIXELS: f64 = 1e-9;
-const MOST_PIXELS: f32 = 1e9;
+pub(crate) const MOST_PIXELS: f32 = 1e9;
 
 /// Normals within a splat turn: a node counts as facing away only where its cone is turned away by this angle more.
 const CONE_MARGIN_DEGREES: f64 = 25.0;

@@ -19,8 +19,8 @@ pub(crate) mod testing;
 mod validate;
 
 pub use build::{BuildOptions, Preset, Watch, build_file, check_splats};
-pub(crate) use cut::cone_margin;
 pub use cut::{BLEND_BAND, Cut, Detail, SHARE_UNIT};
+pub(crate) use cut::{MOST_PIXELS, cone_margin};
 pub use file::{CutSphere, Hierarchy};
 pub(crate) use levels::Levels;
 pub use node::{Block, MOST_CHILDREN, Node, Tree};

@@ -1,0 +1,325 @@
+//! Where splats that carry colour lie in the picture and in the sheets: as `footprint` tells for one, eight at a time.
+
+use super::{
+    footprint::{Kind, Record, SECTION_OVERREACH, origin, record, to_view, widened},
+    plan::Plan,
+    vector::{Lanes, dot, each, log2, three},
+};
+use crate::{
+    engine::uniforms::Source,
+    splat::{FOOTPRINT_BLUR, NO_NORMAL, STEP_BACK, Splat},
+};
+use fearless_simd::{Simd, i32x8, mask32x8, prelude::*};
+
+/// Splats that carry colour, around one origin.
+pub struct Projector<'a> {
+    plan: &'a Plan<'a>,
+    source: Source,
+    /// Columns of the turn to view space.
+    axes: [[f32; 3]; 3],
+    origin: [f32; 3],
+}
+
+/// Eight splats, part by part.
+struct Eight {
+    center: [[f32; 8]; 3],
+    factor: [[f32; 8]; 6],
+    strength: [f32; 8],
+    color: [i32; 8],
+    normal: [i32; 8],
+}
+
+/// Where footprints lie: the first and the last of their pixels and sheets, and which of them meet the picture.
+struct Places<S: Simd> {
+    pixels: [[Lanes<S>; 2]; 2],
+    near: Lanes<S>,
+    far: Lanes<S>,
+    meets: mask32x8<S>,
+}
+
+/// A symmetric matrix: xx, xy, xz, yy, yz, zz.
+type Symmetric<S> = [Lanes<S>; 6];
+
+impl<'a> Projector<'a> {
+    pub fn new(plan: &'a Plan<'a>, source: Source) -> Self {
+        let turn = to_view(&source);
+        let axes = [turn.x_axis, turn.y_axis, turn.z_axis].map(|axis| axis.to_array());
+        let origin = origin(&source).to_array();
+        Self { plan, source, axes, origin }
+    }
+
+    /// Adds the records of some splats, each with a share of its strength.
+    #[inline(always)]
+    pub fn add<'s, S: Simd>(
+        &self,
+        simd: S,
+        splats: impl ExactSizeIterator<Item = (&'s Splat, f32)>,
+        records: &mut Vec<Record>,
+    ) {
+        if self.plan.is_whole() {
+            for (splat, share) in splats {
+                let splat = Splat { strength: splat.strength * share, ..*splat };
+                records.extend(record(self.plan, &self.source, &widened(self.plan, &self.source, &splat)));
+            }
+            return;
+        }
+        let mut eight = Eight {
+            center: [[0.0; 8]; 3],
+            factor: [[1.0; 8]; 6],
+            strength: [0.0; 8],
+            color: [0; 8],
+            normal: [NO_NORMAL as i32; 8],
+        };
+        let mut count = 0;
+        for (splat, share) in splats {
+            for (parts, part) in eight.center.iter_mut().zip(splat.center) {
+                parts[count] = part;
+            }
+            for (parts, part) in eight.factor.iter_mut().zip(splat.factor) {
+                parts[count] = part;
+            }
+            eight.strength[count] = splat.strength * share;
+            eight.color[count] = splat.color as i32;
+            eight.normal[count] = splat.normal as i32;
+            count += 1;
+            if count == 8 {
+                self.add_eight(simd, &eight, u64::MAX, records);
+                count = 0;
+            }
+        }
+        if count > 0 {
+            self.add_eight(simd, &eight, (1 << count) - 1, records);
+        }
+    }
+
+    /// Adds the records of those of eight splats that a mask names.
+    #[inline(always)]
+    fn add_eight<S: Simd>(&self, simd: S, eight: &Eight, mask: u64, records: &mut Vec<Record>) {
+        let plan = self.plan;
+        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let turned = self.turned(three!(I => eight.center[I].simd_into(simd)));
+        let mut center: [Lanes<S>; 3] = three!(I => turned[I] + self.origin[I]);
+        let [b00, b10, b11, b20, b21, b22]: [Lanes<S>; 6] =
+            each!([0, 1, 2, 3, 4, 5], I => eight.factor[I].simd_into(simd));
+        let [_, b, c] = self.axes;
+        let columns = [self.turned([b00, b10, b20]), three!(I => b11 * b[I] + b21 * c[I]), three!(I => b22 * c[I])];
+        let pixel = if plan.view.perspective { dot(center, center).sqrt() } else { one } * (1.0 / plan.frame.scale);
+        let blur = pixel * FOOTPRINT_BLUR as f32;
+        let blur2 = blur * blur;
+        let [x, y, z]: [[Lanes<S>; 3]; 3] = three!(I => three!(J => columns[J][I]));
+        let covariance = [dot(x, x) + blur2, dot(x, y), dot(x, z), dot(y, y) + blur2, dot(y, z), dot(z, z) + blur2];
+        let (normal, has_normal) = normals(simd, eight.normal.simd_into(simd));
+        let normal = self.turned(normal);
+        let normal = three!(I => has_normal.select(normal[I], none));
+        // Opaque splats must not grow by the widening: they step back.
+        let along = three!(I => dot(columns[I], normal));
+        let own2 = dot(along, along);
+        let back = ((own2 + blur2).sqrt() - own2.sqrt()) * STEP_BACK as f32;
+        center = three!(I => center[I] - normal[I] * back);
+        let Places { pixels, near, far, meets } = self.locate(simd, center, &covariance);
+        let mut bits = meets.to_bitmask() & mask;
+        if bits == 0 {
+            return;
+        }
+        let whitening = whitening(simd, &covariance);
+        // Within a sheet, what faces the eye hides what faces away.
+        let mut away = normal[2];
+        if plan.view.perspective {
+            away = dot(normal, center) / dot(center, center).sqrt().max(Lanes::splat(simd, 1e-30));
+        }
+        let facing = (away * -4.0 + 0.5).max(Lanes::splat(simd, 1.0 / 255.0)).min(one);
+        let facing = has_normal.select(facing, one);
+        let packed: i32x8<S> = eight.color.simd_into(simd);
+        let [red, green, blue, opacity] =
+            each!([0, 8, 16, 24], SHIFT => Lanes::<S>::float_from((packed >> SHIFT as u32) & 0xff) * (1.0 / 255.0));
+        let strength: Lanes<S> = eight.strength.simd_into(simd);
+        let [strength, facing, red, green, blue, nx, ny, nz]: [[f32; 8]; 8] = [
+            (strength * opacity).into(),
+            facing.into(),
+            (red * facing).into(),
+            (green * facing).into(),
+            (blue * facing).into(),
+            (normal[0] * facing).into(),
+            (normal[1] * facing).into(),
+            (normal[2] * facing).into(),
+        ];
+        let center: [[f32; 8]; 3] = three!(I => center[I].into());
+        let whitening: [[f32; 8]; 6] = each!([0, 1, 2, 3, 4, 5], I => whitening[I].into());
+        let sheets = [self.sheets_of(simd, near), self.sheets_of(simd, far)];
+        let [[left, top], [right, bottom]]: [[[i32; 8]; 2]; 2] =
+            each!([0, 1], I => each!([0, 1], J => i32x8::truncate_from(pixels[I][J]).into()));
+        records.reserve(8);
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize & 7;
+            bits &= bits - 1;
+            let payload = [1.0, facing[lane], red[lane], green[lane], blue[lane], nx[lane], ny[lane], nz[lane]];
+            records.push(Record {
+                center: three!(I => center[I][lane]),
+                strength: strength[lane],
+                whitening: each!([0, 1, 2, 3, 4, 5], I => whitening[I][lane]),
+                extent2: self.source.extent * self.source.extent,
+                kind: Kind::Radiance,
+                payload,
+                pixels: [[left[lane], top[lane]], [right[lane], bottom[lane]]],
+                sheets: [sheets[0][lane], sheets[1][lane].max(1)],
+            });
+        }
+    }
+
+    #[inline(always)]
+    fn turned<S: Simd>(&self, [x, y, z]: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
+        let [a, b, c] = self.axes;
+        three!(I => x * a[I] + y * b[I] + z * c[I])
+    }
+
+    #[inline(always)]
+    fn locate<S: Simd>(&self, simd: S, c: [Lanes<S>; 3], covariance: &Symmetric<S>) -> Places<S> {
+        let (plan, extent) = (self.plan, self.source.extent);
+        let frame = &plan.frame;
+        let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
+        let [xx, xy, xz, yy, yz, zz] = *covariance;
+        let reaches = [xx.sqrt() * extent, yy.sqrt() * extent, zz.sqrt() * extent];
+        let (mut distance, mut reach, mut far) = (c[2], reaches[2], c[2] + reaches[2]);
+        let mut meets = mask32x8::splat(simd, true);
+        let mut is_beside = mask32x8::splat(simd, false);
+        let mut bounds = [[c[0] - reaches[0], c[0] + reaches[0]], [c[1] - reaches[1], c[1] + reaches[1]]];
+        if plan.view.perspective {
+            let high = c[2] + reaches[2];
+            meets = high.simd_gt(frame.z_near);
+            distance = dot(c, c).sqrt();
+            let inverse = one / distance.max(Lanes::splat(simd, 1e-30));
+            let toward = three!(I => c[I] * inverse);
+            let along = [
+                xx * toward[0] + xy * toward[1] + xz * toward[2],
+                xy * toward[0] + yy * toward[1] + yz * toward[2],
+                xz * toward[0] + yz * toward[1] + zz * toward[2],
+            ];
+            reach = dot(toward, along).max(none).sqrt() * extent;
+            let e2 = extent * extent;
+            let across = (xx + yy + zz) * e2;
+            far = ((distance + reach) * (distance + reach) + across).sqrt();
+            let is_front = (c[2] - reaches[2]).simd_gt(frame.z_near);
+            let (xz, yz, zz) = (xz * e2, yz * e2, zz * e2);
+            let tangents =
+                [tangent_bounds(simd, c[0], c[2], xx * e2, xz, zz), tangent_bounds(simd, c[1], c[2], yy * e2, yz, zz)];
+            if is_front.all_true() {
+                bounds = tangents;
+            } else {
+                let low = Lanes::splat(simd, frame.z_near);
+                let boxes = each!([0, 1], I => box_bounds(simd, bounds[I], low, high));
+                bounds = each!([0, 1], I => each!([0, 1], J => is_front.select(tangents[I][J], boxes[I][J])));
+            }
+            // Beside the eye, rays leave the kernel's middle behind them: the part in front of the first plane must be cut off.
+            is_beside = distance.simd_lt(reach * 2.0);
+        }
+        // Near the rim of a footprint the sections reach beyond the ellipsoid, because a ray keeps a kernel whole.
+        far = (far - distance) * SECTION_OVERREACH + distance;
+        let near = distance - reach * SECTION_OVERREACH;
+        meets &= far.simd_gt(plan.planes[1]) & near.simd_lt(plan.planes[plan.sheets + 1]);
+        let near = is_beside.select(Lanes::splat(simd, -1e38), near);
+        let apron = plan.apron() as f32;
+        let mut pixels = [[none; 2]; 2];
+        for axis in 0..2 {
+            // Pixels whose centres lie in the box, with a margin for rounding.
+            let limit = frame.size[axis] as f32 + apron;
+            let low = bounds[axis][0] * frame.scale + frame.center[axis];
+            let high = bounds[axis][1] * frame.scale + frame.center[axis];
+            // NaN fails.
+            meets &= low.simd_le(high);
+            let first = (low - 0.51).max(Lanes::splat(simd, -apron)).min(Lanes::splat(simd, limit)).ceil();
+            let last = (high - 0.49).max(Lanes::splat(simd, -apron - 1.0)).min(Lanes::splat(simd, limit - 1.0)).floor();
+            meets &= first.simd_le(last);
+            (pixels[0][axis], pixels[1][axis]) = (first, last);
+        }
+        Places { pixels, near, far, meets }
+    }
+
+    /// The sheets that distances lie in.
+    #[inline(always)]
+    fn sheets_of<S: Simd>(&self, simd: S, distance: Lanes<S>) -> [u16; 8] {
+        let plan = self.plan;
+        let frame = &plan.frame;
+        let one = Lanes::splat(simd, 1.0);
+        let near = plan.planes[1];
+        let geometric = frame.geometric_sheets as usize;
+        let turn = plan.planes[1 + geometric];
+        let log = log2(simd, (distance * (1.0 / near)).max(one)) * frame.ratio_log2_inverse;
+        let even = (distance - turn) * frame.step_inverse + geometric as f32;
+        let estimate = distance.simd_lt(turn).select(log, even).floor() + 1.0;
+        let estimate = estimate.max(one).min(Lanes::splat(simd, plan.sheets as f32));
+        let [distances, estimates]: [[f32; 8]; 2] = [distance.into(), estimate.into()];
+        let mut sheets = [0; 8];
+        for ((sheet, estimate), distance) in sheets.iter_mut().zip(estimates).zip(distances) {
+            let mut own = (estimate as usize).min(plan.sheets);
+            // The closed form is off by one or two, where rounding meets a plane. The list decides.
+            for _ in 0..2 {
+                if distance < plan.planes[own] {
+                    own -= 1;
+                } else if distance >= plan.planes[own + 1] && own < plan.sheets {
+                    own += 1;
+                }
+            }
+            *sheet = own as u16;
+        }
+        sheets
+    }
+}
+
+/// The whitening M = L⁻¹ of covariances L·Lᵀ: m00, m10, m20, m11, m21, m22.
+#[inline(always)]
+fn whitening<S: Simd>(simd: S, [xx, xy, xz, yy, yz, zz]: &Symmetric<S>) -> [Lanes<S>; 6] {
+    let one = Lanes::splat(simd, 1.0);
+    // The floors keep discs far thinner than wide invertible in 32 bits.
+    let least = xx.max(yy.max(*zz)) * 1e-7 + 1e-37;
+    let m00 = one / xx.max(least).sqrt();
+    let (l10, l20) = (*xy * m00, *xz * m00);
+    let m11 = one / (*yy - l10 * l10).max(least).sqrt();
+    let l21 = (*yz - l10 * l20) * m11;
+    let m22 = one / (*zz - l20 * l20 - l21 * l21).max(least).sqrt();
+    let m10 = -(l10 * m00 * m11);
+    let m21 = -(l21 * m11 * m22);
+    let m20 = -((l20 * m00 + l21 * m10) * m22);
+    [m00, m10, m20, m11, m21, m22]
+}
+
+/// Unit vectors from their octahedral codes (`decode_normal`), and which codes are normals.
+#[inline(always)]
+pub fn normals<S: Simd>(simd: S, packed: i32x8<S>) -> ([Lanes<S>; 3], mask32x8<S>) {
+    let none = Lanes::splat(simd, 0.0);
+    let x = Lanes::<S>::float_from((packed << 16) >> 16) * (1.0 / 32767.0);
+    let y = Lanes::<S>::float_from(packed >> 16) * (1.0 / 32767.0);
+    let z = 1.0 - x.abs() - y.abs();
+    let fold = (-z).max(none);
+    let x = x - x.simd_ge(none).select(fold, -fold);
+    let y = y - y.simd_ge(none).select(fold, -fold);
+    let inverse = Lanes::splat(simd, 1.0) / (x * x + y * y + z * z).sqrt();
+    ([x * inverse, y * inverse, z * inverse], !packed.simd_eq(NO_NORMAL as i32))
+}
+
+/// Bounds of x/z over an ellipsoid in front of the eye: tangents of its outline, exact in perspective.
+#[inline(always)]
+fn tangent_bounds<S: Simd>(
+    simd: S,
+    x: Lanes<S>,
+    z: Lanes<S>,
+    xx: Lanes<S>,
+    xz: Lanes<S>,
+    zz: Lanes<S>,
+) -> [Lanes<S>; 2] {
+    let one = Lanes::splat(simd, 1.0);
+    let inverse = one / z;
+    let p = x * inverse;
+    let (a, b, c) = (xx * inverse * inverse, xz * inverse * inverse, zz * inverse * inverse);
+    let denominator = one / (one - c);
+    let middle = (p - b) * denominator;
+    let square = a - b * p * 2.0 + c * p * p - (a * c - b * b);
+    let half = square.max(Lanes::splat(simd, 0.0)).sqrt() * denominator.abs();
+    [middle - half, middle + half]
+}
+
+/// Bounds of x/z over the part of a box beyond the nearest visible z.
+#[inline(always)]
+fn box_bounds<S: Simd>(simd: S, [low, high]: [Lanes<S>; 2], z_low: Lanes<S>, z_high: Lanes<S>) -> [Lanes<S>; 2] {
+    let none = Lanes::splat(simd, 0.0);
+    [low / low.simd_lt(none).select(z_low, z_high), high / high.simd_lt(none).select(z_high, z_low)]
+}
