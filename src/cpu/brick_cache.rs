@@ -39,7 +39,7 @@ pub struct BrickCache {
     held: HashMap<Key, Held>,
     samples: Samples,
     /// The ranges of the blocks of each slot's brick.
-    blocks: Vec<Box<[[u8; 2]; BRICK_BLOCKS]>>,
+    blocks: Vec<[[u8; 2]; BRICK_BLOCKS]>,
     free: Vec<usize>,
     update: u64,
     /// Bricks read so far.
@@ -101,10 +101,10 @@ impl BrickCache {
             for (key, brick) in keys.iter().zip(read) {
                 let slot = self.free.pop().unwrap_or(self.blocks.len());
                 if slot == self.blocks.len() {
-                    self.blocks.push(brick.blocks);
+                    self.blocks.push(*brick.blocks);
                     each_type!(&mut self.samples, samples => samples.resize((slot + 1) * SLOT, Default::default()));
                 } else {
-                    self.blocks[slot] = brick.blocks;
+                    self.blocks[slot] = *brick.blocks;
                 }
                 each_type!(&mut self.samples, samples => fill(&mut samples[slot * SLOT..], &brick.samples));
                 self.held.insert(*key, Held { slot, last: self.update });

@@ -142,6 +142,7 @@ impl<S: Simd> Last<S> {
 
 impl Gather<'_> {
     /// The field of a sheet and the rays on which it counts; nothing where it cannot be seen.
+    #[expect(clippy::too_many_arguments, reason = "the state of one packet's walk")]
     #[inline(always)]
     pub fn layer<S: Simd>(
         &self,

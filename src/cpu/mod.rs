@@ -267,13 +267,13 @@ impl CpuRenderer {
                     self.shown.take_if(|(own, _)| *own != first);
                     self.shown.get_or_insert_with(|| (first, Shown::new(volume, ranges, &first)));
                 }
-                (_, Prepared::Bricks(cache), Some(choice)) => {
-                    if self.levels.as_ref().is_none_or(|(own, _)| own != choice) {
-                        let level = |(level, _): &(usize, f64)| {
-                            (Grid::new(cache, choice, *level), Shown::of_bricks(cache, choice, *level))
-                        };
-                        self.levels = Some((choice.clone(), choice.levels.iter().map(level).collect()));
-                    }
+                (_, Prepared::Bricks(cache), Some(choice))
+                    if self.levels.as_ref().is_none_or(|(own, _)| own != choice) =>
+                {
+                    let level = |(level, _): &(usize, f64)| {
+                        (Grid::new(cache, choice, *level), Shown::of_bricks(cache, choice, *level))
+                    };
+                    self.levels = Some((choice.clone(), choice.levels.iter().map(level).collect()));
                 }
                 _ => {}
             }
