@@ -4,13 +4,14 @@
 use glam::DVec3;
 use splatkit::{
     compare::compare_pictures,
+    cpu::CpuRenderer,
     engine::{AdapterChoice, FrameStats, Gpu, Renderer},
     hierarchy::Detail,
     io::Limits,
-    math::{Camera, Kernel, Projection},
+    math::{Bounds, Camera, Kernel, Projection},
     picture::Picture,
     reference,
-    scene::{Classification, Evaluate, Scene, Settings},
+    scene::{Classification, Clip, ClipShape, Evaluate, Scene, Settings},
     volume::{
         Lattice, Samples, TransferFunction, Volume,
         bricks::{self, Bricks, WriteOptions},
@@ -270,4 +271,80 @@ fn what_bricks_cannot_do_is_told() {
     assert!(told(&scene(&bricks), &settings).contains("after interpolation"));
     let two = scene(&bricks).with_bricks(bricks, Kernel::default(), transfer());
     assert!(two.validate().unwrap_err().to_string().contains("2"));
+}
+
+/// The engine for processors gathers bricks: the same picture as of the whole volume, and between levels that of scattering.
+#[test]
+fn processors_gather_bricks() {
+    let cases = [
+        (true, DVec3::ONE, [75, 60, 49]),
+        (false, DVec3::new(1.0, 1.3, 0.8), [49, 65, 33]),
+        // Fewer samples along an axis than a kernel reaches.
+        (true, DVec3::new(1.0, 2.0, 1.0), [64, 3, 40]),
+    ];
+    for (bytes, spacing, dims) in cases {
+        let volume = volume(dims, spacing, bytes);
+        let plain = Scene::new().with_volume(volume.clone(), Kernel::default(), transfer());
+        let bricks = scene(&bricks_of(&volume));
+        for (name, camera) in cameras(&plain) {
+            let drawn = |scene: &Scene, settings: &Settings| {
+                let mut renderer = CpuRenderer::new(scene).expect("a scene");
+                renderer.render(&camera, settings).expect("a picture")
+            };
+            let finest = Settings { evaluate: Evaluate::Gather, ..settings(0.0) };
+            let ((whole, _), (found, stats)) = (drawn(&plain, &finest), drawn(&bricks, &finest));
+            assert!(whole.color.iter().any(|color| color[3] > 0.1), "{name}, {dims:?}: nothing");
+            assert!(stats.gathered > 0 && stats.lambda == 0.0, "{stats:?}");
+            let agreement = decibels(&found, &whole);
+            println!("{name}, {dims:?}: {agreement:.1} dB to the whole volume");
+            assert!(agreement > 80.0, "{name}, {dims:?}: {agreement:.1} dB");
+            let step = spacing.max_element() * camera.view([96, 96]).expect("a view").scale;
+            let near =
+                if name == "flat" { 1.0 } else { camera.view([96, 96]).expect("a view").distances(&plain.bounds())[0] };
+            for lambda in [0.3f64, 0.7] {
+                let between = Settings { detail: Detail::Pixels(2.0 * lambda.exp2() * step / near), ..finest.clone() };
+                let (found, stats) = drawn(&bricks, &between);
+                let (scattered, _) = drawn(&bricks, &Settings { evaluate: Evaluate::Scatter, ..between });
+                let agreement = decibels(&found, &scattered);
+                println!("{name}, {dims:?}, level {:.2}: {agreement:.1} dB to scattering", stats.lambda);
+                assert!(stats.lambda > 0.0 && stats.lambda < 1.0, "{name}, {dims:?}: {}", stats.lambda);
+                assert!(stats.gathered > 0 && agreement > 45.0, "{name}, {dims:?}, {lambda}: {agreement:.1} dB");
+            }
+        }
+    }
+}
+
+/// Slots are used again, and what lies beside bricks comes and goes with their neighbours.
+#[test]
+fn processors_hold_few_bricks() {
+    let volume = volume([130, 120, 110], DVec3::ONE, true);
+    let bricks = bricks_of(&volume);
+    let scene = scene(&bricks);
+    let [(_, near), ..] = cameras(&scene);
+    let mut beside = near.clone();
+    beside.azimuth(140.0);
+    let settings = Settings { evaluate: Evaluate::Gather, page_memory: 30 * 48_000, ..settings(0.0) };
+    let mut renderer = CpuRenderer::new(&scene).expect("a scene");
+    let draw = |renderer: &mut CpuRenderer, camera: &Camera| renderer.render(camera, &settings).expect("a picture");
+    let (first, stats) = draw(&mut renderer, &near);
+    assert!(stats.lambda > 0.0 && stats.brick_bytes <= settings.page_memory, "{stats:?}");
+    let (_, stats) = draw(&mut renderer, &beside);
+    assert!(stats.brick_bytes <= settings.page_memory, "{stats:?}");
+    let (again, _) = draw(&mut renderer, &near);
+    assert_shows_something(&first);
+    assert_eq!(first.color, again.color);
+    // From one end to the other in one renderer, and each alone.
+    let part = |from: f64, to: f64| {
+        let mut own = settings.clone();
+        own.page_memory = 1 << 30;
+        let shape = ClipShape::Box(Bounds { min: DVec3::splat(from), max: DVec3::splat(to) });
+        own.clips = vec![Clip { shape, inside: true }];
+        own
+    };
+    for (from, to) in [(0.0, 40.0), (30.0, 70.0), (60.0, 110.0)] {
+        let own = part(from, to);
+        let (found, _) = renderer.render(&near, &own).expect("a picture");
+        let (alone, _) = CpuRenderer::new(&scene).expect("a scene").render(&near, &own).expect("a picture");
+        assert_eq!(found.color, alone.color);
+    }
 }

@@ -4,10 +4,10 @@
 use super::{
     plan::Plan,
     rays::Rays,
-    vector::{Lanes, dot, each, exp, exp2, four, log2, three},
+    vector::{self, Lanes, dot, each, exp, four, log2, three, words},
 };
 use crate::scene::Optics;
-use fearless_simd::{Simd, f32x4, mask32x8, prelude::*};
+use fearless_simd::{Simd, f32x4, i32x8, mask32x8, prelude::*};
 
 /// Parts of a sheet in which the transfer function is integrated.
 const PARTS: usize = 3;
@@ -113,9 +113,11 @@ impl Visible {
         let slack = (high - low) * 0.125 + (0.5 * NARROW + 1.0);
         let [_, _, last, place] = plan.frame.transfer;
         let (none, last) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, last));
-        let low: [f32; 8] = (low - slack + place).max(none).min(last).into();
-        let high: [f32; 8] = (high + slack + place).max(none).min(last).into();
-        low.iter().zip(high).any(|(low, high)| self.0[high as usize + 1] > self.0[*low as usize])
+        let low: [i32; 8] = i32x8::truncate_from((low - slack + place).max(none).min(last)).into();
+        let high: [i32; 8] = i32x8::truncate_from((high + slack + place).max(none).min(last)).into();
+        let before = words!(simd, L => self.0[low[L] as usize]);
+        let behind = words!(simd, L => self.0[high[L] as usize + 1]);
+        behind.simd_gt(before).any_true()
     }
 }
 
@@ -195,7 +197,7 @@ impl Plan<'_> {
         let has_direction = size.simd_gt(LEAST_GRADIENT);
         let facing = (dot(normal, direction).abs() / size.max(Lanes::splat(simd, LEAST_GRADIENT))).min(one);
         let facing = has_direction.select(facing, one);
-        let highlight = exp2(simd, log2(simd, facing.max(Lanes::splat(simd, 1e-6))) * power) * specular;
+        let highlight = vector::power(simd, facing.max(Lanes::splat(simd, 1e-6)), power) * specular;
         let highlight = has_direction.select(highlight, Lanes::splat(simd, 0.0));
         let share = facing * diffuse + ambient;
         three!(I => color[I].mul_add(share, highlight).min(one))

@@ -7,12 +7,16 @@
 //! Tensor products have weights that are polynomials of the place between two samples. Their derivatives give the gradient. The
 //! samples go on mirrored at the outermost ones, so the weights always add up to 1.
 
-use super::vector::{Lanes, each, exp, four, three};
+use super::{
+    brick_cache::{BESIDE, Grid, SLOT, SLOT_SIDE},
+    vector::{Lanes, each, exp2_within, four, three, words},
+    window::{Sample, Weights, Window, row_of},
+};
 use crate::{
     math::{Kernel, Profile, Tensor},
-    volume::{Samples, Volume},
+    volume::{Samples, Volume, bricks::SIDE},
 };
-use fearless_simd::{Simd, f32x4, i32x8, mask32x8, prelude::*, u32x8};
+use fearless_simd::{Simd, i32x8, mask32x8, prelude::*};
 
 /// How far a place may lie outside the lattice and still have a sample in reach, in steps.
 const BEYOND: f32 = 1.999;
@@ -44,131 +48,6 @@ pub fn deviation(kernel: &Kernel) -> Option<f64> {
     if let Some(Weighting::Gaussian(sigma)) = weighting(kernel) { Some(sigma) } else { None }
 }
 
-/// What samples are, as vectors of them are loaded.
-pub trait Sample: Copy + Send + Sync {
-    /// The samples at four successive places, for places of eight lanes.
-    fn four<S: Simd>(simd: S, samples: &[Self], places: &[usize; 8], offset: usize) -> [Lanes<S>; 4];
-
-    /// The samples at two successive places.
-    fn two<S: Simd>(simd: S, samples: &[Self], places: &[usize; 8], offset: usize) -> [Lanes<S>; 2];
-
-    fn value(self) -> f32;
-}
-
-impl Sample for u8 {
-    #[inline(always)]
-    fn four<S: Simd>(simd: S, samples: &[Self], places: &[usize; 8], offset: usize) -> [Lanes<S>; 4] {
-        let word =
-            |place: usize| samples[place + offset..].first_chunk::<4>().map_or(0, |four| u32::from_le_bytes(*four));
-        let words: [u32; 8] = [
-            word(places[0]),
-            word(places[1]),
-            word(places[2]),
-            word(places[3]),
-            word(places[4]),
-            word(places[5]),
-            word(places[6]),
-            word(places[7]),
-        ];
-        let words: u32x8<S> = words.simd_into(simd);
-        four!(I => Lanes::float_from(((words >> (8 * I as u32)) & 0xff).bitcast::<i32x8<S>>()))
-    }
-
-    #[inline(always)]
-    fn two<S: Simd>(simd: S, samples: &[Self], places: &[usize; 8], offset: usize) -> [Lanes<S>; 2] {
-        let samples = &samples[offset..];
-        let word = |place: usize| samples[place..].first_chunk::<2>().map_or(0, |two| u16::from_le_bytes(*two).into());
-        let words: [u32; 8] = [
-            word(places[0]),
-            word(places[1]),
-            word(places[2]),
-            word(places[3]),
-            word(places[4]),
-            word(places[5]),
-            word(places[6]),
-            word(places[7]),
-        ];
-        let words: u32x8<S> = words.simd_into(simd);
-        [Lanes::float_from((words & 0xff).bitcast::<i32x8<S>>()), Lanes::float_from((words >> 8).bitcast::<i32x8<S>>())]
-    }
-
-    #[inline(always)]
-    fn value(self) -> f32 {
-        f32::from(self)
-    }
-}
-
-/// Samples of other types are loaded one by one.
-macro_rules! one_by_one {
-    ($($sample:ty),*) => {$(
-        impl Sample for $sample {
-            #[inline(always)]
-            fn four<S: Simd>(simd: S, samples: &[Self], places: &[usize; 8], offset: usize) -> [Lanes<S>; 4] {
-                let mut four = [[0.0f32; 8]; 4];
-                for (lane, place) in places.iter().enumerate() {
-                    let Some(own) = samples[place + offset..].first_chunk::<4>() else { continue };
-                    for (row, sample) in four.iter_mut().zip(own) {
-                        row[lane] = *sample as f32;
-                    }
-                }
-                four!(I => four[I].simd_into(simd))
-            }
-
-            #[inline(always)]
-            fn two<S: Simd>(simd: S, samples: &[Self], places: &[usize; 8], offset: usize) -> [Lanes<S>; 2] {
-                let samples = &samples[offset..];
-                let mut two = [[0.0f32; 8]; 2];
-                for (lane, place) in places.iter().enumerate() {
-                    let Some(own) = samples[*place..].first_chunk::<2>() else { continue };
-                    two[0][lane] = own[0] as f32;
-                    two[1][lane] = own[1] as f32;
-                }
-                [two[0].simd_into(simd), two[1].simd_into(simd)]
-            }
-
-            #[inline(always)]
-            fn value(self) -> f32 {
-                self as f32
-            }
-        }
-    )*};
-}
-one_by_one!(u16, i16, i32);
-
-impl Sample for f32 {
-    #[inline(always)]
-    fn four<S: Simd>(simd: S, samples: &[Self], places: &[usize; 8], offset: usize) -> [Lanes<S>; 4] {
-        let samples = &samples[offset..];
-        let [a, b] = each!([0, 4], I => {
-            let [a, b, c, d]: [f32x4<S>; 4] = four!(L => {
-                samples[places[I + L]..].first_chunk::<4>().map_or([0.0; 4], |four| *four).simd_into(simd)
-            });
-            // Rows become columns.
-            let (ac, bd) = (a.zip_low(c), b.zip_low(d));
-            let (ac_high, bd_high) = (a.zip_high(c), b.zip_high(d));
-            [ac.zip_low(bd), ac.zip_high(bd), ac_high.zip_low(bd_high), ac_high.zip_high(bd_high)]
-        });
-        four!(I => simd.combine_f32x4(a[I], b[I]))
-    }
-
-    #[inline(always)]
-    fn two<S: Simd>(simd: S, samples: &[Self], places: &[usize; 8], offset: usize) -> [Lanes<S>; 2] {
-        let samples = &samples[offset..];
-        let mut two = [[0.0f32; 8]; 2];
-        for (lane, place) in places.iter().enumerate() {
-            let Some(own) = samples[*place..].first_chunk::<2>() else { continue };
-            two[0][lane] = own[0];
-            two[1][lane] = own[1];
-        }
-        [two[0].simd_into(simd), two[1].simd_into(simd)]
-    }
-
-    #[inline(always)]
-    fn value(self) -> f32 {
-        self
-    }
-}
-
 /// The samples of a volume by their type.
 pub enum Typed<'a> {
     U8(Field<'a, u8>),
@@ -182,15 +61,24 @@ impl<'a> Typed<'a> {
     /// The field of a volume, whose values count from `zero`. A sharp one has coefficients for a tensor product.
     pub fn new(volume: &'a Volume, weighting: Weighting, zero: f64) -> Self {
         let dims = volume.lattice.dims;
-        if let Some(coefficients) = &volume.coefficients {
-            return Self::F32(Field::new(&coefficients.values, dims, weighting, zero));
+        match &volume.coefficients {
+            Some(coefficients) => Self::F32(Field::new(&coefficients.values, dims, Memory::Rows, weighting, zero)),
+            None => Self::in_memory(&volume.samples, dims, Memory::Rows, weighting, zero),
         }
-        match &volume.samples {
-            Samples::U8(samples) => Self::U8(Field::new(samples, dims, weighting, zero)),
-            Samples::U16(samples) => Self::U16(Field::new(samples, dims, weighting, zero)),
-            Samples::I16(samples) => Self::I16(Field::new(samples, dims, weighting, zero)),
-            Samples::I32(samples) => Self::I32(Field::new(samples, dims, weighting, zero)),
-            Samples::F32(samples) => Self::F32(Field::new(samples, dims, weighting, zero)),
+    }
+
+    /// The field of a level of a volume in bricks; `samples` are those of all slots, at least of one.
+    pub fn of_bricks(samples: &'a Samples, dims: [usize; 3], grid: &'a Grid, weighting: Weighting, zero: f64) -> Self {
+        Self::in_memory(samples, dims, Memory::Slots(grid), weighting, zero)
+    }
+
+    fn in_memory(samples: &'a Samples, dims: [usize; 3], memory: Memory<'a>, weighting: Weighting, zero: f64) -> Self {
+        match samples {
+            Samples::U8(samples) => Self::U8(Field::new(samples, dims, memory, weighting, zero)),
+            Samples::U16(samples) => Self::U16(Field::new(samples, dims, memory, weighting, zero)),
+            Samples::I16(samples) => Self::I16(Field::new(samples, dims, memory, weighting, zero)),
+            Samples::I32(samples) => Self::I32(Field::new(samples, dims, memory, weighting, zero)),
+            Samples::F32(samples) => Self::F32(Field::new(samples, dims, memory, weighting, zero)),
         }
     }
 }
@@ -199,8 +87,18 @@ impl<'a> Typed<'a> {
 pub struct Field<'a, T> {
     samples: &'a [T],
     dims: [usize; 3],
+    memory: Memory<'a>,
     shape: Shape,
     zero: f32,
+}
+
+/// How samples lie in memory.
+#[derive(Clone, Copy)]
+enum Memory<'a> {
+    /// Row by row.
+    Rows,
+    /// In the slots of bricks.
+    Slots(&'a Grid),
 }
 
 /// The kernel between samples.
@@ -222,12 +120,6 @@ struct Bell {
     far: f32,
 }
 
-/// Four weights of an axis, which add up to 1, and their first moment.
-struct Weights<S: Simd> {
-    weights: [Lanes<S>; 4],
-    moment: Lanes<S>,
-}
-
 /// Four weights of an axis, which add up to 1, and their derivatives.
 struct Taps<S: Simd> {
     weights: [Lanes<S>; 4],
@@ -235,13 +127,13 @@ struct Taps<S: Simd> {
 }
 
 impl<'a, T: Sample> Field<'a, T> {
-    fn new(samples: &'a [T], dims: [usize; 3], weighting: Weighting, zero: f64) -> Self {
+    fn new(samples: &'a [T], dims: [usize; 3], memory: Memory<'a>, weighting: Weighting, zero: f64) -> Self {
         let shape = match weighting {
             Weighting::Gaussian(sigma) => Shape::Gaussian(Bell::new(sigma)),
             Weighting::Tensor(Tensor::Linear) => Shape::Linear,
             Weighting::Tensor(tensor) => Shape::Cubic(polynomials(tensor)),
         };
-        Self { samples, dims, shape, zero: zero as f32 }
+        Self { samples, dims, memory, shape, zero: zero as f32 }
     }
 
     /// Values, counted from zero, and their changes a step along each axis, at places in steps.
@@ -259,17 +151,40 @@ impl<'a, T: Sample> Field<'a, T> {
     }
 }
 
-/// Where samples are in memory whose indices along the axes are whole numbers.
-#[inline(always)]
-pub fn offsets<S: Simd>(dims: [usize; 3], index: [Lanes<S>; 3]) -> [usize; 8] {
-    let [x, y, z]: [i32x8<S>; 3] = three!(I => i32x8::truncate_from(index[I]));
-    let [nx, ny, nz] = dims;
-    if nx * ny * nz <= i32::MAX as usize {
-        let own: [i32; 8] = ((z * ny as i32 + y) * nx as i32 + x).into();
-        return each!([0, 1, 2, 3, 4, 5, 6, 7], I => own[I] as usize);
+impl Grid {
+    /// The bricks that hold the second samples of windows, from the indices of the first ones.
+    #[inline(always)]
+    fn bricks<S: Simd>(&self, [x, y, z]: [i32x8<S>; 3]) -> ([i32x8<S>; 3], [usize; 8]) {
+        let [x, y, z] = [(x + 1) >> 5, (y + 1) >> 5, (z + 1) >> 5];
+        let [columns, rows, _] = self.counts.map(|count| count as i32);
+        let numbers: [i32; 8] = ((z * rows + y) * columns + x).into();
+        ([x, y, z], each!([0, 1, 2, 3, 4, 5, 6, 7], L => numbers[L] as usize))
     }
-    let [x, y, z]: [[i32; 8]; 3] = [x.into(), y.into(), z.into()];
-    each!([0, 1, 2, 3, 4, 5, 6, 7], I => (z[I] as usize * ny + y[I] as usize) * nx + x[I] as usize)
+
+    /// Where windows are in the slots. Windows of bricks that are not there are any.
+    #[inline(always)]
+    fn places<S: Simd>(&self, first: [i32x8<S>; 3]) -> [usize; 8] {
+        let (bricks, numbers) = self.bricks(first);
+        let [x, y, z]: [i32x8<S>; 3] = three!(I => first[I] + BESIDE as i32 - bricks[I] * SIDE as i32);
+        let side = SLOT_SIDE as i32;
+        let within: [i32; 8] = ((z * side + y) * side + x).into();
+        each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
+            let slot = self.slots[numbers[L]];
+            (if slot == Self::ABSENT { 0 } else { slot as usize * SLOT }) + within[L] as usize
+        })
+    }
+
+    /// Where there are bricks around places in steps of their level, of so many samples, and a value of each brick.
+    #[inline(always)]
+    pub fn held<S: Simd>(&self, simd: S, dims: [usize; 3], place: [Lanes<S>; 3]) -> (mask32x8<S>, Lanes<S>) {
+        let first = three!(I => {
+            let last = Lanes::splat(simd, dims[I] as f32 - 1.0);
+            i32x8::truncate_from(place[I].max(Lanes::splat(simd, 0.0)).min(last)) - 1
+        });
+        let (_, numbers) = self.bricks(first);
+        let values = words!(simd, L => self.values[numbers[L]].to_bits());
+        (words!(simd, L => self.slots[numbers[L]]).simd_lt(Self::ABSENT), values.bitcast())
+    }
 }
 
 /// Gaussians.
@@ -287,25 +202,58 @@ impl<T: Sample> Field<'_, T> {
             let within = first[axis].simd_ge(1.0) & (first[axis] + 2.0).simd_le(last);
             is_within &= within.all_true();
         }
-        if is_within { self.within(simd, bell, place, first) } else { self.beside(simd, bell, place, first) }
+        let mut weights: [Weights<S>; 3] = three!(I => bell.weights(simd, place[I] - first[I]));
+        let mut starts = three!(I => first[I] - 1.0);
+        if !is_within {
+            if self.dims.iter().any(|&count| count < 4) {
+                return simd.vectorize(
+                    #[inline(always)]
+                    || self.beside(simd, bell, place, first),
+                );
+            }
+            for axis in 0..3 {
+                // Four samples of the lattice; those outside have no weight.
+                let end = Lanes::splat(simd, self.dims[axis] as f32 - 4.0);
+                let start = starts[axis].max(Lanes::splat(simd, 0.0)).min(end);
+                weights[axis] = moved(simd, weights[axis].weights, start - starts[axis]);
+                starts[axis] = start;
+            }
+        }
+        let row = T::weigh(simd, &mut weights[0]);
+        let window = self.window(starts);
+        let (sum, gradient) = self.sums(
+            bell,
+            &weights,
+            T::UNIT,
+            #[inline(always)]
+            |j, k| T::row(simd, &window, j, k, &row, self.zero),
+        );
+        (T::ZERO.map_or(sum, |zero| sum + (zero - self.zero)), gradient)
     }
 
-    /// Where all samples in reach lie in the lattice.
+    /// Samples in the lattice, four along each axis, from the first one of each lane.
     #[inline(always)]
-    fn within<S: Simd>(
-        &self,
-        simd: S,
-        bell: &Bell,
-        place: [Lanes<S>; 3],
-        first: [Lanes<S>; 3],
-    ) -> (Lanes<S>, [Lanes<S>; 3]) {
-        let weights: [Weights<S>; 3] = three!(I => bell.weights(simd, place[I] - first[I]));
-        let places = offsets(self.dims, three!(I => first[I] - 1.0));
-        let [nx, ny, _] = self.dims;
-        self.sums(simd, bell, &weights, &Inside { samples: self.samples, places, row: nx, slice: nx * ny })
+    fn window<S: Simd, const N: usize>(&self, starts: [Lanes<S>; 3]) -> Window<'_, T, N> {
+        let first: [i32x8<S>; 3] = three!(I => i32x8::truncate_from(starts[I]));
+        let [nx, ny, nz] = self.dims;
+        let (places, row, slice) = match self.memory {
+            Memory::Slots(grid) => (grid.places(first), SLOT_SIDE, SLOT_SIDE * SLOT_SIDE),
+            Memory::Rows if nx * ny * nz <= i32::MAX as usize => {
+                let [x, y, z] = first;
+                let own: [i32; 8] = ((z * ny as i32 + y) * nx as i32 + x).into();
+                (each!([0, 1, 2, 3, 4, 5, 6, 7], I => own[I] as usize), nx, nx * ny)
+            }
+            Memory::Rows => {
+                let [x, y, z]: [[i32; 8]; 3] = three!(I => first[I].into());
+                let own =
+                    each!([0, 1, 2, 3, 4, 5, 6, 7], I => (z[I] as usize * ny + y[I] as usize) * nx + x[I] as usize);
+                (own, nx, nx * ny)
+            }
+        };
+        Window::new(self.samples, places, row, slice)
     }
 
-    /// At the border: samples outside the lattice have no weight.
+    /// In lattices of less than four samples along an axis: sample by sample.
     #[inline(always)]
     fn beside<S: Simd>(
         &self,
@@ -319,60 +267,76 @@ impl<T: Sample> Field<'_, T> {
         let mut taps = [[[0; 4]; 8]; 3];
         for axis in 0..3 {
             let last = Lanes::splat(simd, self.dims[axis] as f32 - 1.0);
-            let own = &mut weights[axis];
-            let mut sum = none;
+            let mut own = weights[axis].weights;
             for tap in 0..4 {
                 let index = first[axis] + (tap as f32 - 1.0);
                 let inside = index.max(none).min(last);
-                own.weights[tap] = inside.simd_eq(index).select(own.weights[tap], none);
-                sum += own.weights[tap];
+                own[tap] = inside.simd_eq(index).select(own[tap], none);
                 let indices: [f32; 8] = inside.into();
                 for (own, index) in taps[axis].iter_mut().zip(indices) {
                     own[tap] = index as usize;
                 }
             }
-            let inverse = Lanes::splat(simd, 1.0) / sum;
-            own.weights = four!(I => own.weights[I] * inverse);
-            own.moment = own.weights[2] - own.weights[0] + own.weights[3] * 2.0;
+            weights[axis] = normalised(simd, own);
         }
-        let [nx, ny, _] = self.dims;
-        self.sums(simd, bell, &weights, &Border { samples: self.samples, taps, row: nx, slice: nx * ny })
+        let samples = self.border(taps);
+        let row = weights[0].weights;
+        self.sums(
+            bell,
+            &weights,
+            1.0,
+            #[inline(always)]
+            |j, k| row_of(&row, samples.four(simd, j, k), self.zero),
+        )
     }
 
-    /// The mean of the samples in reach and its gradient.
+    /// The mean of the samples in reach and its gradient. `row` gives the sum of a row of a slice and its first moment, to be
+    /// multiplied by `unit`.
     #[inline(always)]
     fn sums<S: Simd>(
         &self,
-        simd: S,
         bell: &Bell,
         [x, y, z]: &[Weights<S>; 3],
-        samples: &impl Rows<S>,
+        unit: f32,
+        row: impl Fn(usize, usize) -> [Lanes<S>; 2],
     ) -> (Lanes<S>, [Lanes<S>; 3]) {
-        let none = Lanes::splat(simd, 0.0);
-        let (mut sum, mut sum_x, mut sum_y, mut sum_z) = (none, none, none, none);
-        for k in 0..4 {
-            let (mut slice, mut slice_x, mut slice_y) = (none, none, none);
-            for j in 0..4 {
-                let mut four = samples.four(simd, j, k);
-                if self.zero != 0.0 {
-                    four = four!(I => four[I] - self.zero);
-                }
-                let before = x.weights[0] * four[0];
-                let after = x.weights[2] * four[2];
-                let second = x.weights[3] * four[3];
-                let row = x.weights[1].mul_add(four[1], before) + (after + second);
-                slice = y.weights[j].mul_add(row, slice);
-                slice_x = y.weights[j].mul_add(after - before + second * 2.0, slice_x);
-                slice_y = (y.weights[j] * (j as f32 - 1.0)).mul_add(row, slice_y);
-            }
-            sum = z.weights[k].mul_add(slice, sum);
-            sum_x = z.weights[k].mul_add(slice_x, sum_x);
-            sum_y = z.weights[k].mul_add(slice_y, sum_y);
-            sum_z = (z.weights[k] * (k as f32 - 1.0)).mul_add(slice, sum_z);
-        }
+        let weights = four!(K => z.weights[K] * unit);
+        // Of each slice: its sum and the moments along x and y.
+        let slices = four!(K => {
+            let rows = four!(J => row(J, K));
+            let sums = four!(J => y.weights[J] * rows[J][0]);
+            let moment = y.weights[0].mul_add(rows[0][1], y.weights[1] * rows[1][1])
+                + y.weights[2].mul_add(rows[2][1], y.weights[3] * rows[3][1]);
+            [(sums[0] + sums[1]) + (sums[2] + sums[3]), moment, sums[3] * 2.0 + (sums[2] - sums[0])]
+        });
+        let [sum, sum_x, sum_y] = three!(I => {
+            weights[0].mul_add(slices[0][I], weights[1] * slices[1][I])
+                + weights[2].mul_add(slices[2][I], weights[3] * slices[3][I])
+        });
+        let sum_z = weights[3].mul_add(slices[3][0] * 2.0, weights[2] * slices[2][0]) - weights[0] * slices[0][0];
         let (moments, means) = ([sum_x, sum_y, sum_z], [x.moment, y.moment, z.moment]);
         (sum, three!(I => (moments[I] - means[I] * sum) * bell.per_variance))
     }
+}
+
+/// The weights of four samples that lie some further on than those of `weights`; others have none.
+#[inline(always)]
+fn moved<S: Simd>(simd: S, weights: [Lanes<S>; 4], by: Lanes<S>) -> Weights<S> {
+    let none = Lanes::splat(simd, 0.0);
+    let mut found = [none; 4];
+    for (to, own) in found.iter_mut().enumerate() {
+        for (from, weight) in weights.iter().enumerate() {
+            *own = by.simd_eq(from as f32 - to as f32).select(*weight, *own);
+        }
+    }
+    normalised(simd, found)
+}
+
+/// Weights that add up to 1.
+#[inline(always)]
+fn normalised<S: Simd>(simd: S, weights: [Lanes<S>; 4]) -> Weights<S> {
+    let inverse = Lanes::splat(simd, 1.0) / ((weights[0] + weights[1]) + (weights[2] + weights[3]));
+    Weights::new(four!(I => weights[I] * inverse))
 }
 
 impl Bell {
@@ -384,14 +348,12 @@ impl Bell {
 
     #[inline(always)]
     fn weights<S: Simd>(&self, simd: S, t: Lanes<S>) -> Weights<S> {
-        // Beside the weight of the sample before the place.
-        let q = exp(simd, t * self.per_variance);
-        let before = Lanes::splat(simd, self.near) / q;
-        let after = q * self.near;
-        let second = q * q * self.far;
-        let inverse = Lanes::splat(simd, 1.0) / (before + 1.0 + after + second);
-        let weights = [before * inverse, inverse, after * inverse, second * inverse];
-        Weights { weights, moment: weights[2] - weights[0] + weights[3] * 2.0 }
+        // All by the factor from the sample before the place to the place itself.
+        let q = exp2_within(simd, t * (self.per_variance * std::f32::consts::LOG2_E));
+        let after = q * q * self.near;
+        let second = q * (q * q * self.far);
+        let inverse = Lanes::splat(simd, 1.0) / (q + (after + self.near) + second);
+        Weights::new([inverse * self.near, q * inverse, after * inverse, second * inverse])
     }
 }
 
@@ -415,11 +377,9 @@ impl<T: Sample> Field<'_, T> {
             sides = Some(three!(I => seen[I].side));
         }
         let [x, y, z]: [Lanes<S>; 3] = three!(I => place[I] - first[I]);
-        let starts = offsets(self.dims, first);
-        let [nx, ny, _] = self.dims;
         // The rows of the near slice, then those of the far one, with their changes along x.
-        let slice = nx * ny;
-        let pairs = four!(I => T::two(simd, self.samples, &starts, (I % 2) * nx + (I / 2) * slice));
+        let window = self.window(first);
+        let pairs = four!(I => T::two(simd, &window, I % 2, I / 2));
         let rises = four!(I => pairs[I][1] - pairs[I][0]);
         let rows = four!(I => x.mul_add(rises[I], pairs[I][0] - self.zero));
         let along_x = [y.mul_add(rises[1] - rises[0], rises[0]), y.mul_add(rises[3] - rises[2], rises[2])];
@@ -439,11 +399,9 @@ impl<T: Sample> Field<'_, T> {
     #[inline(always)]
     fn cubic<S: Simd>(&self, simd: S, factors: &[[f32; 4]; 4], place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
         let first: [Lanes<S>; 3] = three!(I => place[I].floor());
-        let [nx, ny, _] = self.dims;
         if self.hold(first, [-1.0, 2.0]) {
             let taps: [Taps<S>; 3] = three!(I => Taps::new(simd, factors, place[I] - first[I]));
-            let places = offsets(self.dims, three!(I => first[I] - 1.0));
-            return self.tap_sums(simd, &taps, &Inside { samples: self.samples, places, row: nx, slice: nx * ny });
+            return self.tap_sums(simd, &taps, &self.window(three!(I => first[I] - 1.0)));
         }
         if self.dims.iter().any(|&count| count < 4) {
             return self.mirrored(simd, factors, place);
@@ -459,9 +417,7 @@ impl<T: Sample> Field<'_, T> {
             let start = is_high.select(seen[I].first - 2.0, seen[I].first - 1.0);
             is_low.select(seen[I].first, start)
         });
-        let places = offsets(self.dims, starts);
-        let samples = Inside { samples: self.samples, places, row: nx, slice: nx * ny };
-        let (value, slopes) = self.tap_sums(simd, &taps, &samples);
+        let (value, slopes) = self.tap_sums(simd, &taps, &self.window(starts));
         (value, three!(I => slopes[I] * seen[I].side))
     }
 
@@ -493,8 +449,7 @@ impl<T: Sample> Field<'_, T> {
             }
             Taps::new(simd, factors, place - first)
         });
-        let [nx, ny, _] = self.dims;
-        let samples = Border { samples: self.samples, taps: indices, row: nx, slice: nx * ny };
+        let samples = self.border(indices);
         let (value, slopes) = self.tap_sums(simd, &taps, &samples);
         (value, three!(I => slopes[I] * sides[I]))
     }
@@ -611,29 +566,44 @@ trait Rows<S: Simd> {
     fn four(&self, simd: S, row: usize, slice: usize) -> [Lanes<S>; 4];
 }
 
-/// Rows that lie in the lattice.
-struct Inside<'a, T> {
-    samples: &'a [T],
-    /// The first sample of each lane.
-    places: [usize; 8],
-    row: usize,
-    slice: usize,
-}
-
-impl<S: Simd, T: Sample> Rows<S> for Inside<'_, T> {
+impl<S: Simd, T: Sample> Rows<S> for Window<'_, T, 4> {
     #[inline(always)]
     fn four(&self, simd: S, row: usize, slice: usize) -> [Lanes<S>; 4] {
-        T::four(simd, self.samples, &self.places, slice * self.slice + row * self.row)
+        T::four(simd, self, row, slice)
     }
 }
 
-/// Rows that reach beyond the lattice: samples at its border stand for those outside.
+/// Samples at any indices: those at the lattice's border stand for those outside.
 struct Border<'a, T> {
     samples: &'a [T],
-    /// Along each axis, for each lane, the four indices.
+    /// Where each lane's samples count from.
+    starts: [usize; 8],
+    /// Along each axis, for each lane, the places of four samples.
     taps: [[[usize; 4]; 8]; 3],
     row: usize,
     slice: usize,
+}
+
+impl<T> Field<'_, T> {
+    /// The samples of four indices along each axis for each lane, the second one no further than two from the others.
+    fn border(&self, mut taps: [[[usize; 4]; 8]; 3]) -> Border<'_, T> {
+        let [nx, ny, _] = self.dims;
+        let mut starts = [0; 8];
+        let Memory::Slots(grid) = self.memory else {
+            return Border { samples: self.samples, starts, taps, row: nx, slice: nx * ny };
+        };
+        for (lane, start) in starts.iter_mut().enumerate() {
+            let mut number = 0;
+            for axis in (0..3).rev() {
+                let brick = taps[axis][lane][1] / SIDE;
+                number = number * grid.counts[axis] + brick;
+                taps[axis][lane] = taps[axis][lane].map(|tap| tap + BESIDE - brick * SIDE);
+            }
+            let slot = grid.slots[number];
+            *start = if slot == Grid::ABSENT { 0 } else { slot as usize * SLOT };
+        }
+        Border { samples: self.samples, starts, taps, row: SLOT_SIDE, slice: SLOT_SIDE * SLOT_SIDE }
+    }
 }
 
 impl<S: Simd, T: Sample> Rows<S> for Border<'_, T> {
@@ -643,7 +613,7 @@ impl<S: Simd, T: Sample> Rows<S> for Border<'_, T> {
         for lane in 0..8 {
             let start = self.taps[2][lane][slice] * self.slice + self.taps[1][lane][row] * self.row;
             for (own, x) in found.iter_mut().zip(self.taps[0][lane]) {
-                own[lane] = self.samples[start + x].value();
+                own[lane] = self.samples[self.starts[lane] + start + x].value();
             }
         }
         four!(I => found[I].simd_into(simd))

@@ -1,8 +1,10 @@
 //! The field of a lattice in a sheet, gathered: each ray asks which kernels reach the planes of the sheet.
 
 use super::{
-    close::{Face, Layer, Visible},
+    brick_cache::Grid,
+    close::{Face, Layer, OPAQUE, Visible},
     field::{self, Typed, Weighting},
+    march::is_marked,
     plan::Plan,
     rays::Rays,
     skip::Shown,
@@ -11,7 +13,7 @@ use super::{
 use crate::{
     math::{Kernel, Sheets},
     scene::{Gradient, Item, MOST_GATHERED, Mode, Optics, Scene, Settings},
-    volume::{Arrangement, Volume},
+    volume::{Arrangement, Volume, bricks::Choice},
 };
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
@@ -24,13 +26,18 @@ const LEAST_DEVIATION: f64 = 0.3;
 
 /// Why the field of a scene can't be gathered; none where it can: samples on a Cartesian lattice, kernels of which four weights
 /// an axis hold all, sheets thin enough for a parabola.
-pub fn obstacle(scene: &Scene, settings: &Settings, sheets: &Sheets) -> Option<&'static str> {
+pub fn obstacle(scene: &Scene, settings: &Settings, sheets: &Sheets, choice: Option<&Choice>) -> Option<&'static str> {
     let fields = scene.items.iter().filter(|item| !matches!(item, Item::Radiance(_) | Item::Hierarchy(_)));
-    let [Item::Volume(volume, kernel, _)] = fields.collect::<Vec<_>>()[..] else {
-        return Some("a scene without a volume on a lattice in memory");
+    let (unsuited, spacing) = match fields.collect::<Vec<_>>()[..] {
+        [Item::Volume(volume, kernel, _)] => (unsuited(volume, kernel), volume.lattice.least_kernel_spacing()),
+        [Item::Bricks(bricks, kernel, _)] => {
+            let coarser = choice.map_or(0.0, |choice| choice.lambda).exp2();
+            (unsuited_kernel(kernel), coarser * bricks.header().lattice.least_kernel_spacing())
+        }
+        _ => return Some("a scene without a volume on a lattice"),
     };
-    if let Some(what) = unsuited(volume, kernel) {
-        return Some(what);
+    if unsuited.is_some() {
+        return unsuited;
     }
     if settings.mode != Mode::Sheets || settings.classifies_samples() {
         return Some("samples that are classified before interpolation");
@@ -38,9 +45,8 @@ pub fn obstacle(scene: &Scene, settings: &Settings, sheets: &Sheets) -> Option<&
     if settings.gradient == Gradient::Central {
         return Some("gradients from neighbouring pixels");
     }
-    let most = MOST_GATHERED * volume.lattice.least_kernel_spacing();
     // With room for rounding: default sheets may be as thick as that.
-    (sheets.step > most * (1.0 + 1e-9)).then_some("sheets thicker than two samples")
+    (sheets.step > MOST_GATHERED * spacing * (1.0 + 1e-9)).then_some("sheets thicker than two samples")
 }
 
 /// Why a volume can't be gathered, whatever the settings.
@@ -51,6 +57,10 @@ pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
     if volume.coefficients.is_some() && kernel.as_tensor().is_none() {
         return Some("sharp volumes of radial kernels");
     }
+    unsuited_kernel(kernel)
+}
+
+fn unsuited_kernel(kernel: &Kernel) -> Option<&'static str> {
     match field::weighting(kernel) {
         None => Some("kernels other than tensor products and Gaussians that reach two samples"),
         Some(Weighting::Gaussian(sigma)) if sigma < LEAST_DEVIATION => Some("kernels much narrower than a sample"),
@@ -60,22 +70,65 @@ pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
 
 /// A lattice whose field is gathered.
 pub struct Gather<'a> {
-    pub field: Typed<'a>,
-    pub shown: &'a Shown,
+    /// One level; of volumes in bricks also two, finer first.
+    pub levels: Vec<Level<'a>>,
     /// Sheets are no thicker than the lattice's steps: all of one lies within half a step of its middle.
     pub is_thin: bool,
     pub visible: &'a Visible,
+    /// What values count from.
+    pub zero: f32,
 }
 
-/// The last plane that a packet asked for.
+/// A level of a lattice.
+pub struct Level<'a> {
+    pub field: Typed<'a>,
+    pub dims: [usize; 3],
+    /// Where its bricks are; none of a volume in memory.
+    pub grid: Option<&'a Grid>,
+    pub shown: &'a Shown,
+    /// Its share in the picture.
+    pub share: f32,
+    /// Steps of the level to each step of the lattice along each axis, and where the lattice's first sample is in it.
+    pub scale: [f32; 3],
+    pub shift: [f32; 3],
+}
+
+impl Level<'_> {
+    /// A place in steps of the level.
+    #[inline(always)]
+    fn place<S: Simd>(&self, place: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
+        three!(I => place[I] * self.scale[I] + self.shift[I])
+    }
+
+    /// The field at places in steps of the level, and its change a step along each axis.
+    #[inline(always)]
+    fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
+        // A function of its own for each type of samples, else each would be compiled wherever this one is called.
+        simd.vectorize(
+            #[inline(always)]
+            || match &self.field {
+                Typed::U8(field) => field.at(simd, place),
+                Typed::U16(field) => field.at(simd, place),
+                Typed::I16(field) => field.at(simd, place),
+                Typed::I32(field) => field.at(simd, place),
+                Typed::F32(field) => field.at(simd, place),
+            },
+        )
+    }
+}
+
+/// Sheets that are looked up at once.
+const LOOKED_UP: usize = 8;
+
+/// The last plane that a packet asked for, and what may show in the sheets ahead.
 #[derive(Clone, Copy)]
 pub struct Last<S: Simd> {
     plane: usize,
     face: Face<S>,
     along: Lanes<S>,
-    /// The last plane at which it was asked what may show, and the rays on which something may.
-    shown_on: usize,
-    shows: u64,
+    /// The first sheet of those looked up, and a bit for each ray on which something may show in a sheet.
+    first: usize,
+    shows: [u8; LOOKED_UP],
 }
 
 impl<S: Simd> Last<S> {
@@ -83,12 +136,13 @@ impl<S: Simd> Last<S> {
     pub fn new(simd: S) -> Self {
         let none = Lanes::splat(simd, 0.0);
         let face = Face { value: none, across: [none; 3] };
-        Self { plane: usize::MAX, face, along: none, shown_on: usize::MAX, shows: 0 }
+        Self { plane: usize::MAX, face, along: none, first: usize::MAX - LOOKED_UP, shows: [0; LOOKED_UP] }
     }
 }
 
 impl Gather<'_> {
     /// The field of a sheet and the rays on which it counts; nothing where it cannot be seen.
+    #[expect(clippy::too_many_arguments, reason = "the state of one packet's walk")]
     #[inline(always)]
     pub fn layer<S: Simd>(
         &self,
@@ -96,25 +150,21 @@ impl Gather<'_> {
         plan: &Plan,
         rays: &Rays<S>,
         sheet: usize,
+        marks: &[u64],
+        through: Lanes<S>,
         last: &mut Last<S>,
     ) -> Option<(Layer<S>, mask32x8<S>)> {
         let (start, stop) = (plan.planes[sheet], plan.planes[sheet + 1]);
         let begin = rays.inside[0].max(Lanes::splat(simd, start));
         let end = rays.inside[1].min(Lanes::splat(simd, stop));
-        let mask = begin.simd_lt(end);
+        let mask = begin.simd_lt(end) & through.simd_ge(OPAQUE);
         if !mask.any_true() {
             return None;
         }
-        let mut shows = self.shown.at(simd, rays.place(0.5 * (start + stop)));
-        if !self.is_thin {
-            // Thicker sheets are looked up on both planes too.
-            if last.shown_on != sheet {
-                last.shows = self.shown.at(simd, rays.place(start));
-            }
-            shows |= last.shows;
-            (last.shown_on, last.shows) = (sheet + 1, self.shown.at(simd, rays.place(stop)));
-            shows |= last.shows;
+        if !(last.first..last.first + LOOKED_UP).contains(&sheet) {
+            self.look_up(simd, plan, rays, sheet, marks, last);
         }
+        let shows = last.shows[sheet - last.first].into();
         let mask = mask & mask32x8::from_bitmask(simd, shows);
         if !mask.any_true() {
             return None;
@@ -146,20 +196,78 @@ impl Gather<'_> {
         Some((layer, mask))
     }
 
+    /// Looks up what may show in a sheet and the ones behind it: many at once, because looking takes longer than adding.
+    #[inline(always)]
+    fn look_up<S: Simd>(&self, simd: S, plan: &Plan, rays: &Rays<S>, first: usize, marks: &[u64], last: &mut Last<S>) {
+        last.first = first;
+        last.shows = [0; LOOKED_UP];
+        // What is found on the plane behind the sheet before.
+        let mut behind = None;
+        for (sheet, shows) in (first..=plan.sheets).zip(&mut last.shows) {
+            if !is_marked(marks, sheet) {
+                behind = None;
+                continue;
+            }
+            let (start, stop) = (plan.planes[sheet], plan.planes[sheet + 1]);
+            let mut found = self.shows(simd, rays.place(0.5 * (start + stop)));
+            if !self.is_thin {
+                // Thicker sheets are looked up on both planes too.
+                found |= behind.unwrap_or_else(
+                    #[inline(always)]
+                    || self.shows(simd, rays.place(start)),
+                );
+                let next = self.shows(simd, rays.place(stop));
+                found |= next;
+                behind = Some(next);
+            }
+            *shows = found as u8;
+        }
+    }
+
+    /// Where something may show around places in steps of the lattice, a bit for each lane.
+    #[inline(always)]
+    fn shows<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> u64 {
+        let mut shows = 0;
+        for level in &self.levels {
+            shows |= level.shown.at(simd, level.place(place));
+        }
+        shows
+    }
+
     /// The field at places in steps of the lattice, and its change a step along each axis.
     #[inline(always)]
     fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
-        // A function of its own for each type of samples, else each would be compiled wherever this one is called.
-        simd.vectorize(
-            #[inline(always)]
-            || match &self.field {
-                Typed::U8(field) => field.at(simd, place),
-                Typed::U16(field) => field.at(simd, place),
-                Typed::I16(field) => field.at(simd, place),
-                Typed::I32(field) => field.at(simd, place),
-                Typed::F32(field) => field.at(simd, place),
-            },
-        )
+        match &self.levels[..] {
+            [level] if level.grid.is_none() => level.at(simd, place),
+            levels => simd.vectorize(
+                #[inline(always)]
+                || self.mean(simd, levels, place),
+            ),
+        }
+    }
+
+    /// The mean of levels in bricks by their shares. A level has none where it has no brick; where no level has one, nothing
+    /// shows.
+    #[inline(always)]
+    fn mean<S: Simd>(&self, simd: S, levels: &[Level], place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
+        let none = Lanes::splat(simd, 0.0);
+        let (mut all, mut value, mut slopes, mut hidden) = (none, none, [none; 3], none);
+        for level in levels {
+            let Some(grid) = level.grid else { continue };
+            let place = level.place(place);
+            let (is_held, outside) = grid.held(simd, level.dims, place);
+            hidden = outside - self.zero;
+            if !is_held.any_true() {
+                continue;
+            }
+            let share = is_held.select(Lanes::splat(simd, level.share), none);
+            let (own, own_slopes) = level.at(simd, place);
+            all += share;
+            value = share.mul_add(own, value);
+            slopes = three!(I => (share * level.scale[I]).mul_add(own_slopes[I], slopes[I]));
+        }
+        let inverse = Lanes::splat(simd, 1.0) / all.max(Lanes::splat(simd, f32::MIN_POSITIVE));
+        (all.simd_gt(0.0).select(value * inverse, hidden), three!(I => slopes[I] * inverse))
     }
 
     /// Finds the field on a plane, and its change along the rays a world unit.

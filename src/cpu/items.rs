@@ -2,7 +2,7 @@
 
 use super::{
     bins::BATCH,
-    brick_cache::BrickCache,
+    brick_cache::{BESIDE, BrickCache, SLOT, SLOT_SIDE},
     footprint::{Candidate, Carried, Record, counted, origin, record, to_view, widened},
     page_cache::PageCache,
     plan::Plan,
@@ -16,7 +16,7 @@ use crate::{
     scene::{Item, Scene, Settings},
     splat::{Payload, Splat, SplatSet},
     volume::{
-        Arrangement, Lattice, Samples, Scalar, TransferFunction, Volume,
+        Arrangement, Lattice, Samples, TransferFunction, Volume,
         bricks::{BLOCK, BLOCKS, Choice, SIDE},
     },
 };
@@ -119,11 +119,7 @@ impl Prepared {
                 let own = |index: &u32| lattice.record(plan, *index as usize);
                 Ok(batches(list, spare, |batch, records| records.extend(batch.iter().filter_map(own))))
             }
-            Self::Bricks(cache) => {
-                let Some(choice) = choice else { return Ok(Vec::new()) };
-                cache.update(choice)?;
-                Ok(brick_records(plan, cache, choice))
-            }
+            Self::Bricks(cache) => Ok(choice.map_or_else(Vec::new, |choice| brick_records(plan, cache, choice))),
         }
     }
 }
@@ -205,14 +201,9 @@ impl<'a> LatticeSource<'a> {
     }
 
     fn value(&self, plan: &Plan, index: usize) -> f32 {
-        match (&self.volume.coefficients, &self.volume.samples) {
-            // 32 bits of a float do not hold the whole.
-            (None, Samples::I32(values)) => {
-                let low = values[index] & 0xffff;
-                let [zero, per_value, ..] = plan.frame.transfer;
-                ((((values[index] - low) as f32 - zero) + low as f32) * per_value).clamp(-1e30, 1e30)
-            }
-            _ => counted(plan, self.volume.drawn_value(index) as f32),
+        match &self.volume.coefficients {
+            Some(_) => counted(plan, self.volume.drawn_value(index) as f32),
+            None => sample(plan, &self.volume.samples, index),
         }
     }
 
@@ -305,10 +296,11 @@ fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Re
         .iter()
         .flat_map(|&(level, brick)| (0..SIDE / QUARTER).map(move |quarter| (level, brick, quarter)))
         .collect();
-    let scalar = cache.bricks.header().scalar;
+    let place_in_slot = |[x, y, z]: [usize; 3]| ((z + BESIDE) * SLOT_SIDE + y + BESIDE) * SLOT_SIDE + x + BESIDE;
     let batch = |&(level, brick, quarter): &(usize, u32, usize)| {
         let Some(part) = choice.levels.iter().position(|(own, _)| *own == level) else { return Vec::new() };
-        let Some(held) = cache.get(level, brick) else { return Vec::new() };
+        let Some(slot) = cache.slot(level, brick) else { return Vec::new() };
+        let blocks = cache.blocks(slot);
         let (source, weight) = (&sources[part], choice.levels[part].1 as f32);
         let (to_view, origin, covariance) = (to_view(source), origin(source), symmetric(&source.covariance));
         let dims = cache.bricks.level(level).dims;
@@ -319,7 +311,7 @@ fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Re
                 for x in 0..SIDE {
                     let within = [x, y, z];
                     let block = within.map(|at| at / BLOCK);
-                    let [low, high] = held.blocks[(block[2] * BLOCKS + block[1]) * BLOCKS + block[0]];
+                    let [low, high] = blocks[(block[2] * BLOCKS + block[1]) * BLOCKS + block[0]];
                     let is_inside = (0..3).all(|axis| first[axis] + within[axis] < dims[axis]);
                     if u16::from(high) < choice.shown[usize::from(low)] || !is_inside {
                         continue;
@@ -329,7 +321,7 @@ fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Re
                         center: origin + to_view * steps,
                         covariance,
                         extent: source.extent,
-                        strength: sample(plan, scalar, &held.samples, (z * SIDE + y) * SIDE + x),
+                        strength: sample(plan, cache.samples(), slot * SLOT + place_in_slot(within)),
                         carried: Carried::Scalar { weight, gradient: Vec3::ZERO },
                     };
                     records.extend(record(plan, source, &candidate));
@@ -341,21 +333,16 @@ fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Re
     batches.par_iter().map(batch).collect()
 }
 
-/// A sample of a brick, in entries of the transfer function's table.
-fn sample(plan: &Plan, scalar: Scalar, bytes: &[u8], index: usize) -> f32 {
-    let two = || [bytes[2 * index], bytes[2 * index + 1]];
-    let four = || [0, 1, 2, 3].map(|byte| bytes[4 * index + byte]);
-    match scalar {
-        Scalar::U8 => counted(plan, f32::from(bytes[index])),
-        Scalar::U16 => counted(plan, f32::from(u16::from_ne_bytes(two()))),
-        Scalar::I16 => counted(plan, f32::from(i16::from_ne_bytes(two()))),
-        Scalar::F32 => counted(plan, f32::from_ne_bytes(four())),
-        Scalar::I32 => {
-            let value = i32::from_ne_bytes(four());
-            let low = value & 0xffff;
+/// A sample in entries of the transfer function's table.
+fn sample(plan: &Plan, samples: &Samples, index: usize) -> f32 {
+    match samples {
+        // 32 bits of a float do not hold the whole.
+        Samples::I32(values) => {
+            let low = values[index] & 0xffff;
             let [zero, per_value, ..] = plan.frame.transfer;
-            ((((value - low) as f32 - zero) + low as f32) * per_value).clamp(-1e30, 1e30)
+            ((((values[index] - low) as f32 - zero) + low as f32) * per_value).clamp(-1e30, 1e30)
         }
+        samples => counted(plan, samples.value(index) as f32),
     }
 }
 

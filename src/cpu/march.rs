@@ -109,7 +109,7 @@ impl March<'_> {
                 open = WINDOW;
             }
             if sheet > 0 {
-                self.close(simd, sheet, is_marked(marks, sheet), packets, &mut sums, &mut last);
+                self.close(simd, sheet, marks, packets, &mut sums, &mut last);
                 let is_done = packets.iter().all(|packet| packet.is_done);
                 if is_done && self.plan.optics != Optics::Maximum {
                     return;
@@ -163,12 +163,13 @@ impl March<'_> {
         &self,
         simd: S,
         sheet: usize,
-        has_lattice: bool,
+        marks: &[u64],
         packets: &mut [Packet<S>; PACKETS],
         sums: &mut Sums<S>,
         last: &mut [Last<S>; PACKETS],
     ) {
         let plan = self.plan;
+        let has_lattice = is_marked(marks, sheet);
         let has_sums = plan.has_field && sums.has_field[sheet % WINDOW] != 0;
         let values = (plan.central && has_sums)
             .then(|| [sums.values_on(simd, plan, sheet), sums.values_on(simd, plan, sheet + 1)]);
@@ -179,7 +180,9 @@ impl March<'_> {
             let rays = &packet.rays;
             let radiance = sums.take_radiance(simd, plan, rays, sheet, number);
             let field = match &self.gather {
-                Some(gather) if has_lattice => gather.layer(simd, plan, rays, sheet, &mut last[number]),
+                Some(gather) if has_lattice => {
+                    gather.layer(simd, plan, rays, sheet, marks, packet.pixels.through, &mut last[number])
+                }
                 Some(_) => None,
                 None if has_sums => {
                     let slopes =
@@ -236,7 +239,7 @@ fn record_of(records: &[Vec<Record>], number: u32) -> &Record {
     &records[batch][own]
 }
 
-fn is_marked(marks: &[u64], sheet: usize) -> bool {
+pub fn is_marked(marks: &[u64], sheet: usize) -> bool {
     let bit = sheet - 1;
     marks.get(bit / 64).is_some_and(|word| word >> (bit % 64) & 1 != 0)
 }

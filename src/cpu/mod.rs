@@ -16,6 +16,7 @@
 //! | `rays` | the rays of eight pixels |
 //! | `scatter`, `sums` | adds splats to the open sheets |
 //! | `gather`, `field` | the field of a lattice at a place, and its gradient |
+//! | `window` | loads the samples around eight places |
 //! | `close` | classifies, lights and composites a sheet |
 //! | `vector` | functions of eight numbers at once |
 
@@ -36,6 +37,7 @@ mod scatter;
 pub(crate) mod skip;
 mod sums;
 mod vector;
+mod window;
 
 use crate::{
     Error, Result,
@@ -45,12 +47,13 @@ use crate::{
     picture::Picture,
     scene::{Evaluate, Item, Optics, Scene, Settings},
     volume::{
-        TransferFunction,
-        bricks::Choice,
+        Lattice, TransferFunction,
+        bricks::{Bricks, Choice},
         reach::{EVERYTHING, first_visible},
     },
 };
 use bins::{BLOCK, Bins, TileLists};
+use brick_cache::Grid;
 use close::{NO_VALUE, Visible};
 use fearless_simd::{Level, dispatch};
 use field::Typed;
@@ -75,6 +78,8 @@ pub struct CpuRenderer {
     ranges: Option<Vec<[u8; 2]>>,
     /// What shows of it, for the transfer function's table of that.
     shown: Option<([u16; 256], Shown)>,
+    /// The levels of a volume in bricks that is gathered, for the bricks of the last picture.
+    levels: Option<(Choice, Vec<(Grid, Shown)>)>,
     pace: Pace,
     level: Level,
     /// Memory that is used again.
@@ -122,6 +127,7 @@ impl CpuRenderer {
             prepared: scene.items.iter().map(Prepared::new).collect(),
             ranges: None,
             shown: None,
+            levels: None,
             pace: Pace::default(),
             level: Level::new(),
             spare: Spare::new(),
@@ -153,15 +159,18 @@ impl CpuRenderer {
         let outline = self.outline(&view, settings)?;
         let plan = Plan::new(&self.scene, &view, &outline.sheets, settings, outline.choice.as_ref());
         clock.step("plan");
-        let gathers = self.gathers(settings, &outline.sheets)?;
+        let gathers = self.gathers(settings, &outline)?;
         let before: u64 = self.brick_reads();
         let mut records = Vec::new();
         let mut spare = std::mem::take(&mut self.spare);
         for (item, prepared) in self.scene.items.iter().zip(&mut self.prepared) {
-            if !(gathers && matches!(item, Item::Volume(..))) {
-                let Outline { cut_pixels, choice, shown, .. } = &outline;
-                let (choice, spare) = (choice.as_ref(), &mut spare);
-                records.extend(prepared.records(&plan, settings, *cut_pixels, choice, shown, spare)?);
+            let Outline { cut_pixels, choice, shown, .. } = &outline;
+            let choice = choice.as_ref();
+            if let (Prepared::Bricks(cache), Some(choice)) = (&mut *prepared, choice) {
+                cache.update(choice, most_bricks(&cache.bricks, settings))?;
+            }
+            if !(gathers && matches!(item, Item::Volume(..) | Item::Bricks(..))) {
+                records.extend(prepared.records(&plan, settings, *cut_pixels, choice, shown, &mut spare)?);
             }
         }
         items::check_count(&records)?;
@@ -218,7 +227,11 @@ impl CpuRenderer {
         let pixels = if let Detail::Pixels(pixels) = detail { pixels } else { Detail::PIXELS };
         self.prepared.iter_mut().try_for_each(|prepared| prepared.update_levels(view, pixels))?;
         let bounds = self.scene.bounds();
-        let choice = self.scene.choice(view, settings, detail, usize::MAX, &bounds);
+        let most = self.scene.items.iter().find_map(|item| match item {
+            Item::Bricks(bricks, ..) => Some(most_bricks(bricks, settings)),
+            _ => None,
+        });
+        let choice = self.scene.choice(view, settings, detail, most.unwrap_or(usize::MAX), &bounds);
         let sheets = self.scene.sheets_of(view, settings, choice.as_ref(), &bounds);
         let mut shown = EVERYTHING;
         if let Some(Item::Volume(volume, _, transfer)) = self.scene.items.iter().find(|i| matches!(i, Item::Volume(..)))
@@ -230,20 +243,109 @@ impl CpuRenderer {
     }
 
     /// Whether the field of the scene's volume is gathered.
-    fn gathers(&self, settings: &Settings, sheets: &Sheets) -> Result<bool> {
+    fn gathers(&self, settings: &Settings, outline: &Outline) -> Result<bool> {
         if settings.evaluate == Evaluate::Scatter {
-            return Ok(false);
+            // Sections of tensor products are not known.
+            return self.scene.tensor().map_or(Ok(false), |tensor| {
+                let name = tensor.name();
+                Err(Error::Argument(format!(
+                    "the kernel {name} can't be scattered; gather instead, or leave it to the engine"
+                )))
+            });
         }
-        match gather::obstacle(&self.scene, settings, sheets) {
+        match gather::obstacle(&self.scene, settings, &outline.sheets, outline.choice.as_ref()) {
             Some(what) if settings.evaluate == Evaluate::Gather => {
                 Err(Error::Argument(format!("{what} can't be gathered; scatter instead, or leave it to the engine")))
             }
-            // Sections of tensor products are not known.
             Some(what) if let Some(tensor) = self.scene.tensor() => {
                 Err(Error::Argument(format!("the kernel {} does not draw {what}", tensor.name())))
             }
             obstacle => Ok(obstacle.is_none()),
         }
+    }
+
+    /// What shows of the field that is gathered.
+    fn prepare_gather(&mut self, plan: &Plan, outline: &Outline) {
+        for (item, prepared) in self.scene.items.iter().zip(&self.prepared) {
+            match (item, prepared, &outline.choice) {
+                (Item::Volume(volume, kernel, transfer), ..) => {
+                    let first = match plan.optics {
+                        Optics::Maximum => EVERYTHING,
+                        _ => first_visible(transfer, volume.range),
+                    };
+                    let ranges = self.ranges.get_or_insert_with(|| skip::field_ranges(volume, kernel));
+                    self.shown.take_if(|(own, _)| *own != first);
+                    self.shown.get_or_insert_with(|| (first, Shown::new(volume, ranges, &first)));
+                }
+                (_, Prepared::Bricks(cache), Some(choice))
+                    if self.levels.as_ref().is_none_or(|(own, _)| own != choice) =>
+                {
+                    let level = |(level, _): &(usize, f64)| {
+                        (Grid::new(cache, choice, *level), Shown::of_bricks(cache, choice, *level))
+                    };
+                    self.levels = Some((choice.clone(), choice.levels.iter().map(level).collect()));
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// The field that is gathered; none where none of its bricks shows.
+    fn gather<'a>(&'a self, plan: &Plan, outline: &Outline, visible: &'a Visible) -> Option<Gather<'a>> {
+        let zero = plan.tables.values[0];
+        let mut levels = Vec::new();
+        for (item, prepared) in self.scene.items.iter().zip(&self.prepared) {
+            match (item, prepared) {
+                (Item::Volume(volume, kernel, _), _) => {
+                    let (_, shown) = self.shown.as_ref()?;
+                    let field = Typed::new(volume, field::weighting(kernel)?, zero);
+                    let dims = volume.lattice.dims;
+                    levels.push(gather::Level {
+                        field,
+                        dims,
+                        grid: None,
+                        shown,
+                        share: 1.0,
+                        scale: [1.0; 3],
+                        shift: [0.0; 3],
+                    });
+                }
+                (Item::Bricks(bricks, kernel, _), Prepared::Bricks(cache)) if !cache.samples().is_empty() => {
+                    let (choice, found) = self.levels.as_ref()?;
+                    let fine = &bricks.header().lattice;
+                    for ((level, share), (grid, shown)) in choice.levels.iter().zip(found) {
+                        let (own, dims) = (bricks.lattice(*level), bricks.level(*level).dims);
+                        let field = Typed::of_bricks(cache.samples(), dims, grid, field::weighting(kernel)?, zero);
+                        let to_own = own.axes.inverse();
+                        let scale = (to_own * fine.axes).to_cols_array_2d();
+                        let shift = (to_own * (fine.origin - own.origin)).as_vec3().to_array();
+                        let scale = [0, 1, 2].map(|axis| scale[axis][axis] as f32);
+                        let share = *share as f32;
+                        levels.push(gather::Level { field, dims, grid: Some(grid), shown, share, scale, shift });
+                    }
+                }
+                _ => {}
+            }
+        }
+        let finest = levels.first()?.scale;
+        let is_thin = (0..3).all(|axis| {
+            let [x, y, z, _] = plan.frame.field_axes[axis];
+            let steps = f64::from(x * x + y * y + z * z).sqrt() * f64::from(finest[axis]);
+            steps * outline.sheets.step <= 1.0
+        });
+        Some(Gather { levels, is_thin, visible, zero: zero as f32 })
+    }
+
+    /// The lattices of the levels that are gathered.
+    fn lattices(&self, outline: &Outline) -> Vec<Lattice> {
+        let own = |item: &Item| match (item, &outline.choice) {
+            (Item::Volume(volume, ..), _) => Some(vec![volume.lattice.clone()]),
+            (Item::Bricks(bricks, ..), Some(choice)) => {
+                Some(choice.levels.iter().map(|(level, _)| bricks.lattice(*level)).collect())
+            }
+            _ => None,
+        };
+        self.scene.items.iter().find_map(own).unwrap_or_default()
     }
 
     fn draw(
@@ -254,36 +356,31 @@ impl CpuRenderer {
         gathers: bool,
         clock: &mut Clock,
     ) -> (Picture, FrameStats) {
+        let mut spare = std::mem::take(&mut self.spare_bins);
         let visible = Visible::new(plan);
         let mut marks = Vec::new();
         let mut gather = None;
         if gathers {
-            for item in &self.scene.items {
-                let Item::Volume(volume, kernel, transfer) = item else { continue };
-                let Some(weighting) = field::weighting(kernel) else { continue };
-                let first = match plan.optics {
-                    Optics::Maximum => EVERYTHING,
-                    _ => first_visible(transfer, volume.range),
-                };
-                let ranges = self.ranges.get_or_insert_with(|| skip::field_ranges(volume, kernel));
-                self.shown.take_if(|(own, _)| *own != first);
-                let (_, shown) = self.shown.get_or_insert_with(|| (first, Shown::new(volume, ranges, &first)));
-                let shown: &Shown = shown;
-                marks = shown.sheets_of_tiles(volume, plan.view, &outline.sheets);
-                let field = Typed::new(volume, weighting, plan.tables.values[0]);
-                let is_thin = plan
-                    .frame
-                    .field_axes
-                    .iter()
-                    .all(|[x, y, z, _]| f64::from(x * x + y * y + z * z).sqrt() * outline.sheets.step <= 1.0);
-                gather = Some(Gather { field, shown, is_thin, visible: &visible });
+            self.prepare_gather(plan, outline);
+            gather = self.gather(plan, outline, &visible);
+            clock.step("skip");
+        }
+        if let Some(gather) = &gather {
+            for (level, lattice) in gather.levels.iter().zip(self.lattices(outline)) {
+                let own = level.shown.sheets_of_tiles(&lattice, plan.view, &outline.sheets);
+                if marks.is_empty() {
+                    marks = own;
+                    continue;
+                }
+                for (tile, other) in marks.iter_mut().zip(own) {
+                    tile.iter_mut().zip(other).for_each(|(a, b)| *a |= b);
+                }
             }
             clock.step("skip");
         }
         let marked = |own: &Vec<u64>| own.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
         let gathered = marks.iter().map(marked).sum();
         let march = March { plan, gather, visible: &visible, records };
-        let mut spare = std::mem::take(&mut self.spare_bins);
         let mut bins = Bins::new(plan, records, &mut spare);
         clock.step("bin");
         let drawn = AtomicU64::new(0);
@@ -323,6 +420,11 @@ impl CpuRenderer {
 
 fn record_bytes(records: &[Vec<Record>]) -> u64 {
     records.iter().map(|batch| size_of_val(batch.as_slice()) as u64).sum()
+}
+
+/// Bricks that the settings' memory holds; one at least.
+fn most_bricks(bricks: &Bricks, settings: &Settings) -> usize {
+    usize::try_from(settings.page_memory / brick_cache::slot_bytes(bricks)).unwrap_or(usize::MAX).max(1)
 }
 
 /// The tiles of a block, row by row.

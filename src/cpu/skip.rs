@@ -1,28 +1,40 @@
 //! Which sheets may show something in which tiles: blocks of samples that show something, projected.
 
 use super::{
+    brick_cache::BrickCache,
     field::deviation,
     plan::TILE,
-    vector::{Lanes, three},
+    vector::{Lanes, three, words},
 };
 use crate::{
     math::{Bounds, Kernel, Sheets, View},
-    volume::{Volume, reach::neighbourhood_ranges},
+    volume::{
+        Lattice, Volume,
+        bricks::{self, BLOCKS, Choice},
+        reach::neighbourhood_ranges,
+    },
 };
-use fearless_simd::{Simd, i32x8, prelude::*};
+use fearless_simd::{Simd, i32x8, prelude::*, u32x8};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 /// Samples along each side of a block.
 const BLOCK: usize = 4;
 
-/// The samples of a volume around which something shows: for each block of 4 × 4 × 4 samples a word with a bit for each.
+/// The samples of a volume around which something shows: for each block of 4 × 4 × 4 samples two words with a bit for each. Of
+/// a level in bricks, bits stand for the blocks of samples whose ranges are known.
 #[derive(Debug)]
 pub struct Shown {
+    /// Samples along each axis.
     dims: [usize; 3],
+    /// Bits stand for cells of so many samples along each axis, 2 to the power of this.
+    coarse: u32,
     blocks: [usize; 3],
-    words: Vec<u64>,
+    words: Vec<[u32; 2]>,
 }
+
+/// The bits of 2 × 2 × 2 cells in a word.
+const QUARTER: u32 = 0x0033_0033;
 
 /// The widest Gaussian, in steps, of which that holds.
 const WIDEST: f64 = 0.6;
@@ -55,19 +67,45 @@ impl Shown {
         let word = |block: usize| {
             let at = [block % blocks[0], block / blocks[0] % blocks[1], block / blocks[0] / blocks[1]];
             let along = |axis: usize| at[axis] * BLOCK..((at[axis] + 1) * BLOCK).min(dims[axis]);
-            let mut word = 0;
+            let mut words = [0; 2];
             for z in along(2) {
                 for y in along(1) {
                     let row = &ranges[(z * dims[1] + y) * dims[0]..][along(0)];
                     for (x, range) in row.iter().enumerate() {
-                        word |= u64::from(shows(*range)) << bit_of([x, y, z]);
+                        let (half, bit) = bit_of([x, y, z]);
+                        words[half] |= u32::from(shows(*range)) << bit;
                     }
                 }
             }
-            word
+            words
         };
         let words = (0..blocks.iter().product::<usize>()).into_par_iter().map(word).collect();
-        Self { dims, blocks, words }
+        Self { dims, coarse: 0, blocks, words }
+    }
+
+    /// The blocks of a level of a volume in bricks, of those that a picture shows.
+    pub fn of_bricks(cache: &BrickCache, choice: &Choice, level: usize) -> Self {
+        let size = cache.bricks.level(level);
+        let coarse = bricks::BLOCK.ilog2();
+        let blocks = size.dims.map(|n| n.div_ceil(bricks::BLOCK).div_ceil(BLOCK));
+        let mut words = vec![[0; 2]; blocks.iter().product()];
+        for &(_, brick) in choice.bricks.iter().filter(|(own, _)| *own == level) {
+            let Some(slot) = cache.slot(level, brick) else { continue };
+            let first = size.place(brick).map(|at| at * BLOCKS);
+            for (number, [low, high]) in cache.blocks(slot).iter().enumerate() {
+                if u16::from(*high) < choice.shown[usize::from(*low)] {
+                    continue;
+                }
+                let own = [number % BLOCKS, number / BLOCKS % BLOCKS, number / (BLOCKS * BLOCKS)];
+                let cell = [0, 1, 2].map(|axis| first[axis] + own[axis]);
+                let [x, y, z] = cell.map(|at| at / BLOCK);
+                // Blocks wholly beyond the border show nothing.
+                let Some(words) = words.get_mut((z * blocks[1] + y) * blocks[0] + x) else { continue };
+                let (half, bit) = bit_of(cell);
+                words[half] |= 1 << bit;
+            }
+        }
+        Self { dims: size.dims, coarse, blocks, words }
     }
 
     /// Bytes of memory.
@@ -84,7 +122,8 @@ impl Shown {
             let own = (32 * word..count.min(32 * word + 32)).map(|sample| {
                 let at = [sample % nx, sample / nx % ny, sample / (nx * ny)];
                 let block = (at[2] / BLOCK * rows + at[1] / BLOCK) * columns + at[0] / BLOCK;
-                (self.words[block] >> bit_of(at) & 1) as u32
+                let (half, bit) = bit_of(at);
+                self.words[block][half] >> bit & 1
             });
             own.enumerate().fold(0, |word, (place, bit)| word | bit << place)
         };
@@ -96,30 +135,50 @@ impl Shown {
     pub fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> u64 {
         let [x, y, z]: [i32x8<S>; 3] = three!(I => {
             let last = Lanes::splat(simd, self.dims[I] as f32 - 1.0);
-            i32x8::truncate_from((place[I] + 0.5).max(Lanes::splat(simd, 0.0)).min(last))
+            i32x8::truncate_from((place[I] + 0.5).max(Lanes::splat(simd, 0.0)).min(last)) >> self.coarse
         });
         let [columns, rows, _] = self.blocks.map(|n| n as i32);
         let block = ((z >> 2) * rows + (y >> 2)) * columns + (x >> 2);
-        let bit = ((z & 3) << 4) | ((y & 3) << 2) | (x & 3);
-        let (blocks, bits): ([i32; 8], [i32; 8]) = (block.into(), bit.into());
-        let mut shows = 0;
-        for lane in 0..8 {
-            shows |= (self.words[blocks[lane] as usize] >> bits[lane] & 1) << lane;
-        }
-        shows
+        let halves: [i32; 8] = ((block << 1) | ((z >> 1) & 1)).into();
+        let all = self.words.as_flattened();
+        let words = words!(simd, L => all[halves[L] as usize]);
+        let bit = ((z & 1) << 4) | ((y & 3) << 2) | (x & 3);
+        let shows = (words >> bit.bitcast::<u32x8<S>>()) & 1;
+        shows.simd_eq(1).to_bitmask()
     }
 
     /// For each tile, row by row, the sheets in which it may show something, as bits.
-    pub fn sheets_of_tiles(&self, volume: &Volume, view: &View, sheets: &Sheets) -> Vec<Vec<u64>> {
+    pub fn sheets_of_tiles(&self, lattice: &Lattice, view: &View, sheets: &Sheets) -> Vec<Vec<u64>> {
         let tiles = view.size.map(|side| (side as usize).div_ceil(TILE));
         let words = sheets.count().div_ceil(64);
         let [columns, rows, layers] = self.blocks;
         let slice = |layer: usize| {
             let mut own = vec![0u64; tiles[0] * tiles[1] * words];
             for block in 0..columns * rows {
-                if self.words[layer * columns * rows + block] != 0 {
-                    let at = [block % columns, block / columns, layer];
-                    self.mark(volume, view, sheets, at, &mut own);
+                let words = self.words[layer * columns * rows + block];
+                let place = [block % columns, block / columns, layer].map(|at| at * BLOCK);
+                if self.coarse == 0 {
+                    if words != [0; 2] {
+                        self.mark(lattice, view, sheets, place, BLOCK, &mut own);
+                    }
+                    continue;
+                }
+                // Cells of many samples: eight at a time.
+                for (half, word) in words.iter().enumerate() {
+                    for quarter in 0..4 {
+                        let [x, y] = [quarter % 2 * 2, quarter / 2 * 2];
+                        if word >> (x + BLOCK * y) & QUARTER != 0 {
+                            let at = [place[0] + x, place[1] + y, place[2] + 2 * half];
+                            self.mark(
+                                lattice,
+                                view,
+                                sheets,
+                                at.map(|at| at << self.coarse),
+                                2 << self.coarse,
+                                &mut own,
+                            );
+                        }
+                    }
                 }
             }
             own
@@ -137,13 +196,13 @@ impl Shown {
         all.reduce(none, join).chunks(words.max(1)).map(<[u64]>::to_vec).collect()
     }
 
-    /// Marks the tiles and sheets that a block may lie in.
-    fn mark(&self, volume: &Volume, view: &View, sheets: &Sheets, at: [usize; 3], marks: &mut [u64]) {
-        let low = DVec3::from_array(at.map(|n| (n * BLOCK) as f64 - 0.5));
-        let end = |axis: usize| ((at[axis] + 1) * BLOCK).min(self.dims[axis]) as f64 - 0.5;
+    /// Marks the tiles and sheets that a cube of samples may lie in, from one on and so many along each axis.
+    fn mark(&self, lattice: &Lattice, view: &View, sheets: &Sheets, first: [usize; 3], side: usize, marks: &mut [u64]) {
+        let low = DVec3::from_array(first.map(|n| n as f64 - 0.5));
+        let end = |axis: usize| (first[axis] + side).min(self.dims[axis]) as f64 - 0.5;
         let high = DVec3::new(end(0), end(1), end(2));
-        let half = volume.lattice.axes * DMat3::from_diagonal(0.5 * (high - low));
-        let center = view.to_view(volume.lattice.position(0.5 * (low + high)));
+        let half = lattice.axes * DMat3::from_diagonal(0.5 * (high - low));
+        let center = view.to_view(lattice.position(0.5 * (low + high)));
         let half = view.rotation * half;
         let reach = half.x_axis.abs() + half.y_axis.abs() + half.z_axis.abs();
         let tiles = view.size.map(|side| side.div_ceil(TILE as u32) as usize);
@@ -187,9 +246,9 @@ impl Shown {
     }
 }
 
-/// The bit of a sample in the word of its block.
-fn bit_of([x, y, z]: [usize; 3]) -> usize {
-    (z % BLOCK * BLOCK + y % BLOCK) * BLOCK + x % BLOCK
+/// Which word of its block a sample is in, and its bit there.
+fn bit_of([x, y, z]: [usize; 3]) -> (usize, usize) {
+    (z / 2 % 2, (z % 2 * BLOCK + y % BLOCK) * BLOCK + x % BLOCK)
 }
 
 #[cfg(test)]

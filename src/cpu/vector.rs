@@ -24,7 +24,15 @@ macro_rules! four {
         $crate::cpu::vector::each!([0, 1, 2, 3], $index => $value)
     };
 }
-pub(super) use {each, four, three};
+/// A vector of 32-bit words, an expression for each lane.
+macro_rules! words {
+    ($simd:expr, $lane:ident => $word:expr) => {{
+        let words: [u32; 8] = $crate::cpu::vector::each!([0, 1, 2, 3, 4, 5, 6, 7], $lane => $word);
+        let words: fearless_simd::u32x8<S> = fearless_simd::SimdInto::simd_into(words, $simd);
+        words
+    }};
+}
+pub(super) use {each, four, three, words};
 
 /// Eight numbers.
 pub type Lanes<S> = f32x8<S>;
@@ -32,7 +40,12 @@ pub type Lanes<S> = f32x8<S>;
 /// 2 to the power x, within 4·10⁻⁷ of it, for x from −126 to 126; beyond as at these ends.
 #[inline(always)]
 pub fn exp2<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
-    let x = x.max(Lanes::splat(simd, -126.0)).min(Lanes::splat(simd, 126.0));
+    exp2_within(simd, x.max(Lanes::splat(simd, -126.0)).min(Lanes::splat(simd, 126.0)))
+}
+
+/// 2 to the power x, for x from −126 to 126 alone.
+#[inline(always)]
+pub fn exp2_within<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
     let whole = (x + 0.5).floor();
     let part = x - whole;
     // The Taylor series of 2^part for |part| ≤ ½.
@@ -64,6 +77,25 @@ pub fn log2<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
         sum = sum.mul_add(z2, Lanes::splat(simd, term));
     }
     exponent + z * sum * std::f32::consts::LOG2_E
+}
+
+/// x to a power, x from 10⁻⁶ to 1 and the power no less than 0.
+#[inline(always)]
+pub fn power<S: Simd>(simd: S, x: Lanes<S>, power: f32) -> Lanes<S> {
+    const MOST: f32 = 255.0;
+    if power.fract() != 0.0 || power > MOST {
+        return exp2(simd, log2(simd, x) * power);
+    }
+    // The product of x to the powers of 2 that the power is the sum of.
+    let (mut rest, mut square, mut product) = (power as u32, x, Lanes::splat(simd, 1.0));
+    while rest > 0 {
+        if rest & 1 != 0 {
+            product *= square;
+        }
+        square *= square;
+        rest >>= 1;
+    }
+    product
 }
 
 /// The product of the parts of two vectors, summed.

@@ -38,11 +38,12 @@ const TAIL_BYTES: u64 = 64 << 20;
 
 /// Why the engine cannot gather a scene's field in these settings; none where it can.
 pub fn obstacle(scene: &Scene, settings: &Settings, sheets: &Sheets, gpu: &Gpu) -> Option<&'static str> {
-    if let Some(what) = crate::cpu::gather::obstacle(scene, settings, sheets) {
+    if let Some(what) = crate::cpu::gather::obstacle(scene, settings, sheets, None) {
         return Some(what);
     }
     let volume =
-        scene.items.iter().find_map(|item| if let Item::Volume(volume, ..) = item { Some(volume) } else { None })?;
+        scene.items.iter().find_map(|item| if let Item::Volume(volume, ..) = item { Some(volume) } else { None });
+    let Some(volume) = volume else { return Some("volumes in bricks") };
     let limits = gpu.device.limits();
     if texture_size(volume, kind_of(volume.samples.scalar()))
         .iter()
@@ -230,7 +231,7 @@ impl Field {
         let (_, shown) = self.shown.as_ref()?;
         // Shaders number sheets from 1.
         let words = (sheets.count() + 1).div_ceil(32);
-        let marks = shown.sheets_of_tiles(&self.volume, view, sheets);
+        let marks = shown.sheets_of_tiles(&self.volume.lattice, view, sheets);
         let mut tail = visible_before(variant, table, frame);
         let bits = self.volume.lattice.len().div_ceil(32);
         let starts = [bits, bits + tail.len(), bits + tail.len() + marks.len() * words];

@@ -10,7 +10,8 @@ use crate::{
     render::milliseconds,
     samples::Samples,
     scene::SceneFlags,
-    suite::SuiteFlags,
+    suite::{SuiteFlags, effort::EffortFlags},
+    sweep::SweepFlags,
     timing::{self, Times},
 };
 use clap::Args;
@@ -24,16 +25,20 @@ pub const STEP: f64 = 5.0;
 const FRAMES: u32 = 10;
 
 #[derive(Args, Debug)]
-// The suite brings its own scenes.
-#[command(mut_arg("inputs", |inputs| inputs.required(false).required_unless_present("suite")))]
+// The suite and the sweep bring their own scenes.
+#[command(mut_arg("inputs", |inputs| inputs.required(false).required_unless_present_any(["suite", "sweep"])))]
 pub struct Bench {
     #[command(flatten)]
     scene: SceneFlags,
-    /// Frames that are measured, after a first one that is not [default: 10; 5 of each case of the suite]
+    /// Frames that are measured, after a first one that is not [default: 10; 5 of each case of the suite, as many of each step of the sweep as --effort says]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     frames: Option<u32>,
     #[command(flatten)]
     suite: SuiteFlags,
+    #[command(flatten)]
+    sweep: SweepFlags,
+    #[command(flatten)]
+    effort: EffortFlags,
     #[command(flatten)]
     camera: CameraFlags,
     #[command(flatten)]
@@ -46,7 +51,10 @@ pub struct Bench {
 impl Bench {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
         if self.suite.suite {
-            return self.suite.run(&self.engine, self.frames, self.json, progress);
+            return self.suite.run(&self.engine, &self.effort, self.frames, self.json, progress);
+        }
+        if self.sweep.sweep {
+            return self.sweep.run(&self.engine, &self.effort, self.frames, self.json, progress);
         }
         self.engine.check()?;
         let frames = self.frames.unwrap_or(FRAMES);

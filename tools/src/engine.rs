@@ -162,6 +162,15 @@ impl EngineFlags {
         self.clip.check()
     }
 
+    /// How a volume's field is summed up.
+    pub fn evaluate(&self) -> scene::Evaluate {
+        match self.evaluate {
+            Evaluate::Auto => scene::Evaluate::Auto,
+            Evaluate::Gather => scene::Evaluate::Gather,
+            Evaluate::Scatter => scene::Evaluate::Scatter,
+        }
+    }
+
     /// The settings of a picture before it is averaged down; those that do not go with the scene are an error.
     pub fn settings(&self, loaded: &Loaded, samples: Samples) -> splatkit::Result<Settings> {
         let factor = samples.factor(self.size, loaded.scene.has_splats());
@@ -176,11 +185,7 @@ impl EngineFlags {
             Gradient::Analytic => scene::Gradient::Analytic,
             Gradient::Central => scene::Gradient::Central,
         };
-        settings.evaluate = match self.evaluate {
-            Evaluate::Auto => scene::Evaluate::Auto,
-            Evaluate::Gather => scene::Evaluate::Gather,
-            Evaluate::Scatter => scene::Evaluate::Scatter,
-        };
+        settings.evaluate = self.evaluate();
         if self.no_shade {
             settings.volume_shade = Some(None);
             settings.surface_shade = None;

@@ -26,7 +26,7 @@ pub enum Failure {
     Threads(String),
     /// A file that `check` found damaged; what is wrong has been told.
     Damaged { file: PathBuf, findings: usize },
-    /// Cases of a suite that were not measured, each told with its reason, and the file that therefore was not written.
+    /// Cases of a suite or a sweep that were not measured, each told with its reason, and the file that therefore was not written.
     Incomplete { failed: usize, kept: Option<PathBuf> },
     /// Pictures that differ by more than the user allows.
     Comparison(String),
@@ -170,7 +170,7 @@ impl fmt::Display for Failure {
             Self::Threads(reason) => write!(out, "no threads can be started: {reason}"),
             Self::Damaged { file, findings } => write!(out, "{}: {findings} findings", file.display()),
             Self::Incomplete { failed, kept } => {
-                write!(out, "{failed} of the suite's cases could not be drawn")?;
+                write!(out, "{failed} of the cases could not be drawn")?;
                 kept.iter().try_for_each(|file| write!(out, "; {} is as it was", file.display()))
             }
             Self::Output { file, message, .. } => write!(out, "{}: {message}", file.display()),

@@ -32,6 +32,7 @@ mod scan;
 mod scene;
 mod show;
 mod suite;
+mod sweep;
 mod terminal;
 mod threads;
 mod timing;

@@ -42,16 +42,31 @@ pub fn outcomes(plans: Vec<Plan>, device: &mut Device, counts: Counts, progress:
     let mut outcomes = Vec::new();
     for plan in plans {
         let outcome = outcome(plan, device, counts, progress);
-        // On a lost device all later cases would fail too. Where it does not open, the next one tells of it and tries again.
-        if matches!(outcome.result, Err(Error::DeviceLost(_)))
-            && let Device::Gpu(gpu, _) = device
-            && let Ok(anew) = gpu.reopened()
-        {
-            *gpu = anew;
+        if let Err(error) = &outcome.result {
+            reopen(device, error);
         }
         outcomes.push(outcome);
     }
     outcomes
+}
+
+/// Opens a device anew that an error tells to be lost: all later cases would fail too. Where it does not open, the next one tells
+/// of it and tries again.
+pub fn reopen(device: &mut Device, error: &Error) {
+    if matches!(error, Error::DeviceLost(_))
+        && let Device::Gpu(gpu, _) = device
+        && let Ok(anew) = gpu.reopened()
+    {
+        *gpu = anew;
+    }
+}
+
+/// Refuses a picture that takes nothing of a scene.
+pub fn require_content(stats: &FrameStats) -> Result<()> {
+    if stats.splats == 0 && stats.gathered == 0 {
+        return Err(Error::NothingToDraw("the camera sees no splat that has opacity".into()));
+    }
+    Ok(())
 }
 
 /// Makes the scene of a plan, draws it and lets it go.
@@ -71,9 +86,7 @@ fn measure(case: Case, device: &Device, counts: Counts) -> Result<Measured> {
     let mut renderer = Renderer::new(device, &case.scene)?;
     let settings = &case.settings;
     let stats = renderer.draw(&case.camera(0.0), settings)?;
-    if stats.splats == 0 && stats.gathered == 0 {
-        return Err(Error::NothingToDraw("the camera sees no splat that has opacity".into()));
-    }
+    require_content(&stats)?;
     let mut times = Vec::new();
     for frame in 1..=counts.frames {
         let camera = case.camera(STEP * f64::from(frame));

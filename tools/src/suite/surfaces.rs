@@ -46,7 +46,7 @@ pub fn model(points: u32, size: u32) -> Result<Case> {
 }
 
 /// A knot whose triangles are about as long as they are wide: it is twelve times as long as around.
-fn knot(points: u32) -> Mesh {
+pub fn knot(points: u32) -> Mesh {
     let around = f64::from(points / 12).sqrt().round() as u32;
     Mesh::knot(12 * around, around)
 }

@@ -1,0 +1,334 @@
+//! The samples around eight places, four along each axis, loaded as vectors; or two along each axis.
+
+use super::vector::{Lanes, each, four, words};
+use fearless_simd::{Simd, f32x4, i16x16, i32x8, prelude::*, u32x8};
+
+/// Where `N` samples along each axis around eight places lie in memory.
+pub struct Window<'a, T, const N: usize> {
+    samples: &'a [T],
+    /// The first sample of each lane.
+    places: [usize; 8],
+    /// Samples from one row to the next, and from one slice to the next.
+    row: usize,
+    slice: usize,
+}
+
+impl<'a, T: Copy, const N: usize> Window<'a, T, N> {
+    /// # Panics
+    /// Where a window leaves the samples.
+    #[inline(always)]
+    pub fn new(samples: &'a [T], places: [usize; 8], row: usize, slice: usize) -> Self {
+        let room = samples.len().checked_sub((N - 1) * (row + slice) + N);
+        let is_inside = room.is_some_and(|room| {
+            let ends = each!([0, 1, 2, 3, 4, 5, 6, 7], I => places[I] > room);
+            ends == [false; 8]
+        });
+        assert!(is_inside, "a window beyond the samples");
+        Self { samples, places, row, slice }
+    }
+
+    /// A row of a slice of a lane.
+    #[inline(always)]
+    #[expect(unsafe_code, reason = "eight checks for a window, instead of two for each of its 128 rows: twice as fast")]
+    fn row(&self, lane: usize, row: usize, slice: usize) -> [T; N] {
+        assert!(row < N && slice < N, "a row of no window");
+        let place = self.places[lane] + row * self.row + slice * self.slice;
+        // SAFETY: `new` found that the last row of the last slice ends in the samples; others end before it.
+        unsafe { self.samples.as_ptr().add(place).cast::<[T; N]>().read_unaligned() }
+    }
+}
+
+/// Four weights of an axis, which add up to 1, and their first moment.
+pub struct Weights<S: Simd> {
+    pub weights: [Lanes<S>; 4],
+    pub moment: Lanes<S>,
+}
+
+impl<S: Simd> Weights<S> {
+    /// The moment of weights: the samples count −1, 0, 1 and 2.
+    #[inline(always)]
+    pub fn new(weights: [Lanes<S>; 4]) -> Self {
+        Self { weights, moment: weights[2] - weights[0] + weights[3] * 2.0 }
+    }
+}
+
+/// What samples are, as vectors of them are loaded.
+pub trait Sample: Copy + Send + Sync {
+    /// The weights of four samples in a row and those of its first moment, as [`Sample::row`] takes them.
+    type Row<S: Simd>: Copy;
+    /// What the sums of rows are to be multiplied by.
+    const UNIT: f32;
+    /// Where small integers count from, whose sums are so exact that any other zero may be taken off afterwards. Of other
+    /// samples it is taken off each.
+    const ZERO: Option<f32>;
+
+    /// Weights for rows. Rounds them where rows take rounded ones.
+    fn weigh<S: Simd>(simd: S, weights: &mut Weights<S>) -> Self::Row<S>;
+
+    /// The weighted sum of a row of a slice and its first moment, to be multiplied by [`Sample::UNIT`]. Values count from
+    /// [`Sample::ZERO`], else from `zero`.
+    fn row<S: Simd>(
+        simd: S,
+        window: &Window<Self, 4>,
+        row: usize,
+        slice: usize,
+        weights: &Self::Row<S>,
+        zero: f32,
+    ) -> [Lanes<S>; 2];
+
+    /// The samples of a row of a slice.
+    fn four<S: Simd>(simd: S, window: &Window<Self, 4>, row: usize, slice: usize) -> [Lanes<S>; 4];
+
+    /// The same of a smaller window.
+    fn two<S: Simd>(simd: S, window: &Window<Self, 2>, row: usize, slice: usize) -> [Lanes<S>; 2];
+
+    fn value(self) -> f32;
+}
+
+/// The weighted sum of four samples and its first moment.
+#[inline(always)]
+pub fn row_of<S: Simd>(weights: &[Lanes<S>; 4], mut four: [Lanes<S>; 4], zero: f32) -> [Lanes<S>; 2] {
+    if zero != 0.0 {
+        four = four!(I => four[I] - zero);
+    }
+    let before = weights[0] * four[0];
+    let after = weights[2] * four[2];
+    let second = weights[3] * four[3];
+    [weights[1].mul_add(four[1], before) + (after + second), after - before + second * 2.0]
+}
+
+/// Weights of small integers are multiples of 1/16384: two products of 16 bits fit 32.
+const PARTS: f32 = 16384.0;
+
+/// Weights of two pairs of samples for each lane, and those of the first moment.
+#[derive(Clone, Copy)]
+pub struct Pairs<S: Simd> {
+    value: [i16x16<S>; 2],
+    moment: [i16x16<S>; 2],
+}
+
+impl<S: Simd> Pairs<S> {
+    /// Rounds weights so that they still add up to 1. `order` tells which samples are the pairs.
+    #[inline(always)]
+    fn new(simd: S, weights: &mut Weights<S>, order: [usize; 4]) -> Self {
+        let [before, _, after, second] = four!(I => i32x8::<S>::truncate_from(weights.weights[I] * PARTS + 0.5));
+        let none = i32x8::splat(simd, 0);
+        let values = [before, none + PARTS as i32 - before - after - second, after, second];
+        let moments = [none - before, none, after, second + second];
+        weights.moment = Lanes::float_from(moments[0] + moments[2] + moments[3]) * (1.0 / PARTS);
+        let pair = each!([0, 1], I => [values, moments][I]);
+        let [value, moment] = each!([0, 1], I => {
+            let own = pair[I];
+            each!([0, 2], K => ((own[order[K]] & 0xffff) | (own[order[K + 1]] << 16)).bitcast::<i16x16<S>>())
+        });
+        Self { value, moment }
+    }
+
+    /// The sums of two pairs of samples for each lane.
+    #[inline(always)]
+    fn sums(&self, pairs: [u32x8<S>; 2]) -> [Lanes<S>; 2] {
+        let [a, b] = each!([0, 1], I => pairs[I].bitcast::<i16x16<S>>());
+        let value = a.pairwise_dot_product(self.value[0]) + b.pairwise_dot_product(self.value[1]);
+        let moment = a.pairwise_dot_product(self.moment[0]) + b.pairwise_dot_product(self.moment[1]);
+        [Lanes::float_from(value), Lanes::float_from(moment)]
+    }
+}
+
+impl Sample for u8 {
+    type Row<S: Simd> = Pairs<S>;
+    const UNIT: f32 = 1.0 / PARTS;
+    const ZERO: Option<f32> = Some(0.0);
+
+    #[inline(always)]
+    fn weigh<S: Simd>(simd: S, weights: &mut Weights<S>) -> Pairs<S> {
+        Pairs::new(simd, weights, [0, 2, 1, 3])
+    }
+
+    #[inline(always)]
+    fn row<S: Simd>(
+        simd: S,
+        window: &Window<Self, 4>,
+        row: usize,
+        slice: usize,
+        weights: &Pairs<S>,
+        _: f32,
+    ) -> [Lanes<S>; 2] {
+        let words = words!(simd, L => u32::from_le_bytes(window.row(L, row, slice)));
+        weights.sums([words & 0x00ff_00ff, (words >> 8) & 0x00ff_00ff])
+    }
+
+    #[inline(always)]
+    fn four<S: Simd>(simd: S, window: &Window<Self, 4>, row: usize, slice: usize) -> [Lanes<S>; 4] {
+        let words = words!(simd, L => u32::from_le_bytes(window.row(L, row, slice)));
+        four!(I => Lanes::float_from(((words >> (8 * I as u32)) & 0xff).bitcast::<i32x8<S>>()))
+    }
+
+    #[inline(always)]
+    fn two<S: Simd>(simd: S, window: &Window<Self, 2>, row: usize, slice: usize) -> [Lanes<S>; 2] {
+        let words = words!(simd, L => u32::from(u16::from_le_bytes(window.row(L, row, slice))));
+        [Lanes::float_from((words & 0xff).bitcast::<i32x8<S>>()), Lanes::float_from((words >> 8).bitcast::<i32x8<S>>())]
+    }
+
+    #[inline(always)]
+    fn value(self) -> f32 {
+        f32::from(self)
+    }
+}
+
+/// Samples of two bytes, two in a word. Bits are turned so that they count as signed numbers from
+/// `$zero`; then is told how the first and the second of a word become 32-bit integers.
+macro_rules! two_bytes {
+    ($sample:ty, $turned:expr, $zero:expr, $word:ident => $first:expr, $second:expr) => {
+        impl Sample for $sample {
+            type Row<S: Simd> = Pairs<S>;
+            const UNIT: f32 = 1.0 / PARTS;
+            const ZERO: Option<f32> = Some($zero);
+
+            #[inline(always)]
+            fn weigh<S: Simd>(simd: S, weights: &mut Weights<S>) -> Pairs<S> {
+                Pairs::new(simd, weights, [0, 1, 2, 3])
+            }
+
+            #[inline(always)]
+            fn row<S: Simd>(
+                simd: S,
+                window: &Window<Self, 4>,
+                row: usize,
+                slice: usize,
+                weights: &Pairs<S>,
+                _: f32,
+            ) -> [Lanes<S>; 2] {
+                let a = words!(simd, L => in_word(window.row(L, row, slice), 0));
+                let b = words!(simd, L => in_word(window.row(L, row, slice), 2));
+                let turned: u32 = $turned;
+                weights.sums([a ^ turned, b ^ turned])
+            }
+
+            #[inline(always)]
+            fn four<S: Simd>(simd: S, window: &Window<Self, 4>, row: usize, slice: usize) -> [Lanes<S>; 4] {
+                let [a, b] = each!([0, 2], I => {
+                    let $word = words!(simd, L => in_word(window.row(L, row, slice), I));
+                    [Lanes::float_from($first), Lanes::float_from($second)]
+                });
+                [a[0], a[1], b[0], b[1]]
+            }
+
+            #[inline(always)]
+            fn two<S: Simd>(simd: S, window: &Window<Self, 2>, row: usize, slice: usize) -> [Lanes<S>; 2] {
+                let $word = words!(simd, L => in_word(window.row(L, row, slice), 0));
+                [Lanes::float_from($first), Lanes::float_from($second)]
+            }
+
+            #[inline(always)]
+            fn value(self) -> f32 {
+                f32::from(self)
+            }
+        }
+    };
+}
+two_bytes!(u16, 0x8000_8000, 32768.0, word => (word & 0xffff).bitcast::<i32x8<S>>(), (word >> 16).bitcast::<i32x8<S>>());
+two_bytes!(i16, 0, 0.0, word => (word << 16).bitcast::<i32x8<S>>() >> 16, word.bitcast::<i32x8<S>>() >> 16);
+
+/// Two successive samples in a word.
+#[inline(always)]
+fn in_word<T: Into<i32> + Copy, const N: usize>(samples: [T; N], first: usize) -> u32 {
+    let (low, high): (i32, i32) = (samples[first].into(), samples[first + 1].into());
+    low as u32 & 0xffff | (high as u32) << 16
+}
+
+/// Rows of samples that become 32-bit floats one by one.
+macro_rules! rows_of_floats {
+    () => {
+        type Row<S: Simd> = [Lanes<S>; 4];
+        const UNIT: f32 = 1.0;
+        const ZERO: Option<f32> = None;
+
+        #[inline(always)]
+        fn weigh<S: Simd>(_: S, weights: &mut Weights<S>) -> [Lanes<S>; 4] {
+            weights.weights
+        }
+
+        #[inline(always)]
+        fn row<S: Simd>(
+            simd: S,
+            window: &Window<Self, 4>,
+            row: usize,
+            slice: usize,
+            weights: &[Lanes<S>; 4],
+            zero: f32,
+        ) -> [Lanes<S>; 2] {
+            row_of(weights, Self::four(simd, window, row, slice), zero)
+        }
+    };
+}
+
+impl Sample for i32 {
+    rows_of_floats!();
+
+    #[inline(always)]
+    fn four<S: Simd>(simd: S, window: &Window<Self, 4>, row: usize, slice: usize) -> [Lanes<S>; 4] {
+        columns(
+            simd,
+            each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
+                let own = window.row(L, row, slice);
+                four!(I => own[I] as f32)
+            }),
+        )
+    }
+
+    #[inline(always)]
+    fn two<S: Simd>(simd: S, window: &Window<Self, 2>, row: usize, slice: usize) -> [Lanes<S>; 2] {
+        pairs(
+            simd,
+            each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
+                let own = window.row(L, row, slice);
+                [own[0] as f32, own[1] as f32]
+            }),
+        )
+    }
+
+    #[inline(always)]
+    fn value(self) -> f32 {
+        self as f32
+    }
+}
+
+impl Sample for f32 {
+    rows_of_floats!();
+
+    #[inline(always)]
+    fn four<S: Simd>(simd: S, window: &Window<Self, 4>, row: usize, slice: usize) -> [Lanes<S>; 4] {
+        columns(simd, each!([0, 1, 2, 3, 4, 5, 6, 7], L => window.row(L, row, slice)))
+    }
+
+    #[inline(always)]
+    fn two<S: Simd>(simd: S, window: &Window<Self, 2>, row: usize, slice: usize) -> [Lanes<S>; 2] {
+        pairs(simd, each!([0, 1, 2, 3, 4, 5, 6, 7], L => window.row(L, row, slice)))
+    }
+
+    #[inline(always)]
+    fn value(self) -> f32 {
+        self
+    }
+}
+
+/// Four numbers of each lane: rows become columns.
+#[inline(always)]
+pub fn columns<S: Simd>(simd: S, rows: [[f32; 4]; 8]) -> [Lanes<S>; 4] {
+    let [low, high] = each!([0, 4], I => {
+        let rows: [f32x4<S>; 4] = four!(L => rows[I + L].simd_into(simd));
+        let (ac, bd) = (rows[0].zip_low(rows[2]), rows[1].zip_low(rows[3]));
+        let (ac_high, bd_high) = (rows[0].zip_high(rows[2]), rows[1].zip_high(rows[3]));
+        [ac.zip_low(bd), ac.zip_high(bd), ac_high.zip_low(bd_high), ac_high.zip_high(bd_high)]
+    });
+    four!(I => simd.combine_f32x4(low[I], high[I]))
+}
+
+/// Two numbers of each lane.
+#[inline(always)]
+fn pairs<S: Simd>(simd: S, pairs: [[f32; 2]; 8]) -> [Lanes<S>; 2] {
+    each!([0, 1], I => {
+        let own: [f32; 8] = each!([0, 1, 2, 3, 4, 5, 6, 7], L => pairs[L][I]);
+        own.simd_into(simd)
+    })
+}

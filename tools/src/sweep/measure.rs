@@ -1,0 +1,148 @@
+//! The steps of an axis, drawn and timed.
+
+use super::{
+    asked::Asked,
+    plan::{Plan, Step},
+    ratio::{CLIFF, Ratio},
+};
+use crate::{
+    progress::Progress,
+    render::milliseconds,
+    suite::measure::{reopen, require_content},
+    timing::Times,
+};
+use splatkit::{Device, Error, Renderer, Result, engine::FrameStats, scene::Evaluate};
+use std::time::Instant;
+
+/// How many frames of a step are drawn: the least, and more, up to the most, until they have taken so many milliseconds.
+#[derive(Debug, Clone, Copy)]
+pub struct Frames {
+    pub least: usize,
+    pub most: usize,
+    pub enough: f64,
+}
+
+impl Frames {
+    fn take_more(self, times: &[f64]) -> bool {
+        times.len() < self.least || times.len() < self.most && times.iter().sum::<f64>() < self.enough
+    }
+}
+
+/// A step that costs this many times what is explained does so on a busy machine as on an idle one.
+const HIGH: f64 = 2.0 * CLIFF;
+
+/// A step that was planned, and what it took, or why it was not drawn.
+pub struct Outcome {
+    pub name: String,
+    pub against: Option<usize>,
+    pub result: Result<Measured>,
+}
+
+pub struct Measured {
+    pub size: [u32; 2],
+    pub asked: Asked,
+    pub times: Times,
+    pub stats: FrameStats,
+}
+
+impl Outcome {
+    /// Whether it could not be measured, though the engine draws such scenes.
+    pub fn has_failed(&self) -> bool {
+        self.result.as_ref().is_err_and(|error| !is_undrawn(error))
+    }
+}
+
+/// Whether an engine tells that it does not draw something.
+fn is_undrawn(error: &Error) -> bool {
+    matches!(error, Error::Argument(_))
+}
+
+/// The outcome that one is compared with, and how. The least times of frames count: other programs do not lower them.
+pub fn compared<'a>(outcomes: &'a [Outcome], outcome: &Outcome) -> Option<(&'a Outcome, Ratio)> {
+    let neighbour = &outcomes[outcome.against?];
+    let (own, other) = (outcome.result.as_ref().ok()?, neighbour.result.as_ref().ok()?);
+    Some((neighbour, Ratio::of((own.times.min, &own.asked), (other.times.min, &other.asked))))
+}
+
+/// How steps are drawn.
+pub struct Measure<'a> {
+    pub device: &'a mut Device,
+    pub evaluate: Evaluate,
+    pub frames: Frames,
+    pub progress: &'a Progress,
+}
+
+impl Measure<'_> {
+    pub fn outcomes(&mut self, axis: &str, plans: Vec<Plan>) -> Vec<Outcome> {
+        let mut outcomes = Vec::new();
+        for plan in &plans {
+            let result = self.result(axis, plan);
+            outcomes.push(Outcome { name: plan.name.clone(), against: plan.against, result });
+        }
+        self.look_again(axis, &plans, &mut outcomes);
+        outcomes
+    }
+
+    /// Measures both sides of each low cliff once more: another program may have had the processor. High ones are none of its doing.
+    fn look_again(&mut self, axis: &str, plans: &[Plan], outcomes: &mut [Outcome]) {
+        let mut sides: Vec<usize> = Vec::new();
+        for (at, outcome) in outcomes.iter().enumerate() {
+            if let (Some(other), Some((_, ratio))) = (outcome.against, compared(outcomes, outcome))
+                && ratio.is_cliff()
+                && ratio.beyond() < HIGH
+            {
+                sides.extend([other, at].iter().filter(|side| !sides.contains(side)).collect::<Vec<_>>());
+            }
+        }
+        for side in sides {
+            if let (Ok(again), Ok(first)) = (self.result(axis, &plans[side]), &mut outcomes[side].result)
+                && again.times.min < first.times.min
+            {
+                *first = again;
+            }
+        }
+    }
+
+    /// Makes a plan's scene, draws it and lets it go.
+    fn result(&mut self, axis: &str, plan: &Plan) -> Result<Measured> {
+        let name = &plan.name;
+        self.progress.stage(format!("Making {axis}, {name}"));
+        let result = (plan.make)().and_then(|step| {
+            self.progress.stage(format!("Drawing {axis}, {name}"));
+            self.measured(step)
+        });
+        if let Err(error) = &result {
+            reopen(self.device, error);
+        }
+        result
+    }
+
+    fn measured(&self, step: Step) -> Result<Measured> {
+        let Step { scene, content, camera, mut settings } = step;
+        settings.evaluate = self.evaluate;
+        let mut renderer = Renderer::new(self.device, &scene)?;
+        let (picture, stats) = renderer.render(&camera, &settings)?;
+        require_content(&stats)?;
+        let mut times = Vec::new();
+        while self.frames.take_more(&times) {
+            let start = Instant::now();
+            renderer.draw(&camera, &settings)?;
+            times.push(milliseconds(start));
+        }
+        let asked = content.asked(&camera, &settings, &picture)?;
+        Ok(Measured { size: settings.size, asked, times: Times::of(times), stats })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quick_frames_are_drawn_more_often() {
+        let frames = Frames { least: 2, most: 4, enough: 100.0 };
+        let more = |times: &[f64]| frames.take_more(times);
+        assert!(more(&[500.0]) && !more(&[500.0, 500.0]));
+        assert!(more(&[1.0, 1.0, 1.0]) && !more(&[1.0; 4]));
+    }
+}
