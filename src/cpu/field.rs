@@ -647,13 +647,13 @@ mod tests {
         sums
     }
 
-    fn found(volume: &Volume, tensor: Tensor, places: [[f32; 8]; 3], zero: f64) -> [[f32; 8]; 4] {
+    fn found(volume: &Volume, weighting: Weighting, places: [[f32; 8]; 3], zero: f64) -> [[f32; 8]; 4] {
         fn at<T: Sample, S: Simd>(simd: S, field: &Field<T>, places: [[f32; 8]; 3]) -> [[f32; 8]; 4] {
             let (value, [x, y, z]) = field.at(simd, three!(I => places[I].simd_into(simd)));
             [value, x, y, z].map(Into::into)
         }
         let level = Level::new();
-        match Typed::new(volume, Weighting::Tensor(tensor), zero) {
+        match Typed::new(volume, weighting, zero) {
             Typed::U8(field) => dispatch!(level, simd => at(simd, &field, places)),
             Typed::U16(field) => dispatch!(level, simd => at(simd, &field, places)),
             Typed::I16(field) => dispatch!(level, simd => at(simd, &field, places)),
@@ -686,7 +686,7 @@ mod tests {
                     };
                     let places = [0, 1, 2].map(|axis| std::array::from_fn(|lane| place(axis, lane)));
                     for zero in [0.0, 100.0] {
-                        let found = found(&volume, tensor, places, zero);
+                        let found = found(&volume, Weighting::Tensor(tensor), places, zero);
                         for lane in 0..8 {
                             let place = places.map(|lanes| f64::from(lanes[lane]));
                             let mut expected = truth(&volume, tensor, place);
@@ -702,6 +702,57 @@ mod tests {
                                 );
                             }
                         }
+                    }
+                }
+            }
+        }
+    }
+
+    /// The mean of the samples of a Gaussian that four weights an axis hold, and its changes a step along each axis.
+    fn mean(volume: &Volume, sigma: f64, place: [f64; 3]) -> [f64; 4] {
+        let dims = volume.lattice.dims;
+        let at = |place: [f64; 3]| {
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for index in 0..dims.iter().product() {
+                let own = [index % dims[0], index / dims[0] % dims[1], index / (dims[0] * dims[1])];
+                let away = [0, 1, 2].map(|axis| place[axis] - own[axis] as f64);
+                let weight = (-0.5 * away.iter().map(|d| d * d).sum::<f64>() / (sigma * sigma)).exp();
+                (sum, weights) = (sum + weight * volume.value(index), weights + weight);
+            }
+            sum / weights
+        };
+        let slope = |axis: usize| {
+            let beside = |by: f64| [0, 1, 2].map(|own| place[own] + if own == axis { by } else { 0.0 });
+            (at(beside(1e-4)) - at(beside(-1e-4))) / 2e-4
+        };
+        [at(place), slope(0), slope(1), slope(2)]
+    }
+
+    #[test]
+    fn gaussians_are_means_beside_the_lattice_too() {
+        let dims = [7, 6, 8];
+        let bytes: Vec<u8> = (0..336).map(|at: usize| (at * at * 31 % 251) as u8).collect();
+        let kinds = [
+            Samples::U8(bytes.clone()),
+            Samples::U16(bytes.iter().map(|own| u16::from(*own)).collect()),
+            Samples::I16(bytes.iter().map(|own| i16::from(*own)).collect()),
+            Samples::F32(bytes.iter().map(|own| f32::from(*own)).collect()),
+        ];
+        for samples in kinds {
+            let volume = Volume::new(Lattice::with_spacing(dims, DVec3::ONE), samples).unwrap();
+            for round in 0..40 {
+                let place = |axis: usize, lane: usize| {
+                    let part = ((round * 8 + lane) as f64 * [0.61, 0.77, 0.37][axis]).fract();
+                    (part * (dims[axis] as f64 + 2.0) - 1.5) as f32
+                };
+                let places = [0, 1, 2].map(|axis| std::array::from_fn(|lane| place(axis, lane)));
+                let found = found(&volume, Weighting::Gaussian(0.5), places, 0.0);
+                for lane in 0..8 {
+                    let place = places.map(|lanes| f64::from(lanes[lane]));
+                    for (found, expected) in found.iter().zip(mean(&volume, 0.5, place)) {
+                        // Of 251, by the weights that are left out and, of integers, are rounded.
+                        let found = f64::from(found[lane]);
+                        assert!((found - expected).abs() < 2.0, "{place:?}: {found} {expected}");
                     }
                 }
             }

@@ -112,6 +112,8 @@ impl<S: Simd> Pairs<S> {
     #[inline(always)]
     fn new(simd: S, weights: &mut Weights<S>, order: [usize; 4]) -> Self {
         let [before, _, after, second] = four!(I => i32x8::<S>::truncate_from(weights.weights[I] * PARTS + 0.5));
+        // Twice that must fit 16 bits: beside the lattice, all weight may be that of the last sample.
+        let second = second.min(PARTS as i32 - 1);
         let none = i32x8::splat(simd, 0);
         let values = [before, none + PARTS as i32 - before - after - second, after, second];
         let moments = [none - before, none, after, second + second];
