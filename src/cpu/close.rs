@@ -229,6 +229,13 @@ impl Plan<'_> {
             }
             has_hit = medium.has_hit;
             pixels.hit = has_hit.select(medium.hit, pixels.hit);
+            if radiance.is_none() && self.optics != Optics::XRay {
+                // What has been composited in the sheet is composited as it is.
+                pixels.color = three!(I => before.mul_add(medium.color[I], pixels.color[I]));
+                pixels.through = before * medium.through;
+                self.note_half(simd, sheet, before, medium.depth, has_hit, pixels);
+                return;
+            }
             let own = medium.depth.min(Lanes::splat(simd, MOST_DEPTH));
             // Optical depth for opacity, τ / (1 − e^−τ), of which little is left where τ is small.
             let ratio = own.simd_lt(1e-2).select(own * 0.5 + 1.0, own / (one - exp(simd, -own)));
@@ -246,6 +253,20 @@ impl Plan<'_> {
         let per_depth = share / depth.max(Lanes::splat(simd, LEAST_DIVISOR));
         pixels.color = three!(I => per_depth.mul_add(premultiplied[I], pixels.color[I]));
         pixels.through = before - share;
+        self.note_half(simd, sheet, before, depth, has_hit, pixels);
+    }
+
+    /// Notes where half of the light is taken, if that is in a sheet of some optical depth and not on a surface in it.
+    #[inline(always)]
+    fn note_half<S: Simd>(
+        &self,
+        simd: S,
+        sheet: usize,
+        before: Lanes<S>,
+        depth: Lanes<S>,
+        has_hit: mask32x8<S>,
+        pixels: &mut Pixels<S>,
+    ) {
         let passes = before.simd_gt(0.5) & pixels.through.simd_le(0.5) & !has_hit;
         if passes.any_true() {
             // Inside the sheet, optical depth counts as evenly spread.
