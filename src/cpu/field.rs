@@ -19,7 +19,7 @@ use crate::{
 use fearless_simd::{Simd, i32x8, mask32x8, prelude::*};
 
 /// How far a place may lie outside the lattice and still have a sample in reach, in steps.
-const BEYOND: f32 = 1.999;
+pub const BEYOND: f32 = 1.999;
 /// Weights that samples out of reach may have, beside 1 at the centre.
 const LEAST_WEIGHT: f64 = 5e-3;
 

@@ -3,12 +3,13 @@
 use super::{
     brick_cache::Grid,
     close::{Face, Layer, OPAQUE, Visible},
-    field::{self, Typed, Weighting},
+    field::{self, BEYOND, Typed, Weighting},
     march::is_marked,
     plan::Plan,
     rays::Rays,
+    scatter::normal_cdf,
     skip::Shown,
-    vector::{Lanes, dot, three},
+    vector::{Lanes, dot, each, three},
 };
 use crate::{
     math::{Kernel, Sheets},
@@ -25,15 +26,12 @@ const STRAIGHT: f32 = 64.0;
 const LEAST_DEVIATION: f64 = 0.3;
 
 /// Why the field of a scene can't be gathered; none where it can: samples on a Cartesian lattice, kernels of which four weights
-/// an axis hold all, sheets thin enough for a parabola.
-pub fn obstacle(scene: &Scene, settings: &Settings, sheets: &Sheets, choice: Option<&Choice>) -> Option<&'static str> {
+/// an axis hold all.
+pub fn obstacle(scene: &Scene, settings: &Settings) -> Option<&'static str> {
     let fields = scene.items.iter().filter(|item| !matches!(item, Item::Radiance(_) | Item::Hierarchy(_)));
-    let (unsuited, spacing) = match fields.collect::<Vec<_>>()[..] {
-        [Item::Volume(volume, kernel, _)] => (unsuited(volume, kernel), volume.lattice.least_kernel_spacing()),
-        [Item::Bricks(bricks, kernel, _)] => {
-            let coarser = choice.map_or(0.0, |choice| choice.lambda).exp2();
-            (unsuited_kernel(kernel), coarser * bricks.header().lattice.least_kernel_spacing())
-        }
+    let unsuited = match fields.collect::<Vec<_>>()[..] {
+        [Item::Volume(volume, kernel, _)] => unsuited(volume, kernel),
+        [Item::Bricks(_, kernel, _)] => unsuited_kernel(kernel),
         _ => return Some("a scene without a volume on a lattice"),
     };
     if unsuited.is_some() {
@@ -42,11 +40,26 @@ pub fn obstacle(scene: &Scene, settings: &Settings, sheets: &Sheets, choice: Opt
     if settings.mode != Mode::Sheets || settings.classifies_samples() {
         return Some("samples that are classified before interpolation");
     }
-    if settings.gradient == Gradient::Central {
-        return Some("gradients from neighbouring pixels");
-    }
+    (settings.gradient == Gradient::Central).then_some("gradients from neighbouring pixels")
+}
+
+/// Parts of the thickest sheet: one where what is known of its ends and its middle suffices, else each so thin that two places
+/// in it tell its mean.
+pub fn parts(scene: &Scene, sheets: &Sheets, choice: Option<&Choice>) -> usize {
+    let spacing = scene.items.iter().find_map(|item| match item {
+        Item::Volume(volume, ..) => Some(volume.lattice.least_kernel_spacing()),
+        Item::Bricks(bricks, ..) => {
+            let coarser = choice.map_or(0.0, |choice| choice.lambda).exp2();
+            Some(coarser * bricks.header().lattice.least_kernel_spacing())
+        }
+        _ => None,
+    });
+    let Some(spacing) = spacing else { return 1 };
     // With room for rounding: default sheets may be as thick as that.
-    (sheets.step > MOST_GATHERED * spacing * (1.0 + 1e-9)).then_some("sheets thicker than two samples")
+    if sheets.step <= MOST_GATHERED * spacing * (1.0 + 1e-9) {
+        return 1;
+    }
+    (sheets.step / (PART * spacing)).ceil() as usize
 }
 
 /// Why a volume can't be gathered, whatever the settings.
@@ -72,8 +85,13 @@ fn unsuited_kernel(kernel: &Kernel) -> Option<&'static str> {
 pub struct Gather<'a> {
     /// One level; of volumes in bricks also two, finer first.
     pub levels: Vec<Level<'a>>,
-    /// Sheets are no thicker than the lattice's steps: all of one lies within half a step of its middle.
-    pub is_thin: bool,
+    /// Parts of a sheet: one, but of sheets thicker than two samples.
+    pub parts: usize,
+    /// One over the kernel's standard deviation, in steps, where the field ends with the lattice. Tensor products go on.
+    pub ends: Option<f32>,
+    /// Parts of a sheet at whose ends what shows is looked up. None where sheets are no thicker than the lattice's steps: all
+    /// of one lies within half a step of its middle.
+    pub looks: usize,
     pub visible: &'a Visible,
     /// What values count from.
     pub zero: f32,
@@ -117,6 +135,16 @@ impl Level<'_> {
     }
 }
 
+/// The most samples' spacings in a part of a thick sheet, and the places in a part whose mean is that of the part: exact for
+/// fields of the third degree (Gauss).
+const PART: f64 = 1.5;
+const GAUSS: [f32; 2] = [0.211_324_87, 0.788_675_1];
+/// Standard deviations from a sample beyond which a Gaussian, 1 at the sample, is too little for a value: 10⁻⁴.
+const LAST_VALUE: f32 = 4.29;
+
+/// Places at which what shows is looked up lie no further apart than this, in steps.
+pub const MOST_APART: f64 = 1.1;
+
 /// Sheets that are looked up at once.
 const LOOKED_UP: usize = 8;
 
@@ -137,6 +165,26 @@ impl<S: Simd> Last<S> {
         let none = Lanes::splat(simd, 0.0);
         let face = Face { value: none, across: [none; 3] };
         Self { plane: usize::MAX, face, along: none, first: usize::MAX - LOOKED_UP, shows: [0; LOOKED_UP] }
+    }
+}
+
+/// The square of how far places lie outside the box of the samples, in steps.
+#[inline(always)]
+fn outside2<S: Simd>(simd: S, plan: &Plan, place: [Lanes<S>; 3]) -> Lanes<S> {
+    let none = Lanes::splat(simd, 0.0);
+    let outside = three!(I => {
+        (plan.frame.field_low[I] - place[I]).max(place[I] - plan.frame.field_high[I]).max(none)
+    });
+    dot(outside, outside)
+}
+
+impl<S: Simd> Face<S> {
+    /// This where it has a value, else the mean of its sheet and what the other end, if that has a value, changes by.
+    #[inline(always)]
+    fn or(self, simd: S, has_own: mask32x8<S>, mean: Lanes<S>, other: &Self, has_other: mask32x8<S>) -> Self {
+        let none = Lanes::splat(simd, 0.0);
+        let across = three!(I => has_own.select(self.across[I], has_other.select(other.across[I], none)));
+        Self { value: has_own.select(self.value, mean), across }
     }
 }
 
@@ -183,17 +231,75 @@ impl Gather<'_> {
         let filling = Lanes::splat(simd, 1.0);
         let direction = rays.direction;
         let mut layer = Layer { front, back, middle, start, thickness, begin, end, filling, direction };
+        if self.parts > 1 {
+            self.fill_thick(simd, plan, rays, &mut layer);
+        }
         if plan.optics != Optics::Maximum && !self.visible.may_show(simd, plan, &layer) {
             return None;
         }
-        if !bend.abs().simd_gt(STRAIGHT).any_true() {
-            return Some((layer, mask));
+        if self.parts == 1 && bend.abs().simd_gt(STRAIGHT).any_true() {
+            // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with slopes).
+            let inside = self.at(simd, rays.place(0.5 * (start + stop))).0 * plan.frame.transfer[1];
+            let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
+            layer.middle = mean * 1.5 - sum * 0.25;
         }
-        // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with slopes).
-        let inside = self.at(simd, rays.place(0.5 * (start + stop))).0 * plan.frame.transfer[1];
-        let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
-        layer.middle = mean * 1.5 - sum * 0.25;
         Some((layer, mask))
+    }
+
+    /// Gives a sheet of some parts its mean. Where the field ends with the lattice, only what lies around samples counts, and an
+    /// end without any takes the mean.
+    fn fill_thick<S: Simd>(&self, simd: S, plan: &Plan, rays: &Rays<S>, layer: &mut Layer<S>) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let start = Lanes::splat(simd, layer.start);
+                let stop = start + layer.thickness;
+                let (mut from, mut to) = (start, stop);
+                if self.ends.is_some() {
+                    let [enter, leave] = rays.in_lattice(simd, plan, BEYOND);
+                    (from, to) = (enter.max(start).min(stop), leave.min(stop).max(start));
+                }
+                let step = (to - from) * (1.0 / self.parts as f32);
+                let (mut sum, mut weights) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 0.0));
+                for part in 0..self.parts {
+                    for place in GAUSS {
+                        let place = rays.places(step.mul_add(place + part as f32, from));
+                        let weight = self.kernels_at(simd, plan, place);
+                        sum = weight.mul_add(self.at(simd, place).0, sum);
+                        weights += weight;
+                    }
+                }
+                let mean = sum / weights.max(Lanes::splat(simd, f32::MIN_POSITIVE)) * plan.frame.transfer[1];
+                let (mut front, mut back) = (layer.front, layer.back);
+                if let Some(per_deviation) = self.ends {
+                    let most = (LAST_VALUE / per_deviation).powi(2);
+                    let ends = [layer.start, layer.start + layer.thickness];
+                    let has_value = each!([0, 1], I => outside2(simd, plan, rays.place(ends[I])).simd_le(most));
+                    front = layer.front.or(simd, has_value[0], mean, &layer.back, has_value[1]);
+                    back = layer.back.or(simd, has_value[1], mean, &layer.front, has_value[0]);
+                }
+                (layer.front, layer.back) = (front, back);
+                layer.middle = mean * 1.5 - (front.value + back.value) * 0.25;
+            },
+        )
+    }
+
+    /// What the kernels of a lattice add up to at a place, of what they do far from its borders.
+    #[inline(always)]
+    fn kernels_at<S: Simd>(&self, simd: S, plan: &Plan, place: [Lanes<S>; 3]) -> Lanes<S> {
+        let mut all = Lanes::splat(simd, 1.0);
+        let Some(per_deviation) = self.ends else { return all };
+        for axis in 0..3 {
+            let after = place[axis] - plan.frame.field_low[axis];
+            let before = plan.frame.field_high[axis] - place[axis];
+            let near = after.min(before);
+            if near.simd_lt(BEYOND).any_true() {
+                // As if kernels were as dense as numbers, beyond half a step from the last sample none.
+                all *=
+                    normal_cdf(simd, (after + 0.5) * per_deviation) * normal_cdf(simd, (before + 0.5) * per_deviation);
+            }
+        }
+        all
     }
 
     /// Looks up what may show in a sheet and the ones behind it: many at once, because looking takes longer than adding.
@@ -209,16 +315,21 @@ impl Gather<'_> {
                 continue;
             }
             let (start, stop) = (plan.planes[sheet], plan.planes[sheet + 1]);
-            let mut found = self.shows(simd, rays.place(0.5 * (start + stop)));
-            if !self.is_thin {
-                // Thicker sheets are looked up on both planes too.
-                found |= behind.unwrap_or_else(
+            let found;
+            if self.looks == 0 {
+                found = self.shows(simd, rays.place(0.5 * (start + stop)));
+            } else {
+                let mut some = behind.unwrap_or_else(
                     #[inline(always)]
                     || self.shows(simd, rays.place(start)),
                 );
+                for look in 1..self.looks {
+                    let part = look as f32 / self.looks as f32;
+                    some |= self.shows(simd, rays.place(start + (stop - start) * part));
+                }
                 let next = self.shows(simd, rays.place(stop));
-                found |= next;
                 behind = Some(next);
+                found = some | next;
             }
             *shows = found as u8;
         }

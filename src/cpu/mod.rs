@@ -159,7 +159,7 @@ impl CpuRenderer {
         let outline = self.outline(&view, settings)?;
         let plan = Plan::new(&self.scene, &view, &outline.sheets, settings, outline.choice.as_ref());
         clock.step("plan");
-        let gathers = self.gathers(settings, &outline)?;
+        let gathers = self.gathers(settings)?;
         let before: u64 = self.brick_reads();
         let mut records = Vec::new();
         let mut spare = std::mem::take(&mut self.spare);
@@ -243,7 +243,7 @@ impl CpuRenderer {
     }
 
     /// Whether the field of the scene's volume is gathered.
-    fn gathers(&self, settings: &Settings, outline: &Outline) -> Result<bool> {
+    fn gathers(&self, settings: &Settings) -> Result<bool> {
         if settings.evaluate == Evaluate::Scatter {
             // Sections of tensor products are not known.
             return self.scene.tensor().map_or(Ok(false), |tensor| {
@@ -253,7 +253,7 @@ impl CpuRenderer {
                 )))
             });
         }
-        match gather::obstacle(&self.scene, settings, &outline.sheets, outline.choice.as_ref()) {
+        match gather::obstacle(&self.scene, settings) {
             Some(what) if settings.evaluate == Evaluate::Gather => {
                 Err(Error::Argument(format!("{what} can't be gathered; scatter instead, or leave it to the engine")))
             }
@@ -328,12 +328,19 @@ impl CpuRenderer {
             }
         }
         let finest = levels.first()?.scale;
-        let is_thin = (0..3).all(|axis| {
+        let steps = (0..3).map(|axis| {
             let [x, y, z, _] = plan.frame.field_axes[axis];
-            let steps = f64::from(x * x + y * y + z * z).sqrt() * f64::from(finest[axis]);
-            steps * outline.sheets.step <= 1.0
+            f64::from(x * x + y * y + z * z).sqrt() * f64::from(finest[axis])
         });
-        Some(Gather { levels, is_thin, visible, zero: zero as f32 })
+        let steps = steps.fold(0.0, f64::max) * outline.sheets.step;
+        let looks = if steps <= 1.0 { 0 } else { ((steps / gather::MOST_APART).ceil() as usize).max(2) };
+        let parts = gather::parts(&self.scene, &outline.sheets, outline.choice.as_ref());
+        let deviation = self.scene.items.iter().find_map(|item| match item {
+            Item::Volume(_, kernel, _) | Item::Bricks(_, kernel, _) => field::deviation(kernel),
+            _ => None,
+        });
+        let ends = deviation.map(|deviation| (1.0 / deviation) as f32);
+        Some(Gather { levels, parts, ends, looks, visible, zero: zero as f32 })
     }
 
     /// The lattices of the levels that are gathered.

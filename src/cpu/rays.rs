@@ -81,6 +81,19 @@ impl<S: Simd> Rays<S> {
         Self { pixel, aside: [right, down], direction, cosine: direction[2], start, way, kept, inside, holes }
     }
 
+    /// The part of each ray in the box of the samples, widened by so many steps.
+    #[inline(always)]
+    pub fn in_lattice(&self, simd: S, plan: &Plan, wider: f32) -> Part<S> {
+        let (low, high) = (plan.frame.field_low.map(|low| low - wider), plan.frame.field_high.map(|high| high + wider));
+        part_in_box(simd, low, high, self.start, self.way)
+    }
+
+    /// The places at some distances, in steps of the lattice.
+    #[inline(always)]
+    pub fn places(&self, distances: Lanes<S>) -> [Lanes<S>; 3] {
+        three!(I => self.way[I].mul_add(distances, self.start[I]))
+    }
+
     /// The place at a distance, in steps of the lattice.
     #[inline(always)]
     pub fn place(&self, distance: f32) -> [Lanes<S>; 3] {

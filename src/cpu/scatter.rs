@@ -133,7 +133,7 @@ fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
 /// The normal distribution function, within 2·10⁻⁷ (Abramowitz & Stegun 1964, 26.2.19). Its tails must be right: what they
 /// get wrong is multiplied by the strength of an opaque splat and lies in front of it.
 #[inline(always)]
-fn normal_cdf<S: Simd>(simd: S, t: Lanes<S>) -> Lanes<S> {
+pub fn normal_cdf<S: Simd>(simd: S, t: Lanes<S>) -> Lanes<S> {
     let x = t.abs().min(Lanes::splat(simd, 8.0));
     let one = Lanes::splat(simd, 1.0);
     let mut p = Lanes::splat(simd, 5.382_975e-6);

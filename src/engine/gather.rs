@@ -38,8 +38,11 @@ const TAIL_BYTES: u64 = 64 << 20;
 
 /// Why the engine cannot gather a scene's field in these settings; none where it can.
 pub fn obstacle(scene: &Scene, settings: &Settings, sheets: &Sheets, gpu: &Gpu) -> Option<&'static str> {
-    if let Some(what) = crate::cpu::gather::obstacle(scene, settings, sheets, None) {
+    if let Some(what) = crate::cpu::gather::obstacle(scene, settings) {
         return Some(what);
+    }
+    if crate::cpu::gather::parts(scene, sheets, None) > 1 {
+        return Some("sheets thicker than two samples");
     }
     let volume =
         scene.items.iter().find_map(|item| if let Item::Volume(volume, ..) = item { Some(volume) } else { None });
