@@ -1,9 +1,10 @@
 //! The field of a lattice in a sheet, gathered: each ray asks which kernels reach the planes of the sheet.
 
 use super::{
+    blend::{Point, Way},
     brick_cache::Grid,
     close::{Face, Layer, OPAQUE, Visible},
-    field::{self, Typed, Weighting},
+    field::{self, LEAST_DEVIATION, Typed, Weighting},
     march::is_marked,
     plan::Plan,
     rays::Rays,
@@ -13,7 +14,7 @@ use super::{
 use crate::{
     math::{Kernel, Sheets},
     scene::{Gradient, Item, MOST_GATHERED, Mode, Optics, Scene, Settings},
-    volume::{Arrangement, Volume, bricks::Choice},
+    volume::{Volume, bricks::Choice},
 };
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
@@ -21,12 +22,15 @@ use fearless_simd::{Simd, mask32x8, prelude::*};
 /// sample.
 const STRAIGHT: f32 = 64.0;
 
-/// The least standard deviation of a kernel, in steps, whose weights 32 bits hold.
-const LEAST_DEVIATION: f64 = 0.3;
-
-/// Why the field of a scene can't be gathered; none where it can: samples on a Cartesian lattice, kernels of which four weights
-/// an axis hold all, sheets thin enough for a parabola.
-pub fn obstacle(scene: &Scene, settings: &Settings, sheets: &Sheets, choice: Option<&Choice>) -> Option<&'static str> {
+/// Why the field of a scene can't be gathered; none where it can: a volume that suits, and sheets thin enough for a parabola.
+/// `unsuited` tells what is wrong with a volume and its kernel.
+pub fn obstacle(
+    scene: &Scene,
+    settings: &Settings,
+    sheets: &Sheets,
+    choice: Option<&Choice>,
+    unsuited: impl Fn(&Volume, &Kernel) -> Option<&'static str>,
+) -> Option<&'static str> {
     let fields = scene.items.iter().filter(|item| !matches!(item, Item::Radiance(_) | Item::Hierarchy(_)));
     let (unsuited, spacing) = match fields.collect::<Vec<_>>()[..] {
         [Item::Volume(volume, kernel, _)] => (unsuited(volume, kernel), volume.lattice.least_kernel_spacing()),
@@ -51,16 +55,11 @@ pub fn obstacle(scene: &Scene, settings: &Settings, sheets: &Sheets, choice: Opt
 
 /// Why a volume can't be gathered, whatever the settings.
 pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
-    if volume.lattice.arrangement != Arrangement::Cartesian {
-        return Some("body-centred and rectilinear lattices");
-    }
-    if volume.coefficients.is_some() && kernel.as_tensor().is_none() {
-        return Some("sharp volumes of radial kernels");
-    }
-    unsuited_kernel(kernel)
+    Way::of(volume, kernel).err()
 }
 
-fn unsuited_kernel(kernel: &Kernel) -> Option<&'static str> {
+/// Why a kernel can't be gathered by four weights an axis.
+pub fn unsuited_kernel(kernel: &Kernel) -> Option<&'static str> {
     match field::weighting(kernel) {
         None => Some("kernels other than tensor products and Gaussians that reach two samples"),
         Some(Weighting::Gaussian(sigma)) if sigma < LEAST_DEVIATION => Some("kernels much narrower than a sample"),
@@ -74,6 +73,8 @@ pub struct Gather<'a> {
     pub levels: Vec<Level<'a>>,
     /// Sheets are no thicker than the lattice's steps: all of one lies within half a step of its middle.
     pub is_thin: bool,
+    /// There may be places without a field, and places where kernels add up to more than elsewhere.
+    pub is_blended: bool,
     pub visible: &'a Visible,
     /// What values count from.
     pub zero: f32,
@@ -91,6 +92,8 @@ pub struct Level<'a> {
     /// Steps of the level to each step of the lattice along each axis, and where the lattice's first sample is in it.
     pub scale: [f32; 3],
     pub shift: [f32; 3],
+    /// The same of the cells that are looked up for what they show.
+    pub cells: [[f32; 3]; 2],
 }
 
 impl Level<'_> {
@@ -100,18 +103,25 @@ impl Level<'_> {
         three!(I => place[I] * self.scale[I] + self.shift[I])
     }
 
+    /// A place in cells that are looked up.
+    #[inline(always)]
+    fn cell<S: Simd>(&self, place: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
+        let [scale, shift] = &self.cells;
+        three!(I => place[I] * scale[I] + shift[I])
+    }
+
     /// The field at places in steps of the level, and its change a step along each axis.
     #[inline(always)]
-    fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
+    fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3], way: [Lanes<S>; 3]) -> Point<S> {
         // A function of its own for each type of samples, else each would be compiled wherever this one is called.
         simd.vectorize(
             #[inline(always)]
             || match &self.field {
-                Typed::U8(field) => field.at(simd, place),
-                Typed::U16(field) => field.at(simd, place),
-                Typed::I16(field) => field.at(simd, place),
-                Typed::I32(field) => field.at(simd, place),
-                Typed::F32(field) => field.at(simd, place),
+                Typed::U8(field) => field.at(simd, place, way),
+                Typed::U16(field) => field.at(simd, place, way),
+                Typed::I16(field) => field.at(simd, place, way),
+                Typed::I32(field) => field.at(simd, place, way),
+                Typed::F32(field) => field.at(simd, place, way),
             },
         )
     }
@@ -126,6 +136,7 @@ pub struct Last<S: Simd> {
     plane: usize,
     face: Face<S>,
     along: Lanes<S>,
+    weight: Lanes<S>,
     /// The first sheet of those looked up, and a bit for each ray on which something may show in a sheet.
     first: usize,
     shows: [u8; LOOKED_UP],
@@ -136,7 +147,7 @@ impl<S: Simd> Last<S> {
     pub fn new(simd: S) -> Self {
         let none = Lanes::splat(simd, 0.0);
         let face = Face { value: none, across: [none; 3] };
-        Self { plane: usize::MAX, face, along: none, first: usize::MAX - LOOKED_UP, shows: [0; LOOKED_UP] }
+        Self { plane: usize::MAX, face, along: none, weight: none, first: usize::MAX - LOOKED_UP, shows: [0; LOOKED_UP] }
     }
 }
 
@@ -172,7 +183,7 @@ impl Gather<'_> {
         if last.plane != sheet {
             self.face(simd, plan, rays, sheet, last);
         }
-        let (front, front_along) = (last.face, last.along);
+        let (front, front_along, front_weight) = (last.face, last.along, last.weight);
         self.face(simd, plan, rays, sheet + 1, last);
         let (back, back_along) = (last.face, last.along);
         let thickness = stop - start;
@@ -183,6 +194,21 @@ impl Gather<'_> {
         let filling = Lanes::splat(simd, 1.0);
         let direction = rays.direction;
         let mut layer = Layer { front, back, middle, start, thickness, begin, end, filling, direction };
+        if self.is_blended {
+            let least = front_weight.min(last.weight);
+            let has_gaps = (mask & least.simd_le(0.0)).any_true();
+            if !has_gaps && plan.optics != Optics::Maximum && !self.visible.may_show(simd, plan, &layer) {
+                return None;
+            }
+            if !has_gaps && !bend.abs().simd_gt(STRAIGHT).any_true() {
+                return Some((layer, mask));
+            }
+            let inside = self.at(simd, rays, 0.5 * (start + stop));
+            let has_field = layer.blend(simd, plan, bend, [front_weight, last.weight], &inside);
+            let mask = mask & has_field;
+            let shows = plan.optics == Optics::Maximum || self.visible.may_show(simd, plan, &layer);
+            return (shows && mask.any_true()).then_some((layer, mask));
+        }
         if plan.optics != Optics::Maximum && !self.visible.may_show(simd, plan, &layer) {
             return None;
         }
@@ -190,7 +216,7 @@ impl Gather<'_> {
             return Some((layer, mask));
         }
         // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with slopes).
-        let inside = self.at(simd, rays.place(0.5 * (start + stop))).0 * plan.frame.transfer[1];
+        let inside = self.at(simd, rays, 0.5 * (start + stop)).value * plan.frame.transfer[1];
         let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
         layer.middle = mean * 1.5 - sum * 0.25;
         Some((layer, mask))
@@ -229,19 +255,20 @@ impl Gather<'_> {
     fn shows<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> u64 {
         let mut shows = 0;
         for level in &self.levels {
-            shows |= level.shown.at(simd, level.place(place));
+            shows |= level.shown.at(simd, level.cell(place));
         }
         shows
     }
 
-    /// The field at places in steps of the lattice, and its change a step along each axis.
+    /// The field at a distance along rays, and its change a step of the lattice along each axis.
     #[inline(always)]
-    fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
+    fn at<S: Simd>(&self, simd: S, rays: &Rays<S>, distance: f32) -> Point<S> {
+        let place = rays.place(distance);
         match &self.levels[..] {
-            [level] if level.grid.is_none() => level.at(simd, place),
+            [level] if level.grid.is_none() => level.at(simd, level.place(place), rays.way),
             levels => simd.vectorize(
                 #[inline(always)]
-                || self.mean(simd, levels, place),
+                || self.mean(simd, levels, place, rays.way),
             ),
         }
     }
@@ -249,7 +276,7 @@ impl Gather<'_> {
     /// The mean of levels in bricks by their shares. A level has none where it has no brick; where no level has one, nothing
     /// shows.
     #[inline(always)]
-    fn mean<S: Simd>(&self, simd: S, levels: &[Level], place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
+    fn mean<S: Simd>(&self, simd: S, levels: &[Level], place: [Lanes<S>; 3], way: [Lanes<S>; 3]) -> Point<S> {
         let none = Lanes::splat(simd, 0.0);
         let (mut all, mut value, mut slopes, mut hidden) = (none, none, [none; 3], none);
         for level in levels {
@@ -261,13 +288,14 @@ impl Gather<'_> {
                 continue;
             }
             let share = is_held.select(Lanes::splat(simd, level.share), none);
-            let (own, own_slopes) = level.at(simd, place);
+            let Point { value: own, slopes: own_slopes, .. } = level.at(simd, place, way);
             all += share;
             value = share.mul_add(own, value);
             slopes = three!(I => (share * level.scale[I]).mul_add(own_slopes[I], slopes[I]));
         }
         let inverse = Lanes::splat(simd, 1.0) / all.max(Lanes::splat(simd, f32::MIN_POSITIVE));
-        (all.simd_gt(0.0).select(value * inverse, hidden), three!(I => slopes[I] * inverse))
+        let value = all.simd_gt(0.0).select(value * inverse, hidden);
+        Point { value, slopes: three!(I => slopes[I] * inverse), weight: Lanes::splat(simd, 1.0) }
     }
 
     /// Finds the field on a plane, and its change along the rays a world unit.
@@ -275,7 +303,7 @@ impl Gather<'_> {
     fn face<S: Simd>(&self, simd: S, plan: &Plan, rays: &Rays<S>, plane: usize, last: &mut Last<S>) {
         let frame = &plan.frame;
         let per_value = frame.transfer[1];
-        let (value, slopes) = self.at(simd, rays.place(plan.planes[plane]));
+        let Point { value, slopes, weight } = self.at(simd, rays, plan.planes[plane]);
         // From steps of the lattice to view space.
         let axes = &frame.field_axes;
         let gradient = three!(I => {
@@ -284,7 +312,53 @@ impl Gather<'_> {
         let along = dot(gradient, rays.direction);
         let length = frame.gradients[2];
         let across = three!(I => (gradient[I] - along * rays.direction[I]) * length);
-        (last.plane, last.along) = (plane, along);
+        (last.plane, last.along, last.weight) = (plane, along, weight);
         last.face = Face { value: value * per_value, across };
+    }
+}
+
+impl<S: Simd> Layer<S> {
+    /// Counts the field where kernels add up to more the more, takes the other values where one is missing, and tells where there
+    /// is a field. `weights`: at the faces; `inside`: in the middle; `bend`: how much slopes at the faces differ.
+    #[inline(always)]
+    fn blend(
+        &mut self,
+        simd: S,
+        plan: &Plan,
+        bend: Lanes<S>,
+        [front, back]: [Lanes<S>; 2],
+        inside: &Point<S>,
+    ) -> mask32x8<S> {
+        let none = Lanes::splat(simd, 0.0);
+        let least = plan.frame.isotropic[3];
+        let [has_front, has_inside, has_back] = [front, inside.weight, back].map(
+            #[inline(always)]
+            |weight| weight.simd_gt(0.0),
+        );
+        let values = [self.front.value, inside.value * plan.frame.transfer[1], self.back.value];
+        // Simpson's rule for the sums of weights and of values. Of fields without a value at a place nothing counts there.
+        let shares = [
+            has_front.select(front + least, none) * (1.0 / 6.0),
+            has_inside.select(inside.weight + least, none) * (4.0 / 6.0),
+            has_back.select(back + least, none) * (1.0 / 6.0),
+        ];
+        let weight = shares[0] + shares[1] + shares[2];
+        let value = shares[0] * values[0] + shares[1] * values[1] + shares[2] * values[2];
+        let weighted = value / weight.max(Lanes::splat(simd, 1e-20));
+        // The rule with slopes is better, where there are all values.
+        let sum = values[0] + values[2];
+        let plain = (sum + values[1] * 4.0) * (1.0 / 6.0);
+        let smooth = (sum * 7.0 + values[1] * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
+        let has_all = has_front & has_inside & has_back;
+        let mean = has_all.select(weighted + (smooth - plain), weighted);
+        let (front, back) = (self.front, self.back);
+        let either = |has: mask32x8<S>, own: Face<S>, has_other: mask32x8<S>, other: Face<S>| Face {
+            value: has.select(own.value, mean),
+            across: three!(I => has.select(own.across[I], has_other.select(other.across[I], none))),
+        };
+        self.front = either(has_front, front, has_back, back);
+        self.back = either(has_back, back, has_front, front);
+        self.middle = mean * 1.5 - (self.front.value + self.back.value) * 0.25;
+        weight.simd_gt(least)
     }
 }

@@ -16,11 +16,15 @@
 //! | `rays` | the rays of eight pixels |
 //! | `scatter`, `sums` | adds splats to the open sheets |
 //! | `gather`, `field` | the field of a lattice at a place, and its gradient |
+//! | `blend` | the same by sums over samples, of other kernels and lattices |
+//! | `radial`, `bells`, `rectilinear` | the weights of these sums |
 //! | `window` | loads the samples around eight places |
 //! | `close` | classifies, lights and composites a sheet |
 //! | `vector` | functions of eight numbers at once |
 
+mod bells;
 mod bins;
+mod blend;
 mod brick_cache;
 mod close;
 pub(crate) mod field;
@@ -32,7 +36,9 @@ mod nodes;
 mod page_cache;
 mod plan;
 mod project;
+mod radial;
 mod rays;
+mod rectilinear;
 mod scatter;
 pub(crate) mod skip;
 mod sums;
@@ -52,6 +58,7 @@ use crate::{
         reach::{EVERYTHING, first_visible},
     },
 };
+use blend::{Blend, Way};
 use bins::{BLOCK, Bins, TileLists};
 use brick_cache::Grid;
 use close::{NO_VALUE, Visible};
@@ -76,6 +83,8 @@ pub struct CpuRenderer {
     prepared: Vec<Prepared>,
     /// The ranges of the field around the samples of a lattice that is gathered.
     ranges: Option<Vec<[u8; 2]>>,
+    /// How it is summed, where that takes more than four weights an axis.
+    blend: Option<Blend>,
     /// What shows of it, for the transfer function's table of that.
     shown: Option<([u16; 256], Shown)>,
     /// The levels of a volume in bricks that is gathered, for the bricks of the last picture.
@@ -126,6 +135,7 @@ impl CpuRenderer {
             scene: scene.clone(),
             prepared: scene.items.iter().map(Prepared::new).collect(),
             ranges: None,
+            blend: None,
             shown: None,
             levels: None,
             pace: Pace::default(),
@@ -253,7 +263,8 @@ impl CpuRenderer {
                 )))
             });
         }
-        match gather::obstacle(&self.scene, settings, &outline.sheets, outline.choice.as_ref()) {
+        let choice = outline.choice.as_ref();
+        match gather::obstacle(&self.scene, settings, &outline.sheets, choice, gather::unsuited) {
             Some(what) if settings.evaluate == Evaluate::Gather => {
                 Err(Error::Argument(format!("{what} can't be gathered; scatter instead, or leave it to the engine")))
             }
@@ -273,9 +284,16 @@ impl CpuRenderer {
                         Optics::Maximum => EVERYTHING,
                         _ => first_visible(transfer, volume.range),
                     };
-                    let ranges = self.ranges.get_or_insert_with(|| skip::field_ranges(volume, kernel));
+                    if let (None, Ok(Way::Blend(taps))) = (&self.blend, Way::of(volume, kernel)) {
+                        self.blend = Some(Blend::new(volume, kernel, taps));
+                    }
+                    let ranges = self.ranges.get_or_insert_with(|| match &self.blend {
+                        Some(blend) => blend.ranges(volume, kernel),
+                        None => skip::field_ranges(volume, kernel),
+                    });
+                    let dims = self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).dims;
                     self.shown.take_if(|(own, _)| *own != first);
-                    self.shown.get_or_insert_with(|| (first, Shown::new(volume, ranges, &first)));
+                    self.shown.get_or_insert_with(|| (first, Shown::new(dims, ranges, &first)));
                 }
                 (_, Prepared::Bricks(cache), Some(choice))
                     if self.levels.as_ref().is_none_or(|(own, _)| own != choice) =>
@@ -298,16 +316,24 @@ impl CpuRenderer {
             match (item, prepared) {
                 (Item::Volume(volume, kernel, _), _) => {
                     let (_, shown) = self.shown.as_ref()?;
-                    let field = Typed::new(volume, field::weighting(kernel)?, zero);
-                    let dims = volume.lattice.dims;
+                    let field = match &self.blend {
+                        Some(blend) => Typed::blended(volume, blend, zero),
+                        None => Typed::new(volume, field::weighting(kernel)?, zero),
+                    };
+                    // Coefficients begin before the samples.
+                    let drawn = volume.drawn_lattice();
+                    let before = volume.lattice.axes.inverse() * (volume.lattice.origin - drawn.origin);
+                    let shift = before.as_vec3().to_array();
+                    let cells = self.blend.as_ref().map_or([[1.0; 3], shift], |blend| blend.to_cells(shift));
                     levels.push(gather::Level {
                         field,
-                        dims,
+                        dims: drawn.dims,
                         grid: None,
                         shown,
                         share: 1.0,
                         scale: [1.0; 3],
-                        shift: [0.0; 3],
+                        shift,
+                        cells,
                     });
                 }
                 (Item::Bricks(bricks, kernel, _), Prepared::Bricks(cache)) if !cache.samples().is_empty() => {
@@ -321,25 +347,29 @@ impl CpuRenderer {
                         let shift = (to_own * (fine.origin - own.origin)).as_vec3().to_array();
                         let scale = [0, 1, 2].map(|axis| scale[axis][axis] as f32);
                         let share = *share as f32;
-                        levels.push(gather::Level { field, dims, grid: Some(grid), shown, share, scale, shift });
+                        let cells = [scale, shift];
+                        levels.push(gather::Level { field, dims, grid: Some(grid), shown, share, scale, shift, cells });
                     }
                 }
                 _ => {}
             }
         }
-        let finest = levels.first()?.scale;
+        let [finest, _] = levels.first()?.cells;
         let is_thin = (0..3).all(|axis| {
             let [x, y, z, _] = plan.frame.field_axes[axis];
             let steps = f64::from(x * x + y * y + z * z).sqrt() * f64::from(finest[axis]);
             steps * outline.sheets.step <= 1.0
         });
-        Some(Gather { levels, is_thin, visible, zero: zero as f32 })
+        let is_blended = self.blend.is_some();
+        Some(Gather { levels, is_thin, is_blended, visible, zero: zero as f32 })
     }
 
     /// The lattices of the levels that are gathered.
     fn lattices(&self, outline: &Outline) -> Vec<Lattice> {
         let own = |item: &Item| match (item, &outline.choice) {
-            (Item::Volume(volume, ..), _) => Some(vec![volume.lattice.clone()]),
+            (Item::Volume(volume, ..), _) => {
+                Some(vec![self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).clone()])
+            }
             (Item::Bricks(bricks, ..), Some(choice)) => {
                 Some(choice.levels.iter().map(|(level, _)| bricks.lattice(*level)).collect())
             }
