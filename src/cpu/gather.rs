@@ -147,7 +147,14 @@ impl<S: Simd> Last<S> {
     pub fn new(simd: S) -> Self {
         let none = Lanes::splat(simd, 0.0);
         let face = Face { value: none, across: [none; 3] };
-        Self { plane: usize::MAX, face, along: none, weight: none, first: usize::MAX - LOOKED_UP, shows: [0; LOOKED_UP] }
+        Self {
+            plane: usize::MAX,
+            face,
+            along: none,
+            weight: none,
+            first: usize::MAX - LOOKED_UP,
+            shows: [0; LOOKED_UP],
+        }
     }
 }
 

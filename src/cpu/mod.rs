@@ -1,9 +1,9 @@
 //! The engine for processors: draws scenes without a GPU, by the same sheets.
 //!
 //! A tile of 8 × 8 pixels is walked front to back. *Splats* scatter: each adds its sections to the sheets that it meets
-//! (`scatter`). The field of a Gaussian on a lattice is *gathered* where that is exact: each pixel asks which kernels reach the
-//! planes between its sheets (`gather`). Then the sheet is classified, lit and composited (`close`). The GPU engine does the same
-//! in shaders; tests/cpu_equals_reference.rs compares both with the reference.
+//! (`scatter`). The field of a lattice is *gathered*: each pixel asks which kernels reach the planes between its sheets
+//! (`gather`). Then the sheet is classified, lit and composited (`close`). The GPU engine does the same in shaders;
+//! tests/cpu_equals_reference.rs compares both with the reference.
 //!
 //! | module | does |
 //! |---|---|
@@ -58,8 +58,8 @@ use crate::{
         reach::{EVERYTHING, first_visible},
     },
 };
-use blend::{Blend, Way};
 use bins::{BLOCK, Bins, TileLists};
+use blend::{Blend, Way};
 use brick_cache::Grid;
 use close::{NO_VALUE, Visible};
 use fearless_simd::{Level, dispatch};

@@ -4,6 +4,7 @@
 
 use super::{
     blend::{MOST_TAPS, Sums, reach},
+    field::LEAST_WEIGHT,
     vector::{Lanes, each, exp2, three},
     window::columns,
 };
@@ -13,6 +14,8 @@ use crate::{
 };
 use fearless_simd::{Simd, i32x8, prelude::*};
 
+/// Samples with less weight than this at all eight places are left out.
+const LEAST_COUNTED: f32 = 1e-4;
 /// Cells are looked up by at most so many even bins along an axis.
 const MOST_BINS: f64 = 1048576.0;
 /// Samples that a lattice lacks count as so many times its size away.
@@ -46,6 +49,8 @@ struct Axis {
 /// change a step.
 pub struct Along<S: Simd, const N: usize> {
     pub start: Lanes<S>,
+    /// Which of them count, a bit for each.
+    pub counted: u32,
     weights: [Lanes<S>; N],
     added: [Lanes<S>; N],
     weight_slopes: [Lanes<S>; N],
@@ -102,8 +107,6 @@ impl Axes {
     }
 
     pub fn new(places: &[Vec<f64>; 3], kernel: &Kernel, taps: usize) -> Self {
-        // Windows are an even number of samples wide.
-        let taps = if taps > 8 { MOST_TAPS } else { taps.next_multiple_of(2) };
         Self([0, 1, 2].map(|axis| Axis::new(&places[axis], kernel, taps)))
     }
 
@@ -156,11 +159,17 @@ impl Axes {
         }
         let (mut value, mut slopes) = (none, [none; 3]);
         for (k, slice) in values.chunks_exact(N * N).enumerate() {
+            if z.counted >> k & 1 == 0 {
+                continue;
+            }
             // Of whole values, and of those to which the slopes along z are still to be added.
             let (mut sum, mut plain) = (none, none);
             let (mut sum_x, mut plain_x) = (none, none);
             let (mut sum_y, mut plain_y) = (none, none);
             for (j, row) in slice.chunks_exact(N).enumerate() {
+                if y.counted >> j & 1 == 0 {
+                    continue;
+                }
                 let (mut a, mut b, mut a_x, mut b_x) = (none, none, none, none);
                 for (tap, own) in row.iter().enumerate() {
                     a = both[tap].mul_add(*own, a);
@@ -211,9 +220,7 @@ impl Axis {
             let before = (at > 0).then(|| places[at] - places[at - 1]);
             let after = (at < last).then(|| places[at + 1] - places[at]);
             let shares = match (before, after) {
-                (Some(before), Some(after)) => {
-                    [after / before / (before + after), before / after / (before + after)]
-                }
+                (Some(before), Some(after)) => [after / before / (before + after), before / after / (before + after)],
                 (before, after) => [before, after].map(|distance| distance.map_or(0.0, |distance| 1.0 / distance)),
             };
             [places[at] - places[0], 1.0 / deviation, shares[0], shares[1]].map(|number| number as f32)
@@ -306,6 +313,7 @@ impl Axis {
         });
         let mut own = Along {
             start: each!([0, 1, 2, 3, 4, 5, 6, 7], L => starts[L] as f32).simd_into(simd),
+            counted: 0,
             weights: [none; N],
             added: [none; N],
             weight_slopes: [none; N],
@@ -325,6 +333,16 @@ impl Axis {
             let away = place - at;
             let scaled = away * inverse;
             let weight = exp2(simd, scaled * scaled * (-0.5 * std::f32::consts::LOG2_E));
+            if !weight.simd_gt(LEAST_COUNTED).any_true() {
+                continue;
+            }
+            own.counted |= 1 << tap;
+            // What slopes add takes the neighbours, so it ends where weights do.
+            let has_weight = weight.simd_gt(LEAST_WEIGHT as f32);
+            if has_weight.any_true() {
+                own.counted |= (2 << tap) | ((1 << tap) >> 1);
+            }
+            (before, after) = (has_weight.select(before, none), has_weight.select(after, none));
             let slope = -(weight * scaled * inverse);
             let moment = weight * away;
             let moment_slope = slope.mul_add(away, weight);

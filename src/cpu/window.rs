@@ -3,8 +3,8 @@
 use super::vector::{Lanes, each, four, words};
 use fearless_simd::{Simd, f32x4, i16x16, i32x8, prelude::*, u32x8};
 
-/// Where `N` samples along each axis around eight places lie in memory.
-pub struct Window<'a, T, const N: usize> {
+/// Where `N` samples of each of `R` rows of `R` slices around eight places lie in memory.
+pub struct Window<'a, T, const N: usize, const R: usize = N> {
     samples: &'a [T],
     /// The first sample of each lane.
     places: [usize; 8],
@@ -13,12 +13,12 @@ pub struct Window<'a, T, const N: usize> {
     slice: usize,
 }
 
-impl<'a, T: Copy, const N: usize> Window<'a, T, N> {
+impl<'a, T: Copy, const N: usize, const R: usize> Window<'a, T, N, R> {
     /// # Panics
     /// Where a window leaves the samples.
     #[inline(always)]
     pub fn new(samples: &'a [T], places: [usize; 8], row: usize, slice: usize) -> Self {
-        let room = samples.len().checked_sub((N - 1) * (row + slice) + N);
+        let room = samples.len().checked_sub((R - 1) * (row + slice) + N);
         let is_inside = room.is_some_and(|room| {
             let ends = each!([0, 1, 2, 3, 4, 5, 6, 7], I => places[I] > room);
             ends == [false; 8]
@@ -31,7 +31,7 @@ impl<'a, T: Copy, const N: usize> Window<'a, T, N> {
     #[inline(always)]
     #[expect(unsafe_code, reason = "eight checks for a window, instead of two for each of its 128 rows: twice as fast")]
     fn row<const W: usize>(&self, lane: usize, [first, row, slice]: [usize; 3]) -> [T; W] {
-        assert!(first + W <= N && row < N && slice < N, "a row of no window");
+        assert!(first + W <= N && row < R && slice < R, "a row of no window");
         let place = self.places[lane] + first + row * self.row + slice * self.slice;
         // SAFETY: `new` found that the last row of the last slice ends in the samples; others end before it.
         unsafe { self.samples.as_ptr().add(place).cast::<[T; W]>().read_unaligned() }
@@ -77,10 +77,18 @@ pub trait Sample: Copy + Send + Sync {
     ) -> [Lanes<S>; 2];
 
     /// Four samples of a window, from one of a row of a slice on.
-    fn four<S: Simd, const N: usize>(simd: S, window: &Window<Self, N>, first: [usize; 3]) -> [Lanes<S>; 4];
+    fn four<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 4];
 
     /// Two samples of a window.
-    fn two<S: Simd, const N: usize>(simd: S, window: &Window<Self, N>, first: [usize; 3]) -> [Lanes<S>; 2];
+    fn two<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 2];
 
     fn value(self) -> f32;
 }
@@ -158,13 +166,21 @@ impl Sample for u8 {
     }
 
     #[inline(always)]
-    fn four<S: Simd, const N: usize>(simd: S, window: &Window<Self, N>, first: [usize; 3]) -> [Lanes<S>; 4] {
+    fn four<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 4] {
         let words = words!(simd, L => u32::from_le_bytes(window.row(L, first)));
         four!(I => Lanes::float_from(((words >> (8 * I as u32)) & 0xff).bitcast::<i32x8<S>>()))
     }
 
     #[inline(always)]
-    fn two<S: Simd, const N: usize>(simd: S, window: &Window<Self, N>, first: [usize; 3]) -> [Lanes<S>; 2] {
+    fn two<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 2] {
         let words = words!(simd, L => u32::from(u16::from_le_bytes(window.row(L, first))));
         [Lanes::float_from((words & 0xff).bitcast::<i32x8<S>>()), Lanes::float_from((words >> 8).bitcast::<i32x8<S>>())]
     }
@@ -205,7 +221,7 @@ macro_rules! two_bytes {
             }
 
             #[inline(always)]
-            fn four<S: Simd, const N: usize>(simd: S, window: &Window<Self, N>, first: [usize; 3]) -> [Lanes<S>; 4] {
+            fn four<S: Simd, const N: usize, const R: usize>(simd: S, window: &Window<Self, N, R>, first: [usize; 3]) -> [Lanes<S>; 4] {
                 let [a, b] = each!([0, 2], I => {
                     let [at, row, slice] = first;
                     let $word = words!(simd, L => in_word(window.row(L, [at + I, row, slice])));
@@ -215,7 +231,7 @@ macro_rules! two_bytes {
             }
 
             #[inline(always)]
-            fn two<S: Simd, const N: usize>(simd: S, window: &Window<Self, N>, first: [usize; 3]) -> [Lanes<S>; 2] {
+            fn two<S: Simd, const N: usize, const R: usize>(simd: S, window: &Window<Self, N, R>, first: [usize; 3]) -> [Lanes<S>; 2] {
                 let $word = words!(simd, L => in_word(window.row(L, first)));
                 [Lanes::float_from($first), Lanes::float_from($second)]
             }
@@ -267,7 +283,11 @@ impl Sample for i32 {
     rows_of_floats!();
 
     #[inline(always)]
-    fn four<S: Simd, const N: usize>(simd: S, window: &Window<Self, N>, first: [usize; 3]) -> [Lanes<S>; 4] {
+    fn four<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 4] {
         columns(
             simd,
             each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
@@ -278,7 +298,11 @@ impl Sample for i32 {
     }
 
     #[inline(always)]
-    fn two<S: Simd, const N: usize>(simd: S, window: &Window<Self, N>, first: [usize; 3]) -> [Lanes<S>; 2] {
+    fn two<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 2] {
         pairs(
             simd,
             each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
@@ -298,12 +322,20 @@ impl Sample for f32 {
     rows_of_floats!();
 
     #[inline(always)]
-    fn four<S: Simd, const N: usize>(simd: S, window: &Window<Self, N>, first: [usize; 3]) -> [Lanes<S>; 4] {
+    fn four<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 4] {
         columns(simd, each!([0, 1, 2, 3, 4, 5, 6, 7], L => window.row(L, first)))
     }
 
     #[inline(always)]
-    fn two<S: Simd, const N: usize>(simd: S, window: &Window<Self, N>, first: [usize; 3]) -> [Lanes<S>; 2] {
+    fn two<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 2] {
         pairs(simd, each!([0, 1, 2, 3, 4, 5, 6, 7], L => window.row(L, first)))
     }
 
