@@ -576,8 +576,8 @@ pub enum Evaluate {
     /// Gathers what can be gathered, and scatters the rest.
     #[default]
     Auto,
-    /// Each pixel adds up the kernels that reach its ray. Takes one volume on a Cartesian lattice with a Gaussian kernel, and
-    /// whatever surfaces are in the same scene; other scenes are an error. It is the faster way.
+    /// Each pixel adds up the kernels that reach its ray. Takes one volume, of the GPU engine one on a Cartesian lattice with a
+    /// Gaussian kernel, and whatever surfaces are in the same scene; other scenes are an error. It is the faster way.
     Gather,
     /// Each splat is added to the pixels that it covers.
     Scatter,
