@@ -314,11 +314,9 @@ impl Scene {
                         _ if volume.coefficients.is_some() => 2.0 / 3.0,
                         _ => 4.0 / 3.0,
                     };
-                    let mut step = most.min(2.0 / 3.0 * kernel.extent) * volume.lattice.kernel_spacing();
-                    if volume.lattice.arrangement == Arrangement::Cartesian {
-                        // Lattices with steps of very different lengths stay thin enough to be gathered.
-                        step = step.min(MOST_GATHERED * volume.lattice.least_kernel_spacing());
-                    }
+                    let step = most.min(2.0 / 3.0 * kernel.extent) * volume.lattice.kernel_spacing();
+                    // Sheets of lattices with steps of very different lengths stay thin enough to be gathered.
+                    let step = step.min(MOST_GATHERED * volume.lattice.least_kernel_spacing());
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
                 }
                 Item::Bricks(bricks, kernel, _) if settings.sheet_thickness.is_none() => {
@@ -578,8 +576,8 @@ pub enum Evaluate {
     /// Gathers what can be gathered, and scatters the rest.
     #[default]
     Auto,
-    /// Each pixel adds up the kernels that reach its ray. Takes one volume on a Cartesian lattice with a Gaussian kernel, and
-    /// whatever surfaces are in the same scene; other scenes are an error. It is the faster way.
+    /// Each pixel adds up the kernels that reach its ray. Takes one volume, of the GPU engine one on a Cartesian lattice with a
+    /// Gaussian kernel, and whatever surfaces are in the same scene; other scenes are an error. It is the faster way.
     Gather,
     /// Each splat is added to the pixels that it covers.
     Scatter,

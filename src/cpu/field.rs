@@ -8,6 +8,7 @@
 //! samples go on mirrored at the outermost ones, so the weights always add up to 1.
 
 use super::{
+    blend::{Blend, Point},
     brick_cache::{BESIDE, Grid, SLOT, SLOT_SIDE},
     vector::{Lanes, each, exp2_within, four, three, words},
     window::{Sample, Weights, Window, row_of},
@@ -21,7 +22,9 @@ use fearless_simd::{Simd, i32x8, mask32x8, prelude::*};
 /// How far a place may lie outside the lattice and still have a sample in reach, in steps.
 pub const BEYOND: f32 = 1.999;
 /// Weights that samples out of reach may have, beside 1 at the centre.
-const LEAST_WEIGHT: f64 = 5e-3;
+pub const LEAST_WEIGHT: f64 = 5e-3;
+/// The least standard deviation of a kernel, in steps, whose weights 32 bits hold.
+pub const LEAST_DEVIATION: f64 = 0.3;
 
 /// How the samples around a place are weighed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,27 +61,36 @@ pub enum Typed<'a> {
 }
 
 impl<'a> Typed<'a> {
-    /// The field of a volume, whose values count from `zero`. A sharp one has coefficients for a tensor product.
+    /// The field of a volume, whose values count from `zero`. A sharp one has coefficients in the samples' place.
     pub fn new(volume: &'a Volume, weighting: Weighting, zero: f64) -> Self {
-        let dims = volume.lattice.dims;
+        Self::of_volume(volume, Shape::new(weighting), zero)
+    }
+
+    /// The same by sums over samples.
+    pub fn blended(volume: &'a Volume, blend: &'a Blend, zero: f64) -> Self {
+        Self::of_volume(volume, Shape::Blend(blend), zero)
+    }
+
+    fn of_volume(volume: &'a Volume, shape: Shape<'a>, zero: f64) -> Self {
+        let dims = volume.drawn_lattice().dims;
         match &volume.coefficients {
-            Some(coefficients) => Self::F32(Field::new(&coefficients.values, dims, Memory::Rows, weighting, zero)),
-            None => Self::in_memory(&volume.samples, dims, Memory::Rows, weighting, zero),
+            Some(coefficients) => Self::F32(Field::new(&coefficients.values, dims, Memory::Rows, shape, zero)),
+            None => Self::in_memory(&volume.samples, dims, Memory::Rows, shape, zero),
         }
     }
 
     /// The field of a level of a volume in bricks; `samples` are those of all slots, at least of one.
     pub fn of_bricks(samples: &'a Samples, dims: [usize; 3], grid: &'a Grid, weighting: Weighting, zero: f64) -> Self {
-        Self::in_memory(samples, dims, Memory::Slots(grid), weighting, zero)
+        Self::in_memory(samples, dims, Memory::Slots(grid), Shape::new(weighting), zero)
     }
 
-    fn in_memory(samples: &'a Samples, dims: [usize; 3], memory: Memory<'a>, weighting: Weighting, zero: f64) -> Self {
+    fn in_memory(samples: &'a Samples, dims: [usize; 3], memory: Memory<'a>, shape: Shape<'a>, zero: f64) -> Self {
         match samples {
-            Samples::U8(samples) => Self::U8(Field::new(samples, dims, memory, weighting, zero)),
-            Samples::U16(samples) => Self::U16(Field::new(samples, dims, memory, weighting, zero)),
-            Samples::I16(samples) => Self::I16(Field::new(samples, dims, memory, weighting, zero)),
-            Samples::I32(samples) => Self::I32(Field::new(samples, dims, memory, weighting, zero)),
-            Samples::F32(samples) => Self::F32(Field::new(samples, dims, memory, weighting, zero)),
+            Samples::U8(samples) => Self::U8(Field::new(samples, dims, memory, shape, zero)),
+            Samples::U16(samples) => Self::U16(Field::new(samples, dims, memory, shape, zero)),
+            Samples::I16(samples) => Self::I16(Field::new(samples, dims, memory, shape, zero)),
+            Samples::I32(samples) => Self::I32(Field::new(samples, dims, memory, shape, zero)),
+            Samples::F32(samples) => Self::F32(Field::new(samples, dims, memory, shape, zero)),
         }
     }
 }
@@ -88,7 +100,7 @@ pub struct Field<'a, T> {
     samples: &'a [T],
     dims: [usize; 3],
     memory: Memory<'a>,
-    shape: Shape,
+    shape: Shape<'a>,
     zero: f32,
 }
 
@@ -103,11 +115,22 @@ enum Memory<'a> {
 
 /// The kernel between samples.
 #[derive(Clone, Copy)]
-enum Shape {
+enum Shape<'a> {
     Gaussian(Bell),
     Linear,
     /// Four weights an axis, of the factors of 1, t, t² and t³.
     Cubic([[f32; 4]; 4]),
+    Blend(&'a Blend),
+}
+
+impl Shape<'_> {
+    fn new(weighting: Weighting) -> Self {
+        match weighting {
+            Weighting::Gaussian(sigma) => Self::Gaussian(Bell::new(sigma)),
+            Weighting::Tensor(Tensor::Linear) => Self::Linear,
+            Weighting::Tensor(tensor) => Self::Cubic(polynomials(tensor)),
+        }
+    }
 }
 
 /// A Gaussian along an axis.
@@ -127,19 +150,14 @@ struct Taps<S: Simd> {
 }
 
 impl<'a, T: Sample> Field<'a, T> {
-    fn new(samples: &'a [T], dims: [usize; 3], memory: Memory<'a>, weighting: Weighting, zero: f64) -> Self {
-        let shape = match weighting {
-            Weighting::Gaussian(sigma) => Shape::Gaussian(Bell::new(sigma)),
-            Weighting::Tensor(Tensor::Linear) => Shape::Linear,
-            Weighting::Tensor(tensor) => Shape::Cubic(polynomials(tensor)),
-        };
+    fn new(samples: &'a [T], dims: [usize; 3], memory: Memory<'a>, shape: Shape<'a>, zero: f64) -> Self {
         Self { samples, dims, memory, shape, zero: zero as f32 }
     }
 
-    /// Values, counted from zero, and their changes a step along each axis, at places in steps.
+    /// Values, counted from zero, and their changes a step along each axis, at places in steps on rays that go a `way`.
     #[inline(always)]
-    pub fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
-        match &self.shape {
+    pub fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3], way: [Lanes<S>; 3]) -> Point<S> {
+        let (value, slopes) = match &self.shape {
             Shape::Gaussian(bell) => self.gaussian(simd, bell, place),
             Shape::Linear => self.linear(simd, place),
             // A function of its own: large, and asked for at three places.
@@ -147,7 +165,9 @@ impl<'a, T: Sample> Field<'a, T> {
                 #[inline(always)]
                 || self.cubic(simd, factors, place),
             ),
-        }
+            Shape::Blend(blend) => return blend.at(simd, self.samples, self.zero, place, way),
+        };
+        Point { value, slopes, weight: Lanes::splat(simd, 1.0) }
     }
 }
 
@@ -378,8 +398,8 @@ impl<T: Sample> Field<'_, T> {
         }
         let [x, y, z]: [Lanes<S>; 3] = three!(I => place[I] - first[I]);
         // The rows of the near slice, then those of the far one, with their changes along x.
-        let window = self.window(first);
-        let pairs = four!(I => T::two(simd, &window, I % 2, I / 2));
+        let window: Window<T, 2> = self.window(first);
+        let pairs = four!(I => T::two(simd, &window, [0, I % 2, I / 2]));
         let rises = four!(I => pairs[I][1] - pairs[I][0]);
         let rows = four!(I => x.mul_add(rises[I], pairs[I][0] - self.zero));
         let along_x = [y.mul_add(rises[1] - rises[0], rises[0]), y.mul_add(rises[3] - rises[2], rises[2])];
@@ -569,7 +589,7 @@ trait Rows<S: Simd> {
 impl<S: Simd, T: Sample> Rows<S> for Window<'_, T, 4> {
     #[inline(always)]
     fn four(&self, simd: S, row: usize, slice: usize) -> [Lanes<S>; 4] {
-        T::four(simd, self, row, slice)
+        T::four(simd, self, [0, row, slice])
     }
 }
 
@@ -649,7 +669,8 @@ mod tests {
 
     fn found(volume: &Volume, weighting: Weighting, places: [[f32; 8]; 3], zero: f64) -> [[f32; 8]; 4] {
         fn at<T: Sample, S: Simd>(simd: S, field: &Field<T>, places: [[f32; 8]; 3]) -> [[f32; 8]; 4] {
-            let (value, [x, y, z]) = field.at(simd, three!(I => places[I].simd_into(simd)));
+            let places = three!(I => places[I].simd_into(simd));
+            let Point { value, slopes: [x, y, z], .. } = field.at(simd, places, places);
             [value, x, y, z].map(Into::into)
         }
         let level = Level::new();

@@ -1,9 +1,10 @@
 //! The field of a lattice in a sheet, gathered: each ray asks which kernels reach the planes of the sheet.
 
 use super::{
+    blend::{MOST_TAPS, Point, Way},
     brick_cache::Grid,
     close::{Face, Layer, OPAQUE, Visible},
-    field::{self, BEYOND, Typed, Weighting},
+    field::{self, BEYOND, LEAST_DEVIATION, Typed, Weighting},
     march::is_marked,
     plan::Plan,
     rays::Rays,
@@ -14,7 +15,7 @@ use super::{
 use crate::{
     math::{Kernel, Sheets},
     scene::{Gradient, Item, MOST_GATHERED, Mode, Optics, Scene, Settings},
-    volume::{Arrangement, Volume, bricks::Choice},
+    volume::{Volume, bricks::Choice},
 };
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
@@ -22,12 +23,12 @@ use fearless_simd::{Simd, mask32x8, prelude::*};
 /// sample.
 const STRAIGHT: f32 = 64.0;
 
-/// The least standard deviation of a kernel, in steps, whose weights 32 bits hold.
-const LEAST_DEVIATION: f64 = 0.3;
-
-/// Why the field of a scene can't be gathered; none where it can: samples on a Cartesian lattice, kernels of which four weights
-/// an axis hold all.
-pub fn obstacle(scene: &Scene, settings: &Settings) -> Option<&'static str> {
+/// Why the field of a scene can't be gathered; none where it can. `unsuited` tells what is wrong with a volume and its kernel.
+pub fn obstacle(
+    scene: &Scene,
+    settings: &Settings,
+    unsuited: impl Fn(&Volume, &Kernel) -> Option<&'static str>,
+) -> Option<&'static str> {
     let fields = scene.items.iter().filter(|item| !matches!(item, Item::Radiance(_) | Item::Hierarchy(_)));
     let unsuited = match fields.collect::<Vec<_>>()[..] {
         [Item::Volume(volume, kernel, _)] => unsuited(volume, kernel),
@@ -64,16 +65,11 @@ pub fn parts(scene: &Scene, sheets: &Sheets, choice: Option<&Choice>) -> usize {
 
 /// Why a volume can't be gathered, whatever the settings.
 pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
-    if volume.lattice.arrangement != Arrangement::Cartesian {
-        return Some("body-centred and rectilinear lattices");
-    }
-    if volume.coefficients.is_some() && kernel.as_tensor().is_none() {
-        return Some("sharp volumes of radial kernels");
-    }
-    unsuited_kernel(kernel)
+    Way::of(volume, kernel).err()
 }
 
-fn unsuited_kernel(kernel: &Kernel) -> Option<&'static str> {
+/// Why a kernel can't be gathered by four weights an axis.
+pub fn unsuited_kernel(kernel: &Kernel) -> Option<&'static str> {
     match field::weighting(kernel) {
         None => Some("kernels other than tensor products and Gaussians that reach two samples"),
         Some(Weighting::Gaussian(sigma)) if sigma < LEAST_DEVIATION => Some("kernels much narrower than a sample"),
@@ -92,6 +88,8 @@ pub struct Gather<'a> {
     /// Parts of a sheet at whose ends what shows is looked up. None where sheets are no thicker than the lattice's steps: all
     /// of one lies within half a step of its middle.
     pub looks: usize,
+    /// There may be places without a field, and places where kernels add up to more than elsewhere.
+    pub is_blended: bool,
     pub visible: &'a Visible,
     /// What values count from.
     pub zero: f32,
@@ -109,6 +107,8 @@ pub struct Level<'a> {
     /// Steps of the level to each step of the lattice along each axis, and where the lattice's first sample is in it.
     pub scale: [f32; 3],
     pub shift: [f32; 3],
+    /// The same of the cells that are looked up for what they show.
+    pub cells: [[f32; 3]; 2],
 }
 
 impl Level<'_> {
@@ -118,18 +118,25 @@ impl Level<'_> {
         three!(I => place[I] * self.scale[I] + self.shift[I])
     }
 
+    /// A place in cells that are looked up.
+    #[inline(always)]
+    fn cell<S: Simd>(&self, place: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
+        let [scale, shift] = &self.cells;
+        three!(I => place[I] * scale[I] + shift[I])
+    }
+
     /// The field at places in steps of the level, and its change a step along each axis.
     #[inline(always)]
-    fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
+    fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3], way: [Lanes<S>; 3]) -> Point<S> {
         // A function of its own for each type of samples, else each would be compiled wherever this one is called.
         simd.vectorize(
             #[inline(always)]
             || match &self.field {
-                Typed::U8(field) => field.at(simd, place),
-                Typed::U16(field) => field.at(simd, place),
-                Typed::I16(field) => field.at(simd, place),
-                Typed::I32(field) => field.at(simd, place),
-                Typed::F32(field) => field.at(simd, place),
+                Typed::U8(field) => field.at(simd, place, way),
+                Typed::U16(field) => field.at(simd, place, way),
+                Typed::I16(field) => field.at(simd, place, way),
+                Typed::I32(field) => field.at(simd, place, way),
+                Typed::F32(field) => field.at(simd, place, way),
             },
         )
     }
@@ -154,6 +161,7 @@ pub struct Last<S: Simd> {
     plane: usize,
     face: Face<S>,
     along: Lanes<S>,
+    weight: Lanes<S>,
     /// The first sheet of those looked up, and a bit for each ray on which something may show in a sheet.
     first: usize,
     shows: [u8; LOOKED_UP],
@@ -164,7 +172,14 @@ impl<S: Simd> Last<S> {
     pub fn new(simd: S) -> Self {
         let none = Lanes::splat(simd, 0.0);
         let face = Face { value: none, across: [none; 3] };
-        Self { plane: usize::MAX, face, along: none, first: usize::MAX - LOOKED_UP, shows: [0; LOOKED_UP] }
+        Self {
+            plane: usize::MAX,
+            face,
+            along: none,
+            weight: none,
+            first: usize::MAX - LOOKED_UP,
+            shows: [0; LOOKED_UP],
+        }
     }
 }
 
@@ -220,7 +235,7 @@ impl Gather<'_> {
         if last.plane != sheet {
             self.face(simd, plan, rays, sheet, last);
         }
-        let (front, front_along) = (last.face, last.along);
+        let (front, front_along, front_weight) = (last.face, last.along, last.weight);
         self.face(simd, plan, rays, sheet + 1, last);
         let (back, back_along) = (last.face, last.along);
         let thickness = stop - start;
@@ -232,54 +247,92 @@ impl Gather<'_> {
         let direction = rays.direction;
         let mut layer = Layer { front, back, middle, start, thickness, begin, end, filling, direction };
         if self.parts > 1 {
-            self.fill_thick(simd, plan, rays, &mut layer);
+            let mask = mask & self.fill_thick(simd, plan, rays, [front_weight, last.weight], &mut layer);
+            let shows = plan.optics == Optics::Maximum || self.visible.may_show(simd, plan, &layer);
+            return (shows && mask.any_true()).then_some((layer, mask));
+        }
+        if self.is_blended {
+            let least = front_weight.min(last.weight);
+            let has_gaps = (mask & least.simd_le(0.0)).any_true();
+            if !has_gaps && plan.optics != Optics::Maximum && !self.visible.may_show(simd, plan, &layer) {
+                return None;
+            }
+            if !has_gaps && !bend.abs().simd_gt(STRAIGHT).any_true() {
+                return Some((layer, mask));
+            }
+            let inside = self.at(simd, rays, 0.5 * (start + stop));
+            let has_field = layer.blend(simd, plan, bend, [front_weight, last.weight], &inside);
+            let mask = mask & has_field;
+            let shows = plan.optics == Optics::Maximum || self.visible.may_show(simd, plan, &layer);
+            return (shows && mask.any_true()).then_some((layer, mask));
         }
         if plan.optics != Optics::Maximum && !self.visible.may_show(simd, plan, &layer) {
             return None;
         }
-        if self.parts == 1 && bend.abs().simd_gt(STRAIGHT).any_true() {
-            // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with slopes).
-            let inside = self.at(simd, rays.place(0.5 * (start + stop))).0 * plan.frame.transfer[1];
-            let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
-            layer.middle = mean * 1.5 - sum * 0.25;
+        if !bend.abs().simd_gt(STRAIGHT).any_true() {
+            return Some((layer, mask));
         }
+        // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with slopes).
+        let inside = self.at(simd, rays, 0.5 * (start + stop)).value * plan.frame.transfer[1];
+        let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
+        layer.middle = mean * 1.5 - sum * 0.25;
         Some((layer, mask))
     }
 
-    /// Gives a sheet of some parts its mean. Where the field ends with the lattice, only what lies around samples counts, and an
-    /// end without any takes the mean.
-    fn fill_thick<S: Simd>(&self, simd: S, plan: &Plan, rays: &Rays<S>, layer: &mut Layer<S>) {
+    /// Gives a sheet of some parts its mean, and tells where it has one. A place counts by what kernels add up to there; an end
+    /// without a value takes the mean. `weights`: at the ends.
+    fn fill_thick<S: Simd>(
+        &self,
+        simd: S,
+        plan: &Plan,
+        rays: &Rays<S>,
+        weights: [Lanes<S>; 2],
+        layer: &mut Layer<S>,
+    ) -> mask32x8<S> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let start = Lanes::splat(simd, layer.start);
+                let none = Lanes::splat(simd, 0.0);
+                let start = none + layer.start;
                 let stop = start + layer.thickness;
                 let (mut from, mut to) = (start, stop);
-                if self.ends.is_some() {
-                    let [enter, leave] = rays.in_lattice(simd, plan, BEYOND);
+                if self.is_blended || self.ends.is_some() {
+                    let reach = if self.is_blended { MOST_TAPS as f32 } else { BEYOND };
+                    let [enter, leave] = rays.in_lattice(simd, plan, reach);
                     (from, to) = (enter.max(start).min(stop), leave.min(stop).max(start));
                 }
+                let least = plan.frame.isotropic[3];
                 let step = (to - from) * (1.0 / self.parts as f32);
-                let (mut sum, mut weights) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 0.0));
+                let (mut sum, mut all) = (none, none);
                 for part in 0..self.parts {
                     for place in GAUSS {
                         let place = rays.places(step.mul_add(place + part as f32, from));
-                        let weight = self.kernels_at(simd, plan, place);
-                        sum = weight.mul_add(self.at(simd, place).0, sum);
-                        weights += weight;
+                        let point = self.at_place(simd, rays, place);
+                        let weight = if self.is_blended {
+                            point.weight.simd_gt(0.0).select(point.weight + least, none)
+                        } else {
+                            self.kernels_at(simd, plan, place)
+                        };
+                        sum = weight.mul_add(point.value, sum);
+                        all += weight;
                     }
                 }
-                let mean = sum / weights.max(Lanes::splat(simd, f32::MIN_POSITIVE)) * plan.frame.transfer[1];
-                let (mut front, mut back) = (layer.front, layer.back);
-                if let Some(per_deviation) = self.ends {
+                let mean = sum / all.max(Lanes::splat(simd, f32::MIN_POSITIVE)) * plan.frame.transfer[1];
+                let (front, back) = (layer.front, layer.back);
+                let has_value = if self.is_blended {
+                    each!([0, 1], I => weights[I].simd_gt(0.0))
+                } else if let Some(per_deviation) = self.ends {
                     let most = (LAST_VALUE / per_deviation).powi(2);
                     let ends = [layer.start, layer.start + layer.thickness];
-                    let has_value = each!([0, 1], I => outside2(simd, plan, rays.place(ends[I])).simd_le(most));
-                    front = layer.front.or(simd, has_value[0], mean, &layer.back, has_value[1]);
-                    back = layer.back.or(simd, has_value[1], mean, &layer.front, has_value[0]);
-                }
-                (layer.front, layer.back) = (front, back);
-                layer.middle = mean * 1.5 - (front.value + back.value) * 0.25;
+                    each!([0, 1], I => outside2(simd, plan, rays.place(ends[I])).simd_le(most))
+                } else {
+                    [mask32x8::splat(simd, true); 2]
+                };
+                layer.front = front.or(simd, has_value[0], mean, &back, has_value[1]);
+                layer.back = back.or(simd, has_value[1], mean, &front, has_value[0]);
+                layer.middle = mean * 1.5 - (layer.front.value + layer.back.value) * 0.25;
+                let per_thickness = step * (0.5 / layer.thickness);
+                if self.is_blended { (all * per_thickness).simd_gt(least) } else { mask32x8::splat(simd, true) }
             },
         )
     }
@@ -340,19 +393,25 @@ impl Gather<'_> {
     fn shows<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> u64 {
         let mut shows = 0;
         for level in &self.levels {
-            shows |= level.shown.at(simd, level.place(place));
+            shows |= level.shown.at(simd, level.cell(place));
         }
         shows
     }
 
-    /// The field at places in steps of the lattice, and its change a step along each axis.
+    /// The field at a distance along rays, and its change a step of the lattice along each axis.
     #[inline(always)]
-    fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
+    fn at<S: Simd>(&self, simd: S, rays: &Rays<S>, distance: f32) -> Point<S> {
+        self.at_place(simd, rays, rays.place(distance))
+    }
+
+    /// The same at places on rays, in steps of the lattice.
+    #[inline(always)]
+    fn at_place<S: Simd>(&self, simd: S, rays: &Rays<S>, place: [Lanes<S>; 3]) -> Point<S> {
         match &self.levels[..] {
-            [level] if level.grid.is_none() => level.at(simd, place),
+            [level] if level.grid.is_none() => level.at(simd, level.place(place), rays.way),
             levels => simd.vectorize(
                 #[inline(always)]
-                || self.mean(simd, levels, place),
+                || self.mean(simd, levels, place, rays.way),
             ),
         }
     }
@@ -360,7 +419,7 @@ impl Gather<'_> {
     /// The mean of levels in bricks by their shares. A level has none where it has no brick; where no level has one, nothing
     /// shows.
     #[inline(always)]
-    fn mean<S: Simd>(&self, simd: S, levels: &[Level], place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
+    fn mean<S: Simd>(&self, simd: S, levels: &[Level], place: [Lanes<S>; 3], way: [Lanes<S>; 3]) -> Point<S> {
         let none = Lanes::splat(simd, 0.0);
         let (mut all, mut value, mut slopes, mut hidden) = (none, none, [none; 3], none);
         for level in levels {
@@ -372,13 +431,14 @@ impl Gather<'_> {
                 continue;
             }
             let share = is_held.select(Lanes::splat(simd, level.share), none);
-            let (own, own_slopes) = level.at(simd, place);
+            let Point { value: own, slopes: own_slopes, .. } = level.at(simd, place, way);
             all += share;
             value = share.mul_add(own, value);
             slopes = three!(I => (share * level.scale[I]).mul_add(own_slopes[I], slopes[I]));
         }
         let inverse = Lanes::splat(simd, 1.0) / all.max(Lanes::splat(simd, f32::MIN_POSITIVE));
-        (all.simd_gt(0.0).select(value * inverse, hidden), three!(I => slopes[I] * inverse))
+        let value = all.simd_gt(0.0).select(value * inverse, hidden);
+        Point { value, slopes: three!(I => slopes[I] * inverse), weight: Lanes::splat(simd, 1.0) }
     }
 
     /// Finds the field on a plane, and its change along the rays a world unit.
@@ -386,7 +446,7 @@ impl Gather<'_> {
     fn face<S: Simd>(&self, simd: S, plan: &Plan, rays: &Rays<S>, plane: usize, last: &mut Last<S>) {
         let frame = &plan.frame;
         let per_value = frame.transfer[1];
-        let (value, slopes) = self.at(simd, rays.place(plan.planes[plane]));
+        let Point { value, slopes, weight } = self.at(simd, rays, plan.planes[plane]);
         // From steps of the lattice to view space.
         let axes = &frame.field_axes;
         let gradient = three!(I => {
@@ -395,7 +455,49 @@ impl Gather<'_> {
         let along = dot(gradient, rays.direction);
         let length = frame.gradients[2];
         let across = three!(I => (gradient[I] - along * rays.direction[I]) * length);
-        (last.plane, last.along) = (plane, along);
+        (last.plane, last.along, last.weight) = (plane, along, weight);
         last.face = Face { value: value * per_value, across };
+    }
+}
+
+impl<S: Simd> Layer<S> {
+    /// Counts the field where kernels add up to more the more, takes the other values where one is missing, and tells where there
+    /// is a field. `weights`: at the faces; `inside`: in the middle; `bend`: how much slopes at the faces differ.
+    #[inline(always)]
+    fn blend(
+        &mut self,
+        simd: S,
+        plan: &Plan,
+        bend: Lanes<S>,
+        [front, back]: [Lanes<S>; 2],
+        inside: &Point<S>,
+    ) -> mask32x8<S> {
+        let none = Lanes::splat(simd, 0.0);
+        let least = plan.frame.isotropic[3];
+        let [has_front, has_inside, has_back] = [front, inside.weight, back].map(
+            #[inline(always)]
+            |weight| weight.simd_gt(0.0),
+        );
+        let values = [self.front.value, inside.value * plan.frame.transfer[1], self.back.value];
+        // Simpson's rule for the sums of weights and of values. Of fields without a value at a place nothing counts there.
+        let shares = [
+            has_front.select(front + least, none) * (1.0 / 6.0),
+            has_inside.select(inside.weight + least, none) * (4.0 / 6.0),
+            has_back.select(back + least, none) * (1.0 / 6.0),
+        ];
+        let weight = shares[0] + shares[1] + shares[2];
+        let value = shares[0] * values[0] + shares[1] * values[1] + shares[2] * values[2];
+        let weighted = value / weight.max(Lanes::splat(simd, 1e-20));
+        // The rule with slopes is better, where there are all values.
+        let sum = values[0] + values[2];
+        let plain = (sum + values[1] * 4.0) * (1.0 / 6.0);
+        let smooth = (sum * 7.0 + values[1] * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
+        let has_all = has_front & has_inside & has_back;
+        let mean = has_all.select(weighted + (smooth - plain), weighted);
+        let (front, back) = (self.front, self.back);
+        self.front = front.or(simd, has_front, mean, &back, has_back);
+        self.back = back.or(simd, has_back, mean, &front, has_front);
+        self.middle = mean * 1.5 - (self.front.value + self.back.value) * 0.25;
+        weight.simd_gt(least)
     }
 }

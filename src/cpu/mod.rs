@@ -1,9 +1,9 @@
 //! The engine for processors: draws scenes without a GPU, by the same sheets.
 //!
 //! A tile of 8 × 8 pixels is walked front to back. *Splats* scatter: each adds its sections to the sheets that it meets
-//! (`scatter`). The field of a Gaussian on a lattice is *gathered* where that is exact: each pixel asks which kernels reach the
-//! planes between its sheets (`gather`). Then the sheet is classified, lit and composited (`close`). The GPU engine does the same
-//! in shaders; tests/cpu_equals_reference.rs compares both with the reference.
+//! (`scatter`). The field of a lattice is *gathered*: each pixel asks which kernels reach the planes between its sheets
+//! (`gather`). Then the sheet is classified, lit and composited (`close`). The GPU engine does the same in shaders;
+//! tests/cpu_equals_reference.rs compares both with the reference.
 //!
 //! | module | does |
 //! |---|---|
@@ -16,11 +16,15 @@
 //! | `rays` | the rays of eight pixels |
 //! | `scatter`, `sums` | adds splats to the open sheets |
 //! | `gather`, `field` | the field of a lattice at a place, and its gradient |
+//! | `blend` | the same by sums over samples, of other kernels and lattices |
+//! | `radial`, `bells`, `rectilinear` | the weights of these sums |
 //! | `window` | loads the samples around eight places |
 //! | `close` | classifies, lights and composites a sheet |
 //! | `vector` | functions of eight numbers at once |
 
+mod bells;
 mod bins;
+mod blend;
 mod brick_cache;
 mod close;
 pub(crate) mod field;
@@ -32,7 +36,9 @@ mod nodes;
 mod page_cache;
 mod plan;
 mod project;
+mod radial;
 mod rays;
+mod rectilinear;
 mod scatter;
 pub(crate) mod skip;
 mod sums;
@@ -53,6 +59,7 @@ use crate::{
     },
 };
 use bins::{BLOCK, Bins, TileLists};
+use blend::{Blend, Way};
 use brick_cache::Grid;
 use close::{NO_VALUE, Visible};
 use fearless_simd::{Level, dispatch};
@@ -76,6 +83,8 @@ pub struct CpuRenderer {
     prepared: Vec<Prepared>,
     /// The ranges of the field around the samples of a lattice that is gathered.
     ranges: Option<Vec<[u8; 2]>>,
+    /// How it is summed, where that takes more than four weights an axis.
+    blend: Option<Blend>,
     /// What shows of it, for the transfer function's table of that.
     shown: Option<([u16; 256], Shown)>,
     /// The levels of a volume in bricks that is gathered, for the bricks of the last picture.
@@ -126,6 +135,7 @@ impl CpuRenderer {
             scene: scene.clone(),
             prepared: scene.items.iter().map(Prepared::new).collect(),
             ranges: None,
+            blend: None,
             shown: None,
             levels: None,
             pace: Pace::default(),
@@ -253,7 +263,7 @@ impl CpuRenderer {
                 )))
             });
         }
-        match gather::obstacle(&self.scene, settings) {
+        match gather::obstacle(&self.scene, settings, gather::unsuited) {
             Some(what) if settings.evaluate == Evaluate::Gather => {
                 Err(Error::Argument(format!("{what} can't be gathered; scatter instead, or leave it to the engine")))
             }
@@ -273,9 +283,16 @@ impl CpuRenderer {
                         Optics::Maximum => EVERYTHING,
                         _ => first_visible(transfer, volume.range),
                     };
-                    let ranges = self.ranges.get_or_insert_with(|| skip::field_ranges(volume, kernel));
+                    if let (None, Ok(Way::Blend(taps))) = (&self.blend, Way::of(volume, kernel)) {
+                        self.blend = Some(Blend::new(volume, kernel, taps));
+                    }
+                    let ranges = self.ranges.get_or_insert_with(|| match &self.blend {
+                        Some(blend) => blend.ranges(volume, kernel),
+                        None => skip::field_ranges(volume, kernel),
+                    });
+                    let dims = self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).dims;
                     self.shown.take_if(|(own, _)| *own != first);
-                    self.shown.get_or_insert_with(|| (first, Shown::new(volume, ranges, &first)));
+                    self.shown.get_or_insert_with(|| (first, Shown::new(dims, ranges, &first)));
                 }
                 (_, Prepared::Bricks(cache), Some(choice))
                     if self.levels.as_ref().is_none_or(|(own, _)| own != choice) =>
@@ -298,16 +315,24 @@ impl CpuRenderer {
             match (item, prepared) {
                 (Item::Volume(volume, kernel, _), _) => {
                     let (_, shown) = self.shown.as_ref()?;
-                    let field = Typed::new(volume, field::weighting(kernel)?, zero);
-                    let dims = volume.lattice.dims;
+                    let field = match &self.blend {
+                        Some(blend) => Typed::blended(volume, blend, zero),
+                        None => Typed::new(volume, field::weighting(kernel)?, zero),
+                    };
+                    // Coefficients begin before the samples.
+                    let drawn = volume.drawn_lattice();
+                    let before = volume.lattice.axes.inverse() * (volume.lattice.origin - drawn.origin);
+                    let shift = before.as_vec3().to_array();
+                    let cells = self.blend.as_ref().map_or([[1.0; 3], shift], |blend| blend.to_cells(shift));
                     levels.push(gather::Level {
                         field,
-                        dims,
+                        dims: drawn.dims,
                         grid: None,
                         shown,
                         share: 1.0,
                         scale: [1.0; 3],
-                        shift: [0.0; 3],
+                        shift,
+                        cells,
                     });
                 }
                 (Item::Bricks(bricks, kernel, _), Prepared::Bricks(cache)) if !cache.samples().is_empty() => {
@@ -321,13 +346,14 @@ impl CpuRenderer {
                         let shift = (to_own * (fine.origin - own.origin)).as_vec3().to_array();
                         let scale = [0, 1, 2].map(|axis| scale[axis][axis] as f32);
                         let share = *share as f32;
-                        levels.push(gather::Level { field, dims, grid: Some(grid), shown, share, scale, shift });
+                        let cells = [scale, shift];
+                        levels.push(gather::Level { field, dims, grid: Some(grid), shown, share, scale, shift, cells });
                     }
                 }
                 _ => {}
             }
         }
-        let finest = levels.first()?.scale;
+        let [finest, _] = levels.first()?.cells;
         let steps = (0..3).map(|axis| {
             let [x, y, z, _] = plan.frame.field_axes[axis];
             f64::from(x * x + y * y + z * z).sqrt() * f64::from(finest[axis])
@@ -340,13 +366,16 @@ impl CpuRenderer {
             _ => None,
         });
         let ends = deviation.map(|deviation| (1.0 / deviation) as f32);
-        Some(Gather { levels, parts, ends, looks, visible, zero: zero as f32 })
+        let is_blended = self.blend.is_some();
+        Some(Gather { levels, parts, ends, looks, is_blended, visible, zero: zero as f32 })
     }
 
     /// The lattices of the levels that are gathered.
     fn lattices(&self, outline: &Outline) -> Vec<Lattice> {
         let own = |item: &Item| match (item, &outline.choice) {
-            (Item::Volume(volume, ..), _) => Some(vec![volume.lattice.clone()]),
+            (Item::Volume(volume, ..), _) => {
+                Some(vec![self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).clone()])
+            }
             (Item::Bricks(bricks, ..), Some(choice)) => {
                 Some(choice.levels.iter().map(|(level, _)| bricks.lattice(*level)).collect())
             }

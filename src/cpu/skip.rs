@@ -59,9 +59,9 @@ pub fn field_ranges(volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
 }
 
 impl Shown {
-    /// `ranges`: the extremes around each sample; `first`: the least largest one that shows, for each smallest one.
-    pub fn new(volume: &Volume, ranges: &[[u8; 2]], first: &[u16; 256]) -> Self {
-        let dims = volume.lattice.dims;
+    /// `dims`: samples along each axis; `ranges`: the extremes around each; `first`: the least largest one that shows, for each
+    /// smallest one.
+    pub fn new(dims: [usize; 3], ranges: &[[u8; 2]], first: &[u16; 256]) -> Self {
         let shows = |[low, high]: [u8; 2]| u16::from(high) >= first[usize::from(low)];
         let blocks = dims.map(|n| n.div_ceil(BLOCK));
         let word = |block: usize| {
@@ -254,14 +254,12 @@ fn bit_of([x, y, z]: [usize; 3]) -> (usize, usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::volume::{Lattice, Samples};
 
     #[test]
     fn bits_are_in_the_order_of_the_samples() {
         let (dims, odd) = ([5, 3, 6], |sample: usize| sample * sample % 7 == 2);
-        let volume = Volume::new(Lattice::with_spacing(dims, DVec3::ONE), Samples::U8(vec![0; 90])).unwrap();
         let ranges: Vec<[u8; 2]> = (0..90).map(|sample| [0, if odd(sample) { 200 } else { 10 }]).collect();
-        let shown = Shown::new(&volume, &ranges, &[100; 256]);
+        let shown = Shown::new(dims, &ranges, &[100; 256]);
         for (word, bits) in shown.bits().into_iter().enumerate() {
             for bit in 0..32 {
                 let sample = 32 * word + bit;

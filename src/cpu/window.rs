@@ -3,8 +3,8 @@
 use super::vector::{Lanes, each, four, words};
 use fearless_simd::{Simd, f32x4, i16x16, i32x8, prelude::*, u32x8};
 
-/// Where `N` samples along each axis around eight places lie in memory.
-pub struct Window<'a, T, const N: usize> {
+/// Where `N` samples of each of `R` rows of `R` slices around eight places lie in memory.
+pub struct Window<'a, T, const N: usize, const R: usize = N> {
     samples: &'a [T],
     /// The first sample of each lane.
     places: [usize; 8],
@@ -13,12 +13,12 @@ pub struct Window<'a, T, const N: usize> {
     slice: usize,
 }
 
-impl<'a, T: Copy, const N: usize> Window<'a, T, N> {
+impl<'a, T: Copy, const N: usize, const R: usize> Window<'a, T, N, R> {
     /// # Panics
     /// Where a window leaves the samples.
     #[inline(always)]
     pub fn new(samples: &'a [T], places: [usize; 8], row: usize, slice: usize) -> Self {
-        let room = samples.len().checked_sub((N - 1) * (row + slice) + N);
+        let room = samples.len().checked_sub((R - 1) * (row + slice) + N);
         let is_inside = room.is_some_and(|room| {
             let ends = each!([0, 1, 2, 3, 4, 5, 6, 7], I => places[I] > room);
             ends == [false; 8]
@@ -27,14 +27,14 @@ impl<'a, T: Copy, const N: usize> Window<'a, T, N> {
         Self { samples, places, row, slice }
     }
 
-    /// A row of a slice of a lane.
+    /// Samples of a row of a slice of a lane, from one on.
     #[inline(always)]
     #[expect(unsafe_code, reason = "eight checks for a window, instead of two for each of its 128 rows: twice as fast")]
-    fn row(&self, lane: usize, row: usize, slice: usize) -> [T; N] {
-        assert!(row < N && slice < N, "a row of no window");
-        let place = self.places[lane] + row * self.row + slice * self.slice;
+    fn row<const W: usize>(&self, lane: usize, [first, row, slice]: [usize; 3]) -> [T; W] {
+        assert!(first + W <= N && row < R && slice < R, "a row of no window");
+        let place = self.places[lane] + first + row * self.row + slice * self.slice;
         // SAFETY: `new` found that the last row of the last slice ends in the samples; others end before it.
-        unsafe { self.samples.as_ptr().add(place).cast::<[T; N]>().read_unaligned() }
+        unsafe { self.samples.as_ptr().add(place).cast::<[T; W]>().read_unaligned() }
     }
 }
 
@@ -76,11 +76,19 @@ pub trait Sample: Copy + Send + Sync {
         zero: f32,
     ) -> [Lanes<S>; 2];
 
-    /// The samples of a row of a slice.
-    fn four<S: Simd>(simd: S, window: &Window<Self, 4>, row: usize, slice: usize) -> [Lanes<S>; 4];
+    /// Four samples of a window, from one of a row of a slice on.
+    fn four<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 4];
 
-    /// The same of a smaller window.
-    fn two<S: Simd>(simd: S, window: &Window<Self, 2>, row: usize, slice: usize) -> [Lanes<S>; 2];
+    /// Two samples of a window.
+    fn two<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 2];
 
     fn value(self) -> f32;
 }
@@ -155,19 +163,27 @@ impl Sample for u8 {
         weights: &Pairs<S>,
         _: f32,
     ) -> [Lanes<S>; 2] {
-        let words = words!(simd, L => u32::from_le_bytes(window.row(L, row, slice)));
+        let words = words!(simd, L => u32::from_le_bytes(window.row(L, [0, row, slice])));
         weights.sums([words & 0x00ff_00ff, (words >> 8) & 0x00ff_00ff])
     }
 
     #[inline(always)]
-    fn four<S: Simd>(simd: S, window: &Window<Self, 4>, row: usize, slice: usize) -> [Lanes<S>; 4] {
-        let words = words!(simd, L => u32::from_le_bytes(window.row(L, row, slice)));
+    fn four<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 4] {
+        let words = words!(simd, L => u32::from_le_bytes(window.row(L, first)));
         four!(I => Lanes::float_from(((words >> (8 * I as u32)) & 0xff).bitcast::<i32x8<S>>()))
     }
 
     #[inline(always)]
-    fn two<S: Simd>(simd: S, window: &Window<Self, 2>, row: usize, slice: usize) -> [Lanes<S>; 2] {
-        let words = words!(simd, L => u32::from(u16::from_le_bytes(window.row(L, row, slice))));
+    fn two<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 2] {
+        let words = words!(simd, L => u32::from(u16::from_le_bytes(window.row(L, first))));
         [Lanes::float_from((words & 0xff).bitcast::<i32x8<S>>()), Lanes::float_from((words >> 8).bitcast::<i32x8<S>>())]
     }
 
@@ -200,24 +216,25 @@ macro_rules! two_bytes {
                 weights: &Pairs<S>,
                 _: f32,
             ) -> [Lanes<S>; 2] {
-                let a = words!(simd, L => in_word(window.row(L, row, slice), 0));
-                let b = words!(simd, L => in_word(window.row(L, row, slice), 2));
+                let a = words!(simd, L => in_word(window.row(L, [0, row, slice])));
+                let b = words!(simd, L => in_word(window.row(L, [2, row, slice])));
                 let turned: u32 = $turned;
                 weights.sums([a ^ turned, b ^ turned])
             }
 
             #[inline(always)]
-            fn four<S: Simd>(simd: S, window: &Window<Self, 4>, row: usize, slice: usize) -> [Lanes<S>; 4] {
+            fn four<S: Simd, const N: usize, const R: usize>(simd: S, window: &Window<Self, N, R>, first: [usize; 3]) -> [Lanes<S>; 4] {
                 let [a, b] = each!([0, 2], I => {
-                    let $word = words!(simd, L => in_word(window.row(L, row, slice), I));
+                    let [at, row, slice] = first;
+                    let $word = words!(simd, L => in_word(window.row(L, [at + I, row, slice])));
                     [Lanes::float_from($first), Lanes::float_from($second)]
                 });
                 [a[0], a[1], b[0], b[1]]
             }
 
             #[inline(always)]
-            fn two<S: Simd>(simd: S, window: &Window<Self, 2>, row: usize, slice: usize) -> [Lanes<S>; 2] {
-                let $word = words!(simd, L => in_word(window.row(L, row, slice), 0));
+            fn two<S: Simd, const N: usize, const R: usize>(simd: S, window: &Window<Self, N, R>, first: [usize; 3]) -> [Lanes<S>; 2] {
+                let $word = words!(simd, L => in_word(window.row(L, first)));
                 [Lanes::float_from($first), Lanes::float_from($second)]
             }
 
@@ -233,8 +250,8 @@ two_bytes!(i16, 0, 0.0, word => (word << 16).bitcast::<i32x8<S>>() >> 16, word.b
 
 /// Two successive samples in a word.
 #[inline(always)]
-fn in_word<T: Into<i32> + Copy, const N: usize>(samples: [T; N], first: usize) -> u32 {
-    let (low, high): (i32, i32) = (samples[first].into(), samples[first + 1].into());
+fn in_word<T: Into<i32> + Copy>(samples: [T; 2]) -> u32 {
+    let (low, high): (i32, i32) = (samples[0].into(), samples[1].into());
     low as u32 & 0xffff | (high as u32) << 16
 }
 
@@ -259,7 +276,7 @@ macro_rules! rows_of_floats {
             weights: &[Lanes<S>; 4],
             zero: f32,
         ) -> [Lanes<S>; 2] {
-            row_of(weights, Self::four(simd, window, row, slice), zero)
+            row_of(weights, Self::four(simd, window, [0, row, slice]), zero)
         }
     };
 }
@@ -268,22 +285,30 @@ impl Sample for i32 {
     rows_of_floats!();
 
     #[inline(always)]
-    fn four<S: Simd>(simd: S, window: &Window<Self, 4>, row: usize, slice: usize) -> [Lanes<S>; 4] {
+    fn four<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 4] {
         columns(
             simd,
             each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
-                let own = window.row(L, row, slice);
+                let own: [i32; 4] = window.row(L, first);
                 four!(I => own[I] as f32)
             }),
         )
     }
 
     #[inline(always)]
-    fn two<S: Simd>(simd: S, window: &Window<Self, 2>, row: usize, slice: usize) -> [Lanes<S>; 2] {
+    fn two<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 2] {
         pairs(
             simd,
             each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
-                let own = window.row(L, row, slice);
+                let own: [i32; 2] = window.row(L, first);
                 [own[0] as f32, own[1] as f32]
             }),
         )
@@ -299,13 +324,21 @@ impl Sample for f32 {
     rows_of_floats!();
 
     #[inline(always)]
-    fn four<S: Simd>(simd: S, window: &Window<Self, 4>, row: usize, slice: usize) -> [Lanes<S>; 4] {
-        columns(simd, each!([0, 1, 2, 3, 4, 5, 6, 7], L => window.row(L, row, slice)))
+    fn four<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 4] {
+        columns(simd, each!([0, 1, 2, 3, 4, 5, 6, 7], L => window.row(L, first)))
     }
 
     #[inline(always)]
-    fn two<S: Simd>(simd: S, window: &Window<Self, 2>, row: usize, slice: usize) -> [Lanes<S>; 2] {
-        pairs(simd, each!([0, 1, 2, 3, 4, 5, 6, 7], L => window.row(L, row, slice)))
+    fn two<S: Simd, const N: usize, const R: usize>(
+        simd: S,
+        window: &Window<Self, N, R>,
+        first: [usize; 3],
+    ) -> [Lanes<S>; 2] {
+        pairs(simd, each!([0, 1, 2, 3, 4, 5, 6, 7], L => window.row(L, first)))
     }
 
     #[inline(always)]
@@ -328,7 +361,7 @@ pub fn columns<S: Simd>(simd: S, rows: [[f32; 4]; 8]) -> [Lanes<S>; 4] {
 
 /// Two numbers of each lane.
 #[inline(always)]
-fn pairs<S: Simd>(simd: S, pairs: [[f32; 2]; 8]) -> [Lanes<S>; 2] {
+pub fn pairs<S: Simd>(simd: S, pairs: [[f32; 2]; 8]) -> [Lanes<S>; 2] {
     each!([0, 1], I => {
         let own: [f32; 8] = each!([0, 1, 2, 3, 4, 5, 6, 7], L => pairs[L][I]);
         own.simd_into(simd)

@@ -11,11 +11,12 @@ use super::{
 use crate::{
     cpu::{
         field::deviation,
+        gather::unsuited_kernel,
         skip::{Shown, field_ranges},
     },
     math::{Kernel, Sheets, View},
     scene::{Item, Scene, Settings},
-    volume::{Scalar, Volume},
+    volume::{Arrangement, Scalar, Volume},
 };
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -36,9 +37,20 @@ const FOUR: u32 = 5;
 /// tables.
 const TAIL_BYTES: u64 = 64 << 20;
 
+/// Why the engine cannot gather a volume, whatever the settings.
+pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
+    if volume.lattice.arrangement != Arrangement::Cartesian {
+        return Some("body-centred and rectilinear lattices");
+    }
+    if volume.coefficients.is_some() && kernel.as_tensor().is_none() {
+        return Some("sharp volumes of radial kernels");
+    }
+    unsuited_kernel(kernel)
+}
+
 /// Why the engine cannot gather a scene's field in these settings; none where it can.
 pub fn obstacle(scene: &Scene, settings: &Settings, sheets: &Sheets, gpu: &Gpu) -> Option<&'static str> {
-    if let Some(what) = crate::cpu::gather::obstacle(scene, settings) {
+    if let Some(what) = crate::cpu::gather::obstacle(scene, settings, unsuited) {
         return Some(what);
     }
     if crate::cpu::gather::parts(scene, sheets, None) > 1 {
@@ -216,7 +228,7 @@ impl Field {
     /// [`first_visible`](crate::volume::reach::first_visible).
     pub fn show(&mut self, first: &[u16; 256]) {
         if self.shown.as_ref().is_none_or(|(own, _)| own != first) {
-            self.shown = Some((*first, Shown::new(&self.volume, &self.ranges, first)));
+            self.shown = Some((*first, Shown::new(self.volume.lattice.dims, &self.ranges, first)));
             self.has_bits = false;
         }
     }

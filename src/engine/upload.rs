@@ -3,7 +3,7 @@
 use super::{
     Gpu,
     bricks::{Listed, Room, SelectBricks, Shelf, Slab},
-    gather::{Field, kind_of, texture_bytes},
+    gather::{Field, kind_of, texture_bytes, unsuited},
     nodes::{Forest, Growth, Slots},
     scan::Scan,
     select::{Select, Selection},
@@ -11,7 +11,6 @@ use super::{
 };
 use crate::{
     Error, Result,
-    cpu::gather::unsuited,
     hierarchy::{Cut, Levels},
     math::{Bounds, Kernel, View},
     scene::{Item, Optics, Scene, Settings},

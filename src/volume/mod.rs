@@ -6,7 +6,7 @@ mod contradictions;
 mod grid;
 mod head;
 mod lattice;
-mod overshoot;
+pub(crate) mod overshoot;
 pub mod phantoms;
 mod prefilter;
 mod presets;

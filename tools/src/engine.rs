@@ -103,7 +103,7 @@ enum Gradient {
 enum Evaluate {
     /// Gather what can be gathered, scatter the rest.
     Auto,
-    /// Sum up, for each pixel, the samples around its ray: for a volume on a Cartesian lattice, also among surfaces.
+    /// Sum up, for each pixel, the samples around its ray: for a volume, also among surfaces (the engine for GPUs takes Cartesian lattices alone).
     Gather,
     /// Add each sample to the pixels that its splat covers.
     Scatter,

@@ -1,0 +1,742 @@
+//! The field of lattices and kernels for which four weights an axis of a Cartesian lattice do not hold all: sums of weights and of
+//! weighted values over the samples in reach, and their quotient. So the field is what splats add up to: samples outside the
+//! lattice have no weight, and where next to no kernel reaches there is no field.
+
+use super::{
+    bells,
+    field::{LEAST_DEVIATION, LEAST_WEIGHT, Weighting, weighting},
+    radial::Radial,
+    rectilinear::Axes,
+    vector::{Lanes, each, three},
+    window::{Sample, Window},
+};
+use crate::{
+    math::{Kernel, Profile},
+    volume::{Arrangement, Lattice, Volume, overshoot::Overshoot, reach::neighbourhood_ranges},
+};
+use fearless_simd::{Simd, i32x8, prelude::*};
+use glam::{DMat3, DVec3};
+
+/// The most samples along an axis that a place looks at.
+pub const MOST_TAPS: usize = 12;
+/// The same of kernels that are no products, of which each sample takes a weight of its own.
+const MOST_RADIAL_TAPS: usize = 8;
+/// The least extent of a kernel, in samples: fields of narrower ones change like steps.
+const LEAST_EXTENT: f64 = 1.2;
+/// So far away no kernel reaches: where samples would be that the lattice lacks.
+const FAR: f32 = 16.0;
+/// Places beyond the lattice by more steps than that have no sample in reach.
+const BEYOND: f32 = 32.0;
+
+/// How a volume is gathered.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Way {
+    /// By four weights an axis.
+    Plain(Weighting),
+    /// By sums over so many samples along each axis of each Cartesian lattice.
+    Blend(usize),
+}
+
+impl Way {
+    /// # Errors
+    /// What can't be gathered, in words.
+    pub fn of(volume: &Volume, kernel: &Kernel) -> Result<Self, &'static str> {
+        let arrangement = &volume.lattice.arrangement;
+        let plain = weighting(kernel).filter(|_| *arrangement == Arrangement::Cartesian);
+        match (&kernel.profile, plain) {
+            (Profile::Tensor(_), Some(plain)) => return Ok(Self::Plain(plain)),
+            (Profile::Tensor(_), None) => return Err("tensor products on other lattices than Cartesian ones"),
+            (Profile::Gaussian(sigma), _) if *sigma < LEAST_DEVIATION => {
+                return Err("kernels much narrower than a sample");
+            }
+            (Profile::Gaussian(_), Some(plain)) => return Ok(Self::Plain(plain)),
+            (Profile::Gaussian(_), None) => {}
+            _ if kernel.extent < LEAST_EXTENT => return Err("kernels much narrower than a sample"),
+            _ => {}
+        }
+        if let Arrangement::Rectilinear(places) = arrangement {
+            if !is_whole(kernel) {
+                return Err("kernels that end where they still have weight, on a rectilinear lattice");
+            }
+            return match Axes::taps(places, kernel) {
+                Some(taps) => Ok(Self::Blend(rounded(taps))),
+                None => Err("a rectilinear lattice whose kernels reach far more samples in some places than in others"),
+            };
+        }
+        // Around the sample before a place, or around the nearest one where that takes fewer.
+        let reach = reach(kernel) * volume.lattice.unit([0; 3]).x;
+        let taps = (2 * reach.ceil() as usize).min(2 * (reach + 0.5).floor() as usize + 1);
+        let most = if is_whole(kernel) { MOST_TAPS } else { MOST_RADIAL_TAPS };
+        if taps > most { Err("kernels that reach too many samples") } else { Ok(Self::Blend(rounded(taps))) }
+    }
+}
+
+/// The next larger number of samples along an axis for which there is a function.
+fn rounded(taps: usize) -> usize {
+    match taps {
+        0..=2 => 2,
+        3..=6 => taps,
+        7..=8 => 8,
+        _ => MOST_TAPS,
+    }
+}
+
+/// How far a kernel reaches, in samples: a Gaussian, which does not end along the rays, as far as it has weight.
+pub fn reach(kernel: &Kernel) -> f64 {
+    match kernel.profile {
+        Profile::Gaussian(sigma) => sigma * (-2.0 * LEAST_WEIGHT.ln()).sqrt(),
+        _ => kernel.extent,
+    }
+}
+
+/// Whether a kernel is a Gaussian that ends where it has no weight: a product along the axes.
+fn is_whole(kernel: &Kernel) -> bool {
+    matches!(kernel.profile, Profile::Gaussian(_)) && reach(kernel) <= kernel.extent
+}
+
+/// What is summed of the kernels at a place: their weights and weighted values, and how both change a step along the axes.
+#[derive(Clone, Copy)]
+pub struct Sums<S: Simd> {
+    pub weight: Lanes<S>,
+    pub value: Lanes<S>,
+    pub weight_slopes: [Lanes<S>; 3],
+    pub value_slopes: [Lanes<S>; 3],
+}
+
+/// The field at a place: its value and its change a step along each axis. Weights count from what kernels must add up to; where
+/// they are not above 0 there is no field.
+#[derive(Clone, Copy)]
+pub struct Point<S: Simd> {
+    pub value: Lanes<S>,
+    pub slopes: [Lanes<S>; 3],
+    pub weight: Lanes<S>,
+}
+
+impl<S: Simd> Sums<S> {
+    #[inline(always)]
+    fn plus(&self, other: &Self) -> Self {
+        Self {
+            weight: self.weight + other.weight,
+            value: self.value + other.value,
+            weight_slopes: three!(I => self.weight_slopes[I] + other.weight_slopes[I]),
+            value_slopes: three!(I => self.value_slopes[I] + other.value_slopes[I]),
+        }
+    }
+
+    /// The field, whose slopes are so many times as large as those of the sums.
+    #[inline(always)]
+    fn quotient(&self, simd: S, scale: f32) -> Point<S> {
+        // Where kernels of both signs all but cancel, and far outside, any number will do.
+        let inverse = Lanes::splat(simd, 1.0) / self.weight.max(Lanes::splat(simd, 1e-20));
+        let value = self.value * inverse;
+        let inverse = inverse * scale;
+        let slopes = three!(I => (self.value_slopes[I] - value * self.weight_slopes[I]) * inverse);
+        Point { value, slopes, weight: self.weight }
+    }
+}
+
+/// A Cartesian lattice among those that a lattice consists of.
+#[derive(Debug)]
+struct Part {
+    /// Its first sample, and the samples from one row to the next and from one slice to the next.
+    first: usize,
+    row: usize,
+    slice: usize,
+    dims: [usize; 3],
+    /// Where its first sample is and how far from that the last one is, in steps.
+    shift: [f32; 3],
+    size: [f32; 3],
+}
+
+/// The weights of samples.
+#[derive(Debug)]
+enum Form {
+    Radial(Radial),
+    /// Gaussians, by log₂ of the weight of a sample 1 away; cut at a distance from the ray, or not.
+    Bells {
+        log: f32,
+        radius: Option<f32>,
+    },
+    Rectilinear(Box<Axes>),
+}
+
+/// A lattice and its kernel.
+#[derive(Debug)]
+pub struct Blend {
+    parts: Vec<Part>,
+    form: Form,
+    /// Samples along each axis of each part that a place looks at.
+    taps: usize,
+    /// Samples' spacings to the step.
+    per_step: f32,
+    extent: f32,
+    /// What kernels must add up to.
+    least: f32,
+    /// The cells that are looked up for what they may show.
+    cells: Lattice,
+}
+
+impl Blend {
+    /// What takes so many samples along each axis.
+    pub fn new(volume: &Volume, kernel: &Kernel, taps: usize) -> Self {
+        let lattice = volume.drawn_lattice();
+        let [nx, ny, nz] = lattice.dims;
+        let whole = |size| Part { first: 0, row: nx, slice: nx * ny, dims: lattice.dims, shift: [0.0; 3], size };
+        let steps = |dims: [usize; 3]| dims.map(|count| count as f32 - 1.0);
+        let cartesian = |dims| Lattice::cartesian(dims, lattice.origin, lattice.axes);
+        let bells = |sigma: f64| Form::Bells {
+            log: (-0.5 * std::f64::consts::LOG2_E / (sigma * sigma)) as f32,
+            radius: (!is_whole(kernel)).then_some(kernel.extent as f32),
+        };
+        let mut form = match kernel.profile {
+            Profile::Gaussian(sigma) => bells(sigma),
+            _ => Form::Radial(Radial::new(kernel)),
+        };
+        let (parts, cells) = match &lattice.arrangement {
+            Arrangement::Cartesian => (vec![whole(steps(lattice.dims))], cartesian(lattice.dims)),
+            Arrangement::BodyCentred => {
+                // Every second layer, from the first one and from the second one on.
+                let dims = |layer: usize| [nx, ny, (nz + 1 - layer) / 2];
+                let part = |layer: usize| {
+                    let shift = [0.5 * layer as f32; 3];
+                    let (dims, size) = (dims(layer), steps(dims(layer)));
+                    Part { first: layer * nx * ny, row: nx, slice: 2 * nx * ny, dims, shift, size }
+                };
+                let parts = [0, 1].map(part).into_iter().filter(|part| part.dims[2] > 0).collect();
+                (parts, cartesian(dims(0)))
+            }
+            Arrangement::Rectilinear(places) => {
+                let axes = Axes::new(places, kernel, taps);
+                let (dims, widths) = axes.cells();
+                let widths = DVec3::from_array(widths);
+                let first = DVec3::new(places[0][0], places[1][0], places[2][0]);
+                let origin = lattice.position(first + 0.5 * widths);
+                form = Form::Rectilinear(Box::new(axes));
+                let size = [0, 1, 2].map(|axis| (places[axis][lattice.dims[axis] - 1] - first[axis]) as f32);
+                (vec![whole(size)], Lattice::cartesian(dims, origin, lattice.axes * DMat3::from_diagonal(widths)))
+            }
+        };
+        Self {
+            parts,
+            form,
+            taps,
+            per_step: if lattice.arrangement == Arrangement::BodyCentred { std::f32::consts::SQRT_2 } else { 1.0 },
+            extent: kernel.extent as f32,
+            least: kernel.least_sum() as f32,
+            cells,
+        }
+    }
+
+    /// A Cartesian lattice of cells, for each of which [`ranges`](Self::ranges) tells what the field may be.
+    pub fn cells(&self) -> &Lattice {
+        &self.cells
+    }
+
+    /// Cells to the step along each axis, and where the lattice's first sample is among them; `drawn_from` is where the
+    /// volume's first sample is on the lattice drawn, in steps.
+    pub fn to_cells(&self, drawn_from: [f32; 3]) -> [[f32; 3]; 2] {
+        match &self.form {
+            Form::Rectilinear(axes) => [axes.cells().1.map(|width| (1.0 / width) as f32), [-0.5; 3]],
+            _ => [[1.0; 3], drawn_from],
+        }
+    }
+
+    /// For each cell the range of the field in it and half a cell around it, in steps of 1/255 of the volume's range.
+    pub fn ranges(&self, volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
+        if let Form::Rectilinear(axes) = &self.form {
+            return axes.ranges(volume);
+        }
+        let lattice = volume.drawn_lattice();
+        let mut ranges = match &volume.coefficients {
+            Some(coefficients) => coefficients.ranges.clone(),
+            None => {
+                let mut radius = lattice.reach(reach(kernel));
+                if lattice.arrangement == Arrangement::BodyCentred {
+                    // A place may be nearer to a layer that is not looked up.
+                    radius[2] += 1;
+                }
+                let mut ranges = neighbourhood_ranges(volume, radius);
+                self.widen(&mut ranges, lattice, kernel);
+                ranges
+            }
+        };
+        if lattice.arrangement == Arrangement::BodyCentred {
+            let slice = lattice.dims[0] * lattice.dims[1];
+            ranges = ranges.chunks(slice).step_by(2).flatten().copied().collect();
+        }
+        ranges
+    }
+
+    /// Makes room for the overshoot of kernels that have values of both signs: the sum of the weights' magnitudes where they add
+    /// up to 1. At the border they add up to the least sum at worst.
+    fn widen(&self, ranges: &mut [[u8; 2]], lattice: &Lattice, kernel: &Kernel) {
+        if !kernel.is_signed() {
+            return;
+        }
+        let (mut inside, mut largest) = (1.0f64, 0.0f64);
+        let half = self.taps as i32 / 2 + 1;
+        for place in 0..9usize.pow(3) {
+            let place = [place % 9, place / 9 % 9, place / 81].map(|at| at as f64 / 8.0);
+            let (mut sum, mut size) = (0.0, 0.0);
+            for part in &self.parts {
+                for tap in 0..(2 * half + 2).pow(3) {
+                    let side = 2 * half + 2;
+                    let at = [tap % side, tap / side % side, tap / side / side].map(|at| f64::from(at - half));
+                    let away = [0, 1, 2].map(|axis| place[axis] - at[axis] - f64::from(part.shift[axis]));
+                    let weight = kernel.value(DVec3::from_array(away).length() * f64::from(self.per_step));
+                    sum += weight;
+                    size += weight.abs();
+                }
+            }
+            inside = inside.max(size / sum);
+            largest = largest.max(size);
+        }
+        let [inside, outside] = [inside, largest / f64::from(self.least)]
+            .map(|lebesgue| Overshoot { lebesgue: lebesgue * 1.01, tails: Vec::new() });
+        let reach = lattice.reach(kernel.extent + 1.0);
+        for (at, range) in ranges.iter_mut().enumerate() {
+            let index = lattice.index(at);
+            let is_inside =
+                (0..3).all(|axis| index[axis] >= reach[axis] && index[axis] + reach[axis] < lattice.dims[axis]);
+            *range = if is_inside { &inside } else { &outside }.widen([*range].into_iter());
+        }
+    }
+
+    /// The field at places in steps, on rays along which a world unit is so many steps.
+    #[inline(always)]
+    pub fn at<S: Simd, T: Sample>(
+        &self,
+        simd: S,
+        samples: &[T],
+        zero: f32,
+        place: [Lanes<S>; 3],
+        way: [Lanes<S>; 3],
+    ) -> Point<S> {
+        // A function of its own for each number of samples.
+        let sums = match self.taps {
+            2 => self.sums::<S, T, 2, 2, 8>(simd, samples, zero, place, way),
+            3 => self.sums::<S, T, 3, 4, 27>(simd, samples, zero, place, way),
+            4 => self.sums::<S, T, 4, 4, 64>(simd, samples, zero, place, way),
+            5 => self.sums::<S, T, 5, 6, 125>(simd, samples, zero, place, way),
+            6 => self.sums::<S, T, 6, 6, 216>(simd, samples, zero, place, way),
+            8 => self.sums::<S, T, 8, 8, 512>(simd, samples, zero, place, way),
+            _ => self.sums::<S, T, MOST_TAPS, MOST_TAPS, { MOST_TAPS * MOST_TAPS * MOST_TAPS }>(
+                simd, samples, zero, place, way,
+            ),
+        };
+        let mut point = sums.quotient(simd, self.per_step);
+        point.weight -= self.least;
+        point
+    }
+
+    /// Sums over `N` samples along each axis, `ALL` together; rows are loaded `WIDE` samples long.
+    fn sums<S: Simd, T: Sample, const N: usize, const WIDE: usize, const ALL: usize>(
+        &self,
+        simd: S,
+        samples: &[T],
+        zero: f32,
+        place: [Lanes<S>; 3],
+        way: [Lanes<S>; 3],
+    ) -> Sums<S> {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let none = Lanes::splat(simd, 0.0);
+                let mut all: Option<Sums<S>> = None;
+                let mut values = [none; ALL];
+                for part in &self.parts {
+                    let samples = &samples[part.first..];
+                    let place = three!(I => {
+                        let beyond = part.size[I].mul_add(2.0, BEYOND);
+                        (place[I] - part.shift[I]).max(Lanes::splat(simd, -beyond)).min(Lanes::splat(simd, beyond))
+                    });
+                    let own = match &self.form {
+                        Form::Rectilinear(axes) => {
+                            let taps = three!(I => axes.along::<S, N>(simd, I, place[I]));
+                            let counted = [taps[1].counted, taps[2].counted];
+                            let starts = three!(I => taps[I].start);
+                            part.load::<S, T, N, WIDE, ALL>(simd, samples, zero, starts, counted, &mut values);
+                            Axes::sums(simd, &taps, &values)
+                        }
+                        form => {
+                            let starts = three!(I => {
+                                let last = part.dims[I] as f32 - N as f32;
+                                // The first of an even number around the cell, or of an odd one around the nearest sample.
+                                let start = (place[I] - (N as f32 * 0.5 - 1.0)).floor();
+                                start.min(Lanes::splat(simd, last)).max(none)
+                            });
+                            let away = three!(I => {
+                                let mut away = [Lanes::splat(simd, FAR); N];
+                                for (tap, own) in away.iter_mut().enumerate().take(part.dims[I]) {
+                                    *own = (place[I] - starts[I] - tap as f32) * self.per_step;
+                                }
+                                away
+                            });
+                            part.load::<S, T, N, WIDE, ALL>(simd, samples, zero, starts, [u32::MAX; 2], &mut values);
+                            let away = [&away[0][..], &away[1][..], &away[2][..]];
+                            match form {
+                                Form::Radial(radial) => radial.sums(simd, away, &values, self.extent),
+                                Form::Bells { log, radius } => bells::sums(simd, *log, *radius, way, away, &values),
+                                Form::Rectilinear(_) => continue,
+                            }
+                        }
+                    };
+                    all = Some(all.map_or(
+                        own,
+                        #[inline(always)]
+                        |all| all.plus(&own),
+                    ));
+                }
+                all.unwrap_or(Sums { weight: none, value: none, weight_slopes: [none; 3], value_slopes: [none; 3] })
+            },
+        )
+    }
+}
+
+impl Part {
+    /// The values of samples, counted from zero, `N` along each axis; of those that the lattice lacks, any. Of the rows of slices
+    /// and of the slices, those that have a bit.
+    #[inline(always)]
+    fn load<S: Simd, T: Sample, const N: usize, const WIDE: usize, const ALL: usize>(
+        &self,
+        simd: S,
+        samples: &[T],
+        zero: f32,
+        starts: [Lanes<S>; 3],
+        [rows, slices]: [u32; 2],
+        values: &mut [Lanes<S>; ALL],
+    ) {
+        let mut first: [[i32; 8]; 3] = three!(I => i32x8::<S>::truncate_from(starts[I]).into());
+        let Self { row, slice, dims, .. } = *self;
+        if dims.iter().any(|&count| count < WIDE) {
+            // Sample by sample.
+            for (at, value) in values.iter_mut().enumerate() {
+                let tap = [at % N, at / N % N, at / (N * N)];
+                let own = each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
+                    let [x, y, z] = three!(I => (first[I][L] as usize + tap[I]).min(dims[I] - 1));
+                    samples[z * slice + y * row + x].value() - zero
+                });
+                *value = own.simd_into(simd);
+            }
+            return;
+        }
+        let mut places = [0; 8];
+        // Rows that would go on beyond the lattice's last sample begin one earlier.
+        let mut is_moved = [0.0; 8];
+        for lane in 0..8 {
+            let last = (dims[0] - WIDE) as i32;
+            is_moved[lane] = (first[0][lane] - last).max(0) as f32;
+            first[0][lane] = first[0][lane].min(last);
+            places[lane] = first[2][lane] as usize * slice + first[1][lane] as usize * row + first[0][lane] as usize;
+        }
+        let is_moved = SimdInto::<Lanes<S>, S>::simd_into(is_moved, simd).simd_gt(0.5);
+        let any_moved = N < WIDE && is_moved.any_true();
+        let window = Window::<T, WIDE, N>::new(samples, places, row, slice);
+        let mut loaded = [Lanes::splat(simd, 0.0); WIDE];
+        for k in 0..N {
+            for j in 0..N {
+                if (rows >> j) & (slices >> k) & 1 == 0 {
+                    continue;
+                }
+                let mut at = 0;
+                while at + 4 <= WIDE {
+                    loaded[at..at + 4].copy_from_slice(&T::four(simd, &window, [at, j, k]));
+                    at += 4;
+                }
+                if at < WIDE {
+                    loaded[at..].copy_from_slice(&T::two(simd, &window, [at, j, k]));
+                }
+                let own = &mut values[(k * N + j) * N..][..N];
+                for tap in 0..N {
+                    own[tap] = loaded[tap] - zero;
+                    if any_moved {
+                        own[tap] = is_moved.select(loaded[(tap + 1) % WIDE] - zero, own[tap]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        cpu::field::{Field, Typed},
+        volume::Samples,
+    };
+    use fearless_simd::{Level, dispatch};
+    use std::sync::Arc;
+
+    /// Random bytes, the same in every run, as samples of any type.
+    fn volume(lattice: Lattice, kind: usize) -> Volume {
+        let mut random = 3u64;
+        let mut byte = || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (random >> 56) as u8
+        };
+        let bytes: Vec<u8> = (0..lattice.len()).map(|_| byte()).collect();
+        let samples = match kind % 5 {
+            0 => Samples::U8(bytes),
+            1 => Samples::U16(bytes.into_iter().map(u16::from).collect()),
+            2 => Samples::I16(bytes.into_iter().map(i16::from).collect()),
+            3 => Samples::I32(bytes.into_iter().map(i32::from).collect()),
+            _ => Samples::F32(bytes.into_iter().map(f32::from).collect()),
+        };
+        Volume::new(lattice, samples).unwrap()
+    }
+
+    fn cartesian(dims: [usize; 3]) -> Lattice {
+        Lattice::with_spacing(dims, DVec3::ONE)
+    }
+
+    fn body_centred(dims: [usize; 3]) -> Lattice {
+        Lattice::body_centred(dims, DVec3::ZERO, DMat3::IDENTITY)
+    }
+
+    fn rectilinear(dims: [usize; 3], steps: &[f64]) -> Lattice {
+        let axis = |count: usize| {
+            let mut at = 2.0;
+            let step = |i: usize| {
+                at += steps[i % steps.len()];
+                at
+            };
+            (0..count).map(step).collect::<Vec<f64>>()
+        };
+        let arrangement = Arrangement::Rectilinear(Arc::new(dims.map(axis)));
+        Lattice { arrangement, ..cartesian(dims) }
+    }
+
+    /// All that is gathered by sums.
+    fn kinds() -> Vec<(Volume, Kernel)> {
+        let gaussian = |sigma, extent| Kernel::gaussian(sigma, extent).unwrap();
+        let table = Kernel::table((0..=64).map(|at| (1.0 - f64::from(at) / 64.0).powi(2)).collect(), 1.8).unwrap();
+        let mut found = Vec::new();
+        for (kind, kernel) in [
+            Kernel::b_spline(2.0).unwrap(),
+            Kernel::b_spline(1.3).unwrap(),
+            Kernel::hann(3.0).unwrap(),
+            Kernel::hann(4.0).unwrap(),
+            table.clone(),
+            gaussian(0.6, 1.5),
+            gaussian(0.9, 1.2),
+            gaussian(0.9, 3.0),
+            gaussian(1.5, 6.0),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            found.push((volume(cartesian([13, 12, 14]), kind), kernel.clone()));
+            found.push((volume(cartesian([14, 1, 5]), kind + 1), kernel));
+        }
+        for (kind, kernel) in
+            [gaussian(0.6, 2.0), gaussian(0.6, 1.3), Kernel::b_spline(2.0).unwrap(), Kernel::hann(3.0).unwrap(), table]
+                .into_iter()
+                .enumerate()
+        {
+            found.push((volume(body_centred([9, 8, 17]), kind), kernel.clone()));
+            found.push((volume(body_centred([3, 9, 6]), kind + 1), kernel.clone()));
+            found.push((volume(body_centred([7, 2, 1]), kind + 2), kernel));
+        }
+        for (kind, steps) in
+            [&[1.0][..], &[0.5, 0.7, 1.0, 1.4, 2.0, 1.2], &[1.0, 3.0], &[0.3, 0.3, 0.3, 0.9]].into_iter().enumerate()
+        {
+            found.push((volume(rectilinear([12, 13, 11], steps), kind), gaussian(0.6, 2.0)));
+            found.push((volume(rectilinear([1, 3, 12], steps), kind + 1), gaussian(0.6, 2.0)));
+        }
+        let kernel = gaussian(0.7, 3.0);
+        let sharp = |lattice: Lattice| volume(lattice, 4).sharpened(&kernel).unwrap();
+        found.push((sharp(cartesian([8, 9, 7])), kernel.clone()));
+        found.push((sharp(body_centred([6, 5, 9])), kernel.clone()));
+        found
+    }
+
+    /// h and h′(r)/r.
+    fn weight_of(kernel: &Kernel, r: f64) -> [f64; 2] {
+        if let Profile::Gaussian(sigma) = kernel.profile {
+            let h = (-0.5 * (r / sigma).powi(2)).exp();
+            return [h, -h / (sigma * sigma)];
+        }
+        let r = r.max(1e-6);
+        [kernel.value(r), (kernel.value(r + 1e-6) - kernel.value(r - 1e-6)) / 2e-6 / r]
+    }
+
+    /// The gradient at a sample of a rectilinear lattice, by its neighbours.
+    fn slope_at(volume: &Volume, at: usize) -> DVec3 {
+        let lattice = &volume.lattice;
+        let index = lattice.index(at);
+        let stride = [1, lattice.dims[0], lattice.dims[0] * lattice.dims[1]];
+        DVec3::from_array([0, 1, 2].map(|axis| {
+            let here = lattice.steps(index)[axis];
+            let beside = |other: usize| {
+                let mut own = index;
+                own[axis] = other;
+                let sample = at + other * stride[axis] - index[axis] * stride[axis];
+                (volume.value(sample) - volume.value(at), lattice.steps(own)[axis] - here)
+            };
+            let before = index[axis].checked_sub(1).map(beside).map(|(rise, away)| (rise / away, -away));
+            let after = (index[axis] + 1 < lattice.dims[axis]).then(|| beside(index[axis] + 1));
+            match (before, after.map(|(rise, away)| (rise / away, away))) {
+                (Some((a, d)), Some((b, e))) => (a * e + b * d) / (d + e),
+                (Some((slope, _)), None) | (None, Some((slope, _))) => slope,
+                (None, None) => 0.0,
+            }
+        }))
+    }
+
+    /// The sum of the weights, the value and its changes a step, over all samples in double precision.
+    fn truth(volume: &Volume, kernel: &Kernel, place: DVec3, way: DVec3) -> [f64; 5] {
+        let lattice = volume.drawn_lattice();
+        let (mut weight, mut value) = (0.0, 0.0);
+        let (mut weight_slopes, mut value_slopes) = (DVec3::ZERO, DVec3::ZERO);
+        let is_sloped = matches!(lattice.arrangement, Arrangement::Rectilinear(_));
+        for at in 0..lattice.len() {
+            let index = lattice.index(at);
+            let steps = lattice.steps(index) - lattice.step_range()[0];
+            let unit = lattice.unit(index);
+            let away = place - steps;
+            let [h, s] = weight_of(kernel, (away / unit).length());
+            let beside = (away / unit - way * (away / unit).dot(way)).length();
+            // What lies further is no part of the kernel; of Gaussians on rectilinear lattices it is left out.
+            if beside > kernel.extent && !is_sloped {
+                continue;
+            }
+            let slope = if is_sloped { slope_at(volume, at) } else { DVec3::ZERO };
+            let own = volume.drawn_value(at) + slope.dot(away);
+            let h_slope = s * away / (unit * unit);
+            weight += h;
+            value += h * own;
+            weight_slopes += h_slope;
+            value_slopes += h_slope * own + h * slope;
+        }
+        let value = value / weight;
+        let slopes = (value_slopes - value * weight_slopes) / weight;
+        [weight, value, slopes.x, slopes.y, slopes.z]
+    }
+
+    fn found(typed: &Typed, places: [[f32; 8]; 3], way: [f32; 3]) -> [[f32; 8]; 5] {
+        fn at<T: Sample, S: Simd>(simd: S, field: &Field<T>, places: [[f32; 8]; 3], way: [f32; 3]) -> [[f32; 8]; 5] {
+            let way = three!(I => Lanes::splat(simd, way[I]));
+            let Point { value, slopes: [x, y, z], weight } =
+                field.at(simd, three!(I => places[I].simd_into(simd)), way);
+            [weight, value, x, y, z].map(Into::into)
+        }
+        let level = Level::new();
+        match typed {
+            Typed::U8(field) => dispatch!(level, simd => at(simd, field, places, way)),
+            Typed::U16(field) => dispatch!(level, simd => at(simd, field, places, way)),
+            Typed::I16(field) => dispatch!(level, simd => at(simd, field, places, way)),
+            Typed::I32(field) => dispatch!(level, simd => at(simd, field, places, way)),
+            Typed::F32(field) => dispatch!(level, simd => at(simd, field, places, way)),
+        }
+    }
+
+    /// Places in the box of a lattice, and some beyond it, in steps from its first sample.
+    fn places(lattice: &Lattice, round: usize, beyond: f64) -> [[f32; 8]; 3] {
+        let [low, high] = lattice.step_range();
+        [0, 1, 2].map(|axis| {
+            std::array::from_fn(|lane| {
+                let part = ((round * 8 + lane) as f64 * [0.618, 0.7549, 0.5698][axis]).fract();
+                (part * (high[axis] - low[axis] + 2.0 * beyond) - beyond) as f32
+            })
+        })
+    }
+
+    #[test]
+    fn fields_are_quotients_of_sums_over_all_samples() {
+        for (volume, kernel) in kinds() {
+            let Ok(Way::Blend(taps)) = Way::of(&volume, &kernel) else { panic!("{kernel:?}") };
+            let blend = Blend::new(&volume, &kernel, taps);
+            let way = DVec3::new(1.0, 2.0, -0.5).normalize();
+            let lattice = volume.drawn_lattice();
+            let name = format!("{:?} on {:?} of {:?}", kernel.profile, lattice.arrangement, lattice.dims);
+            // Of Gaussians weights below a two-hundredth are left out, or counted where they should not be.
+            let is_cut = matches!(kernel.profile, Profile::Gaussian(_));
+            let (mut compared, mut error, mut slope_error) = (0, 0.0f64, 0.0f64);
+            for zero in [0.0, 100.0] {
+                let typed = Typed::blended(&volume, &blend, zero);
+                for round in 0..20 {
+                    let places = places(lattice, round, if round < 15 { 0.0 } else { 0.7 });
+                    let found = found(&typed, places, way.as_vec3().to_array().map(|along| 3.0 * along));
+                    for lane in 0..8 {
+                        let place = DVec3::from_array(places.map(|own| f64::from(own[lane])));
+                        let expected = truth(&volume, &kernel, place, way);
+                        let [weight, own @ ..] = found.map(|own| f64::from(own[lane]));
+                        let least = kernel.least_sum();
+                        let near = if is_cut { 0.01 + 0.05 * expected[0] } else { 1e-4 };
+                        assert!(
+                            (weight + least - expected[0]).abs() < near,
+                            "{name}: {weight} {least} {expected:?} at {place}"
+                        );
+                        if expected[0] < least + if is_cut { 0.3 } else { 0.02 } {
+                            continue;
+                        }
+                        compared += 1;
+                        error += (own[0] + zero - expected[1]).powi(2);
+                        slope_error += (1..4).map(|i| (own[i] - expected[i + 1]).powi(2)).sum::<f64>();
+                    }
+                }
+            }
+            assert!(compared > 20, "{name}: {compared}");
+            let [error, slope_error] = [error, slope_error].map(|sum| (sum / f64::from(compared)).sqrt());
+            // Of bytes.
+            let most = if is_cut { [1.5, 8.0] } else { [2e-3, 0.1] };
+            assert!(error < most[0] && slope_error < most[1], "{name}: off by {error}, slopes by {slope_error}");
+        }
+    }
+
+    #[test]
+    fn fields_lie_in_the_ranges_of_their_cells() {
+        for (volume, kernel) in kinds() {
+            let Ok(Way::Blend(taps)) = Way::of(&volume, &kernel) else { panic!("{kernel:?}") };
+            let blend = Blend::new(&volume, &kernel, taps);
+            let ranges = blend.ranges(&volume, &kernel);
+            let dims = blend.cells().dims;
+            assert_eq!(ranges.len(), dims.iter().product::<usize>());
+            let before = volume.lattice.origin - volume.drawn_lattice().origin;
+            let [scale, shift] = blend.to_cells(before.as_vec3().to_array());
+            let typed = Typed::blended(&volume, &blend, 0.0);
+            for round in 0..40 {
+                let places = places(&volume.lattice, round, 0.0);
+                let drawn = [0, 1, 2].map(|axis| places[axis].map(|place| place + before[axis] as f32));
+                let [weight, value, ..] = found(&typed, drawn, [1.0, 2.0, -0.5]);
+                for lane in (0..8).filter(|lane| weight[*lane] > 0.0) {
+                    let cell = [0, 1, 2].map(|axis| {
+                        let at = places[axis][lane] * scale[axis] + shift[axis];
+                        at.round().clamp(0.0, dims[axis] as f32 - 1.0) as usize
+                    });
+                    let [low, high] = ranges[(cell[2] * dims[1] + cell[1]) * dims[0] + cell[0]];
+                    let [first, last] = volume.range;
+                    let step = (f64::from(value[lane]) - first) * 255.0 / (last - first);
+                    // Ranges are cut to that of the samples.
+                    let step = step.clamp(0.0, 255.0);
+                    assert!(
+                        step >= f64::from(low) - 0.5 && step <= f64::from(high) + 0.5,
+                        "{:?} on {:?}: {step} at {cell:?} of {dims:?} is not in {low} … {high}",
+                        kernel.profile,
+                        volume.lattice.arrangement
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_gathered_is_told() {
+        let told = |lattice: Lattice, kernel: Kernel, what: &str| {
+            let message = Way::of(&volume(lattice, 0), &kernel).unwrap_err();
+            assert!(message.contains(what), "{message}");
+        };
+        told(cartesian([4; 3]), Kernel::hann(4.2).unwrap(), "too many");
+        told(cartesian([4; 3]), Kernel::gaussian(2.0, 9.0).unwrap(), "too many");
+        told(cartesian([4; 3]), Kernel::b_spline(1.1).unwrap(), "narrower");
+        told(body_centred([4; 3]), Kernel::gaussian(0.29, 2.0).unwrap(), "narrower");
+        told(rectilinear([4; 3], &[1.0]), Kernel::gaussian(0.6, 1.5).unwrap(), "still have weight");
+        told(
+            rectilinear([40; 3], &[0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 20.0]),
+            Kernel::default(),
+            "far more samples",
+        );
+        assert!(Way::of(&volume(cartesian([4; 3]), 0), &Kernel::default()) == Ok(Way::Plain(Weighting::Gaussian(0.6))));
+    }
+}
