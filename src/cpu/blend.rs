@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     math::{Kernel, Profile},
-    volume::{Arrangement, Lattice, Volume, overshoot::Overshoot, reach::neighbourhood_ranges},
+    volume::{Arrangement, Lattice, Samples, Volume, overshoot::Overshoot, reach::neighbourhood_ranges},
 };
 use fearless_simd::{Simd, i32x8, prelude::*};
 use glam::{DMat3, DVec3};
@@ -74,8 +74,8 @@ impl Way {
 /// The next larger number of samples along an axis for which there is a function.
 fn rounded(taps: usize) -> usize {
     match taps {
-        0..=2 => 2,
-        3..=6 => taps,
+        0..=3 => 3,
+        4..=6 => taps,
         7..=8 => 8,
         _ => MOST_TAPS,
     }
@@ -110,6 +110,38 @@ pub struct Point<S: Simd> {
     pub value: Lanes<S>,
     pub slopes: [Lanes<S>; 3],
     pub weight: Lanes<S>,
+}
+
+/// What samples carry.
+#[derive(Clone, Copy)]
+enum Source<'a> {
+    Samples(&'a Samples),
+    /// Of a sharp volume.
+    Coefficients(&'a [f32]),
+}
+
+/// A volume that is gathered by sums.
+pub struct Blended<'a> {
+    blend: &'a Blend,
+    samples: Source<'a>,
+    zero: f32,
+}
+
+impl<'a> Blended<'a> {
+    /// Values count from `zero`.
+    pub fn new(volume: &'a Volume, blend: &'a Blend, zero: f64) -> Self {
+        let samples = match &volume.coefficients {
+            Some(coefficients) => Source::Coefficients(&coefficients.values),
+            None => Source::Samples(&volume.samples),
+        };
+        Self { blend, samples, zero: zero as f32 }
+    }
+
+    /// The field at places in steps, on rays along which a world unit is so many steps.
+    #[inline(always)]
+    pub fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3], way: [Lanes<S>; 3]) -> Point<S> {
+        self.blend.at(simd, self.samples, self.zero, place, way)
+    }
 }
 
 impl<S: Simd> Sums<S> {
@@ -304,23 +336,15 @@ impl Blend {
 
     /// The field at places in steps, on rays along which a world unit is so many steps.
     #[inline(always)]
-    pub fn at<S: Simd, T: Sample>(
-        &self,
-        simd: S,
-        samples: &[T],
-        zero: f32,
-        place: [Lanes<S>; 3],
-        way: [Lanes<S>; 3],
-    ) -> Point<S> {
+    fn at<S: Simd>(&self, simd: S, samples: Source, zero: f32, place: [Lanes<S>; 3], way: [Lanes<S>; 3]) -> Point<S> {
         // A function of its own for each number of samples.
         let sums = match self.taps {
-            2 => self.sums::<S, T, 2, 2, 8>(simd, samples, zero, place, way),
-            3 => self.sums::<S, T, 3, 4, 27>(simd, samples, zero, place, way),
-            4 => self.sums::<S, T, 4, 4, 64>(simd, samples, zero, place, way),
-            5 => self.sums::<S, T, 5, 6, 125>(simd, samples, zero, place, way),
-            6 => self.sums::<S, T, 6, 6, 216>(simd, samples, zero, place, way),
-            8 => self.sums::<S, T, 8, 8, 512>(simd, samples, zero, place, way),
-            _ => self.sums::<S, T, MOST_TAPS, MOST_TAPS, { MOST_TAPS * MOST_TAPS * MOST_TAPS }>(
+            ..=3 => self.sums::<S, 3, 4, 27>(simd, samples, zero, place, way),
+            4 => self.sums::<S, 4, 4, 64>(simd, samples, zero, place, way),
+            5 => self.sums::<S, 5, 6, 125>(simd, samples, zero, place, way),
+            6 => self.sums::<S, 6, 6, 216>(simd, samples, zero, place, way),
+            8 => self.sums::<S, 8, 8, 512>(simd, samples, zero, place, way),
+            _ => self.sums::<S, MOST_TAPS, MOST_TAPS, { MOST_TAPS * MOST_TAPS * MOST_TAPS }>(
                 simd, samples, zero, place, way,
             ),
         };
@@ -330,10 +354,10 @@ impl Blend {
     }
 
     /// Sums over `N` samples along each axis, `ALL` together; rows are loaded `WIDE` samples long.
-    fn sums<S: Simd, T: Sample, const N: usize, const WIDE: usize, const ALL: usize>(
+    fn sums<S: Simd, const N: usize, const WIDE: usize, const ALL: usize>(
         &self,
         simd: S,
-        samples: &[T],
+        samples: Source,
         zero: f32,
         place: [Lanes<S>; 3],
         way: [Lanes<S>; 3],
@@ -345,7 +369,6 @@ impl Blend {
                 let mut all: Option<Sums<S>> = None;
                 let mut values = [none; ALL];
                 for part in &self.parts {
-                    let samples = &samples[part.first..];
                     let place = three!(I => {
                         let beyond = part.size[I].mul_add(2.0, BEYOND);
                         (place[I] - part.shift[I]).max(Lanes::splat(simd, -beyond)).min(Lanes::splat(simd, beyond))
@@ -355,7 +378,7 @@ impl Blend {
                             let taps = three!(I => axes.along::<S, N>(simd, I, place[I]));
                             let counted = [taps[1].counted, taps[2].counted];
                             let starts = three!(I => taps[I].start);
-                            part.load::<S, T, N, WIDE, ALL>(simd, samples, zero, starts, counted, &mut values);
+                            part.load::<S, N, WIDE, ALL>(simd, samples, zero, starts, counted, &mut values);
                             Axes::sums(simd, &taps, &values)
                         }
                         form => {
@@ -372,7 +395,7 @@ impl Blend {
                                 }
                                 away
                             });
-                            part.load::<S, T, N, WIDE, ALL>(simd, samples, zero, starts, [u32::MAX; 2], &mut values);
+                            part.load::<S, N, WIDE, ALL>(simd, samples, zero, starts, [u32::MAX; 2], &mut values);
                             let away = [&away[0][..], &away[1][..], &away[2][..]];
                             match form {
                                 Form::Radial(radial) => radial.sums(simd, away, &values, self.extent),
@@ -397,7 +420,43 @@ impl Part {
     /// The values of samples, counted from zero, `N` along each axis; of those that the lattice lacks, any. Of the rows of slices
     /// and of the slices, those that have a bit.
     #[inline(always)]
-    fn load<S: Simd, T: Sample, const N: usize, const WIDE: usize, const ALL: usize>(
+    fn load<S: Simd, const N: usize, const WIDE: usize, const ALL: usize>(
+        &self,
+        simd: S,
+        samples: Source,
+        zero: f32,
+        starts: [Lanes<S>; 3],
+        bits: [u32; 2],
+        values: &mut [Lanes<S>; ALL],
+    ) {
+        // A function of its own for each type of samples. Sums are the same for all.
+        simd.vectorize(
+            #[inline(always)]
+            || match samples {
+                Source::Coefficients(own) => {
+                    self.load_of::<S, f32, N, WIDE, ALL>(simd, own, zero, starts, bits, values);
+                }
+                Source::Samples(Samples::F32(own)) => {
+                    self.load_of::<S, f32, N, WIDE, ALL>(simd, own, zero, starts, bits, values);
+                }
+                Source::Samples(Samples::U8(own)) => {
+                    self.load_of::<S, u8, N, WIDE, ALL>(simd, own, zero, starts, bits, values);
+                }
+                Source::Samples(Samples::U16(own)) => {
+                    self.load_of::<S, u16, N, WIDE, ALL>(simd, own, zero, starts, bits, values);
+                }
+                Source::Samples(Samples::I16(own)) => {
+                    self.load_of::<S, i16, N, WIDE, ALL>(simd, own, zero, starts, bits, values);
+                }
+                Source::Samples(Samples::I32(own)) => {
+                    self.load_of::<S, i32, N, WIDE, ALL>(simd, own, zero, starts, bits, values);
+                }
+            },
+        );
+    }
+
+    #[inline(always)]
+    fn load_of<S: Simd, T: Sample, const N: usize, const WIDE: usize, const ALL: usize>(
         &self,
         simd: S,
         samples: &[T],
@@ -406,6 +465,7 @@ impl Part {
         [rows, slices]: [u32; 2],
         values: &mut [Lanes<S>; ALL],
     ) {
+        let samples = &samples[self.first..];
         let mut first: [[i32; 8]; 3] = three!(I => i32x8::<S>::truncate_from(starts[I]).into());
         let Self { row, slice, dims, .. } = *self;
         if dims.iter().any(|&count| count < WIDE) {
@@ -461,10 +521,7 @@ impl Part {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        cpu::field::{Field, Typed},
-        volume::Samples,
-    };
+    use crate::cpu::field::Typed;
     use fearless_simd::{Level, dispatch};
     use std::sync::Arc;
 
@@ -615,20 +672,15 @@ mod tests {
     }
 
     fn found(typed: &Typed, places: [[f32; 8]; 3], way: [f32; 3]) -> [[f32; 8]; 5] {
-        fn at<T: Sample, S: Simd>(simd: S, field: &Field<T>, places: [[f32; 8]; 3], way: [f32; 3]) -> [[f32; 8]; 5] {
+        #[inline(always)]
+        fn at<S: Simd>(simd: S, blended: &Blended, places: [[f32; 8]; 3], way: [f32; 3]) -> [[f32; 8]; 5] {
             let way = three!(I => Lanes::splat(simd, way[I]));
             let Point { value, slopes: [x, y, z], weight } =
-                field.at(simd, three!(I => places[I].simd_into(simd)), way);
+                blended.at(simd, three!(I => places[I].simd_into(simd)), way);
             [weight, value, x, y, z].map(Into::into)
         }
-        let level = Level::new();
-        match typed {
-            Typed::U8(field) => dispatch!(level, simd => at(simd, field, places, way)),
-            Typed::U16(field) => dispatch!(level, simd => at(simd, field, places, way)),
-            Typed::I16(field) => dispatch!(level, simd => at(simd, field, places, way)),
-            Typed::I32(field) => dispatch!(level, simd => at(simd, field, places, way)),
-            Typed::F32(field) => dispatch!(level, simd => at(simd, field, places, way)),
-        }
+        let Typed::Blend(blended) = typed else { panic!("no sums") };
+        dispatch!(Level::new(), simd => at(simd, blended, places, way))
     }
 
     /// Places in the box of a lattice, and some beyond it, in steps from its first sample.

@@ -8,7 +8,7 @@
 //! samples go on mirrored at the outermost ones, so the weights always add up to 1.
 
 use super::{
-    blend::{Blend, Point},
+    blend::{Blend, Blended},
     brick_cache::{BESIDE, Grid, SLOT, SLOT_SIDE},
     vector::{Lanes, each, exp2_within, four, three, words},
     window::{Sample, Weights, Window, row_of},
@@ -58,6 +58,8 @@ pub enum Typed<'a> {
     I16(Field<'a, i16>),
     I32(Field<'a, i32>),
     F32(Field<'a, f32>),
+    /// By sums, of any type.
+    Blend(Blended<'a>),
 }
 
 impl<'a> Typed<'a> {
@@ -68,10 +70,10 @@ impl<'a> Typed<'a> {
 
     /// The same by sums over samples.
     pub fn blended(volume: &'a Volume, blend: &'a Blend, zero: f64) -> Self {
-        Self::of_volume(volume, Shape::Blend(blend), zero)
+        Self::Blend(Blended::new(volume, blend, zero))
     }
 
-    fn of_volume(volume: &'a Volume, shape: Shape<'a>, zero: f64) -> Self {
+    fn of_volume(volume: &'a Volume, shape: Shape, zero: f64) -> Self {
         let dims = volume.drawn_lattice().dims;
         match &volume.coefficients {
             Some(coefficients) => Self::F32(Field::new(&coefficients.values, dims, Memory::Rows, shape, zero)),
@@ -84,7 +86,7 @@ impl<'a> Typed<'a> {
         Self::in_memory(samples, dims, Memory::Slots(grid), Shape::new(weighting), zero)
     }
 
-    fn in_memory(samples: &'a Samples, dims: [usize; 3], memory: Memory<'a>, shape: Shape<'a>, zero: f64) -> Self {
+    fn in_memory(samples: &'a Samples, dims: [usize; 3], memory: Memory<'a>, shape: Shape, zero: f64) -> Self {
         match samples {
             Samples::U8(samples) => Self::U8(Field::new(samples, dims, memory, shape, zero)),
             Samples::U16(samples) => Self::U16(Field::new(samples, dims, memory, shape, zero)),
@@ -100,7 +102,7 @@ pub struct Field<'a, T> {
     samples: &'a [T],
     dims: [usize; 3],
     memory: Memory<'a>,
-    shape: Shape<'a>,
+    shape: Shape,
     zero: f32,
 }
 
@@ -115,15 +117,14 @@ enum Memory<'a> {
 
 /// The kernel between samples.
 #[derive(Clone, Copy)]
-enum Shape<'a> {
+enum Shape {
     Gaussian(Bell),
     Linear,
     /// Four weights an axis, of the factors of 1, t, t² and t³.
     Cubic([[f32; 4]; 4]),
-    Blend(&'a Blend),
 }
 
-impl Shape<'_> {
+impl Shape {
     fn new(weighting: Weighting) -> Self {
         match weighting {
             Weighting::Gaussian(sigma) => Self::Gaussian(Bell::new(sigma)),
@@ -150,14 +151,14 @@ struct Taps<S: Simd> {
 }
 
 impl<'a, T: Sample> Field<'a, T> {
-    fn new(samples: &'a [T], dims: [usize; 3], memory: Memory<'a>, shape: Shape<'a>, zero: f64) -> Self {
+    fn new(samples: &'a [T], dims: [usize; 3], memory: Memory<'a>, shape: Shape, zero: f64) -> Self {
         Self { samples, dims, memory, shape, zero: zero as f32 }
     }
 
-    /// Values, counted from zero, and their changes a step along each axis, at places in steps on rays that go a `way`.
+    /// Values, counted from zero, and their changes a step along each axis, at places in steps.
     #[inline(always)]
-    pub fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3], way: [Lanes<S>; 3]) -> Point<S> {
-        let (value, slopes) = match &self.shape {
+    pub fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
+        match &self.shape {
             Shape::Gaussian(bell) => self.gaussian(simd, bell, place),
             Shape::Linear => self.linear(simd, place),
             // A function of its own: large, and asked for at three places.
@@ -165,9 +166,7 @@ impl<'a, T: Sample> Field<'a, T> {
                 #[inline(always)]
                 || self.cubic(simd, factors, place),
             ),
-            Shape::Blend(blend) => return blend.at(simd, self.samples, self.zero, place, way),
-        };
-        Point { value, slopes, weight: Lanes::splat(simd, 1.0) }
+        }
     }
 }
 
@@ -670,7 +669,7 @@ mod tests {
     fn found(volume: &Volume, weighting: Weighting, places: [[f32; 8]; 3], zero: f64) -> [[f32; 8]; 4] {
         fn at<T: Sample, S: Simd>(simd: S, field: &Field<T>, places: [[f32; 8]; 3]) -> [[f32; 8]; 4] {
             let places = three!(I => places[I].simd_into(simd));
-            let Point { value, slopes: [x, y, z], .. } = field.at(simd, places, places);
+            let (value, [x, y, z]) = field.at(simd, places);
             [value, x, y, z].map(Into::into)
         }
         let level = Level::new();
@@ -680,6 +679,7 @@ mod tests {
             Typed::I16(field) => dispatch!(level, simd => at(simd, &field, places)),
             Typed::I32(field) => dispatch!(level, simd => at(simd, &field, places)),
             Typed::F32(field) => dispatch!(level, simd => at(simd, &field, places)),
+            Typed::Blend(_) => unreachable!("four weights an axis"),
         }
     }
 

@@ -131,12 +131,16 @@ impl Level<'_> {
         // A function of its own for each type of samples, else each would be compiled wherever this one is called.
         simd.vectorize(
             #[inline(always)]
-            || match &self.field {
-                Typed::U8(field) => field.at(simd, place, way),
-                Typed::U16(field) => field.at(simd, place, way),
-                Typed::I16(field) => field.at(simd, place, way),
-                Typed::I32(field) => field.at(simd, place, way),
-                Typed::F32(field) => field.at(simd, place, way),
+            || {
+                let (value, slopes) = match &self.field {
+                    Typed::U8(field) => field.at(simd, place),
+                    Typed::U16(field) => field.at(simd, place),
+                    Typed::I16(field) => field.at(simd, place),
+                    Typed::I32(field) => field.at(simd, place),
+                    Typed::F32(field) => field.at(simd, place),
+                    Typed::Blend(blended) => return blended.at(simd, place, way),
+                };
+                Point { value, slopes, weight: Lanes::splat(simd, 1.0) }
             },
         )
     }

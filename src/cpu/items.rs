@@ -7,6 +7,7 @@ use super::{
     page_cache::PageCache,
     plan::Plan,
     project::Projector,
+    vector::lanes,
 };
 use crate::{
     Error, Result,
@@ -20,7 +21,7 @@ use crate::{
         bricks::{BLOCK, BLOCKS, Choice, SIDE},
     },
 };
-use fearless_simd::{Level, dispatch};
+use fearless_simd::Level;
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -97,7 +98,7 @@ impl Prepared {
             Self::Set { drawn, .. } if drawn.payload == Payload::Radiance => {
                 let projector = Projector::new(plan, Source::of_splats(view, drawn, true));
                 Ok(batches(&drawn.splats, spare, |batch: &[Splat], records| {
-                    dispatch!(Level::new(), simd => projector.add(simd, batch.iter().map(|splat| (splat, 1.0)), records));
+                    lanes!(Level::new(), simd => projector.add(simd, batch.iter().map(|splat| (splat, 1.0)), records));
                 }))
             }
             Self::Set { drawn, .. } => {

@@ -62,7 +62,7 @@ use bins::{BLOCK, Bins, TileLists};
 use blend::{Blend, Way};
 use brick_cache::Grid;
 use close::{NO_VALUE, Visible};
-use fearless_simd::{Level, dispatch};
+use fearless_simd::Level;
 use field::Typed;
 use footprint::Record;
 use gather::Gather;
@@ -75,6 +75,7 @@ use std::{
     sync::atomic::{AtomicU64, Ordering::Relaxed},
     time::Instant,
 };
+use vector::lanes;
 
 /// A scene and what was made of it to draw it. Cameras and settings may change from picture to picture.
 #[derive(Debug)]
@@ -480,7 +481,7 @@ fn draw_block(
         if at[0] < tiles[0] && at[1] < tiles[1] {
             let (entries, marks) =
                 (entries.of(number), marks.get(at[1] * tiles[0] + at[0]).map_or(&[][..], Vec::as_slice));
-            *tile = dispatch!(level, simd => march.tile(simd, at, entries, marks, &mut count));
+            *tile = lanes!(level, simd => march.tile(simd, at, entries, marks, &mut count));
         }
     }
     drawn.fetch_add(count, Relaxed);

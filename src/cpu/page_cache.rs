@@ -6,6 +6,7 @@ use super::{
     nodes::{Drawn, Nodes},
     plan::Plan,
     project::Projector,
+    vector::lanes,
 };
 use crate::{
     Result,
@@ -14,7 +15,7 @@ use crate::{
     math::View,
     scene::Settings,
 };
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::{Level, Simd};
 use rayon::prelude::*;
 use std::{collections::HashMap, sync::Arc};
 
@@ -128,7 +129,7 @@ impl PageCache {
         let mut records = spare_for(spare, self.active.len());
         records.par_iter_mut().zip(&self.active).for_each(|(records, page)| {
             let Some(Held { nodes, .. }) = self.held.get(page) else { return };
-            dispatch!(level, simd => {
+            lanes!(level, simd => {
                 let splat = |(node, share): &Drawn| (&nodes.splats[*node as usize], *share * (1.0 / SHARE_UNIT as f32));
                 projector.add(simd, self.drawn_of(simd, &cut, nodes).iter().map(splat), records);
             });
@@ -146,7 +147,7 @@ impl PageCache {
         let (level, cut) = (Level::new(), self.cut(view, settings, pixels));
         let of = |page: &u32| {
             let Some(Held { nodes, .. }) = self.held.get(page) else { return 0 };
-            dispatch!(level, simd => self.drawn_of(simd, &cut, nodes).len() as u64)
+            lanes!(level, simd => self.drawn_of(simd, &cut, nodes).len() as u64)
         };
         self.active.par_iter().map(of).sum()
     }

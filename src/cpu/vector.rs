@@ -32,7 +32,42 @@ macro_rules! words {
         words
     }};
 }
-pub(super) use {each, four, three, words};
+/// What a processor's vectors compute, as `fearless_simd::dispatch` does it, with one copy of the code less: processors of before
+/// 2013, which have SSE4.2 but no AVX2, take that of SSE2.
+macro_rules! lanes {
+    ($level:expr, $simd:ident => $of_lanes:expr) => {{
+        #[cfg(target_arch = "x86_64")]
+        {
+            let level: fearless_simd::Level = $level;
+            if let Some($simd) = level.as_avx512() {
+                fearless_simd::Simd::vectorize(
+                    $simd,
+                    #[inline(always)]
+                    || $of_lanes,
+                )
+            } else if let Some($simd) = level.as_avx2() {
+                fearless_simd::Simd::vectorize(
+                    $simd,
+                    #[inline(always)]
+                    || $of_lanes,
+                )
+            } else if let Some($simd) = level.as_sse2() {
+                fearless_simd::Simd::vectorize(
+                    $simd,
+                    #[inline(always)]
+                    || $of_lanes,
+                )
+            } else {
+                unreachable!("every such processor has SSE2")
+            }
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        {
+            fearless_simd::dispatch!($level, $simd => $of_lanes)
+        }
+    }};
+}
+pub(super) use {each, four, lanes, three, words};
 
 /// Eight numbers.
 pub type Lanes<S> = f32x8<S>;
