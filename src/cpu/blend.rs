@@ -737,9 +737,22 @@ mod tests {
         }
     }
 
+    /// A step from 100 to 150 on the same lattice, in a range of 0 to 255: beside it fields overshoot.
+    fn stepped(volume: &Volume) -> Volume {
+        let last = volume.lattice.len() - 1;
+        let value = |at: usize| match at {
+            0 => 0,
+            at if at == last => 255,
+            at => 100 + 50 * u8::from(at > last / 2),
+        };
+        Volume::new(volume.lattice.clone(), Samples::U8((0..=last).map(value).collect())).unwrap()
+    }
+
     #[test]
     fn fields_lie_in_the_ranges_of_their_cells() {
-        for (volume, kernel) in kinds() {
+        let steps = kinds().into_iter().filter(|(volume, _)| volume.coefficients.is_none());
+        let steps = steps.map(|(volume, kernel)| (stepped(&volume), kernel));
+        for (volume, kernel) in kinds().into_iter().chain(steps) {
             let Ok(Way::Blend(taps)) = Way::of(&volume, &kernel) else { panic!("{kernel:?}") };
             let blend = Blend::new(&volume, &kernel, taps);
             let ranges = blend.ranges(&volume, &kernel);

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     math::{Kernel, Sheets},
     scene::{Gradient, Item, MOST_GATHERED, Mode, Optics, Scene, Settings},
-    volume::{Volume, bricks::Choice},
+    volume::{Arrangement, Volume, bricks::Choice},
 };
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
@@ -23,10 +23,12 @@ use fearless_simd::{Simd, mask32x8, prelude::*};
 /// sample.
 const STRAIGHT: f32 = 64.0;
 
-/// Why the field of a scene can't be gathered; none where it can. `unsuited` tells what is wrong with a volume and its kernel.
+/// Why the field of a scene can't be gathered in sheets of so many [`parts`]; none where it can. `unsuited` tells what is wrong
+/// with a volume and its kernel.
 pub fn obstacle(
     scene: &Scene,
     settings: &Settings,
+    parts: usize,
     unsuited: impl Fn(&Volume, &Kernel) -> Option<&'static str>,
 ) -> Option<&'static str> {
     let fields = scene.items.iter().filter(|item| !matches!(item, Item::Radiance(_) | Item::Hierarchy(_)));
@@ -37,6 +39,10 @@ pub fn obstacle(
     };
     if unsuited.is_some() {
         return unsuited;
+    }
+    let is_rectilinear = |item: &Item| matches!(item, Item::Volume(volume, ..) if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_)));
+    if parts > 1 && scene.items.iter().any(is_rectilinear) {
+        return Some("sheets thicker than two samples of a rectilinear lattice");
     }
     if settings.mode != Mode::Sheets || settings.classifies_samples() {
         return Some("samples that are classified before interpolation");

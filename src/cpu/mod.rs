@@ -170,7 +170,7 @@ impl CpuRenderer {
         let outline = self.outline(&view, settings)?;
         let plan = Plan::new(&self.scene, &view, &outline.sheets, settings, outline.choice.as_ref());
         clock.step("plan");
-        let gathers = self.gathers(settings)?;
+        let gathers = self.gathers(settings, &outline)?;
         let before: u64 = self.brick_reads();
         let mut records = Vec::new();
         let mut spare = std::mem::take(&mut self.spare);
@@ -254,7 +254,7 @@ impl CpuRenderer {
     }
 
     /// Whether the field of the scene's volume is gathered.
-    fn gathers(&self, settings: &Settings) -> Result<bool> {
+    fn gathers(&self, settings: &Settings, outline: &Outline) -> Result<bool> {
         if settings.evaluate == Evaluate::Scatter {
             // Sections of tensor products are not known.
             return self.scene.tensor().map_or(Ok(false), |tensor| {
@@ -264,7 +264,8 @@ impl CpuRenderer {
                 )))
             });
         }
-        match gather::obstacle(&self.scene, settings, gather::unsuited) {
+        let parts = gather::parts(&self.scene, &outline.sheets, outline.choice.as_ref());
+        match gather::obstacle(&self.scene, settings, parts, gather::unsuited) {
             Some(what) if settings.evaluate == Evaluate::Gather => {
                 Err(Error::Argument(format!("{what} can't be gathered; scatter instead, or leave it to the engine")))
             }

@@ -50,10 +50,11 @@ pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
 
 /// Why the engine cannot gather a scene's field in these settings; none where it can.
 pub fn obstacle(scene: &Scene, settings: &Settings, sheets: &Sheets, gpu: &Gpu) -> Option<&'static str> {
-    if let Some(what) = crate::cpu::gather::obstacle(scene, settings, unsuited) {
+    let parts = crate::cpu::gather::parts(scene, sheets, None);
+    if let Some(what) = crate::cpu::gather::obstacle(scene, settings, parts, unsuited) {
         return Some(what);
     }
-    if crate::cpu::gather::parts(scene, sheets, None) > 1 {
+    if parts > 1 {
         return Some("sheets thicker than two samples");
     }
     let volume =
