@@ -352,9 +352,10 @@ impl Gather<'_> {
     fn kernels_at<S: Simd>(&self, simd: S, plan: &Plan, place: [Lanes<S>; 3]) -> Lanes<S> {
         let mut all = Lanes::splat(simd, 1.0);
         let Some(per_deviation) = self.ends else { return all };
-        for axis in 0..3 {
-            let after = place[axis] - plan.frame.field_low[axis];
-            let before = plan.frame.field_high[axis] - place[axis];
+        let ends = plan.frame.field_low.iter().zip(plan.frame.field_high);
+        for (place, (low, high)) in place.into_iter().zip(ends) {
+            let after = place - *low;
+            let before = high - place;
             let near = after.min(before);
             if near.simd_lt(BEYOND).any_true() {
                 // As if kernels were as dense as numbers, beyond half a step from the last sample none.
