@@ -67,7 +67,8 @@ fn reading(criterion: &mut Criterion) {
         header: 0,
     };
     criterion.bench_function("read a raw volume", |bench| {
-        bench.iter(|| io::load_volume(black_box(&raw.0), &limits, Some(&layout)).expect("a volume"));
+        bench
+            .iter(|| io::load_volume(black_box(&raw.0), &limits, Some(&layout)).expect("a volume"));
     });
 }
 
@@ -76,14 +77,16 @@ fn surfaces(criterion: &mut Criterion) {
     criterion.bench_function("surfels of a mesh", |bench| {
         bench.iter(|| black_box(&mesh).surfels(&SurfelOptions::default()).expect("surfels"));
     });
-    let build = || Tree::build(black_box(&set), &BuildOptions::default(), &|_, _| ()).expect("a tree");
+    let build =
+        || Tree::build(black_box(&set), &BuildOptions::default(), &|_, _| ()).expect("a tree");
     criterion.bench_function("build a tree", |bench| bench.iter(build));
     let tree = build();
     let encode = || to_bytes(black_box(&tree), &WriteOptions::default()).expect("a file");
     criterion.bench_function("encode a hierarchy", |bench| bench.iter(encode));
     let bytes = encode();
     let decode = |bytes| {
-        let hierarchy = Hierarchy::from_bytes(bytes, Path::new("memory"), &Limits::default()).expect("a hierarchy");
+        let hierarchy = Hierarchy::from_bytes(bytes, Path::new("memory"), &Limits::default())
+            .expect("a hierarchy");
         hierarchy.read_tree().expect("a tree")
     };
     criterion.bench_function("decode a hierarchy", |bench| {

@@ -14,7 +14,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let surfels = mesh.surfels(&SurfelOptions::default())?.splats.len();
         let seconds = start.elapsed().as_secs_f64();
         let millions = mesh.positions.len() as f64 / 1e6;
-        println!("{millions:.2} M vertices, {surfels} surfels: {seconds:.3} s, {:.2} M vertices/s", millions / seconds);
+        println!(
+            "{millions:.2} M vertices, {surfels} surfels: {seconds:.3} s, {:.2} M vertices/s",
+            millions / seconds
+        );
     }
     Ok(())
 }

@@ -87,14 +87,21 @@ fn same_size(a: [u32; 2], b: [u32; 2]) -> Result<[u32; 2]> {
 }
 
 /// Compares what two functions tell of each pixel.
-fn compare_pixels(a: impl Fn(usize) -> [f64; 4], b: impl Fn(usize) -> [f64; 4], size: [u32; 2]) -> Result<Comparison> {
+fn compare_pixels(
+    a: impl Fn(usize) -> [f64; 4],
+    b: impl Fn(usize) -> [f64; 4],
+    size: [u32; 2],
+) -> Result<Comparison> {
     let [width, height] = size.map(|side| side as usize);
     let count = width.saturating_mul(height);
     if count == 0 {
-        return Err(Error::Argument(format!("pictures of {width}x{height} pixels have none to compare")));
+        return Err(Error::Argument(format!(
+            "pictures of {width}x{height} pixels have none to compare"
+        )));
     }
     let channels = if (0..count).all(|at| a(at)[3] == 1.0 && b(at)[3] == 1.0) { 3 } else { 4 };
-    let mut comparison = Comparison { psnr: None, ssim: 0.0, max_difference: 0.0, different_pixels: 0 };
+    let mut comparison =
+        Comparison { psnr: None, ssim: 0.0, max_difference: 0.0, different_pixels: 0 };
     let mut squares = 0.0;
     for (a, b) in (0..count).map(|at| (a(at), b(at))) {
         let mut largest: f64 = 0.0;
@@ -110,7 +117,8 @@ fn compare_pixels(a: impl Fn(usize) -> [f64; 4], b: impl Fn(usize) -> [f64; 4], 
     let mean = squares / (count * channels) as f64;
     comparison.psnr = (mean > 0.0).then(|| -10.0 * mean.log10());
     let brightness = |[r, g, b, _]: [f64; 4]| 0.299 * r + 0.587 * g + 0.114 * b;
-    comparison.ssim = structural_similarity(|at| [brightness(a(at)), brightness(b(at))], [width, height]);
+    comparison.ssim =
+        structural_similarity(|at| [brightness(a(at)), brightness(b(at))], [width, height]);
     Ok(comparison)
 }
 
@@ -130,7 +138,11 @@ fn structural_similarity(pixel: impl Fn(usize) -> [f64; 2], [width, height]: [us
             let [a, b] = pixel(y * width + x);
             [a, b, a * a, b * b, a * b]
         }));
-        let mut row = if rows.len() == down.len() { rows.pop_front().unwrap_or_default() } else { Vec::new() };
+        let mut row = if rows.len() == down.len() {
+            rows.pop_front().unwrap_or_default()
+        } else {
+            Vec::new()
+        };
         row.clear();
         row.extend((0..columns).map(|x| average(&across, own[x..].iter())));
         rows.push_back(row);
@@ -139,9 +151,10 @@ fn structural_similarity(pixel: impl Fn(usize) -> [f64; 2], [width, height]: [us
         }
         for x in 0..columns {
             let [a, b, square_a, square_b, mixed] = average(&down, rows.iter().map(|row| &row[x]));
-            let (variance_a, variance_b, covariance) = (square_a - a * a, square_b - b * b, mixed - a * b);
-            sum +=
-                (2.0 * a * b + c1) * (2.0 * covariance + c2) / ((a * a + b * b + c1) * (variance_a + variance_b + c2));
+            let (variance_a, variance_b, covariance) =
+                (square_a - a * a, square_b - b * b, mixed - a * b);
+            sum += (2.0 * a * b + c1) * (2.0 * covariance + c2)
+                / ((a * a + b * b + c1) * (variance_a + variance_b + c2));
         }
     }
     sum / (columns * (height + 1 - down.len())) as f64
@@ -149,7 +162,10 @@ fn structural_similarity(pixel: impl Fn(usize) -> [f64; 2], [width, height]: [us
 
 /// The sum of some numbers times weights.
 fn average<'a>(window: &[f64], values: impl Iterator<Item = &'a [f64; 5]>) -> [f64; 5] {
-    window.iter().zip(values).fold([0.0; 5], |sum, (weight, value)| std::array::from_fn(|i| sum[i] + weight * value[i]))
+    window
+        .iter()
+        .zip(values)
+        .fold([0.0; 5], |sum, (weight, value)| std::array::from_fn(|i| sum[i] + weight * value[i]))
 }
 
 /// The weights of a window along an axis of `length` pixels, of sum 1: 11 of them, or as many as the axis has.
@@ -215,7 +231,9 @@ mod tests {
         // separation), rounded to 10 digits.
         let size = [24usize, 17];
         let a = texture(size, |x, y| ((x * x * 7 + y * 29 + x * y * 3) % 251) as u8);
-        let b = texture(size, |x, y| ((x * x * 7 + y * 29 + x * y * 3) % 251 / 2 + (x * 5 + y * 3) % 60) as u8);
+        let b = texture(size, |x, y| {
+            ((x * x * 7 + y * 29 + x * y * 3) % 251 / 2 + (x * 5 + y * 3) % 60) as u8
+        });
         let found = compare(&a, &b, [24, 17]).unwrap();
         close(found.ssim, 0.745_384_820_6);
         close(found.psnr.unwrap(), 14.008_331_670_7);
@@ -232,7 +250,12 @@ mod tests {
 
     #[test]
     fn pictures_of_numbers_and_of_none() {
-        let picture = |v: f32| Picture { width: 3, height: 1, color: vec![[v, 0.0, 0.0, 1.0]; 3], depth: vec![1.0; 3] };
+        let picture = |v: f32| Picture {
+            width: 3,
+            height: 1,
+            color: vec![[v, 0.0, 0.0, 1.0]; 3],
+            depth: vec![1.0; 3],
+        };
         let found = compare_pictures(&picture(0.25), &picture(0.25 + 0.001)).unwrap();
         assert_eq!(found.different_pixels, 0);
         assert!((found.psnr.unwrap() - (60.0 + 10.0 * 3.0_f64.log10())).abs() < 1e-3);
@@ -244,8 +267,12 @@ mod tests {
     fn what_cannot_be_compared_is_told() {
         assert!(matches!(compare(&[0; 16], &[0; 12], [2, 2]), Err(Error::Argument(_))));
         assert!(matches!(compare(&[], &[], [0, 2]), Err(Error::Argument(_))));
-        let picture =
-            |width: u32| Picture { width, height: 1, color: vec![[0.0; 4]; width as usize], depth: Vec::new() };
+        let picture = |width: u32| Picture {
+            width,
+            height: 1,
+            color: vec![[0.0; 4]; width as usize],
+            depth: Vec::new(),
+        };
         assert!(matches!(compare_pictures(&picture(2), &picture(3)), Err(Error::Argument(_))));
     }
 
@@ -263,14 +290,20 @@ mod tests {
         assert_eq!(compare_files(&png, &png, &limits).unwrap().psnr, None);
         assert!(compare_files(&png, &jpeg, &limits).unwrap().psnr.unwrap() > 30.0);
         assert!(matches!(compare_files(&png, &text, &limits), Err(Error::Input { .. })));
-        assert!(matches!(compare_files(&folder.join("none.png"), &png, &limits), Err(Error::File { .. })));
+        assert!(matches!(
+            compare_files(&folder.join("none.png"), &png, &limits),
+            Err(Error::File { .. })
+        ));
         let small = Limits { texels: 64 * 47, ..Limits::default() };
         assert!(matches!(compare_files(&png, &png, &small), Err(Error::Limit { .. })));
         // Room for one of them, and for both: a pixel counts 16 bytes while it is decoded.
         let of_one = std::fs::metadata(&png).unwrap().len() + 16 * 64 * 48;
         for (bytes, fits) in [(of_one - 1, false), (2 * of_one - 1, false), (2 * of_one, true)] {
             let found = compare_files(&png, &png, &Limits { bytes, ..limits.clone() });
-            assert!(if fits { found.is_ok() } else { matches!(found, Err(Error::Limit { .. })) }, "{bytes}: {found:?}");
+            assert!(
+                if fits { found.is_ok() } else { matches!(found, Err(Error::Limit { .. })) },
+                "{bytes}: {found:?}"
+            );
         }
         std::fs::remove_dir_all(&folder).unwrap();
     }

@@ -84,7 +84,11 @@ mod tests {
     #[test]
     fn time_runs_out() {
         let over = Deadline::after(0);
-        assert!(over.is_over() && !Deadline::after(1000).is_over() && !Deadline::after(u64::MAX).is_over());
+        assert!(
+            over.is_over()
+                && !Deadline::after(1000).is_over()
+                && !Deadline::after(u64::MAX).is_over()
+        );
         assert!(Deadline::default().check("nothing").is_ok());
         let message = over.check("cutting triangles").unwrap_err().to_string();
         assert_eq!(message, "cutting triangles takes longer than the limit of 0 s");

@@ -56,7 +56,12 @@ pub enum Error {
 impl Error {
     /// An [`Error::Input`] without a hint.
     pub fn input(file: &Path, place: impl Into<String>, message: impl Into<String>) -> Self {
-        Self::Input { file: file.to_owned(), place: place.into(), message: message.into(), hint: None }
+        Self::Input {
+            file: file.to_owned(),
+            place: place.into(),
+            message: message.into(),
+            hint: None,
+        }
     }
 
     /// An [`Error::File`].

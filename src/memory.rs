@@ -8,8 +8,13 @@ use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 /// `None` where the system does not tell.
 pub fn most() -> Option<u64> {
     let asked = RefreshKind::nothing().with_memory(MemoryRefreshKind::nothing().with_ram());
-    let machine = System::new_with_specifics(asked).ok().map(|system| system.total_memory()).filter(|bytes| *bytes > 0);
-    let limits = groups().into_iter().filter_map(|path| std::fs::read_to_string(path).ok()?.trim().parse::<u64>().ok());
+    let machine = System::new_with_specifics(asked)
+        .ok()
+        .map(|system| system.total_memory())
+        .filter(|bytes| *bytes > 0);
+    let limits = groups()
+        .into_iter()
+        .filter_map(|path| std::fs::read_to_string(path).ok()?.trim().parse::<u64>().ok());
     limits.chain(machine).min().map(|bytes| bytes / 4 * 3)
 }
 
@@ -19,7 +24,9 @@ pub(crate) fn check(what: &str, bytes: u64) -> std::result::Result<(), String> {
     // Nothing that is allocated is larger than that.
     let most = most().unwrap_or(u64::MAX).min(isize::MAX as u64);
     if bytes > most {
-        return Err(format!("{what} takes {bytes} bytes of memory, more than the {most} that may be taken here"));
+        return Err(format!(
+            "{what} takes {bytes} bytes of memory, more than the {most} that may be taken here"
+        ));
     }
     Ok(())
 }
@@ -41,7 +48,11 @@ pub(crate) fn room(what: &str, bytes: u64) -> Result<()> {
     };
     let probe = usize::try_from(bytes).ok().and_then(ask);
     let reserve: Option<Vec<Vec<u8>>> = (0..RESERVE.0).map(|_| ask(RESERVE.1)).collect();
-    if probe.is_some() && reserve.is_some() { Ok(()) } else { Err(Error::Memory { what: what.into(), bytes }) }
+    if probe.is_some() && reserve.is_some() {
+        Ok(())
+    } else {
+        Err(Error::Memory { what: what.into(), bytes })
+    }
 }
 
 /// Blocks, and bytes of a block, that must be left for the small lists of all threads.
@@ -72,7 +83,9 @@ fn groups() -> Vec<PathBuf> {
             _ => continue,
         };
         let own = Path::new(root).join(group.trim_start_matches('/'));
-        files.extend(own.ancestors().take_while(|path| path.starts_with(root)).map(|path| path.join(name)));
+        files.extend(
+            own.ancestors().take_while(|path| path.starts_with(root)).map(|path| path.join(name)),
+        );
     }
     files
 }
@@ -88,7 +101,10 @@ mod tests {
         assert!((1 << 28..1 << 50).contains(&found), "{found}");
         assert!(check("that", 1 << 20).is_ok());
         let message = check("this", u64::MAX).unwrap_err();
-        assert!(message.starts_with("this takes 18446744073709551615 bytes of memory, more than"), "{message}");
+        assert!(
+            message.starts_with("this takes 18446744073709551615 bytes of memory, more than"),
+            "{message}"
+        );
         let groups = groups();
         assert!(groups.iter().all(|path| path.starts_with("/sys/fs/cgroup")), "{groups:?}");
     }

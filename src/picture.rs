@@ -46,7 +46,9 @@ impl Picture {
         if found as u64 == u64::from(*width) * u64::from(*height) {
             return Ok(());
         }
-        Err(Error::Argument(format!("a picture of {width}x{height} pixels cannot have {found} {what}")))
+        Err(Error::Argument(format!(
+            "a picture of {width}x{height} pixels cannot have {found} {what}"
+        )))
     }
 
     /// Averages blocks of `factor` × `factor` pixels: the second half of supersampling. Depth takes the nearest. Rows and
@@ -117,7 +119,8 @@ impl Picture {
     pub fn encode_depth(&self) -> Result<Vec<u8>> {
         self.check_depths()?;
         let finite = self.depth.iter().copied().filter(|d| d.is_finite());
-        let [near, far] = finite.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], d| [low.min(d), high.max(d)]);
+        let [near, far] = finite
+            .fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], d| [low.min(d), high.max(d)]);
         let grey = |&depth: &f32| match (far - depth) / (far - near) {
             _ if !depth.is_finite() => 0,
             share if share.is_finite() => 1 + (65534.0 * share).round() as u16,
@@ -125,7 +128,8 @@ impl Picture {
             _ => u16::MAX,
         };
         let pixels: Vec<u16> = self.depth.iter().map(grey).collect();
-        let picture = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(self.width, self.height, pixels);
+        let picture =
+            image::ImageBuffer::<image::Luma<u16>, _>::from_raw(self.width, self.height, pixels);
         encode(&picture.ok_or_else(too_large)?.into(), image::ImageFormat::Png)
     }
 }
@@ -146,7 +150,10 @@ impl PictureFormat {
         match image::ImageFormat::from_path(path) {
             Ok(image::ImageFormat::Png) => Ok(Self::Png),
             Ok(image::ImageFormat::Jpeg) => Ok(Self::Jpeg),
-            _ => Err(Error::Argument(format!("{}: unknown picture format, use .png or .jpg", path.display()))),
+            _ => Err(Error::Argument(format!(
+                "{}: unknown picture format, use .png or .jpg",
+                path.display()
+            ))),
         }
     }
 }
@@ -157,7 +164,9 @@ fn too_large() -> Error {
 
 fn encode(picture: &image::DynamicImage, format: image::ImageFormat) -> Result<Vec<u8>> {
     let mut bytes = std::io::Cursor::new(Vec::new());
-    picture.write_to(&mut bytes, format).map_err(|e| Error::Argument(format!("the picture cannot be stored: {e}")))?;
+    picture
+        .write_to(&mut bytes, format)
+        .map_err(|e| Error::Argument(format!("the picture cannot be stored: {e}")))?;
     Ok(bytes.into_inner())
 }
 
@@ -171,15 +180,22 @@ mod tests {
         let picture = Picture { width: 4, height: 1, color: vec![[0.0; 4]; 4], depth };
         let read = image::load_from_memory(&picture.encode_depth().unwrap()).unwrap().to_luma16();
         assert_eq!(read.into_raw(), [65535, 1, 0, 32768]);
-        let flat = Picture { width: 2, height: 1, color: vec![[0.0; 4]; 2], depth: vec![1.0, f32::INFINITY] };
+        let flat = Picture {
+            width: 2,
+            height: 1,
+            color: vec![[0.0; 4]; 2],
+            depth: vec![1.0, f32::INFINITY],
+        };
         let read = image::load_from_memory(&flat.encode_depth().unwrap()).unwrap().to_luma16();
         assert_eq!(read.into_raw(), [65535, 0]);
     }
 
     #[test]
     fn pictures_that_contradict_themselves_are_refused() {
-        let refused = |result: Result<()>| assert!(matches!(result, Err(Error::Argument(_))), "{result:?}");
-        for (size, colors, depths) in [(2, 3, 4), (2, 9, 9), (2, 4, 0), (0, 1, 1), (u32::MAX, 1, 1)] {
+        let refused =
+            |result: Result<()>| assert!(matches!(result, Err(Error::Argument(_))), "{result:?}");
+        for (size, colors, depths) in [(2, 3, 4), (2, 9, 9), (2, 4, 0), (0, 1, 1), (u32::MAX, 1, 1)]
+        {
             let color = vec![[0.5; 4]; colors];
             let picture = Picture { width: size, height: size, color, depth: vec![1.0; depths] };
             refused(picture.reduced(2).map(|_| ()));
@@ -191,7 +207,8 @@ mod tests {
                 refused(picture.encode_depth().map(|_| ()));
             }
         }
-        let picture = Picture { width: 2, height: 3, color: vec![[0.5; 4]; 6], depth: vec![1.0; 6] };
+        let picture =
+            Picture { width: 2, height: 3, color: vec![[0.5; 4]; 6], depth: vec![1.0; 6] };
         refused(picture.reduced(0).map(|_| ()));
         let reduced = picture.reduced(2).unwrap();
         assert_eq!((reduced.width, reduced.height, reduced.color), (1, 1, vec![[0.5; 4]]));

@@ -68,7 +68,11 @@ impl Renderer {
     /// # Errors
     /// [`Error::Argument`] for a scene that [`Scene::validate`] refuses; [`Error::Gpu`] for one that does not fit the device.
     pub fn new(device: &Device, scene: &Scene) -> Result<Self> {
-        Ok(Self { scene: scene.clone(), device: device.clone(), drawer: Drawer::new(device, scene)? })
+        Ok(Self {
+            scene: scene.clone(),
+            device: device.clone(),
+            drawer: Drawer::new(device, scene)?,
+        })
     }
 
     /// What draws.
@@ -80,7 +84,11 @@ impl Renderer {
     ///
     /// # Errors
     /// Those of [`engine::Renderer::render`] and [`CpuRenderer::render`].
-    pub fn render(&mut self, camera: &Camera, settings: &Settings) -> Result<(Picture, FrameStats)> {
+    pub fn render(
+        &mut self,
+        camera: &Camera,
+        settings: &Settings,
+    ) -> Result<(Picture, FrameStats)> {
         match self.render_once(camera, settings) {
             Err(Error::DeviceLost(reason)) => {
                 tracing::warn!("{reason}; drawing again on a device opened anew");
@@ -91,7 +99,11 @@ impl Renderer {
         }
     }
 
-    fn render_once(&mut self, camera: &Camera, settings: &Settings) -> Result<(Picture, FrameStats)> {
+    fn render_once(
+        &mut self,
+        camera: &Camera,
+        settings: &Settings,
+    ) -> Result<(Picture, FrameStats)> {
         match &mut self.drawer {
             Drawer::Gpu(renderer, prepared) => renderer.render(prepared, camera, settings),
             Drawer::Cpu(renderer) => renderer.render(camera, settings),

@@ -62,21 +62,35 @@ impl Scene {
 
     /// Adds scattered samples.
     #[must_use]
-    pub fn with_samples(mut self, set: impl Into<Arc<SplatSet>>, transfer: TransferFunction) -> Self {
+    pub fn with_samples(
+        mut self,
+        set: impl Into<Arc<SplatSet>>,
+        transfer: TransferFunction,
+    ) -> Self {
         self.items.push(Item::Scalar(set.into(), transfer));
         self
     }
 
     /// Adds a volume.
     #[must_use]
-    pub fn with_volume(mut self, volume: impl Into<Arc<Volume>>, kernel: Kernel, transfer: TransferFunction) -> Self {
+    pub fn with_volume(
+        mut self,
+        volume: impl Into<Arc<Volume>>,
+        kernel: Kernel,
+        transfer: TransferFunction,
+    ) -> Self {
         self.items.push(Item::Volume(volume.into(), kernel, transfer));
         self
     }
 
     /// Adds a volume in bricks.
     #[must_use]
-    pub fn with_bricks(mut self, bricks: impl Into<Arc<Bricks>>, kernel: Kernel, transfer: TransferFunction) -> Self {
+    pub fn with_bricks(
+        mut self,
+        bricks: impl Into<Arc<Bricks>>,
+        kernel: Kernel,
+        transfer: TransferFunction,
+    ) -> Self {
         self.items.push(Item::Bricks(bricks.into(), kernel, transfer));
         self
     }
@@ -88,7 +102,9 @@ impl Scene {
     pub(crate) fn shown_by(&self, transfer: &TransferFunction) -> Result<Self> {
         let mut scene = self.clone();
         for (number, item) in scene.items.iter_mut().enumerate() {
-            if let Item::Scalar(_, shown) | Item::Volume(_, _, shown) | Item::Bricks(_, _, shown) = item {
+            if let Item::Scalar(_, shown) | Item::Volume(_, _, shown) | Item::Bricks(_, _, shown) =
+                item
+            {
                 shown.clone_from(transfer);
             }
             numbers::check_field(item).map_err(numbers::of_item(number))?;
@@ -120,9 +136,12 @@ impl Scene {
         const OPTICAL_DEPTH: f64 = 7.0;
         self.items.iter().any(|item| match item {
             Item::Radiance(_) | Item::Hierarchy(_) => true,
-            Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => {
+            Item::Scalar(_, transfer)
+            | Item::Volume(_, _, transfer)
+            | Item::Bricks(_, _, transfer) => {
                 let Bounds { min, max } = item.bounds();
-                !transfer.isosurfaces.is_empty() || transfer.most_extinction() * (max - min).length() > OPTICAL_DEPTH
+                !transfer.isosurfaces.is_empty()
+                    || transfer.most_extinction() * (max - min).length() > OPTICAL_DEPTH
             }
         })
     }
@@ -136,10 +155,16 @@ impl Scene {
         let [width, height] = settings.size;
         if u64::from(width) * u64::from(height) > Settings::MAX_PIXELS {
             let most = Settings::MAX_PIXELS;
-            return wrong(format!("a picture of {width}x{height} pixels is larger than {most} pixels"));
+            return wrong(format!(
+                "a picture of {width}x{height} pixels is larger than {most} pixels"
+            ));
         }
         if settings.clips.len() > Settings::MAX_CLIPS {
-            return wrong(format!("{} clips are more than {}", settings.clips.len(), Settings::MAX_CLIPS));
+            return wrong(format!(
+                "{} clips are more than {}",
+                settings.clips.len(),
+                Settings::MAX_CLIPS
+            ));
         }
         for clip in &settings.clips {
             match clip.shape {
@@ -152,7 +177,10 @@ impl Scene {
                     }
                 }
                 ClipShape::Box(bounds) => {
-                    if !(bounds.min.is_finite() && bounds.max.is_finite() && bounds.min.cmplt(bounds.max).all()) {
+                    if !(bounds.min.is_finite()
+                        && bounds.max.is_finite()
+                        && bounds.min.cmplt(bounds.max).all())
+                    {
                         let Bounds { min, max } = bounds;
                         return wrong(format!("a clip box from {min} to {max} holds nothing"));
                     }
@@ -175,7 +203,10 @@ impl Scene {
                     if let Some(tensor) = kernel.as_tensor() {
                         check_tensor(tensor, &volume.lattice, before).map_err(Error::Argument)?;
                     }
-                    if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_)) && !is_gaussian && !before {
+                    if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_))
+                        && !is_gaussian
+                        && !before
+                    {
                         return wrong(
                             "a rectilinear volume takes a Gaussian kernel, unless it is classified before".into(),
                         );
@@ -239,18 +270,26 @@ impl Scene {
             };
             fields += usize::from(payload == Payload::Scalar);
             if set.payload != payload {
-                return Err(Error::Argument(format!("a set of {:?} splats was added as {payload:?}", set.payload)));
+                return Err(Error::Argument(format!(
+                    "a set of {:?} splats was added as {payload:?}",
+                    set.payload
+                )));
             }
             if !(set.extent > 0.0 && set.extent <= SplatSet::MAX_EXTENT) {
                 let most = SplatSet::MAX_EXTENT;
-                return Err(Error::Argument(format!("a splat set's extent must lie in 0 … {most}, is {}", set.extent)));
+                return Err(Error::Argument(format!(
+                    "a splat set's extent must lie in 0 … {most}, is {}",
+                    set.extent
+                )));
             }
         }
         for (number, item) in self.items.iter().enumerate() {
             numbers::check_item(item).map_err(numbers::of_item(number))?;
         }
         if fields > 1 {
-            return Err(Error::Argument(format!("a picture takes one volume or sample set, the scene has {fields}")));
+            return Err(Error::Argument(format!(
+                "a picture takes one volume or sample set, the scene has {fields}"
+            )));
         }
         if self.bounds().is_empty() {
             return Err(Error::NothingToDraw("the scene holds no splats".into()));
@@ -314,7 +353,8 @@ impl Scene {
                         _ if volume.coefficients.is_some() => 2.0 / 3.0,
                         _ => 4.0 / 3.0,
                     };
-                    let step = most.min(2.0 / 3.0 * kernel.extent) * volume.lattice.kernel_spacing();
+                    let step =
+                        most.min(2.0 / 3.0 * kernel.extent) * volume.lattice.kernel_spacing();
                     // Sheets of lattices with steps of very different lengths stay thin enough to be gathered.
                     let step = step.min(MOST_GATHERED * volume.lattice.least_kernel_spacing());
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
@@ -327,7 +367,9 @@ impl Scene {
                     thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
                 }
                 Item::Volume(..) | Item::Bricks(..) => {}
-                Item::Radiance(_) | Item::Hierarchy(_) | Item::Scalar(..) => pixels = Some(settings.sheet_pixels),
+                Item::Radiance(_) | Item::Hierarchy(_) | Item::Scalar(..) => {
+                    pixels = Some(settings.sheet_pixels)
+                }
             }
         }
         Sheets::new(view, [near, far], thickness, pixels)
@@ -339,10 +381,14 @@ impl Scene {
 fn check_tensor(tensor: Tensor, lattice: &Lattice, before: bool) -> Result<(), String> {
     let name = tensor.name();
     if lattice.arrangement != Arrangement::Cartesian {
-        return Err(format!("the kernel {name} takes a Cartesian lattice: it is a product along the lattice's axes"));
+        return Err(format!(
+            "the kernel {name} takes a Cartesian lattice: it is a product along the lattice's axes"
+        ));
     }
     if before {
-        return Err(format!("the kernel {name} is classified after interpolation, in image-aligned sheets"));
+        return Err(format!(
+            "the kernel {name} is classified after interpolation, in image-aligned sheets"
+        ));
     }
     Ok(())
 }
@@ -368,7 +414,9 @@ impl Scene {
                 let room = settings.page_memory / bricks::slot_bytes(bricks);
                 let (pixels, room) = match detail {
                     Detail::Pixels(pixels) => (pixels, room),
-                    Detail::Splats(splats) => (Detail::PIXELS, room.min(splats / bricks::SIDE.pow(3) as u64)),
+                    Detail::Splats(splats) => {
+                        (Detail::PIXELS, room.min(splats / bricks::SIDE.pow(3) as u64))
+                    }
                     Detail::Milliseconds(_) => (Detail::PIXELS, room),
                 };
                 let most = usize::try_from(room).unwrap_or(usize::MAX).min(most).max(1);
@@ -381,7 +429,11 @@ impl Scene {
                 }
                 let choice = choose(&first_visible(transfer, bricks.header().range));
                 let sheets = self.sheets_of(view, settings, Some(&choice), bounds);
-                Some(if self.mixes_afar(settings, &sheets, Some(&choice)) { choose(&EVERYTHING) } else { choice })
+                Some(if self.mixes_afar(settings, &sheets, Some(&choice)) {
+                    choose(&EVERYTHING)
+                } else {
+                    choice
+                })
             }
             _ => None,
         };
@@ -394,7 +446,12 @@ impl Scene {
     /// Whether sheets are thicker than kernels reach, so that samples count of whose neighbourhood nothing shows: they change the
     /// mean of a sheet beside what shows. Sheets of the usual thickness are thicker than that along the shortest steps of uneven
     /// lattices alone, where it is not seen: there the typical step counts.
-    pub(crate) fn mixes_afar(&self, settings: &Settings, sheets: &Sheets, choice: Option<&Choice>) -> bool {
+    pub(crate) fn mixes_afar(
+        &self,
+        settings: &Settings,
+        sheets: &Sheets,
+        choice: Option<&Choice>,
+    ) -> bool {
         let step = |lattice: &Lattice| match settings.sheet_thickness {
             Some(_) => lattice.least_kernel_spacing(),
             None => lattice.kernel_spacing(),
@@ -407,7 +464,8 @@ impl Scene {
             }
             _ => None,
         };
-        !settings.classifies_samples() && self.items.iter().filter_map(reach).any(|reach| reach < sheets.step)
+        !settings.classifies_samples()
+            && self.items.iter().filter_map(reach).any(|reach| reach < sheets.step)
     }
 }
 
@@ -419,7 +477,9 @@ impl Scene {
         let normal = self.sheet_normal(view);
         let keys = bounds.corners().map(|corner| normal.dot(view.to_view(corner)));
         let [mut near, mut far] =
-            keys.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &key| [low.min(key), high.max(key)]);
+            keys.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &key| {
+                [low.min(key), high.max(key)]
+            });
         if view.perspective {
             // Both sides of the eye count from it.
             (near, far) = (near.max(-far).max(0.0), far.max(-near));
@@ -427,7 +487,8 @@ impl Scene {
         let slices = self.lattice().map(|lattice| {
             let along = |step: DVec3| normal.dot(view.rotation * (lattice.axes * step)).abs();
             // The axis that is not in the sheets.
-            let distance = [DVec3::X, DVec3::Y, DVec3::Z].map(along).into_iter().fold(0.0, f64::max);
+            let distance =
+                [DVec3::X, DVec3::Y, DVec3::Z].map(along).into_iter().fold(0.0, f64::max);
             let share = match &lattice.arrangement {
                 Arrangement::Cartesian => 1.0,
                 Arrangement::BodyCentred => 0.5,
@@ -436,7 +497,8 @@ impl Scene {
             (normal.dot(view.to_view(lattice.position(lattice.step_range()[0]))), distance * share)
         });
         let (start, thickness) = slices.unwrap_or_else(|| {
-            let middle = if view.perspective { view.to_view(bounds.center()).length() } else { 1.0 };
+            let middle =
+                if view.perspective { view.to_view(bounds.center()).length() } else { 1.0 };
             (near, settings.sheet_thickness.unwrap_or(settings.sheet_pixels * middle / view.scale))
         });
         let thickness = thickness.max((far - near) / Sheets::MAX as f64);
@@ -489,7 +551,8 @@ impl Item {
 /// The box of what the kernels of a lattice reach.
 fn reached(lattice: &Lattice, kernel: &Kernel) -> Bounds {
     let axes = lattice.axes * DMat3::from_diagonal(lattice.largest_unit());
-    let reach = kernel.extent * DVec3::new(axes.row(0).length(), axes.row(1).length(), axes.row(2).length());
+    let reach = kernel.extent
+        * DVec3::new(axes.row(0).length(), axes.row(1).length(), axes.row(2).length());
     let [low, high] = lattice.bounds();
     Bounds { min: low - reach, max: high + reach }
 }
@@ -659,7 +722,8 @@ impl Settings {
 
     /// Whether nodes that face away are left out of a hierarchy that bounds a solid, or does not, within some bounds.
     pub(crate) fn culls(&self, closed: bool, bounds: &Bounds, view: &View) -> bool {
-        let is_outside = || !view.perspective || view.distances(bounds)[0] > self.near.unwrap_or(0.0);
+        let is_outside =
+            || !view.perspective || view.distances(bounds)[0] > self.near.unwrap_or(0.0);
         self.cull_backfaces.unwrap_or_else(|| closed && self.clips.is_empty() && is_outside())
     }
 

@@ -119,7 +119,11 @@ impl Splat {
     /// The standard deviations along the axes: the half extents of an ellipsoid are the lengths of the rows of its factor.
     pub(crate) fn deviations(&self) -> Vec3 {
         let [b00, b10, b11, b20, b21, b22] = self.factor;
-        Vec3::new(b00.abs(), (b10 * b10 + b11 * b11).sqrt(), (b20 * b20 + b21 * b21 + b22 * b22).sqrt())
+        Vec3::new(
+            b00.abs(),
+            (b10 * b10 + b11 * b11).sqrt(),
+            (b20 * b20 + b21 * b21 + b22 * b22).sqrt(),
+        )
     }
 }
 
@@ -145,7 +149,9 @@ impl SplatSet {
     /// beside each other would become one.
     pub fn move_origin(&mut self, origin: DVec3) -> Result<()> {
         if !origin.is_finite() {
-            return Err(Error::Argument(format!("the new origin {origin} of the splats is not finite")));
+            return Err(Error::Argument(format!(
+                "the new origin {origin} of the splats is not finite"
+            )));
         }
         let shift = self.origin - origin;
         self.origin = origin;
@@ -159,7 +165,8 @@ impl SplatSet {
             (f64::from(center.abs().max_element()), size)
         };
         let both = |a: (f64, f64), b: (f64, f64)| (a.0.max(b.0), a.1 + b.1);
-        let (farthest, sizes) = self.splats.par_iter_mut().map(move_one).reduce(|| (0.0, 0.0), both);
+        let (farthest, sizes) =
+            self.splats.par_iter_mut().map(move_one).reduce(|| (0.0, 0.0), both);
         let (step, size) = (farthest * f64::from(f32::EPSILON), sizes / self.splats.len() as f64);
         if step > 0.25 * size {
             return Err(Error::Argument(format!(
@@ -190,12 +197,22 @@ mod tests {
 
     #[test]
     fn places_hold_while_the_origin_moves() {
-        let splat =
-            |x: f32| Splat { center: [x, 0.0, 0.0], factor: [0.01, 0.0, 0.01, 0.0, 0.0, 0.01], ..Splat::zeroed() };
+        let splat = |x: f32| Splat {
+            center: [x, 0.0, 0.0],
+            factor: [0.01, 0.0, 0.01, 0.0, 0.0, 0.01],
+            ..Splat::zeroed()
+        };
         let splats = vec![splat(0.0), splat(0.25)];
-        let mut set = SplatSet { origin: DVec3::X, payload: Payload::Radiance, splats, extent: 3.0, overlap: 1.0 };
+        let mut set = SplatSet {
+            origin: DVec3::X,
+            payload: Payload::Radiance,
+            splats,
+            extent: 3.0,
+            overlap: 1.0,
+        };
         set.move_origin(DVec3::new(1001.0, 0.0, 0.0)).unwrap();
-        let places: Vec<f64> = set.splats.iter().map(|s| set.origin.x + f64::from(s.center[0])).collect();
+        let places: Vec<f64> =
+            set.splats.iter().map(|s| set.origin.x + f64::from(s.center[0])).collect();
         assert!((places[0] - 1.0).abs() < 1e-4 && (places[1] - 1.25).abs() < 1e-4, "{places:?}");
         let error = set.move_origin(DVec3::new(4e6, 0.0, 0.0)).unwrap_err().to_string();
         assert!(error.contains("in steps of 0.477"), "{error}");

@@ -83,7 +83,10 @@ fn every_cut_of_every_format_is_told() {
                 Err(error) => refused(&folder.0.join(referring), &error, &context),
                 // The end of a PNG says nothing that a picture needs.
                 Ok(told) => {
-                    assert!(may_load || name == "a.png" && at + 16 >= bytes.len(), "{context}: loads as {told}")
+                    assert!(
+                        may_load || name == "a.png" && at + 16 >= bytes.len(),
+                        "{context}: loads as {told}"
+                    )
                 }
             }
         }
@@ -98,9 +101,15 @@ fn every_flipped_byte_of_a_hierarchy_and_of_bricks_is_found() {
     let folder = Folder::new();
     let limits = Limits::default();
     let bricks = splv(&folder);
-    for (name, bytes) in [("lossless.splk", splk(true)), ("lossy.splk", splk(false)), ("a.splv", bricks)] {
+    for (name, bytes) in
+        [("lossless.splk", splk(true)), ("lossy.splk", splk(false)), ("a.splv", bricks)]
+    {
         let check = |path: &Path| {
-            if name.ends_with("splk") { file::check(path, &limits) } else { bricks::check(path, &limits, &|_, _| ()) }
+            if name.ends_with("splk") {
+                file::check(path, &limits)
+            } else {
+                bricks::check(path, &limits, &|_, _| ())
+            }
         };
         let path = folder.write(name, &bytes);
         assert_eq!(check(&path).findings, [], "{name}");
@@ -109,7 +118,11 @@ fn every_flipped_byte_of_a_hierarchy_and_of_bricks_is_found() {
             // All bits, or one that turns.
             flipped[at] ^= if at % 2 == 0 { 0xff } else { 1 << (at / 2 % 8) };
             let path = folder.write(name, &flipped);
-            assert!(!check(&path).is_sound(), "{name}: byte {at} of {} is flipped and nothing is found", bytes.len());
+            assert!(
+                !check(&path).is_sound(),
+                "{name}: byte {at} of {} is flipped and nothing is found",
+                bytes.len()
+            );
             // Reading finds it too, or reads what stands in other bytes.
             if let Err(error) = load(&path, &limits) {
                 refused(&path, &error, name);
@@ -168,12 +181,19 @@ fn each_bad_input_has_its_message() {
 fn worst_inputs_stay_within_their_limits() {
     const NAME: &str = "SPLATKIT_WORST_INPUT";
     if let Some(path) = std::env::var_os(NAME) {
-        let bytes = std::env::var("SPLATKIT_WORST_LIMIT").ok().and_then(|text| text.parse().ok()).expect("a limit");
+        let bytes = std::env::var("SPLATKIT_WORST_LIMIT")
+            .ok()
+            .and_then(|text| text.parse().ok())
+            .expect("a limit");
         let limits = Limits { bytes, ..Limits::default() };
         let before = peak();
         let begun = Instant::now();
         let outcome = load(Path::new(&path), &limits).unwrap_or_else(|error| error.to_string());
-        println!("measured {} {} {outcome}", begun.elapsed().as_millis(), peak().saturating_sub(before));
+        println!(
+            "measured {} {} {outcome}",
+            begun.elapsed().as_millis(),
+            peak().saturating_sub(before)
+        );
         return;
     }
     if peak() == 0 {
@@ -191,18 +211,28 @@ fn worst_inputs_stay_within_their_limits() {
                 .output()
                 .expect("a run");
             let text = String::from_utf8_lossy(&run.stdout).into_owned();
-            let line = text.lines().find_map(|line| line.split_once("measured ")).map(|(_, rest)| rest.to_owned());
-            let line = line.unwrap_or_else(|| panic!("{name}: {text}{}", String::from_utf8_lossy(&run.stderr)));
+            let line = text
+                .lines()
+                .find_map(|line| line.split_once("measured "))
+                .map(|(_, rest)| rest.to_owned());
+            let line = line.unwrap_or_else(|| {
+                panic!("{name}: {text}{}", String::from_utf8_lossy(&run.stderr))
+            });
             let mut words = line.splitn(3, ' ');
-            let mut number = || words.next().and_then(|word| word.parse::<u64>().ok()).expect("a number");
+            let mut number =
+                || words.next().and_then(|word| word.parse::<u64>().ok()).expect("a number");
             let (milliseconds, taken) = (number(), number());
-            let outcome = words.next().unwrap_or_default().replace(&format!("{}/", folder.0.display()), "");
+            let outcome =
+                words.next().unwrap_or_default().replace(&format!("{}/", folder.0.display()), "");
             let (size, taken_mib) = (bytes.len() as f64 / 1048576.0, taken as f64 / 1048576.0);
             println!(
                 "{name}: {size:.2} MiB, limit {} MiB: {milliseconds} ms, {taken_mib:.1} MiB: {outcome}",
                 limit >> 20
             );
-            assert!(taken <= limit + PROGRAM, "{name}: takes {taken} bytes, over the limit of {limit}: {outcome}");
+            assert!(
+                taken <= limit + PROGRAM,
+                "{name}: takes {taken} bytes, over the limit of {limit}: {outcome}"
+            );
             worst = (worst.0.max(milliseconds), worst.1.max(taken));
         }
     }
@@ -220,10 +250,16 @@ fn places_beyond_what_32_bits_count_are_found() {
     let samples: Vec<u8> = (0..64).collect();
     for (name, end) in [("far.raw", 64), ("far_cut.raw", 63)] {
         let mut file = std::fs::File::create(folder.0.join(name)).expect("a file");
-        file.seek(SeekFrom::Start(header)).and_then(|_| file.write_all(&samples[..end])).expect("room");
+        file.seek(SeekFrom::Start(header))
+            .and_then(|_| file.write_all(&samples[..end]))
+            .expect("room");
     }
     let layout = RawLayout { header, ..RAW };
-    let read = |name: &str, limits: &Limits| match load_volume(&folder.0.join(name), limits, Some(&layout)) {
+    let read = |name: &str, limits: &Limits| match load_volume(
+        &folder.0.join(name),
+        limits,
+        Some(&layout),
+    ) {
         Ok(volume) => format!("{:?} {}", volume.range, volume.value(63)),
         Err(error) => error.to_string().replace(&format!("{}/", folder.0.display()), ""),
     };
@@ -277,7 +313,8 @@ fn shared_pieces(count: usize, bytes: usize) -> Vec<u8> {
 fn equal_pages_are_read_within_limits() {
     let limits = Limits { bytes: 256 << 20, ..Limits::default() };
     let bytes = crafted::pages_of_one_node(100);
-    let hierarchy = Hierarchy::from_bytes(bytes, Path::new("equal.splk"), &limits).expect("a directory");
+    let hierarchy =
+        Hierarchy::from_bytes(bytes, Path::new("equal.splk"), &limits).expect("a directory");
     let told = [
         hierarchy.read_tree().map(|_| ()).expect_err("too much").to_string(),
         hierarchy.leaves().map(|_| ()).expect_err("too much").to_string(),
@@ -291,15 +328,16 @@ fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
     let mib = 1usize << 20;
     let nodes = vec![r#"{"mesh":0}"#; 100_000].join(",");
     let all: Vec<String> = (0..100_000).map(|node| node.to_string()).collect();
-    let instances =
-        gltf_with("none", &nodes).replace(r#"{"nodes":[0]}"#, &format!(r#"{{"nodes":[{}]}}"#, all.join(",")));
+    let instances = gltf_with("none", &nodes)
+        .replace(r#"{"nodes":[0]}"#, &format!(r#"{{"nodes":[{}]}}"#, all.join(",")));
     let (data, big) = ("data:;base64,", "A".repeat(mib));
     let instances = instances
         .replace("none", &format!("{data}{big}"))
         .replace(r#""count":3,"type":"VEC3""#, r#""count":60000,"type":"VEC3""#)
         .replace(r#""byteLength":36"#, r#""byteLength":720000"#);
     let block = zlib(&vec![0; 200 * mib]);
-    let counts: Vec<u8> = [1, 200 * mib as u32, 0, block.len() as u32].iter().flat_map(|n| n.to_le_bytes()).collect();
+    let counts: Vec<u8> =
+        [1, 200 * mib as u32, 0, block.len() as u32].iter().flat_map(|n| n.to_le_bytes()).collect();
     let vti = "<VTKFile type='ImageData' byte_order='LittleEndian' compressor='vtkZLibDataCompressor'><ImageData WholeExtent='0 1023 0 1023 0 199'>\
          <Piece Extent='0 1023 0 1023 0 199'><PointData><DataArray type='UInt8' Name='v' format='appended' offset='0'/></PointData></Piece>\
          </ImageData><AppendedData encoding='raw'>_";
@@ -307,7 +345,9 @@ fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
     let wide = format!("{}\n{}", vec!["1"; 4096].join(" "), "1\n".repeat(mib));
     let polygon = format!("{}\n", vec!["0"; 2 * mib].join(" "));
     let list = ply(
-        &format!("element vertex 1\n{FLOATS}element face 1\nproperty list uint int vertex_indices\n"),
+        &format!(
+            "element vertex 1\n{FLOATS}element face 1\nproperty list uint int vertex_indices\n"
+        ),
         &format!("0 0 0\n{} {polygon}", 2 * mib),
     );
     vec![
@@ -324,26 +364,48 @@ fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
             "corners.stl",
             format!(
                 "solid\n{}",
-                "facet\nouter loop\nvertex 0 0 0\nvertex 0 0 0\nvertex 0 0 0\nendloop\nendfacet\n".repeat(mib / 24)
+                "facet\nouter loop\nvertex 0 0 0\nvertex 0 0 0\nvertex 0 0 0\nendloop\nendfacet\n"
+                    .repeat(mib / 24)
             )
             .into(),
         ),
-        ("numbers.pcd", pcd(&mib.to_string(), format!("DATA ascii\n{}", "1 2 3\n".repeat(mib)).as_bytes())),
-        ("objects.gltf", format!(r#"{{"asset":{{"version":"2.0"}},"nodes":[{}]}}"#, vec!["{}"; mib].join(",")).into()),
+        (
+            "numbers.pcd",
+            pcd(&mib.to_string(), format!("DATA ascii\n{}", "1 2 3\n".repeat(mib)).as_bytes()),
+        ),
+        (
+            "objects.gltf",
+            format!(r#"{{"asset":{{"version":"2.0"}},"nodes":[{}]}}"#, vec!["{}"; mib].join(","))
+                .into(),
+        ),
         (
             "numbers.gltf",
-            format!(r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"children":[{}]}}]}}"#, vec!["9"; 2 * mib].join(","))
-                .into(),
+            format!(
+                r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"children":[{}]}}]}}"#,
+                vec!["9"; 2 * mib].join(",")
+            )
+            .into(),
         ),
         ("instances.gltf", instances.into()),
         ("bomb.nrrd", nrrd("1024 1024 200", "encoding: gzip", &gzip(&vec![0; 200 * mib]))),
-        ("keys.nrrd", nrrd("1 1 1", &(0..200_000).map(|i| format!("{i}:=\n")).collect::<String>(), b"")),
+        (
+            "keys.nrrd",
+            nrrd("1 1 1", &(0..200_000).map(|i| format!("{i}:=\n")).collect::<String>(), b""),
+        ),
         ("bomb.vti", vti),
         ("pieces.vti", vtk_xml("ImageData", "", &"<Piece/>".repeat(mib / 4)).into()),
-        ("attributes.vti", vtk_xml("ImageData", "", &"<Piece a='' b='' c='' d=''/>".repeat(mib / 8)).into()),
+        (
+            "attributes.vti",
+            vtk_xml("ImageData", "", &"<Piece a='' b='' c='' d=''/>".repeat(mib / 8)).into(),
+        ),
         (
             "attribute.vti",
-            vtk_xml("ImageData", &(0..mib / 8).map(|i| format!(" a{i}=''")).collect::<String>(), "").into(),
+            vtk_xml(
+                "ImageData",
+                &(0..mib / 8).map(|i| format!(" a{i}=''")).collect::<String>(),
+                "",
+            )
+            .into(),
         ),
         ("shared.vti", shared_pieces(20_000, mib)),
         ("deep.vti", vtk_xml("ImageData", "", &"<a>".repeat(mib)).into()),

@@ -23,7 +23,8 @@ use std::sync::Arc;
 /// Round waves that reach the borders, of odd sizes: values 0 … 200.
 fn value(dims: [usize; 3], index: usize) -> f64 {
     let at = [index % dims[0], index / dims[0] % dims[1], index / dims[0] / dims[1]];
-    let p = DVec3::from_array(std::array::from_fn(|axis| at[axis] as f64 / dims[axis] as f64 - 0.45));
+    let p =
+        DVec3::from_array(std::array::from_fn(|axis| at[axis] as f64 / dims[axis] as f64 - 0.45));
     let wave = (22.0 * p.length()).cos() + 0.4 * (17.0 * p.x).sin() * (13.0 * p.y).cos();
     (100.0 + 90.0 * wave * (1.0 - p.length())).clamp(0.0, 200.0)
 }
@@ -79,7 +80,12 @@ fn settings(pixels: f64) -> Settings {
     Settings { detail, evaluate, ..Settings::new([96, 96]) }
 }
 
-fn draw(renderer: &mut Renderer, scene: &Scene, camera: &Camera, settings: &Settings) -> (Picture, FrameStats) {
+fn draw(
+    renderer: &mut Renderer,
+    scene: &Scene,
+    camera: &Camera,
+    settings: &Settings,
+) -> (Picture, FrameStats) {
     let mut prepared = renderer.prepare(scene).expect("a scene");
     renderer.render(&mut prepared, camera, settings).expect("a picture")
 }
@@ -96,10 +102,13 @@ fn assert_shows_something(picture: &Picture) {
 #[test]
 fn the_finest_level_is_the_volume() {
     let mut renderer = renderer();
-    for (bytes, spacing, dims) in [(true, DVec3::ONE, [75, 60, 49]), (false, DVec3::new(1.0, 1.3, 0.8), [49, 65, 33])] {
+    for (bytes, spacing, dims) in
+        [(true, DVec3::ONE, [75, 60, 49]), (false, DVec3::new(1.0, 1.3, 0.8), [49, 65, 33])]
+    {
         let volume = volume(dims, spacing, bytes);
         let plain = Scene::new().with_volume(volume.clone(), Kernel::default(), transfer());
-        let path = std::env::temp_dir().join(format!("splatkit-bricks-{}-{bytes}.splv", std::process::id()));
+        let path = std::env::temp_dir()
+            .join(format!("splatkit-bricks-{}-{bytes}.splv", std::process::id()));
         bricks::write(&volume, &path, &WriteOptions::default(), &|_, _| ()).expect("a file");
         let file = Arc::new(Bricks::open(&path, &Limits::default()).expect("bricks"));
         for (name, camera) in cameras(&plain) {
@@ -111,8 +120,13 @@ fn the_finest_level_is_the_volume() {
                     let (found, stats) = draw(&mut renderer, &scene(&bricks), &camera, &settings);
                     assert_eq!(stats.lambda, 0.0);
                     let agreement = decibels(&found, &expected);
-                    println!("{name}, bytes: {bytes}, {origin}, occlusion: {occlusion}: {agreement:.1} dB");
-                    assert!(agreement > 100.0, "{name}, {bytes}, {origin}, {occlusion}: {agreement:.1} dB");
+                    println!(
+                        "{name}, bytes: {bytes}, {origin}, occlusion: {occlusion}: {agreement:.1} dB"
+                    );
+                    assert!(
+                        agreement > 100.0,
+                        "{name}, {bytes}, {origin}, {occlusion}: {agreement:.1} dB"
+                    );
                 }
             }
         }
@@ -150,7 +164,8 @@ fn the_reference_draws_the_whole_volume() {
     let volume = volume([21, 18, 35], DVec3::ONE, true);
     let [.., (_, camera)] = cameras(&scene(&bricks_of(&volume)));
     let settings = Settings { size: [40, 40], ..settings(0.0) };
-    let expected = reference::render(&scene(&bricks_of(&volume)), &camera, &settings).expect("a picture");
+    let expected =
+        reference::render(&scene(&bricks_of(&volume)), &camera, &settings).expect("a picture");
     let (found, _) = draw(&mut renderer(), &scene(&bricks_of(&volume)), &camera, &settings);
     let agreement = decibels(&found, &expected);
     assert!(agreement > 50.0, "{agreement:.1} dB");
@@ -204,15 +219,23 @@ fn a_zoom_shows_no_pop() {
     for (name, camera) in &cameras(&scene) {
         // λ is 1 at twice the pixels that a step covers.
         let view = camera.view([96, 96]).expect("a view");
-        let lambda = |pixels| bricks::choice(&bricks, &view, 2.0, pixels, &EVERYTHING, usize::MAX).lambda;
-        let some = (0..).map(|power| 2f64.powi(power)).find(|pixels| lambda(*pixels) > 0.0).expect("pixels");
+        let lambda =
+            |pixels| bricks::choice(&bricks, &view, 2.0, pixels, &EVERYTHING, usize::MAX).lambda;
+        let some = (0..)
+            .map(|power| 2f64.powi(power))
+            .find(|pixels| lambda(*pixels) > 0.0)
+            .expect("pixels");
         let covered = some / lambda(some).exp2();
         const STEPS: u32 = 8;
         let pictures: Vec<Picture> = (0..=2 * STEPS)
             .map(|step| {
                 let wanted = f64::from(step) / f64::from(STEPS);
                 let (picture, stats) = renderer
-                    .render(&mut prepared, camera, &settings(covered * wanted.exp2() * (1.0 + 1e-12)))
+                    .render(
+                        &mut prepared,
+                        camera,
+                        &settings(covered * wanted.exp2() * (1.0 + 1e-12)),
+                    )
                     .expect("a picture");
                 assert!((stats.lambda - wanted).abs() < 1e-6, "{} {wanted}", stats.lambda);
                 assert_shows_something(&picture);
@@ -221,7 +244,8 @@ fn a_zoom_shows_no_pop() {
             .collect();
         let change = |pair: &[Picture]| {
             let squares = pair[0].color.iter().zip(&pair[1].color);
-            let sum: f64 = squares.flat_map(|(a, b)| (0..4).map(|c| f64::from(a[c] - b[c]).powi(2))).sum();
+            let sum: f64 =
+                squares.flat_map(|(a, b)| (0..4).map(|c| f64::from(a[c] - b[c]).powi(2))).sum();
             (sum / (4 * pair[0].color.len()) as f64).sqrt()
         };
         let changes: Vec<f64> = pictures.windows(2).map(change).collect();
@@ -244,8 +268,9 @@ fn bricks_are_read_once() {
     let plain = Scene::new().with_volume(volume, Kernel::default(), other.clone());
     let (expected, _) = draw(&mut renderer, &plain, camera, &settings(0.0));
     let mut prepared = renderer.prepare(&scene).expect("a scene");
-    let mut frame =
-        |prepared: &mut _, camera: &Camera| renderer.render(prepared, camera, &settings(0.0)).expect("a picture");
+    let mut frame = |prepared: &mut _, camera: &Camera| {
+        renderer.render(prepared, camera, &settings(0.0)).expect("a picture")
+    };
     let (first, stats) = frame(&mut prepared, camera);
     assert_eq!((stats.bricks, stats.read_bricks), (12, 12));
     let (second, stats) = frame(&mut prepared, camera);
@@ -264,8 +289,11 @@ fn bricks_are_read_once() {
 fn what_bricks_cannot_do_is_told() {
     let bricks = bricks_of(&volume([9; 3], DVec3::ONE, true));
     let mut settings = settings(1.0);
-    let told = |scene: &Scene, settings: &Settings| scene.validate_settings(settings).unwrap_err().to_string();
-    let hann = Scene::new().with_bricks(bricks.clone(), Kernel::hann(2.0).expect("a kernel"), transfer());
+    let told = |scene: &Scene, settings: &Settings| {
+        scene.validate_settings(settings).unwrap_err().to_string()
+    };
+    let hann =
+        Scene::new().with_bricks(bricks.clone(), Kernel::hann(2.0).expect("a kernel"), transfer());
     assert!(told(&hann, &settings).contains("Gaussian"));
     settings.classification = Classification::Pre;
     assert!(told(&scene(&bricks), &settings).contains("after interpolation"));
@@ -299,16 +327,33 @@ fn processors_gather_bricks() {
             println!("{name}, {dims:?}: {agreement:.1} dB to the whole volume");
             assert!(agreement > 80.0, "{name}, {dims:?}: {agreement:.1} dB");
             let step = spacing.max_element() * camera.view([96, 96]).expect("a view").scale;
-            let near =
-                if name == "flat" { 1.0 } else { camera.view([96, 96]).expect("a view").distances(&plain.bounds())[0] };
+            let near = if name == "flat" {
+                1.0
+            } else {
+                camera.view([96, 96]).expect("a view").distances(&plain.bounds())[0]
+            };
             for lambda in [0.3f64, 0.7] {
-                let between = Settings { detail: Detail::Pixels(2.0 * lambda.exp2() * step / near), ..finest.clone() };
+                let between = Settings {
+                    detail: Detail::Pixels(2.0 * lambda.exp2() * step / near),
+                    ..finest.clone()
+                };
                 let (found, stats) = drawn(&bricks, &between);
-                let (scattered, _) = drawn(&bricks, &Settings { evaluate: Evaluate::Scatter, ..between });
+                let (scattered, _) =
+                    drawn(&bricks, &Settings { evaluate: Evaluate::Scatter, ..between });
                 let agreement = decibels(&found, &scattered);
-                println!("{name}, {dims:?}, level {:.2}: {agreement:.1} dB to scattering", stats.lambda);
-                assert!(stats.lambda > 0.0 && stats.lambda < 1.0, "{name}, {dims:?}: {}", stats.lambda);
-                assert!(stats.gathered > 0 && agreement > 45.0, "{name}, {dims:?}, {lambda}: {agreement:.1} dB");
+                println!(
+                    "{name}, {dims:?}, level {:.2}: {agreement:.1} dB to scattering",
+                    stats.lambda
+                );
+                assert!(
+                    stats.lambda > 0.0 && stats.lambda < 1.0,
+                    "{name}, {dims:?}: {}",
+                    stats.lambda
+                );
+                assert!(
+                    stats.gathered > 0 && agreement > 45.0,
+                    "{name}, {dims:?}, {lambda}: {agreement:.1} dB"
+                );
             }
         }
     }
@@ -323,9 +368,12 @@ fn processors_hold_few_bricks() {
     let [(_, near), ..] = cameras(&scene);
     let mut beside = near.clone();
     beside.azimuth(140.0);
-    let settings = Settings { evaluate: Evaluate::Gather, page_memory: 30 * 48_000, ..settings(0.0) };
+    let settings =
+        Settings { evaluate: Evaluate::Gather, page_memory: 30 * 48_000, ..settings(0.0) };
     let mut renderer = CpuRenderer::new(&scene).expect("a scene");
-    let draw = |renderer: &mut CpuRenderer, camera: &Camera| renderer.render(camera, &settings).expect("a picture");
+    let draw = |renderer: &mut CpuRenderer, camera: &Camera| {
+        renderer.render(camera, &settings).expect("a picture")
+    };
     let (first, stats) = draw(&mut renderer, &near);
     assert!(stats.lambda > 0.0 && stats.brick_bytes <= settings.page_memory, "{stats:?}");
     let (_, stats) = draw(&mut renderer, &beside);
@@ -344,7 +392,8 @@ fn processors_hold_few_bricks() {
     for (from, to) in [(0.0, 40.0), (30.0, 70.0), (60.0, 110.0)] {
         let own = part(from, to);
         let (found, _) = renderer.render(&near, &own).expect("a picture");
-        let (alone, _) = CpuRenderer::new(&scene).expect("a scene").render(&near, &own).expect("a picture");
+        let (alone, _) =
+            CpuRenderer::new(&scene).expect("a scene").render(&near, &own).expect("a picture");
         assert_eq!(found.color, alone.color);
     }
 }

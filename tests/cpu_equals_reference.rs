@@ -32,8 +32,12 @@ fn assert_matches(case: &Case, least: f64) {
     println!("{}: {psnr:.1} dB", case.name);
     if let Ok(folder) = std::env::var("SPLATKIT_PICTURES") {
         let folder = std::path::Path::new(&folder);
-        found.save(&folder.join(format!("{}-cpu.png", case.name)), None).expect("a folder to write to");
-        truth.save(&folder.join(format!("{}-reference.png", case.name)), None).expect("a folder to write to");
+        found
+            .save(&folder.join(format!("{}-cpu.png", case.name)), None)
+            .expect("a folder to write to");
+        truth
+            .save(&folder.join(format!("{}-reference.png", case.name)), None)
+            .expect("a folder to write to");
     }
     assert!(psnr >= least, "{}: {psnr:.1} dB, expected {least} dB", case.name);
     // Whole kernels and thick sheets have their depths where the engines put them: at centres, and evenly in a sheet.
@@ -45,7 +49,9 @@ fn assert_matches(case: &Case, least: f64) {
         let depths = found.depth.iter().zip(&truth.depth).zip(&truth.color);
         depths.filter(|((_, depth), color)| color[3] > 0.9 && depth.is_finite())
     };
-    let far = opaque().filter(|((found, expected), _)| (**found - **expected).abs() > 0.05 * size).count();
+    let far = opaque()
+        .filter(|((found, expected), _)| (**found - **expected).abs() > 0.05 * size)
+        .count();
     assert!(far * 50 <= opaque().count(), "{}: {far} of {} depths", case.name, opaque().count());
 }
 
@@ -157,8 +163,12 @@ fn mixed_scenes() {
 fn whole_kernels() {
     let mut in_sheets = methods::single_ellipsoids();
     in_sheets.settings.mode = Mode::AxisSheets;
-    let inside =
-        [methods::single_splats(Order::FrontToBack), methods::single_ellipsoids(), methods::axis_sheets(), in_sheets];
+    let inside = [
+        methods::single_splats(Order::FrontToBack),
+        methods::single_ellipsoids(),
+        methods::axis_sheets(),
+        in_sheets,
+    ];
     let outside = [
         methods::axis_sheets(),
         methods::axis_sheets_body_centred_orthographic(),
@@ -174,7 +184,9 @@ fn whole_kernels() {
 /// Sheets thicker than kernels reach mix samples of whose neighbourhood nothing shows.
 #[test]
 fn thick_sheets() {
-    for case in [scenes::blobs_analytic, methods::body_centred, methods::sharp, methods::rectilinear] {
+    for case in
+        [scenes::blobs_analytic, methods::body_centred, methods::sharp, methods::rectilinear]
+    {
         for samples in [1.9, 2.3, 4.0, 8.0, 1000.0] {
             let mut case = case();
             let Item::Volume(volume, ..) = &case.scene.items[0] else { panic!("{}", case.name) };
@@ -188,7 +200,9 @@ fn thick_sheets() {
     }
     // Seen along short steps beside long ones.
     let mut flat = scenes::blobs_analytic();
-    let Item::Volume(volume, kernel, transfer) = &flat.scene.items[0] else { panic!("{}", flat.name) };
+    let Item::Volume(volume, kernel, transfer) = &flat.scene.items[0] else {
+        panic!("{}", flat.name)
+    };
     let mut volume = Volume::clone(volume);
     volume.lattice.axes.z_axis *= 8.0;
     volume.lattice.origin.z -= 7.0 * 19.0 * 0.05;
@@ -201,10 +215,16 @@ fn thick_sheets() {
 /// The same bytes however many threads draw.
 #[test]
 fn threads_change_nothing() {
-    for make in [scenes::marschner_lobb, scenes::huge_among_small, scenes::surface_in_a_volume, methods::body_centred] {
+    for make in [
+        scenes::marschner_lobb,
+        scenes::huge_among_small,
+        scenes::surface_in_a_volume,
+        methods::body_centred,
+    ] {
         let case = make();
         let with = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let pool =
+                rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
             pool.install(|| drawn(&case)).color
         };
         assert_eq!(with(1), with(3), "{}", case.name);

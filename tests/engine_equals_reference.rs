@@ -60,7 +60,11 @@ fn blobs_from_afar() {
 /// Peak signal-to-noise ratio of premultiplied colour and opacity, in dB.
 fn psnr(a: &Picture, b: &Picture) -> f64 {
     assert_eq!((a.width, a.height), (b.width, b.height));
-    let squares = a.color.iter().zip(&b.color).flat_map(|(a, b)| (0..4).map(|c| f64::from(a[c] - b[c]).powi(2)));
+    let squares = a
+        .color
+        .iter()
+        .zip(&b.color)
+        .flat_map(|(a, b)| (0..4).map(|c| f64::from(a[c] - b[c]).powi(2)));
     -10.0 * (squares.sum::<f64>() / (4 * a.color.len()) as f64).log10()
 }
 
@@ -85,14 +89,22 @@ fn assert_agrees(case: &Case, way: &str, found: &Picture, expected: &Picture, le
     println!("{} {way}: {agreement:.1} dB", case.name);
     if let Ok(folder) = std::env::var("SPLATKIT_PICTURES") {
         let folder = std::path::Path::new(&folder);
-        found.save(&folder.join(format!("{}-{way}.png", case.name)), None).expect("a folder to write to");
-        expected.save(&folder.join(format!("{}-reference.png", case.name)), None).expect("a folder to write to");
+        found
+            .save(&folder.join(format!("{}-{way}.png", case.name)), None)
+            .expect("a folder to write to");
+        expected
+            .save(&folder.join(format!("{}-reference.png", case.name)), None)
+            .expect("a folder to write to");
     }
     assert!(agreement >= least, "{} {way}: {agreement:.1} dB, expected {least} dB", case.name);
     let size = case.scene.bounds().diagonal() as f32;
     for ((found, expected), color) in found.depth.iter().zip(&expected.depth).zip(&expected.color) {
         if way == "gathered" && color[3] > 0.9 && expected.is_finite() {
-            assert!((found - expected).abs() < 0.05 * size, "{}: depth {found} for {expected}", case.name);
+            assert!(
+                (found - expected).abs() < 0.05 * size,
+                "{}: depth {found} for {expected}",
+                case.name
+            );
         }
     }
 }
@@ -140,8 +152,13 @@ fn what_is_gathered_and_what_is_not() {
         (methods::sharp(), "sharp volumes"),
         (thick(4.0), "sheets thicker"),
     ] {
-        let error = drawn_by(Evaluate::Gather, &case, Budget::default()).expect_err(case.name).to_string();
-        assert!(error.contains(what) && error.contains("can't be gathered"), "{}: {error}", case.name);
+        let error =
+            drawn_by(Evaluate::Gather, &case, Budget::default()).expect_err(case.name).to_string();
+        assert!(
+            error.contains(what) && error.contains("can't be gathered"),
+            "{}: {error}",
+            case.name
+        );
     }
 }
 
@@ -157,8 +174,11 @@ fn thick(samples: f64) -> Case {
 #[test]
 fn samples_of_all_types_and_few() {
     let case = scenes::blobs_analytic();
-    let Item::Volume(volume, kernel, transfer) = &case.scene.items[0] else { panic!("{}", case.name) };
-    let values: Vec<f32> = (0..volume.lattice.len()).map(|index| volume.value(index) as f32).collect();
+    let Item::Volume(volume, kernel, transfer) = &case.scene.items[0] else {
+        panic!("{}", case.name)
+    };
+    let values: Vec<f32> =
+        (0..volume.lattice.len()).map(|index| volume.value(index) as f32).collect();
     let with = |samples: Samples, dims: [usize; 3]| {
         let lattice = Lattice { dims, ..volume.lattice.clone() };
         Volume::new(lattice, samples).expect("a volume")
@@ -166,7 +186,8 @@ fn samples_of_all_types_and_few() {
     let dims = volume.lattice.dims;
     let part = |dims: [usize; 3]| {
         let own = |index: usize| {
-            let at = [index % dims[0], index / dims[0] % dims[1], index / dims[0] / dims[1]].map(|n| n + 6);
+            let at = [index % dims[0], index / dims[0] % dims[1], index / dims[0] / dims[1]]
+                .map(|n| n + 6);
             values[(at[2] * volume.lattice.dims[1] + at[1]) * volume.lattice.dims[0] + at[0]]
         };
         (0..dims.iter().product()).map(own).collect::<Vec<f32>>()
@@ -200,17 +221,27 @@ fn samples_of_all_types_and_few() {
 /// its opacities.
 fn assert_shows_something(Case { name, settings, .. }: &Case, picture: &Picture) {
     let [width, height] = settings.size;
-    assert_eq!((picture.color.len(), picture.depth.len()), ((width * height) as usize, (width * height) as usize));
+    assert_eq!(
+        (picture.color.len(), picture.depth.len()),
+        ((width * height) as usize, (width * height) as usize)
+    );
     let range = f32::EPSILON..=1.0 + 4.0 * f32::EPSILON;
     let mut covered = 0;
     let mut deep = 0;
     // The largest value of a ray is at no depth.
     let has_depths = settings.optics != Optics::Maximum;
     for (color, &depth) in picture.color.iter().zip(&picture.depth) {
-        assert!(color.iter().all(|v| *v == 0.0 || range.contains(v) || v.abs() < 1e-6), "{name}: {color:?}");
+        assert!(
+            color.iter().all(|v| *v == 0.0 || range.contains(v) || v.abs() < 1e-6),
+            "{name}: {color:?}"
+        );
         let is_opaque = has_depths && color[3] > 0.500_001;
         assert!(is_opaque <= depth.is_finite(), "{name}: depth {depth} at opacity {}", color[3]);
-        assert!((color[3] < 0.499_999) <= (depth == f32::INFINITY), "{name}: depth {depth} at opacity {}", color[3]);
+        assert!(
+            (color[3] < 0.499_999) <= (depth == f32::INFINITY),
+            "{name}: depth {depth} at opacity {}",
+            color[3]
+        );
         covered += usize::from(color[3] > 0.05);
         deep += usize::from(depth.is_finite());
     }
@@ -402,7 +433,9 @@ fn single_ellipsoids() {
 /// and ends are only the tails of kernels, which have no slope to speak of.
 #[test]
 fn thick_sheets() {
-    for case in [scenes::blobs_analytic, methods::body_centred, methods::sharp, methods::rectilinear] {
+    for case in
+        [scenes::blobs_analytic, methods::body_centred, methods::sharp, methods::rectilinear]
+    {
         for samples in [1.9, 2.1, 4.0, 8.0, 1000.0] {
             let mut case = case();
             let Item::Volume(volume, ..) = &case.scene.items[0] else { panic!("{}", case.name) };
@@ -416,7 +449,9 @@ fn thick_sheets() {
     }
     // Seen along short steps beside long ones.
     let mut flat = scenes::blobs_analytic();
-    let Item::Volume(volume, kernel, transfer) = &flat.scene.items[0] else { panic!("{}", flat.name) };
+    let Item::Volume(volume, kernel, transfer) = &flat.scene.items[0] else {
+        panic!("{}", flat.name)
+    };
     let mut volume = Volume::clone(volume);
     volume.lattice.axes.z_axis *= 8.0;
     volume.lattice.origin.z -= 7.0 * 19.0 * 0.05;
@@ -476,7 +511,8 @@ fn single_splats_in_both_orders() {
     let [front, back] = [Order::FrontToBack, Order::BackToFront].map(|order| {
         let case = methods::single_splats(order);
         let found = drawn(&case, Budget::default());
-        let expected = reference::render(&case.scene, &case.camera, &case.settings).expect(case.name);
+        let expected =
+            reference::render(&case.scene, &case.camera, &case.settings).expect(case.name);
         let agreement = psnr(&found, &expected);
         println!("{order:?}: {agreement:.1} dB");
         assert!(agreement > 50.0, "{order:?}: {agreement:.1} dB");
@@ -538,14 +574,23 @@ fn small_budgets_draw_the_same_picture() {
     ];
     for (case, few_entries, few_words) in cases {
         let whole = drawn(&case, Budget::default());
-        for (entries, record_words) in [(few_entries, 1 << 22), (1 << 24, few_words), (few_entries, few_words)] {
-            let mut renderer = Renderer::with_budget(&gpu, Budget { entries, record_words, ..Budget::default() });
+        for (entries, record_words) in
+            [(few_entries, 1 << 22), (1 << 24, few_words), (few_entries, few_words)]
+        {
+            let mut renderer =
+                Renderer::with_budget(&gpu, Budget { entries, record_words, ..Budget::default() });
             let mut prepared = renderer.prepare(&case.scene).expect(case.name);
-            let (parts, stats) = renderer.render(&mut prepared, &case.camera, &case.settings).expect(case.name);
+            let (parts, stats) =
+                renderer.render(&mut prepared, &case.camera, &case.settings).expect(case.name);
             assert!(stats.passes > 1, "{}: {entries} entries fit in one pass", case.name);
             let agreement = psnr(&parts, &whole);
             println!("{}: {} passes, {agreement:.1} dB", case.name, stats.passes);
-            assert!(agreement > 90.0, "{}: {agreement:.1} dB in {} passes", case.name, stats.passes);
+            assert!(
+                agreement > 90.0,
+                "{}: {agreement:.1} dB in {} passes",
+                case.name,
+                stats.passes
+            );
         }
     }
 }
@@ -573,15 +618,20 @@ fn the_gpus_way_is_the_same() {
         methods::sharp_body_centred(),
     ];
     let own = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
-    let info = wgpu::AdapterInfo { device_type: wgpu::DeviceType::DiscreteGpu, ..wgpu::AdapterInfo::clone(&own.info) };
+    let info = wgpu::AdapterInfo {
+        device_type: wgpu::DeviceType::DiscreteGpu,
+        ..wgpu::AdapterInfo::clone(&own.info)
+    };
     let gpu = Gpu::from_wgpu(own.device.clone(), own.queue.clone(), info);
     let mut renderer = Renderer::new(&gpu);
     for case in cases {
         let mut prepared = renderer.prepare(&case.scene).expect(case.name);
-        let mut draw = || renderer.render(&mut prepared, &case.camera, &case.settings).expect(case.name).0;
+        let mut draw =
+            || renderer.render(&mut prepared, &case.camera, &case.settings).expect(case.name).0;
         let found = draw();
         assert_eq!(bits(&found), bits(&draw()), "{}", case.name);
-        let expected = reference::render(&case.scene, &case.camera, &case.settings).expect(case.name);
+        let expected =
+            reference::render(&case.scene, &case.camera, &case.settings).expect(case.name);
         let agreement = psnr(&found, &expected);
         println!("{} the GPU's way: {agreement:.1} dB", case.name);
         assert!(agreement >= least_of_gathered(case.name), "{}: {agreement:.1} dB", case.name);
@@ -614,7 +664,8 @@ fn tiles_that_stop_go_on() {
 fn a_budget_too_small_for_a_single_sheet_is_an_error() {
     let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
     let case = by(Evaluate::Scatter, scenes::blobs_analytic());
-    let mut renderer = Renderer::with_budget(&gpu, Budget { entries: 8, record_words: 8, ..Budget::default() });
+    let mut renderer =
+        Renderer::with_budget(&gpu, Budget { entries: 8, record_words: 8, ..Budget::default() });
     let mut prepared = renderer.prepare(&case.scene).expect(case.name);
     let found = renderer.render(&mut prepared, &case.camera, &case.settings);
     assert!(found.is_err_and(|e| e.to_string().contains("budget")));
@@ -664,10 +715,13 @@ fn thousands_of_splats_in_one_bin() {
 #[test]
 fn kernels_that_are_not_drawn_are_named() {
     let case = scenes::blobs_analytic();
-    let splatkit::scene::Item::Volume(volume, _, transfer) = &case.scene.items[0] else { panic!("a volume") };
+    let splatkit::scene::Item::Volume(volume, _, transfer) = &case.scene.items[0] else {
+        panic!("a volume")
+    };
     let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
     for tensor in Tensor::ALL {
-        let scene = Scene::new().with_volume(volume.clone(), Kernel::tensor(tensor), transfer.clone());
+        let scene =
+            Scene::new().with_volume(volume.clone(), Kernel::tensor(tensor), transfer.clone());
         let error = Renderer::new(&gpu).prepare(&scene).expect_err("no such kernels").to_string();
         assert!(error.contains(tensor.name()) && error.contains("the CPU engine does"), "{error}");
     }
@@ -676,10 +730,13 @@ fn kernels_that_are_not_drawn_are_named() {
 #[test]
 fn a_new_transfer_function_needs_no_new_upload() {
     let case = scenes::blobs_analytic();
-    let splatkit::scene::Item::Volume(volume, kernel, transfer) = &case.scene.items[0] else { panic!("a volume") };
+    let splatkit::scene::Item::Volume(volume, kernel, transfer) = &case.scene.items[0] else {
+        panic!("a volume")
+    };
     let mut other = transfer.clone();
     other.opacity = vec![(100.0, 0.0), (130.0, 0.9), (160.0, 0.0)];
-    let scene = splatkit::scene::Scene::new().with_volume(volume.clone(), kernel.clone(), other.clone());
+    let scene =
+        splatkit::scene::Scene::new().with_volume(volume.clone(), kernel.clone(), other.clone());
     let expected = reference::render(&scene, &case.camera, &case.settings).expect(case.name);
     let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
     let mut renderer = Renderer::new(&gpu);

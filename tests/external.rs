@@ -19,7 +19,8 @@ struct Folder(PathBuf);
 
 impl Folder {
     fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("splatkit-external-{}-{name}", std::process::id()));
+        let path =
+            std::env::temp_dir().join(format!("splatkit-external-{}-{name}", std::process::id()));
         std::fs::create_dir_all(&path).unwrap();
         Self(path)
     }
@@ -30,7 +31,8 @@ impl Folder {
 
     fn names(&self) -> Vec<String> {
         let entries = std::fs::read_dir(&self.0).unwrap();
-        let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        let mut names: Vec<_> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
         names.sort();
         names
     }
@@ -97,7 +99,8 @@ fn both_ways(folder: &Folder, name: &str) -> (Vec<Splat>, Vec<Splat>, Converted)
 fn ply(mesh: &Mesh, big: bool, double: bool) -> Vec<u8> {
     let order = if big { "big" } else { "little" };
     let kind = if double { "double" } else { "float" };
-    let mut out = format!("ply\nformat binary_{order}_endian 1.0\nelement vertex {}\n", mesh.positions.len());
+    let mut out =
+        format!("ply\nformat binary_{order}_endian 1.0\nelement vertex {}\n", mesh.positions.len());
     for axis in ["x", "y", "z"] {
         out += &format!("property {kind} {axis}\n");
     }
@@ -105,7 +108,10 @@ fn ply(mesh: &Mesh, big: bool, double: bool) -> Vec<u8> {
         out += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
     }
     if !mesh.triangles.is_empty() {
-        out += &format!("element face {}\nproperty list uchar int vertex_indices\n", mesh.triangles.len());
+        out += &format!(
+            "element face {}\nproperty list uchar int vertex_indices\n",
+            mesh.triangles.len()
+        );
     }
     let mut out = (out + "end_header\n").into_bytes();
     let ordered = |mut bytes: Vec<u8>| {
@@ -116,7 +122,11 @@ fn ply(mesh: &Mesh, big: bool, double: bool) -> Vec<u8> {
     };
     for (index, position) in mesh.positions.iter().enumerate() {
         for value in (mesh.origin + position.as_dvec3()).to_array() {
-            let bytes = if double { value.to_le_bytes().to_vec() } else { (value as f32).to_le_bytes().to_vec() };
+            let bytes = if double {
+                value.to_le_bytes().to_vec()
+            } else {
+                (value as f32).to_le_bytes().to_vec()
+            };
             out.extend(ordered(bytes));
         }
         out.extend(mesh.colors.get(index).map(|color| color[..3].to_vec()).unwrap_or_default());
@@ -141,7 +151,8 @@ fn torus(along: u32, around: u32) -> Mesh {
 fn nearly_the_same(a: &Splat, b: &Splat) -> bool {
     let size = a.factor.iter().fold(0.0f32, |most, entry| most.max(entry.abs()));
     let normals = decode_normal(a.normal).zip(decode_normal(b.normal));
-    let near = |a: &[f32], b: &[f32], most: f32| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= most);
+    let near =
+        |a: &[f32], b: &[f32], most: f32| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= most);
     near(&a.center, &b.center, 1e-3 * size)
         && near(&a.factor, &b.factor, 1e-2 * size)
         && a.color == b.color
@@ -156,7 +167,11 @@ fn meshes_have_the_same_leaves() {
     // Long edges in one place: a lid, and a needle.
     let mut long = shared.clone();
     let last = long.positions.len() as u32;
-    long.positions.extend([Vec3::new(5.0, 0.0, 0.0), Vec3::new(5.0, 3.0, 0.2), Vec3::new(5.0, 0.0, 3.0)]);
+    long.positions.extend([
+        Vec3::new(5.0, 0.0, 0.0),
+        Vec3::new(5.0, 3.0, 0.2),
+        Vec3::new(5.0, 0.0, 3.0),
+    ]);
     long.colors.extend([[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255]]);
     long.triangles.extend([[last, last + 1, last + 2], [last, 100, last + 1], [0, 1, last]]);
     // Every triangle has vertices of its own.
@@ -174,11 +189,15 @@ fn meshes_have_the_same_leaves() {
     let second = shared.positions.len() as u32;
     turned.positions.extend(shared.positions.iter().map(|place| *place + Vec3::X * 9.0));
     turned.colors.extend(&shared.colors);
-    turned.triangles.extend(shared.triangles.iter().map(|&[a, b, c]| [a, c, b].map(|vertex| vertex + second)));
+    turned
+        .triangles
+        .extend(shared.triangles.iter().map(|&[a, b, c]| [a, c, b].map(|vertex| vertex + second)));
     let mut turned_split = split.clone();
     turned_split.positions.extend(split.positions.iter().map(|place| *place + Vec3::X * 9.0));
     let second = split.positions.len() as u32;
-    turned_split.triangles.extend(split.triangles.iter().map(|&[a, b, c]| [a, c, b].map(|vertex| vertex + second)));
+    turned_split
+        .triangles
+        .extend(split.triangles.iter().map(|&[a, b, c]| [a, c, b].map(|vertex| vertex + second)));
     let mut far = shared.clone();
     far.origin = glam::DVec3::new(4_500_000.25, 5_300_000.5, 417.125);
     for (name, mesh, big, double) in [
@@ -193,7 +212,11 @@ fn meshes_have_the_same_leaves() {
         std::fs::write(folder.path(name), ply(&mesh, big, double)).unwrap();
         let (whole, parts, converted) = both_ways(&folder, name);
         assert!(converted.regions > 10, "{name}: {}", converted.regions);
-        assert_eq!(converted.closed, ["stray", "shared", "split", "far"].contains(&&name[..name.len() - 4]), "{name}");
+        assert_eq!(
+            converted.closed,
+            ["stray", "shared", "split", "far"].contains(&&name[..name.len() - 4]),
+            "{name}"
+        );
         assert_eq!(whole.len(), parts.len(), "{name}");
         if name == "long.ply" {
             // Normals over what was cut are interpolated; the shares of the corners are rounded.
@@ -224,11 +247,16 @@ fn clouds_have_nearly_the_same_leaves() {
         let size = a.factor.iter().fold(0.0, |size: f32, part| size.max(part.abs()));
         let is_near = a.factor.iter().zip(b.factor).all(|(a, b)| (a - b).abs() < 1e-3 * size);
         other_shapes += u32::from(!is_near);
-        let (Some(a), Some(b)) = (decode_normal(a.normal), decode_normal(b.normal)) else { continue };
+        let (Some(a), Some(b)) = (decode_normal(a.normal), decode_normal(b.normal)) else {
+            continue;
+        };
         other_sides += u32::from(a.dot(b) < 0.0);
     }
     let most = whole.len() as u32 / 100;
-    assert!(other_shapes <= most && other_sides <= most, "{other_shapes} shapes and {other_sides} sides of {most}");
+    assert!(
+        other_shapes <= most && other_sides <= most,
+        "{other_shapes} shapes and {other_sides} sides of {most}"
+    );
 }
 
 /// Points of far coarser parts are drawn so many times as wide as the median one, which regions know about.
@@ -237,10 +265,12 @@ fn uneven_clouds_are_as_wide() {
     let folder = Folder::new("uneven");
     let shifted = |i: u32, edge: u32, step: f32| {
         let jitter = |salt: u32| (i.wrapping_mul(salt) >> 16 & 255) as f32 / 255.0 - 0.5;
-        let [x, y] = [(i % edge) as f32 + jitter(2_654_435_761), (i / edge) as f32 + jitter(2_246_822_519)];
+        let [x, y] =
+            [(i % edge) as f32 + jitter(2_654_435_761), (i / edge) as f32 + jitter(2_246_822_519)];
         Vec3::new(x, y, 0.3 * jitter(3_266_489_917)) * step
     };
-    let mut cloud = Mesh { positions: (0..40_000).map(|i| shifted(i, 200, 0.01)).collect(), ..Mesh::default() };
+    let mut cloud =
+        Mesh { positions: (0..40_000).map(|i| shifted(i, 200, 0.01)).collect(), ..Mesh::default() };
     cloud.positions.extend((0..400).map(|i| shifted(i, 20, 1.0) + Vec3::new(5.0, 5.0, 0.0)));
     std::fs::write(folder.path("cloud.ply"), ply(&cloud, false, false)).unwrap();
     let (whole, parts, converted) = both_ways(&folder, "cloud.ply");
@@ -258,7 +288,9 @@ fn uneven_clouds_are_as_wide() {
 fn crowded_clouds_are_cut_too() {
     let folder = Folder::new("crowded");
     let mut cloud = Mesh { positions: vec![Vec3::ONE; 20_000], ..Mesh::default() };
-    cloud.positions.extend((0..5000).map(|i| Vec3::new((i % 50) as f32, (i / 50) as f32, 0.0) * 1e-5));
+    cloud
+        .positions
+        .extend((0..5000).map(|i| Vec3::new((i % 50) as f32, (i / 50) as f32, 0.0) * 1e-5));
     cloud.positions.push(Vec3::splat(100.0));
     std::fs::write(folder.path("cloud.ply"), ply(&cloud, false, false)).unwrap();
     let (whole, parts, converted) = both_ways(&folder, "cloud.ply");
@@ -315,9 +347,11 @@ fn solid_parts_are_those_of_the_whole() {
                 [first - 1, first, first + 1, first + 2]
             };
             mesh.positions.extend([Vec3::Y, Vec3::Z, Vec3::X].map(|side| place + side));
-            mesh.triangles.extend([[a, b, c], [a, c, d], [b, d, c], [a, d, b]].map(|[p, q, r]| match i == turned {
-                true => [p, q, r],
-                false => [q, p, r],
+            mesh.triangles.extend([[a, b, c], [a, c, d], [b, d, c], [a, d, b]].map(|[p, q, r]| {
+                match i == turned {
+                    true => [p, q, r],
+                    false => [q, p, r],
+                }
             }));
         }
         mesh
@@ -354,7 +388,8 @@ fn what_is_damaged_leaves_nothing() {
         (endless, "is not finite"),
     ] {
         std::fs::write(folder.path("a.ply"), bytes).unwrap();
-        let error = in_regions(&[folder.path("a.ply")], &folder.path("out.splk")).unwrap_err().to_string();
+        let error =
+            in_regions(&[folder.path("a.ply")], &folder.path("out.splk")).unwrap_err().to_string();
         assert!(error.contains(message), "{error}");
         assert_eq!(folder.names(), ["a.ply"]);
     }
@@ -385,7 +420,9 @@ fn points_of_surveys_keep_their_millimetres_and_colours() {
         las[104] = if colored { 2 } else { 0 };
         las[105..107].copy_from_slice(&26u16.to_le_bytes());
         las[107..111].copy_from_slice(&count.to_le_bytes());
-        for (at, value) in [(131, 0.001), (139, 0.001), (147, 0.001), (155, 4.5e6), (163, 5.3e6), (171, 400.0)] {
+        for (at, value) in
+            [(131, 0.001), (139, 0.001), (147, 0.001), (155, 4.5e6), (163, 5.3e6), (171, 400.0)]
+        {
             las[at..at + 8].copy_from_slice(&f64::to_le_bytes(value));
         }
         las.extend((0..count).flat_map(record));

@@ -28,13 +28,18 @@ fn scene(in_bricks: bool) -> Scene {
     knot.positions.iter_mut().for_each(|place| *place = *place * 0.5 + middle);
     let scene = Scene::new().with_splats(knot.surfels(&SurfelOptions::default()).unwrap());
     match in_bricks {
-        true => scene.with_bricks(Bricks::from_volume(volume).unwrap(), Kernel::default(), transfer),
+        true => {
+            scene.with_bricks(Bricks::from_volume(volume).unwrap(), Kernel::default(), transfer)
+        }
         false => scene.with_volume(volume, Kernel::default(), transfer),
     }
 }
 
 fn view(scene: &Scene) -> (Camera, Settings) {
-    (Camera::framing(&scene.bounds(), DVec3::new(0.4, -0.3, -1.0), DVec3::Y, 1.2), Settings::new([160, 120]))
+    (
+        Camera::framing(&scene.bounds(), DVec3::new(0.4, -0.3, -1.0), DVec3::Y, 1.2),
+        Settings::new([160, 120]),
+    )
 }
 
 fn drawn(gpu: &Gpu, scene: &Scene) -> splatkit::Result<Picture> {
@@ -127,7 +132,8 @@ fn hang(gpu: &Gpu) {
             }
         }";
     let source = wgpu::ShaderSource::Wgsl(source.into());
-    let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
+    let module =
+        gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor { label: None, source });
     let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: Some("hang"),
         layout: None,
@@ -174,9 +180,14 @@ fn a_device_that_does_not_answer_in_time_is_an_error() {
         let impatient = gpu.reopened().expect("opens again").with_patience(Duration::from_nanos(1));
         drawn(&impatient, &scene).map(|picture| assert!(same(&picture, &truth)))
     });
-    let error = pictures.filter_map(Result::err).next().expect("slower than a nanosecond, at least once");
+    let error =
+        pictures.filter_map(Result::err).next().expect("slower than a nanosecond, at least once");
     let error = error.to_string();
-    assert!(error.contains("did not answer within") || error.contains("did not finish the picture within"), "{error}");
+    assert!(
+        error.contains("did not answer within")
+            || error.contains("did not finish the picture within"),
+        "{error}"
+    );
 }
 
 /// What a pixel may differ by where smaller buffers cut the scene into other parts: as of tests/occlusion.rs.
@@ -190,7 +201,8 @@ fn difference(a: &Picture, b: &Picture) -> f32 {
 /// A host's device of some limits.
 fn host_device(required_limits: wgpu::Limits) -> Gpu {
     let open = async {
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+        let instance =
+            wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
         let adapter = instance.enumerate_adapters(wgpu::Backends::all()).await.swap_remove(0);
         let descriptor = wgpu::DeviceDescriptor { required_limits, ..Default::default() };
         let (device, queue) = adapter.request_device(&descriptor).await.expect("a device");
@@ -219,7 +231,10 @@ fn a_small_device_draws_the_same_or_says_why_not() {
         match scattered(&small_device(1 << shift), &scene) {
             Ok(picture) => {
                 let found = difference(&picture, &truth);
-                assert!(found <= MOST_DIFFERENCE, "2^{shift} bytes a buffer: another picture, by {found}");
+                assert!(
+                    found <= MOST_DIFFERENCE,
+                    "2^{shift} bytes a buffer: another picture, by {found}"
+                );
             }
             Err(Error::Gpu(message)) => {
                 assert!(message.contains("buffer"), "2^{shift} bytes a buffer: {message}");
@@ -252,14 +267,21 @@ fn what_did_not_fit_leaves_the_device_usable() {
 #[test]
 fn dispatches_of_many_rows_draw_the_same() {
     let usual = host_device(wgpu::Limits::default());
-    let narrow = [16, 24]
-        .map(|row| host_device(wgpu::Limits { max_compute_workgroups_per_dimension: row, ..wgpu::Limits::default() }));
+    let narrow = [16, 24].map(|row| {
+        host_device(wgpu::Limits {
+            max_compute_workgroups_per_dimension: row,
+            ..wgpu::Limits::default()
+        })
+    });
     for (name, scene) in [("whole", scene(false)), ("in bricks", scene(true))] {
         let expected = drawn(&usual, &scene).expect("draws");
         let covered = expected.color.iter().filter(|color| color[3] > 0.5).count();
         assert!(covered > 1000, "{name}: {covered} pixels");
         for gpu in &narrow {
-            assert!(same(&drawn(gpu, &scene).expect("draws"), &expected), "{name}: another picture");
+            assert!(
+                same(&drawn(gpu, &scene).expect("draws"), &expected),
+                "{name}: another picture"
+            );
         }
     }
 }
@@ -267,14 +289,18 @@ fn dispatches_of_many_rows_draw_the_same() {
 /// Slices so wide that a binding holds few: chunks of two slices with their neighbours. Wider ones are refused.
 #[test]
 fn wide_slices_are_drawn_in_thin_chunks() {
-    let gpu = host_device(wgpu::Limits { max_storage_buffer_binding_size: 1 << 20, ..wgpu::Limits::default() });
+    let gpu = host_device(wgpu::Limits {
+        max_storage_buffer_binding_size: 1 << 20,
+        ..wgpu::Limits::default()
+    });
     let scene = |side: usize| {
         let value = |index: usize| {
             let [x, y] = [index % side, index / side % side].map(|at| at as f64 / side as f64);
             (255.0 * (20.0 * x).sin().abs() * (20.0 * y).cos().abs()) as u8
         };
         let samples = Samples::U8((0..9 * side * side).map(value).collect());
-        let volume = Volume::new(Lattice::with_spacing([side, side, 9], DVec3::ONE), samples).unwrap();
+        let volume =
+            Volume::new(Lattice::with_spacing([side, side, 9], DVec3::ONE), samples).unwrap();
         let transfer = TransferFunction::automatic(&volume);
         Scene::new().with_volume(volume, Kernel::default(), transfer)
     };
@@ -285,7 +311,10 @@ fn wide_slices_are_drawn_in_thin_chunks() {
     let difference = difference(&scattered(&gpu, &wide).expect("draws"), &expected);
     assert!(difference < MOST_DIFFERENCE, "another picture, by {difference}");
     let refused = scattered(&gpu, &scene(600)).unwrap_err();
-    assert!(matches!(&refused, Error::Argument(what) if what.contains("convert the volume to bricks")), "{refused}");
+    assert!(
+        matches!(&refused, Error::Argument(what) if what.contains("convert the volume to bricks")),
+        "{refused}"
+    );
 }
 
 /// A picture with more tiles than there are bins for all its sheets is drawn in strips.
@@ -320,24 +349,34 @@ fn many_sheets_of_many_tiles_are_drawn_in_strips() {
 fn bricks_that_show_too_much_are_drawn_coarser() {
     let volume = Arc::new(Phantom::Specimen.sample_bytes([128; 3]).unwrap());
     // All of it shows, the air a little.
-    let transfer =
-        TransferFunction { opacity: vec![(0.0, 0.001), (255.0, 0.9)], ..TransferFunction::automatic(&volume) };
-    let scene = Scene::new().with_bricks(Bricks::from_volume(volume).unwrap(), Kernel::default(), transfer);
+    let transfer = TransferFunction {
+        opacity: vec![(0.0, 0.001), (255.0, 0.9)],
+        ..TransferFunction::automatic(&volume)
+    };
+    let scene =
+        Scene::new().with_bricks(Bricks::from_volume(volume).unwrap(), Kernel::default(), transfer);
     let (camera, settings) = view(&scene);
     let settings = Settings { detail: Detail::Pixels(0.0), ..settings };
     let [(fine, all), (coarse, fewer)] = [1 << 27, 1 << 20].map(|bytes| {
-        let gpu = host_device(wgpu::Limits { max_storage_buffer_binding_size: bytes, ..wgpu::Limits::default() });
+        let gpu = host_device(wgpu::Limits {
+            max_storage_buffer_binding_size: bytes,
+            ..wgpu::Limits::default()
+        });
         let mut renderer = Renderer::new(&gpu);
         let mut prepared = renderer.prepare(&scene).expect("fits");
         let first = renderer.render(&mut prepared, &camera, &settings).expect("draws").0;
-        let (again, stats) = renderer.render(&mut prepared, &camera, &settings).expect("draws again");
+        let (again, stats) =
+            renderer.render(&mut prepared, &camera, &settings).expect("draws again");
         assert!(same(&first, &again), "another picture");
         assert_eq!(stats.read_bricks, 0, "a view that rests reads nothing");
         (again, stats)
     });
     assert_eq!((all.lambda, all.bricks), (0.0, 64));
     assert!(fewer.lambda > 0.0 && fewer.bricks < 64, "{fewer:?}");
-    let agreement = compare_pictures(&fine, &coarse).expect("pictures of one size").psnr.unwrap_or(f64::INFINITY);
+    let agreement = compare_pictures(&fine, &coarse)
+        .expect("pictures of one size")
+        .psnr
+        .unwrap_or(f64::INFINITY);
     assert!(agreement > 25.0, "{agreement:.1} dB");
 }
 
@@ -351,13 +390,19 @@ fn a_budget_counts_for_the_whole_picture() {
     let settings = Settings { size: [400, 300], detail: Detail::Splats(3000), ..settings };
     // 16 bytes a pixel: the second draws 163 rows at a time.
     let pictures = [1 << 27, 1 << 20].map(|bytes| {
-        let gpu = host_device(wgpu::Limits { max_storage_buffer_binding_size: bytes, ..wgpu::Limits::default() });
+        let gpu = host_device(wgpu::Limits {
+            max_storage_buffer_binding_size: bytes,
+            ..wgpu::Limits::default()
+        });
         let mut renderer = Renderer::new(&gpu);
         let mut prepared = renderer.prepare(&scene).expect("fits");
         renderer.render(&mut prepared, &camera, &settings).expect("draws")
     });
     let [(whole, own), (strips, others)] = &pictures;
-    assert!(own.cut_pixels > 0.0 && own.splats > 1500 && own.splats > others.splats, "{own:?}\n{others:?}");
+    assert!(
+        own.cut_pixels > 0.0 && own.splats > 1500 && own.splats > others.splats,
+        "{own:?}\n{others:?}"
+    );
     assert!((own.cut_pixels / others.cut_pixels - 1.0).abs() < 1e-9, "{own:?}\n{others:?}");
     let difference = difference(whole, strips);
     assert!(difference < MOST_DIFFERENCE, "another picture, by {difference}");
@@ -421,15 +466,22 @@ fn memory_is_kept_to() {
                 Ok(mut prepared) => {
                     let mut draw = || renderer.render(&mut prepared, &camera, &settings);
                     // What is refused once is refused again.
-                    let first = draw().map_err(|error| error.to_string()).map(|(picture, _)| picture);
+                    let first =
+                        draw().map_err(|error| error.to_string()).map(|(picture, _)| picture);
                     match draw() {
                         Err(error) => {
                             assert_eq!(first.err(), Some(error.to_string()));
                             Err(("drawn", error))
                         }
                         Ok((picture, stats)) => {
-                            assert!(same(&picture, &first.expect("draws the first time, too")), "2^{shift} bytes");
-                            assert!(stats.lambda <= coarsest, "2^{shift} bytes: coarser than with less");
+                            assert!(
+                                same(&picture, &first.expect("draws the first time, too")),
+                                "2^{shift} bytes"
+                            );
+                            assert!(
+                                stats.lambda <= coarsest,
+                                "2^{shift} bytes: coarser than with less"
+                            );
                             coarsest = stats.lambda;
                             Ok(picture)
                         }
@@ -441,7 +493,10 @@ fn memory_is_kept_to() {
                 // Bricks of a coarser level.
                 Ok(picture) if in_bricks => {
                     let like = compare_pictures(&picture, &expected).expect("of one size").psnr;
-                    assert!(like.is_some_and(|decibels| decibels > 15.0), "2^{shift} bytes: {like:?} dB");
+                    assert!(
+                        like.is_some_and(|decibels| decibels > 15.0),
+                        "2^{shift} bytes: {like:?} dB"
+                    );
                     "coarser"
                 }
                 Ok(_) => panic!("2^{shift} bytes: another picture"),
@@ -455,8 +510,11 @@ fn memory_is_kept_to() {
         println!("{outcomes:?}");
         let mut kinds = outcomes.clone();
         kinds.dedup();
-        let expected: &[&str] =
-            if in_bricks { &["prepared", "coarser", "done"] } else { &["prepared", "drawn", "done"] };
+        let expected: &[&str] = if in_bricks {
+            &["prepared", "coarser", "done"]
+        } else {
+            &["prepared", "drawn", "done"]
+        };
         assert_eq!(kinds, expected, "{outcomes:?}");
     }
 }

@@ -18,7 +18,11 @@ use std::sync::Arc;
 
 fn drawn(case: &Case) -> Picture {
     let settings = Settings { evaluate: Evaluate::Gather, ..case.settings.clone() };
-    CpuRenderer::new(&case.scene).expect(case.name).render(&case.camera, &settings).expect(case.name).0
+    CpuRenderer::new(&case.scene)
+        .expect(case.name)
+        .render(&case.camera, &settings)
+        .expect(case.name)
+        .0
 }
 
 fn truth(case: &Case) -> Picture {
@@ -58,7 +62,9 @@ fn random(lattice: Lattice) -> Case {
     let [low, high] = volume.bounds();
     volume.lattice.origin += scenes::ORIGIN - 0.5 * (low + high);
     let items = case.scene.items.iter().map(|item| match item {
-        Item::Volume(_, kernel, transfer) => Item::Volume(volume.clone().into(), kernel.clone(), transfer.clone()),
+        Item::Volume(_, kernel, transfer) => {
+            Item::Volume(volume.clone().into(), kernel.clone(), transfer.clone())
+        }
         other => other.clone(),
     });
     Case { name: "random", scene: Scene { items: items.collect() }, ..case }
@@ -125,7 +131,11 @@ fn kernels() -> Vec<(&'static str, Kernel)> {
 
 /// Kernels of both signs have no field where too few of them reach: its border in a single layer of samples lies within sheets.
 fn least_of_borders(name: &str) -> f64 {
-    if name.starts_with("hann") && (name.contains(" 1,") || name.contains(" 1]")) { 28.0 } else { 50.0 }
+    if name.starts_with("hann") && (name.contains(" 1,") || name.contains(" 1]")) {
+        28.0
+    } else {
+        50.0
+    }
 }
 
 #[test]
@@ -158,7 +168,9 @@ fn other_looks_agree_with_the_reference() {
 fn borders_and_flat_lattices_agree_with_the_reference() {
     let dims = [[12, 9, 10], [2, 10, 8], [9, 1, 7], [3, 3, 3]];
     let named = |(name, kernel): (&'static str, Kernel)| {
-        dims.map(|dims| (format!("{name}, {dims:?}"), with_kernel(&random(cartesian(dims)), &kernel, false)))
+        dims.map(|dims| {
+            (format!("{name}, {dims:?}"), with_kernel(&random(cartesian(dims)), &kernel, false))
+        })
     };
     agree(kernels().into_iter().flat_map(named), least_of_borders);
 }
@@ -168,8 +180,9 @@ fn body_centred_lattices_agree_with_the_reference() {
     let kernels = kernels().into_iter().chain([("gaussian", Kernel::default())]);
     let named = |(name, kernel): (&'static str, Kernel)| {
         let own = with_kernel(&methods::body_centred(), &kernel, false);
-        let random = [[8, 2, 6], [5, 6, 1]]
-            .map(|dims| (format!("{name}, {dims:?}"), with_kernel(&random(body_centred(dims)), &kernel, false)));
+        let random = [[8, 2, 6], [5, 6, 1]].map(|dims| {
+            (format!("{name}, {dims:?}"), with_kernel(&random(body_centred(dims)), &kernel, false))
+        });
         [(name.to_string(), own)].into_iter().chain(random)
     };
     agree(kernels.flat_map(named), least_of_borders);
@@ -198,11 +211,16 @@ fn sharp_volumes_agree_with_the_reference() {
     let mut cases = Vec::new();
     for (name, kernel) in kernels {
         let kernel = kernel.expect(name);
-        for case in [scenes::blobs_analytic(), scenes::blobs_orthographic(), random(cartesian([9, 6, 8]))] {
+        for case in
+            [scenes::blobs_analytic(), scenes::blobs_orthographic(), random(cartesian([9, 6, 8]))]
+        {
             cases.push((format!("{name}, {}", case.name), with_kernel(&case, &kernel, true)));
         }
         for case in [methods::body_centred(), random(body_centred([7, 6, 11]))] {
-            cases.push((format!("{name}, body-centred, {}", case.name), with_kernel(&case, &kernel, true)));
+            cases.push((
+                format!("{name}, body-centred, {}", case.name),
+                with_kernel(&case, &kernel, true),
+            ));
         }
     }
     agree(cases, |_| 50.0);

@@ -34,7 +34,8 @@ fn knot(count: u32) -> SplatSet {
 }
 
 fn build(set: &SplatSet, block_splats: usize) -> Tree {
-    Tree::build(set, &BuildOptions { block_splats, ..BuildOptions::default() }, &|_, _| ()).expect("a tree")
+    Tree::build(set, &BuildOptions { block_splats, ..BuildOptions::default() }, &|_, _| ())
+        .expect("a tree")
 }
 
 /// Looks at a set from where it fills this part of the picture.
@@ -66,7 +67,8 @@ fn trees_of_every_preset_keep_their_promises_and_all_splats() {
             let options = BuildOptions { preset, block_splats, ..BuildOptions::default() };
             let tree = Tree::build(&set, &options, &|_, _| ()).expect("a tree");
             assert_eq!(tree.is_joined(), block_splats == 1000);
-            let errors: Vec<_> = validate(&tree).into_iter().filter(|f| f.severity == Severity::Error).collect();
+            let errors: Vec<_> =
+                validate(&tree).into_iter().filter(|f| f.severity == Severity::Error).collect();
             assert!(errors.is_empty(), "{preset:?}: {errors:?}");
             let mut leaves: Vec<[u8; 48]> =
                 tree.nodes().filter(|node| node.is_leaf()).map(|node| bytes(&node.splat)).collect();
@@ -108,14 +110,24 @@ fn a_hierarchy_in_a_volume() {
     let mut mesh = Mesh::knot(300, 24);
     mesh.positions.iter_mut().for_each(|place| *place *= 0.4);
     let set = mesh.surfels(&SurfelOptions::default()).expect("surfels");
-    let file =
-        to_bytes(&build(&set, 1 << 20), &WriteOptions { lossless: true, ..WriteOptions::default() }).expect("a file");
-    let hierarchy = || Hierarchy::from_bytes(file.clone(), Path::new("knot.splk"), &Limits::default()).expect("opens");
+    let file = to_bytes(
+        &build(&set, 1 << 20),
+        &WriteOptions { lossless: true, ..WriteOptions::default() },
+    )
+    .expect("a file");
+    let hierarchy = || {
+        Hierarchy::from_bytes(file.clone(), Path::new("knot.splk"), &Limits::default())
+            .expect("opens")
+    };
     let transfer = TransferFunction::automatic(&volume);
     let scene = || Scene::new().with_hierarchy(hierarchy());
     let scenes = [
         scene().with_volume(volume.clone(), Kernel::default(), transfer.clone()),
-        scene().with_bricks(Bricks::from_volume(volume).expect("bricks"), Kernel::default(), transfer),
+        scene().with_bricks(
+            Bricks::from_volume(volume).expect("bricks"),
+            Kernel::default(),
+            transfer,
+        ),
     ];
     for scene in scenes {
         let camera = camera(&scene.bounds(), 0.8);
@@ -123,8 +135,10 @@ fn a_hierarchy_in_a_volume() {
         let mut prepared = renderer.prepare(&scene).expect("fits");
         // Nearer, so that bricks and pages are read anew.
         for part in [0.3, 1.0] {
-            let camera =
-                Camera { position: camera.focal_point + (camera.position - camera.focal_point) / part, ..camera };
+            let camera = Camera {
+                position: camera.focal_point + (camera.position - camera.focal_point) / part,
+                ..camera
+            };
             let truth = reference::render(&scene, &camera, &settings(1.0)).expect("draws");
             let found = renderer.render(&mut prepared, &camera, &settings(1.0)).expect("draws").0;
             let agreement = decibels(&found, &truth);
@@ -137,17 +151,22 @@ fn a_hierarchy_in_a_volume() {
 /// What was at hand before a page that cannot be read is drawn as ever afterwards.
 #[test]
 fn a_page_that_cannot_be_read_takes_nothing_with_it() {
-    let mut file = to_bytes(&build(&knot(60_000), 1 << 20), &WriteOptions::default()).expect("a file");
+    let mut file =
+        to_bytes(&build(&knot(60_000), 1 << 20), &WriteOptions::default()).expect("a file");
     let last = file.len() - 100;
     file[last] ^= 0x55;
-    let hierarchy = Hierarchy::from_bytes(file, Path::new("knot.splk"), &Limits::default()).expect("opens");
+    let hierarchy =
+        Hierarchy::from_bytes(file, Path::new("knot.splk"), &Limits::default()).expect("opens");
     assert!(hierarchy.pages().len() > 8);
     let scene = Scene::new().with_hierarchy(hierarchy);
     let camera = camera(&scene.bounds(), 0.8);
     let mut renderer = renderer();
     let mut prepared = renderer.prepare(&scene).expect("fits");
     for _ in 0..2 {
-        let error = renderer.render(&mut prepared, &camera, &settings(0.0)).expect_err("a broken page").to_string();
+        let error = renderer
+            .render(&mut prepared, &camera, &settings(0.0))
+            .expect_err("a broken page")
+            .to_string();
         assert!(error.contains("knot.splk: page"), "{error}");
     }
     let coarse = settings(16.0);
@@ -182,9 +201,10 @@ fn smallest_sphere(tree: &Tree) -> f64 {
 
 #[test]
 fn root_spheres_are_nearly_the_smallest() {
-    for (name, set) in
-        [("knot", knot(20_000)), ("ball", Mesh::sphere(5).surfels(&SurfelOptions::default()).expect("surfels"))]
-    {
+    for (name, set) in [
+        ("knot", knot(20_000)),
+        ("ball", Mesh::sphere(5).surfels(&SurfelOptions::default()).expect("surfels")),
+    ] {
         for block_splats in [1 << 20, 1000] {
             let tree = build(&set, block_splats);
             let inflation = f64::from(tree.blocks[0].nodes[0].radius) / smallest_sphere(&tree);
@@ -205,15 +225,20 @@ fn shares_add_up_on_every_way_down() {
             // The picture is so wide that nothing is beside it.
             let view = View { center: view.center + 1e6, size: [2_000_000; 2], ..view };
             let cut = Cut::new(&view, tree.origin, pixels, false);
-            let selected: std::collections::HashMap<*const _, u32> =
-                tree.selected(&cut).into_iter().map(|(node, share)| (std::ptr::from_ref(node), share)).collect();
-            let share =
-                |node: &splatkit::hierarchy::Node| selected.get(&std::ptr::from_ref(node)).copied().unwrap_or(0);
+            let selected: std::collections::HashMap<*const _, u32> = tree
+                .selected(&cut)
+                .into_iter()
+                .map(|(node, share)| (std::ptr::from_ref(node), share))
+                .collect();
+            let share = |node: &splatkit::hierarchy::Node| {
+                selected.get(&std::ptr::from_ref(node)).copied().unwrap_or(0)
+            };
             let mut ways = 0;
             let mut open = vec![(0usize, 0usize, 0u32)];
             while let Some((block, index, above)) = open.pop() {
                 let node = &tree.blocks[block].nodes[index];
-                let child_block = tree.blocks.iter().position(|b| block == 0 && b.portal == Some(index as u32));
+                let child_block =
+                    tree.blocks.iter().position(|b| block == 0 && b.portal == Some(index as u32));
                 if let Some(child) = child_block {
                     open.push((child, 0, above));
                     continue;
@@ -224,7 +249,8 @@ fn shares_add_up_on_every_way_down() {
                     ways += 1;
                 }
                 open.extend(
-                    (node.first_child..node.first_child + node.children).map(|child| (block, child as usize, sum)),
+                    (node.first_child..node.first_child + node.children)
+                        .map(|child| (block, child as usize, sum)),
                 );
             }
             assert_eq!(ways, set.splats.len());
@@ -239,27 +265,35 @@ fn the_engine_draws_the_cut_that_the_oracle_finds() {
     let mut renderer = renderer();
     for block_splats in [1 << 20, 700] {
         let tree = build(&set, block_splats);
-        let file = to_bytes(&tree, &WriteOptions { lossless: true, ..WriteOptions::default() }).expect("a file");
-        let file = Hierarchy::from_bytes(file, Path::new("memory"), &Limits::default()).expect("a hierarchy");
+        let file = to_bytes(&tree, &WriteOptions { lossless: true, ..WriteOptions::default() })
+            .expect("a file");
+        let file = Hierarchy::from_bytes(file, Path::new("memory"), &Limits::default())
+            .expect("a hierarchy");
         let memory = Hierarchy::from_tree(tree.clone()).expect("a hierarchy");
         for hierarchy in [memory, file] {
-            let mut prepared = renderer.prepare(&Scene::new().with_hierarchy(hierarchy)).expect("prepared");
-            for (part, pixels) in [(1.0, 0.0), (1.0, 3.0), (0.3, 1.0), (0.3, 4.0), (2.5, 5.0), (1.0, 1e10)] {
+            let mut prepared =
+                renderer.prepare(&Scene::new().with_hierarchy(hierarchy)).expect("prepared");
+            for (part, pixels) in
+                [(1.0, 0.0), (1.0, 3.0), (0.3, 1.0), (0.3, 4.0), (2.5, 5.0), (1.0, 1e10)]
+            {
                 for orthographic in [false, true] {
                     let mut camera = camera(&set.bounds(), part);
                     if orthographic {
                         camera.make_orthographic();
                     }
                     let settings = settings(pixels);
-                    let (found, stats) = renderer.render(&mut prepared, &camera, &settings).expect("a picture");
+                    let (found, stats) =
+                        renderer.render(&mut prepared, &camera, &settings).expect("a picture");
                     let view = camera.view(settings.size).expect("a view");
                     let cut = tree.cut(&view, settings.detail, None).expect("a cut");
                     if part <= 1.0 {
                         assert_eq!(stats.splats, cut.splats.len() as u64, "{part} {pixels}");
                     }
-                    let mut flat = renderer.prepare(&Scene::new().with_splats(cut)).expect("prepared");
+                    let mut flat =
+                        renderer.prepare(&Scene::new().with_splats(cut)).expect("prepared");
                     // The same sheets need the same bounds, which a cut's splats have but nearly.
-                    let (expected, _) = renderer.render(&mut flat, &camera, &settings).expect("a picture");
+                    let (expected, _) =
+                        renderer.render(&mut flat, &camera, &settings).expect("a picture");
                     let agreement = decibels(&found, &expected);
                     assert!(agreement > 40.0, "{part} {pixels}: {agreement:.1} dB");
                 }
@@ -290,7 +324,9 @@ fn the_engine_matches_the_reference() {
 fn holes(leaves: &Picture, cut: &Picture) -> usize {
     let [width, height] = [leaves.width as i32, leaves.height as i32];
     let covered = |x: i32, y: i32| {
-        (0..width).contains(&x) && (0..height).contains(&y) && leaves.color[(y * width + x) as usize][3] > 0.99
+        (0..width).contains(&x)
+            && (0..height).contains(&y)
+            && leaves.color[(y * width + x) as usize][3] > 0.99
     };
     let inside = |x: i32, y: i32| (-2..=2).all(|i| (-2..=2).all(|j| covered(x + i, y + j)));
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
@@ -307,12 +343,17 @@ fn coarse_cuts_have_no_holes_and_look_like_the_leaves() {
     let mut prepared = renderer.prepare(&Scene::new().with_hierarchy(hierarchy)).expect("prepared");
     for part in [0.9, 0.4, 0.25] {
         let camera = camera(&set.bounds(), part);
-        let (leaves, all) = renderer.render(&mut prepared, &camera, &settings(0.0)).expect("a picture");
+        let (leaves, all) =
+            renderer.render(&mut prepared, &camera, &settings(0.0)).expect("a picture");
         let mut last = f64::INFINITY;
         for (pixels, least) in [(1.0, 40.0), (2.0, 30.0), (4.0, 24.0)] {
-            let (cut, stats) = renderer.render(&mut prepared, &camera, &settings(pixels)).expect("a picture");
+            let (cut, stats) =
+                renderer.render(&mut prepared, &camera, &settings(pixels)).expect("a picture");
             let agreement = decibels(&cut, &leaves);
-            println!("{part} {pixels}: {} of {} splats, {agreement:.1} dB", stats.splats, all.splats);
+            println!(
+                "{part} {pixels}: {} of {} splats, {agreement:.1} dB",
+                stats.splats, all.splats
+            );
             assert_eq!(holes(&leaves, &cut), 0, "{part} {pixels}");
             assert!(agreement > least, "{part} {pixels}: {agreement:.1} dB");
             assert!(agreement <= last + 3.0, "coarser cuts are no better");
@@ -332,7 +373,11 @@ fn a_budget_of_splats_is_kept_and_used() {
         let camera = camera(&set.bounds(), 0.9);
         let (_, stats) = renderer.render(&mut prepared, &camera, &settings).expect("a picture");
         let all = set.splats.len() as u64;
-        assert!(stats.splats <= most && stats.splats * 2 > most.min(all), "{} of {most}", stats.splats);
+        assert!(
+            stats.splats <= most && stats.splats * 2 > most.min(all),
+            "{} of {most}",
+            stats.splats
+        );
     }
 }
 
@@ -345,7 +390,8 @@ fn a_page_cache_of_any_size_draws_a_whole_picture() {
     let camera = camera(&set.bounds(), 0.9);
     let mut draw = |room: u64, detail: f64| {
         let hierarchy = Hierarchy::from_tree(tree.clone()).expect("a hierarchy");
-        let mut prepared = renderer.prepare(&Scene::new().with_hierarchy(hierarchy)).expect("prepared");
+        let mut prepared =
+            renderer.prepare(&Scene::new().with_hierarchy(hierarchy)).expect("prepared");
         let settings = Settings { page_memory: room, ..settings(detail) };
         renderer.render(&mut prepared, &camera, &settings).expect("a picture")
     };
@@ -357,14 +403,18 @@ fn a_page_cache_of_any_size_draws_a_whole_picture() {
         assert!(stats.missing_pages > 0 && stats.splats < set.splats.len() as u64);
         assert_eq!(holes(&all, &some), 0, "{pages} pages");
         let agreement = decibels(&some, &all);
-        println!("{pages} pages: {} missing, {} splats, {agreement:.1} dB", stats.missing_pages, stats.splats);
+        println!(
+            "{pages} pages: {} missing, {} splats, {agreement:.1} dB",
+            stats.missing_pages, stats.splats
+        );
         assert!(agreement > last, "{agreement}");
         last = agreement;
     }
     // What a device may take bounds them, too, all hierarchies together.
     let hierarchy = || Hierarchy::from_tree(tree.clone()).expect("a hierarchy");
     let scene = Scene::new().with_hierarchy(hierarchy()).with_hierarchy(hierarchy());
-    let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("an adapter").with_memory(20 * 4096 * 96);
+    let gpu =
+        Gpu::headless(&AdapterChoice::Automatic).expect("an adapter").with_memory(20 * 4096 * 96);
     let mut renderer = Renderer::new(&gpu);
     let mut prepared = renderer.prepare(&scene).expect("prepared");
     let (both, stats) = renderer.render(&mut prepared, &camera, &settings(0.0)).expect("a picture");
@@ -379,15 +429,21 @@ fn a_view_looks_the_same_however_it_was_reached() {
     let tree = build(&set, 10_000);
     let mut renderer = renderer();
     let hierarchy = || Hierarchy::from_tree(tree.clone()).expect("a hierarchy");
-    let mut wanderer = renderer.prepare(&Scene::new().with_hierarchy(hierarchy())).expect("prepared");
+    let mut wanderer =
+        renderer.prepare(&Scene::new().with_hierarchy(hierarchy())).expect("prepared");
     for part in [0.1, 2.0, 0.9, 4.0, 0.3] {
         let camera = camera(&set.bounds(), part);
         let settings = Settings { page_memory: 20 * 4096 * 96, ..settings(2.0) };
         let (found, _) = renderer.render(&mut wanderer, &camera, &settings).expect("a picture");
-        let mut fresh = renderer.prepare(&Scene::new().with_hierarchy(hierarchy())).expect("prepared");
+        let mut fresh =
+            renderer.prepare(&Scene::new().with_hierarchy(hierarchy())).expect("prepared");
         let (expected, _) = renderer.render(&mut fresh, &camera, &settings).expect("a picture");
         // The order of the splats differs, and with it the rounding of their sums.
-        assert!(decibels(&found, &expected) > 60.0, "{part}: {:.1} dB", decibels(&found, &expected));
+        assert!(
+            decibels(&found, &expected) > 60.0,
+            "{part}: {:.1} dB",
+            decibels(&found, &expected)
+        );
     }
 }
 
@@ -418,26 +474,40 @@ fn an_opened_surface_shows_its_back() {
     let options = BuildOptions { closed: true, ..BuildOptions::default() };
     let tree = Tree::build(&set, &options, &|_, _| ()).expect("a tree");
     let bounds = set.bounds();
-    let scenes = [Scene::new().with_splats(set), Scene::new().with_hierarchy(Hierarchy::from_tree(tree).expect("one"))];
+    let scenes = [
+        Scene::new().with_splats(set),
+        Scene::new().with_hierarchy(Hierarchy::from_tree(tree).expect("one")),
+    ];
     let mut renderer = renderer();
     let mut prepared = scenes.map(|scene| renderer.prepare(&scene).expect("prepared"));
     let outside = camera(&bounds, 0.9);
     let mut within = outside.clone();
-    within.position = bounds.center() + 0.25 * (outside.position - bounds.center()).normalize() * bounds.diagonal();
+    within.position = bounds.center()
+        + 0.25 * (outside.position - bounds.center()).normalize() * bounds.diagonal();
     within.projection = Projection::Perspective { view_angle: 100.0 };
-    let open = Clip { shape: ClipShape::HalfSpace { normal: DVec3::Z, offset: bounds.center().z }, inside: true };
+    let open = Clip {
+        shape: ClipShape::HalfSpace { normal: DVec3::Z, offset: bounds.center().z },
+        inside: true,
+    };
     for (name, camera, clips, culls) in [
         ("whole", &outside, vec![], true),
         ("cut open", &outside, vec![open], false),
         ("within", &within, vec![], false),
     ] {
         let settings = Settings { clips, ..settings(0.0) };
-        let [(expected, all), (found, drawn)] =
-            prepared.each_mut().map(|prepared| renderer.render(prepared, camera, &settings).expect("a picture"));
+        let [(expected, all), (found, drawn)] = prepared
+            .each_mut()
+            .map(|prepared| renderer.render(prepared, camera, &settings).expect("a picture"));
         let agreement = decibels(&found, &expected);
         println!("{name}: {} of {} splats, {agreement:.1} dB", drawn.splats, all.splats);
         assert!(agreement > 40.0, "{name}: {agreement:.1} dB");
-        assert_eq!(drawn.splats * 10 < all.splats * 8, culls, "{name}: {} of {}", drawn.splats, all.splats);
+        assert_eq!(
+            drawn.splats * 10 < all.splats * 8,
+            culls,
+            "{name}: {} of {}",
+            drawn.splats,
+            all.splats
+        );
     }
 }
 
@@ -448,12 +518,18 @@ fn optical_depths_beyond_what_can_be_drawn_are_refused() {
     let built = |set: &SplatSet| Tree::build(set, &BuildOptions::default(), &|_, _| ());
     set.splats[7].strength = Splat::MOST_OPTICAL_DEPTH;
     let tree = built(&set).expect("a tree");
-    let scene = Scene::new().with_hierarchy(Hierarchy::from_tree(tree.clone()).expect("a hierarchy"));
-    let picture = reference::render(&scene, &camera(&scene.bounds(), 0.9), &settings(0.0)).expect("draws");
+    let scene =
+        Scene::new().with_hierarchy(Hierarchy::from_tree(tree.clone()).expect("a hierarchy"));
+    let picture =
+        reference::render(&scene, &camera(&scene.bounds(), 0.9), &settings(0.0)).expect("draws");
     assert!(picture.color.iter().flatten().all(|value| value.is_finite()));
     set.splats[7].strength *= 1.01;
     let error = built(&set).expect_err("too deep").to_string();
-    assert!(error.contains("splat 7 at") && error.contains("optical depths from 0 to 1e10 can be merged"), "{error}");
+    assert!(
+        error.contains("splat 7 at")
+            && error.contains("optical depths from 0 to 1e10 can be merged"),
+        "{error}"
+    );
 }
 
 /// Normals that are smooth over edges are not those of the faces, and it is the faces that face away.
@@ -465,9 +541,11 @@ fn smooth_normals_over_edges_lose_nothing() {
     let set = cube.surfels(&options).expect("surfels");
     assert!(cube.is_solid());
     let tree =
-        Tree::build(&set, &BuildOptions { closed: true, ..BuildOptions::default() }, &|_, _| ()).expect("a tree");
+        Tree::build(&set, &BuildOptions { closed: true, ..BuildOptions::default() }, &|_, _| ())
+            .expect("a tree");
     let file = to_bytes(&tree, &WriteOptions::default()).expect("a file");
-    let file = Hierarchy::from_bytes(file, Path::new("memory"), &Limits::default()).expect("a hierarchy");
+    let file =
+        Hierarchy::from_bytes(file, Path::new("memory"), &Limits::default()).expect("a hierarchy");
     assert!(file.check().is_sound(), "{:?}", file.check().findings);
     for tree in [file.read_tree().expect("a tree"), tree] {
         assert_eq!(validate(&tree), []);
@@ -481,7 +559,8 @@ fn smooth_normals_over_edges_lose_nothing() {
                 let scene = Scene::new().with_splats(cut);
                 reference::render(&scene, &camera, &Settings::new([64, 64])).expect("draws").color
             });
-            lost += all.iter().zip(&culled).filter(|(all, culled)| culled[3] < all[3] - 0.1).count();
+            lost +=
+                all.iter().zip(&culled).filter(|(all, culled)| culled[3] < all[3] - 0.1).count();
         }
         println!("{lost} pixels lost; {} of {} splats drawn", counts[1], counts[0]);
         assert!(lost == 0 && counts[1] < counts[0] * 95 / 100, "{lost} {counts:?}");

@@ -91,11 +91,14 @@ fn scenes(round: u32, folder: &Path) -> Vec<(&'static str, Scene)> {
     // A table as programs write it.
     let mut table = String::from("x,y,z,value\n");
     for index in 0..600 + varied(round, 4, 600) {
-        let [x, y, z] = [5, 6, 7].map(|salt| f64::from(varied(index + 7919 * round, salt, 1000)) / 1000.0);
+        let [x, y, z] =
+            [5, 6, 7].map(|salt| f64::from(varied(index + 7919 * round, salt, 1000)) / 1000.0);
         table += &format!("{x},{y},{z},{}\n", x * y + z);
     }
     let name = Path::new("a.csv");
-    let points = io::read_samples(&Source::from_bytes(name, table.as_bytes(), &limits).unwrap(), None).unwrap();
+    let points =
+        io::read_samples(&Source::from_bytes(name, table.as_bytes(), &limits).unwrap(), None)
+            .unwrap();
     let scattered = points.to_splats(&SampleOptions::default()).unwrap();
     let range = points.range();
     let shown = TransferFunction {
@@ -110,7 +113,10 @@ fn scenes(round: u32, folder: &Path) -> Vec<(&'static str, Scene)> {
         ("surfels", Scene::new().with_splats(surfels.clone())),
         ("hierarchy", Scene::new().with_hierarchy(read)),
         ("scattered", Scene::new().with_samples(scattered, shown)),
-        ("mixed", Scene::new().with_volume(volume, Kernel::default(), transfer).with_splats(surfels)),
+        (
+            "mixed",
+            Scene::new().with_volume(volume, Kernel::default(), transfer).with_splats(surfels),
+        ),
     ]
 }
 
@@ -130,8 +136,9 @@ fn settings(round: u32, name: &str) -> Settings {
 /// Bytes that the process holds; nothing where the system does not tell.
 fn resident() -> u64 {
     let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let kib =
-        text.lines().find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB")?.parse::<u64>().ok());
+    let kib = text.lines().find_map(|line| {
+        line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB")?.parse::<u64>().ok()
+    });
     1024 * kib.unwrap_or(0)
 }
 
@@ -144,7 +151,8 @@ fn on_the_gpu(gpu: &Gpu) -> (usize, u64) {
 
 #[test]
 fn nothing_grows() {
-    let seconds = std::env::var("SPLATKIT_LOAD_SECONDS").ok().map(|text| text.parse().expect("seconds"));
+    let seconds =
+        std::env::var("SPLATKIT_LOAD_SECONDS").ok().map(|text| text.parse().expect("seconds"));
     let end = seconds.map(|seconds| Instant::now() + Duration::from_secs(seconds));
     let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("an adapter");
     let folder = Folder::new();
@@ -159,15 +167,19 @@ fn nothing_grows() {
             let mut renderer = Renderer::new(&gpu);
             for (name, scene) in scenes(round, &folder.0) {
                 let mut prepared = renderer.prepare(&scene).unwrap();
-                let mut camera = Camera::framing(&scene.bounds(), DVec3::new(0.4, -0.7, -1.0), DVec3::Y, 1.2);
+                let mut camera =
+                    Camera::framing(&scene.bounds(), DVec3::new(0.4, -0.7, -1.0), DVec3::Y, 1.2);
                 for step in 0..2 {
-                    let drawn = renderer.render(&mut prepared, &camera, &settings(round + step, name));
-                    let picture = drawn.unwrap_or_else(|error| panic!("round {round}, {name}: {error}")).0;
+                    let drawn =
+                        renderer.render(&mut prepared, &camera, &settings(round + step, name));
+                    let picture =
+                        drawn.unwrap_or_else(|error| panic!("round {round}, {name}: {error}")).0;
                     assert!(
                         picture.color.iter().any(|pixel| pixel[3] > 0.0),
                         "round {round}, {name}: an empty picture"
                     );
-                    camera.position = camera.focal_point + 1.3 * (camera.position - camera.focal_point);
+                    camera.position =
+                        camera.focal_point + 1.3 * (camera.position - camera.focal_point);
                     pictures += 1;
                 }
             }

@@ -32,13 +32,18 @@ struct Bounded;
 const SMALL: usize = 1 << 20;
 
 fn refuses(more: usize) -> bool {
-    more > SMALL && (more > LARGEST.load(Relaxed) || HELD.load(Relaxed).saturating_add(more) > MOST.load(Relaxed))
+    more > SMALL
+        && (more > LARGEST.load(Relaxed)
+            || HELD.load(Relaxed).saturating_add(more) > MOST.load(Relaxed))
 }
 
 #[global_allocator]
 static ALLOCATOR: Bounded = Bounded;
 
-#[expect(unsafe_code, reason = "an allocator that fails is what this tests; it hands on to the system's")]
+#[expect(
+    unsafe_code,
+    reason = "an allocator that fails is what this tests; it hands on to the system's"
+)]
 // SAFETY: memory comes from the system's allocator alone, and null where there is none is allowed.
 unsafe impl GlobalAlloc for Bounded {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
@@ -82,7 +87,8 @@ struct Folder(PathBuf);
 
 impl Folder {
     fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("splatkit-no-memory-{}-{name}", std::process::id()));
+        let path =
+            std::env::temp_dir().join(format!("splatkit-no-memory-{}-{name}", std::process::id()));
         std::fs::create_dir_all(&path).unwrap();
         Self(path)
     }
@@ -105,12 +111,16 @@ fn ply(side: u32, has_triangles: bool) -> Vec<u8> {
     let mut out = (out + "end_header\n").into_bytes();
     for vertex in 0..side * side {
         let (x, y) = ((vertex % side) as f32, (vertex / side) as f32);
-        [x, y, (x * 0.3).sin() + (y * 0.2).cos()].iter().for_each(|value| out.extend(value.to_le_bytes()));
+        [x, y, (x * 0.3).sin() + (y * 0.2).cos()]
+            .iter()
+            .for_each(|value| out.extend(value.to_le_bytes()));
     }
-    for corner in
-        (0..(side - 1) * (side - 1) * u32::from(has_triangles)).map(|at| at % (side - 1) + at / (side - 1) * side)
+    for corner in (0..(side - 1) * (side - 1) * u32::from(has_triangles))
+        .map(|at| at % (side - 1) + at / (side - 1) * side)
     {
-        for triangle in [[corner, corner + 1, corner + side], [corner + 1, corner + side + 1, corner + side]] {
+        for triangle in
+            [[corner, corner + 1, corner + side], [corner + 1, corner + side + 1, corner + side]]
+        {
             out.push(3);
             triangle.iter().for_each(|vertex| out.extend(vertex.to_le_bytes()));
         }
@@ -124,7 +134,9 @@ fn obj(side: u32) -> Vec<u8> {
     for vertex in 0..side * side {
         out += &format!("v {} {} {}\n", vertex % side, vertex / side, vertex % 7);
     }
-    for corner in (0..(side - 1) * (side - 1)).map(|at| at % (side - 1) + at / (side - 1) * side + 1) {
+    for corner in
+        (0..(side - 1) * (side - 1)).map(|at| at % (side - 1) + at / (side - 1) * side + 1)
+    {
         out += &format!("f {} {} {} {}\n", corner, corner + 1, corner + side + 1, corner + side);
     }
     out.into_bytes()
@@ -136,7 +148,8 @@ fn convert(input: &Path, output: &Path) -> Result<usize> {
     mesh.is_solid();
     let set = mesh.surfels(&SurfelOptions::default()).map_err(|error| error.in_file(input))?;
     drop(mesh);
-    let build = BuildOptions { preset: Preset::Fastest, block_splats: 1 << 10, ..BuildOptions::default() };
+    let build =
+        BuildOptions { preset: Preset::Fastest, block_splats: 1 << 10, ..BuildOptions::default() };
     let write = WriteOptions::default();
     build_file(&set, output, &build, &write, &|_, _| ()).map_err(|error| error.in_file(input))?;
     let tree = Tree::build(&set, &build, &|_, _| ()).map_err(|error| error.in_file(input))?;
@@ -197,7 +210,10 @@ fn no_single_allocation_that_fails_ends_the_process() {
 fn no_sum_of_allocations_that_fails_ends_the_process() {
     for (name, content) in inputs() {
         let bound = |bytes: usize| {
-            MOST.store(if bytes == usize::MAX { bytes } else { HELD.load(Relaxed).saturating_add(bytes) }, Relaxed);
+            MOST.store(
+                if bytes == usize::MAX { bytes } else { HELD.load(Relaxed).saturating_add(bytes) },
+                Relaxed,
+            );
         };
         let refused = walk(name, content, bound, SMALL);
         assert!(refused > 3, "{name}: {refused}");

@@ -64,7 +64,12 @@ fn knot_in_a_sphere() -> Case {
     case("knot in a sphere", Scene::new().with_splats(knot).with_splats(surfels(&sphere)))
 }
 
-fn draw(renderer: &mut Renderer, case: &Case, camera: &Camera, occlusion: bool) -> (Picture, FrameStats) {
+fn draw(
+    renderer: &mut Renderer,
+    case: &Case,
+    camera: &Camera,
+    occlusion: bool,
+) -> (Picture, FrameStats) {
     let mut prepared = renderer.prepare(&case.scene).expect(case.name);
     let settings = Settings { occlusion, ..case.settings.clone() };
     renderer.render(&mut prepared, camera, &settings).expect(case.name)
@@ -87,8 +92,15 @@ fn hidden_in(case: &Case, views: u32) -> u64 {
         assert_eq!(others.hidden, 0);
         assert!(stats.passes >= others.passes, "{}: {} passes", case.name, stats.passes);
         let difference = largest_difference(&culled, &whole);
-        println!("{} view {step}: {} of {} hidden, {difference:.5}", case.name, stats.hidden, stats.splats);
-        assert!(difference <= MOST_DIFFERENCE, "{} view {step}: a channel differs by {difference}", case.name);
+        println!(
+            "{} view {step}: {} of {} hidden, {difference:.5}",
+            case.name, stats.hidden, stats.splats
+        );
+        assert!(
+            difference <= MOST_DIFFERENCE,
+            "{} view {step}: a channel differs by {difference}",
+            case.name
+        );
         hidden += stats.hidden;
     }
     hidden
@@ -152,7 +164,8 @@ fn the_same_bytes_each_time() {
         let (again, _) = draw(&mut renderer, &case, &case.camera, true);
         assert!(first.color == again.color && first.depth == again.depth);
     }
-    let orthographic = Camera { projection: Projection::Orthographic { height: 3.0 }, ..case.camera.clone() };
+    let orthographic =
+        Camera { projection: Projection::Orthographic { height: 3.0 }, ..case.camera.clone() };
     let (first, _) = draw(&mut renderer, &case, &orthographic, true);
     let (again, _) = draw(&mut renderer, &case, &orthographic, true);
     assert!(first.color == again.color);

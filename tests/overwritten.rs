@@ -34,8 +34,10 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
     let points = lines(1500, |i| format!("{} {} {}\n", i % 60, i / 60, i % 7));
     let faces = lines(900, |i| format!("f {} {} {}\n", i + 1, i + 2, i + 62));
     let values = lines(4096, |i| format!("{} ", i % 200));
-    let header = "element vertex 1500\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
-    let pcd = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1500\nHEIGHT 1\nPOINTS 1500\nDATA ascii\n";
+    let header =
+        "element vertex 1500\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+    let pcd =
+        "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1500\nHEIGHT 1\nPOINTS 1500\nDATA ascii\n";
     let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
     let vti = format!(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"0.1\" byte_order=\"LittleEndian\">\n\
@@ -48,11 +50,27 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
         "# vtk DataFile Version 3.0\n@\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 16 16 16\nPOINT_DATA 4096\n\
          SCALARS s int\nLOOKUP_TABLE d\n{values}"
     );
-    let nrrd = format!("NRRD0004\n# @\ntype: uint8\ndimension: 3\nsizes: 16 16 16\nencoding: ascii\n\n{values}");
+    let nrrd = format!(
+        "NRRD0004\n# @\ntype: uint8\ndimension: 3\nsizes: 16 16 16\nencoding: ascii\n\n{values}"
+    );
     vec![
-        ("a.obj", padded(&(lines(1500, |i| format!("v {} {} {}\n", i % 60, i / 60, i % 7)) + "# @\n" + &faces), "x")),
+        (
+            "a.obj",
+            padded(
+                &(lines(1500, |i| format!("v {} {} {}\n", i % 60, i / 60, i % 7))
+                    + "# @\n"
+                    + &faces),
+                "x",
+            ),
+        ),
         ("a.xyz", padded(&format!("# @\n{points}"), "x")),
-        ("a.csv", padded(&format!("# @\nx,y,z,value\n{}", lines(1500, |i| format!("{i},{},1,{i}\n", i % 7))), "x")),
+        (
+            "a.csv",
+            padded(
+                &format!("# @\nx,y,z,value\n{}", lines(1500, |i| format!("{i},{},1,{i}\n", i % 7))),
+                "x",
+            ),
+        ),
         ("a.ply", padded(&format!("ply\nformat ascii 1.0\ncomment @\n{header}{points}"), "x")),
         ("a.pcd", padded(&format!("# @\n{pcd}{points}"), "x")),
         ("a.stl", padded(&format!("solid @\n{}endsolid\n", facet.repeat(200)), "x")),
@@ -67,7 +85,8 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
 fn overwrite(file: &File, sound: &[u8], stop: &AtomicBool) {
     let mut state = 1u64;
     while !stop.load(Relaxed) {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let byte = [0xf0, 0xe2, 0xc3, 0x80, b'9', b' ', b'\n', 0][(state >> 32) as usize % 8];
         let anywhere = (state >> 35) as usize % sound.len();
         for at in [sound.len() - 1, sound.len() - 2, anywhere] {

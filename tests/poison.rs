@@ -26,7 +26,9 @@ const POISONED: usize = 17;
 
 fn gpu() -> &'static Gpu {
     static GPU: OnceLock<Gpu> = OnceLock::new();
-    GPU.get_or_init(|| Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver"))
+    GPU.get_or_init(|| {
+        Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver")
+    })
 }
 
 fn settings() -> Settings {
@@ -53,7 +55,8 @@ fn ball() -> SplatSet {
     let splat = |i: u32| {
         let z = 1.0 - (2.0 * i as f32 + 1.0) / 64.0;
         let turn = 2.4 * i as f32;
-        let normal = Vec3::new((1.0 - z * z).sqrt() * turn.cos(), (1.0 - z * z).sqrt() * turn.sin(), z);
+        let normal =
+            Vec3::new((1.0 - z * z).sqrt() * turn.cos(), (1.0 - z * z).sqrt() * turn.sin(), z);
         Splat {
             center: (0.8 * normal).to_array(),
             strength: 3.0,
@@ -69,7 +72,8 @@ fn ball() -> SplatSet {
 fn samples() -> SplatSet {
     let mut set = SplatSet { payload: Payload::Scalar, ..ball() };
     for (i, splat) in set.splats.iter_mut().enumerate() {
-        *splat = Splat::sample(Vec3::from(splat.center), i as f32 / 64.0, splat.factor, 1.0, Vec3::ZERO);
+        *splat =
+            Splat::sample(Vec3::from(splat.center), i as f32 / 64.0, splat.factor, 1.0, Vec3::ZERO);
     }
     set
 }
@@ -88,7 +92,8 @@ fn lattice() -> Lattice {
 }
 
 fn volume() -> Volume {
-    Volume::new(lattice(), Samples::F32((0..125).map(|i| (i % 11) as f32 / 10.0).collect())).expect("a volume")
+    Volume::new(lattice(), Samples::F32((0..125).map(|i| (i % 11) as f32 / 10.0).collect()))
+        .expect("a volume")
 }
 
 fn with_volume(volume: Volume) -> Scene {
@@ -98,7 +103,8 @@ fn with_volume(volume: Volume) -> Scene {
 /// Both renderers refuse, in the same words, which hold all of these.
 fn assert_refused(scene: &Scene, camera: &Camera, settings: &Settings, words: &[&str]) {
     let found = drawn(scene, camera, settings).expect_err(&format!("{words:?}")).to_string();
-    let expected = reference::render(scene, camera, settings).expect_err(&format!("{words:?}")).to_string();
+    let expected =
+        reference::render(scene, camera, settings).expect_err(&format!("{words:?}")).to_string();
     assert_eq!(found, expected);
     words.iter().for_each(|word| assert!(found.contains(word), "“{found}” does not say “{word}”"));
 }
@@ -110,12 +116,13 @@ struct Faults(Vec<String>);
 impl Faults {
     /// The engine refuses in words, or draws what the reference draws.
     fn look(&mut self, what: &str, scene: &Scene, camera: &Camera, settings: &Settings) {
-        let fault = match (drawn(scene, camera, settings), reference::render(scene, camera, settings)) {
-            (Ok(found), Ok(expected)) => difference(&found, &expected),
-            (Err(Error::Argument(_) | Error::NothingToDraw(_)), Err(_)) => None,
-            (Err(error), _) => Some(format!("the engine refuses: {error}")),
-            (Ok(_), Err(error)) => Some(format!("only the reference refuses: {error}")),
-        };
+        let fault =
+            match (drawn(scene, camera, settings), reference::render(scene, camera, settings)) {
+                (Ok(found), Ok(expected)) => difference(&found, &expected),
+                (Err(Error::Argument(_) | Error::NothingToDraw(_)), Err(_)) => None,
+                (Err(error), _) => Some(format!("the engine refuses: {error}")),
+                (Ok(_), Err(error)) => Some(format!("only the reference refuses: {error}")),
+            };
         self.0.extend(fault.map(|fault| format!("{what}: {fault}")));
     }
 
@@ -126,7 +133,9 @@ impl Faults {
 
 fn difference(found: &Picture, expected: &Picture) -> Option<String> {
     for (name, picture) in [("reference", expected), ("engine", found)] {
-        if let Some(odd) = picture.color.iter().find(|color| !color.iter().all(|v| (-1e-4..=1.0001).contains(v))) {
+        if let Some(odd) =
+            picture.color.iter().find(|color| !color.iter().all(|v| (-1e-4..=1.0001).contains(v)))
+        {
             return Some(format!("the {name} draws the colour {odd:?}"));
         }
         if picture.depth.iter().any(|depth| depth.is_nan()) {
@@ -136,10 +145,13 @@ fn difference(found: &Picture, expected: &Picture) -> Option<String> {
     let pairs = found.color.iter().flatten().zip(expected.color.iter().flatten());
     let squares: f64 = pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum();
     let agreement = -10.0 * (squares / (4 * found.color.len()) as f64).log10();
-    let shown =
-        |picture: &Picture| picture.color.iter().map(|color| color[3]).sum::<f32>() / picture.color.len() as f32;
+    let shown = |picture: &Picture| {
+        picture.color.iter().map(|color| color[3]).sum::<f32>() / picture.color.len() as f32
+    };
     let share = [found, expected].map(shown);
-    (agreement < 40.0).then(|| format!("the engine is at {agreement:.1} dB from the reference, opacities {share:?}"))
+    (agreement < 40.0).then(|| {
+        format!("the engine is at {agreement:.1} dB from the reference, opacities {share:?}")
+    })
 }
 
 /// The numbers of a splat one by one.
@@ -165,7 +177,9 @@ fn scene_of(set: SplatSet) -> Scene {
 #[test]
 fn triangles_far_from_the_origin_come_to_an_end() {
     let mesh = Mesh {
-        positions: [(0.0, 0.0), (80.0, 0.0), (0.0, 80.0)].map(|(x, y)| Vec3::new(1e8 + x, 1e8 + y, 0.0)).to_vec(),
+        positions: [(0.0, 0.0), (80.0, 0.0), (0.0, 80.0)]
+            .map(|(x, y)| Vec3::new(1e8 + x, 1e8 + y, 0.0))
+            .to_vec(),
         triangles: vec![[0, 1, 2]],
         ..Mesh::default()
     };
@@ -189,12 +203,17 @@ fn splats_that_are_not_finite_are_named() {
         for number in 0..10 {
             for poison in NOT_FINITE {
                 let mut set = set.clone();
-                let (name, value) = numbers_of(&mut set.splats[POISONED]).into_iter().nth(number).expect("a number");
+                let (name, value) = numbers_of(&mut set.splats[POISONED])
+                    .into_iter()
+                    .nth(number)
+                    .expect("a number");
                 *value = poison;
                 // The first item is sound: the second one is told of.
                 let scene = match set.payload {
                     Payload::Radiance => Scene::new().with_splats(ball()).with_splats(set),
-                    Payload::Scalar => Scene::new().with_splats(ball()).with_samples(set, transfer()),
+                    Payload::Scalar => {
+                        Scene::new().with_splats(ball()).with_samples(set, transfer())
+                    }
                 };
                 assert_refused(&scene, &camera(), &settings(), &["item 1", "splat 17", name]);
             }
@@ -206,7 +225,12 @@ fn splats_that_are_not_finite_are_named() {
     let mut weightless = samples();
     let splat = &mut weightless.splats[POISONED];
     *splat = Splat::sample(Vec3::ZERO, 0.5, splat.factor, f32::NAN, Vec3::ZERO);
-    assert_refused(&scene_of(weightless), &camera(), &settings(), &["item 0", "splat 17", "weight"]);
+    assert_refused(
+        &scene_of(weightless),
+        &camera(),
+        &settings(),
+        &["item 0", "splat 17", "weight"],
+    );
 }
 
 #[test]
@@ -233,7 +257,11 @@ fn odd_splats_are_drawn_or_refused() {
         for number in 0..10 {
             for odd in ODD {
                 let mut set = set.clone();
-                *numbers_of(&mut set.splats[POISONED]).into_iter().nth(number).expect("a number").1 = odd;
+                *numbers_of(&mut set.splats[POISONED])
+                    .into_iter()
+                    .nth(number)
+                    .expect("a number")
+                    .1 = odd;
                 let what = format!("{:?} with number {number} {odd:e}", set.payload);
                 faults.look(&what, &scene_of(set), &camera(), &settings());
             }
@@ -267,7 +295,12 @@ fn volumes_that_are_not_finite_are_named() {
             &["item 0", "origin"],
         );
         let range = [0.0, poison];
-        assert_refused(&with_volume(Volume { range, ..volume() }), &camera(), &settings(), &["item 0", "range"]);
+        assert_refused(
+            &with_volume(Volume { range, ..volume() }),
+            &camera(),
+            &settings(),
+            &["item 0", "range"],
+        );
         let kernel = |profile, extent| {
             let scene = Scene::new().with_volume(volume(), Kernel { profile, extent }, transfer());
             assert_refused(&scene, &camera(), &settings(), &["item 0", "kernel"]);
@@ -285,14 +318,28 @@ fn odd_volumes_are_drawn_or_refused() {
         let mut values: Vec<f32> = (0..125).map(|i| (i % 11) as f32 / 10.0).collect();
         values[62] = odd;
         let odd_volume = Volume::new(lattice(), Samples::F32(values)).expect("a volume");
-        faults.look(&format!("a sample of {odd:e}"), &with_volume(odd_volume), &camera(), &settings());
+        faults.look(
+            &format!("a sample of {odd:e}"),
+            &with_volume(odd_volume),
+            &camera(),
+            &settings(),
+        );
         let all = Volume::new(lattice(), Samples::F32(vec![odd; 125])).expect("a volume");
         faults.look(&format!("all samples of {odd:e}"), &with_volume(all), &camera(), &settings());
-        let wide = Lattice { axes: DMat3::from_diagonal(DVec3::new(0.5, 0.5, odd.into())), ..lattice() };
+        let wide =
+            Lattice { axes: DMat3::from_diagonal(DVec3::new(0.5, 0.5, odd.into())), ..lattice() };
         if let Ok(wide) = Volume::new(wide, volume().samples) {
-            faults.look(&format!("a spacing of {odd:e}"), &with_volume(wide), &camera(), &settings());
+            faults.look(
+                &format!("a spacing of {odd:e}"),
+                &with_volume(wide),
+                &camera(),
+                &settings(),
+            );
         }
-        let far = Volume { lattice: Lattice { origin: DVec3::splat(odd.into()), ..lattice() }, ..volume() };
+        let far = Volume {
+            lattice: Lattice { origin: DVec3::splat(odd.into()), ..lattice() },
+            ..volume()
+        };
         faults.look(&format!("a lattice at {odd:e}"), &with_volume(far), &camera(), &settings());
     }
     faults.tell();
@@ -321,7 +368,9 @@ fn scattered_samples_are_drawn_or_refused() {
         refused(with(&|points| points.positions[POISONED].y = poison), "sample 17");
         refused(with(&|points| points.values[POISONED] = poison), "sample 17");
         refused(
-            with(&|points| points.radii = [vec![0.1; POISONED], vec![poison; 64 - POISONED]].concat()),
+            with(&|points| {
+                points.radii = [vec![0.1; POISONED], vec![poison; 64 - POISONED]].concat()
+            }),
             "sample 17",
         );
         refused(with(&|points| points.origin.x = poison.into()), "origin");
@@ -330,14 +379,21 @@ fn scattered_samples_are_drawn_or_refused() {
         for (what, points) in [
             ("position", with(&|points| points.positions[POISONED].y = odd)),
             ("value", with(&|points| points.values[POISONED] = odd)),
-            ("radius", with(&|points| points.radii = [vec![0.3; POISONED], vec![odd; 64 - POISONED]].concat())),
+            (
+                "radius",
+                with(&|points| {
+                    points.radii = [vec![0.3; POISONED], vec![odd; 64 - POISONED]].concat()
+                }),
+            ),
         ] {
             match points.to_splats(&SampleOptions::default()) {
                 Ok(set) => {
                     let what = format!("a sample with {what} {odd:e}");
                     faults.look(&what, &scene_of(set), &camera(), &settings());
                 }
-                Err(error) => assert!(matches!(error, Error::Argument(_)), "{what} {odd:e}: {error}"),
+                Err(error) => {
+                    assert!(matches!(error, Error::Argument(_)), "{what} {odd:e}: {error}")
+                }
             }
         }
     }
@@ -363,13 +419,20 @@ fn transfer_functions_are_named() {
         refused(&|transfer| transfer.opacity[0].0 = poison, "opacity point 0");
         refused(&|transfer| transfer.opacity[0].1 = poison, "opacity point 0");
         refused(&|transfer| transfer.unit = poison, "unit");
-        refused(&|transfer| transfer.shade = Some(Shade { power: poison, ..Shade::default() }), "shade");
+        refused(
+            &|transfer| transfer.shade = Some(Shade { power: poison, ..Shade::default() }),
+            "shade",
+        );
         refused(&|transfer| transfer.gradient = vec![(0.0, poison)], "gradient point 0");
     }
     refused(&|transfer| transfer.color.clear(), "no color points");
     refused(&|transfer| transfer.unit = 1e-310, "unit");
     for unit in [1e-37, 1e-28, 1e-10, 1e10, 1e20, 1e24, 1e30, 1e300] {
-        let scene = Scene::new().with_volume(volume(), Kernel::default(), TransferFunction { unit, ..transfer() });
+        let scene = Scene::new().with_volume(
+            volume(),
+            Kernel::default(),
+            TransferFunction { unit, ..transfer() },
+        );
         faults.look(&format!("a unit of {unit:e}"), &scene, &camera(), &settings());
     }
     for far in [1e30, 1e38, 1e300, f64::MAX] {
@@ -405,8 +468,14 @@ fn cameras_are_refused_or_draw() {
         for odd in [1e-310, 1e-200, 1e-30, 1e-6, 1e6, 1e20, 1e38, 1e200, 1e308] {
             for (what, camera) in [
                 ("distance", Camera { position: DVec3::new(0.6, -0.8, 0.0) * odd, ..camera() }),
-                ("angle", Camera { projection: Projection::Perspective { view_angle: odd }, ..camera() }),
-                ("height", Camera { projection: Projection::Orthographic { height: odd }, ..camera() }),
+                (
+                    "angle",
+                    Camera { projection: Projection::Perspective { view_angle: odd }, ..camera() },
+                ),
+                (
+                    "height",
+                    Camera { projection: Projection::Orthographic { height: odd }, ..camera() },
+                ),
                 ("up", Camera { view_up: DVec3::Z * odd, ..camera() }),
             ] {
                 faults.look(&format!("a camera's {what} of {odd:e}"), &scene, &camera, &settings());
@@ -420,7 +489,8 @@ fn cameras_are_refused_or_draw() {
 fn settings_are_named() {
     let scene = scene_of(ball());
     for poison in NOT_FINITE.map(f64::from).into_iter().chain([-1.0]) {
-        let refused = |settings: Settings, word| assert_refused(&scene, &camera(), &settings, &[word]);
+        let refused =
+            |settings: Settings, word| assert_refused(&scene, &camera(), &settings, &[word]);
         let shade = Some(Shade { diffuse: poison, ..Shade::default() });
         refused(Settings { sheet_thickness: Some(poison), ..settings() }, "thickness");
         refused(Settings { sheet_pixels: poison, ..settings() }, "thickness");

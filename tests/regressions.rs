@@ -18,7 +18,8 @@ const MOST_TIME: Duration = Duration::from_secs(20);
 fn inputs(format: &str) -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/regressions").join(format);
     let entries = fs::read_dir(folder).into_iter().flatten();
-    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("a readable folder").path()).collect();
+    let mut paths: Vec<PathBuf> =
+        entries.map(|entry| entry.expect("a readable folder").path()).collect();
     paths.sort();
     paths
 }
@@ -51,6 +52,9 @@ fn every_folder_has_its_format() {
     for entry in fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("a readable folder").path();
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-        assert!(path.is_file() || oracle::FORMATS.iter().any(|(format, _)| *format == name), "{name} is no format");
+        assert!(
+            path.is_file() || oracle::FORMATS.iter().any(|(format, _)| *format == name),
+            "{name} is no format"
+        );
     }
 }

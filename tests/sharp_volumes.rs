@@ -33,7 +33,11 @@ fn kernels() -> Vec<Kernel> {
 
 /// Cartesian and body-centred, of unequal and sheared axes, thin and long.
 fn lattices() -> Vec<Lattice> {
-    let sheared = DMat3::from_cols(DVec3::new(0.3, 0.1, 0.0), DVec3::new(0.0, 2.0, -0.4), DVec3::new(0.2, 0.0, 1.1));
+    let sheared = DMat3::from_cols(
+        DVec3::new(0.3, 0.1, 0.0),
+        DVec3::new(0.0, 2.0, -0.4),
+        DVec3::new(0.2, 0.0, 1.1),
+    );
     let origin = DVec3::new(-5.0, 7.0, 0.5);
     vec![
         Lattice::with_spacing([9, 8, 7], DVec3::ONE),
@@ -62,7 +66,11 @@ fn sharp_volumes_pass_through_their_samples() {
             for sample in 0..volume.len() {
                 let found = field.value_at(volume.lattice.sample_position(sample)).unwrap();
                 let error = (found - volume.value(sample)).abs() / range;
-                assert!(error < 1e-4, "{kernel:?} on {:?}: sample {sample} is off by {error:e}", volume.lattice);
+                assert!(
+                    error < 1e-4,
+                    "{kernel:?} on {:?}: sample {sample} is off by {error:e}",
+                    volume.lattice
+                );
             }
         }
     }
@@ -71,7 +79,8 @@ fn sharp_volumes_pass_through_their_samples() {
 /// Weak detail far from single outliers, which give the volume a range that the detail does not fill.
 fn with_outliers(lattice: Lattice, mut detail: impl FnMut(DVec3) -> f64) -> Volume {
     let count = lattice.len();
-    let mut values: Vec<f32> = (0..count).map(|sample| detail(lattice.steps(lattice.index(sample))) as f32).collect();
+    let mut values: Vec<f32> =
+        (0..count).map(|sample| detail(lattice.steps(lattice.index(sample))) as f32).collect();
     (values[0], values[count - 1]) = (0.0, 255.0);
     Volume::new(lattice, Samples::F32(values)).unwrap()
 }
@@ -82,7 +91,11 @@ fn ranges_hold_what_is_reconstructed() {
     let mut random = Random(11);
     // Samples on either side of a cell's middle alternate as the cardinal function there does.
     let worst = |steps: DVec3| {
-        let sign = (steps - 7.5).abs().floor().to_array().map(|at| if at % 2.0 == 0.0 { 1.0 } else { -1.0 });
+        let sign = (steps - 7.5)
+            .abs()
+            .floor()
+            .to_array()
+            .map(|at| if at % 2.0 == 0.0 { 1.0 } else { -1.0 });
         128.0 + 10.0 * sign.iter().product::<f64>()
     };
     let mut tightest = f64::INFINITY;
@@ -121,7 +134,11 @@ fn slack(volume: &Volume, kernel: &Kernel, random: &mut Random) -> f64 {
     for (sample, range) in coefficients.ranges.iter().enumerate() {
         for place in 0..4 {
             // One of them the middle of a cell.
-            let offset = if place == 0 { DVec3::splat(0.5) } else { kernel.extent * (2.0 * random.place() - 1.0) };
+            let offset = if place == 0 {
+                DVec3::splat(0.5)
+            } else {
+                kernel.extent * (2.0 * random.place() - 1.0)
+            };
             let position = coefficients.lattice.sample_position(sample) + unit * offset;
             // Beyond the volume sums are not whole.
             let steps = inverse * (position - volume.lattice.origin);
@@ -131,7 +148,11 @@ fn slack(volume: &Volume, kernel: &Kernel, random: &mut Random) -> f64 {
             let step = (field.value_at(position).unwrap() - low) / (high - low) * 255.0;
             let step = step.clamp(0.0, 255.0);
             let inside = step - f64::from(range[0]) > -0.01 && f64::from(range[1]) - step > -0.01;
-            assert!(inside, "{kernel:?}, {:?}: {step} outside {range:?} of sample {sample}", volume.lattice);
+            assert!(
+                inside,
+                "{kernel:?}, {:?}: {step} outside {range:?} of sample {sample}",
+                volume.lattice
+            );
             if range[1] < 255 && step > 130.0 {
                 tightest = tightest.min(f64::from(range[1]) - step);
             }
@@ -147,9 +168,12 @@ const INSIDE: f64 = 0.71;
 /// Root mean square error ×100 of a field against the signal, at random places.
 fn error(inside: impl Fn(DVec3) -> bool, field: impl Fn(DVec3) -> f64) -> f64 {
     let mut random = Random(3);
-    let places = std::iter::repeat_with(|| 2.0 * random.place() - 1.0).filter(|&place| inside(place));
+    let places =
+        std::iter::repeat_with(|| 2.0 * random.place() - 1.0).filter(|&place| inside(place));
     let count = 60_000;
-    let squares = places.take(count).map(|place| (field(place) - Phantom::MarschnerLobb.value(place)).powi(2));
+    let squares = places
+        .take(count)
+        .map(|place| (field(place) - Phantom::MarschnerLobb.value(place)).powi(2));
     100.0 * (squares.sum::<f64>() / count as f64).sqrt()
 }
 
@@ -192,8 +216,10 @@ fn trilinear(volume: &Volume, place: DVec3) -> f64 {
     let corner = |corner: usize| {
         let [i, j, k] = [corner & 1, corner >> 1 & 1, corner >> 2];
         let share = |at: usize, part: f64| if at == 1 { part } else { 1.0 - part };
-        let index =
-            (((low.z as usize + k) * lattice.dims[1]) + low.y as usize + j) * lattice.dims[0] + low.x as usize + i;
+        let index = (((low.z as usize + k) * lattice.dims[1]) + low.y as usize + j)
+            * lattice.dims[0]
+            + low.x as usize
+            + i;
         volume.value(index) * share(i, part.x) * share(j, part.y) * share(k, part.z)
     };
     (0..8).map(corner).sum()
@@ -202,8 +228,12 @@ fn trilinear(volume: &Volume, place: DVec3) -> f64 {
 #[test]
 fn marschner_and_lobb() {
     let names = ["sigma 0.5, R 2", "sigma 0.6, R 2", "sigma 0.7, R 3", "B-spline"];
-    let kernels =
-        [Kernel::gaussian(0.5, 2.0), Kernel::gaussian(0.6, 2.0), Kernel::gaussian(0.7, 3.0), Kernel::b_spline(2.0)];
+    let kernels = [
+        Kernel::gaussian(0.5, 2.0),
+        Kernel::gaussian(0.6, 2.0),
+        Kernel::gaussian(0.7, 3.0),
+        Kernel::b_spline(2.0),
+    ];
     for (samples, linear, most) in [(40, 2.92, 1.3), (64, 1.28, 0.1)] {
         let volume = signal(samples);
         let found = error(in_cube, |place| trilinear(&volume, place));
@@ -212,7 +242,10 @@ fn marschner_and_lobb() {
         for (name, kernel) in names.iter().zip(&kernels) {
             let kernel = kernel.as_ref().unwrap();
             let found = sharp(volume.clone(), kernel, in_cube);
-            println!("{samples}³ {name}: smooth {:.3}, sharp {found:.3}", reconstructed(&volume, kernel, in_cube));
+            println!(
+                "{samples}³ {name}: smooth {:.3}, sharp {found:.3}",
+                reconstructed(&volume, kernel, in_cube)
+            );
             assert!(kernel.extent < 3.0 || found <= most);
         }
     }
@@ -223,10 +256,18 @@ fn marschner_and_lobb() {
 fn body_centred_lattices_hold_as_much() {
     for samples in [40, 64] {
         for kernel in [Kernel::gaussian(0.6, 2.0).unwrap(), Kernel::gaussian(0.7, 3.0).unwrap()] {
-            let smooth = [signal(samples), on_body_centred(samples)].map(|v| reconstructed(&v, &kernel, in_cylinder));
-            let sharp = [signal(samples), on_body_centred(samples), body_centred(&signal(samples)).unwrap()]
-                .map(|v| sharp(v, &kernel, in_cylinder));
-            println!("{samples}³ {:?}: smooth {smooth:.3?}, sharp (and resampled) {sharp:.3?}", kernel.profile);
+            let smooth = [signal(samples), on_body_centred(samples)]
+                .map(|v| reconstructed(&v, &kernel, in_cylinder));
+            let sharp = [
+                signal(samples),
+                on_body_centred(samples),
+                body_centred(&signal(samples)).unwrap(),
+            ]
+            .map(|v| sharp(v, &kernel, in_cylinder));
+            println!(
+                "{samples}³ {:?}: smooth {smooth:.3?}, sharp (and resampled) {sharp:.3?}",
+                kernel.profile
+            );
             assert!((smooth[1] / smooth[0] - 1.0).abs() < 0.05);
         }
     }
@@ -246,8 +287,9 @@ fn a_scan_is_made_sharp_in_seconds() {
         let start = std::time::Instant::now();
         let sharp = volume.clone().sharpened(&kernel).unwrap();
         println!("{:?}: {:.2?}, {}", kernel.profile, start.elapsed(), peak());
-        let share =
-            |ranges: &[[u8; 2]]| ranges.iter().filter(|range| range[1] > 40).count() as f64 / ranges.len() as f64;
+        let share = |ranges: &[[u8; 2]]| {
+            ranges.iter().filter(|range| range[1] > 40).count() as f64 / ranges.len() as f64
+        };
         println!(
             "above 40: {:.3} of the samples, smooth {:.3}",
             share(&sharp.drawn_ranges(&kernel)),

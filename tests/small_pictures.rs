@@ -30,7 +30,8 @@ fn hills(side: u32) -> SplatSet {
     let place = |x: f32, y: f32| Vec3::new(x, y, 0.08 * (9.0 * x).sin() * (7.0 * y).cos());
     let positions = (0..side * side).map(|i| place(at(i % side), at(i / side))).collect();
     let corners = (0..side - 1).flat_map(|y| (0..side - 1).map(move |x| y * side + x));
-    let triangles = corners.flat_map(|a| [[a, a + 1, a + side + 1], [a, a + side + 1, a + side]]).collect();
+    let triangles =
+        corners.flat_map(|a| [[a, a + 1, a + side + 1], [a, a + side + 1, a + side]]).collect();
     let mesh = Mesh { positions, triangles, ..Mesh::default() };
     mesh.surfels(&SurfelOptions::default()).expect("surfels")
 }
@@ -38,10 +39,13 @@ fn hills(side: u32) -> SplatSet {
 fn samples(count: u32) -> Scene {
     let unit = |i: u32, step: f64| (f64::from(i) * step).fract() as f32;
     // Steps that fill space evenly (Roberts 2018).
-    let place = |i: u32| Vec3::new(unit(i, 0.819_172_5), unit(i, 0.671_043_6), unit(i, 0.549_700_5));
+    let place =
+        |i: u32| Vec3::new(unit(i, 0.819_172_5), unit(i, 0.671_043_6), unit(i, 0.549_700_5));
     let positions: Vec<Vec3> = (0..count).map(place).collect();
     let values = positions.iter().map(|p| (6.0 * p.x).sin() * (5.0 * p.y).cos() + p.z).collect();
-    let set = Points { positions, values, ..Points::default() }.to_splats(&SampleOptions::default()).expect("splats");
+    let set = Points { positions, values, ..Points::default() }
+        .to_splats(&SampleOptions::default())
+        .expect("splats");
     let json = r#"{"color": [[0, 0.9, 0.5, 0.3]], "opacity": [[-1, 0], [2, 0.9]], "unit": 0.1}"#;
     let transfer = TransferFunction::from_json(json).expect("a transfer function");
     Scene::new().with_samples(set, transfer)
@@ -78,10 +82,13 @@ fn thousands_of_splats_in_a_pixel_agree_with_the_reference() {
     ] {
         for size in [[1, 1], [5, 3], [16, 24]] {
             let settings = Settings { evaluate, ..Settings::new(size) };
-            let draw = |tile_entries| drawn(&scene, &settings, Budget { tile_entries, ..Budget::default() });
+            let draw = |tile_entries| {
+                drawn(&scene, &settings, Budget { tile_entries, ..Budget::default() })
+            };
             let whole = draw(None);
             let stopped = psnr(&draw(Some(700)), &whole);
-            let truth = reference::render(&scene, &camera(&scene, size), &settings).expect("the reference draws");
+            let truth = reference::render(&scene, &camera(&scene, size), &settings)
+                .expect("the reference draws");
             let agreement = psnr(&whole, &truth);
             println!("{name} {size:?}: {agreement:.1} dB, with more stops {stopped:.1} dB");
             assert!(stopped > 80.0, "{name} {size:?}: {stopped:.1} dB with more stops");
@@ -95,7 +102,9 @@ fn thousands_of_splats_in_a_pixel_agree_with_the_reference() {
 #[test]
 fn fewer_splats_stand_for_what_is_too_fine() {
     let surface = Scene::new().with_splats(hills(500));
-    for (name, scene, side, factor) in [("surface", surface, 160, 4), ("samples", samples(300_000), 20, 1)] {
+    for (name, scene, side, factor) in
+        [("surface", surface, 160, 4), ("samples", samples(300_000), 20, 1)]
+    {
         let gpu = gpu();
         let mut renderer = Renderer::new(&gpu);
         let mut prepared = renderer.prepare(&scene).expect("prepares");
@@ -107,7 +116,8 @@ fn fewer_splats_stand_for_what_is_too_fine() {
         let (whole, all) = draw(Detail::Pixels(0.0));
         // What was drawn before changes nothing.
         let (again, _) = draw(Detail::default());
-        let reduced = |picture: &Picture| picture.clone().reduced(factor).expect("a smaller picture");
+        let reduced =
+            |picture: &Picture| picture.clone().reduced(factor).expect("a smaller picture");
         let agreement = psnr(&reduced(&small), &reduced(&whole));
         println!("{name}: {} splats for {}, {agreement:.1} dB", few.splats, all.splats);
         assert!(few.splats * 8 < all.splats, "{name}: {} splats for {}", few.splats, all.splats);
@@ -127,7 +137,9 @@ fn a_picture_ends_at_the_time_limit() {
     let mut prepared = renderer.prepare(&scene).expect("prepares");
     let start = Instant::now();
     let size = [8, 8];
-    let error = renderer.render(&mut prepared, &camera(&scene, size), &Settings::new(size)).expect_err("too slow");
+    let error = renderer
+        .render(&mut prepared, &camera(&scene, size), &Settings::new(size))
+        .expect_err("too slow");
     assert!(error.to_string().contains("within 0.3 s"), "{error}");
     assert!(start.elapsed() < Duration::from_secs(60), "{:?}", start.elapsed());
 }
@@ -178,13 +190,19 @@ fn any_scenes() -> Vec<(&'static str, Scene)> {
 /// SPLATKIT_SIZES_SECONDS says.
 #[test]
 fn any_scene_draws_at_any_size() {
-    let seconds = std::env::var("SPLATKIT_SIZES_SECONDS").ok().and_then(|text| text.parse().ok()).unwrap_or(5.0);
+    let seconds = std::env::var("SPLATKIT_SIZES_SECONDS")
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(5.0);
     let gpu = gpu().with_patience(Duration::from_secs(60));
     let scenes = any_scenes();
     let mut renderers: Vec<Renderer> = [None, Some(50)]
-        .map(|tile_entries| Renderer::with_budget(&gpu, Budget { tile_entries, ..Budget::default() }))
+        .map(|tile_entries| {
+            Renderer::with_budget(&gpu, Budget { tile_entries, ..Budget::default() })
+        })
         .into();
-    let mut prepared: Vec<_> = scenes.iter().map(|(_, scene)| renderers[0].prepare(scene).expect("prepares")).collect();
+    let mut prepared: Vec<_> =
+        scenes.iter().map(|(_, scene)| renderers[0].prepare(scene).expect("prepares")).collect();
     let mut random = Random(0x0005_eed0_f512_e5aa);
     let start = Instant::now();
     let (mut pictures, mut longest) = (0, Duration::ZERO);
@@ -205,11 +223,15 @@ fn any_scene_draws_at_any_size() {
         let number = random.below(2) as usize;
         let drawn = renderers[number].render(&mut prepared[which], &camera, &settings);
         let took = own.elapsed();
-        let what = format!("{name} at {size:?}, cut {pixels}, {camera:?}, picture {pictures}, {took:?}");
+        let what =
+            format!("{name} at {size:?}, cut {pixels}, {camera:?}, picture {pictures}, {took:?}");
         let (picture, _) = drawn.unwrap_or_else(|error| panic!("{what}: {error}"));
         let inside = |value: &f32| (-1e-4..=1.0001).contains(value);
         assert!(picture.color.as_flattened().iter().all(inside), "{what}: colours beyond 0 … 1");
-        assert!(!picture.depth.iter().any(|depth| depth.is_nan()), "{what}: depths that are no numbers");
+        assert!(
+            !picture.depth.iter().any(|depth| depth.is_nan()),
+            "{what}: depths that are no numbers"
+        );
         pictures += 1;
         longest = longest.max(took);
     }

@@ -16,8 +16,12 @@ use splatkit::{
 };
 
 /// The kernels, and whether the volume is made sharp.
-const KERNELS: [(Tensor, bool); 4] =
-    [(Tensor::Linear, false), (Tensor::CatmullRom, false), (Tensor::CubicBSpline, false), (Tensor::CubicBSpline, true)];
+const KERNELS: [(Tensor, bool); 4] = [
+    (Tensor::Linear, false),
+    (Tensor::CatmullRom, false),
+    (Tensor::CubicBSpline, false),
+    (Tensor::CubicBSpline, true),
+];
 
 /// A case with another kernel.
 fn with_kernel(case: &Case, tensor: Tensor, is_sharp: bool) -> Case {
@@ -48,9 +52,12 @@ fn border(dims: [usize; 3]) -> Case {
         64 + (random >> 58) as u8 * 2
     });
     let first = scenes::ORIGIN - 0.5 * (axes * DVec3::from(dims.map(|n| n as f64 - 1.0)));
-    let volume = Volume::new(Lattice::cartesian(dims, first, axes), Samples::U8(values.collect())).expect("a volume");
+    let volume = Volume::new(Lattice::cartesian(dims, first, axes), Samples::U8(values.collect()))
+        .expect("a volume");
     let items = case.scene.items.iter().map(|item| match item {
-        Item::Volume(_, kernel, transfer) => Item::Volume(volume.clone().into(), kernel.clone(), transfer.clone()),
+        Item::Volume(_, kernel, transfer) => {
+            Item::Volume(volume.clone().into(), kernel.clone(), transfer.clone())
+        }
         other => other.clone(),
     });
     let settings = Settings { volume_shade: Some(None), ..case.settings.clone() };
@@ -75,8 +82,12 @@ fn agree(cases: impl Iterator<Item = Case>, least: impl Fn(&str, Tensor) -> f64)
         for (tensor, is_sharp) in KERNELS {
             let case = with_kernel(&case, tensor, is_sharp);
             let agreement = agreement(&case);
-            let line =
-                format!("{} {}{}: {agreement:.1} dB", case.name, tensor.name(), ["", " sharp"][usize::from(is_sharp)]);
+            let line = format!(
+                "{} {}{}: {agreement:.1} dB",
+                case.name,
+                tensor.name(),
+                ["", " sharp"][usize::from(is_sharp)]
+            );
             println!("{line}");
             if agreement < least(case.name, tensor) {
                 failed.push(line);
@@ -120,13 +131,20 @@ fn borders_and_flat_lattices_agree_with_the_reference() {
 fn fields_pass_through_the_samples() {
     for dims in [[6, 5, 7], [2, 4, 1]] {
         let case = border(dims);
-        for (tensor, is_sharp) in KERNELS.into_iter().filter(|(tensor, is_sharp)| *is_sharp || tensor.interpolates()) {
+        for (tensor, is_sharp) in
+            KERNELS.into_iter().filter(|(tensor, is_sharp)| *is_sharp || tensor.interpolates())
+        {
             let case = with_kernel(&case, tensor, is_sharp);
-            let [Item::Volume(volume, kernel, _)] = case.scene.items.as_slice() else { panic!("no volume") };
+            let [Item::Volume(volume, kernel, _)] = case.scene.items.as_slice() else {
+                panic!("no volume")
+            };
             let field = Reconstruction::new(volume, kernel).expect("a field");
             for at in 0..volume.len() {
                 let found = field.value_at(volume.lattice.sample_position(at)).expect("a value");
-                assert!((found - volume.value(at)).abs() < 1e-4, "{tensor:?} {dims:?} at {at}: {found}");
+                assert!(
+                    (found - volume.value(at)).abs() < 1e-4,
+                    "{tensor:?} {dims:?} at {at}: {found}"
+                );
             }
         }
     }
@@ -138,7 +156,9 @@ fn what_does_not_go_with_them_is_told() {
     let refused = |case: &Case, what: &str| {
         let case = with_kernel(case, Tensor::CatmullRom, false);
         let by_reference = reference::render(&case.scene, &case.camera, &case.settings);
-        for error in [drawn(&case).map(|_| ()), by_reference.map(|_| ())].map(|result| result.expect_err(case.name)) {
+        for error in [drawn(&case).map(|_| ()), by_reference.map(|_| ())]
+            .map(|result| result.expect_err(case.name))
+        {
             assert!(error.to_string().contains(what), "{}: {error}", case.name);
         }
     };
@@ -147,13 +167,22 @@ fn what_does_not_go_with_them_is_told() {
         change(&mut case.settings);
         case
     };
-    refused(&with(|settings| settings.classification = Classification::Pre), "classified after interpolation");
+    refused(
+        &with(|settings| settings.classification = Classification::Pre),
+        "classified after interpolation",
+    );
     refused(&with(|settings| settings.mode = Mode::AxisSheets), "classified after interpolation");
-    refused(&with(|settings| settings.mode = Mode::Splats(Order::FrontToBack)), "classified after interpolation");
+    refused(
+        &with(|settings| settings.mode = Mode::Splats(Order::FrontToBack)),
+        "classified after interpolation",
+    );
     for case in [methods::rectilinear(), methods::body_centred()] {
         let case = with_kernel(&case, Tensor::Linear, false);
-        let [Item::Volume(volume, kernel, _)] = case.scene.items.as_slice() else { panic!("no volume") };
-        let error = reference::render(&case.scene, &case.camera, &case.settings).expect_err(case.name);
+        let [Item::Volume(volume, kernel, _)] = case.scene.items.as_slice() else {
+            panic!("no volume")
+        };
+        let error =
+            reference::render(&case.scene, &case.camera, &case.settings).expect_err(case.name);
         assert!(error.to_string().contains("Cartesian"), "{error}");
         assert!(Reconstruction::new(volume, kernel).is_err() && drawn(&case).is_err());
         assert!(Volume::clone(volume).sharpened(kernel).is_err());

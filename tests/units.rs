@@ -14,7 +14,9 @@ use std::sync::OnceLock;
 
 fn gpu() -> &'static Gpu {
     static GPU: OnceLock<Gpu> = OnceLock::new();
-    GPU.get_or_init(|| Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver"))
+    GPU.get_or_init(|| {
+        Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver")
+    })
 }
 
 /// World lengths per length, values per value and the value of what was 0.
@@ -34,12 +36,21 @@ impl Units {
 
     /// Seen from outside, or from within.
     fn camera(self, projection: Projection, is_inside: bool) -> Camera {
-        let position = if is_inside { DVec3::new(0.3, -0.2, 0.1) } else { DVec3::new(2.0, -3.0, 1.5) } * self.length;
+        let position =
+            if is_inside { DVec3::new(0.3, -0.2, 0.1) } else { DVec3::new(2.0, -3.0, 1.5) }
+                * self.length;
         let projection = match projection {
-            Projection::Orthographic { height } => Projection::Orthographic { height: height * self.length },
+            Projection::Orthographic { height } => {
+                Projection::Orthographic { height: height * self.length }
+            }
             other => other,
         };
-        Camera { position, focal_point: DVec3::new(-0.1, 0.1, 0.0) * self.length, view_up: DVec3::Z, projection }
+        Camera {
+            position,
+            focal_point: DVec3::new(-0.1, 0.1, 0.0) * self.length,
+            view_up: DVec3::Z,
+            projection,
+        }
     }
 
     fn transfer(self) -> TransferFunction {
@@ -52,14 +63,21 @@ impl Units {
             unit: 0.2 * self.length,
             shade: Some(Shade::default()),
             gradient: vec![slope(20.0, 0.2), slope(200.0, 1.0)],
-            isosurfaces: vec![Isosurface { value: self.to_value(150.0), color: [0.4, 0.9, 0.4], opacity: 0.5 }],
+            isosurfaces: vec![Isosurface {
+                value: self.to_value(150.0),
+                color: [0.4, 0.9, 0.4],
+                opacity: 0.5,
+            }],
         }
     }
 
     fn lattice(self) -> Lattice {
         const SIDE: usize = 24;
         let step = 2.0 / (SIDE - 1) as f64 * self.length;
-        Lattice { origin: DVec3::splat(-self.length), ..Lattice::with_spacing([SIDE; 3], DVec3::splat(step)) }
+        Lattice {
+            origin: DVec3::splat(-self.length),
+            ..Lattice::with_spacing([SIDE; 3], DVec3::splat(step))
+        }
     }
 
     /// Whole values from 0 to 255 in their own units.
@@ -67,7 +85,10 @@ impl Units {
         let lattice = USUAL.lattice();
         let value = |sample: usize| {
             let at = lattice.sample_position(sample);
-            (255.0 * (1.0 - at.length_squared() / 1.5).max(0.0) * (0.75 + 0.25 * (5.0 * at.x).sin())).round()
+            (255.0
+                * (1.0 - at.length_squared() / 1.5).max(0.0)
+                * (0.75 + 0.25 * (5.0 * at.x).sin()))
+            .round()
         };
         (0..lattice.len()).map(|sample| self.to_value(value(sample))).collect()
     }
@@ -80,7 +101,8 @@ impl Units {
     fn splats(self) -> Scene {
         let splats = (0..300u16).map(|i| {
             let angle = f64::from(i) * 2.4;
-            let normal = DVec3::new(angle.cos(), angle.sin(), f64::from(i) / 150.0 - 1.0).normalize();
+            let normal =
+                DVec3::new(angle.cos(), angle.sin(), f64::from(i) / 150.0 - 1.0).normalize();
             let size = (0.08 * self.length) as f32;
             Splat {
                 center: (normal * self.length).as_vec3().to_array(),
@@ -91,7 +113,13 @@ impl Units {
             }
         });
         let (payload, splats) = (Payload::Radiance, splats.collect());
-        Scene::new().with_splats(SplatSet { payload, origin: DVec3::ZERO, extent: 3.0, overlap: 1.0, splats })
+        Scene::new().with_splats(SplatSet {
+            payload,
+            origin: DVec3::ZERO,
+            extent: 3.0,
+            overlap: 1.0,
+            splats,
+        })
     }
 }
 
@@ -107,8 +135,15 @@ fn drawn(scene: &Scene, camera: &Camera, settings: &Settings) -> Picture {
 
 /// Peak signal-to-noise ratio of colour and opacity, in dB; of pictures that show something.
 fn psnr(a: &Picture, b: &Picture) -> f64 {
-    assert!(a.color.iter().filter(|color| color[3] > 0.1).count() > a.color.len() / 8, "an empty picture");
-    let squares = a.color.iter().zip(&b.color).flat_map(|(a, b)| (0..4).map(|c| f64::from(a[c] - b[c]).powi(2)));
+    assert!(
+        a.color.iter().filter(|color| color[3] > 0.1).count() > a.color.len() / 8,
+        "an empty picture"
+    );
+    let squares = a
+        .color
+        .iter()
+        .zip(&b.color)
+        .flat_map(|(a, b)| (0..4).map(|c| f64::from(a[c] - b[c]).powi(2)));
     -10.0 * (squares.sum::<f64>() / (4 * a.color.len()) as f64).log10()
 }
 
@@ -146,15 +181,18 @@ fn flat_surroundings_are_flat() {
         shade: Some(Shade::default()),
         ..TransferFunction::default()
     };
-    let samples = (0..USUAL.lattice().len()).map(|sample| if inside(sample) { 255 } else { 0 }).collect();
-    let volume = Volume::new(USUAL.lattice(), Samples::U8(samples)).expect("the samples fill the lattice");
+    let samples =
+        (0..USUAL.lattice().len()).map(|sample| if inside(sample) { 255 } else { 0 }).collect();
+    let volume =
+        Volume::new(USUAL.lattice(), Samples::U8(samples)).expect("the samples fill the lattice");
     let scene = Scene::new().with_volume(volume, Kernel::default(), transfer);
     let camera = USUAL.camera(PERSPECTIVE, false);
     let expected = reference::render(&scene, &camera, &settings()).expect("a picture");
     // Gathered, kernels are cut to a cube of four samples a side, not to the ball in it: at the edge of the ball of samples, which is
     // as hard as can be, that costs two decibels.
     for (evaluate, least) in [(Evaluate::Scatter, 40.0), (Evaluate::Gather, 38.0)] {
-        let agreement = psnr(&expected, &drawn(&scene, &camera, &Settings { evaluate, ..settings() }));
+        let agreement =
+            psnr(&expected, &drawn(&scene, &camera, &Settings { evaluate, ..settings() }));
         println!("flat surroundings, {evaluate:?}: {agreement:.1} dB");
         assert!(agreement > least, "{evaluate:?}: {agreement:.1} dB");
     }
@@ -166,15 +204,21 @@ fn lengths_of_any_unit() {
     for (projection, is_inside) in [(PERSPECTIVE, false), (ORTHOGRAPHIC, false), (WIDE, true)] {
         let pictures = |units: Units| {
             let camera = units.camera(projection, is_inside);
-            [units.volume(floats.clone()), units.splats()].map(|scene| drawn(&scene, &camera, &settings()))
+            [units.volume(floats.clone()), units.splats()]
+                .map(|scene| drawn(&scene, &camera, &settings()))
         };
         let expected = pictures(USUAL);
         for length in [1e-14, 1e-9, 1e9, 1e15] {
             let found = pictures(Units { length, ..USUAL });
-            for (what, (found, expected)) in ["volume", "splats"].iter().zip(found.iter().zip(&expected)) {
+            for (what, (found, expected)) in
+                ["volume", "splats"].iter().zip(found.iter().zip(&expected))
+            {
                 let agreement = psnr(expected, found);
                 println!("{projection:?}, lengths times {length:e}, {what}: {agreement:.1} dB");
-                assert!(agreement > 60.0, "{projection:?}, lengths times {length:e}, {what}: {agreement:.1} dB");
+                assert!(
+                    agreement > 60.0,
+                    "{projection:?}, lengths times {length:e}, {what}: {agreement:.1} dB"
+                );
             }
         }
     }
@@ -187,7 +231,8 @@ fn from_the_eye_on() {
     let scene = USUAL.splats();
     let expected = drawn(&scene, &camera, &settings());
     for near in [0.0, 1e-30, 1e-4] {
-        let agreement = psnr(&expected, &drawn(&scene, &camera, &Settings { near: Some(near), ..settings() }));
+        let agreement =
+            psnr(&expected, &drawn(&scene, &camera, &Settings { near: Some(near), ..settings() }));
         println!("from {near:e} on: {agreement:.1} dB");
         assert!(agreement > 40.0, "from {near} on: {agreement:.1} dB");
     }
@@ -206,8 +251,10 @@ fn from_the_eye_on() {
 #[test]
 fn a_scene_belongs_to_its_device() {
     let other = Gpu::headless(&AdapterChoice::Automatic).expect("another device");
-    let mut prepared: PreparedScene = Renderer::new(&other).prepare(&USUAL.splats()).expect("a scene");
-    let found = Renderer::new(gpu()).render(&mut prepared, &USUAL.camera(PERSPECTIVE, false), &settings());
+    let mut prepared: PreparedScene =
+        Renderer::new(&other).prepare(&USUAL.splats()).expect("a scene");
+    let found =
+        Renderer::new(gpu()).render(&mut prepared, &USUAL.camera(PERSPECTIVE, false), &settings());
     let message = found.expect_err("another device").to_string();
     assert!(message.contains("prepared on another device"), "{message}");
 }

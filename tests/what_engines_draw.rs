@@ -13,11 +13,14 @@ use splatkit::{
     picture::Picture,
     reference,
     scattered::{Points, SampleOptions},
-    scene::{Classification, Clip, ClipShape, Evaluate, Gradient, Mode, Optics, Order, Scene, Settings},
+    scene::{
+        Classification, Clip, ClipShape, Evaluate, Gradient, Mode, Optics, Order, Scene, Settings,
+    },
     splat::SplatSet,
     surface::{Mesh, SurfelOptions},
     volume::{
-        Arrangement, Isosurface, Lattice, Samples, Shade, TransferFunction, Volume, bricks::Bricks, phantoms::Phantom,
+        Arrangement, Isosurface, Lattice, Samples, Shade, TransferFunction, Volume, bricks::Bricks,
+        phantoms::Phantom,
     },
 };
 use std::{fmt::Write, fs, path::Path, sync::Arc};
@@ -77,12 +80,18 @@ fn sheared() -> Lattice {
 
 fn body_centred() -> Lattice {
     let edge = 2.0 / (SIDE as f64 - 0.5);
-    Lattice::body_centred([SIDE, SIDE, 2 * SIDE], DVec3::NEG_ONE, DMat3::from_diagonal(DVec3::splat(edge)))
+    Lattice::body_centred(
+        [SIDE, SIDE, 2 * SIDE],
+        DVec3::NEG_ONE,
+        DMat3::from_diagonal(DVec3::splat(edge)),
+    )
 }
 
 fn rectilinear() -> Lattice {
     let last = (SIDE - 1) as f64;
-    let place = |i: usize| (2.0 * i as f64 / last - 1.0) * (0.7 + 0.3 * (2.0 * i as f64 / last - 1.0).abs());
+    let place = |i: usize| {
+        (2.0 * i as f64 / last - 1.0) * (0.7 + 0.3 * (2.0 * i as f64 / last - 1.0).abs())
+    };
     let places: [Vec<f64>; 3] = std::array::from_fn(|_| (0..SIDE).map(place).collect());
     let arrangement = Arrangement::Rectilinear(Arc::new(places));
     Lattice { dims: [SIDE; 3], origin: DVec3::ZERO, axes: DMat3::IDENTITY, arrangement }
@@ -126,7 +135,11 @@ fn usual() -> Result<Scene> {
 }
 
 fn bricks(scene: Scene, kernel: Result<Kernel>) -> Result<Scene> {
-    Ok(scene.with_bricks(Bricks::from_volume(Arc::new(bytes_on(cartesian(SIDE))?))?, kernel?, transfer()))
+    Ok(scene.with_bricks(
+        Bricks::from_volume(Arc::new(bytes_on(cartesian(SIDE))?))?,
+        kernel?,
+        transfer(),
+    ))
 }
 
 fn samples(scene: Scene) -> Result<Scene> {
@@ -148,7 +161,11 @@ fn surface() -> Result<Scene> {
 }
 
 fn hierarchy() -> Result<Hierarchy> {
-    let tree = Tree::build(&surfels()?, &BuildOptions { closed: true, ..BuildOptions::default() }, &|_, _| ())?;
+    let tree = Tree::build(
+        &surfels()?,
+        &BuildOptions { closed: true, ..BuildOptions::default() },
+        &|_, _| (),
+    )?;
     Hierarchy::from_tree(tree)
 }
 
@@ -164,8 +181,11 @@ fn rows() -> Vec<Row> {
     };
     let gradient = || TransferFunction { gradient: vec![(0.0, 0.0), (300.0, 1.0)], ..transfer() };
     let lit = |transfer| shown(cartesian(SIDE), Ok(Kernel::default()), transfer);
-    let thick = |samples: f64| move |settings: &mut Settings| settings.sheet_thickness = Some(samples * 2.0 / 11.0);
-    let clip = |shape| move |settings: &mut Settings| settings.clips = vec![Clip { shape, inside: true }];
+    let thick = |samples: f64| {
+        move |settings: &mut Settings| settings.sheet_thickness = Some(samples * 2.0 / 11.0)
+    };
+    let clip =
+        |shape| move |settings: &mut Settings| settings.clips = vec![Clip { shape, inside: true }];
     let cube = Bounds { min: DVec3::splat(-0.5), max: DVec3::splat(0.6) };
     vec![
         row("a Cartesian lattice", usual()),
@@ -174,14 +194,26 @@ fn rows() -> Vec<Row> {
         row("a body-centred lattice", on(body_centred())),
         row("a rectilinear lattice", on(rectilinear())),
         row("a volume in bricks", bricks(Scene::new(), gaussian())),
-        row("samples of 16 bits", of_type(|v| Samples::U16((0..v.len()).map(|i| v.value(i) as u16).collect()))),
-        row("samples of 32 bits", of_type(|v| Samples::F32((0..v.len()).map(|i| v.value(i) as f32).collect()))),
+        row(
+            "samples of 16 bits",
+            of_type(|v| Samples::U16((0..v.len()).map(|i| v.value(i) as u16).collect())),
+        ),
+        row(
+            "samples of 32 bits",
+            of_type(|v| Samples::F32((0..v.len()).map(|i| v.value(i) as f32).collect())),
+        ),
         row("scattered samples", samples(Scene::new())),
         row("surfels", surface()),
         row("a hierarchy", hierarchy().map(|own| Scene::new().with_hierarchy(own))),
         row("surfels and a volume", surfels().and_then(|own| Ok(usual()?.with_splats(own)))),
-        row("a hierarchy and a volume", hierarchy().and_then(|own| Ok(usual()?.with_hierarchy(own)))),
-        row("surfels and a volume in bricks", surface().and_then(|scene| bricks(scene, gaussian()))),
+        row(
+            "a hierarchy and a volume",
+            hierarchy().and_then(|own| Ok(usual()?.with_hierarchy(own))),
+        ),
+        row(
+            "surfels and a volume in bricks",
+            surface().and_then(|scene| bricks(scene, gaussian())),
+        ),
         row("surfels and scattered samples", surface().and_then(samples)),
         row("kernel: a Gaussian that reaches 3 samples", by(Kernel::gaussian(0.6, 3.0))),
         row("kernel: a Gaussian that reaches 1.5", by(Kernel::gaussian(0.6, 1.5))),
@@ -193,8 +225,14 @@ fn rows() -> Vec<Row> {
         row("kernel: linear", by(tensor(Tensor::Linear))),
         row("kernel: catmull-rom", by(tensor(Tensor::CatmullRom))),
         row("kernel: cubic-b-spline", by(tensor(Tensor::CubicBSpline))),
-        row("b-spline on a rectilinear lattice", shown(rectilinear(), Kernel::b_spline(2.0), transfer())),
-        row("linear on a rectilinear lattice", shown(rectilinear(), tensor(Tensor::Linear), transfer())),
+        row(
+            "b-spline on a rectilinear lattice",
+            shown(rectilinear(), Kernel::b_spline(2.0), transfer()),
+        ),
+        row(
+            "linear on a rectilinear lattice",
+            shown(rectilinear(), tensor(Tensor::Linear), transfer()),
+        ),
         row("linear in bricks", bricks(Scene::new(), tensor(Tensor::Linear))),
         row("sharp: gaussian", sharp(cartesian(SIDE), gaussian())),
         row("sharp: b-spline", sharp(cartesian(SIDE), Kernel::b_spline(2.0))),
@@ -202,13 +240,16 @@ fn rows() -> Vec<Row> {
         row("sharp, on a body-centred lattice", sharp(body_centred(), gaussian())),
         row("sharp, on a rectilinear lattice", sharp(rectilinear(), gaussian())),
         row("light", lit(light())),
-        row("light by --gradient central", lit(light())).with(|own| own.gradient = Gradient::Central),
+        row("light by --gradient central", lit(light()))
+            .with(|own| own.gradient = Gradient::Central),
         row("an isosurface", lit(isosurface())),
         row("opacity by the gradient", lit(gradient())),
-        row("a clip plane", usual()).with(clip(ClipShape::HalfSpace { normal: DVec3::X, offset: 0.2 })),
+        row("a clip plane", usual())
+            .with(clip(ClipShape::HalfSpace { normal: DVec3::X, offset: 0.2 })),
         row("a clip box", usual()).with(clip(ClipShape::Box(cube))),
         row("a clipped surface", surface()).with(clip(ClipShape::Box(cube))),
-        row("no perspective", usual()).from(|camera| camera.projection = Projection::Orthographic { height: 3.0 }),
+        row("no perspective", usual())
+            .from(|camera| camera.projection = Projection::Orthographic { height: 3.0 }),
         row("a camera inside", usual()).from(|camera| camera.position *= 0.05),
         row("sheets of 2 samples", usual()).with(thick(2.0)),
         row("sheets of 4 samples", usual()).with(thick(4.0)),
@@ -216,11 +257,13 @@ fn rows() -> Vec<Row> {
         row("--classify pre", usual()).with(|own| own.classification = Classification::Pre),
         row("--mode axis-sheets", usual()).with(|own| own.mode = Mode::AxisSheets),
         row("--mode splats", usual()).with(|own| own.mode = Mode::Splats(Order::FrontToBack)),
-        row("--mode splats of surfels", surface()).with(|own| own.mode = Mode::Splats(Order::BackToFront)),
+        row("--mode splats of surfels", surface())
+            .with(|own| own.mode = Mode::Splats(Order::BackToFront)),
         row("--classify pre by linear", by(tensor(Tensor::Linear)))
             .with(|own| own.classification = Classification::Pre),
         row("--optics maximum", usual()).with(|own| own.optics = Optics::Maximum),
-        row("--optics maximum of scattered samples", samples(Scene::new())).with(|own| own.optics = Optics::Maximum),
+        row("--optics maximum of scattered samples", samples(Scene::new()))
+            .with(|own| own.optics = Optics::Maximum),
         row("--optics maximum of surfels", surface()).with(|own| own.optics = Optics::Maximum),
         row("--optics x-ray", usual()).with(|own| own.optics = Optics::XRay),
     ]
@@ -249,7 +292,9 @@ impl Reasons {
                 });
                 format!("no ({})", at + 1)
             }
-            Err(error) => panic!("an engine that does not draw something says so by an argument error: {error}"),
+            Err(error) => panic!(
+                "an engine that does not draw something says so by an argument error: {error}"
+            ),
         }
     }
 }
@@ -282,7 +327,10 @@ fn check_likeness(row: &Row, pictures: &[(&str, &Picture)]) {
     let truth = reference::render(scene, &row.camera, &row.settings).expect(row.name);
     assert!(truth.color.iter().any(|pixel| pixel[3] > 0.3), "{}: an empty picture", row.name);
     for (column, picture) in pictures {
-        let psnr = compare_pictures(picture, &truth).expect("pictures of one size").psnr.unwrap_or(f64::INFINITY);
+        let psnr = compare_pictures(picture, &truth)
+            .expect("pictures of one size")
+            .psnr
+            .unwrap_or(f64::INFINITY);
         assert!(psnr > LIKENESS, "{}, {column}: {psnr:.1} dB", row.name);
     }
 }
@@ -294,9 +342,12 @@ fn table() -> String {
     let heads = COLUMNS.map(|(name, _)| name).join(" | ");
     let mut text = format!("| | {heads} |\n|---|{}\n", "---|".repeat(COLUMNS.len()));
     for row in rows() {
-        let answers = COLUMNS.map(|(column, evaluate)| (column, engines.draw(&row, column, evaluate)));
-        let pictures: Vec<_> =
-            answers.iter().filter_map(|(column, answer)| Some((*column, answer.as_ref().ok()?))).collect();
+        let answers =
+            COLUMNS.map(|(column, evaluate)| (column, engines.draw(&row, column, evaluate)));
+        let pictures: Vec<_> = answers
+            .iter()
+            .filter_map(|(column, answer)| Some((*column, answer.as_ref().ok()?)))
+            .collect();
         check_likeness(&row, &pictures);
         let cells = answers.each_ref().map(|(_, answer)| reasons.cell(answer));
         writeln!(text, "| {} | {} |", row.name, cells.join(" | ")).expect("text takes text");

@@ -42,12 +42,18 @@ pub fn sums<S: Simd>(
 
 /// Sums whose slopes are the first moments.
 #[inline(always)]
-fn products<S: Simd>(simd: S, weights: [&[Lanes<S>]; 3], away: [&[Lanes<S>]; 3], values: &[Lanes<S>]) -> Sums<S> {
+fn products<S: Simd>(
+    simd: S,
+    weights: [&[Lanes<S>]; 3],
+    away: [&[Lanes<S>]; 3],
+    values: &[Lanes<S>],
+) -> Sums<S> {
     let none = Lanes::splat(simd, 0.0);
     let mut moments = [[none; MOST_TAPS]; 3];
     let (mut all, mut means) = ([none; 3], [none; 3]);
     for axis in 0..3 {
-        for ((moment, weight), away) in moments[axis].iter_mut().zip(weights[axis]).zip(away[axis]) {
+        for ((moment, weight), away) in moments[axis].iter_mut().zip(weights[axis]).zip(away[axis])
+        {
             *moment = *weight * *away;
             all[axis] += *weight;
             means[axis] += *moment;
@@ -74,7 +80,8 @@ fn products<S: Simd>(simd: S, weights: [&[Lanes<S>]; 3], away: [&[Lanes<S>]; 3],
         value_slopes[1] = z.mul_add(slice_y, value_slopes[1]);
         value_slopes[2] = moment_z.mul_add(slice, value_slopes[2]);
     }
-    let weight_slopes = [means[0] * all[1] * all[2], all[0] * means[1] * all[2], all[0] * all[1] * means[2]];
+    let weight_slopes =
+        [means[0] * all[1] * all[2], all[0] * means[1] * all[2], all[0] * all[1] * means[2]];
     Sums { weight: all[0] * all[1] * all[2], value, weight_slopes, value_slopes }
 }
 

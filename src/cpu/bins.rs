@@ -131,7 +131,9 @@ impl<'a> Bins<'a> {
         let mut parts = Vec::new();
         let (mut start, mut sum) = (0, 0);
         for row in 0..self.blocks[1] {
-            let count: usize = (row * self.blocks[0]..(row + 1) * self.blocks[0]).map(|block| self.count(block)).sum();
+            let count: usize = (row * self.blocks[0]..(row + 1) * self.blocks[0])
+                .map(|block| self.count(block))
+                .sum();
             if row > start && sum + count as u64 > MOST_ENTRIES {
                 parts.push(start..row);
                 (start, sum) = (row, 0);
@@ -170,7 +172,9 @@ impl<'a> Bins<'a> {
         let is_single = plan.single().is_some();
         self.groups.par_iter_mut().for_each(|group| {
             let batches = group.batches.clone().zip(&self.records[group.batches.clone()]);
-            let numbers = batches.flat_map(|(batch, own)| (0..own.len()).map(move |place| batch << BATCH_BITS | place));
+            let numbers = batches.flat_map(|(batch, own)| {
+                (0..own.len()).map(move |place| batch << BATCH_BITS | place)
+            });
             for (span, number) in group.spans.iter().zip(numbers) {
                 let [first, last] = span.blocks();
                 let (key, order) = (number as u32, u64::from(span.order));
@@ -180,7 +184,9 @@ impl<'a> Bins<'a> {
                         let entry = if is_single {
                             order << 32 | u64::from(key ^ turn)
                         } else {
-                            order << 40 | u64::from(key) << 8 | u64::from(span.within([column, row]))
+                            order << 40
+                                | u64::from(key) << 8
+                                | u64::from(span.within([column, row]))
                         };
                         entries[*next as usize].store(entry, Relaxed);
                         *next += 1;
@@ -216,8 +222,11 @@ impl Lists<'_> {
     pub fn of_tiles(&self, column: usize, row: usize, columns: usize) -> TileLists {
         let own = row * columns + column - self.first;
         let entries = &self.entries[self.starts[own]..self.starts[own + 1]];
-        let entries =
-            if self.plan.single().is_some() { self.by_order(entries, [column, row]) } else { by_sheet(entries) };
+        let entries = if self.plan.single().is_some() {
+            self.by_order(entries, [column, row])
+        } else {
+            by_sheet(entries)
+        };
         TileLists::new(&entries)
     }
 
@@ -230,7 +239,11 @@ impl Lists<'_> {
             let (batch, place) = place_of(number);
             let record = &self.records[batch][place];
             let tiles = tiles_of(self.plan, record).map(|tile| tile.map(|at| at as u16));
-            Entry { record: number, sheet: record.sheets[0], within: Span { tiles, order: 0 }.within(block) }
+            Entry {
+                record: number,
+                sheet: record.sheets[0],
+                within: Span { tiles, order: 0 }.within(block),
+            }
         };
         sorted.into_iter().map(entry).collect()
     }
@@ -257,7 +270,8 @@ fn by_sheet(entries: &[AtomicU64]) -> Vec<Entry> {
     for entry in entries {
         let key = entry.load(Relaxed);
         let end = &mut ends[usize::from(sheet(key))];
-        sorted[*end as usize] = Entry { record: (key >> 8) as u32, sheet: sheet(key), within: key as u8 };
+        sorted[*end as usize] =
+            Entry { record: (key >> 8) as u32, sheet: sheet(key), within: key as u8 };
         *end += 1;
     }
     sorted
@@ -292,7 +306,8 @@ impl TileLists {
 impl Entry {
     /// Names the tiles of the block that it meets.
     fn tiles(&self, mut name: impl FnMut(usize)) {
-        let [left, right, top, bottom] = [0, 2, 4, 6].map(|shift| usize::from(self.within >> shift & 3));
+        let [left, right, top, bottom] =
+            [0, 2, 4, 6].map(|shift| usize::from(self.within >> shift & 3));
         for row in top..=bottom {
             for column in left..=right {
                 name(row * BLOCK + column);

@@ -12,7 +12,9 @@ use super::{
 };
 use crate::{
     math::{Kernel, Profile},
-    volume::{Arrangement, Lattice, Samples, Volume, overshoot::Overshoot, reach::neighbourhood_ranges},
+    volume::{
+        Arrangement, Lattice, Samples, Volume, overshoot::Overshoot, reach::neighbourhood_ranges,
+    },
 };
 use fearless_simd::{Simd, i32x8, prelude::*};
 use glam::{DMat3, DVec3};
@@ -45,7 +47,9 @@ impl Way {
         let plain = weighting(kernel).filter(|_| *arrangement == Arrangement::Cartesian);
         match (&kernel.profile, plain) {
             (Profile::Tensor(_), Some(plain)) => return Ok(Self::Plain(plain)),
-            (Profile::Tensor(_), None) => return Err("tensor products on other lattices than Cartesian ones"),
+            (Profile::Tensor(_), None) => {
+                return Err("tensor products on other lattices than Cartesian ones");
+            }
             (Profile::Gaussian(sigma), _) if *sigma < LEAST_DEVIATION => {
                 return Err("kernels much narrower than a sample");
             }
@@ -56,18 +60,26 @@ impl Way {
         }
         if let Arrangement::Rectilinear(places) = arrangement {
             if !is_whole(kernel) {
-                return Err("kernels that end where they still have weight, on a rectilinear lattice");
+                return Err(
+                    "kernels that end where they still have weight, on a rectilinear lattice",
+                );
             }
             return match Axes::taps(places, kernel) {
                 Some(taps) => Ok(Self::Blend(rounded(taps))),
-                None => Err("a rectilinear lattice whose kernels reach far more samples in some places than in others"),
+                None => Err(
+                    "a rectilinear lattice whose kernels reach far more samples in some places than in others",
+                ),
             };
         }
         // Around the sample before a place, or around the nearest one where that takes fewer.
         let reach = reach(kernel) * volume.lattice.unit([0; 3]).x;
         let taps = (2 * reach.ceil() as usize).min(2 * (reach + 0.5).floor() as usize + 1);
         let most = if is_whole(kernel) { MOST_TAPS } else { MOST_RADIAL_TAPS };
-        if taps > most { Err("kernels that reach too many samples") } else { Ok(Self::Blend(rounded(taps))) }
+        if taps > most {
+            Err("kernels that reach too many samples")
+        } else {
+            Ok(Self::Blend(rounded(taps)))
+        }
     }
 }
 
@@ -213,7 +225,14 @@ impl Blend {
     pub fn new(volume: &Volume, kernel: &Kernel, taps: usize) -> Self {
         let lattice = volume.drawn_lattice();
         let [nx, ny, nz] = lattice.dims;
-        let whole = |size| Part { first: 0, row: nx, slice: nx * ny, dims: lattice.dims, shift: [0.0; 3], size };
+        let whole = |size| Part {
+            first: 0,
+            row: nx,
+            slice: nx * ny,
+            dims: lattice.dims,
+            shift: [0.0; 3],
+            size,
+        };
         let steps = |dims: [usize; 3]| dims.map(|count| count as f32 - 1.0);
         let cartesian = |dims| Lattice::cartesian(dims, lattice.origin, lattice.axes);
         let bells = |sigma: f64| Form::Bells {
@@ -244,15 +263,23 @@ impl Blend {
                 let first = DVec3::new(places[0][0], places[1][0], places[2][0]);
                 let origin = lattice.position(first + 0.5 * widths);
                 form = Form::Rectilinear(Box::new(axes));
-                let size = [0, 1, 2].map(|axis| (places[axis][lattice.dims[axis] - 1] - first[axis]) as f32);
-                (vec![whole(size)], Lattice::cartesian(dims, origin, lattice.axes * DMat3::from_diagonal(widths)))
+                let size = [0, 1, 2]
+                    .map(|axis| (places[axis][lattice.dims[axis] - 1] - first[axis]) as f32);
+                (
+                    vec![whole(size)],
+                    Lattice::cartesian(dims, origin, lattice.axes * DMat3::from_diagonal(widths)),
+                )
             }
         };
         Self {
             parts,
             form,
             taps,
-            per_step: if lattice.arrangement == Arrangement::BodyCentred { std::f32::consts::SQRT_2 } else { 1.0 },
+            per_step: if lattice.arrangement == Arrangement::BodyCentred {
+                std::f32::consts::SQRT_2
+            } else {
+                1.0
+            },
             extent: kernel.extent as f32,
             least: kernel.least_sum() as f32,
             cells,
@@ -268,7 +295,9 @@ impl Blend {
     /// volume's first sample is on the lattice drawn, in steps.
     pub fn to_cells(&self, drawn_from: [f32; 3]) -> [[f32; 3]; 2] {
         match &self.form {
-            Form::Rectilinear(axes) => [axes.cells().1.map(|width| (1.0 / width) as f32), [-0.5; 3]],
+            Form::Rectilinear(axes) => {
+                [axes.cells().1.map(|width| (1.0 / width) as f32), [-0.5; 3]]
+            }
             _ => [[1.0; 3], drawn_from],
         }
     }
@@ -313,9 +342,12 @@ impl Blend {
             for part in &self.parts {
                 for tap in 0..(2 * half + 2).pow(3) {
                     let side = 2 * half + 2;
-                    let at = [tap % side, tap / side % side, tap / side / side].map(|at| f64::from(at - half));
-                    let away = [0, 1, 2].map(|axis| place[axis] - at[axis] - f64::from(part.shift[axis]));
-                    let weight = kernel.value(DVec3::from_array(away).length() * f64::from(self.per_step));
+                    let at = [tap % side, tap / side % side, tap / side / side]
+                        .map(|at| f64::from(at - half));
+                    let away =
+                        [0, 1, 2].map(|axis| place[axis] - at[axis] - f64::from(part.shift[axis]));
+                    let weight =
+                        kernel.value(DVec3::from_array(away).length() * f64::from(self.per_step));
                     sum += weight;
                     size += weight.abs();
                 }
@@ -328,15 +360,23 @@ impl Blend {
         let reach = lattice.reach(kernel.extent + 1.0);
         for (at, range) in ranges.iter_mut().enumerate() {
             let index = lattice.index(at);
-            let is_inside =
-                (0..3).all(|axis| index[axis] >= reach[axis] && index[axis] + reach[axis] < lattice.dims[axis]);
+            let is_inside = (0..3).all(|axis| {
+                index[axis] >= reach[axis] && index[axis] + reach[axis] < lattice.dims[axis]
+            });
             *range = if is_inside { &inside } else { &outside }.widen([*range].into_iter());
         }
     }
 
     /// The field at places in steps, on rays along which a world unit is so many steps.
     #[inline(always)]
-    fn at<S: Simd>(&self, simd: S, samples: Source, zero: f32, place: [Lanes<S>; 3], way: [Lanes<S>; 3]) -> Point<S> {
+    fn at<S: Simd>(
+        &self,
+        simd: S,
+        samples: Source,
+        zero: f32,
+        place: [Lanes<S>; 3],
+        way: [Lanes<S>; 3],
+    ) -> Point<S> {
         // A function of its own for each number of samples.
         let sums = match self.taps {
             ..=3 => self.sums::<S, 3, 4, 27>(simd, samples, zero, place, way),
@@ -487,7 +527,9 @@ impl Part {
             let last = (dims[0] - WIDE) as i32;
             is_moved[lane] = (first[0][lane] - last).max(0) as f32;
             first[0][lane] = first[0][lane].min(last);
-            places[lane] = first[2][lane] as usize * slice + first[1][lane] as usize * row + first[0][lane] as usize;
+            places[lane] = first[2][lane] as usize * slice
+                + first[1][lane] as usize * row
+                + first[0][lane] as usize;
         }
         let is_moved = SimdInto::<Lanes<S>, S>::simd_into(is_moved, simd).simd_gt(0.5);
         let any_moved = N < WIDE && is_moved.any_true();
@@ -567,7 +609,9 @@ mod tests {
     /// All that is gathered by sums.
     fn kinds() -> Vec<(Volume, Kernel)> {
         let gaussian = |sigma, extent| Kernel::gaussian(sigma, extent).unwrap();
-        let table = Kernel::table((0..=64).map(|at| (1.0 - f64::from(at) / 64.0).powi(2)).collect(), 1.8).unwrap();
+        let table =
+            Kernel::table((0..=64).map(|at| (1.0 - f64::from(at) / 64.0).powi(2)).collect(), 1.8)
+                .unwrap();
         let mut found = Vec::new();
         for (kind, kernel) in [
             Kernel::b_spline(2.0).unwrap(),
@@ -586,17 +630,24 @@ mod tests {
             found.push((volume(cartesian([13, 12, 14]), kind), kernel.clone()));
             found.push((volume(cartesian([14, 1, 5]), kind + 1), kernel));
         }
-        for (kind, kernel) in
-            [gaussian(0.6, 2.0), gaussian(0.6, 1.3), Kernel::b_spline(2.0).unwrap(), Kernel::hann(3.0).unwrap(), table]
-                .into_iter()
-                .enumerate()
+        for (kind, kernel) in [
+            gaussian(0.6, 2.0),
+            gaussian(0.6, 1.3),
+            Kernel::b_spline(2.0).unwrap(),
+            Kernel::hann(3.0).unwrap(),
+            table,
+        ]
+        .into_iter()
+        .enumerate()
         {
             found.push((volume(body_centred([9, 8, 17]), kind), kernel.clone()));
             found.push((volume(body_centred([3, 9, 6]), kind + 1), kernel.clone()));
             found.push((volume(body_centred([7, 2, 1]), kind + 2), kernel));
         }
         for (kind, steps) in
-            [&[1.0][..], &[0.5, 0.7, 1.0, 1.4, 2.0, 1.2], &[1.0, 3.0], &[0.3, 0.3, 0.3, 0.9]].into_iter().enumerate()
+            [&[1.0][..], &[0.5, 0.7, 1.0, 1.4, 2.0, 1.2], &[1.0, 3.0], &[0.3, 0.3, 0.3, 0.9]]
+                .into_iter()
+                .enumerate()
         {
             found.push((volume(rectilinear([12, 13, 11], steps), kind), gaussian(0.6, 2.0)));
             found.push((volume(rectilinear([1, 3, 12], steps), kind + 1), gaussian(0.6, 2.0)));
@@ -631,7 +682,8 @@ mod tests {
                 let sample = at + other * stride[axis] - index[axis] * stride[axis];
                 (volume.value(sample) - volume.value(at), lattice.steps(own)[axis] - here)
             };
-            let before = index[axis].checked_sub(1).map(beside).map(|(rise, away)| (rise / away, -away));
+            let before =
+                index[axis].checked_sub(1).map(beside).map(|(rise, away)| (rise / away, -away));
             let after = (index[axis] + 1 < lattice.dims[axis]).then(|| beside(index[axis] + 1));
             match (before, after.map(|(rise, away)| (rise / away, away))) {
                 (Some((a, d)), Some((b, e))) => (a * e + b * d) / (d + e),
@@ -673,7 +725,12 @@ mod tests {
 
     fn found(typed: &Typed, places: [[f32; 8]; 3], way: [f32; 3]) -> [[f32; 8]; 5] {
         #[inline(always)]
-        fn at<S: Simd>(simd: S, blended: &Blended, places: [[f32; 8]; 3], way: [f32; 3]) -> [[f32; 8]; 5] {
+        fn at<S: Simd>(
+            simd: S,
+            blended: &Blended,
+            places: [[f32; 8]; 3],
+            way: [f32; 3],
+        ) -> [[f32; 8]; 5] {
             let way = three!(I => Lanes::splat(simd, way[I]));
             let Point { value, slopes: [x, y, z], weight } =
                 blended.at(simd, three!(I => places[I].simd_into(simd)), way);
@@ -701,7 +758,8 @@ mod tests {
             let blend = Blend::new(&volume, &kernel, taps);
             let way = DVec3::new(1.0, 2.0, -0.5).normalize();
             let lattice = volume.drawn_lattice();
-            let name = format!("{:?} on {:?} of {:?}", kernel.profile, lattice.arrangement, lattice.dims);
+            let name =
+                format!("{:?} on {:?} of {:?}", kernel.profile, lattice.arrangement, lattice.dims);
             // Of Gaussians weights below a two-hundredth are left out, or counted where they should not be.
             let is_cut = matches!(kernel.profile, Profile::Gaussian(_));
             let (mut compared, mut error, mut slope_error) = (0, 0.0f64, 0.0f64);
@@ -709,7 +767,8 @@ mod tests {
                 let typed = Typed::blended(&volume, &blend, zero);
                 for round in 0..20 {
                     let places = places(lattice, round, if round < 15 { 0.0 } else { 0.7 });
-                    let found = found(&typed, places, way.as_vec3().to_array().map(|along| 3.0 * along));
+                    let found =
+                        found(&typed, places, way.as_vec3().to_array().map(|along| 3.0 * along));
                     for lane in 0..8 {
                         let place = DVec3::from_array(places.map(|own| f64::from(own[lane])));
                         let expected = truth(&volume, &kernel, place, way);
@@ -725,15 +784,20 @@ mod tests {
                         }
                         compared += 1;
                         error += (own[0] + zero - expected[1]).powi(2);
-                        slope_error += (1..4).map(|i| (own[i] - expected[i + 1]).powi(2)).sum::<f64>();
+                        slope_error +=
+                            (1..4).map(|i| (own[i] - expected[i + 1]).powi(2)).sum::<f64>();
                     }
                 }
             }
             assert!(compared > 20, "{name}: {compared}");
-            let [error, slope_error] = [error, slope_error].map(|sum| (sum / f64::from(compared)).sqrt());
+            let [error, slope_error] =
+                [error, slope_error].map(|sum| (sum / f64::from(compared)).sqrt());
             // Of bytes.
             let most = if is_cut { [1.5, 8.0] } else { [2e-3, 0.1] };
-            assert!(error < most[0] && slope_error < most[1], "{name}: off by {error}, slopes by {slope_error}");
+            assert!(
+                error < most[0] && slope_error < most[1],
+                "{name}: off by {error}, slopes by {slope_error}"
+            );
         }
     }
 
@@ -763,7 +827,8 @@ mod tests {
             let typed = Typed::blended(&volume, &blend, 0.0);
             for round in 0..40 {
                 let places = places(&volume.lattice, round, 0.0);
-                let drawn = [0, 1, 2].map(|axis| places[axis].map(|place| place + before[axis] as f32));
+                let drawn =
+                    [0, 1, 2].map(|axis| places[axis].map(|place| place + before[axis] as f32));
                 let [weight, value, ..] = found(&typed, drawn, [1.0, 2.0, -0.5]);
                 for lane in (0..8).filter(|lane| weight[*lane] > 0.0) {
                     let cell = [0, 1, 2].map(|axis| {
@@ -802,6 +867,9 @@ mod tests {
             Kernel::default(),
             "far more samples",
         );
-        assert!(Way::of(&volume(cartesian([4; 3]), 0), &Kernel::default()) == Ok(Way::Plain(Weighting::Gaussian(0.6))));
+        assert!(
+            Way::of(&volume(cartesian([4; 3]), 0), &Kernel::default())
+                == Ok(Way::Plain(Weighting::Gaussian(0.6)))
+        );
     }
 }

@@ -87,7 +87,8 @@ impl BrickCache {
     /// Reads the bricks of a choice. Of the others those stay that were needed last, `most` bricks in all.
     pub fn update(&mut self, choice: &Choice, most: usize) -> Result<()> {
         self.update += 1;
-        let absent: Vec<Key> = choice.bricks.iter().copied().filter(|key| !self.held.contains_key(key)).collect();
+        let absent: Vec<Key> =
+            choice.bricks.iter().copied().filter(|key| !self.held.contains_key(key)).collect();
         for key in &choice.bricks {
             if let Some(held) = self.held.get_mut(key) {
                 held.last = self.update;
@@ -95,8 +96,10 @@ impl BrickCache {
         }
         self.make_room((self.held.len() + absent.len()).saturating_sub(most));
         for keys in absent.chunks(BATCH) {
-            let read: Vec<_> =
-                keys.par_iter().map(|&(level, brick)| self.bricks.read(level, brick)).collect::<Result<_>>()?;
+            let read: Vec<_> = keys
+                .par_iter()
+                .map(|&(level, brick)| self.bricks.read(level, brick))
+                .collect::<Result<_>>()?;
             self.reads += read.len() as u64;
             for (key, brick) in keys.iter().zip(read) {
                 let slot = self.free.pop().unwrap_or(self.blocks.len());
@@ -116,8 +119,12 @@ impl BrickCache {
 
     /// Lets go of up to so many bricks that this update does not need, those first that no view needed for longest.
     fn make_room(&mut self, count: usize) {
-        let mut others: Vec<(u64, Key)> =
-            self.held.iter().filter(|(_, held)| held.last < self.update).map(|(key, held)| (held.last, *key)).collect();
+        let mut others: Vec<(u64, Key)> = self
+            .held
+            .iter()
+            .filter(|(_, held)| held.last < self.update)
+            .map(|(key, held)| (held.last, *key))
+            .collect();
         others.sort_unstable();
         for (_, key) in others.iter().take(count) {
             self.free.extend(self.held.remove(key).map(|held| held.slot));
@@ -130,7 +137,9 @@ impl BrickCache {
         let mut touched: Vec<Key> = Vec::new();
         for &(level, brick) in read {
             touched.extend(
-                around().filter_map(|step| self.neighbour(level, brick, step)).map(|(number, _)| (level, number)),
+                around()
+                    .filter_map(|step| self.neighbour(level, brick, step))
+                    .map(|(number, _)| (level, number)),
             );
         }
         touched.sort_unstable();
@@ -150,7 +159,9 @@ impl BrickCache {
         let place = size.place(brick);
         let mut number = 0;
         for axis in (0..3).rev() {
-            let at = place[axis].checked_add_signed(step[axis]).filter(|at| *at < size.brick_dims[axis])?;
+            let at = place[axis]
+                .checked_add_signed(step[axis])
+                .filter(|at| *at < size.brick_dims[axis])?;
             number = number * size.brick_dims[axis] + at;
         }
         let number = number as u32;
@@ -173,7 +184,9 @@ fn place_of([x, y, z]: [isize; 3]) -> usize {
 fn fill<T: AnyBitPattern>(slot: &mut [T], bytes: &[u8]) {
     for (row, bytes) in bytes.chunks_exact(SIDE * size_of::<T>()).enumerate() {
         let start = place_of([0, (row % SIDE) as isize, (row / SIDE) as isize]);
-        for (own, bytes) in slot[start..start + SIDE].iter_mut().zip(bytes.chunks_exact(size_of::<T>())) {
+        for (own, bytes) in
+            slot[start..start + SIDE].iter_mut().zip(bytes.chunks_exact(size_of::<T>()))
+        {
             *own = bytemuck::pod_read_unaligned(bytes);
         }
     }

@@ -88,7 +88,8 @@ impl Visible {
             return Self(Vec::new());
         }
         let [_, _, last, place] = plan.frame.transfer;
-        let mut shows: Vec<bool> = plan.tables.entries[..=last as usize].iter().map(|entry| entry[3] > 0.0).collect();
+        let mut shows: Vec<bool> =
+            plan.tables.entries[..=last as usize].iter().map(|entry| entry[3] > 0.0).collect();
         for surface in &plan.frame.isosurfaces[..plan.isosurfaces] {
             let at = (surface[0][0] + place).clamp(0.0, last) as usize;
             let end = (at + 2).min(shows.len());
@@ -114,7 +115,8 @@ impl Visible {
         let [_, _, last, place] = plan.frame.transfer;
         let (none, last) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, last));
         let low: [i32; 8] = i32x8::truncate_from((low - slack + place).max(none).min(last)).into();
-        let high: [i32; 8] = i32x8::truncate_from((high + slack + place).max(none).min(last)).into();
+        let high: [i32; 8] =
+            i32x8::truncate_from((high + slack + place).max(none).min(last)).into();
         let before = words!(simd, L => self.0[low[L] as usize]);
         let behind = words!(simd, L => self.0[high[L] as usize + 1]);
         behind.simd_gt(before).any_true()
@@ -129,7 +131,8 @@ impl Plan<'_> {
         let none = Lanes::splat(simd, 0.0);
         let all = Lanes::splat(simd, end);
         let middle = (a + b) * 0.5 + place;
-        let reach = ((a - b).abs().max(Lanes::splat(simd, NARROW)) * 0.5).max(middle.abs() * NARROW_AFAR);
+        let reach =
+            ((a - b).abs().max(Lanes::splat(simd, NARROW)) * 0.5).max(middle.abs() * NARROW_AFAR);
         let (low, high) = ((middle - reach).floor(), (middle + reach).ceil());
         let inverse = Lanes::splat(simd, 1.0) / (high - low);
         let (first, last) = (low.max(none).min(all), high.max(none).min(all));
@@ -172,9 +175,11 @@ impl Plan<'_> {
     #[inline(always)]
     fn gradient_factor<S: Simd>(&self, simd: S, magnitude: Lanes<S>) -> Lanes<S> {
         let [first, per_magnitude, ..] = self.frame.gradients;
-        let factors = &self.tables.entries[self.tables.starts[1] as usize..self.tables.starts[2] as usize];
+        let factors =
+            &self.tables.entries[self.tables.starts[1] as usize..self.tables.starts[2] as usize];
         let last = Lanes::splat(simd, (factors.len() - 2) as f32);
-        let at: [f32; 8] = ((magnitude - first) * per_magnitude).max(Lanes::splat(simd, 0.0)).min(last).into();
+        let at: [f32; 8] =
+            ((magnitude - first) * per_magnitude).max(Lanes::splat(simd, 0.0)).min(last).into();
         let factor = |at: f32| {
             let [low, high] = [factors[at as usize][0], factors[at as usize + 1][0]];
             low + (high - low) * at.fract()
@@ -195,7 +200,8 @@ impl Plan<'_> {
         let one = Lanes::splat(simd, 1.0);
         let size = dot(normal, normal).sqrt();
         let has_direction = size.simd_gt(LEAST_GRADIENT);
-        let facing = (dot(normal, direction).abs() / size.max(Lanes::splat(simd, LEAST_GRADIENT))).min(one);
+        let facing =
+            (dot(normal, direction).abs() / size.max(Lanes::splat(simd, LEAST_GRADIENT))).min(one);
         let facing = has_direction.select(facing, one);
         let highlight = vector::power(simd, facing.max(Lanes::splat(simd, 1e-6)), power) * specular;
         let highlight = has_direction.select(highlight, Lanes::splat(simd, 0.0));
@@ -270,7 +276,8 @@ impl Plan<'_> {
         let passes = before.simd_gt(0.5) & pixels.through.simd_le(0.5) & !has_hit;
         if passes.any_true() {
             // Inside the sheet, optical depth counts as evenly spread.
-            let part = log2(simd, before * 2.0) * std::f32::consts::LN_2 / depth.max(Lanes::splat(simd, LEAST_DIVISOR));
+            let part = log2(simd, before * 2.0) * std::f32::consts::LN_2
+                / depth.max(Lanes::splat(simd, LEAST_DIVISOR));
             let [start, stop] = [self.planes[sheet], self.planes[sheet + 1]];
             pixels.hit = passes.select(part * (stop - start) + start, pixels.hit);
         }
@@ -357,8 +364,11 @@ impl Plan<'_> {
             let near = begin + step * part as f32;
             let next_place = place + step * per_thickness;
             let next = if is_curved { layer.parabola(next_place) } else { value };
-            let mut shown =
-                if self.is_integrated { self.between(simd, value, next) } else { self.one(simd, layer.mean()) };
+            let mut shown = if self.is_integrated {
+                self.between(simd, value, next)
+            } else {
+                self.one(simd, layer.mean())
+            };
             let mut normal = [none; 3];
             if self.is_lit || self.has_gradient_opacity {
                 normal = self.gradient(layer, (place + next_place) * 0.5);
@@ -382,9 +392,13 @@ impl Plan<'_> {
             for number in 0..self.isosurfaces {
                 // From the value at the front to that at the back.
                 let rises = next.simd_gt(value);
-                let [up, down] = [number, self.isosurfaces - 1 - number].map(|i| self.frame.isosurfaces[i]);
+                let [up, down] =
+                    [number, self.isosurfaces - 1 - number].map(|i| self.frame.isosurfaces[i]);
                 let own = |row: usize, column: usize| {
-                    rises.select(Lanes::splat(simd, up[row][column]), Lanes::splat(simd, down[row][column]))
+                    rises.select(
+                        Lanes::splat(simd, up[row][column]),
+                        Lanes::splat(simd, down[row][column]),
+                    )
                 };
                 let level = own(0, 0);
                 let crosses = (value.simd_lt(level) ^ next.simd_lt(level)) & mask;
@@ -405,7 +419,8 @@ impl Plan<'_> {
                 let mut surface = [0, 1, 2].map(|channel| own(1, channel));
                 if self.is_lit {
                     let normal = self.gradient(layer, place + (next_place - place) * share);
-                    surface = self.lit(simd, surface, normal, layer.direction, self.frame.volume_shade);
+                    surface =
+                        self.lit(simd, surface, normal, layer.direction, self.frame.volume_shade);
                 }
                 for (sum, channel) in medium.color.iter_mut().zip(surface) {
                     *sum = taken.mul_add(channel, *sum);

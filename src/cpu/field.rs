@@ -76,17 +76,31 @@ impl<'a> Typed<'a> {
     fn of_volume(volume: &'a Volume, shape: Shape, zero: f64) -> Self {
         let dims = volume.drawn_lattice().dims;
         match &volume.coefficients {
-            Some(coefficients) => Self::F32(Field::new(&coefficients.values, dims, Memory::Rows, shape, zero)),
+            Some(coefficients) => {
+                Self::F32(Field::new(&coefficients.values, dims, Memory::Rows, shape, zero))
+            }
             None => Self::in_memory(&volume.samples, dims, Memory::Rows, shape, zero),
         }
     }
 
     /// The field of a level of a volume in bricks; `samples` are those of all slots, at least of one.
-    pub fn of_bricks(samples: &'a Samples, dims: [usize; 3], grid: &'a Grid, weighting: Weighting, zero: f64) -> Self {
+    pub fn of_bricks(
+        samples: &'a Samples,
+        dims: [usize; 3],
+        grid: &'a Grid,
+        weighting: Weighting,
+        zero: f64,
+    ) -> Self {
         Self::in_memory(samples, dims, Memory::Slots(grid), Shape::new(weighting), zero)
     }
 
-    fn in_memory(samples: &'a Samples, dims: [usize; 3], memory: Memory<'a>, shape: Shape, zero: f64) -> Self {
+    fn in_memory(
+        samples: &'a Samples,
+        dims: [usize; 3],
+        memory: Memory<'a>,
+        shape: Shape,
+        zero: f64,
+    ) -> Self {
         match samples {
             Samples::U8(samples) => Self::U8(Field::new(samples, dims, memory, shape, zero)),
             Samples::U16(samples) => Self::U16(Field::new(samples, dims, memory, shape, zero)),
@@ -151,7 +165,13 @@ struct Taps<S: Simd> {
 }
 
 impl<'a, T: Sample> Field<'a, T> {
-    fn new(samples: &'a [T], dims: [usize; 3], memory: Memory<'a>, shape: Shape, zero: f64) -> Self {
+    fn new(
+        samples: &'a [T],
+        dims: [usize; 3],
+        memory: Memory<'a>,
+        shape: Shape,
+        zero: f64,
+    ) -> Self {
         Self { samples, dims, memory, shape, zero: zero as f32 }
     }
 
@@ -184,7 +204,8 @@ impl Grid {
     #[inline(always)]
     fn places<S: Simd>(&self, first: [i32x8<S>; 3]) -> [usize; 8] {
         let (bricks, numbers) = self.bricks(first);
-        let [x, y, z]: [i32x8<S>; 3] = three!(I => first[I] + BESIDE as i32 - bricks[I] * SIDE as i32);
+        let [x, y, z]: [i32x8<S>; 3] =
+            three!(I => first[I] + BESIDE as i32 - bricks[I] * SIDE as i32);
         let side = SLOT_SIDE as i32;
         let within: [i32; 8] = ((z * side + y) * side + x).into();
         each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
@@ -195,7 +216,12 @@ impl Grid {
 
     /// Where there are bricks around places in steps of their level, of so many samples, and a value of each brick.
     #[inline(always)]
-    pub fn held<S: Simd>(&self, simd: S, dims: [usize; 3], place: [Lanes<S>; 3]) -> (mask32x8<S>, Lanes<S>) {
+    pub fn held<S: Simd>(
+        &self,
+        simd: S,
+        dims: [usize; 3],
+        place: [Lanes<S>; 3],
+    ) -> (mask32x8<S>, Lanes<S>) {
         let first = three!(I => {
             let last = Lanes::splat(simd, dims[I] as f32 - 1.0);
             i32x8::truncate_from(place[I].max(Lanes::splat(simd, 0.0)).min(last)) - 1
@@ -209,7 +235,12 @@ impl Grid {
 /// Gaussians.
 impl<T: Sample> Field<'_, T> {
     #[inline(always)]
-    fn gaussian<S: Simd>(&self, simd: S, bell: &Bell, place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
+    fn gaussian<S: Simd>(
+        &self,
+        simd: S,
+        bell: &Bell,
+        place: [Lanes<S>; 3],
+    ) -> (Lanes<S>, [Lanes<S>; 3]) {
         let mut place = place;
         let mut first = [Lanes::splat(simd, 0.0); 3];
         let mut is_within = true;
@@ -264,8 +295,7 @@ impl<T: Sample> Field<'_, T> {
             }
             Memory::Rows => {
                 let [x, y, z]: [[i32; 8]; 3] = three!(I => first[I].into());
-                let own =
-                    each!([0, 1, 2, 3, 4, 5, 6, 7], I => (z[I] as usize * ny + y[I] as usize) * nx + x[I] as usize);
+                let own = each!([0, 1, 2, 3, 4, 5, 6, 7], I => (z[I] as usize * ny + y[I] as usize) * nx + x[I] as usize);
                 (own, nx, nx * ny)
             }
         };
@@ -332,7 +362,8 @@ impl<T: Sample> Field<'_, T> {
             weights[0].mul_add(slices[0][I], weights[1] * slices[1][I])
                 + weights[2].mul_add(slices[2][I], weights[3] * slices[3][I])
         });
-        let sum_z = weights[3].mul_add(slices[3][0] * 2.0, weights[2] * slices[2][0]) - weights[0] * slices[0][0];
+        let sum_z = weights[3].mul_add(slices[3][0] * 2.0, weights[2] * slices[2][0])
+            - weights[0] * slices[0][0];
         let (moments, means) = ([sum_x, sum_y, sum_z], [x.moment, y.moment, z.moment]);
         (sum, three!(I => (moments[I] - means[I] * sum) * bell.per_variance))
     }
@@ -401,7 +432,8 @@ impl<T: Sample> Field<'_, T> {
         let pairs = four!(I => T::two(simd, &window, [0, I % 2, I / 2]));
         let rises = four!(I => pairs[I][1] - pairs[I][0]);
         let rows = four!(I => x.mul_add(rises[I], pairs[I][0] - self.zero));
-        let along_x = [y.mul_add(rises[1] - rises[0], rises[0]), y.mul_add(rises[3] - rises[2], rises[2])];
+        let along_x =
+            [y.mul_add(rises[1] - rises[0], rises[0]), y.mul_add(rises[3] - rises[2], rises[2])];
         let along_y = [rows[1] - rows[0], rows[3] - rows[2]];
         let slices = [y.mul_add(along_y[0], rows[0]), y.mul_add(along_y[1], rows[2])];
         let along_z = slices[1] - slices[0];
@@ -416,7 +448,12 @@ impl<T: Sample> Field<'_, T> {
 
     /// Sums four samples along each axis.
     #[inline(always)]
-    fn cubic<S: Simd>(&self, simd: S, factors: &[[f32; 4]; 4], place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
+    fn cubic<S: Simd>(
+        &self,
+        simd: S,
+        factors: &[[f32; 4]; 4],
+        place: [Lanes<S>; 3],
+    ) -> (Lanes<S>, [Lanes<S>; 3]) {
         let first: [Lanes<S>; 3] = three!(I => place[I].floor());
         if self.hold(first, [-1.0, 2.0]) {
             let taps: [Taps<S>; 3] = three!(I => Taps::new(simd, factors, place[I] - first[I]));
@@ -427,7 +464,8 @@ impl<T: Sample> Field<'_, T> {
         }
         // Four samples of the lattice, on which the mirror images beside them count too.
         let seen = three!(I => Seen::new(simd, place[I], self.dims[I]));
-        let mut taps: [Taps<S>; 3] = three!(I => Taps::new(simd, factors, seen[I].place - seen[I].first));
+        let mut taps: [Taps<S>; 3] =
+            three!(I => Taps::new(simd, factors, seen[I].place - seen[I].first));
         let starts = three!(I => {
             let is_low = seen[I].first.simd_lt(0.5);
             let is_high = seen[I].first.simd_gt(self.dims[I] as f32 - 2.5);
@@ -451,7 +489,12 @@ impl<T: Sample> Field<'_, T> {
 
     /// At the border of any lattice, sample by sample.
     #[inline(always)]
-    fn mirrored<S: Simd>(&self, simd: S, factors: &[[f32; 4]; 4], place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
+    fn mirrored<S: Simd>(
+        &self,
+        simd: S,
+        factors: &[[f32; 4]; 4],
+        place: [Lanes<S>; 3],
+    ) -> (Lanes<S>, [Lanes<S>; 3]) {
         let none = Lanes::splat(simd, 0.0);
         let mut sides = [none; 3];
         let mut indices = [[[0; 4]; 8]; 3];
@@ -568,7 +611,10 @@ impl<S: Simd> Seen<S> {
         let period = 2.0 * last;
         let around = place - (place * (1.0 / period)).floor() * period;
         let is_turned = around.simd_gt(last);
-        let place = is_turned.select(around * -1.0 + period, around).max(none).min(Lanes::splat(simd, last));
+        let place = is_turned
+            .select(around * -1.0 + period, around)
+            .max(none)
+            .min(Lanes::splat(simd, last));
         let first = place.floor().min(Lanes::splat(simd, last - 1.0));
         let side = is_turned.select(Lanes::splat(simd, -1.0), Lanes::splat(simd, 1.0));
         Self { place, first, side }
@@ -658,7 +704,11 @@ mod tests {
             let sample = volume.value((k * ny + j) * nx + i);
             for (number, sum) in sums.iter_mut().enumerate() {
                 let weight = |axis: usize| {
-                    if axis + 1 == number { tensor.slope(away[axis]) } else { tensor.value(away[axis]) }
+                    if axis + 1 == number {
+                        tensor.slope(away[axis])
+                    } else {
+                        tensor.value(away[axis])
+                    }
                 };
                 *sum += sample * weight(0) * weight(1) * weight(2);
             }
@@ -666,8 +716,17 @@ mod tests {
         sums
     }
 
-    fn found(volume: &Volume, weighting: Weighting, places: [[f32; 8]; 3], zero: f64) -> [[f32; 8]; 4] {
-        fn at<T: Sample, S: Simd>(simd: S, field: &Field<T>, places: [[f32; 8]; 3]) -> [[f32; 8]; 4] {
+    fn found(
+        volume: &Volume,
+        weighting: Weighting,
+        places: [[f32; 8]; 3],
+        zero: f64,
+    ) -> [[f32; 8]; 4] {
+        fn at<T: Sample, S: Simd>(
+            simd: S,
+            field: &Field<T>,
+            places: [[f32; 8]; 3],
+        ) -> [[f32; 8]; 4] {
             let places = three!(I => places[I].simd_into(simd));
             let (value, [x, y, z]) = field.at(simd, places);
             [value, x, y, z].map(Into::into)
@@ -685,7 +744,9 @@ mod tests {
 
     #[test]
     fn tensor_products_are_sums_over_mirrored_samples() {
-        for (number, dims) in [[7, 6, 8], [1, 5, 4], [6, 2, 1], [4, 5, 6], [2, 3, 2]].into_iter().enumerate() {
+        for (number, dims) in
+            [[7, 6, 8], [1, 5, 4], [6, 2, 1], [4, 5, 6], [2, 3, 2]].into_iter().enumerate()
+        {
             let count = dims.iter().product();
             let bytes: Vec<u8> = (0..count).map(|at: usize| (at * at * 31 % 251) as u8).collect();
             let samples = match number {
@@ -705,7 +766,8 @@ mod tests {
                         let last = dims[axis] as f64 - 1.0;
                         (part * (last + 2.0 * beyond) - beyond) as f32
                     };
-                    let places = [0, 1, 2].map(|axis| std::array::from_fn(|lane| place(axis, lane)));
+                    let places =
+                        [0, 1, 2].map(|axis| std::array::from_fn(|lane| place(axis, lane)));
                     for zero in [0.0, 100.0] {
                         let found = found(&volume, Weighting::Tensor(tensor), places, zero);
                         for lane in 0..8 {
@@ -713,7 +775,8 @@ mod tests {
                             let mut expected = truth(&volume, tensor, place);
                             expected[0] -= zero;
                             // At a sample a linear field has a kink: its slope is that of either side.
-                            let is_kink = tensor == Tensor::Linear && place.iter().any(|at| at.fract() == 0.0);
+                            let is_kink = tensor == Tensor::Linear
+                                && place.iter().any(|at| at.fract() == 0.0);
                             let compared = if is_kink { 1 } else { 4 };
                             for (found, expected) in found.iter().zip(expected).take(compared) {
                                 let found = f64::from(found[lane]);
@@ -737,13 +800,15 @@ mod tests {
             for index in 0..dims.iter().product() {
                 let own = [index % dims[0], index / dims[0] % dims[1], index / (dims[0] * dims[1])];
                 let away = [0, 1, 2].map(|axis| place[axis] - own[axis] as f64);
-                let weight = (-0.5 * away.iter().map(|d| d * d).sum::<f64>() / (sigma * sigma)).exp();
+                let weight =
+                    (-0.5 * away.iter().map(|d| d * d).sum::<f64>() / (sigma * sigma)).exp();
                 (sum, weights) = (sum + weight * volume.value(index), weights + weight);
             }
             sum / weights
         };
         let slope = |axis: usize| {
-            let beside = |by: f64| [0, 1, 2].map(|own| place[own] + if own == axis { by } else { 0.0 });
+            let beside =
+                |by: f64| [0, 1, 2].map(|own| place[own] + if own == axis { by } else { 0.0 });
             (at(beside(1e-4)) - at(beside(-1e-4))) / 2e-4
         };
         [at(place), slope(0), slope(1), slope(2)]

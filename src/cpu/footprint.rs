@@ -72,14 +72,19 @@ pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
     let to_view = to_view(source);
     let mut center = to_view * Vec3::from(splat.center) + origin(source);
     let [b00, b10, b11, b20, b21, b22] = splat.factor;
-    let factor = Mat3::from_cols(Vec3::new(b00, b10, b20), Vec3::new(0.0, b11, b21), Vec3::new(0.0, 0.0, b22));
+    let factor = Mat3::from_cols(
+        Vec3::new(b00, b10, b20),
+        Vec3::new(0.0, b11, b21),
+        Vec3::new(0.0, 0.0, b22),
+    );
     let turned = to_view * factor;
     let pixel = if plan.view.perspective { center.length() } else { 1.0 } / plan.frame.scale;
     let blur2 = (FOOTPRINT_BLUR as f32 * pixel).powi(2);
     let covariance = turned * turned.transpose() + Mat3::from_diagonal(Vec3::splat(blur2));
     let mut strength = splat.strength;
     let carried = if source.flags & RADIANCE != 0 {
-        let [red, green, blue, opacity] = splat.color.to_le_bytes().map(|part| f32::from(part) / 255.0);
+        let [red, green, blue, opacity] =
+            splat.color.to_le_bytes().map(|part| f32::from(part) / 255.0);
         strength *= opacity;
         let normal = decode_normal(splat.normal).map_or(Vec3::ZERO, |normal| to_view * normal);
         if normal != Vec3::ZERO {
@@ -137,7 +142,8 @@ pub fn record(plan: &Plan, source: &Source, splat: &Candidate) -> Option<Record>
     let m20 = -(l20 * m00 + l21 * m10) * m22;
     let mut strength = splat.strength;
     let radiance = |color: [f32; 3], normal: Vec3| {
-        let facing = if plan.single().is_some() { 1.0 } else { facing_weight(plan, normal, splat.center) };
+        let facing =
+            if plan.single().is_some() { 1.0 } else { facing_weight(plan, normal, splat.center) };
         let [red, green, blue] = color;
         [1.0, 1.0, red, green, blue, normal.x, normal.y, normal.z].map(|part| part * facing)
     };
@@ -187,7 +193,11 @@ fn facing_weight(plan: &Plan, normal: Vec3, center: Vec3) -> f32 {
     if normal == Vec3::ZERO {
         return 1.0;
     }
-    let away = if plan.view.perspective { normal.dot(center) / center.length().max(1e-30) } else { normal.z };
+    let away = if plan.view.perspective {
+        normal.dot(center) / center.length().max(1e-30)
+    } else {
+        normal.z
+    };
     (0.5 - 4.0 * away).clamp(1.0 / 255.0, 1.0)
 }
 
@@ -226,10 +236,16 @@ fn locate(plan: &Plan, splat: &Candidate, ends: bool) -> Option<Place> {
         far = ((distance + reach) * (distance + reach) + across).sqrt();
         bounds = if c.z - reaches.z > frame.z_near {
             let (xz, yz, zz) = (e2 * s.x_axis.z, e2 * s.y_axis.z, e2 * s.z_axis.z);
-            [tangent_bounds(c.x, c.z, e2 * s.x_axis.x, xz, zz), tangent_bounds(c.y, c.z, e2 * s.y_axis.y, yz, zz)]
+            [
+                tangent_bounds(c.x, c.z, e2 * s.x_axis.x, xz, zz),
+                tangent_bounds(c.y, c.z, e2 * s.y_axis.y, yz, zz),
+            ]
         } else {
             let high = c.z + reaches.z;
-            [box_bounds(c.x, reaches.x, frame.z_near, high), box_bounds(c.y, reaches.y, frame.z_near, high)]
+            [
+                box_bounds(c.x, reaches.x, frame.z_near, high),
+                box_bounds(c.y, reaches.y, frame.z_near, high),
+            ]
         };
     } else {
         bounds = [[c.x - reaches.x, c.x + reaches.x], [c.y - reaches.y, c.y + reaches.y]];

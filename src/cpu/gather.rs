@@ -31,7 +31,8 @@ pub fn obstacle(
     parts: usize,
     unsuited: impl Fn(&Volume, &Kernel) -> Option<&'static str>,
 ) -> Option<&'static str> {
-    let fields = scene.items.iter().filter(|item| !matches!(item, Item::Radiance(_) | Item::Hierarchy(_)));
+    let fields =
+        scene.items.iter().filter(|item| !matches!(item, Item::Radiance(_) | Item::Hierarchy(_)));
     let unsuited = match fields.collect::<Vec<_>>()[..] {
         [Item::Volume(volume, kernel, _)] => unsuited(volume, kernel),
         [Item::Bricks(_, kernel, _)] => unsuited_kernel(kernel),
@@ -78,7 +79,9 @@ pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
 pub fn unsuited_kernel(kernel: &Kernel) -> Option<&'static str> {
     match field::weighting(kernel) {
         None => Some("kernels other than tensor products and Gaussians that reach two samples"),
-        Some(Weighting::Gaussian(sigma)) if sigma < LEAST_DEVIATION => Some("kernels much narrower than a sample"),
+        Some(Weighting::Gaussian(sigma)) if sigma < LEAST_DEVIATION => {
+            Some("kernels much narrower than a sample")
+        }
         Some(_) => None,
     }
 }
@@ -206,9 +209,17 @@ fn outside2<S: Simd>(simd: S, plan: &Plan, place: [Lanes<S>; 3]) -> Lanes<S> {
 impl<S: Simd> Face<S> {
     /// This where it has a value, else the mean of its sheet and what the other end, if that has a value, changes by.
     #[inline(always)]
-    fn or(self, simd: S, has_own: mask32x8<S>, mean: Lanes<S>, other: &Self, has_other: mask32x8<S>) -> Self {
+    fn or(
+        self,
+        simd: S,
+        has_own: mask32x8<S>,
+        mean: Lanes<S>,
+        other: &Self,
+        has_other: mask32x8<S>,
+    ) -> Self {
         let none = Lanes::splat(simd, 0.0);
-        let across = three!(I => has_own.select(self.across[I], has_other.select(other.across[I], none)));
+        let across =
+            three!(I => has_own.select(self.across[I], has_other.select(other.across[I], none)));
         Self { value: has_own.select(self.value, mean), across }
     }
 }
@@ -255,16 +266,21 @@ impl Gather<'_> {
         let middle = sum * 0.5 + bend * 0.125;
         let filling = Lanes::splat(simd, 1.0);
         let direction = rays.direction;
-        let mut layer = Layer { front, back, middle, start, thickness, begin, end, filling, direction };
+        let mut layer =
+            Layer { front, back, middle, start, thickness, begin, end, filling, direction };
         if self.parts > 1 {
-            let mask = mask & self.fill_thick(simd, plan, rays, [front_weight, last.weight], &mut layer);
+            let mask =
+                mask & self.fill_thick(simd, plan, rays, [front_weight, last.weight], &mut layer);
             let shows = plan.optics == Optics::Maximum || self.visible.may_show(simd, plan, &layer);
             return (shows && mask.any_true()).then_some((layer, mask));
         }
         if self.is_blended {
             let least = front_weight.min(last.weight);
             let has_gaps = (mask & least.simd_le(0.0)).any_true();
-            if !has_gaps && plan.optics != Optics::Maximum && !self.visible.may_show(simd, plan, &layer) {
+            if !has_gaps
+                && plan.optics != Optics::Maximum
+                && !self.visible.may_show(simd, plan, &layer)
+            {
                 return None;
             }
             if !has_gaps && !bend.abs().simd_gt(STRAIGHT).any_true() {
@@ -327,7 +343,8 @@ impl Gather<'_> {
                         all += weight;
                     }
                 }
-                let mean = sum / all.max(Lanes::splat(simd, f32::MIN_POSITIVE)) * plan.frame.transfer[1];
+                let mean =
+                    sum / all.max(Lanes::splat(simd, f32::MIN_POSITIVE)) * plan.frame.transfer[1];
                 let (front, back) = (layer.front, layer.back);
                 let has_value = if self.is_blended {
                     each!([0, 1], I => weights[I].simd_gt(0.0))
@@ -342,7 +359,11 @@ impl Gather<'_> {
                 layer.back = back.or(simd, has_value[1], mean, &front, has_value[0]);
                 layer.middle = mean * 1.5 - (layer.front.value + layer.back.value) * 0.25;
                 let per_thickness = step * (0.5 / layer.thickness);
-                if self.is_blended { (all * per_thickness).simd_gt(least) } else { mask32x8::splat(simd, true) }
+                if self.is_blended {
+                    (all * per_thickness).simd_gt(least)
+                } else {
+                    mask32x8::splat(simd, true)
+                }
             },
         )
     }
@@ -359,8 +380,8 @@ impl Gather<'_> {
             let near = after.min(before);
             if near.simd_lt(BEYOND).any_true() {
                 // As if kernels were as dense as numbers, beyond half a step from the last sample none.
-                all *=
-                    normal_cdf(simd, (after + 0.5) * per_deviation) * normal_cdf(simd, (before + 0.5) * per_deviation);
+                all *= normal_cdf(simd, (after + 0.5) * per_deviation)
+                    * normal_cdf(simd, (before + 0.5) * per_deviation);
             }
         }
         all
@@ -368,7 +389,15 @@ impl Gather<'_> {
 
     /// Looks up what may show in a sheet and the ones behind it: many at once, because looking takes longer than adding.
     #[inline(always)]
-    fn look_up<S: Simd>(&self, simd: S, plan: &Plan, rays: &Rays<S>, first: usize, marks: &[u64], last: &mut Last<S>) {
+    fn look_up<S: Simd>(
+        &self,
+        simd: S,
+        plan: &Plan,
+        rays: &Rays<S>,
+        first: usize,
+        marks: &[u64],
+        last: &mut Last<S>,
+    ) {
         last.first = first;
         last.shows = [0; LOOKED_UP];
         // What is found on the plane behind the sheet before.
@@ -430,7 +459,13 @@ impl Gather<'_> {
     /// The mean of levels in bricks by their shares. A level has none where it has no brick; where no level has one, nothing
     /// shows.
     #[inline(always)]
-    fn mean<S: Simd>(&self, simd: S, levels: &[Level], place: [Lanes<S>; 3], way: [Lanes<S>; 3]) -> Point<S> {
+    fn mean<S: Simd>(
+        &self,
+        simd: S,
+        levels: &[Level],
+        place: [Lanes<S>; 3],
+        way: [Lanes<S>; 3],
+    ) -> Point<S> {
         let none = Lanes::splat(simd, 0.0);
         let (mut all, mut value, mut slopes, mut hidden) = (none, none, [none; 3], none);
         for level in levels {
@@ -454,7 +489,14 @@ impl Gather<'_> {
 
     /// Finds the field on a plane, and its change along the rays a world unit.
     #[inline(always)]
-    fn face<S: Simd>(&self, simd: S, plan: &Plan, rays: &Rays<S>, plane: usize, last: &mut Last<S>) {
+    fn face<S: Simd>(
+        &self,
+        simd: S,
+        plan: &Plan,
+        rays: &Rays<S>,
+        plane: usize,
+        last: &mut Last<S>,
+    ) {
         let frame = &plan.frame;
         let per_value = frame.transfer[1];
         let Point { value, slopes, weight } = self.at(simd, rays, plan.planes[plane]);

@@ -55,10 +55,15 @@ impl Prepared {
                 Self::Set { levels: Levels::new(set).map(Box::new), drawn: set.clone() }
             }
             Item::Hierarchy(hierarchy) => Self::Hierarchy(Box::new(PageCache::new(hierarchy))),
-            Item::Volume(volume, kernel, _) => {
-                Self::Volume { volume: volume.clone(), kernel: kernel.clone(), ranges: None, listed: None }
+            Item::Volume(volume, kernel, _) => Self::Volume {
+                volume: volume.clone(),
+                kernel: kernel.clone(),
+                ranges: None,
+                listed: None,
+            },
+            Item::Bricks(bricks, kernel, _) => {
+                Self::Bricks(Box::new(BrickCache::new(bricks, kernel)))
             }
-            Item::Bricks(bricks, kernel, _) => Self::Bricks(Box::new(BrickCache::new(bricks, kernel))),
         }
     }
 
@@ -104,7 +109,9 @@ impl Prepared {
             Self::Set { drawn, .. } => {
                 let source = Source::of_splats(view, drawn, false);
                 let own = |splat: &Splat| record(plan, &source, &widened(plan, &source, splat));
-                Ok(batches(&drawn.splats, spare, |batch, records| records.extend(batch.iter().filter_map(own))))
+                Ok(batches(&drawn.splats, spare, |batch, records| {
+                    records.extend(batch.iter().filter_map(own))
+                }))
             }
             Self::Hierarchy(pages) => {
                 pages.update(view, settings, pixels)?;
@@ -113,14 +120,19 @@ impl Prepared {
             Self::Volume { volume, kernel, ranges, listed } => {
                 let ranges = ranges.get_or_insert_with(|| volume.drawn_ranges(kernel).into_owned());
                 if listed.as_ref().is_none_or(|(own, _)| **own != *shown) {
-                    *listed = Some((Box::new(*shown), list(volume.drawn_lattice().dims, ranges, shown)));
+                    *listed =
+                        Some((Box::new(*shown), list(volume.drawn_lattice().dims, ranges, shown)));
                 }
                 let Some((_, list)) = listed else { return Ok(Vec::new()) };
                 let lattice = LatticeSource::new(plan, volume, kernel);
                 let own = |index: &u32| lattice.record(plan, *index as usize);
-                Ok(batches(list, spare, |batch, records| records.extend(batch.iter().filter_map(own))))
+                Ok(batches(list, spare, |batch, records| {
+                    records.extend(batch.iter().filter_map(own))
+                }))
             }
-            Self::Bricks(cache) => Ok(choice.map_or_else(Vec::new, |choice| brick_records(plan, cache, choice))),
+            Self::Bricks(cache) => {
+                Ok(choice.map_or_else(Vec::new, |choice| brick_records(plan, cache, choice)))
+            }
         }
     }
 }
@@ -132,7 +144,10 @@ fn batches<T: Sync>(
     add: impl Fn(&[T], &mut Vec<Record>) + Sync,
 ) -> Vec<Vec<Record>> {
     let mut records = spare_for(spare, candidates.len().div_ceil(BATCH));
-    records.par_iter_mut().zip(candidates.par_chunks(BATCH)).for_each(|(records, batch)| add(batch, records));
+    records
+        .par_iter_mut()
+        .zip(candidates.par_chunks(BATCH))
+        .for_each(|(records, batch)| add(batch, records));
     records
 }
 
@@ -157,21 +172,26 @@ fn list(dims: [usize; 3], ranges: &[[u8; 2]], shown: &[u16; 256]) -> Vec<u32> {
     let shows = |[low, high]: [u8; 2]| u16::from(high) >= shown[usize::from(low)];
     let layer = |layer: usize| {
         let mut list = Vec::new();
-        let along = |block: usize, axis: usize| block * LIST_BLOCK..((block + 1) * LIST_BLOCK).min(dims[axis]);
+        let along = |block: usize, axis: usize| {
+            block * LIST_BLOCK..((block + 1) * LIST_BLOCK).min(dims[axis])
+        };
         for row in 0..dims[1].div_ceil(LIST_BLOCK) {
             for column in 0..dims[0].div_ceil(LIST_BLOCK) {
                 for z in along(layer, 2) {
                     for y in along(row, 1) {
                         let start = (z * dims[1] + y) * dims[0];
                         let own = along(column, 0).map(|x| start + x);
-                        list.extend(own.filter(|index| shows(ranges[*index])).map(|index| index as u32));
+                        list.extend(
+                            own.filter(|index| shows(ranges[*index])).map(|index| index as u32),
+                        );
                     }
                 }
             }
         }
         list
     };
-    let layers: Vec<Vec<u32>> = (0..dims[2].div_ceil(LIST_BLOCK)).into_par_iter().map(layer).collect();
+    let layers: Vec<Vec<u32>> =
+        (0..dims[2].div_ceil(LIST_BLOCK)).into_par_iter().map(layer).collect();
     layers.concat()
 }
 
@@ -248,9 +268,12 @@ impl<'a> LatticeSource<'a> {
     fn slope(&self, plan: &Plan, axis: usize, index: [usize; 3], value: f32) -> f32 {
         let dims = self.lattice.dims;
         // Layers of one kind of a body-centred lattice lie two apart.
-        let stride = if axis == 2 && self.lattice.arrangement == Arrangement::BodyCentred { 2 } else { 1 };
+        let stride =
+            if axis == 2 && self.lattice.arrangement == Arrangement::BodyCentred { 2 } else { 1 };
         let place = |at: usize| match &self.lattice.arrangement {
-            Arrangement::Rectilinear(coordinates) => (coordinates[axis][at] - coordinates[axis][0]) as f32,
+            Arrangement::Rectilinear(coordinates) => {
+                (coordinates[axis][at] - coordinates[axis][0]) as f32
+            }
             _ => at as f32 / stride as f32,
         };
         let beside = |at: usize| {
@@ -287,7 +310,9 @@ fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Re
     let sources: Vec<Source> = choice
         .levels
         .iter()
-        .map(|(level, _)| Source::of_lattice(plan.view, &cache.bricks.lattice(*level), &cache.kernel, false))
+        .map(|(level, _)| {
+            Source::of_lattice(plan.view, &cache.bricks.lattice(*level), &cache.kernel, false)
+        })
         .collect();
     // A batch is a quarter of a brick.
     const QUARTER: usize = BATCH / (SIDE * SIDE);
@@ -297,13 +322,17 @@ fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Re
         .iter()
         .flat_map(|&(level, brick)| (0..SIDE / QUARTER).map(move |quarter| (level, brick, quarter)))
         .collect();
-    let place_in_slot = |[x, y, z]: [usize; 3]| ((z + BESIDE) * SLOT_SIDE + y + BESIDE) * SLOT_SIDE + x + BESIDE;
+    let place_in_slot =
+        |[x, y, z]: [usize; 3]| ((z + BESIDE) * SLOT_SIDE + y + BESIDE) * SLOT_SIDE + x + BESIDE;
     let batch = |&(level, brick, quarter): &(usize, u32, usize)| {
-        let Some(part) = choice.levels.iter().position(|(own, _)| *own == level) else { return Vec::new() };
+        let Some(part) = choice.levels.iter().position(|(own, _)| *own == level) else {
+            return Vec::new();
+        };
         let Some(slot) = cache.slot(level, brick) else { return Vec::new() };
         let blocks = cache.blocks(slot);
         let (source, weight) = (&sources[part], choice.levels[part].1 as f32);
-        let (to_view, origin, covariance) = (to_view(source), origin(source), symmetric(&source.covariance));
+        let (to_view, origin, covariance) =
+            (to_view(source), origin(source), symmetric(&source.covariance));
         let dims = cache.bricks.level(level).dims;
         let first = cache.bricks.level(level).place(brick).map(|at| at * SIDE);
         let mut records = Vec::new();
@@ -317,12 +346,18 @@ fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Re
                     if u16::from(high) < choice.shown[usize::from(low)] || !is_inside {
                         continue;
                     }
-                    let steps = Vec3::from_array(std::array::from_fn(|axis| (first[axis] + within[axis]) as f32));
+                    let steps = Vec3::from_array(std::array::from_fn(|axis| {
+                        (first[axis] + within[axis]) as f32
+                    }));
                     let candidate = Candidate {
                         center: origin + to_view * steps,
                         covariance,
                         extent: source.extent,
-                        strength: sample(plan, cache.samples(), slot * SLOT + place_in_slot(within)),
+                        strength: sample(
+                            plan,
+                            cache.samples(),
+                            slot * SLOT + place_in_slot(within),
+                        ),
                         carried: Carried::Scalar { weight, gradient: Vec3::ZERO },
                     };
                     records.extend(record(plan, source, &candidate));
@@ -350,7 +385,9 @@ fn sample(plan: &Plan, samples: &Samples, index: usize) -> f32 {
 /// The transfer function of a scene's field, and the range of its values; none without a field.
 pub fn transfer_of(scene: &Scene) -> Option<&TransferFunction> {
     scene.items.iter().find_map(|item| match item {
-        Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => Some(transfer),
+        Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => {
+            Some(transfer)
+        }
         Item::Radiance(_) | Item::Hierarchy(_) => None,
     })
 }
@@ -360,5 +397,7 @@ pub fn check_count(records: &[Vec<Record>]) -> Result<()> {
     if records.len() <= u32::MAX as usize / BATCH {
         return Ok(());
     }
-    Err(Error::Argument("the picture takes more splats than 4,294,967,295; take a coarser cut".into()))
+    Err(Error::Argument(
+        "the picture takes more splats than 4,294,967,295; take a coarser cut".into(),
+    ))
 }

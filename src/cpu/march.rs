@@ -35,7 +35,14 @@ impl March<'_> {
     /// Draws a tile. `entries` are its splats by their first sheets; `marks` the sheets in which the lattice may show
     /// something, a bit each.
     #[inline(always)]
-    pub fn tile<S: Simd>(&self, simd: S, at: [usize; 2], entries: &[Entry], marks: &[u64], drawn: &mut u64) -> Tile {
+    pub fn tile<S: Simd>(
+        &self,
+        simd: S,
+        at: [usize; 2],
+        entries: &[Entry],
+        marks: &[u64],
+        drawn: &mut u64,
+    ) -> Tile {
         if entries.is_empty() && marks.iter().all(|word| *word == 0) {
             return EMPTY;
         }
@@ -66,7 +73,15 @@ impl March<'_> {
         let mut sums = Sums::new(simd);
         for entry in entries {
             let window = Window { front: usize::from(entry.sheet), is_continued: false };
-            add(simd, self.plan, record_of(self.records, entry.record), window, corner, packets, &mut sums);
+            add(
+                simd,
+                self.plan,
+                record_of(self.records, entry.record),
+                window,
+                corner,
+                packets,
+                &mut sums,
+            );
             *drawn += 1;
             if order == Order::FrontToBack {
                 for packet in packets.iter_mut() {
@@ -103,7 +118,9 @@ impl March<'_> {
                 sheet = first - 1;
             }
             let continued = std::mem::take(&mut ahead[sheet % WINDOW]);
-            let added = self.add(simd, sheet, entries, &mut next, continued, corner, packets, &mut sums, &mut ahead);
+            let added = self.add(
+                simd, sheet, entries, &mut next, continued, corner, packets, &mut sums, &mut ahead,
+            );
             *drawn += added;
             if added > 0 {
                 open = WINDOW;
@@ -144,7 +161,15 @@ impl March<'_> {
         let mut added = 0;
         for (number, is_continued) in continued.iter().map(|number| (*number, true)).chain(begun) {
             let record = record_of(self.records, number);
-            add(simd, self.plan, record, Window { front: sheet, is_continued }, corner, packets, sums);
+            add(
+                simd,
+                self.plan,
+                record,
+                Window { front: sheet, is_continued },
+                corner,
+                packets,
+                sums,
+            );
             added += 1;
             if usize::from(record.sheets[1]) >= sheet + WINDOW && !self.plan.is_whole() {
                 ahead[(sheet + WINDOW - 1) % WINDOW].push(number);
@@ -180,16 +205,24 @@ impl March<'_> {
             let rays = &packet.rays;
             let radiance = sums.take_radiance(simd, plan, rays, sheet, number);
             let field = match &self.gather {
-                Some(gather) if has_lattice => {
-                    gather.layer(simd, plan, rays, sheet, marks, packet.pixels.through, &mut last[number])
-                }
+                Some(gather) if has_lattice => gather.layer(
+                    simd,
+                    plan,
+                    rays,
+                    sheet,
+                    marks,
+                    packet.pixels.through,
+                    &mut last[number],
+                ),
                 Some(_) => None,
                 None if has_sums => {
-                    let slopes =
-                        values.as_ref().map(|values| values.each_ref().map(|on| differences(simd, on, number)));
+                    let slopes = values
+                        .as_ref()
+                        .map(|values| values.each_ref().map(|on| differences(simd, on, number)));
                     let layer = sums.resolve(simd, plan, rays, sheet, number, slopes);
                     let is_maximum = plan.optics == Optics::Maximum;
-                    layer.filter(|(layer, _)| is_maximum || self.visible.may_show(simd, plan, layer))
+                    layer
+                        .filter(|(layer, _)| is_maximum || self.visible.may_show(simd, plan, layer))
                 }
                 None => None,
             };
@@ -198,7 +231,8 @@ impl March<'_> {
             }
             let field = field.as_ref().map(|(layer, mask)| (layer, *mask));
             plan.close(simd, sheet, rays, field, radiance, &mut packet.pixels);
-            packet.is_done = plan.optics != Optics::Maximum && !packet.pixels.through.simd_ge(OPAQUE).any_true();
+            packet.is_done =
+                plan.optics != Optics::Maximum && !packet.pixels.through.simd_ge(OPAQUE).any_true();
         }
     }
 
@@ -225,7 +259,8 @@ impl March<'_> {
             }
             let hit: [f32; 8] = hit.into();
             for lane in 0..8 {
-                let own = &mut tile[(number / 2 * HIGH + lane / WIDE) * TILE + number % 2 * WIDE + lane % WIDE];
+                let own = &mut tile
+                    [(number / 2 * HIGH + lane / WIDE) * TILE + number % 2 * WIDE + lane % WIDE];
                 *own = ([red[lane], green[lane], blue[lane], 1.0 - through[lane]], hit[lane]);
             }
         }

@@ -160,7 +160,11 @@ impl CpuRenderer {
     /// # Errors
     /// [`Error::Argument`] for a camera or settings that make no picture of this scene; those of reading,
     /// for scenes that are read as they are drawn.
-    pub fn render(&mut self, camera: &Camera, settings: &Settings) -> Result<(Picture, FrameStats)> {
+    pub fn render(
+        &mut self,
+        camera: &Camera,
+        settings: &Settings,
+    ) -> Result<(Picture, FrameStats)> {
         let start = Instant::now();
         self.scene.validate_settings(settings)?;
         let view = camera.view(settings.size)?;
@@ -168,7 +172,8 @@ impl CpuRenderer {
         view.validate_for(&bounds)?;
         let mut clock = Clock { last: start, steps: Vec::new() };
         let outline = self.outline(&view, settings)?;
-        let plan = Plan::new(&self.scene, &view, &outline.sheets, settings, outline.choice.as_ref());
+        let plan =
+            Plan::new(&self.scene, &view, &outline.sheets, settings, outline.choice.as_ref());
         clock.step("plan");
         let gathers = self.gathers(settings, &outline)?;
         let before: u64 = self.brick_reads();
@@ -181,7 +186,14 @@ impl CpuRenderer {
                 cache.update(choice, most_bricks(&cache.bricks, settings))?;
             }
             if !(gathers && matches!(item, Item::Volume(..) | Item::Bricks(..))) {
-                records.extend(prepared.records(&plan, settings, *cut_pixels, choice, shown, &mut spare)?);
+                records.extend(prepared.records(
+                    &plan,
+                    settings,
+                    *cut_pixels,
+                    choice,
+                    shown,
+                    &mut spare,
+                )?);
             }
         }
         items::check_count(&records)?;
@@ -215,7 +227,9 @@ impl CpuRenderer {
     }
 
     fn brick_reads(&self) -> u64 {
-        let reads = |prepared: &Prepared| if let Prepared::Bricks(bricks) = prepared { bricks.reads } else { 0 };
+        let reads = |prepared: &Prepared| {
+            if let Prepared::Bricks(bricks) = prepared { bricks.reads } else { 0 }
+        };
         self.prepared.iter().map(reads).sum()
     }
 
@@ -227,7 +241,9 @@ impl CpuRenderer {
         let mut pages: Vec<_> = self
             .prepared
             .iter_mut()
-            .filter_map(|prepared| if let Prepared::Hierarchy(pages) = prepared { Some(pages.as_mut()) } else { None })
+            .filter_map(|prepared| {
+                if let Prepared::Hierarchy(pages) = prepared { Some(pages.as_mut()) } else { None }
+            })
             .collect();
         let cut_pixels = match detail {
             _ if pages.is_empty() => 0.0,
@@ -245,7 +261,8 @@ impl CpuRenderer {
         let choice = self.scene.choice(view, settings, detail, most.unwrap_or(usize::MAX), &bounds);
         let sheets = self.scene.sheets_of(view, settings, choice.as_ref(), &bounds);
         let mut shown = EVERYTHING;
-        if let Some(Item::Volume(volume, _, transfer)) = self.scene.items.iter().find(|i| matches!(i, Item::Volume(..)))
+        if let Some(Item::Volume(volume, _, transfer)) =
+            self.scene.items.iter().find(|i| matches!(i, Item::Volume(..)))
             && !self.scene.mixes_afar(settings, &sheets, choice.as_ref())
         {
             shown = first_visible(transfer, volume.range);
@@ -266,9 +283,9 @@ impl CpuRenderer {
         }
         let parts = gather::parts(&self.scene, &outline.sheets, outline.choice.as_ref());
         match gather::obstacle(&self.scene, settings, parts, gather::unsuited) {
-            Some(what) if settings.evaluate == Evaluate::Gather => {
-                Err(Error::Argument(format!("{what} can't be gathered; scatter instead, or leave it to the engine")))
-            }
+            Some(what) if settings.evaluate == Evaluate::Gather => Err(Error::Argument(format!(
+                "{what} can't be gathered; scatter instead, or leave it to the engine"
+            ))),
             Some(what) if let Some(tensor) = self.scene.tensor() => {
                 Err(Error::Argument(format!("the kernel {} does not draw {what}", tensor.name())))
             }
@@ -292,7 +309,8 @@ impl CpuRenderer {
                         Some(blend) => blend.ranges(volume, kernel),
                         None => skip::field_ranges(volume, kernel),
                     });
-                    let dims = self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).dims;
+                    let dims =
+                        self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).dims;
                     self.shown.take_if(|(own, _)| *own != first);
                     self.shown.get_or_insert_with(|| (first, Shown::new(dims, ranges, &first)));
                 }
@@ -310,7 +328,12 @@ impl CpuRenderer {
     }
 
     /// The field that is gathered; none where none of its bricks shows.
-    fn gather<'a>(&'a self, plan: &Plan, outline: &Outline, visible: &'a Visible) -> Option<Gather<'a>> {
+    fn gather<'a>(
+        &'a self,
+        plan: &Plan,
+        outline: &Outline,
+        visible: &'a Visible,
+    ) -> Option<Gather<'a>> {
         let zero = plan.tables.values[0];
         let mut levels = Vec::new();
         for (item, prepared) in self.scene.items.iter().zip(&self.prepared) {
@@ -323,9 +346,13 @@ impl CpuRenderer {
                     };
                     // Coefficients begin before the samples.
                     let drawn = volume.drawn_lattice();
-                    let before = volume.lattice.axes.inverse() * (volume.lattice.origin - drawn.origin);
+                    let before =
+                        volume.lattice.axes.inverse() * (volume.lattice.origin - drawn.origin);
                     let shift = before.as_vec3().to_array();
-                    let cells = self.blend.as_ref().map_or([[1.0; 3], shift], |blend| blend.to_cells(shift));
+                    let cells = self
+                        .blend
+                        .as_ref()
+                        .map_or([[1.0; 3], shift], |blend| blend.to_cells(shift));
                     levels.push(gather::Level {
                         field,
                         dims: drawn.dims,
@@ -337,19 +364,36 @@ impl CpuRenderer {
                         cells,
                     });
                 }
-                (Item::Bricks(bricks, kernel, _), Prepared::Bricks(cache)) if !cache.samples().is_empty() => {
+                (Item::Bricks(bricks, kernel, _), Prepared::Bricks(cache))
+                    if !cache.samples().is_empty() =>
+                {
                     let (choice, found) = self.levels.as_ref()?;
                     let fine = &bricks.header().lattice;
                     for ((level, share), (grid, shown)) in choice.levels.iter().zip(found) {
                         let (own, dims) = (bricks.lattice(*level), bricks.level(*level).dims);
-                        let field = Typed::of_bricks(cache.samples(), dims, grid, field::weighting(kernel)?, zero);
+                        let field = Typed::of_bricks(
+                            cache.samples(),
+                            dims,
+                            grid,
+                            field::weighting(kernel)?,
+                            zero,
+                        );
                         let to_own = own.axes.inverse();
                         let scale = (to_own * fine.axes).to_cols_array_2d();
                         let shift = (to_own * (fine.origin - own.origin)).as_vec3().to_array();
                         let scale = [0, 1, 2].map(|axis| scale[axis][axis] as f32);
                         let share = *share as f32;
                         let cells = [scale, shift];
-                        levels.push(gather::Level { field, dims, grid: Some(grid), shown, share, scale, shift, cells });
+                        levels.push(gather::Level {
+                            field,
+                            dims,
+                            grid: Some(grid),
+                            shown,
+                            share,
+                            scale,
+                            shift,
+                            cells,
+                        });
                     }
                 }
                 _ => {}
@@ -361,7 +405,8 @@ impl CpuRenderer {
             f64::from(x * x + y * y + z * z).sqrt() * f64::from(finest[axis])
         });
         let steps = steps.fold(0.0, f64::max) * outline.sheets.step;
-        let looks = if steps <= 1.0 { 0 } else { ((steps / gather::MOST_APART).ceil() as usize).max(2) };
+        let looks =
+            if steps <= 1.0 { 0 } else { ((steps / gather::MOST_APART).ceil() as usize).max(2) };
         let parts = gather::parts(&self.scene, &outline.sheets, outline.choice.as_ref());
         let deviation = self.scene.items.iter().find_map(|item| match item {
             Item::Volume(_, kernel, _) | Item::Bricks(_, kernel, _) => field::deviation(kernel),
@@ -416,7 +461,8 @@ impl CpuRenderer {
             }
             clock.step("skip");
         }
-        let marked = |own: &Vec<u64>| own.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
+        let marked =
+            |own: &Vec<u64>| own.iter().map(|word| u64::from(word.count_ones())).sum::<u64>();
         let gathered = marks.iter().map(marked).sum();
         let march = March { plan, gather, visible: &visible, records };
         let mut bins = Bins::new(plan, records, &mut spare);
@@ -462,7 +508,9 @@ fn record_bytes(records: &[Vec<Record>]) -> u64 {
 
 /// Bricks that the settings' memory holds; one at least.
 fn most_bricks(bricks: &Bricks, settings: &Settings) -> usize {
-    usize::try_from(settings.page_memory / brick_cache::slot_bytes(bricks)).unwrap_or(usize::MAX).max(1)
+    usize::try_from(settings.page_memory / brick_cache::slot_bytes(bricks))
+        .unwrap_or(usize::MAX)
+        .max(1)
 }
 
 /// The tiles of a block, row by row.
@@ -480,8 +528,10 @@ fn draw_block(
     for (number, tile) in found.iter_mut().enumerate() {
         let at = [column * BLOCK + number % BLOCK, row * BLOCK + number / BLOCK];
         if at[0] < tiles[0] && at[1] < tiles[1] {
-            let (entries, marks) =
-                (entries.of(number), marks.get(at[1] * tiles[0] + at[0]).map_or(&[][..], Vec::as_slice));
+            let (entries, marks) = (
+                entries.of(number),
+                marks.get(at[1] * tiles[0] + at[0]).map_or(&[][..], Vec::as_slice),
+            );
             *tile = lanes!(level, simd => march.tile(simd, at, entries, marks, &mut count));
         }
     }
@@ -502,10 +552,12 @@ fn write_band(
     for (y, (color, depth)) in color.chunks_mut(width).zip(depth.chunks_mut(width)).enumerate() {
         let parts = color.chunks_mut(step).zip(depth.chunks_mut(step));
         for (tile, (color, depth)) in parts.enumerate() {
-            let own = &blocks[tile / BLOCK][y / step * BLOCK + tile % BLOCK][(y % step + apron) * TILE + apron..];
+            let own = &blocks[tile / BLOCK][y / step * BLOCK + tile % BLOCK]
+                [(y % step + apron) * TILE + apron..];
             for ((color, depth), (own, hit)) in color.iter_mut().zip(depth).zip(own) {
                 if plan.optics == Optics::Maximum {
-                    *color = transfer.map_or([0.0; 4], |transfer| of_largest(*hit, transfer, &plan.frame));
+                    *color = transfer
+                        .map_or([0.0; 4], |transfer| of_largest(*hit, transfer, &plan.frame));
                     *depth = f32::INFINITY;
                     continue;
                 }

@@ -23,7 +23,8 @@ struct Spheres([Vec<f32>; 5]);
 
 impl Spheres {
     fn new(spheres: impl Iterator<Item = CutSphere>, count: usize) -> Self {
-        let mut parts: [Vec<f32>; 5] = std::array::from_fn(|_| Vec::with_capacity(count.next_multiple_of(8)));
+        let mut parts: [Vec<f32>; 5] =
+            std::array::from_fn(|_| Vec::with_capacity(count.next_multiple_of(8)));
         for sphere in spheres {
             let [x, y, z] = sphere.center;
             for (part, value) in parts.iter_mut().zip([x, y, z, sphere.radius, sphere.size]) {
@@ -80,7 +81,9 @@ impl Nodes {
         let root = count.next_multiple_of(8) as u32;
         let or_root = |parent: &u32| if (*parent as usize) < count { *parent } else { root };
         let parent: Vec<u32> = page.parent.iter().map(or_root).collect();
-        let ends = |run: &[u32]| run.iter().fold([u32::MAX, 0], |[low, high], own| [low.min(*own), high.max(*own)]);
+        let ends = |run: &[u32]| {
+            run.iter().fold([u32::MAX, 0], |[low, high], own| [low.min(*own), high.max(*own)])
+        };
         Self {
             splats: page.nodes.iter().map(|node| node.splat).collect(),
             spheres: Spheres::new(spheres, page.nodes.len()),
@@ -98,12 +101,18 @@ impl Nodes {
     }
 
     pub fn bytes(&self) -> u64 {
-        Self::bytes_of(self.splats.len()) + (self.parents.0[0].len() * size_of::<CutSphere>()) as u64
+        Self::bytes_of(self.splats.len())
+            + (self.parents.0[0].len() * size_of::<CutSphere>()) as u64
     }
 
     /// The nodes that a cut draws, in order. `is_active`: whether a page takes part.
     #[inline(always)]
-    pub fn drawn<S: Simd>(&self, simd: S, cut: &Cut, is_active: impl Fn(u32) -> bool) -> Vec<Drawn> {
+    pub fn drawn<S: Simd>(
+        &self,
+        simd: S,
+        cut: &Cut,
+        is_active: impl Fn(u32) -> bool,
+    ) -> Vec<Drawn> {
         let root = self.parents.0[0].len();
         let mut above = vec![SHARE_UNIT as f32; root + 1];
         for first in (0..root).step_by(8) {
@@ -119,7 +128,9 @@ impl Nodes {
             for first in (run * RUN..end).step_by(8) {
                 let count = (end - first).min(8);
                 let (mut above_own, mut gives_way) = ([0.0f32; 8], [0.0f32; 8]);
-                let nodes = self.parent[first..first + count].iter().zip(&self.child_pages[first..first + count]);
+                let nodes = self.parent[first..first + count]
+                    .iter()
+                    .zip(&self.child_pages[first..first + count]);
                 for (lane, (parent, child)) in nodes.enumerate() {
                     if *child != last_child.0 {
                         last_child = (*child, *child != NO_PAGE && is_active(*child));
@@ -181,7 +192,8 @@ impl Nodes {
         let center = to_view(simd, cut, three!(I => centers[I].simd_into(simd)));
         let mut hidden = mask32x8::splat(simd, false);
         for side in cut.sides {
-            hidden |= (center[0] * side.x + center[1] * side.y + center[2] * side.z + side.w).simd_lt(-reach);
+            hidden |= (center[0] * side.x + center[1] * side.y + center[2] * side.z + side.w)
+                .simd_lt(-reach);
         }
         if cut.perspective {
             hidden |= center[2].simd_lt(-reach);
@@ -191,7 +203,13 @@ impl Nodes {
 
     /// Whether all normals of eight nodes' cones face away.
     #[inline(always)]
-    fn face_away<S: Simd>(&self, simd: S, cut: &Cut, nodes: [usize; 8], radius: Lanes<S>) -> mask32x8<S> {
+    fn face_away<S: Simd>(
+        &self,
+        simd: S,
+        cut: &Cut,
+        nodes: [usize; 8],
+        radius: Lanes<S>,
+    ) -> mask32x8<S> {
         let (mut places, mut cones, mut packed) = ([[0.0f32; 8]; 3], [0.0f32; 8], [0i32; 8]);
         for (lane, node) in nodes.into_iter().enumerate() {
             for (places, part) in places.iter_mut().zip(&self.spheres.0) {

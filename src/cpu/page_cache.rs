@@ -81,10 +81,21 @@ impl PageCache {
         }
         self.missing = needed.len() - most;
         needed.truncate(most);
-        let absent: Vec<u32> = needed.iter().copied().filter(|page| !self.held.contains_key(page)).collect();
-        self.make_room(&needed, absent.iter().map(|&page| bytes_of(page)).sum(), settings.page_memory);
+        let absent: Vec<u32> =
+            needed.iter().copied().filter(|page| !self.held.contains_key(page)).collect();
+        self.make_room(
+            &needed,
+            absent.iter().map(|&page| bytes_of(page)).sum(),
+            settings.page_memory,
+        );
         let read = |&page: &u32| {
-            Ok((page, Held { nodes: Nodes::new(&self.hierarchy.read_page(page)?), last_needed: self.frame }))
+            Ok((
+                page,
+                Held {
+                    nodes: Nodes::new(&self.hierarchy.read_page(page)?),
+                    last_needed: self.frame,
+                },
+            ))
         };
         let read: Vec<(u32, Held)> = absent.par_iter().map(read).collect::<Result<_>>()?;
         self.held.extend(read);
@@ -122,10 +133,17 @@ impl PageCache {
     }
 
     /// The records of the splats that a cut draws, each with its share of its optical depth, page by page.
-    pub fn records(&self, plan: &Plan, settings: &Settings, pixels: f64, spare: &mut Spare) -> Vec<Vec<Record>> {
+    pub fn records(
+        &self,
+        plan: &Plan,
+        settings: &Settings,
+        pixels: f64,
+        spare: &mut Spare,
+    ) -> Vec<Vec<Record>> {
         let (level, cut) = (Level::new(), self.cut(plan.view, settings, pixels));
         let header = self.hierarchy.header();
-        let projector = Projector::new(plan, Source::of_radiance(plan.view, header.origin, header.extent));
+        let projector =
+            Projector::new(plan, Source::of_radiance(plan.view, header.origin, header.extent));
         let mut records = spare_for(spare, self.active.len());
         records.par_iter_mut().zip(&self.active).for_each(|(records, page)| {
             let Some(Held { nodes, .. }) = self.held.get(page) else { return };
@@ -159,14 +177,21 @@ impl PageCache {
 }
 
 /// The finest cut of some hierarchies that draws no more than `most` splats of them together; pages are at hand for it.
-pub fn finest_within(caches: &mut [&mut PageCache], view: &View, settings: &Settings, most: u64) -> Result<f64> {
+pub fn finest_within(
+    caches: &mut [&mut PageCache],
+    view: &View,
+    settings: &Settings,
+    most: u64,
+) -> Result<f64> {
     // The pages of a cut hold several times what it draws.
     let nodes = most.saturating_mul(8).max(1 << 16);
-    let pages = caches.iter().map(|cache| cache.finest_pages(view, settings, nodes)).fold(0.0, f64::max);
+    let pages =
+        caches.iter().map(|cache| cache.finest_pages(view, settings, nodes)).fold(0.0, f64::max);
     for cache in caches.iter_mut() {
         cache.update(view, settings, pages)?;
     }
-    let count = |pixels: f64| caches.iter().map(|cache| cache.count(view, settings, pixels)).sum::<u64>();
+    let count =
+        |pixels: f64| caches.iter().map(|cache| cache.count(view, settings, pixels)).sum::<u64>();
     if count(pages) <= most {
         return Ok(pages);
     }

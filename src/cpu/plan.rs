@@ -52,7 +52,13 @@ pub struct Plan<'a> {
 }
 
 impl<'a> Plan<'a> {
-    pub fn new(scene: &Scene, view: &'a View, sheets: &Sheets, settings: &Settings, choice: Option<&Choice>) -> Self {
+    pub fn new(
+        scene: &Scene,
+        view: &'a View,
+        sheets: &Sheets,
+        settings: &Settings,
+        choice: Option<&Choice>,
+    ) -> Self {
         let mut planes = vec![-NOWHERE];
         planes.extend(sheets.planes.iter().map(|plane| *plane as f32));
         planes.extend([NOWHERE; 4]);
@@ -101,7 +107,8 @@ impl<'a> Plan<'a> {
                 }
                 Item::Volume(volume, kernel, transfer) => {
                     plan.on_lattice = true;
-                    plan.has_slopes = matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_));
+                    plan.has_slopes =
+                        matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_));
                     plan.set_field(sheets, settings, transfer, volume.range, Some(kernel));
                 }
                 Item::Bricks(bricks, kernel, transfer) => {
@@ -123,7 +130,8 @@ impl<'a> Plan<'a> {
     ) {
         self.tables = Tables::new(transfer, range, kernel);
         self.frame.set_tables(&self.tables, transfer, self.view, sheets);
-        self.table_kernel = kernel.is_some_and(|kernel| !matches!(kernel.profile, Profile::Gaussian(_)));
+        self.table_kernel =
+            kernel.is_some_and(|kernel| !matches!(kernel.profile, Profile::Gaussian(_)));
         let emits = settings.optics == Optics::EmissionAbsorption;
         let is_shaded = emits && settings.shade_of(transfer).is_some();
         if settings.classifies_samples() {
@@ -134,7 +142,8 @@ impl<'a> Plan<'a> {
         }
         self.has_field = true;
         self.is_lit = is_shaded;
-        self.has_gradient_opacity = !transfer.gradient.is_empty() && settings.optics != Optics::Maximum;
+        self.has_gradient_opacity =
+            !transfer.gradient.is_empty() && settings.optics != Optics::Maximum;
         self.isosurfaces = if emits { transfer.isosurfaces.len() } else { 0 };
         self.central = self.has_gradients() && settings.gradient == Gradient::Central;
     }

@@ -59,7 +59,11 @@ impl<'a> Projector<'a> {
         if self.plan.is_whole() {
             for (splat, share) in splats {
                 let splat = Splat { strength: splat.strength * share, ..*splat };
-                records.extend(record(self.plan, &self.source, &widened(self.plan, &self.source, &splat)));
+                records.extend(record(
+                    self.plan,
+                    &self.source,
+                    &widened(self.plan, &self.source, &splat),
+                ));
             }
             return;
         }
@@ -102,12 +106,24 @@ impl<'a> Projector<'a> {
         let [b00, b10, b11, b20, b21, b22]: [Lanes<S>; 6] =
             each!([0, 1, 2, 3, 4, 5], I => eight.factor[I].simd_into(simd));
         let [_, b, c] = self.axes;
-        let columns = [self.turned([b00, b10, b20]), three!(I => b11 * b[I] + b21 * c[I]), three!(I => b22 * c[I])];
-        let pixel = if plan.view.perspective { dot(center, center).sqrt() } else { one } * (1.0 / plan.frame.scale);
+        let columns = [
+            self.turned([b00, b10, b20]),
+            three!(I => b11 * b[I] + b21 * c[I]),
+            three!(I => b22 * c[I]),
+        ];
+        let pixel = if plan.view.perspective { dot(center, center).sqrt() } else { one }
+            * (1.0 / plan.frame.scale);
         let blur = pixel * FOOTPRINT_BLUR as f32;
         let blur2 = blur * blur;
         let [x, y, z]: [[Lanes<S>; 3]; 3] = three!(I => three!(J => columns[J][I]));
-        let covariance = [dot(x, x) + blur2, dot(x, y), dot(x, z), dot(y, y) + blur2, dot(y, z), dot(z, z) + blur2];
+        let covariance = [
+            dot(x, x) + blur2,
+            dot(x, y),
+            dot(x, z),
+            dot(y, y) + blur2,
+            dot(y, z),
+            dot(z, z) + blur2,
+        ];
         let (normal, has_normal) = normals(simd, eight.normal.simd_into(simd));
         let normal = self.turned(normal);
         let normal = three!(I => has_normal.select(normal[I], none));
@@ -130,8 +146,7 @@ impl<'a> Projector<'a> {
         let facing = (away * -4.0 + 0.5).max(Lanes::splat(simd, 1.0 / 255.0)).min(one);
         let facing = has_normal.select(facing, one);
         let packed: i32x8<S> = eight.color.simd_into(simd);
-        let [red, green, blue, opacity] =
-            each!([0, 8, 16, 24], SHIFT => Lanes::<S>::float_from((packed >> SHIFT as u32) & 0xff) * (1.0 / 255.0));
+        let [red, green, blue, opacity] = each!([0, 8, 16, 24], SHIFT => Lanes::<S>::float_from((packed >> SHIFT as u32) & 0xff) * (1.0 / 255.0));
         let strength: Lanes<S> = eight.strength.simd_into(simd);
         let [strength, facing, red, green, blue, nx, ny, nz]: [[f32; 8]; 8] = [
             (strength * opacity).into(),
@@ -152,7 +167,16 @@ impl<'a> Projector<'a> {
         while bits != 0 {
             let lane = bits.trailing_zeros() as usize & 7;
             bits &= bits - 1;
-            let payload = [1.0, facing[lane], red[lane], green[lane], blue[lane], nx[lane], ny[lane], nz[lane]];
+            let payload = [
+                1.0,
+                facing[lane],
+                red[lane],
+                green[lane],
+                blue[lane],
+                nx[lane],
+                ny[lane],
+                nz[lane],
+            ];
             records.push(Record {
                 center: three!(I => center[I][lane]),
                 strength: strength[lane],
@@ -182,7 +206,8 @@ impl<'a> Projector<'a> {
         let (mut distance, mut reach, mut far) = (c[2], reaches[2], c[2] + reaches[2]);
         let mut meets = mask32x8::splat(simd, true);
         let mut is_beside = mask32x8::splat(simd, false);
-        let mut bounds = [[c[0] - reaches[0], c[0] + reaches[0]], [c[1] - reaches[1], c[1] + reaches[1]]];
+        let mut bounds =
+            [[c[0] - reaches[0], c[0] + reaches[0]], [c[1] - reaches[1], c[1] + reaches[1]]];
         if plan.view.perspective {
             let high = c[2] + reaches[2];
             meets = high.simd_gt(frame.z_near);
@@ -200,8 +225,10 @@ impl<'a> Projector<'a> {
             far = ((distance + reach) * (distance + reach) + across).sqrt();
             let is_front = (c[2] - reaches[2]).simd_gt(frame.z_near);
             let (xz, yz, zz) = (xz * e2, yz * e2, zz * e2);
-            let tangents =
-                [tangent_bounds(simd, c[0], c[2], xx * e2, xz, zz), tangent_bounds(simd, c[1], c[2], yy * e2, yz, zz)];
+            let tangents = [
+                tangent_bounds(simd, c[0], c[2], xx * e2, xz, zz),
+                tangent_bounds(simd, c[1], c[2], yy * e2, yz, zz),
+            ];
             if is_front.all_true() {
                 bounds = tangents;
             } else {
@@ -226,8 +253,12 @@ impl<'a> Projector<'a> {
             let high = bounds[axis][1] * frame.scale + frame.center[axis];
             // NaN fails.
             meets &= low.simd_le(high);
-            let first = (low - 0.51).max(Lanes::splat(simd, -apron)).min(Lanes::splat(simd, limit)).ceil();
-            let last = (high - 0.49).max(Lanes::splat(simd, -apron - 1.0)).min(Lanes::splat(simd, limit - 1.0)).floor();
+            let first =
+                (low - 0.51).max(Lanes::splat(simd, -apron)).min(Lanes::splat(simd, limit)).ceil();
+            let last = (high - 0.49)
+                .max(Lanes::splat(simd, -apron - 1.0))
+                .min(Lanes::splat(simd, limit - 1.0))
+                .floor();
             meets &= first.simd_le(last);
             (pixels[0][axis], pixels[1][axis]) = (first, last);
         }
@@ -319,7 +350,12 @@ fn tangent_bounds<S: Simd>(
 
 /// Bounds of x/z over the part of a box beyond the nearest visible z.
 #[inline(always)]
-fn box_bounds<S: Simd>(simd: S, [low, high]: [Lanes<S>; 2], z_low: Lanes<S>, z_high: Lanes<S>) -> [Lanes<S>; 2] {
+fn box_bounds<S: Simd>(
+    simd: S,
+    [low, high]: [Lanes<S>; 2],
+    z_low: Lanes<S>,
+    z_high: Lanes<S>,
+) -> [Lanes<S>; 2] {
     let none = Lanes::splat(simd, 0.0);
     [low / low.simd_lt(none).select(z_low, z_high), high / high.simd_lt(none).select(z_high, z_low)]
 }

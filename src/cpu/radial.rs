@@ -66,14 +66,21 @@ impl Radial {
                 if let Some(even) = Even::new(kernel) {
                     return Self::High(even);
                 }
-                let value = |at: u32| kernel.value(kernel.extent * f64::from(at) / f64::from(PIECES));
+                let value =
+                    |at: u32| kernel.value(kernel.extent * f64::from(at) / f64::from(PIECES));
                 Self::Table(Table::new(&(0..=PIECES).map(value).collect::<Vec<_>>(), kernel.extent))
             }
         }
     }
 
     /// The sums over samples that are so far from a place along the axes, in samples; values of a row lie beside each other.
-    pub fn sums<S: Simd>(&self, simd: S, away: [&[Lanes<S>]; 3], values: &[Lanes<S>], extent: f32) -> Sums<S> {
+    pub fn sums<S: Simd>(
+        &self,
+        simd: S,
+        away: [&[Lanes<S>]; 3],
+        values: &[Lanes<S>],
+        extent: f32,
+    ) -> Sums<S> {
         let squared = extent * extent;
         // A function of its own for each form.
         match self {
@@ -140,7 +147,12 @@ fn sums<S: Simd>(
         weight_slopes[2] = slope_z.mul_add(*z, weight_slopes[2]);
         value_slopes[2] = value_z.mul_add(*z, value_slopes[2]);
     }
-    Sums { weight, value, weight_slopes: three!(I => weight_slopes[I]), value_slopes: three!(I => value_slopes[I]) }
+    Sums {
+        weight,
+        value,
+        weight_slopes: three!(I => weight_slopes[I]),
+        value_slopes: three!(I => value_slopes[I]),
+    }
 }
 
 impl Weigh for Spline {
@@ -166,12 +178,17 @@ impl<const N: usize> Even<N> {
         // Chebyshev's polynomials by their values at the zeros of a later one.
         const NODES: usize = 64;
         let angle = |node: usize| PI * (node as f64 + 0.5) / NODES as f64;
-        let values: Vec<f64> = (0..NODES).map(|node| kernel.value(radius(angle(node).cos()))).collect();
+        let values: Vec<f64> =
+            (0..NODES).map(|node| kernel.value(radius(angle(node).cos()))).collect();
         let mut factors = [0.0; N];
         let (mut before, mut own) = ([0.0; N], [0.0; N]);
         own[0] = 1.0;
         for degree in 0..N {
-            let sum: f64 = values.iter().enumerate().map(|(node, v)| v * (degree as f64 * angle(node)).cos()).sum();
+            let sum: f64 = values
+                .iter()
+                .enumerate()
+                .map(|(node, v)| v * (degree as f64 * angle(node)).cos())
+                .sum();
             let share = sum * if degree == 0 { 1.0 } else { 2.0 } / NODES as f64;
             factors.iter_mut().zip(own).for_each(|(factor, own)| *factor += share * own);
             let mut next = [0.0; N];
@@ -182,7 +199,12 @@ impl<const N: usize> Even<N> {
             (before, own) = (own, next);
         }
         let largest = kernel.value(0.0).abs();
-        let at = |v: f64| factors.iter().rev().fold([0.0, 0.0], |[sum, slope], own| [sum * v + own, slope * v + sum]);
+        let at = |v: f64| {
+            factors
+                .iter()
+                .rev()
+                .fold([0.0, 0.0], |[sum, slope], own| [sum * v + own, slope * v + sum])
+        };
         let is_near = (0..=1000).all(|step| {
             let v = f64::from(step) / 500.0 - 1.0;
             let [value, slope] = at(v);
@@ -202,7 +224,9 @@ impl<const N: usize> Weigh for Even<N> {
     #[inline(always)]
     fn weigh<S: Simd>(&self, simd: S, squared: Lanes<S>) -> [Lanes<S>; 2] {
         let one = Lanes::splat(simd, 1.0);
-        let v = squared.min(Lanes::splat(simd, self.last)).mul_add(Lanes::splat(simd, self.scale), -one);
+        let v = squared
+            .min(Lanes::splat(simd, self.last))
+            .mul_add(Lanes::splat(simd, self.scale), -one);
         let mut value = Lanes::splat(simd, self.factors[N - 1]);
         let mut slope = value;
         for power in (1..N - 1).rev() {
@@ -216,7 +240,8 @@ impl<const N: usize> Weigh for Even<N> {
 impl Table {
     fn new(values: &[f64], extent: f64) -> Self {
         let next = |at: usize| values.get(at + 1).map_or(0.0, |next| next - values[at]) as f32;
-        let mut pairs: Vec<_> = (0..values.len() - 1).map(|at| [values[at] as f32, next(at)]).collect();
+        let mut pairs: Vec<_> =
+            (0..values.len() - 1).map(|at| [values[at] as f32, next(at)]).collect();
         // Nothing beyond the extent.
         pairs.push([0.0; 2]);
         Self { pairs, per_step: ((values.len() - 1) as f64 / extent) as f32 }
@@ -245,7 +270,8 @@ mod tests {
     #[test]
     fn weights_are_those_of_the_kernels() {
         let table = Kernel::table(vec![1.0, 0.7, 0.1, -0.1, 0.2], 2.5).unwrap();
-        let mut kernels = vec![table, Kernel::b_spline(2.0).unwrap(), Kernel::b_spline(1.3).unwrap()];
+        let mut kernels =
+            vec![table, Kernel::b_spline(2.0).unwrap(), Kernel::b_spline(1.3).unwrap()];
         kernels.extend([1.3, 2.0, 2.7, 3.0, 4.0].map(|extent| Kernel::hann(extent).unwrap()));
         fn at<S: Simd>(simd: S, kernel: &impl Weigh, squared: [f32; 8]) -> [[f32; 8]; 2] {
             kernel.weigh(simd, squared.simd_into(simd)).map(Into::into)
@@ -253,9 +279,13 @@ mod tests {
         let level = Level::new();
         for kernel in kernels {
             let radial = Radial::new(&kernel);
-            assert!(!matches!((&radial, &kernel.profile), (Radial::Table(_), Profile::Hann)), "{kernel:?}");
+            assert!(
+                !matches!((&radial, &kernel.profile), (Radial::Table(_), Profile::Hann)),
+                "{kernel:?}"
+            );
             for step in 0..100 {
-                let radius = |lane: usize| (step * 8 + lane) as f64 / 799.0 * (kernel.extent + 0.4) + 1e-3;
+                let radius =
+                    |lane: usize| (step * 8 + lane) as f64 / 799.0 * (kernel.extent + 0.4) + 1e-3;
                 let radii: [f64; 8] = std::array::from_fn(radius);
                 let squared = radii.map(|r| (r * r) as f32);
                 let [values, slopes] = match &radial {
@@ -274,9 +304,15 @@ mod tests {
                     if matches!(radial, Radial::Table(_)) && (at - at.round()).abs() < 1e-4 {
                         continue;
                     }
-                    assert!((f64::from(value) - expected).abs() < 1e-5, "{kernel:?} at {r}: {value} {expected}");
+                    assert!(
+                        (f64::from(value) - expected).abs() < 1e-5,
+                        "{kernel:?} at {r}: {value} {expected}"
+                    );
                     let slope = f64::from(slope) * r;
-                    assert!((slope - rise).abs() < 1e-4, "slope of {kernel:?} at {r}: {slope} {rise}");
+                    assert!(
+                        (slope - rise).abs() < 1e-4,
+                        "slope of {kernel:?} at {r}: {slope} {rise}"
+                    );
                 }
             }
         }

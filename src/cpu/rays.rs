@@ -56,8 +56,10 @@ impl<S: Simd> Rays<S> {
         } else {
             ([right, down, none], [none, none, one])
         };
-        let rows: [[f32; 4]; 3] = three!(I => [frame.world[0][I], frame.world[1][I], frame.world[2][I], 0.0]);
-        let (from, toward) = (three!(I => dot_with(rows[I], origin)), three!(I => dot_with(rows[I], direction)));
+        let rows: [[f32; 4]; 3] =
+            three!(I => [frame.world[0][I], frame.world[1][I], frame.world[2][I], 0.0]);
+        let (from, toward) =
+            (three!(I => dot_with(rows[I], origin)), three!(I => dot_with(rows[I], direction)));
         let mut kept = [Lanes::splat(simd, BEFORE), Lanes::splat(simd, BEHIND)];
         for [low, high] in &frame.clips[..plan.clips] {
             let part = if high[3] > 0.0 {
@@ -78,13 +80,26 @@ impl<S: Simd> Rays<S> {
             let part = part_in_box(simd, frame.field_low, frame.field_high, start, way);
             inside = [kept[0].max(part[0]), kept[1].min(part[1])];
         }
-        Self { pixel, aside: [right, down], direction, cosine: direction[2], start, way, kept, inside, holes }
+        Self {
+            pixel,
+            aside: [right, down],
+            direction,
+            cosine: direction[2],
+            start,
+            way,
+            kept,
+            inside,
+            holes,
+        }
     }
 
     /// The part of each ray in the box of the samples, widened by so many steps.
     #[inline(always)]
     pub fn in_lattice(&self, simd: S, plan: &Plan, wider: f32) -> Part<S> {
-        let (low, high) = (plan.frame.field_low.map(|low| low - wider), plan.frame.field_high.map(|high| high + wider));
+        let (low, high) = (
+            plan.frame.field_low.map(|low| low - wider),
+            plan.frame.field_high.map(|high| high + wider),
+        );
         part_in_box(simd, low, high, self.start, self.way)
     }
 

@@ -63,7 +63,11 @@ fn deviations(places: &[f64], kernel: &Kernel) -> Vec<f64> {
     let last = places.len() - 1;
     let unit = |at: usize| {
         let (before, after) = (at.saturating_sub(1), (at + 1).min(last));
-        if before == after { 1.0 } else { (places[after] - places[before]) / (after - before) as f64 }
+        if before == after {
+            1.0
+        } else {
+            (places[after] - places[before]) / (after - before) as f64
+        }
     };
     (0..=last).map(|at| sigma * unit(at)).collect()
 }
@@ -74,7 +78,8 @@ fn reached(places: &[f64], kernel: &Kernel) -> Vec<[u32; 2]> {
     let reach = reach(kernel) / sigma;
     let last = places.len() - 1;
     let cells = last.max(1);
-    let mut found: Vec<[u32; 2]> = (0..cells).map(|cell| [cell as u32, (cell + 1).min(last) as u32]).collect();
+    let mut found: Vec<[u32; 2]> =
+        (0..cells).map(|cell| [cell as u32, (cell + 1).min(last) as u32]).collect();
     for (at, (place, deviation)) in places.iter().zip(deviations(places, kernel)).enumerate() {
         let own = [place - reach * deviation, place + reach * deviation];
         let first = places.partition_point(|place| *place <= own[0]).saturating_sub(1);
@@ -98,7 +103,11 @@ impl Axes {
     pub fn taps(places: &[Vec<f64>; 3], kernel: &Kernel) -> Option<usize> {
         let most = |places: &Vec<f64>| {
             let [least, all] = distances(places);
-            let most = reached(places, kernel).iter().map(|[low, high]| (high - low + 1) as usize).max().unwrap_or(1);
+            let most = reached(places, kernel)
+                .iter()
+                .map(|[low, high]| (high - low + 1) as usize)
+                .max()
+                .unwrap_or(1);
             (all / least <= 0.5 * MOST_BINS).then_some(most)
         };
         let [x, y, z] = places;
@@ -117,7 +126,12 @@ impl Axes {
 
     /// The weights along an axis.
     #[inline(always)]
-    pub fn along<S: Simd, const N: usize>(&self, simd: S, axis: usize, place: Lanes<S>) -> Along<S, N> {
+    pub fn along<S: Simd, const N: usize>(
+        &self,
+        simd: S,
+        axis: usize,
+        place: Lanes<S>,
+    ) -> Along<S, N> {
         self.0[axis].along(simd, place)
     }
 
@@ -135,7 +149,9 @@ impl Axes {
                 for [first, last] in &reached {
                     for at in 0..inner {
                         let along = (*first..=*last).map(|sample| slab[sample * inner + at]);
-                        ranges.push(along.fold([255, 0], |[a, b], [low, high]| [a.min(low), b.max(high)]));
+                        ranges.push(
+                            along.fold([255, 0], |[a, b], [low, high]| [a.min(low), b.max(high)]),
+                        );
                     }
                 }
             }
@@ -149,7 +165,11 @@ impl Axes {
 
     /// The sums over the samples in reach; values of a row lie beside each other.
     #[inline(always)]
-    pub fn sums<S: Simd, const N: usize>(simd: S, [x, y, z]: &[Along<S, N>; 3], values: &[Lanes<S>]) -> Sums<S> {
+    pub fn sums<S: Simd, const N: usize>(
+        simd: S,
+        [x, y, z]: &[Along<S, N>; 3],
+        values: &[Lanes<S>],
+    ) -> Sums<S> {
         let none = Lanes::splat(simd, 0.0);
         let mut both = [none; N];
         let mut both_slopes = [none; N];
@@ -190,14 +210,19 @@ impl Axes {
             value = weight.mul_add(sum, added.mul_add(plain, value));
             slopes[0] = weight.mul_add(sum_x, added.mul_add(plain_x, slopes[0]));
             slopes[1] = weight.mul_add(sum_y, added.mul_add(plain_y, slopes[1]));
-            slopes[2] = z.weight_slopes[k].mul_add(sum, z.added_slopes[k].mul_add(plain, slopes[2]));
+            slopes[2] =
+                z.weight_slopes[k].mul_add(sum, z.added_slopes[k].mul_add(plain, slopes[2]));
         }
         let all = three!(I => total(simd, &[x, y, z][I].weights));
         let changes = three!(I => total(simd, &[x, y, z][I].weight_slopes));
         Sums {
             weight: all[0] * all[1] * all[2],
             value,
-            weight_slopes: [changes[0] * all[1] * all[2], all[0] * changes[1] * all[2], all[0] * all[1] * changes[2]],
+            weight_slopes: [
+                changes[0] * all[1] * all[2],
+                all[0] * changes[1] * all[2],
+                all[0] * all[1] * changes[2],
+            ],
             value_slopes: three!(I => slopes[I]),
         }
     }
@@ -220,15 +245,22 @@ impl Axis {
             let before = (at > 0).then(|| places[at] - places[at - 1]);
             let after = (at < last).then(|| places[at + 1] - places[at]);
             let shares = match (before, after) {
-                (Some(before), Some(after)) => [after / before / (before + after), before / after / (before + after)],
-                (before, after) => [before, after].map(|distance| distance.map_or(0.0, |distance| 1.0 / distance)),
+                (Some(before), Some(after)) => {
+                    [after / before / (before + after), before / after / (before + after)]
+                }
+                (before, after) => {
+                    [before, after].map(|distance| distance.map_or(0.0, |distance| 1.0 / distance))
+                }
             };
-            [places[at] - places[0], 1.0 / deviation, shares[0], shares[1]].map(|number| number as f32)
+            [places[at] - places[0], 1.0 / deviation, shares[0], shares[1]]
+                .map(|number| number as f32)
         };
         let deviations = deviations(places, kernel);
-        let mut samples: Vec<_> = deviations.iter().enumerate().map(|(at, deviation)| own(at, *deviation)).collect();
+        let mut samples: Vec<_> =
+            deviations.iter().enumerate().map(|(at, deviation)| own(at, *deviation)).collect();
         // Windows of lattices that are smaller go on beyond them.
-        samples.resize(count.max(taps), [FAR * (samples[last][0] + 1.0), samples[last][1], 0.0, 0.0]);
+        samples
+            .resize(count.max(taps), [FAR * (samples[last][0] + 1.0), samples[last][1], 0.0, 0.0]);
         let reached = reached(places, kernel);
         let start = |[low, high]: &[u32; 2]| {
             let spare = (taps as u32).saturating_sub(high - low + 1);
@@ -240,7 +272,9 @@ impl Axis {
         let per_step = if last > 0 { bins / all } else { 1.0 };
         let cell = |bin: usize| {
             let place = places[0] + bin as f64 / per_step;
-            (places.partition_point(|at| *at <= place) as u32).saturating_sub(1).min(last.max(1) as u32 - 1)
+            (places.partition_point(|at| *at <= place) as u32)
+                .saturating_sub(1)
+                .min(last.max(1) as u32 - 1)
         };
         let cells = if last > 0 { (all / least).ceil().min(2.0 * count as f64) } else { 1.0 };
         Self {
@@ -267,7 +301,9 @@ impl Axis {
             // Bins tell the cell that they begin in; places may be in the next one.
             let [first, last] = [of(places[0]), (of(places[1]) + 1).min(end)];
             let own = self.reached[first..=last].iter();
-            own.fold([usize::MAX, 0], |[a, b], [low, high]| [a.min(*low as usize), b.max(*high as usize)])
+            own.fold([usize::MAX, 0], |[a, b], [low, high]| {
+                [a.min(*low as usize), b.max(*high as usize)]
+            })
         };
         (0..self.cells).map(cell).collect()
     }
@@ -278,7 +314,8 @@ impl Axis {
         for (cell, start) in self.starts.iter().enumerate() {
             let window = *start as usize..(*start as usize + MOST_TAPS).min(self.count);
             for part in 0..=PLACES {
-                let ends = [cell, (cell + 1).min(self.count - 1)].map(|at| f64::from(self.samples[at][0]));
+                let ends =
+                    [cell, (cell + 1).min(self.count - 1)].map(|at| f64::from(self.samples[at][0]));
                 let place = ends[0] + (ends[1] - ends[0]) * part as f64 / PLACES as f64;
                 let mut added = [0.0; MOST_TAPS + 2];
                 let mut all = 0.0;
@@ -301,7 +338,8 @@ impl Axis {
     fn along<S: Simd, const N: usize>(&self, simd: S, place: Lanes<S>) -> Along<S, N> {
         let none = Lanes::splat(simd, 0.0);
         let end = Lanes::splat(simd, self.bins.len() as f32 - 1.0);
-        let bins: [i32; 8] = i32x8::truncate_from((place * self.per_step).max(none).min(end)).into();
+        let bins: [i32; 8] =
+            i32x8::truncate_from((place * self.per_step).max(none).min(end)).into();
         let places: [f32; 8] = place.into();
         let last = self.starts.len() - 1;
         let starts = each!([0, 1, 2, 3, 4, 5, 6, 7], L => {

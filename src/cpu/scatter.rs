@@ -66,7 +66,11 @@ impl Projected {
         let scale = plan.frame.scale;
         let [m00, m10, m20, m11, m21, m22] = record.whitening;
         let inverse = 1.0 / scale;
-        let m = [[m00 * inverse, m10 * inverse, m20 * inverse], [0.0, m11 * inverse, m21 * inverse], [0.0, 0.0, m22]];
+        let m = [
+            [m00 * inverse, m10 * inverse, m20 * inverse],
+            [0.0, m11 * inverse, m21 * inverse],
+            [0.0, 0.0, m22],
+        ];
         let [x, y, z] = record.center;
         let mut at = [plan.frame.center[0] + scale * x, plan.frame.center[1] + scale * y];
         let mut whitened = [0.0, 0.0, m22 * z];
@@ -104,7 +108,9 @@ impl Projected {
             let x = rays.pixel[0] - plan.frame.center[0];
             let y = rays.pixel[1] - plan.frame.center[1];
             beta = [x * m0[0], x * m0[1] + y * m1[1], x * m0[2] + y * m1[2] + m2[2]];
-            l = beta[0] * self.whitened[0] + beta[1] * self.whitened[1] + beta[2] * self.whitened[2];
+            l = beta[0] * self.whitened[0]
+                + beta[1] * self.whitened[1]
+                + beta[2] * self.whitened[2];
         } else {
             let none = Lanes::splat(simd, 0.0);
             beta = [none, none, Lanes::splat(simd, m2[2])];
@@ -137,7 +143,8 @@ pub fn normal_cdf<S: Simd>(simd: S, t: Lanes<S>) -> Lanes<S> {
     let x = t.abs().min(Lanes::splat(simd, 8.0));
     let one = Lanes::splat(simd, 1.0);
     let mut p = Lanes::splat(simd, 5.382_975e-6);
-    for term in [4.889_063_6e-5, 3.800_357_5e-5, 3.277_626_3e-3, 2.114_100_6e-2, 4.986_735e-2, 1.0] {
+    for term in [4.889_063_6e-5, 3.800_357_5e-5, 3.277_626_3e-3, 2.114_100_6e-2, 4.986_735e-2, 1.0]
+    {
         p = p.mul_add(x, Lanes::splat(simd, term));
     }
     p = p * p;
@@ -175,7 +182,8 @@ pub fn add<S: Simd>(
     let projected = Projected::new(plan, record);
     let [first, last] = record.pixels;
     let from: [usize; 2] = [0, 1].map(|axis| (first[axis] - corner[axis]).max(0) as usize);
-    let to: [usize; 2] = [0, 1].map(|axis| (last[axis] - corner[axis]).min(super::plan::TILE as i32 - 1) as usize);
+    let to: [usize; 2] =
+        [0, 1].map(|axis| (last[axis] - corner[axis]).min(super::plan::TILE as i32 - 1) as usize);
     for row in from[1] / HIGH..=to[1] / HIGH {
         for column in from[0] / WIDE..=to[0] / WIDE {
             let number = row * 2 + column;
@@ -221,7 +229,11 @@ fn sections<S: Simd>(
     let one = Lanes::splat(simd, 1.0);
     let mut last = before(one);
     for (section, t) in sections.iter_mut().zip(along.t).take(count) {
-        let next = if plan.has_field || plan.is_classified { normal_cdf(simd, t) } else { near_normal_cdf(simd, t) };
+        let next = if plan.has_field || plan.is_classified {
+            normal_cdf(simd, t)
+        } else {
+            near_normal_cdf(simd, t)
+        };
         *section = next - last;
         last = next;
     }
@@ -237,7 +249,10 @@ fn planes_of(plan: &Plan, record: &Record, window: Window) -> usize {
     if plan.is_whole() { 0 } else { ahead.min(WINDOW - 1) }
 }
 
-#[expect(clippy::too_many_arguments, reason = "all of them are one splat, one packet or the picture")]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "all of them are one splat, one packet or the picture"
+)]
 #[inline(always)]
 fn add_radiance<S: Simd>(
     simd: S,
@@ -301,7 +316,14 @@ fn add_radiance<S: Simd>(
 
 /// Composites a splat by itself, before or behind what is there.
 #[inline(always)]
-fn single<S: Simd>(simd: S, plan: &Plan, record: &Record, depth: Lanes<S>, order: Order, packet: &mut Packet<S>) {
+fn single<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    record: &Record,
+    depth: Lanes<S>,
+    order: Order,
+    packet: &mut Packet<S>,
+) {
     let [_, _, red, green, blue, x, y, z] = record.payload;
     let normal = [x, y, z].map(|part| Lanes::splat(simd, part));
     let mut color = [red, green, blue].map(|part| Lanes::splat(simd, part));
@@ -341,7 +363,10 @@ fn is_kept<S: Simd>(plan: &Plan, rays: &Rays<S>, distance: Lanes<S>) -> mask32x8
     kept
 }
 
-#[expect(clippy::too_many_arguments, reason = "all of them are one splat, one packet or the picture")]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "all of them are one splat, one packet or the picture"
+)]
 #[inline(always)]
 fn add_scalar<S: Simd>(
     simd: S,
@@ -461,7 +486,8 @@ fn kernel_integral<S: Simd>(simd: S, plan: &Plan, rho: Lanes<S>, t: Lanes<S>) ->
         let (x, y) = (place(rhos[lane]), place(ts[lane].abs()));
         let [a, b, c, d] = plan.tables.entries[start + x as usize * SECTIONS + y as usize];
         let (low, high) = (a + (b - a) * y.fract(), c + (d - c) * y.fract());
-        found[lane] = (low + (high - low) * x.fract()).copysign(if ts[lane] >= 0.0 { 1.0 } else { -1.0 });
+        found[lane] =
+            (low + (high - low) * x.fract()).copysign(if ts[lane] >= 0.0 { 1.0 } else { -1.0 });
     }
     found.simd_into(simd)
 }

@@ -65,7 +65,8 @@ impl Shown {
         let shows = |[low, high]: [u8; 2]| u16::from(high) >= first[usize::from(low)];
         let blocks = dims.map(|n| n.div_ceil(BLOCK));
         let word = |block: usize| {
-            let at = [block % blocks[0], block / blocks[0] % blocks[1], block / blocks[0] / blocks[1]];
+            let at =
+                [block % blocks[0], block / blocks[0] % blocks[1], block / blocks[0] / blocks[1]];
             let along = |axis: usize| at[axis] * BLOCK..((at[axis] + 1) * BLOCK).min(dims[axis]);
             let mut words = [0; 2];
             for z in along(2) {
@@ -100,7 +101,9 @@ impl Shown {
                 let cell = [0, 1, 2].map(|axis| first[axis] + own[axis]);
                 let [x, y, z] = cell.map(|at| at / BLOCK);
                 // Blocks wholly beyond the border show nothing.
-                let Some(words) = words.get_mut((z * blocks[1] + y) * blocks[0] + x) else { continue };
+                let Some(words) = words.get_mut((z * blocks[1] + y) * blocks[0] + x) else {
+                    continue;
+                };
                 let (half, bit) = bit_of(cell);
                 words[half] |= 1 << bit;
             }
@@ -148,7 +151,12 @@ impl Shown {
     }
 
     /// For each tile, row by row, the sheets in which it may show something, as bits.
-    pub fn sheets_of_tiles(&self, lattice: &Lattice, view: &View, sheets: &Sheets) -> Vec<Vec<u64>> {
+    pub fn sheets_of_tiles(
+        &self,
+        lattice: &Lattice,
+        view: &View,
+        sheets: &Sheets,
+    ) -> Vec<Vec<u64>> {
         let tiles = view.size.map(|side| (side as usize).div_ceil(TILE));
         let words = sheets.count().div_ceil(64);
         let [columns, rows, layers] = self.blocks;
@@ -197,7 +205,15 @@ impl Shown {
     }
 
     /// Marks the tiles and sheets that a cube of samples may lie in, from one on and so many along each axis.
-    fn mark(&self, lattice: &Lattice, view: &View, sheets: &Sheets, first: [usize; 3], side: usize, marks: &mut [u64]) {
+    fn mark(
+        &self,
+        lattice: &Lattice,
+        view: &View,
+        sheets: &Sheets,
+        first: [usize; 3],
+        side: usize,
+        marks: &mut [u64],
+    ) {
         let low = DVec3::from_array(first.map(|n| n as f64 - 0.5));
         let end = |axis: usize| (first[axis] + side).min(self.dims[axis]) as f64 - 0.5;
         let high = DVec3::new(end(0), end(1), end(2));
@@ -217,7 +233,8 @@ impl Shown {
                 };
                 let depths = [box_around.min.z, box_around.max.z];
                 let places = ends.iter().flat_map(|&along| depths.map(|z| place(along, z)));
-                let [from, to] = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
+                let [from, to] = places
+                    .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
                 let side = TILE as f64;
                 if to < 0.0 || from >= f64::from(view.size[axis]) {
                     return;
@@ -258,7 +275,8 @@ mod tests {
     #[test]
     fn bits_are_in_the_order_of_the_samples() {
         let (dims, odd) = ([5, 3, 6], |sample: usize| sample * sample % 7 == 2);
-        let ranges: Vec<[u8; 2]> = (0..90).map(|sample| [0, if odd(sample) { 200 } else { 10 }]).collect();
+        let ranges: Vec<[u8; 2]> =
+            (0..90).map(|sample| [0, if odd(sample) { 200 } else { 10 }]).collect();
         let shown = Shown::new(dims, &ranges, &[100; 256]);
         for (word, bits) in shown.bits().into_iter().enumerate() {
             for bit in 0..32 {

@@ -58,8 +58,12 @@ impl<S: Simd> Sums<S> {
             radiance: [[[none; 8]; PACKETS]; WINDOW],
             has_radiance: [0; WINDOW],
             field: [[FieldSums { weight: none, value: none }; PACKETS]; WINDOW],
-            faces: [[FaceSums { weight: none, value: none, weight_slope: [none; 2], value_slope: [none; 2] }; PACKETS];
-                WINDOW],
+            faces: [[FaceSums {
+                weight: none,
+                value: none,
+                weight_slope: [none; 2],
+                value_slope: [none; 2],
+            }; PACKETS]; WINDOW],
             has_field: [0; WINDOW],
             none,
         }
@@ -124,15 +128,24 @@ impl<S: Simd> Sums<S> {
         let front = self.face(simd, plan, rays, sheet, packet, slopes.map(|[front, _]| front));
         let back = self.face(simd, plan, rays, sheet + 1, packet, slopes.map(|[_, back]| back));
         let either = |a: &Resolved<S>, b: &Resolved<S>| {
-            let across =
-                three!(I => a.has_value.select(a.face.across[I], b.has_value.select(b.face.across[I], self.none)));
+            let across = three!(I => a.has_value.select(a.face.across[I], b.has_value.select(b.face.across[I], self.none)));
             Face { value: a.has_value.select(a.face.value, value), across }
         };
         let (front, back) = (either(&front, &back), either(&back, &front));
         let middle = value * 1.5 - (front.value + back.value) * 0.25;
         let begin = rays.inside[0].max(Lanes::splat(simd, start));
         let end = rays.inside[1].min(Lanes::splat(simd, stop));
-        let layer = Layer { front, back, middle, start, thickness, begin, end, filling, direction: rays.direction };
+        let layer = Layer {
+            front,
+            back,
+            middle,
+            start,
+            thickness,
+            begin,
+            end,
+            filling,
+            direction: rays.direction,
+        };
         Some((layer, has_value))
     }
 
@@ -152,7 +165,8 @@ impl<S: Simd> Sums<S> {
         let value = own.value * inverse;
         let mut across = [self.none; 3];
         if plan.has_gradients() {
-            let of = |axis: usize| (value * own.weight_slope[axis] - own.value_slope[axis]) * inverse;
+            let of =
+                |axis: usize| (value * own.weight_slope[axis] - own.value_slope[axis]) * inverse;
             let slopes = differences.unwrap_or([of(0), of(1)]);
             across = across_of(simd, plan, rays, slopes, plan.planes[plane]);
         }
@@ -190,8 +204,12 @@ impl<S: Simd> Sums<S> {
         if self.has_field[slot] != 0 {
             let none = self.none;
             self.field[slot] = [FieldSums { weight: none, value: none }; PACKETS];
-            self.faces[slot] =
-                [FaceSums { weight: none, value: none, weight_slope: [none; 2], value_slope: [none; 2] }; PACKETS];
+            self.faces[slot] = [FaceSums {
+                weight: none,
+                value: none,
+                weight_slope: [none; 2],
+                value_slope: [none; 2],
+            }; PACKETS];
             self.has_field[slot] = 0;
         }
     }
@@ -199,7 +217,13 @@ impl<S: Simd> Sums<S> {
 
 /// The part of the gradient across the ray from the slopes a pixel to the right and down, on the plane at a distance.
 #[inline(always)]
-fn across_of<S: Simd>(simd: S, plan: &Plan, rays: &Rays<S>, slopes: [Lanes<S>; 2], distance: f32) -> [Lanes<S>; 3] {
+fn across_of<S: Simd>(
+    simd: S,
+    plan: &Plan,
+    rays: &Rays<S>,
+    slopes: [Lanes<S>; 2],
+    distance: f32,
+) -> [Lanes<S>; 3] {
     let [.., to_world] = plan.frame.gradients;
     let scale = if plan.view.perspective {
         Lanes::splat(simd, to_world) / (rays.cosine * distance)

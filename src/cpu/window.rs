@@ -29,7 +29,10 @@ impl<'a, T: Copy, const N: usize, const R: usize> Window<'a, T, N, R> {
 
     /// Samples of a row of a slice of a lane, from one on.
     #[inline(always)]
-    #[expect(unsafe_code, reason = "eight checks for a window, instead of two for each of its 128 rows: twice as fast")]
+    #[expect(
+        unsafe_code,
+        reason = "eight checks for a window, instead of two for each of its 128 rows: twice as fast"
+    )]
     fn row<const W: usize>(&self, lane: usize, [first, row, slice]: [usize; 3]) -> [T; W] {
         assert!(first + W <= N && row < R && slice < R, "a row of no window");
         let place = self.places[lane] + first + row * self.row + slice * self.slice;
@@ -95,7 +98,11 @@ pub trait Sample: Copy + Send + Sync {
 
 /// The weighted sum of four samples and its first moment.
 #[inline(always)]
-pub fn row_of<S: Simd>(weights: &[Lanes<S>; 4], mut four: [Lanes<S>; 4], zero: f32) -> [Lanes<S>; 2] {
+pub fn row_of<S: Simd>(
+    weights: &[Lanes<S>; 4],
+    mut four: [Lanes<S>; 4],
+    zero: f32,
+) -> [Lanes<S>; 2] {
     if zero != 0.0 {
         four = four!(I => four[I] - zero);
     }
@@ -119,7 +126,8 @@ impl<S: Simd> Pairs<S> {
     /// Rounds weights so that they still add up to 1. `order` tells which samples are the pairs.
     #[inline(always)]
     fn new(simd: S, weights: &mut Weights<S>, order: [usize; 4]) -> Self {
-        let [before, _, after, second] = four!(I => i32x8::<S>::truncate_from(weights.weights[I] * PARTS + 0.5));
+        let [before, _, after, second] =
+            four!(I => i32x8::<S>::truncate_from(weights.weights[I] * PARTS + 0.5));
         // Twice that must fit 16 bits: beside the lattice, all weight may be that of the last sample.
         let second = second.min(PARTS as i32 - 1);
         let none = i32x8::splat(simd, 0);
@@ -139,7 +147,8 @@ impl<S: Simd> Pairs<S> {
     fn sums(&self, pairs: [u32x8<S>; 2]) -> [Lanes<S>; 2] {
         let [a, b] = each!([0, 1], I => pairs[I].bitcast::<i16x16<S>>());
         let value = a.pairwise_dot_product(self.value[0]) + b.pairwise_dot_product(self.value[1]);
-        let moment = a.pairwise_dot_product(self.moment[0]) + b.pairwise_dot_product(self.moment[1]);
+        let moment =
+            a.pairwise_dot_product(self.moment[0]) + b.pairwise_dot_product(self.moment[1]);
         [Lanes::float_from(value), Lanes::float_from(moment)]
     }
 }
@@ -184,7 +193,10 @@ impl Sample for u8 {
         first: [usize; 3],
     ) -> [Lanes<S>; 2] {
         let words = words!(simd, L => u32::from(u16::from_le_bytes(window.row(L, first))));
-        [Lanes::float_from((words & 0xff).bitcast::<i32x8<S>>()), Lanes::float_from((words >> 8).bitcast::<i32x8<S>>())]
+        [
+            Lanes::float_from((words & 0xff).bitcast::<i32x8<S>>()),
+            Lanes::float_from((words >> 8).bitcast::<i32x8<S>>()),
+        ]
     }
 
     #[inline(always)]

@@ -72,9 +72,10 @@ fn target(wanted: &Path) -> io::Result<PathBuf> {
         return Ok(wanted.to_owned());
     }
     wanted.canonicalize().map_err(|error| match error.kind() {
-        io::ErrorKind::NotFound => {
-            io::Error::new(io::ErrorKind::InvalidInput, "it is a symbolic link to a file that does not exist")
-        }
+        io::ErrorKind::NotFound => io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "it is a symbolic link to a file that does not exist",
+        ),
         _ => error,
     })
 }
@@ -108,7 +109,10 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
 ///
 /// # Errors
 /// As of [`write`](write()).
-pub fn write_with(path: &Path, write: impl FnOnce(&mut BufWriter<AtomicFile>) -> io::Result<()>) -> Result<()> {
+pub fn write_with(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<AtomicFile>) -> io::Result<()>,
+) -> Result<()> {
     let mut out = BufWriter::with_capacity(BUFFER, AtomicFile::create(path)?);
     write(&mut out).and_then(|()| out.flush()).map_err(|e| Error::output(path, e))?;
     out.into_inner().map_err(|e| Error::output(path, e.into_error()))?.commit()

@@ -59,7 +59,8 @@ impl Part {
     /// Makes one beside the file that is wanted. Nobody may read it who may not read the file that it replaces.
     pub fn create(wanted: &Path) -> io::Result<Self> {
         // Names may be too long already.
-        let name: String = wanted.file_name().unwrap_or_default().to_string_lossy().chars().take(50).collect();
+        let name: String =
+            wanted.file_name().unwrap_or_default().to_string_lossy().chars().take(50).collect();
         let permissions = wanted.metadata().ok().map(|found| found.permissions());
         let mut live = live();
         step(Step::Create)?;
@@ -71,7 +72,9 @@ impl Part {
                 Ok(file) => {
                     race("created", &path);
                     // Where files cannot be locked, none is taken for stale.
-                    if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) || !names(&path, &file) {
+                    if matches!(file.try_lock(), Err(TryLockError::WouldBlock))
+                        || !names(&path, &file)
+                    {
                         // Another process held it for stale before it was locked, and may have made its own.
                         continue;
                     }
@@ -102,7 +105,8 @@ impl Part {
         let mut live = live();
         step(Step::Rename)?;
         if !names(&self.path, &self.file) {
-            let message = format!("{} was removed or replaced by another program", self.path.display());
+            let message =
+                format!("{} was removed or replaced by another program", self.path.display());
             return Err(io::Error::other(message));
         }
         std::fs::rename(&self.path, wanted)?;
@@ -115,7 +119,10 @@ impl Drop for Part {
     fn drop(&mut self) {
         let mut live = live();
         // What was renamed or abandoned is not listed, and whatever has the name now is not this one.
-        if live.remove(&self.number).is_some() && step(Step::Remove).is_ok() && names(&self.path, &self.file) {
+        if live.remove(&self.number).is_some()
+            && step(Step::Remove).is_ok()
+            && names(&self.path, &self.file)
+        {
             std::fs::remove_file(&self.path).ok();
         }
     }

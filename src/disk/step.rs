@@ -76,7 +76,10 @@ pub(crate) mod faults {
     }
 
     /// Runs something while another process acts at those moments.
-    pub(crate) fn against<T>(other: impl FnMut(&str, &Path) + 'static, run: impl FnOnce() -> T) -> T {
+    pub(crate) fn against<T>(
+        other: impl FnMut(&str, &Path) + 'static,
+        run: impl FnOnce() -> T,
+    ) -> T {
         RACE.set(Some(Box::new(other)));
         let found = run();
         RACE.set(None);

@@ -58,11 +58,16 @@ fn stop_everywhere(name: &str, writer: impl Fn(&Path) -> Result<()>) -> usize {
             if fault == Fault::Full {
                 match done {
                     // Nothing is lost where the folder could not be synced.
-                    Ok(()) => assert!(step == Step::SyncFolder && found.as_ref() == Some(&new), "{told}"),
+                    Ok(()) => {
+                        assert!(step == Step::SyncFolder && found.as_ref() == Some(&new), "{told}")
+                    }
                     Err(error) => {
                         assert_eq!(found.as_deref(), old, "{told}");
                         assert!(error.to_string().contains(name), "{told}: {error}");
-                        assert!(matches!(error, Error::Output { .. }) || step == Step::Read, "{told}: {error}");
+                        assert!(
+                            matches!(error, Error::Output { .. }) || step == Step::Read,
+                            "{told}: {error}"
+                        );
                     }
                 }
                 assert!(names(&folder).iter().all(|n| n == name), "{told}: {:?}", names(&folder));
@@ -70,7 +75,10 @@ fn stop_everywhere(name: &str, writer: impl Fn(&Path) -> Result<()>) -> usize {
             }
             assert!(found.as_deref() == old || found.as_ref() == Some(&new), "{told}");
             for left in names(&folder).iter().filter(|left| *left != name) {
-                assert!(left.starts_with(&format!(".{name}.")) && left.ends_with(".splatkit-part"), "{told}: {left}");
+                assert!(
+                    left.starts_with(&format!(".{name}.")) && left.ends_with(".splatkit-part"),
+                    "{told}: {left}"
+                );
                 let bytes = std::fs::read(folder.path().join(left)).unwrap();
                 assert!(bytes == new || !is_read(name, bytes), "{told}");
             }
@@ -100,7 +108,8 @@ fn volume() -> Volume {
 #[test]
 fn hierarchies_are_whole_or_not_there() {
     let tree = tree(&surface(500, 1));
-    let stops = stop_everywhere("a.splk", |path| file::write(&tree, path, &file::WriteOptions::default()));
+    let stops =
+        stop_everywhere("a.splk", |path| file::write(&tree, path, &file::WriteOptions::default()));
     assert!(stops >= 12, "{stops}");
 }
 
@@ -109,7 +118,8 @@ fn hierarchies_made_in_regions_are_whole_or_not_there() {
     let inputs = Folder::new();
     let input = inputs.path().join("in.ply");
     // Triangles as coarse as these would be cut in a great many.
-    ply::write(&Mesh { triangles: Vec::new(), normals: Vec::new(), ..Mesh::sphere(4) }, &input).unwrap();
+    ply::write(&Mesh { triangles: Vec::new(), normals: Vec::new(), ..Mesh::sphere(4) }, &input)
+        .unwrap();
     let options = ExternalOptions {
         memory: 1,
         preset: hierarchy::Preset::Fastest,
@@ -119,7 +129,8 @@ fn hierarchies_made_in_regions_are_whole_or_not_there() {
     let stops = stop_everywhere("b.splk", |path| {
         let write = file::WriteOptions::default();
         let files = [input.clone()];
-        external::convert(&files, &Limits::default(), path, &options, &write, &|_, _, _| ()).map(|_| ())
+        external::convert(&files, &Limits::default(), path, &options, &write, &|_, _, _| ())
+            .map(|_| ())
     });
     assert!(stops >= 12, "{stops}");
 }
@@ -128,7 +139,8 @@ fn hierarchies_made_in_regions_are_whole_or_not_there() {
 fn volumes_in_bricks_are_whole_or_not_there() {
     let volume = volume();
     let options = bricks::WriteOptions::default();
-    let stops = stop_everywhere("a.splv", |path| bricks::write(&volume, path, &options, &|_, _| ()));
+    let stops =
+        stop_everywhere("a.splv", |path| bricks::write(&volume, path, &options, &|_, _| ()));
     assert!(stops >= 12, "{stops}");
     let inputs = Folder::new();
     let input = inputs.write("in.raw", volume.samples.bytes());
@@ -136,7 +148,9 @@ fn volumes_in_bricks_are_whole_or_not_there() {
     let (dims, spacing) = (volume.lattice.dims, DVec3::ONE);
     let layout = RawLayout { dims, sample_type, spacing, endian: Endian::Little, header: 0 };
     let stream = VolumeStream::open(&input, &Limits::default(), Some(&layout)).unwrap().unwrap();
-    let stops = stop_everywhere("b.splv", |path| bricks::convert(&stream, volume.range, path, &options, &|_, _| ()));
+    let stops = stop_everywhere("b.splv", |path| {
+        bricks::convert(&stream, volume.range, path, &options, &|_, _| ())
+    });
     assert!(stops >= 12, "{stops}");
 }
 
@@ -152,13 +166,18 @@ fn other_files_are_whole_or_not_there() {
         stop_everywhere("a.ply", |path| ply::write(&mesh, path)),
         stop_everywhere("gaussians.ply", |path| ply::write_gaussians(&set, path)),
         stop_everywhere("a.nrrd", |path| nrrd::write(&volume, path)),
-        stop_everywhere("bytes.nrrd", |path| nrrd::write_bytes(&lattice, path, |k| vec![k as u8; 90])),
+        stop_everywhere("bytes.nrrd", |path| {
+            nrrd::write_bytes(&lattice, path, |k| vec![k as u8; 90])
+        }),
         stop_everywhere("a.png", |path| picture.save(path, None)),
         stop_everywhere("a.jpg", |path| picture.save(path, None)),
         stop_everywhere("report.json", |path| write(path, br#"{"adapter": "none"}"#)),
         stop_everywhere("report.md", |path| write(path, &b"| a |\n".repeat(1000))),
     ];
-    assert!(stops.iter().all(|&stops| stops >= 12) && stops.iter().sum::<usize>() > 300, "{stops:?}");
+    assert!(
+        stops.iter().all(|&stops| stops >= 12) && stops.iter().sum::<usize>() > 300,
+        "{stops:?}"
+    );
 }
 
 #[test]
@@ -183,9 +202,14 @@ fn several_write_one_file_and_the_last_one_stays() {
 fn what_is_there_is_left_as_it_is() {
     let folder = Folder::new();
     std::fs::create_dir(folder.path().join("a.png")).unwrap();
-    for (name, message) in [("a.png", "that is no file"), ("none/a.png", "a.png: cannot be written")] {
+    for (name, message) in
+        [("a.png", "that is no file"), ("none/a.png", "a.png: cannot be written")]
+    {
         let error = write(&folder.path().join(name), b"new").unwrap_err();
-        assert!(matches!(error, Error::Output { .. }) && error.to_string().contains(message), "{error}");
+        assert!(
+            matches!(error, Error::Output { .. }) && error.to_string().contains(message),
+            "{error}"
+        );
     }
     assert_eq!(names(&folder), ["a.png"]);
     // What has the name of a leftover but is none, nor a file.
@@ -270,7 +294,10 @@ fn a_part_that_is_replaced_while_it_is_written_is_an_error() {
     std::fs::remove_file(&part).unwrap();
     std::fs::write(&part, b"half").unwrap();
     let error = file.commit().unwrap_err().to_string();
-    assert!(error.contains("a.txt.0.splatkit-part was removed or replaced by another program"), "{error}");
+    assert!(
+        error.contains("a.txt.0.splatkit-part was removed or replaced by another program"),
+        "{error}"
+    );
     assert_eq!(std::fs::read(&path).unwrap(), OLD);
 }
 
@@ -328,7 +355,10 @@ fn links_stay_and_what_they_lead_to_is_written() {
     for link in [&nowhere, &round] {
         let error = write(link, b"new").unwrap_err().to_string();
         assert!(error.contains(&*link.to_string_lossy()), "{error}");
-        assert!(link == &round || error.contains("a symbolic link to a file that does not exist"), "{error}");
+        assert!(
+            link == &round || error.contains("a symbolic link to a file that does not exist"),
+            "{error}"
+        );
         assert!(link.is_symlink());
     }
     assert_eq!(names(&other), ["target.txt"]);

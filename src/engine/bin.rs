@@ -19,7 +19,8 @@ impl Bin {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
         use Binding::{Read, Uniform, Write};
         let constants = variant.constants();
-        let bindings: &[Binding] = &[Uniform, Uniform, Uniform, Read, Read, Write, Write, Write, Write];
+        let bindings: &[Binding] =
+            &[Uniform, Uniform, Uniform, Read, Read, Write, Write, Write, Write];
         let stage = |label, entry, groups: &[&[Binding]]| {
             let sources = [&constants, shaders::FRAME, shaders::BINS, shaders::STATE, shaders::BIN];
             Stage::new(gpu, label, &sources, entry, groups)
@@ -49,9 +50,14 @@ impl Bin {
     /// Finds the sizes of the bins, but for what large splats add, and lists these.
     pub fn encode_count(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
         let buffers = Self::buffers(targets);
-        let arguments = self.prepare.bind(gpu, 1, &[targets.bin_arguments.as_entire_buffer_binding()]);
+        let arguments =
+            self.prepare.bind(gpu, 1, &[targets.bin_arguments.as_entire_buffer_binding()]);
         self.prepare.dispatch(encoder, &[&self.prepare.bind(gpu, 0, &buffers), &arguments], 1);
-        self.count.dispatch_indirect(encoder, &[&self.count.bind(gpu, 0, &buffers)], (&targets.bin_arguments, 0));
+        self.count.dispatch_indirect(
+            encoder,
+            &[&self.count.bind(gpu, 0, &buffers)],
+            (&targets.bin_arguments, 0),
+        );
     }
 
     /// Fills the bins.

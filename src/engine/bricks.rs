@@ -181,9 +181,12 @@ impl Shelf {
                 None => absent.push(key),
             }
         }
-        let most = usize::try_from(room / slot_bytes(&self.bricks)).unwrap_or(usize::MAX).max(choice.bricks.len());
+        let most = usize::try_from(room / slot_bytes(&self.bricks))
+            .unwrap_or(usize::MAX)
+            .max(choice.bricks.len());
         let free = self.slots.iter().filter(|slot| slot.is_none()).count();
-        let mut wanted = absent.len().saturating_sub(free).min(most.saturating_sub(self.slots.len()));
+        let mut wanted =
+            absent.len().saturating_sub(free).min(most.saturating_sub(self.slots.len()));
         while wanted > 0 {
             wanted = wanted.saturating_sub(self.grow(gpu, wanted, most));
         }
@@ -194,7 +197,8 @@ impl Shelf {
     /// Adds slots for about `wanted` more bricks, so that there are no more than `most`; tells how many.
     fn grow(&mut self, gpu: &Gpu, wanted: usize, most: usize) -> usize {
         let bytes = self.bricks.brick_bytes();
-        let fit = usize::try_from(gpu.binding_size() / (8 * u64::from(SLOT_SAMPLES))).unwrap_or(usize::MAX);
+        let fit = usize::try_from(gpu.binding_size() / (8 * u64::from(SLOT_SAMPLES)))
+            .unwrap_or(usize::MAX);
         // A view's neighbours need some more; a small volume has no more.
         let all: usize = self.bricks.levels().iter().map(|level| level.bricks()).sum();
         let room = most.min(all).saturating_sub(self.slots.len()).max(1);
@@ -202,7 +206,8 @@ impl Shelf {
         let first = self.slots.len();
         self.slots.extend(std::iter::repeat_n(None, count));
         let data = super::buffer(gpu, "bricks", (count * bytes) as u64, Usage::STORAGE);
-        let ranges = super::buffer(gpu, "brick ranges", (count * 2 * BRICK_BLOCKS) as u64, Usage::STORAGE);
+        let ranges =
+            super::buffer(gpu, "brick ranges", (count * 2 * BRICK_BLOCKS) as u64, Usage::STORAGE);
         self.chunks.push((data.clone(), ranges.clone(), first));
         self.grown.push(Slots { data, ranges, first, count });
         count
@@ -211,13 +216,16 @@ impl Shelf {
     /// Reads bricks and puts them in slots that are free, or whose bricks were not needed for longest.
     fn load(&mut self, gpu: &Gpu, absent: &[Key]) -> Result<()> {
         let last_needed = |slot: &usize| self.slots[*slot].map_or(0, |(_, update)| update);
-        let mut places: Vec<usize> = (0..self.slots.len()).filter(|slot| last_needed(slot) < self.update).collect();
+        let mut places: Vec<usize> =
+            (0..self.slots.len()).filter(|slot| last_needed(slot) < self.update).collect();
         places.sort_by_key(last_needed);
         let mut places = places.into_iter();
         let bytes = self.bricks.brick_bytes();
         for batch in absent.chunks(BATCH) {
-            let read: Vec<Brick> =
-                batch.par_iter().map(|&(level, brick)| self.bricks.read(level, brick)).collect::<Result<_>>()?;
+            let read: Vec<Brick> = batch
+                .par_iter()
+                .map(|&(level, brick)| self.bricks.read(level, brick))
+                .collect::<Result<_>>()?;
             for ((&key, brick), slot) in batch.iter().zip(&read).zip(&mut places) {
                 if let Some((old, _)) = self.slots[slot].replace((key, self.update)) {
                     self.slot_of.remove(&old);
@@ -246,7 +254,8 @@ impl Shelf {
             }
             _ => [0; 4],
         };
-        let places: Vec<[u32; 4]> = self.slots[slab.first..slab.first + slab.count_slots].iter().map(place).collect();
+        let places: Vec<[u32; 4]> =
+            self.slots[slab.first..slab.first + slab.count_slots].iter().map(place).collect();
         gpu.queue.write_buffer(&slab.slots, 0, bytemuck::cast_slice(&places));
     }
 }
@@ -263,7 +272,11 @@ impl Drawn {
     fn of(choice: &Choice) -> Self {
         let mut bricks = choice.bricks.clone();
         bricks.sort_unstable();
-        Self { bricks, levels: choice.levels.iter().map(|(level, _)| *level).collect(), shown: choice.shown }
+        Self {
+            bricks,
+            levels: choice.levels.iter().map(|(level, _)| *level).collect(),
+            shown: choice.shown,
+        }
     }
 }
 
@@ -299,7 +312,12 @@ impl SelectBricks {
         let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&shown.map(u32::from)));
         // All slabs count in the same place, one after the other; so they count again before they write.
         let most = slabs.iter().map(|(slab, _)| slab.blocks()).max().unwrap_or(0);
-        let blocks = super::buffer(gpu, "select blocks", 4 * (u64::from(most) + 1), Usage::STORAGE | Usage::COPY_SRC);
+        let blocks = super::buffer(
+            gpu,
+            "select blocks",
+            4 * (u64::from(most) + 1),
+            Usage::STORAGE | Usage::COPY_SRC,
+        );
         let totals = super::buffer(gpu, "select totals", 4 * slabs.len() as u64, Usage::COPY_SRC);
         let bind = |stage: &Stage, slab: &Slab, uniform: &wgpu::Buffer| {
             let buffers = [uniform, &slab.ranges, &visible, &blocks, &slab.selected, &slab.slots];
@@ -308,17 +326,31 @@ impl SelectBricks {
         let count = |encoder: &mut wgpu::CommandEncoder, slab: &Slab, uniform: &wgpu::Buffer| {
             // Behind the last block stands their sum after the scan.
             encoder.clear_buffer(&blocks, 0, None);
-            self.count.dispatch(encoder, &[&bind(&self.count, slab, uniform)], slab.blocks().div_ceil(64));
+            self.count.dispatch(
+                encoder,
+                &[&bind(&self.count, slab, uniform)],
+                slab.blocks().div_ceil(64),
+            );
             scan.encode(gpu, encoder, &blocks, slab.blocks() + 1);
         };
-        let encoder = || gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("select") });
+        let encoder = || {
+            gpu.device
+                .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("select") })
+        };
         let mut counting = encoder();
         for (at, (slab, uniform)) in (0..).zip(slabs.iter()) {
             count(&mut counting, slab, uniform);
-            counting.copy_buffer_to_buffer(&blocks, 4 * u64::from(slab.blocks()), &totals, 4 * at, 4);
+            counting.copy_buffer_to_buffer(
+                &blocks,
+                4 * u64::from(slab.blocks()),
+                &totals,
+                4 * at,
+                4,
+            );
         }
         gpu.queue.submit([counting.finish()]);
-        let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&gpu.read(&totals, 0, 4 * slabs.len() as u64)?);
+        let counts: Vec<u32> =
+            bytemuck::pod_collect_to_vec(&gpu.read(&totals, 0, 4 * slabs.len() as u64)?);
         let runs: u64 = counts.iter().map(|&count| u64::from(runs_of(count))).sum();
         if runs > most_runs {
             return Ok(runs);
@@ -330,7 +362,11 @@ impl SelectBricks {
             slab.selected = super::buffer(gpu, "selected", 4 * u64::from(own), Usage::STORAGE);
             if own > 0 {
                 count(&mut writing, slab, uniform);
-                self.write.dispatch(&mut writing, &[&bind(&self.write, slab, uniform)], slab.blocks().div_ceil(64));
+                self.write.dispatch(
+                    &mut writing,
+                    &[&bind(&self.write, slab, uniform)],
+                    slab.blocks().div_ceil(64),
+                );
             }
         }
         gpu.queue.submit([writing.finish()]);

@@ -22,8 +22,15 @@ impl Cull {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
         use Binding::{Read, Uniform, Write};
         let constants = variant.constants();
-        let sources =
-            [&constants, shaders::FRAME, shaders::SPANS, shaders::MAP, shaders::STATE, shaders::ACTIVE, shaders::CULL];
+        let sources = [
+            &constants,
+            shaders::FRAME,
+            shaders::SPANS,
+            shaders::MAP,
+            shaders::STATE,
+            shaders::ACTIVE,
+            shaders::CULL,
+        ];
         let own: &[Binding] = &[Uniform, Uniform, Read, Read, Read, Write, Write, Write];
         let chunk: &[Binding] = &[Uniform, Read];
         Self {
@@ -32,7 +39,13 @@ impl Cull {
         }
     }
 
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets, chunks: &[Chunk]) {
+    pub fn encode(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        targets: &Targets,
+        chunks: &[Chunk],
+    ) {
         // Runs behind a hierarchy's last drawn node, and the element after the last run, count nothing.
         encoder.clear_buffer(&targets.runs, 0, None);
         encoder.clear_buffer(&targets.active, 0, None);
@@ -55,9 +68,11 @@ impl Cull {
             let buffers = buffers.map(|b| b.as_entire_buffer_binding());
             let own = [&chunk.uniform, numbers].map(|b| b.as_entire_buffer_binding());
             let groups = [self.cull.bind(gpu, 0, &buffers), self.cull.bind(gpu, 1, &own)];
-            let workgroups = chunk.candidates.div_ceil(WORKGROUP_CANDIDATES).next_multiple_of(HANDS);
+            let workgroups =
+                chunk.candidates.div_ceil(WORKGROUP_CANDIDATES).next_multiple_of(HANDS);
             self.cull.dispatch(encoder, &[&groups[0], &groups[1]], workgroups);
-            let arguments = self.prepare.bind(gpu, 2, &[chunk.active_arguments.as_entire_buffer_binding()]);
+            let arguments =
+                self.prepare.bind(gpu, 2, &[chunk.active_arguments.as_entire_buffer_binding()]);
             let groups = [self.prepare.bind(gpu, 0, &buffers), self.prepare.bind(gpu, 1, &own)];
             self.prepare.dispatch(encoder, &[&groups[0], &groups[1], &arguments], 1);
         }

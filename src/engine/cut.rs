@@ -40,13 +40,29 @@ impl Cut {
         };
         Self {
             count: stage("cut: count", shaders::CUT, "count", &[&nodes, &[Read, Write, Write]]),
-            write: stage("cut: write", shaders::CUT, "write", &[&[Uniform], &[Read, Write, Write, Write, Write]]),
-            tally: stage("tally", shaders::TALLY, "count", &[&[nodes.as_slice(), &[Write]].concat()]),
+            write: stage(
+                "cut: write",
+                shaders::CUT,
+                "write",
+                &[&[Uniform], &[Read, Write, Write, Write, Write]],
+            ),
+            tally: stage(
+                "tally",
+                shaders::TALLY,
+                "count",
+                &[&[nodes.as_slice(), &[Write]].concat()],
+            ),
         }
     }
 
     /// Encodes the making of a chunk's list.
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, scan: &Scan, chunk: &NodeChunk<'_>) {
+    pub fn encode(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        scan: &Scan,
+        chunk: &NodeChunk<'_>,
+    ) {
         let (nodes, list) = (chunk.nodes(), chunk.list());
         let at_hand = chunk.slots.active() * SLOT_NODES;
         let groups = at_hand / (64 * OWN_NODES);

@@ -28,11 +28,15 @@ impl Condition {
         device.set_device_lost_callback(move |_, reason| own.lose(reason));
         let own = self.clone();
         // Without a handler wgpu ends the program where memory runs out.
-        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| own.note(&error.to_string())));
+        device
+            .on_uncaptured_error(Arc::new(move |error: wgpu::Error| own.note(&error.to_string())));
     }
 
     fn note(&self, complaint: &str) {
-        self.stray.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| complaint.to_owned());
+        self.stray
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get_or_insert_with(|| complaint.to_owned());
     }
 
     fn lose(&self, reason: impl Into<String>) {
@@ -66,7 +70,11 @@ impl Gpu {
     }
 
     fn hear<T>(&self, work: impl FnOnce() -> T) -> (T, Option<Error>) {
-        let filters = [wgpu::ErrorFilter::Validation, wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::OutOfMemory];
+        let filters = [
+            wgpu::ErrorFilter::Validation,
+            wgpu::ErrorFilter::Internal,
+            wgpu::ErrorFilter::OutOfMemory,
+        ];
         let scopes = filters.map(|filter| self.device.push_error_scope(filter));
         let done = work();
         // The last that was opened is closed first. Memory that ran out is the reason of what else went wrong.
@@ -74,7 +82,9 @@ impl Gpu {
         let complaint = complaints.reduce(Option::or).flatten().map(|complaint| {
             let (name, reason) = (&self.info.name, complaint.to_string());
             Error::Gpu(match complaint {
-                wgpu::Error::OutOfMemory { .. } => format!("the memory of {name} ran out: {reason}"),
+                wgpu::Error::OutOfMemory { .. } => {
+                    format!("the memory of {name} ran out: {reason}")
+                }
                 _ => format!("{name}: {reason}"),
             })
         });
@@ -100,7 +110,10 @@ impl Gpu {
                 // Letting go of a device waits for it. This one may never be done, so its memory stays where it is.
                 std::mem::forget(self.clone());
                 // The device opened anew would take as long again: this is not told as a loss that can be mended.
-                return Err(Error::Gpu(format!("{} did not answer within {seconds} s", self.info.name)));
+                return Err(Error::Gpu(format!(
+                    "{} did not answer within {seconds} s",
+                    self.info.name
+                )));
             }
             Ok(Err(error)) => self.condition.lose(error.to_string()),
             Err(_) => self.condition.lose("it was gone when it was waited for"),
@@ -127,7 +140,8 @@ impl Gpu {
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder =
+            self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, bytes);
         self.queue.submit([encoder.finish()]);
         let (sender, receiver) = std::sync::mpsc::channel();
@@ -137,7 +151,12 @@ impl Gpu {
         // Another thread that waits for the same device may be about to call back; one that is lost may forget to.
         match receiver.recv_timeout(self.patience.min(CALL_BACK)) {
             Ok(Ok(())) => {}
-            _ => return Err(Error::DeviceLost(format!("{} did not give back what was drawn", self.info.name))),
+            _ => {
+                return Err(Error::DeviceLost(format!(
+                    "{} did not give back what was drawn",
+                    self.info.name
+                )));
+            }
         }
         let view = staging.get_mapped_range(..).map_err(|e| Error::Gpu(e.to_string()))?;
         Ok(view.to_vec())

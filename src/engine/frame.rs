@@ -19,7 +19,10 @@ use super::{
     shaders::Variant,
     tables::{self, Tables},
     tiles::Tiles,
-    uniforms::{self, AGAIN_ARGUMENTS, ARGUMENT_BYTES, Frame, MARCH_ARGUMENTS, PASS_BYTES, SCAN_ARGUMENTS, State},
+    uniforms::{
+        self, AGAIN_ARGUMENTS, ARGUMENT_BYTES, Frame, MARCH_ARGUMENTS, PASS_BYTES, SCAN_ARGUMENTS,
+        State,
+    },
     upload::{Origin, PreparedScene, upload},
 };
 use crate::{
@@ -137,7 +140,11 @@ pub fn variant(
         central: false,
         // A software adapter runs eight invocations at once: eight columns of eight pixels fill a tile.
         rows: if gpu.is_software() { 8 } else { 1 },
-        most_entries: budget.tile_entries.unwrap_or(if gpu.is_software() { SOFTWARE_ENTRIES } else { u32::MAX }),
+        most_entries: budget.tile_entries.unwrap_or(if gpu.is_software() {
+            SOFTWARE_ENTRIES
+        } else {
+            u32::MAX
+        }),
     };
     [variant.clips, variant.holes] = uniforms::clip_counts(settings);
     let classified = settings.classifies_samples();
@@ -150,7 +157,9 @@ pub fn variant(
                 variant.surface_shaded |= is_lit && settings.surface_shade.is_some();
                 continue;
             }
-            Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => transfer,
+            Item::Scalar(_, transfer)
+            | Item::Volume(_, _, transfer)
+            | Item::Bricks(_, _, transfer) => transfer,
         };
         let shaded = is_lit && settings.shade_of(transfer).is_some();
         if classified {
@@ -159,7 +168,8 @@ pub fn variant(
         } else {
             variant.scalar = true;
             variant.volume_shaded = shaded;
-            variant.gradient_opacity = !transfer.gradient.is_empty() && settings.optics != Optics::Maximum;
+            variant.gradient_opacity =
+                !transfer.gradient.is_empty() && settings.optics != Optics::Maximum;
             variant.isosurfaces = if is_lit { transfer.isosurfaces.len() as u32 } else { 0 };
         }
         variant.beyond = match item {
@@ -175,17 +185,20 @@ pub fn variant(
             variant.table_kernel = !matches!(kernel.profile, Profile::Gaussian(_));
             let alike = !variant.rectilinear && !variant.table_kernel && !classified;
             variant.isotropic = alike && !gather && are_flat(&volume.lattice, kernel, view, item);
-            variant.sample_kind = prepared.field.as_ref().filter(|_| gather).map_or(0, |field| field.kind);
+            variant.sample_kind =
+                prepared.field.as_ref().filter(|_| gather).map_or(0, |field| field.kind);
         }
         if let (Item::Bricks(bricks, kernel, _), Some(choice)) = (item, choice) {
             variant.lattice = true;
             variant.two_levels = choice.levels.len() > 1;
-            let flat = |&(level, _): &(usize, f64)| are_flat(&bricks.lattice(level), kernel, view, item);
+            let flat =
+                |&(level, _): &(usize, f64)| are_flat(&bricks.lattice(level), kernel, view, item);
             variant.isotropic = choice.levels.iter().all(flat);
         }
     }
     // Where a pass ends, march meets splats again and closes sheets twice: of a field that costs more than of a surface.
-    variant.least_share = budget.least_share.unwrap_or(if variant.scalar { 1 << 21 } else { 1 << 18 });
+    variant.least_share =
+        budget.least_share.unwrap_or(if variant.scalar { 1 << 21 } else { 1 << 18 });
     variant.central = variant.gradients() && settings.gradient == Gradient::Central;
     if gather && variant.rows > 1 {
         // Each pixel looks at the samples around its own ray, so pixels of an invocation would share nothing.
@@ -316,8 +329,21 @@ pub struct Targets {
 impl Targets {
     /// Bytes of GPU memory.
     pub fn bytes(&self) -> u64 {
-        let Self { frame, planes, tables, run_spans, needs, census, state, map, runs, active, records, boxes, .. } =
-            self;
+        let Self {
+            frame,
+            planes,
+            tables,
+            run_spans,
+            needs,
+            census,
+            state,
+            map,
+            runs,
+            active,
+            records,
+            boxes,
+            ..
+        } = self;
         let Self { bins, entries, large, long_bins, progress, colors, depths, .. } = self;
         [frame, planes, tables, run_spans, needs, census, state, map, runs, active, records, boxes]
             .into_iter()
@@ -334,7 +360,9 @@ pub struct Pool(Vec<(&'static str, wgpu::Buffer)>);
 impl Pool {
     fn take(&mut self, gpu: &Gpu, label: &'static str, bytes: u64) -> wgpu::Buffer {
         let bytes = bytes.max(16).next_multiple_of(16);
-        if let Some((_, buffer)) = self.0.iter().find(|(name, buffer)| *name == label && buffer.size() >= bytes) {
+        if let Some((_, buffer)) =
+            self.0.iter().find(|(name, buffer)| *name == label && buffer.size() >= bytes)
+        {
             return buffer.clone();
         }
         self.0.retain(|(name, _)| *name != label);
@@ -350,7 +378,10 @@ impl Pool {
 }
 
 /// Makes (or takes from the pool) everything a frame needs.
-#[allow(clippy::too_many_arguments, reason = "each is a different thing that the renderer holds apart")]
+#[allow(
+    clippy::too_many_arguments,
+    reason = "each is a different thing that the renderer holds apart"
+)]
 pub fn targets(
     gpu: &Gpu,
     pool: &mut Pool,
@@ -366,7 +397,10 @@ pub fn targets(
     let pixels = u64::from(width) * u64::from(height);
     if pixels * 16 > gpu.binding_size() {
         // The renderer cuts pictures in strips of whole rows; only a single row can be too long.
-        return Err(Error::Argument(format!("a picture {width} pixels wide is too wide for {}", gpu.info.name)));
+        return Err(Error::Argument(format!(
+            "a picture {width} pixels wide is too wide for {}",
+            gpu.info.name
+        )));
     }
     let most_runs = most_runs(gpu);
     if prepared.runs > most_runs {
@@ -404,7 +438,8 @@ pub fn targets(
     let table = tables_of(prepared, view, sheets, &mut frame);
     let field = prepared.field.as_mut().filter(|_| variant.gather);
     let before = field.as_ref().map_or(0, |field| field.bytes());
-    let gathered = field.and_then(|field| field.list(gpu, view, sheets, variant, &table, &mut frame));
+    let gathered =
+        field.and_then(|field| field.list(gpu, view, sheets, variant, &table, &mut frame));
     if gathered.is_some() {
         prepared.bytes += prepared.field.as_ref().map_or(0, |field| field.bytes()) - before;
     }
@@ -442,7 +477,11 @@ pub fn targets(
         long_bins: pool.take(gpu, "long bins", 4 * bin_count),
         long_count: pool.take(gpu, "long count", 4),
         long_arguments: pool.take(gpu, "long arguments", 12),
-        progress: pool.take(gpu, "progress", 4 * (gathered_word(tile_count) + 1 + u64::from(tile_count))),
+        progress: pool.take(
+            gpu,
+            "progress",
+            4 * (gathered_word(tile_count) + 1 + u64::from(tile_count)),
+        ),
         colors: pool.take(gpu, "colors", 16 * pixels + slots),
         depths: pool.take(gpu, "depths", 4 * pixels),
         gathered,
@@ -457,12 +496,19 @@ pub fn gathered_word(tiles: u32) -> u64 {
 }
 
 /// The tables of the scene's field; a frame without one gets some of no meaning.
-fn tables_of(prepared: &PreparedScene, view: &View, sheets: &Sheets, frame: &mut Frame) -> Vec<[f32; 4]> {
+fn tables_of(
+    prepared: &PreparedScene,
+    view: &View,
+    sheets: &Sheets,
+    frame: &mut Frame,
+) -> Vec<[f32; 4]> {
     let field = prepared.scene.items.iter().find_map(|item| match item {
         Item::Radiance(_) | Item::Hierarchy(_) => None,
         Item::Scalar(set, transfer) => Some((transfer, set.value_range(), None)),
         Item::Volume(volume, kernel, transfer) => Some((transfer, volume.range, Some(kernel))),
-        Item::Bricks(bricks, kernel, transfer) => Some((transfer, bricks.header().range, Some(kernel))),
+        Item::Bricks(bricks, kernel, transfer) => {
+            Some((transfer, bricks.header().range, Some(kernel)))
+        }
     });
     let Some((transfer, range, kernel)) = field else { return vec![[0.0; 4]; 2] };
     let tables = Tables::new(transfer, range, kernel);
@@ -536,7 +582,10 @@ impl<'a> Work<'a> {
                     scan.encode(gpu, encoder, &targets.runs, targets.run_total + 1);
                 }),
             ),
-            ("project", Box::new(move |encoder| scatter.project.encode(gpu, encoder, targets, chunks))),
+            (
+                "project",
+                Box::new(move |encoder| scatter.project.encode(gpu, encoder, targets, chunks)),
+            ),
             (
                 "bin",
                 Box::new(move |encoder| {

@@ -49,7 +49,12 @@ pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
 }
 
 /// Why the engine cannot gather a scene's field in these settings; none where it can.
-pub fn obstacle(scene: &Scene, settings: &Settings, sheets: &Sheets, gpu: &Gpu) -> Option<&'static str> {
+pub fn obstacle(
+    scene: &Scene,
+    settings: &Settings,
+    sheets: &Sheets,
+    gpu: &Gpu,
+) -> Option<&'static str> {
     let parts = crate::cpu::gather::parts(scene, sheets, None);
     if let Some(what) = crate::cpu::gather::obstacle(scene, settings, parts, unsuited) {
         return Some(what);
@@ -57,8 +62,10 @@ pub fn obstacle(scene: &Scene, settings: &Settings, sheets: &Sheets, gpu: &Gpu) 
     if parts > 1 {
         return Some("sheets thicker than two samples");
     }
-    let volume =
-        scene.items.iter().find_map(|item| if let Item::Volume(volume, ..) = item { Some(volume) } else { None });
+    let volume = scene
+        .items
+        .iter()
+        .find_map(|item| if let Item::Volume(volume, ..) = item { Some(volume) } else { None });
     let Some(volume) = volume else { return Some("volumes in bricks") };
     let limits = gpu.device.limits();
     if texture_size(volume, kind_of(volume.samples.scalar()))
@@ -144,9 +151,14 @@ fn texture(gpu: &Gpu, volume: &Volume, kind: u32) -> wgpu::Texture {
     let row = volume.lattice.dims[0] * volume.samples.sample_bytes();
     let (to_row, to_slice) = (4 * words, 4 * words * rows);
     let each = (COPIED / to_slice).max(1);
-    for (first, own) in (0..depth).step_by(each).zip(volume.samples.bytes().chunks(row * rows * each)) {
+    for (first, own) in
+        (0..depth).step_by(each).zip(volume.samples.bytes().chunks(row * rows * each))
+    {
         let mut packed = vec![0u8; own.len() / row * to_row];
-        packed.par_chunks_mut(to_row).zip(own.par_chunks(row)).for_each(|(to, from)| write_row(from, kind, to));
+        packed
+            .par_chunks_mut(to_row)
+            .zip(own.par_chunks(row))
+            .for_each(|(to, from)| write_row(from, kind, to));
         let layers = (packed.len() / to_slice) as u32;
         gpu.queue.write_texture(
             wgpu::TexelCopyTextureInfo {
@@ -156,7 +168,11 @@ fn texture(gpu: &Gpu, volume: &Volume, kind: u32) -> wgpu::Texture {
                 aspect: wgpu::TextureAspect::All,
             },
             &packed,
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(to_row as u32), rows_per_image: Some(height) },
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(to_row as u32),
+                rows_per_image: Some(height),
+            },
             wgpu::Extent3d { width, height, depth_or_array_layers: layers },
         );
     }
@@ -371,7 +387,8 @@ mod tests {
     fn sheets_are_numbered_from_one_across_words() {
         let marks = [1 << 31 | 1 << 63 | 1, 1u64 << 30];
         let words: Vec<u32> = numbered_from_one(&marks).collect();
-        let found: Vec<usize> = (0..32 * words.len()).filter(|bit| words[bit / 32] >> (bit % 32) & 1 != 0).collect();
+        let found: Vec<usize> =
+            (0..32 * words.len()).filter(|bit| words[bit / 32] >> (bit % 32) & 1 != 0).collect();
         assert_eq!(found, [1, 32, 64, 95]);
     }
 }

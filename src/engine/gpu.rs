@@ -74,7 +74,8 @@ fn usable_adapters() -> Vec<wgpu::Adapter> {
     // One that lacks compute shaders, or storage buffers in them, cannot run the engine.
     adapters.retain(|a| {
         let flags = a.get_downlevel_capabilities().flags;
-        flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS) && a.limits().max_storage_buffers_per_shader_stage >= 8
+        flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
+            && a.limits().max_storage_buffers_per_shader_stage >= 8
     });
     adapters.sort_by_key(|a| rank(&a.get_info()));
     adapters
@@ -110,18 +111,27 @@ impl Gpu {
         }
         let wanted = match choice {
             AdapterChoice::Automatic => match std::env::var("WGPU_ADAPTER_NAME") {
-                Ok(name) if !name.is_empty() => (by_name(&name), format!("named “{name}” (WGPU_ADAPTER_NAME)")),
+                Ok(name) if !name.is_empty() => {
+                    (by_name(&name), format!("named “{name}” (WGPU_ADAPTER_NAME)"))
+                }
                 _ => (Some(0), String::new()),
             },
-            AdapterChoice::Index(index) => (Some(*index).filter(|&i| i < adapters.len()), format!("number {index}")),
+            AdapterChoice::Index(index) => {
+                (Some(*index).filter(|&i| i < adapters.len()), format!("number {index}"))
+            }
             AdapterChoice::Name(name) => (by_name(name), format!("named “{name}”")),
             AdapterChoice::Software => {
-                let found = adapters.iter().position(|a| a.get_info().device_type == wgpu::DeviceType::Cpu);
+                let found =
+                    adapters.iter().position(|a| a.get_info().device_type == wgpu::DeviceType::Cpu);
                 (found, format!("in software; {NO_ADAPTER_HELP}"))
             }
         };
         let Some(index) = wanted.0 else {
-            return Err(Error::NoAdapter(format!("there is no adapter {}; found: {}", wanted.1, names())));
+            return Err(Error::NoAdapter(format!(
+                "there is no adapter {}; found: {}",
+                wanted.1,
+                names()
+            )));
         };
         let gpu = Self::open(&adapters.swap_remove(index))?;
         gpu.condition.listen(&gpu.device);
@@ -135,7 +145,9 @@ impl Gpu {
     /// As of [`Self::headless`]; [`Error::Argument`] for the device of a host application, which is the host's to open.
     pub fn reopened(&self) -> Result<Self> {
         let Some(choice) = &self.choice else {
-            return Err(Error::Argument("the device is the host's; it has to be opened there".into()));
+            return Err(Error::Argument(
+                "the device is the host's; it has to be opened there".into(),
+            ));
         };
         Ok(Self { patience: self.patience, memory: self.memory, ..Self::headless(choice)? })
     }
@@ -175,7 +187,10 @@ impl Gpu {
     fn open(adapter: &wgpu::Adapter) -> Result<Self> {
         // WebGPU's defaults are what the engine is built for; larger bindings only save passes, and with two more of them a volume
         // among surfaces can be gathered.
-        let buffers = adapter.limits().max_storage_buffers_per_shader_stage.clamp(8, super::gather::MOST_BUFFERS);
+        let buffers = adapter
+            .limits()
+            .max_storage_buffers_per_shader_stage
+            .clamp(8, super::gather::MOST_BUFFERS);
         let limits = wgpu::Limits {
             max_storage_buffers_per_shader_stage: buffers,
             max_storage_buffer_binding_size: adapter.limits().max_storage_buffer_binding_size,
@@ -189,8 +204,10 @@ impl Gpu {
             required_limits: limits,
             ..Default::default()
         };
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
-            .map_err(|e| Error::NoAdapter(format!("{} cannot be opened: {e}", adapter.get_info().name)))?;
+        let (device, queue) =
+            pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| {
+                Error::NoAdapter(format!("{} cannot be opened: {e}", adapter.get_info().name))
+            })?;
         Ok(Self::from_wgpu(device, queue, adapter.get_info()))
     }
 

@@ -32,21 +32,37 @@ impl Large {
     }
 
     fn buffers(targets: &Targets) -> [wgpu::BufferBinding<'_>; 6] {
-        [&targets.frame, &targets.pass, &targets.boxes, &targets.bins, &targets.entries, &targets.large]
-            .map(|b| b.as_entire_buffer_binding())
+        [
+            &targets.frame,
+            &targets.pass,
+            &targets.boxes,
+            &targets.bins,
+            &targets.entries,
+            &targets.large,
+        ]
+        .map(|b| b.as_entire_buffer_binding())
     }
 
     /// Counts the entries of the splats that bin has listed.
     pub fn encode_count(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
         let buffers = Self::buffers(targets);
-        let arguments = self.prepare.bind(gpu, 1, &[targets.large_arguments.as_entire_buffer_binding()]);
+        let arguments =
+            self.prepare.bind(gpu, 1, &[targets.large_arguments.as_entire_buffer_binding()]);
         self.prepare.dispatch(encoder, &[&self.prepare.bind(gpu, 0, &buffers), &arguments], 1);
-        self.count.dispatch_indirect(encoder, &[&self.count.bind(gpu, 0, &buffers)], (&targets.large_arguments, 0));
+        self.count.dispatch_indirect(
+            encoder,
+            &[&self.count.bind(gpu, 0, &buffers)],
+            (&targets.large_arguments, 0),
+        );
     }
 
     /// Writes their entries.
     pub fn encode_fill(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
         let buffers = Self::buffers(targets);
-        self.fill.dispatch_indirect(encoder, &[&self.fill.bind(gpu, 0, &buffers)], (&targets.large_arguments, 0));
+        self.fill.dispatch_indirect(
+            encoder,
+            &[&self.fill.bind(gpu, 0, &buffers)],
+            (&targets.large_arguments, 0),
+        );
     }
 }

@@ -28,7 +28,8 @@ impl March {
             shaders::SAVED,
             shaders::MARCH,
         ];
-        let mut bindings = vec![Uniform, Read, Uniform, Read, Read, Read, Read, Write, Write, Write];
+        let mut bindings =
+            vec![Uniform, Read, Uniform, Read, Read, Read, Read, Write, Write, Write];
         if variant.gather {
             sources.extend([shaders::VALUE, shaders::FIELD_LATTICE, shaders::MARCH_LATTICE]);
             bindings.push(Read);
@@ -36,11 +37,23 @@ impl March {
             sources.push(shaders::FIELD_SUMS);
         }
         let texture: &[&[Binding]] = if variant.gather { &[&[Binding::Texture]] } else { &[] };
-        Self(Stage::new(gpu, "march", &sources, "march", &[&[bindings.as_slice()], texture].concat()))
+        Self(Stage::new(
+            gpu,
+            "march",
+            &sources,
+            "march",
+            &[&[bindings.as_slice()], texture].concat(),
+        ))
     }
 
     /// `arguments`: where in the pass's the dispatch stands.
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets, arguments: u64) {
+    pub fn encode(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        targets: &Targets,
+        arguments: u64,
+    ) {
         let mut buffers = vec![
             targets.frame.as_entire_buffer_binding(),
             targets.planes.as_entire_buffer_binding(),

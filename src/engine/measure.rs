@@ -28,12 +28,25 @@ impl Measure {
                 shaders::BINS,
                 shaders::MEASURE,
             ];
-            Stage::new(gpu, "measure", &sources, "measure", &[&[Uniform, Read, Write, Write, Write], bindings])
+            Stage::new(
+                gpu,
+                "measure",
+                &sources,
+                "measure",
+                &[&[Uniform, Read, Write, Write, Write], bindings],
+            )
         }))
     }
 
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets, chunk: &Chunk) {
-        let buffers = [&targets.frame, &targets.planes, &chunk.spans, &targets.run_spans, &targets.needs];
+    pub fn encode(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        targets: &Targets,
+        chunk: &Chunk,
+    ) {
+        let buffers =
+            [&targets.frame, &targets.planes, &chunk.spans, &targets.run_spans, &targets.needs];
         let buffers = buffers.map(|b| b.as_entire_buffer_binding());
         self.0.dispatch(gpu, encoder, chunk, &buffers);
     }

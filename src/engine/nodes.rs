@@ -64,7 +64,8 @@ const SLOT_BOUNDS: u64 = (SLOT_NODES / RUN_NODES) as u64 * size_of::<GpuBounds>(
 /// Bytes of a slot's nodes, and of their splats.
 const SLOT_HALF: u64 = SLOT_NODES as u64 * size_of::<GpuNode>() as u64;
 /// Bytes that a slot takes: these, what the cut makes of them, and their spans.
-const SLOT_BYTES: u64 = 2 * SLOT_HALF + SLOT_BOUNDS + 4 * (4 * SLOT_NODES + counts_of(SLOT_NODES)) as u64;
+const SLOT_BYTES: u64 =
+    2 * SLOT_HALF + SLOT_BOUNDS + 4 * (4 * SLOT_NODES + counts_of(SLOT_NODES)) as u64;
 
 /// `Cut` in nodes.wgsl.
 #[repr(C)]
@@ -108,7 +109,8 @@ impl NodeChunk<'_> {
     /// What nodes.wgsl binds.
     pub fn nodes(&self) -> [wgpu::BufferBinding<'_>; 6] {
         let Slots { cut, nodes, slots, resident, .. } = self.slots;
-        [self.source, cut, nodes, self.splats, slots, resident].map(|b| b.as_entire_buffer_binding())
+        [self.source, cut, nodes, self.splats, slots, resident]
+            .map(|b| b.as_entire_buffer_binding())
     }
 
     /// What cut.wgsl binds besides.
@@ -119,7 +121,11 @@ impl NodeChunk<'_> {
 }
 
 impl Slots {
-    pub fn chunk<'a>(&'a self, source: &'a wgpu::Buffer, splats: &'a wgpu::Buffer) -> NodeChunk<'a> {
+    pub fn chunk<'a>(
+        &'a self,
+        source: &'a wgpu::Buffer,
+        splats: &'a wgpu::Buffer,
+    ) -> NodeChunk<'a> {
         NodeChunk { source, splats, slots: self }
     }
 
@@ -164,7 +170,12 @@ impl Forest {
         let pages = hierarchy.pages().len();
         Self {
             hierarchy: hierarchy.clone(),
-            resident: super::buffer(gpu, "resident pages", pages.div_ceil(32) as u64 * 4, Usage::STORAGE),
+            resident: super::buffer(
+                gpu,
+                "resident pages",
+                pages.div_ceil(32) as u64 * 4,
+                Usage::STORAGE,
+            ),
             cut: super::buffer(gpu, "cut", size_of::<GpuCut>() as u64, Usage::UNIFORM),
             slots: Vec::new(),
             slot_of: vec![None; pages],
@@ -236,8 +247,11 @@ impl Forest {
             let wanted = absent.len() - free - grown_slots(&grown);
             grown.push(self.grow(gpu, wanted, most - self.slots.len()));
         }
-        let all: Vec<(&Slots, &wgpu::Buffer)> =
-            chunks.iter().copied().chain(grown.iter().map(|g: &Growth| (&g.slots, &g.splats))).collect();
+        let all: Vec<(&Slots, &wgpu::Buffer)> = chunks
+            .iter()
+            .copied()
+            .chain(grown.iter().map(|g: &Growth| (&g.slots, &g.splats)))
+            .collect();
         if let Err(error) = self.load(gpu, &absent, &all) {
             // The buffers that it grew by go, and what was put in them.
             for (page, _) in self.slots.drain(held..).flatten() {
@@ -261,9 +275,19 @@ impl Forest {
             nodes: super::buffer(gpu, "nodes", half, Usage::STORAGE),
             slots: super::buffer(gpu, "slots", 8 * count as u64, Usage::STORAGE),
             bounds: super::buffer(gpu, "node bounds", count as u64 * SLOT_BOUNDS, Usage::STORAGE),
-            counts: super::buffer(gpu, "cut counts", 4 * u64::from(counts_of(capacity)), Usage::STORAGE),
+            counts: super::buffer(
+                gpu,
+                "cut counts",
+                4 * u64::from(counts_of(capacity)),
+                Usage::STORAGE,
+            ),
             found: super::buffer(gpu, "found nodes", 4 * u64::from(capacity), Usage::STORAGE),
-            selected: super::buffer(gpu, "drawn nodes", 4 * (u64::from(capacity) + 1), Usage::STORAGE),
+            selected: super::buffer(
+                gpu,
+                "drawn nodes",
+                4 * (u64::from(capacity) + 1),
+                Usage::STORAGE,
+            ),
             arguments: super::buffer(gpu, "drawn arguments", 12, Usage::STORAGE | Usage::INDIRECT),
             resident: self.resident.clone(),
             cut: self.cut.clone(),
@@ -276,15 +300,22 @@ impl Forest {
     }
 
     /// Reads pages and puts them in slots that are free or whose pages were not needed for longest.
-    fn load(&mut self, gpu: &Gpu, absent: &[u32], chunks: &[(&Slots, &wgpu::Buffer)]) -> Result<()> {
+    fn load(
+        &mut self,
+        gpu: &Gpu,
+        absent: &[u32],
+        chunks: &[(&Slots, &wgpu::Buffer)],
+    ) -> Result<()> {
         let mut places: Vec<u32> = (0..self.slots.len() as u32).collect();
         let last_needed = |slot: &u32| self.slots[*slot as usize].map_or(0, |(_, frame)| frame);
         places.retain(|slot| last_needed(slot) < self.frame);
         places.sort_by_key(last_needed);
         let mut places = places.into_iter();
         for batch in absent.chunks(BATCH) {
-            let pages: Vec<Page> =
-                batch.par_iter().map(|&page| self.hierarchy.read_page(page)).collect::<Result<_>>()?;
+            let pages: Vec<Page> = batch
+                .par_iter()
+                .map(|&page| self.hierarchy.read_page(page))
+                .collect::<Result<_>>()?;
             for (&page, content) in batch.iter().zip(&pages) {
                 let Some(slot) = places.next() else {
                     self.missing += 1;
@@ -295,16 +326,27 @@ impl Forest {
                 }
                 self.slots[slot as usize] = Some((page, self.frame));
                 self.slot_of[page as usize] = Some(slot);
-                let holder =
-                    chunks.iter().find(|(s, _)| (s.first_slot..s.first_slot + s.count).contains(&(slot as usize)));
+                let holder = chunks.iter().find(|(s, _)| {
+                    (s.first_slot..s.first_slot + s.count).contains(&(slot as usize))
+                });
                 let Some((slots, splats)) = holder else { continue };
                 let place = (slot as usize - slots.first_slot) as u64;
-                let nodes: Vec<GpuNode> = (0..content.nodes.len()).map(|index| gpu_node(content, index)).collect();
-                let own: Vec<crate::splat::Splat> = content.nodes.iter().map(|node| node.splat).collect();
+                let nodes: Vec<GpuNode> =
+                    (0..content.nodes.len()).map(|index| gpu_node(content, index)).collect();
+                let own: Vec<crate::splat::Splat> =
+                    content.nodes.iter().map(|node| node.splat).collect();
                 let runs = (0..content.nodes.len()).step_by(RUN_NODES as usize);
                 let bounds: Vec<GpuBounds> = runs.map(|first| run_bounds(content, first)).collect();
-                gpu.queue.write_buffer(&slots.nodes, place * SLOT_HALF, bytemuck::cast_slice(&nodes));
-                gpu.queue.write_buffer(&slots.bounds, place * SLOT_BOUNDS, bytemuck::cast_slice(&bounds));
+                gpu.queue.write_buffer(
+                    &slots.nodes,
+                    place * SLOT_HALF,
+                    bytemuck::cast_slice(&nodes),
+                );
+                gpu.queue.write_buffer(
+                    &slots.bounds,
+                    place * SLOT_BOUNDS,
+                    bytemuck::cast_slice(&bounds),
+                );
                 gpu.queue.write_buffer(splats, place * SLOT_HALF, bytemuck::cast_slice(&own));
             }
             // What is written waits in staging memory until something is submitted.
@@ -347,7 +389,9 @@ fn grown_slots(grown: &[Growth]) -> usize {
 fn run_bounds(page: &Page, first: usize) -> GpuBounds {
     match parents_around(page, first, RUN_NODES as usize) {
         None => GpuBounds { size: -1.0, ..GpuBounds::default() },
-        Some(CutSphere { center, radius, size }) => GpuBounds { center, radius, size, unused: [0.0; 3] },
+        Some(CutSphere { center, radius, size }) => {
+            GpuBounds { center, radius, size, unused: [0.0; 3] }
+        }
     }
 }
 

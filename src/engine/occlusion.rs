@@ -26,7 +26,13 @@ impl Occlusion {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
         use Binding::{Read, Uniform, Write};
         let stage = |label, entry| {
-            let sources = [&variant.constants(), shaders::FRAME, shaders::MAP, shaders::PROGRESS, shaders::OCCLUSION];
+            let sources = [
+                &variant.constants(),
+                shaders::FRAME,
+                shaders::MAP,
+                shaders::PROGRESS,
+                shaders::OCCLUSION,
+            ];
             Stage::new(gpu, label, &sources, entry, &[&[Uniform, Read, Read, Write]])
         };
         Self {

@@ -23,7 +23,13 @@ impl Order {
         let bindings = [Uniform, Uniform, Read, Write, Write, Write, Read, Read];
         let stage = |label, entry, arguments: &[&[Binding]]| {
             let groups = [&[bindings.as_slice()], arguments].concat();
-            Stage::new(gpu, label, &[&constants, shaders::FRAME, shaders::PROGRESS, shaders::ORDER], entry, &groups)
+            Stage::new(
+                gpu,
+                label,
+                &[&constants, shaders::FRAME, shaders::PROGRESS, shaders::ORDER],
+                entry,
+                &groups,
+            )
         };
         Self {
             short: stage("order", "order", &[]),
@@ -46,8 +52,17 @@ impl Order {
         ];
         let group = self.short.bind(gpu, 0, &buffers);
         self.short.dispatch_indirect(encoder, &[&group], (&targets.arguments, ORDER_ARGUMENTS));
-        let arguments = self.count_long.bind(gpu, 1, &[targets.long_arguments.as_entire_buffer_binding()]);
-        self.count_long.dispatch(encoder, &[&self.count_long.bind(gpu, 0, &buffers), &arguments], 1);
-        self.long.dispatch_indirect(encoder, &[&self.long.bind(gpu, 0, &buffers)], (&targets.long_arguments, 0));
+        let arguments =
+            self.count_long.bind(gpu, 1, &[targets.long_arguments.as_entire_buffer_binding()]);
+        self.count_long.dispatch(
+            encoder,
+            &[&self.count_long.bind(gpu, 0, &buffers), &arguments],
+            1,
+        );
+        self.long.dispatch_indirect(
+            encoder,
+            &[&self.long.bind(gpu, 0, &buffers)],
+            (&targets.long_arguments, 0),
+        );
     }
 }

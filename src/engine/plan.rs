@@ -35,7 +35,13 @@ impl Plan {
         let survey = [shared.as_slice(), &[shaders::SURVEY]].concat();
         Self {
             total: plan("plan: total", "total"),
-            survey: Stage::new(gpu, "survey", &survey, "survey", &[&[Uniform, Read, Read, Uniform, Write]]),
+            survey: Stage::new(
+                gpu,
+                "survey",
+                &survey,
+                "survey",
+                &[&[Uniform, Read, Read, Uniform, Write]],
+            ),
             accumulate: plan("plan: accumulate", "accumulate"),
             advance: plan("plan: advance", "advance"),
         }
@@ -61,7 +67,13 @@ impl Plan {
         let buffers = Self::buffers(targets);
         self.total.dispatch(encoder, &[&self.total.bind(gpu, 0, &buffers)], 1);
         encoder.clear_buffer(&targets.census, 0, None);
-        let own = [&targets.frame, &targets.run_spans, &targets.needs, &targets.run_count, &targets.census];
+        let own = [
+            &targets.frame,
+            &targets.run_spans,
+            &targets.needs,
+            &targets.run_count,
+            &targets.census,
+        ];
         let survey = self.survey.bind(gpu, 0, &own.map(|b| b.as_entire_buffer_binding()));
         self.survey.dispatch(encoder, &[&survey], targets.run_total.div_ceil(64));
         self.accumulate.dispatch(encoder, &[&self.accumulate.bind(gpu, 0, &buffers)], 1);

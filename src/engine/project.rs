@@ -33,10 +33,22 @@ impl Project {
         }))
     }
 
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets, chunks: &[Chunk]) {
-        let buffers =
-            [&targets.frame, &targets.planes, &targets.runs, &targets.active, &targets.records, &targets.boxes]
-                .map(|b| b.as_entire_buffer_binding());
+    pub fn encode(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        targets: &Targets,
+        chunks: &[Chunk],
+    ) {
+        let buffers = [
+            &targets.frame,
+            &targets.planes,
+            &targets.runs,
+            &targets.active,
+            &targets.records,
+            &targets.boxes,
+        ]
+        .map(|b| b.as_entire_buffer_binding());
         for chunk in chunks {
             self.0.dispatch_indirect(gpu, encoder, chunk, &buffers, &chunk.active_arguments);
         }

@@ -145,14 +145,20 @@ impl Renderer {
     ) -> Result<(Picture, FrameStats)> {
         let [width, height] = settings.size;
         let mut picture = Picture { width, height, color: Vec::new(), depth: Vec::new() };
-        let stats = self.draw_strips(prepared, camera, settings, false, |renderer, targets, strip| {
-            renderer.read(targets, strip, settings, &mut picture)
-        })?;
+        let stats =
+            self.draw_strips(prepared, camera, settings, false, |renderer, targets, strip| {
+                renderer.read(targets, strip, settings, &mut picture)
+            })?;
         Ok((picture, stats))
     }
 
     /// Draws a picture and leaves it on the GPU: a frame's time without the way back.
-    pub fn draw(&mut self, prepared: &mut PreparedScene, camera: &Camera, settings: &Settings) -> Result<FrameStats> {
+    pub fn draw(
+        &mut self,
+        prepared: &mut PreparedScene,
+        camera: &Camera,
+        settings: &Settings,
+    ) -> Result<FrameStats> {
         self.draw_strips(prepared, camera, settings, false, |_, _, _| Ok(()))
     }
 
@@ -200,14 +206,16 @@ impl Renderer {
             let view = camera.view(settings.size)?;
             let start = Instant::now();
             let outline = renderer.outline(prepared, &view, settings)?;
-            let mut stats = FrameStats { read_bricks: outline.read_bricks, ..FrameStats::default() };
+            let mut stats =
+                FrameStats { read_bricks: outline.read_bricks, ..FrameStats::default() };
             let strips = renderer.strips(&view, &outline.sheets);
             for strip in &strips {
                 if strips.len() > 1 {
                     // The pages of the whole may be more than there is room for.
                     prepared.update_forests(&renderer.gpu, strip, settings, outline.cut_pixels)?;
                 }
-                let (targets, own) = renderer.draw_frame(prepared, strip, settings, &outline, profile)?;
+                let (targets, own) =
+                    renderer.draw_frame(prepared, strip, settings, &outline, profile)?;
                 done(renderer, &targets, strip)?;
                 stats.add(own);
             }
@@ -217,7 +225,12 @@ impl Renderer {
     }
 
     /// What is drawn of a scene in a view.
-    fn outline(&mut self, prepared: &mut PreparedScene, view: &View, settings: &Settings) -> Result<Outline> {
+    fn outline(
+        &mut self,
+        prepared: &mut PreparedScene,
+        view: &View,
+        settings: &Settings,
+    ) -> Result<Outline> {
         let detail = self.paced(view, settings.detail);
         let cut_pixels = match detail {
             _ if prepared.forests.is_empty() => 0.0,
@@ -225,7 +238,8 @@ impl Renderer {
             Detail::Splats(most) => self.finest_cut(prepared, view, settings, most)?,
             Detail::Milliseconds(_) => Detail::PIXELS,
         };
-        let reads = |prepared: &PreparedScene| prepared.shelf.as_ref().map_or(0, |shelf| shelf.reads);
+        let reads =
+            |prepared: &PreparedScene| prepared.shelf.as_ref().map_or(0, |shelf| shelf.reads);
         let before = reads(prepared);
         let pixels = if let Detail::Pixels(pixels) = detail { pixels } else { Detail::PIXELS };
         prepared.update_levels(&self.gpu, view, pixels)?;
@@ -243,14 +257,19 @@ impl Renderer {
     }
 
     /// Whether a scene's field is gathered.
-    fn gathers(&self, prepared: &PreparedScene, settings: &Settings, sheets: &Sheets) -> Result<bool> {
+    fn gathers(
+        &self,
+        prepared: &PreparedScene,
+        settings: &Settings,
+        sheets: &Sheets,
+    ) -> Result<bool> {
         if settings.evaluate == Evaluate::Scatter {
             return Ok(false);
         }
         match gather::obstacle(&prepared.scene, settings, sheets, &self.gpu) {
-            Some(what) if settings.evaluate == Evaluate::Gather => {
-                Err(Error::Argument(format!("{what} can't be gathered; scatter instead, or leave it to the engine")))
-            }
+            Some(what) if settings.evaluate == Evaluate::Gather => Err(Error::Argument(format!(
+                "{what} can't be gathered; scatter instead, or leave it to the engine"
+            ))),
             obstacle => Ok(obstacle.is_none()),
         }
     }
@@ -279,25 +298,34 @@ impl Renderer {
         settings: &Settings,
         detail: Detail,
     ) -> Result<Option<Choice>> {
-        let choose =
-            |prepared: &PreparedScene, most| prepared.scene.choice(view, settings, detail, most, &prepared.bounds);
+        let choose = |prepared: &PreparedScene, most| {
+            prepared.scene.choice(view, settings, detail, most, &prepared.bounds)
+        };
         let Some(shelf) = &prepared.shelf else { return Ok(None) };
         // Half of the memory is for what they show.
         let room = prepared.room_to_read(&self.gpu);
         let bytes = settings.page_memory.min(room / 2);
         let held = usize::try_from(bytes / slot_bytes(&shelf.bricks)).unwrap_or(usize::MAX);
         let Some(wanted) = choose(prepared, held) else { return Ok(None) };
-        let most_runs = u64::from(frame::most_runs(&self.gpu)).saturating_sub(prepared.other_runs());
+        let most_runs =
+            u64::from(frame::most_runs(&self.gpu)).saturating_sub(prepared.other_runs());
         let most_runs = most_runs.min((room - bytes) / list_bytes(u64::from(RUN)));
         // A view that rests is not searched again.
         let mut most = prepared.shelf.as_ref().and_then(|shelf| shelf.fitting(&wanted, most_runs));
         loop {
-            let choice = most.and_then(|most| choose(prepared, most)).unwrap_or_else(|| wanted.clone());
+            let choice =
+                most.and_then(|most| choose(prepared, most)).unwrap_or_else(|| wanted.clone());
             // Of the coarsest all is listed, and refused where even that is too much memory.
             let runs = if choice.bricks.len() > 1 { most_runs } else { u64::MAX };
             let room = Room { bytes, runs };
-            let Listed::TooMany { runs, most: fit } =
-                prepared.update_bricks(&self.gpu, &self.select_bricks, &self.scan, view, &choice, room)?
+            let Listed::TooMany { runs, most: fit } = prepared.update_bricks(
+                &self.gpu,
+                &self.select_bricks,
+                &self.scan,
+                view,
+                &choice,
+                room,
+            )?
             else {
                 if let (Some(most), Some(shelf)) = (most, &mut prepared.shelf) {
                     shelf.set_fitting(&wanted, most_runs, most);
@@ -336,14 +364,26 @@ impl Renderer {
         profile: bool,
     ) -> Result<(Targets, FrameStats)> {
         view.validate_for(&prepared.bounds)?;
-        let _span = tracing::debug_span!("frame", width = view.size[0], height = view.size[1]).entered();
+        let _span =
+            tracing::debug_span!("frame", width = view.size[0], height = view.size[1]).entered();
         let gpu = &self.gpu;
         let Outline { cut_pixels, choice, sheets, gather, .. } = outline;
         let choice = choice.as_ref();
         let variant = frame::variant(gpu, prepared, view, settings, self.budget, choice, *gather);
         let pool = &mut self.pool;
-        let targets = frame::targets(gpu, pool, prepared, &variant, view, sheets, settings, self.budget, choice)?;
-        let pipelines = self.pipelines.entry(variant).or_insert_with(|| Pipelines::new(gpu, &variant));
+        let targets = frame::targets(
+            gpu,
+            pool,
+            prepared,
+            &variant,
+            view,
+            sheets,
+            settings,
+            self.budget,
+            choice,
+        )?;
+        let pipelines =
+            self.pipelines.entry(variant).or_insert_with(|| Pipelines::new(gpu, &variant));
         for chunk in &prepared.chunks {
             let lattice = matches!(chunk.origin, Origin::Lattice { .. } | Origin::Bricks { .. });
             let source = chunk.source(view, variant.isotropic && lattice, &prepared.forests);
@@ -366,7 +406,13 @@ impl Renderer {
         if variant.scatters() {
             // As many passes as the last frame took; what is too many does nothing.
             let passes = if profile { 1 } else { self.passes };
-            state = draw_passes(work, std::mem::take(&mut steps), passes, self.budget, profile.then_some(&mut times))?;
+            state = draw_passes(
+                work,
+                std::mem::take(&mut steps),
+                passes,
+                self.budget,
+                profile.then_some(&mut times),
+            )?;
         }
         if let Some(gathered) = &targets.gathered {
             steps.extend(work.gathered());
@@ -402,7 +448,13 @@ impl Renderer {
     }
 
     /// The finest cut, in pixels, that draws no more than `most` nodes of those for which there is room.
-    fn finest_cut(&self, prepared: &mut PreparedScene, view: &View, settings: &Settings, most: u64) -> Result<f64> {
+    fn finest_cut(
+        &self,
+        prepared: &mut PreparedScene,
+        view: &View,
+        settings: &Settings,
+        most: u64,
+    ) -> Result<f64> {
         // The pages of a cut hold several times what it draws.
         let nodes = most.saturating_mul(8).max(1 << 16);
         let finest = |forest: &Forest| forest.finest_within(view, settings, nodes);
@@ -411,25 +463,40 @@ impl Renderer {
         prepared.update_forests(gpu, view, settings, pixels)?;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         let counters = super::buffer(gpu, "tally", tally_bytes(), usage);
-        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("tally") });
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("tally") });
         for chunk in &prepared.chunks {
             if let Origin::Nodes { slots, .. } = &chunk.origin {
                 let source = chunk.source(view, false, &prepared.forests);
                 gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
-                self.cut.encode_tally(gpu, &mut encoder, &slots.chunk(&chunk.uniform, &chunk.data), &counters);
+                self.cut.encode_tally(
+                    gpu,
+                    &mut encoder,
+                    &slots.chunk(&chunk.uniform, &chunk.data),
+                    &counters,
+                );
             }
         }
         gpu.queue.submit([encoder.finish()]);
-        let tally: Vec<i32> = bytemuck::pod_collect_to_vec(&gpu.read(&counters, 0, tally_bytes())?);
+        let tally: Vec<i32> =
+            bytemuck::pod_collect_to_vec(&gpu.read(&counters, 0, tally_bytes())?);
         Ok(pixels.max(finest_within(&tally, most)))
     }
 
     /// Appends the rows of a strip to a picture.
-    fn read(&self, targets: &Targets, view: &View, settings: &Settings, picture: &mut Picture) -> Result<()> {
+    fn read(
+        &self,
+        targets: &Targets,
+        view: &View,
+        settings: &Settings,
+        picture: &mut Picture,
+    ) -> Result<()> {
         let pixels = view.size[0] as usize * view.size[1] as usize;
         let color: Vec<[f32; 4]> =
             bytemuck::pod_collect_to_vec(&self.gpu.read(&targets.colors, 0, 16 * pixels as u64)?);
-        let hits: Vec<f32> = bytemuck::pod_collect_to_vec(&self.gpu.read(&targets.depths, 0, 4 * pixels as u64)?);
+        let hits: Vec<f32> =
+            bytemuck::pod_collect_to_vec(&self.gpu.read(&targets.depths, 0, 4 * pixels as u64)?);
         let width = view.size[0] as usize;
         picture.depth.extend((0..pixels).map(|i| {
             // The largest value has no place of its own.
@@ -487,7 +554,11 @@ fn draw_passes<'a>(
     loop {
         steps.extend((0..passes).flat_map(|_| work.depth_pass()));
         submit(gpu, std::mem::take(&mut steps), times.as_deref_mut())?;
-        let state: State = bytemuck::pod_read_unaligned(&gpu.read(&targets.state, 0, size_of::<State>() as u64)?);
+        let state: State = bytemuck::pod_read_unaligned(&gpu.read(
+            &targets.state,
+            0,
+            size_of::<State>() as u64,
+        )?);
         let is_done = state.done != 0 && state.stalled == 0;
         if std::mem::replace(&mut advanced, state.advanced) == state.advanced && !is_done {
             return Err(did_nothing(gpu));
@@ -521,7 +592,9 @@ fn submit<'a>(
     steps: impl IntoIterator<Item = Step<'a>>,
     times: Option<&mut Vec<(&'static str, f64)>>,
 ) -> Result<()> {
-    let new = || gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
+    let new = || {
+        gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") })
+    };
     let mut encoder = new();
     let Some(times) = times else {
         steps.into_iter().for_each(|(_, encode)| encode(&mut encoder));

@@ -30,7 +30,8 @@ impl Resume {
     }
 
     fn encode(stage: &Stage, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
-        let buffers = [&targets.frame, &targets.state, &targets.pass, &targets.arguments, &targets.progress];
+        let buffers =
+            [&targets.frame, &targets.state, &targets.pass, &targets.arguments, &targets.progress];
         let group = stage.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
         stage.dispatch(encoder, &[&group], 1);
     }

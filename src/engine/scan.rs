@@ -55,10 +55,21 @@ impl Scan {
     }
 
     /// Replaces each of the first `count` numbers by the sum of those before it.
-    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, numbers: &wgpu::Buffer, count: u32) {
+    pub fn encode(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        numbers: &wgpu::Buffer,
+        count: u32,
+    ) {
         debug_assert!(count <= SCAN_CAPACITY);
         let size = [count, 0, 0, 0];
-        let size = super::filled_buffer(gpu, "scan size", bytemuck::bytes_of(&size), wgpu::BufferUsages::UNIFORM);
+        let size = super::filled_buffer(
+            gpu,
+            "scan size",
+            bytemuck::bytes_of(&size),
+            wgpu::BufferUsages::UNIFORM,
+        );
         let buffers = [&size, numbers, &self.segments].map(|b| b.as_entire_buffer_binding());
         let groups = count.div_ceil(SEGMENT * 64);
         self.sum.dispatch(encoder, &[&self.sum.bind(gpu, 0, &buffers)], groups);

@@ -96,10 +96,14 @@ impl Select {
     ) -> Result<()> {
         let visible = upload(gpu, "visible levels", bytemuck::cast_slice(&shown.map(u32::from)));
         let bind = |stage: &Stage, selection: &Selection| {
-            let buffers = [uniform, &selection.ranges, &visible, &selection.blocks, &selection.selected];
+            let buffers =
+                [uniform, &selection.ranges, &visible, &selection.blocks, &selection.selected];
             stage.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()))
         };
-        let encoder = || gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("select") });
+        let encoder = || {
+            gpu.device
+                .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("select") })
+        };
         let (blocks, groups) = (selection.block_count, selection.block_count.div_ceil(64));
         let mut counting = encoder();
         // Behind the last block stands their sum after the scan.
@@ -110,7 +114,8 @@ impl Select {
         let total = gpu.read(&selection.blocks, 4 * u64::from(blocks), 4)?;
         selection.count = bytemuck::pod_read_unaligned(&total);
         check(selection.count)?;
-        selection.selected = super::buffer(gpu, "selected", 4 * u64::from(selection.count), Usage::STORAGE);
+        selection.selected =
+            super::buffer(gpu, "selected", 4 * u64::from(selection.count), Usage::STORAGE);
         let mut writing = encoder();
         self.write.dispatch(&mut writing, &[&bind(&self.write, selection)], groups);
         gpu.queue.submit([writing.finish()]);

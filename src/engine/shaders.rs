@@ -116,7 +116,8 @@ impl Variant {
     /// Sheets that one dispatch of gather draws: as many as a driver's bound on iterations allows.
     pub fn gathered_sheets(&self) -> u32 {
         // Those that find the sheet and look at its planes, and those that close it.
-        let pieces = PARTS * (1 + self.isosurfaces) * (1 + self.holes) + (1 + self.holes) * self.holes * self.holes;
+        let pieces = PARTS * (1 + self.isosurfaces) * (1 + self.holes)
+            + (1 + self.holes) * self.holes * self.holes;
         let most = self.most_entries.saturating_mul(ENTRY_ITERATIONS);
         if self.can_stop() { (most / (6 + pieces)).max(1) } else { u32::MAX }
     }
@@ -177,7 +178,8 @@ impl Variant {
             ("CAN_STOP", self.can_stop()),
         ];
         // What closing a sheet takes of the iterations that a driver allows, in entries (see docs/engine.md).
-        let closing = (2 + self.rows * parts * (1 + self.isosurfaces) * (1 + self.holes)).div_ceil(ENTRY_ITERATIONS);
+        let closing = (2 + self.rows * parts * (1 + self.isosurfaces) * (1 + self.holes))
+            .div_ceil(ENTRY_ITERATIONS);
         let closing = closing + u32::from(self.gather);
         let counts = [
             ("ISOSURFACES", self.isosurfaces),
@@ -195,9 +197,13 @@ impl Variant {
             ("LANE_ROWS", 8 / self.rows),
         ];
         let flags = flags.map(|(name, value)| format!("const {name}: bool = {value};\n")).concat();
-        let counts = counts.map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).concat();
+        let counts =
+            counts.map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).concat();
         let apron = i32::from(self.central);
         let step = self.tile_step();
-        format!("{flags}{counts}const APRON: i32 = {apron};\nconst TILE_STEP: i32 = {step};\n{}", tables::constants())
+        format!(
+            "{flags}{counts}const APRON: i32 = {apron};\nconst TILE_STEP: i32 = {step};\n{}",
+            tables::constants()
+        )
     }
 }

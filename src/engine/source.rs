@@ -23,8 +23,14 @@ pub fn per_source(make: impl Fn(&str, &[Binding]) -> Stage) -> Sources<Stage> {
     let lattice = [shaders::VALUE, shaders::SAMPLE, shaders::SOURCE_LATTICE].concat();
     let bricks = [shaders::VALUE, shaders::SAMPLE, shaders::SOURCE_BRICKS].concat();
     Sources {
-        splats: make(&[shaders::VALUE, shaders::SPLATS, shaders::SOURCE_SPLATS].concat(), &[Uniform, Read]),
-        nodes: make(&[shaders::VALUE, shaders::SPLATS, shaders::SOURCE_NODES].concat(), &[Uniform, Read, Read]),
+        splats: make(
+            &[shaders::VALUE, shaders::SPLATS, shaders::SOURCE_SPLATS].concat(),
+            &[Uniform, Read],
+        ),
+        nodes: make(
+            &[shaders::VALUE, shaders::SPLATS, shaders::SOURCE_NODES].concat(),
+            &[Uniform, Read, Read],
+        ),
         lattice: make(&lattice, &[Uniform, Read, Read, Uniform]),
         bricks: make(&bricks, &[Uniform, Read, Read, Uniform]),
     }
@@ -41,7 +47,9 @@ impl Sources<Stage> {
     ) {
         match &chunk.origin {
             // The number of drawn nodes is known on the GPU alone.
-            Origin::Nodes { slots, .. } => self.dispatch_indirect(gpu, encoder, chunk, buffers, &slots.arguments),
+            Origin::Nodes { slots, .. } => {
+                self.dispatch_indirect(gpu, encoder, chunk, buffers, &slots.arguments)
+            }
             _ => {
                 let (stage, groups) = self.bound(gpu, chunk, buffers);
                 let workgroups = chunk.candidates.div_ceil(WORKGROUP_CANDIDATES);
@@ -63,10 +71,17 @@ impl Sources<Stage> {
         stage.dispatch_indirect(encoder, &[&groups[0], &groups[1]], (arguments, 0));
     }
 
-    fn bound(&self, gpu: &Gpu, chunk: &Chunk, buffers: &[wgpu::BufferBinding<'_>]) -> (&Stage, [wgpu::BindGroup; 2]) {
+    fn bound(
+        &self,
+        gpu: &Gpu,
+        chunk: &Chunk,
+        buffers: &[wgpu::BufferBinding<'_>],
+    ) -> (&Stage, [wgpu::BindGroup; 2]) {
         let (stage, own) = match &chunk.origin {
             Origin::Splats { .. } => (&self.splats, vec![&chunk.uniform, &chunk.data]),
-            Origin::Nodes { slots, .. } => (&self.nodes, vec![&chunk.uniform, &chunk.data, &slots.selected]),
+            Origin::Nodes { slots, .. } => {
+                (&self.nodes, vec![&chunk.uniform, &chunk.data, &slots.selected])
+            }
             Origin::Lattice { selection, places, .. } => {
                 (&self.lattice, vec![&chunk.uniform, &chunk.data, &selection.selected, places])
             }

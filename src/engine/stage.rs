@@ -25,12 +25,21 @@ pub struct Stage {
 
 impl Stage {
     /// Compiles `entry` of the joined `sources`; `groups` lists the bindings of each bind group.
-    pub fn new(gpu: &Gpu, label: &'static str, sources: &[&str], entry: &str, groups: &[&[Binding]]) -> Self {
+    pub fn new(
+        gpu: &Gpu,
+        label: &'static str,
+        sources: &[&str],
+        entry: &str,
+        groups: &[&[Binding]],
+    ) -> Self {
         let device = &gpu.device;
         let most_workgroups = device.limits().max_compute_workgroups_per_dimension;
-        let source = format!("{}\nconst MOST_WORKGROUPS: u32 = {most_workgroups}u;\n", sources.concat());
-        let descriptor =
-            wgpu::ShaderModuleDescriptor { label: Some(label), source: wgpu::ShaderSource::Wgsl(source.into()) };
+        let source =
+            format!("{}\nconst MOST_WORKGROUPS: u32 = {most_workgroups}u;\n", sources.concat());
+        let descriptor = wgpu::ShaderModuleDescriptor {
+            label: Some(label),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        };
         // Loop counters and clamped indices keep the driver from unrolling the loops over an invocation's pixels, whose sums
         // then live in memory instead of registers: march took 5 times as long with them (Mesa 22.3 software Vulkan).
         let checks = wgpu::ShaderRuntimeChecks {
@@ -43,7 +52,8 @@ impl Stage {
         // by, or are compared with the buffers' capacities before use (records and entries); none comes from a file.
         #[expect(unsafe_code, reason = "shaders without the checks that untrusted ones need")]
         let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
-        let layouts: Vec<_> = groups.iter().map(|bindings| layout(device, label, bindings)).collect();
+        let layouts: Vec<_> =
+            groups.iter().map(|bindings| layout(device, label, bindings)).collect();
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(label),
             bind_group_layouts: &layouts.iter().map(Some).collect::<Vec<_>>(),
@@ -65,7 +75,12 @@ impl Stage {
     }
 
     /// Binds buffers (whole, or parts) to group `group`, in the order of their binding numbers.
-    pub fn bind(&self, gpu: &Gpu, group: usize, buffers: &[wgpu::BufferBinding<'_>]) -> wgpu::BindGroup {
+    pub fn bind(
+        &self,
+        gpu: &Gpu,
+        group: usize,
+        buffers: &[wgpu::BufferBinding<'_>],
+    ) -> wgpu::BindGroup {
         let entries: Vec<_> = (0..)
             .zip(buffers)
             .map(|(binding, buffer)| wgpu::BindGroupEntry {
@@ -81,20 +96,37 @@ impl Stage {
     }
 
     /// Binds a texture as the only one of group `group`.
-    pub fn bind_texture(&self, gpu: &Gpu, group: usize, texture: &wgpu::TextureView) -> wgpu::BindGroup {
+    pub fn bind_texture(
+        &self,
+        gpu: &Gpu,
+        group: usize,
+        texture: &wgpu::TextureView,
+    ) -> wgpu::BindGroup {
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(self.label),
             layout: &self.layouts[group],
-            entries: &[wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(texture) }],
+            entries: &[wgpu::BindGroupEntry {
+                binding: 0,
+                resource: wgpu::BindingResource::TextureView(texture),
+            }],
         })
     }
 
     /// Encodes a dispatch of a fixed number of workgroups. More than fit one dimension go on in the second, so that
     /// workgroup (x, y) is number x + y · `MOST_WORKGROUPS`, and a few of the last row may be too many.
-    pub fn dispatch(&self, encoder: &mut wgpu::CommandEncoder, groups: &[&wgpu::BindGroup], workgroups: u32) {
+    pub fn dispatch(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        groups: &[&wgpu::BindGroup],
+        workgroups: u32,
+    ) {
         let columns = workgroups.min(self.most_workgroups);
         if columns > 0 {
-            self.begin(encoder, groups).dispatch_workgroups(columns, workgroups.div_ceil(columns), 1);
+            self.begin(encoder, groups).dispatch_workgroups(
+                columns,
+                workgroups.div_ceil(columns),
+                1,
+            );
         }
     }
 
@@ -108,9 +140,15 @@ impl Stage {
         self.begin(encoder, groups).dispatch_workgroups_indirect(arguments, offset);
     }
 
-    fn begin<'a>(&self, encoder: &'a mut wgpu::CommandEncoder, groups: &[&wgpu::BindGroup]) -> wgpu::ComputePass<'a> {
-        let mut pass = encoder
-            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(self.label), timestamp_writes: None });
+    fn begin<'a>(
+        &self,
+        encoder: &'a mut wgpu::CommandEncoder,
+        groups: &[&wgpu::BindGroup],
+    ) -> wgpu::ComputePass<'a> {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some(self.label),
+            timestamp_writes: None,
+        });
         pass.set_pipeline(&self.pipeline);
         for (index, group) in (0..).zip(groups) {
             pass.set_bind_group(index, *group, &[]);
@@ -120,7 +158,8 @@ impl Stage {
 }
 
 fn layout(device: &wgpu::Device, label: &str, bindings: &[Binding]) -> wgpu::BindGroupLayout {
-    let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let buffer =
+        |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let entries: Vec<_> = (0..)
         .zip(bindings)
         .map(|(binding, kind)| wgpu::BindGroupLayoutEntry {
@@ -139,5 +178,8 @@ fn layout(device: &wgpu::Device, label: &str, bindings: &[Binding]) -> wgpu::Bin
             count: None,
         })
         .collect();
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some(label),
+        entries: &entries,
+    })
 }

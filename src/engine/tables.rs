@@ -60,7 +60,8 @@ impl Tables {
         starts[1] = entries.len() as u32;
         let (first, per_magnitude) = factors(transfer, &mut entries);
         starts[2] = entries.len() as u32;
-        let is_radial_table = |kernel: &&Kernel| !matches!(kernel.profile, Profile::Gaussian(_) | Profile::Tensor(_));
+        let is_radial_table =
+            |kernel: &&Kernel| !matches!(kernel.profile, Profile::Gaussian(_) | Profile::Tensor(_));
         if let Some(kernel) = kernel.filter(is_radial_table) {
             entries.extend(radial(kernel));
             starts[3] = entries.len() as u32;
@@ -97,20 +98,27 @@ fn window(transfer: &TransferFunction, [low, high]: [f64; 2]) -> Window {
     // No samples have no range.
     let [low, high] = if low <= high { [low, high] } else { [0.0; 2] };
     let reach = OVERSHOOT * (high - low);
-    let within = |[first, last]: [f64; 2]| [first, last].map(|value| value.clamp(low - reach, high + reach));
+    let within =
+        |[first, last]: [f64; 2]| [first, last].map(|value| value.clamp(low - reach, high + reach));
     let changes: Vec<_> = changes(transfer).into_iter().map(within).collect();
     let [mut first, mut last] = within(transfer.span());
-    let changing =
-        changes.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], part| [a.min(part[0]), b.max(part[1])]);
+    let changing = changes
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], part| [a.min(part[0]), b.max(part[1])]);
     // To look values up that have no entries costs a little more.
     if changing[1] - changing[0] < 0.25 * (last - first) {
         [first, last] = if changing[0] <= changing[1] { changing } else { [first; 2] };
     }
     // A single step, or a function that does not change there: as wide as values of 32 bits are apart, or more.
-    let least =
-        (first.abs() * 2f64.powi(-22)).max(LEAST_PART * (high - low)).max(f64::from(f32::MIN_POSITIVE) * VALUES as f64);
+    let least = (first.abs() * 2f64.powi(-22))
+        .max(LEAST_PART * (high - low))
+        .max(f64::from(f32::MIN_POSITIVE) * VALUES as f64);
     let lack = (least - (last - first)).max(0.0);
-    let shortest = changes.iter().map(|[a, b]| b - a).filter(|width| *width > 0.0).fold(f64::INFINITY, f64::min);
+    let shortest = changes
+        .iter()
+        .map(|[a, b]| b - a)
+        .filter(|width| *width > 0.0)
+        .fold(f64::INFINITY, f64::min);
     let wanted = PART * (last - first).max(least) / shortest;
     let entries = (wanted.min(MOST_VALUES as f64) as usize).next_power_of_two().max(VALUES);
     // Where it begins or ends by a step, both sides of that have entries.
@@ -127,10 +135,16 @@ fn zero([low, high]: [f64; 2]) -> f64 {
 
 /// The parts between two points of the function in which what it shows changes.
 fn changes(transfer: &TransferFunction) -> Vec<[f64; 2]> {
-    let opacity = transfer.opacity.windows(2).filter(|pair| pair[0].1 != pair[1].1).map(|pair| [pair[0].0, pair[1].0]);
+    let opacity = transfer
+        .opacity
+        .windows(2)
+        .filter(|pair| pair[0].1 != pair[1].1)
+        .map(|pair| [pair[0].0, pair[1].0]);
     // Colours count where there is opacity.
     let shown = transfer.opacity.windows(2).filter(|pair| pair[0].1 > 0.0 || pair[1].1 > 0.0);
-    let ends = |points: &[(f64, f64)]| [(points[0], f64::NEG_INFINITY), (points[points.len() - 1], f64::INFINITY)];
+    let ends = |points: &[(f64, f64)]| {
+        [(points[0], f64::NEG_INFINITY), (points[points.len() - 1], f64::INFINITY)]
+    };
     let beyond = ends(&transfer.opacity).into_iter().filter(|(point, _)| point.1 > 0.0);
     let shown: Vec<[f64; 2]> = shown
         .map(|pair| [pair[0].0, pair[1].0])
@@ -167,11 +181,14 @@ fn integrals(transfer: &TransferFunction, [low, high]: [f64; 2], count: usize) -
 /// magnitude.
 fn factors(transfer: &TransferFunction, entries: &mut Vec<[f32; 4]>) -> (f64, f64) {
     let changing = transfer.gradient.windows(2).filter(|pair| pair[0].1 != pair[1].1);
-    let [first, last] =
-        changing.fold([f64::INFINITY, 0.0], |[low, high], pair| [f64::min(low, pair[0].0), f64::max(high, pair[1].0)]);
+    let [first, last] = changing.fold([f64::INFINITY, 0.0], |[low, high], pair| {
+        [f64::min(low, pair[0].0), f64::max(high, pair[1].0)]
+    });
     let first = if first <= last { first } else { 0.0 };
     // A step has both its sides within two entries.
-    let width = (last - first).max(first * 2f64.powi(-12)).max(f64::from(f32::MIN_POSITIVE) * GRADIENTS as f64);
+    let width = (last - first)
+        .max(first * 2f64.powi(-12))
+        .max(f64::from(f32::MIN_POSITIVE) * GRADIENTS as f64);
     let step = width / (GRADIENTS - 2) as f64;
     let start = first - 0.5 * step;
     let factor = |i: usize| transfer.gradient_factor(start + step * i.min(GRADIENTS - 1) as f64);
@@ -186,8 +203,8 @@ fn radial(kernel: &Kernel) -> Vec<[f32; 4]> {
         // h′ by central differences; at the centre h′/r has a limit, which a radius beside it nearly has.
         let r = (i as f64 * step).max(0.5 * step);
         let d = 0.25 * step;
-        let slope =
-            (kernel.value((r + d).min(kernel.extent)) - kernel.value(r - d)) / ((r + d).min(kernel.extent) - r + d);
+        let slope = (kernel.value((r + d).min(kernel.extent)) - kernel.value(r - d))
+            / ((r + d).min(kernel.extent) - r + d);
         [kernel.value(i as f64 * step) as f32, (-slope / r) as f32]
     };
     let entries: Vec<_> = (0..RADII).map(at).collect();
@@ -221,8 +238,12 @@ fn sections(kernel: &Kernel) -> Vec<[f32; 4]> {
         row
     };
     let rows: Vec<_> = (0..=SECTIONS).map(row).collect();
-    let corners = |i: usize, j: usize| [rows[i][j], rows[i][j + 1], rows[i + 1][j], rows[i + 1][j + 1]];
-    (0..SECTIONS).flat_map(|i| (0..SECTIONS).map(move |j| (i, j))).map(|(i, j)| corners(i, j)).collect()
+    let corners =
+        |i: usize, j: usize| [rows[i][j], rows[i][j + 1], rows[i + 1][j], rows[i + 1][j + 1]];
+    (0..SECTIONS)
+        .flat_map(|i| (0..SECTIONS).map(move |j| (i, j)))
+        .map(|(i, j)| corners(i, j))
+        .collect()
 }
 
 /// Whether samples in a range have values that get no entries.
@@ -237,7 +258,10 @@ mod tests {
 
     #[test]
     fn the_parts_start_where_the_shader_looks() {
-        let transfer = TransferFunction { gradient: vec![(0.0, 0.0), (2.0, 1.0)], ..TransferFunction::default() };
+        let transfer = TransferFunction {
+            gradient: vec![(0.0, 0.0), (2.0, 1.0)],
+            ..TransferFunction::default()
+        };
         let tables = Tables::new(&transfer, [0.0, 1.0], Some(&Kernel::b_spline(2.0).unwrap()));
         let [integrals, factors, radii, sections] = tables.starts.map(|start| start as usize);
         assert_eq!(tables.entries.len(), sections + SECTIONS * SECTIONS);
@@ -254,7 +278,8 @@ mod tests {
         let tables = Tables::new(&transfer, [0.0, 1.0], None);
         let [zero, per_value, last, place] = tables.values;
         let low = zero - place / per_value;
-        let whole = f64::from(tables.entries[tables.starts[0] as usize + VALUES - 1][3]) / per_value;
+        let whole =
+            f64::from(tables.entries[tables.starts[0] as usize + VALUES - 1][3]) / per_value;
         let expected = (low + last / per_value - 0.5) * transfer.extinction(0.9);
         assert!((whole / expected - 1.0).abs() < 1e-3, "{whole} {expected}");
     }
@@ -273,17 +298,26 @@ mod tests {
         let near = |found: [f64; 2], expected: [f64; 2]| {
             let beside = (expected[1] - expected[0]) * 2.0 / 4095.0;
             let is_near = found[0] < expected[0] && expected[1] < found[1];
-            assert!(is_near && found[1] - found[0] < expected[1] - expected[0] + 2.01 * beside, "{found:?}");
+            assert!(
+                is_near && found[1] - found[0] < expected[1] - expected[0] + 2.01 * beside,
+                "{found:?}"
+            );
         };
         near(over(&[(100.0, 0.0), (400.0, 1.0)], [-32768.0, 32767.0]), [100.0, 400.0]);
         near(over(&[(-1e6, 0.0), (1e6, 1.0)], [0.0, 100.0]), [-25.0, 125.0]);
         // No samples at all.
-        assert!(over(&[(100.0, 0.0), (400.0, 1.0)], [f64::INFINITY, f64::NEG_INFINITY]).iter().all(|v| v.is_finite()));
+        assert!(
+            over(&[(100.0, 0.0), (400.0, 1.0)], [f64::INFINITY, f64::NEG_INFINITY])
+                .iter()
+                .all(|v| v.is_finite())
+        );
         // A step, at 0 too, and values that are all one.
         for (value, range) in [(80.0, [0.0, 255.0]), (0.0, [-1.0, 1e30]), (7.0, [7.0, 7.0])] {
             let [low, high] = over(&[(value, 0.0), (value, 1.0)], range);
             assert!(
-                low < value && value < high && high - low <= (value * 1e-3).max((range[1] - range[0]) * 1e-6) + 1e-30,
+                low < value
+                    && value < high
+                    && high - low <= (value * 1e-3).max((range[1] - range[0]) * 1e-6) + 1e-30,
                 "{low} {high}"
             );
             assert!(((VALUES as f64 / (high - low)) as f32).is_finite());
@@ -295,11 +329,19 @@ mod tests {
     fn values_before_and_behind_are_those_of_the_function() {
         let with = |opacity: &[(f64, f64)]| {
             let color = vec![(opacity[0].0, [1.0; 3])];
-            let transfer = TransferFunction { color, opacity: opacity.to_vec(), ..TransferFunction::default() };
+            let transfer = TransferFunction {
+                color,
+                opacity: opacity.to_vec(),
+                ..TransferFunction::default()
+            };
             let tables = Tables::new(&transfer, [0.0, 255.0], None);
             let entries = [tables.entries[0][3], tables.entries[VALUES - 1][3]];
             let beyond = tables.beyond.map(|shown| shown[3]);
-            assert_eq!(entries, [0.0, 255.0].map(|value| transfer.extinction(value) as f32), "{opacity:?}");
+            assert_eq!(
+                entries,
+                [0.0, 255.0].map(|value| transfer.extinction(value) as f32),
+                "{opacity:?}"
+            );
             assert_eq!(beyond, entries, "{opacity:?}");
         };
         with(&[(50.0, 0.8), (50.0, 0.0), (100.0, 0.0)]);

@@ -34,8 +34,11 @@ impl Tiles {
         let buffers = buffers.map(|b| b.as_entire_buffer_binding());
         let group = self.list.bind(gpu, 0, &buffers);
         self.list.dispatch_indirect(encoder, &[&group], (&targets.arguments, TILE_ARGUMENTS));
-        let arguments =
-            self.prepare.bind(gpu, 1, &[&targets.arguments, &targets.state].map(|b| b.as_entire_buffer_binding()));
+        let arguments = self.prepare.bind(
+            gpu,
+            1,
+            &[&targets.arguments, &targets.state].map(|b| b.as_entire_buffer_binding()),
+        );
         self.prepare.dispatch(encoder, &[&self.prepare.bind(gpu, 0, &buffers), &arguments], 1);
     }
 }

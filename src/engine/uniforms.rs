@@ -118,7 +118,9 @@ fn columns(m: DMat3) -> [[f32; 4]; 3] {
 }
 
 fn shade(s: Option<Shade>) -> [f32; 4] {
-    s.map_or([1.0, 0.0, 0.0, 1.0], |s| [s.ambient, s.diffuse, s.specular, s.power].map(|v| v as f32))
+    s.map_or([1.0, 0.0, 0.0, 1.0], |s| {
+        [s.ambient, s.diffuse, s.specular, s.power].map(|v| v as f32)
+    })
 }
 
 impl Source {
@@ -171,7 +173,13 @@ fn smallest_cosine(view: &View) -> f64 {
 
 impl Frame {
     /// Everything but the tiles, the capacities and the tables.
-    pub fn new(scene: &Scene, view: &View, sheets: &Sheets, settings: &Settings, choice: Option<&Choice>) -> Self {
+    pub fn new(
+        scene: &Scene,
+        view: &View,
+        sheets: &Sheets,
+        settings: &Settings,
+        choice: Option<&Choice>,
+    ) -> Self {
         let mut frame = Self {
             size: view.size,
             center: [view.center.x as f32, view.center.y as f32],
@@ -179,7 +187,11 @@ impl Frame {
             perspective: view.perspective.into(),
             sheet_count: sheets.count() as u32,
             geometric_sheets: sheets.turn as u32,
-            ratio_log2_inverse: if sheets.turn > 0 { (1.0 / sheets.ratio.log2()) as f32 } else { 0.0 },
+            ratio_log2_inverse: if sheets.turn > 0 {
+                (1.0 / sheets.ratio.log2()) as f32
+            } else {
+                0.0
+            },
             step_inverse: (1.0 / sheets.step) as f32,
             // Axis-aligned sheets may begin behind an eye among them.
             z_near: (sheets.planes[0] * smallest_cosine(view)).max(1e-6 * sheets.step) as f32,
@@ -207,7 +219,10 @@ impl Frame {
                     let levels = choice.map_or(&[][..], |choice| &choice.levels);
                     // The field fills the same box whatever is drawn.
                     frame.set_field(view, &bricks.header().lattice);
-                    frame.set_kernel(&bricks.lattice(levels.first().map_or(0, |(level, _)| *level)), kernel);
+                    frame.set_kernel(
+                        &bricks.lattice(levels.first().map_or(0, |(level, _)| *level)),
+                        kernel,
+                    );
                     for (own, &(_, weight)) in frame.levels.iter_mut().zip(levels) {
                         *own = weight as f32;
                     }
@@ -225,7 +240,13 @@ impl Frame {
     }
 
     /// How values are looked up. Gradients count over the thickness of a sheet.
-    pub fn set_tables(&mut self, tables: &Tables, transfer: &TransferFunction, view: &View, sheets: &Sheets) {
+    pub fn set_tables(
+        &mut self,
+        tables: &Tables,
+        transfer: &TransferFunction,
+        view: &View,
+        sheets: &Sheets,
+    ) {
         let [zero, per_value, ..] = tables.values;
         self.transfer = tables.values.map(|v| v as f32);
         let [first, per_magnitude] = tables.gradients;
@@ -240,7 +261,8 @@ impl Frame {
         for (own, surface) in self.isosurfaces.iter_mut().zip(surfaces) {
             let Isosurface { value, color: [red, green, blue], opacity } = surface;
             let (entry, depth) = ((value - zero) * per_value, -(1.0 - opacity).max(1e-9).ln());
-            *own = [[entry, opacity, depth, 0.0], [red, green, blue, 0.0]].map(|part| part.map(|v| v as f32));
+            *own = [[entry, opacity, depth, 0.0], [red, green, blue, 0.0]]
+                .map(|part| part.map(|v| v as f32));
         }
     }
 
@@ -262,7 +284,8 @@ impl Frame {
         let unit = lattice.unit([0; 3]);
         let sigma = kernel.unit() * unit.x * lattice.axes.x_axis.length();
         let radius = kernel.radius();
-        self.isotropic = [sigma, 1.0 / sigma, radius * radius, kernel.least_sum()].map(|v| v as f32);
+        self.isotropic =
+            [sigma, 1.0 / sigma, radius * radius, kernel.least_sum()].map(|v| v as f32);
         // A cell of the body-centred lattice holds two samples.
         let overlap = match lattice.arrangement {
             Arrangement::BodyCentred => kernel.integral() * (unit.x * unit.y * unit.z) / 0.5,

@@ -157,7 +157,9 @@ impl PreparedScene {
                     prepared.add_volume(gpu, volume, kernel.clone())?;
                 }
                 Item::Volume(..) => {}
-                Item::Bricks(bricks, kernel, _) => prepared.shelf = Some(Shelf::new(bricks, kernel)),
+                Item::Bricks(bricks, kernel, _) => {
+                    prepared.shelf = Some(Shelf::new(bricks, kernel))
+                }
             }
         }
         Ok(prepared)
@@ -320,7 +322,8 @@ impl PreparedScene {
 
     /// Runs of candidates in bricks.
     fn brick_runs(&self) -> u64 {
-        let bricks = self.chunks.iter().filter(|chunk| matches!(chunk.origin, Origin::Bricks { .. }));
+        let bricks =
+            self.chunks.iter().filter(|chunk| matches!(chunk.origin, Origin::Bricks { .. }));
         bricks.map(|chunk| u64::from(runs_of(chunk.candidates))).sum()
     }
 
@@ -334,7 +337,8 @@ impl PreparedScene {
         });
         let slots = self.shelf.as_ref().map_or(0, Shelf::bytes);
         let readers = self.forests.len() + usize::from(self.shelf.is_some());
-        gpu.memory_left(self.bytes.saturating_sub(slots + held.sum::<u64>())) / readers.max(1) as u64
+        gpu.memory_left(self.bytes.saturating_sub(slots + held.sum::<u64>()))
+            / readers.max(1) as u64
     }
 
     /// Runs of candidates in all that does not lie in bricks.
@@ -366,8 +370,9 @@ impl PreparedScene {
             own.push((slab.as_mut(), &chunk.uniform));
         }
         let rest = self.bytes - before;
-        let runs = select
-            .update(gpu, scan, &mut own, &choice.shown, most, |count| gpu.check_memory(rest + list_bytes(count)))?;
+        let runs = select.update(gpu, scan, &mut own, &choice.shown, most, |count| {
+            gpu.check_memory(rest + list_bytes(count))
+        })?;
         if runs > most {
             return Ok(Listed::TooMany { runs, most });
         }
@@ -402,7 +407,13 @@ impl PreparedScene {
         done
     }
 
-    fn update_level(&mut self, gpu: &Gpu, own: &mut LevelledSet, view: &View, pixels: f64) -> Result<()> {
+    fn update_level(
+        &mut self,
+        gpu: &Gpu,
+        own: &mut LevelledSet,
+        view: &View,
+        pixels: f64,
+    ) -> Result<()> {
         let cut = Cut::new(view, own.levels.origin(), pixels, false);
         if own.cut == Some(cut) {
             return Ok(());
@@ -413,7 +424,8 @@ impl PreparedScene {
             return Ok(());
         }
         let is_old = |chunk: &Chunk| matches!(&chunk.origin, Origin::Splats { item, .. } if *item == own.item);
-        self.bytes -= self.chunks.iter().filter(|chunk| is_old(chunk)).map(Chunk::bytes).sum::<u64>();
+        self.bytes -=
+            self.chunks.iter().filter(|chunk| is_old(chunk)).map(Chunk::bytes).sum::<u64>();
         self.chunks.retain(|chunk| !is_old(chunk));
         own.set = None;
         gpu.check_memory(self.bytes + splat_bytes(&set))?;
@@ -434,7 +446,8 @@ impl PreparedScene {
         let lattice = volume.drawn_lattice();
         let [width, height, depth] = lattice.dims;
         let slice = (width * height) as u64;
-        let bytes = volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
+        let bytes =
+            volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
         let held = gpu.binding_size() / bytes / slice;
         // Of its own samples it also holds spans, where all of them show.
         let own = CHUNK_VOXELS.min(gpu.binding_size() / SPAN_BYTES) / slice;
@@ -452,7 +465,9 @@ impl PreparedScene {
         for first in (0..depth).step_by(slices) {
             let end = (first + slices).min(depth);
             let held = first.saturating_sub(NEIGHBOURS)..(end + NEIGHBOURS).min(depth);
-            let in_slices = |slices: std::ops::Range<usize>| slices.start * slice as usize..slices.end * slice as usize;
+            let in_slices = |slices: std::ops::Range<usize>| {
+                slices.start * slice as usize..slices.end * slice as usize
+            };
             let own = in_slices(first..end);
             let dims = [width, height, end - first].map(|n| n as u32);
             let selection = Selection::new(gpu, dims, &ranges[own.clone()]);
@@ -484,7 +499,13 @@ impl PreparedScene {
     }
 
     /// Brings what the cuts of all hierarchies need to the GPU, as far as there is room for it.
-    pub(super) fn update_forests(&mut self, gpu: &Gpu, view: &View, settings: &Settings, pixels: f64) -> Result<()> {
+    pub(super) fn update_forests(
+        &mut self,
+        gpu: &Gpu,
+        view: &View,
+        settings: &Settings,
+        pixels: f64,
+    ) -> Result<()> {
         let room = settings.page_memory.min(self.room_to_read(gpu));
         for index in 0..self.forests.len() {
             let cut = self.forests[index].cut(view, settings, pixels);
@@ -492,28 +513,49 @@ impl PreparedScene {
                 .chunks
                 .iter()
                 .filter_map(|chunk| match &chunk.origin {
-                    Origin::Nodes { forest, slots } if *forest == index => Some((slots.as_ref(), &chunk.data)),
+                    Origin::Nodes { forest, slots } if *forest == index => {
+                        Some((slots.as_ref(), &chunk.data))
+                    }
                     _ => None,
                 })
                 .collect();
             let grown = self.forests[index].update(gpu, &cut, room, &own)?;
             for Growth { slots, splats, capacity } in grown {
                 self.bytes += slots.bytes();
-                self.push_chunk(gpu, Origin::Nodes { forest: index, slots: Box::new(slots) }, splats, capacity);
+                self.push_chunk(
+                    gpu,
+                    Origin::Nodes { forest: index, slots: Box::new(slots) },
+                    splats,
+                    capacity,
+                );
             }
         }
         Ok(())
     }
 
     fn push_chunk(&mut self, gpu: &Gpu, origin: Origin, data: wgpu::Buffer, count: u32) {
-        let uniform = super::buffer(gpu, "source", size_of::<Source>() as u64, wgpu::BufferUsages::UNIFORM);
+        let uniform =
+            super::buffer(gpu, "source", size_of::<Source>() as u64, wgpu::BufferUsages::UNIFORM);
         // Those of samples are not known yet.
-        let candidates = if matches!(origin, Origin::Lattice { .. } | Origin::Bricks { .. }) { 0 } else { count };
+        let candidates = if matches!(origin, Origin::Lattice { .. } | Origin::Bricks { .. }) {
+            0
+        } else {
+            count
+        };
         let spans = spans(gpu, candidates);
         self.bytes += data.size() + spans.size();
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
         let active_arguments = super::buffer(gpu, "active arguments", 12, usage);
-        self.chunks.push(Chunk { origin, data, uniform, spans, active_arguments, count, candidates, first_run: 0 });
+        self.chunks.push(Chunk {
+            origin,
+            data,
+            uniform,
+            spans,
+            active_arguments,
+            count,
+            candidates,
+            first_run: 0,
+        });
         self.number_runs();
     }
 }
@@ -532,7 +574,8 @@ fn in_space_order(splats: &[Splat]) -> Cow<'_, [Splat]> {
     // Ten bits, two zeros after each.
     let spread = |cell: u32| (0..10).fold(0, |code, bit| code | (cell >> bit & 1) << (3 * bit));
     let code = |splat: &Splat| {
-        let cell = ((Vec3::from_array(splat.center) - low) * to_cells).as_uvec3().min(UVec3::splat(1023));
+        let cell =
+            ((Vec3::from_array(splat.center) - low) * to_cells).as_uvec3().min(UVec3::splat(1023));
         spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2
     };
     let mut order: Vec<(u32, u32)> =
@@ -581,7 +624,9 @@ impl Chunk {
             Origin::Lattice { volume, kernel, slices: [first, low, high], .. } => {
                 let lattice = volume.drawn_lattice();
                 let [width, height, depth] = lattice.dims.map(|n| n as u32);
-                let kind = kind_of(volume.coefficients.as_ref().map_or(volume.samples.scalar(), |_| Scalar::F32));
+                let kind = kind_of(
+                    volume.coefficients.as_ref().map_or(volume.samples.scalar(), |_| Scalar::F32),
+                );
                 Source {
                     lattice: [width, height, depth, kind],
                     slices: [*first, *low, *high, 0],
@@ -592,7 +637,8 @@ impl Chunk {
 
         let [first, low, high, _] = source.slices;
         let slices = [first, low, high, self.candidates];
-        let flags = source.flags | if matches!(self.origin, Origin::Nodes { .. }) { NODES } else { 0 };
+        let flags =
+            source.flags | if matches!(self.origin, Origin::Nodes { .. }) { NODES } else { 0 };
         Source { count: self.count, first_run: self.first_run, slices, flags, ..source }
     }
 }
@@ -612,10 +658,16 @@ fn places(gpu: &Gpu, lattice: &Lattice) -> Result<wgpu::Buffer> {
         for (place, (axis, at)) in places.iter_mut().zip(each) {
             let mut index = [0; 3];
             index[axis] = at;
-            *place = [coordinates[axis][at] - coordinates[axis][0], lattice.unit(index)[axis]].map(|v| v as f32);
+            *place = [coordinates[axis][at] - coordinates[axis][0], lattice.unit(index)[axis]]
+                .map(|v| v as f32);
         }
     }
-    Ok(super::filled_buffer(gpu, "places", bytemuck::cast_slice(&places), wgpu::BufferUsages::UNIFORM))
+    Ok(super::filled_buffer(
+        gpu,
+        "places",
+        bytemuck::cast_slice(&places),
+        wgpu::BufferUsages::UNIFORM,
+    ))
 }
 
 /// Bytes of an item's splats or samples on the GPU, with what is known of each beforehand: its span, or the range around it. What
@@ -624,7 +676,8 @@ fn bytes_of(item: &Item) -> u64 {
     match item {
         Item::Radiance(set) | Item::Scalar(set, _) => splat_bytes(set),
         Item::Volume(volume, ..) => {
-            let sample = volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
+            let sample =
+                volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
             volume.drawn_lattice().len() as u64 * (sample + 2)
         }
         Item::Hierarchy(_) | Item::Bricks(..) => 0,

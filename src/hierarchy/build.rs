@@ -118,7 +118,8 @@ pub fn build_file(
     check_splats(set)?;
     memory::room(WORK, order_bytes(set) + at_work(build.block_splats))?;
     let parts = partition::blocks(&set.splats, build.block_splats.max(64));
-    let mut builder = Builder::new(path, set.extent, enclosing(&set.splats, set.extent), build.preset, write)?;
+    let mut builder =
+        Builder::new(path, set.extent, enclosing(&set.splats, set.extent), build.preset, write)?;
     let mut built = 0;
     for parts in parts.chunks(2 * rayon::current_num_threads()) {
         let block = |part: &Vec<u32>| {
@@ -163,7 +164,13 @@ pub(crate) struct Builder {
 }
 
 impl Builder {
-    pub fn new(path: &Path, extent: f32, outer: Sphere, preset: Preset, options: &WriteOptions) -> Result<Self> {
+    pub fn new(
+        path: &Path,
+        extent: f32,
+        outer: Sphere,
+        preset: Preset,
+        options: &WriteOptions,
+    ) -> Result<Self> {
         Ok(Self { writer: Writer::new(path, extent, options)?, outer, preset, roots: Vec::new() })
     }
 
@@ -223,20 +230,30 @@ const FARTHEST: f32 = 1e9;
 /// [`MOST_OPTICAL_DEPTH`](Splat::MOST_OPTICAL_DEPTH), and for samples; [`Error::NothingToDraw`] where there are none.
 pub fn check_splats(set: &SplatSet) -> Result<()> {
     if set.payload != Payload::Radiance {
-        return Err(Error::Argument("a hierarchy is built of splats that carry colour, not of samples".into()));
+        return Err(Error::Argument(
+            "a hierarchy is built of splats that carry colour, not of samples".into(),
+        ));
     }
     if set.splats.is_empty() {
         return Err(Error::NothingToDraw("there are no splats to build a hierarchy of".into()));
     }
     if !(set.extent > 0.0 && set.extent <= SplatSet::MAX_EXTENT) {
         let most = SplatSet::MAX_EXTENT;
-        return Err(Error::Argument(format!("a splat set's extent must lie in 0 … {most}, is {}", set.extent)));
+        return Err(Error::Argument(format!(
+            "a splat set's extent must lie in 0 … {most}, is {}",
+            set.extent
+        )));
     }
     if u32::try_from(set.splats.len()).is_err() {
-        return Err(Error::Argument("a set holds more splats than 32 bits can name; build it in blocks".into()));
+        return Err(Error::Argument(
+            "a set holds more splats than 32 bits can name; build it in blocks".into(),
+        ));
     }
     if !set.origin.is_finite() {
-        return Err(Error::Argument(format!("the origin {} of the splats is not finite", set.origin)));
+        return Err(Error::Argument(format!(
+            "the origin {} of the splats is not finite",
+            set.origin
+        )));
     }
     let most = Splat::MOST_OPTICAL_DEPTH;
     let is_sound = |s: &Splat| {
@@ -245,7 +262,9 @@ pub fn check_splats(set: &SplatSet) -> Result<()> {
     };
     if let Some(index) = set.splats.par_iter().position_first(|splat| !is_sound(splat)) {
         let Splat { center, strength, factor, .. } = set.splats[index];
-        let message = format!("splat {index} at {center:?}, of factor {factor:?} and optical depth {strength}");
+        let message = format!(
+            "splat {index} at {center:?}, of factor {factor:?} and optical depth {strength}"
+        );
         return Err(Error::Argument(format!(
             "{message}: places and shapes up to {FARTHEST:e} and optical depths from 0 to {most:e} can be merged"
         )));
@@ -261,11 +280,23 @@ mod tests {
     #[test]
     fn building_keeps_to_the_deadline() {
         let splats = surface(500, 1);
-        let set = SplatSet { origin: glam::DVec3::ZERO, payload: Payload::Radiance, splats, extent: 3.0, overlap: 1.0 };
+        let set = SplatSet {
+            origin: glam::DVec3::ZERO,
+            payload: Payload::Radiance,
+            splats,
+            extent: 3.0,
+            overlap: 1.0,
+        };
         let options = BuildOptions { deadline: Deadline::after(0), ..BuildOptions::default() };
         let built = [
             Tree::build(&set, &options, &|_, _| ()).map(drop),
-            build_file(&set, &Folder::new().path().join("a.splk"), &options, &WriteOptions::default(), &|_, _| ()),
+            build_file(
+                &set,
+                &Folder::new().path().join("a.splk"),
+                &options,
+                &WriteOptions::default(),
+                &|_, _| (),
+            ),
         ];
         for built in built {
             let message = built.unwrap_err().to_string();

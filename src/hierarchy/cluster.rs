@@ -99,13 +99,16 @@ fn apart(boxes: &[Aabb]) -> Cow<'_, [Aabb]> {
         return Cow::Borrowed(boxes);
     }
     keys.sort_unstable();
-    if keys.len() <= MOST_ALIKE || !keys.windows(MOST_ALIKE + 1).any(|run| run[0] == run[MOST_ALIKE]) {
+    if keys.len() <= MOST_ALIKE
+        || !keys.windows(MOST_ALIKE + 1).any(|run| run[0] == run[MOST_ALIKE])
+    {
         return Cow::Borrowed(boxes);
     }
     let mut found: HashMap<[u32; 6], u64> = HashMap::new();
     let set_apart = |own: &Aabb| {
         let before = found.entry(key(own)).or_default();
-        let place: u64 = (0..u64::BITS - before.leading_zeros()).map(|level| (*before >> level) << level).sum();
+        let place: u64 =
+            (0..u64::BITS - before.leading_zeros()).map(|level| (*before >> level) << level).sum();
         *before += 1;
         let width = (own.max.x - own.min.x) / 1024.0;
         // Far from the origin numbers of 32 bits are wider than that.
@@ -123,12 +126,15 @@ const BUCKET_BITS: u32 = 15;
 
 /// All bits of a box.
 fn key(own: &Aabb) -> [u32; 6] {
-    [own.min.x, own.min.y, own.min.z, own.max.x, own.max.y, own.max.z].map(|value| (value + 0.0).to_bits())
+    [own.min.x, own.min.y, own.min.z, own.max.x, own.max.y, own.max.z]
+        .map(|value| (value + 0.0).to_bits())
 }
 
 /// The bits in one number (Knuth 1973: by the golden ratio).
 fn mixed(key: [u32; 6]) -> u64 {
-    key.iter().fold(0, |sum: u64, &part| (sum.rotate_left(21) ^ u64::from(part)).wrapping_mul(0x9e37_79b9_7f4a_7c15))
+    key.iter().fold(0, |sum: u64, &part| {
+        (sum.rotate_left(21) ^ u64::from(part)).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+    })
 }
 
 /// A binary hierarchy over the leaves' boxes.
@@ -158,7 +164,8 @@ fn groups(pairs: &Bvh2) -> Vec<bool> {
         if usize::from(counts[0] + counts[1]) > MOST_CHILDREN {
             let larger = usize::from(counts[1] > counts[0]);
             for side in [larger, 1 - larger] {
-                let is_small = counts[side] <= 2 && usize::from(counts[0] + counts[1]) <= MOST_CHILDREN;
+                let is_small =
+                    counts[side] <= 2 && usize::from(counts[0] + counts[1]) <= MOST_CHILDREN;
                 if counts[side] > 1 && !is_small {
                     closed[halves[side]] = true;
                     counts[side] = 1;
@@ -208,7 +215,8 @@ mod tests {
         let mut heights = vec![0; nodes.len()];
         for (index, node) in nodes.iter().enumerate().rev().filter(|(_, node)| !node.is_leaf()) {
             let first = node.first_child as usize;
-            heights[index] = 1 + heights[first..first + node.children as usize].iter().max().unwrap_or(&0);
+            heights[index] =
+                1 + heights[first..first + node.children as usize].iter().max().unwrap_or(&0);
         }
         heights[0]
     }
@@ -232,7 +240,8 @@ mod tests {
                 first_child: 0,
                 children: 0,
             };
-            let (block, sources) = cluster(&vec![box_of(&splat); 8000], leaf, |_| Mass::of(&splat), Preset::Balanced);
+            let (block, sources) =
+                cluster(&vec![box_of(&splat); 8000], leaf, |_| Mass::of(&splat), Preset::Balanced);
             assert!(depth(&block.nodes) <= 16, "{} levels of 8000 at {at}", depth(&block.nodes));
             assert_eq!(sources.len(), block.nodes.len());
         }

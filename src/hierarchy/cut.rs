@@ -192,9 +192,15 @@ impl Tree {
     ///
     /// # Errors
     /// [`Error::Argument`] for a tree whose nodes are not in order, as [`Block`](super::Block) tells.
-    pub fn cut(&self, view: &View, detail: Detail, cull_backfaces: Option<bool>) -> Result<SplatSet> {
+    pub fn cut(
+        &self,
+        view: &View,
+        detail: Detail,
+        cull_backfaces: Option<bool>,
+    ) -> Result<SplatSet> {
         for (number, block) in self.blocks.iter().enumerate() {
-            in_order(&block.nodes).map_err(|message| Error::Argument(format!("block {number}: {message}")))?;
+            in_order(&block.nodes)
+                .map_err(|message| Error::Argument(format!("block {number}: {message}")))?;
         }
         let culls = cull_backfaces.unwrap_or(self.closed);
         let at = |pixels: f64| Cut::new(view, self.origin, pixels, culls);
@@ -217,8 +223,15 @@ impl Tree {
 
     /// The splats of a cut, as those of [`Self::cut`], of a tree whose nodes are in order.
     pub(super) fn at_cut(&self, cut: &Cut) -> SplatSet {
-        let splats = self.selected(cut).iter().map(|(node, share)| faded(&node.splat, *share)).collect();
-        SplatSet { origin: self.origin, payload: Payload::Radiance, splats, extent: self.extent, overlap: 1.0 }
+        let splats =
+            self.selected(cut).iter().map(|(node, share)| faded(&node.splat, *share)).collect();
+        SplatSet {
+            origin: self.origin,
+            payload: Payload::Radiance,
+            splats,
+            extent: self.extent,
+            overlap: 1.0,
+        }
     }
 
     /// The nodes of a cut, with their shares in parts of [`SHARE_UNIT`].
@@ -226,14 +239,25 @@ impl Tree {
     /// # Panics
     /// Where the nodes of a block are not in order, as [`cut`](Self::cut) finds out and [`validate`](super::validate()) tells.
     pub fn selected(&self, cut: &Cut) -> Vec<(&Node, u32)> {
-        let own = self.blocks.par_iter().enumerate().map(|(index, block)| self.selected_of(index, block, cut));
+        let own = self
+            .blocks
+            .par_iter()
+            .enumerate()
+            .map(|(index, block)| self.selected_of(index, block, cut));
         own.collect::<Vec<_>>().concat()
     }
 
     /// Those of one block.
-    fn selected_of<'a>(&'a self, index: usize, block: &'a Block, cut: &Cut) -> Vec<(&'a Node, u32)> {
+    fn selected_of<'a>(
+        &'a self,
+        index: usize,
+        block: &'a Block,
+        cut: &Cut,
+    ) -> Vec<(&'a Node, u32)> {
         let above = block.portal.zip(self.blocks.first()).and_then(|(portal, top)| {
-            let holds = |node: &&Node| (node.first_child..node.first_child + node.children).contains(&portal);
+            let holds = |node: &&Node| {
+                (node.first_child..node.first_child + node.children).contains(&portal)
+            };
             top.nodes.iter().find(holds).map(CutSphere::of)
         });
         if above.is_some_and(|above| cut.refinement(&above) == 0) {
@@ -250,7 +274,8 @@ impl Tree {
         for (node, parent) in block.nodes.iter().zip(&parents) {
             // The root of its block stands in a portal's place.
             let is_portal = self.is_joined() && index == 0 && node.is_leaf();
-            let share = if is_portal { 0 } else { cut.share(node, parent.as_ref(), !node.is_leaf()) };
+            let share =
+                if is_portal { 0 } else { cut.share(node, parent.as_ref(), !node.is_leaf()) };
             if share > 0 {
                 selected.push((node, share));
             }

@@ -15,7 +15,10 @@ impl Hierarchy {
     pub fn leaves(&self) -> Result<SplatSet> {
         self.check_size()?;
         // Page by page, and as a whole.
-        memory::room("reading the splats of the finest level", 2 * size_of::<Splat>() as u64 * self.header().leaves)?;
+        memory::room(
+            "reading the splats of the finest level",
+            2 * size_of::<Splat>() as u64 * self.header().leaves,
+        )?;
         let of_page = |page: u32| {
             let page = self.read_page(page)?;
             let nodes = page.nodes.iter().filter(|node| node.is_leaf() && !page.has_portals);
@@ -25,6 +28,12 @@ impl Hierarchy {
             (0..self.pages().len() as u32).into_par_iter().map(of_page).collect::<Result<_>>()?;
         let header = self.header();
         let splats = pages.concat();
-        Ok(SplatSet { origin: header.origin, payload: Payload::Radiance, splats, extent: header.extent, overlap: 1.0 })
+        Ok(SplatSet {
+            origin: header.origin,
+            payload: Payload::Radiance,
+            splats,
+            extent: header.extent,
+            overlap: 1.0,
+        })
     }
 }

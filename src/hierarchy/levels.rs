@@ -2,7 +2,10 @@
 //! than what a picture can show, it takes fewer: of splats that carry colour a cut of a tree that is built in memory, once; of
 //! scattered samples one for each cell of a grid.
 
-use super::{BuildOptions, Cut, Node, Preset, Tree, check_splats, file::CutSphere, merge::leaf, sphere::enclosing};
+use super::{
+    BuildOptions, Cut, Node, Preset, Tree, check_splats, file::CutSphere, merge::leaf,
+    sphere::enclosing,
+};
 use crate::{
     Result, memory, scattered,
     splat::{Payload, SplatSet},
@@ -85,7 +88,11 @@ impl Levels {
 
     fn cells(&mut self, cut: &Cut) -> Arc<SplatSet> {
         let around = enclosing(&self.set.splats, self.set.extent);
-        let unit = CutSphere { center: around.center.as_vec3().to_array(), radius: around.radius as f32, size: 1.0 };
+        let unit = CutSphere {
+            center: around.center.as_vec3().to_array(),
+            radius: around.radius as f32,
+            size: 1.0,
+        };
         let edge = CELL / f64::from(cut.widths(&unit)).max(f64::from(f32::MIN_POSITIVE));
         let power = edge.log2().floor().clamp(-100.0, 100.0) as i32;
         if let Fewer::Cells(own, set) = &self.fewer
@@ -126,7 +133,13 @@ mod tests {
             Splat { center, strength: 1.0, factor, color: u32::MAX, normal: 0 }
         };
         let splats = (0..side * side).map(splat).collect();
-        Arc::new(SplatSet { origin: DVec3::ZERO, payload: Payload::Radiance, splats, extent: 3.0, overlap: 1.0 })
+        Arc::new(SplatSet {
+            origin: DVec3::ZERO,
+            payload: Payload::Radiance,
+            splats,
+            extent: 3.0,
+            overlap: 1.0,
+        })
     }
 
     fn view(size: [u32; 2]) -> View {

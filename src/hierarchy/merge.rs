@@ -39,7 +39,14 @@ pub(crate) struct Mass {
 /// The covariance behind a splat's factor.
 pub(crate) fn covariance(factor: &[f32; 6]) -> Moments {
     let [b00, b10, b11, b20, b21, b22] = *factor;
-    [b00 * b00, b00 * b10, b00 * b20, b10 * b10 + b11 * b11, b10 * b20 + b11 * b21, b20 * b20 + b21 * b21 + b22 * b22]
+    [
+        b00 * b00,
+        b00 * b10,
+        b00 * b20,
+        b10 * b10 + b11 * b11,
+        b10 * b20 + b11 * b21,
+        b20 * b20 + b21 * b21 + b22 * b22,
+    ]
 }
 
 /// Cholesky's lower factor, with floors that keep it regular.
@@ -55,7 +62,8 @@ fn factor(m: &Moments) -> [f32; 6] {
 }
 
 /// cos(acos(r)/3) as a polynomial of √(1 + r), by rising powers: at most 3·10⁻⁶ off.
-pub(super) const THIRD: [f32; 6] = [0.500_002_7, 0.408_164, -0.054_907_8, 0.016_816_5, -0.004_783_6, 0.000_734_3];
+pub(super) const THIRD: [f32; 6] =
+    [0.500_002_7, 0.408_164, -0.054_907_8, 0.016_816_5, -0.004_783_6, 0.000_734_3];
 
 /// The mean variance along the axes, and the matrix in it: products of variances themselves are lost in 32 bits where a
 /// splat is smaller than 1e-10 or larger than 1e9. 0 where there is no variance.
@@ -205,7 +213,9 @@ fn cone(axis: u32, children: &[Node]) -> f32 {
     let Some(axis) = decode_normal(axis) else { return -1.0 };
     let mut narrowest = 1.0f32;
     for child in children {
-        let Some(own) = decode_normal(child.splat.normal).filter(|_| child.cone > -1.0) else { return -1.0 };
+        let Some(own) = decode_normal(child.splat.normal).filter(|_| child.cone > -1.0) else {
+            return -1.0;
+        };
         let (cos, sin) = (axis.dot(own), axis.cross(own).length());
         let (own_cos, own_sin) = (child.cone, (1.0 - child.cone * child.cone).max(0.0).sqrt());
         // Two angles that add up to more than half a turn leave no cone.

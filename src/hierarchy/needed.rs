@@ -28,7 +28,8 @@ impl Needed {
         let test = |(page, entry): (usize, &PageEntry)| {
             hierarchy.is_present(page as u32) && (page == 0 || cut.may_refine(&parents_of(entry)))
         };
-        let mut needed: Vec<bool> = pages.par_iter().enumerate().with_min_len(1 << 10).map(test).collect();
+        let mut needed: Vec<bool> =
+            pages.par_iter().enumerate().with_min_len(1 << 10).map(test).collect();
         for index in (0..pages.len()).rev() {
             if needed[index] {
                 for parent in pages[index].parent_pages.clone() {
@@ -60,7 +61,11 @@ impl Needed {
 
 /// A sphere that holds the spheres of all parents of a page's nodes, and the largest of their sizes.
 fn parents_of(entry: &PageEntry) -> CutSphere {
-    CutSphere { center: entry.parents_center, radius: entry.parents_radius, size: entry.largest_parent_size }
+    CutSphere {
+        center: entry.parents_center,
+        radius: entry.parents_radius,
+        size: entry.largest_parent_size,
+    }
 }
 
 /// What holds the spheres and sizes of the parents of some successive nodes of a page, so that none is refined where this is

@@ -73,8 +73,9 @@ impl Tree {
     pub fn nodes(&self) -> impl Iterator<Item = &Node> {
         let joined = self.is_joined();
         let blocks = self.blocks.iter().enumerate();
-        blocks
-            .flat_map(move |(index, block)| block.nodes.iter().filter(move |n| !(joined && index == 0 && n.is_leaf())))
+        blocks.flat_map(move |(index, block)| {
+            block.nodes.iter().filter(move |n| !(joined && index == 0 && n.is_leaf()))
+        })
     }
 
     /// How many splats of the source the tree holds.

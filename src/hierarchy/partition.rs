@@ -25,7 +25,8 @@ impl Cube {
 
     /// The Morton key of a place: ten bits along each axis, interleaved.
     pub fn key(&self, place: Vec3) -> u32 {
-        let cell = ((place - self.low) * self.scale).clamp(Vec3::ZERO, Vec3::splat(((1 << BITS) - 1) as f32));
+        let cell = ((place - self.low) * self.scale)
+            .clamp(Vec3::ZERO, Vec3::splat(((1 << BITS) - 1) as f32));
         spread(cell.x as u32) | spread(cell.y as u32) << 1 | spread(cell.z as u32) << 2
     }
 
@@ -33,7 +34,8 @@ impl Cube {
     pub fn fine_key(&self, place: Vec3) -> u64 {
         let scale = f64::from(self.scale) * f64::from(1 << (FINE_BITS - BITS));
         let cell = (place - self.low).as_dvec3() * scale;
-        let [x, y, z] = cell.to_array().map(|cell| cell.clamp(0.0, f64::from((1 << FINE_BITS) - 1)) as u32);
+        let [x, y, z] =
+            cell.to_array().map(|cell| cell.clamp(0.0, f64::from((1 << FINE_BITS) - 1)) as u32);
         let low = (1 << BITS) - 1;
         let part = |shift: u32| {
             let [x, y, z] = [x, y, z].map(|cell| cell >> shift & low);
@@ -70,7 +72,9 @@ pub(crate) fn blocks(splats: &[Splat], wanted: usize) -> Vec<Vec<u32>> {
         .fold(|| none, |(low, high), p| (low.min(p), high.max(p)))
         .reduce(|| none, |a, b| (a.0.min(b.0), a.1.max(b.1)));
     let cube = Cube::around(low, high);
-    let key = |(index, splat): (usize, &Splat)| u64::from(cube.key(Vec3::from(splat.center))) << 32 | index as u64;
+    let key = |(index, splat): (usize, &Splat)| {
+        u64::from(cube.key(Vec3::from(splat.center))) << 32 | index as u64
+    };
     let mut keys: Vec<u64> = splats.par_iter().enumerate().with_min_len(1 << 14).map(key).collect();
     keys.radix_sort_unstable();
     let count = splats.len().div_ceil(wanted);

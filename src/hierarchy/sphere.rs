@@ -52,8 +52,9 @@ impl Sphere {
     /// A sphere around others that is nearly the smallest.
     pub fn around(spheres: &[Self], rounds: u32) -> Self {
         let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let (low, high) =
-            spheres.iter().fold(none, |(low, high), s| (low.min(s.center - s.radius), high.max(s.center + s.radius)));
+        let (low, high) = spheres.iter().fold(none, |(low, high), s| {
+            (low.min(s.center - s.radius), high.max(s.center + s.radius))
+        });
         let mut center = (low + high) * 0.5;
         let mut best = Self { center, radius: f64::INFINITY };
         for round in 0..=rounds {
@@ -141,7 +142,8 @@ pub(crate) fn raise(block: &mut Block) -> Vec<u32> {
 pub(crate) fn nest(block: &mut Block, heights: &[u32], outer: Sphere) {
     let nodes = &mut block.nodes;
     let leaves = nodes.iter().filter(|node| node.is_leaf()).map(Sphere::of);
-    let reach = leaves.map(|leaf| leaf.center.distance(outer.center) + leaf.radius).fold(0.0, f64::max);
+    let reach =
+        leaves.map(|leaf| leaf.center.distance(outer.center) + leaf.radius).fold(0.0, f64::max);
     let outer = Sphere { radius: outer.radius.max(reach * (1.0 + 1e-6)), ..outer };
     let mut parents = vec![0u32; nodes.len()];
     for (index, node) in (0..).zip(nodes.iter()) {
@@ -286,7 +288,8 @@ const OUTSIDE: f64 = 0.005;
 /// `extent` standard deviations from their centres.
 pub(crate) fn enclosing(splats: &[Splat], extent: f32) -> Sphere {
     let sphere = |splat: &Splat| Sphere::of(&leaf(splat, extent));
-    let mut core: Vec<Sphere> = extremes(splats).iter().map(|&index| sphere(&splats[index])).collect();
+    let mut core: Vec<Sphere> =
+        extremes(splats).iter().map(|&index| sphere(&splats[index])).collect();
     let mut around = Sphere::around(&core, 1 << 12);
     for growth in 0.. {
         // Most splats lie so far inside that their size need not be known: a splat's largest standard deviation is at most

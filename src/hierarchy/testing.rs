@@ -13,7 +13,8 @@ pub struct Random(pub u64);
 impl Random {
     /// In 0..1.
     pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
@@ -47,7 +48,11 @@ pub fn factor(axes: [DVec3; 3], sigma: [f64; 3]) -> [f32; 6] {
 /// B·Bᵀ.
 pub fn covariance(splat: &Splat) -> DMat3 {
     let [b00, b10, b11, b20, b21, b22] = splat.factor.map(f64::from);
-    let b = DMat3::from_cols(DVec3::new(b00, b10, b20), DVec3::new(0.0, b11, b21), DVec3::new(0.0, 0.0, b22));
+    let b = DMat3::from_cols(
+        DVec3::new(b00, b10, b20),
+        DVec3::new(0.0, b11, b21),
+        DVec3::new(0.0, 0.0, b22),
+    );
     b * b.transpose()
 }
 
@@ -61,7 +66,8 @@ pub fn ellipsoid(splat: &Splat) -> ([f64; 3], [DVec3; 3]) {
 pub fn surface(count: usize, seed: u64) -> Vec<Splat> {
     let mut random = Random(seed);
     let turn = std::f64::consts::PI * (3.0 - 5f64.sqrt());
-    let height = |d: DVec3| 1.0 + 0.1 * (5.0 * d.x).sin() * (4.0 * d.y).cos() + 0.03 * (11.0 * d.z).sin();
+    let height =
+        |d: DVec3| 1.0 + 0.1 * (5.0 * d.x).sin() * (4.0 * d.y).cos() + 0.03 * (11.0 * d.z).sin();
     let spacing = (4.0 * std::f64::consts::PI / count as f64).sqrt();
     let splat = |index: usize| {
         let z = 1.0 - (2 * index + 1) as f64 / count as f64;
@@ -72,7 +78,8 @@ pub fn surface(count: usize, seed: u64) -> Vec<Splat> {
         let place = |d: DVec3| d * height(d);
         let (x, y) = direction.any_orthonormal_pair();
         let step = 1e-4;
-        let [along_x, along_y] = [x, y].map(|t| place((direction + t * step).normalize()) - place(direction));
+        let [along_x, along_y] =
+            [x, y].map(|t| place((direction + t * step).normalize()) - place(direction));
         let normal = along_x.cross(along_y).normalize();
         let normal = decode_normal(encode_normal(normal.as_vec3())).unwrap().as_dvec3();
         let (u, v) = normal.any_orthonormal_pair();
@@ -81,7 +88,9 @@ pub fn surface(count: usize, seed: u64) -> Vec<Splat> {
         let large = spacing * (0.42 + 0.1 * random.next());
         let small = large * (0.6 + 0.4 * random.next());
         let shade = |value: f64| (127.0 + 100.0 * value) as u32;
-        let tint = [(3.0 * direction.x).sin(), (4.0 * direction.y).sin(), (5.0 * direction.z).sin()].map(shade);
+        let tint =
+            [(3.0 * direction.x).sin(), (4.0 * direction.y).sin(), (5.0 * direction.z).sin()]
+                .map(shade);
         Splat {
             center: place(direction).as_vec3().to_array(),
             strength: 8.0,
@@ -100,8 +109,13 @@ pub fn cloud(count: usize, seed: u64) -> Vec<Splat> {
         let first = random.direction();
         let second = first.cross(random.direction()).normalize();
         let size = 0.01 * (random.next() * 3.0).exp();
-        let sigma = [size, size * (0.05 + 0.95 * random.next()), size * (0.05 + 0.95 * random.next())];
-        let normal = if random.next() < 0.2 { NO_NORMAL } else { encode_normal(random.direction().as_vec3()) };
+        let sigma =
+            [size, size * (0.05 + 0.95 * random.next()), size * (0.05 + 0.95 * random.next())];
+        let normal = if random.next() < 0.2 {
+            NO_NORMAL
+        } else {
+            encode_normal(random.direction().as_vec3())
+        };
         Splat {
             center: (random.direction() * random.next()).as_vec3().to_array(),
             strength: (0.01 + 5.0 * random.next()) as f32,
@@ -170,12 +184,15 @@ fn branch(leaves: &mut [Node]) -> Branch {
     // Not every node has all children that it could have.
     let most = if count <= 8 { 8 } else { 4 + (node.splat.center[0].to_bits() % 5) as usize };
     while groups.len() < most {
-        let Some(largest) = (0..groups.len()).filter(|&g| groups[g].len() > 1).max_by_key(|&g| groups[g].len()) else {
+        let Some(largest) =
+            (0..groups.len()).filter(|&g| groups[g].len() > 1).max_by_key(|&g| groups[g].len())
+        else {
             break;
         };
         let group = groups.swap_remove(largest);
         let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        let (low, high) = group.iter().fold(none, |(low, high), n| (low.min(n.center()), high.max(n.center())));
+        let (low, high) =
+            group.iter().fold(none, |(low, high), n| (low.min(n.center()), high.max(n.center())));
         let axis = (high - low).max_position();
         group.sort_by(|a, b| a.center[axis].total_cmp(&b.center[axis]));
         let (left, right) = group.split_at_mut(group.len() / 2);
@@ -192,12 +209,16 @@ fn merge(leaves: &[Node]) -> Node {
     let mut sum = DMat3::ZERO;
     for leaf in leaves {
         let away = place(leaf) - center;
-        sum += covariance(&leaf.splat) + DMat3::from_cols(away * away.x, away * away.y, away * away.z);
+        sum +=
+            covariance(&leaf.splat) + DMat3::from_cols(away * away.x, away * away.y, away * away.z);
     }
     let (squares, axes) = eigen(sum * (1.0 / count));
     let sigma = squares.map(f64::sqrt);
-    let normals: Option<Vec<Vec3>> = leaves.iter().map(|leaf| decode_normal(leaf.splat.normal)).collect();
-    let normal = normals.map_or(NO_NORMAL, |normals| encode_normal(normals.iter().sum::<Vec3>().normalize_or_zero()));
+    let normals: Option<Vec<Vec3>> =
+        leaves.iter().map(|leaf| decode_normal(leaf.splat.normal)).collect();
+    let normal = normals.map_or(NO_NORMAL, |normals| {
+        encode_normal(normals.iter().sum::<Vec3>().normalize_or_zero())
+    });
     let mean = |shift: u32| {
         let sum: u64 = leaves.iter().map(|leaf| u64::from(leaf.splat.color >> shift & 255)).sum();
         ((sum / leaves.len() as u64) as u32) << shift
@@ -223,7 +244,8 @@ pub fn tree(splats: &[Splat]) -> Tree {
 pub fn joined(splats: &[Splat], count: usize) -> Tree {
     let mut leaves: Vec<Node> = splats.iter().copied().map(leaf).collect();
     leaves.sort_by(|a, b| a.center[0].total_cmp(&b.center[0]));
-    let below: Vec<Vec<Node>> = leaves.chunks(leaves.len().div_ceil(count)).map(|part| grow(part.to_vec())).collect();
+    let below: Vec<Vec<Node>> =
+        leaves.chunks(leaves.len().div_ceil(count)).map(|part| grow(part.to_vec())).collect();
     let portal = |nodes: &Vec<Node>| Node { first_child: 0, children: 0, ..nodes[0] };
     let top = grow(below.iter().map(portal).collect());
     let portal_of = |nodes: &Vec<Node>| {
@@ -232,14 +254,20 @@ pub fn joined(splats: &[Splat], count: usize) -> Tree {
     };
     let portals: Vec<Option<u32>> = below.iter().map(portal_of).collect();
     let below = below.into_iter().zip(portals).map(|(nodes, portal)| Block { nodes, portal });
-    whole(std::iter::once(Block { nodes: top.clone(), portal: None }).chain(below).collect(), splats.len())
+    whole(
+        std::iter::once(Block { nodes: top.clone(), portal: None }).chain(below).collect(),
+        splats.len(),
+    )
 }
 
 fn whole(blocks: Vec<Block>, points: usize) -> Tree {
     let origin = DVec3::new(4e5, -2e6, 30.0);
     let bounds = Bounds { min: origin, max: origin };
-    let mut tree = Tree { origin, extent: EXTENT, closed: true, bounds, source_points: points as u64, blocks };
+    let mut tree =
+        Tree { origin, extent: EXTENT, closed: true, bounds, source_points: points as u64, blocks };
     let splats = tree.nodes().filter(|node| node.is_leaf()).map(|node| node.splat).collect();
-    tree.bounds = SplatSet { origin, payload: Payload::Radiance, splats, extent: EXTENT, overlap: 1.0 }.bounds();
+    tree.bounds =
+        SplatSet { origin, payload: Payload::Radiance, splats, extent: EXTENT, overlap: 1.0 }
+            .bounds();
     tree
 }

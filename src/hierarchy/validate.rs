@@ -53,7 +53,8 @@ impl Findings {
         let code = finding.code;
         if self.list.iter().filter(|other| other.code == code).count() < MOST {
             self.list.push(finding);
-        } else if let Some((_, count)) = self.left_out.iter_mut().find(|(other, _)| *other == code) {
+        } else if let Some((_, count)) = self.left_out.iter_mut().find(|(other, _)| *other == code)
+        {
             *count += 1;
         } else {
             self.left_out.push((code, 1));
@@ -62,7 +63,9 @@ impl Findings {
 
     pub fn finish(mut self) -> Vec<Finding> {
         let more = self.left_out.iter();
-        let more = more.map(|(code, count)| Finding::error(code, "further places", format!("{count} more of these")));
+        let more = more.map(|(code, count)| {
+            Finding::error(code, "further places", format!("{count} more of these"))
+        });
         self.list.extend(more.collect::<Vec<_>>());
         self.list
     }
@@ -121,13 +124,18 @@ impl Footprints {
 
     /// Adds a leaf; what is wrong with its sphere.
     fn add(&mut self, leaf: &Node) -> Option<String> {
-        let (center, reach) = (Vec3::from(leaf.splat.center), self.extent * leaf.splat.deviations());
+        let (center, reach) =
+            (Vec3::from(leaf.splat.center), self.extent * leaf.splat.deviations());
         (self.low, self.high) = (self.low.min(center - reach), self.high.max(center + reach));
         self.widest = self.widest.max(reach.max_element());
         let reach = self.extent * deviation(&leaf.splat);
         let needed = leaf.center().distance(center) + reach;
-        (needed * (1.0 - ROUNDING) > leaf.radius)
-            .then(|| format!("its footprint ends {needed} from its centre, its sphere has radius {}", leaf.radius))
+        (needed * (1.0 - ROUNDING) > leaf.radius).then(|| {
+            format!(
+                "its footprint ends {needed} from its centre, its sphere has radius {}",
+                leaf.radius
+            )
+        })
     }
 
     /// Checks the box that is told of; nothing where there were no leaves.
@@ -135,20 +143,28 @@ impl Footprints {
         if !self.low.cmple(self.high).all() {
             return;
         }
-        let found = Bounds { min: origin + self.low.as_dvec3(), max: origin + self.high.as_dvec3() };
-        let most = BOX * found.diagonal().max(told.diagonal()) + BOX_OF_WIDEST * f64::from(self.widest);
+        let found =
+            Bounds { min: origin + self.low.as_dvec3(), max: origin + self.high.as_dvec3() };
+        let most =
+            BOX * found.diagonal().max(told.diagonal()) + BOX_OF_WIDEST * f64::from(self.widest);
         let off = (found.min - told.min).abs().max((found.max - told.max).abs()).max_element();
         if off > most {
             let [low, high, told_low, told_high] = [found.min, found.max, told.min, told.max];
-            let message =
-                format!("footprints lie between {low} and {high}, and it tells of {told_low} and {told_high}");
+            let message = format!(
+                "footprints lie between {low} and {high}, and it tells of {told_low} and {told_high}"
+            );
             findings.push(Finding::error("bounds", place, message));
         }
     }
 }
 
 /// Checks the nodes of a block, whose leaves are added to the `footprints`; those of a block of portals are none.
-pub fn check_block(number: usize, nodes: &[Node], mut footprints: Option<&mut Footprints>, findings: &mut Findings) {
+pub fn check_block(
+    number: usize,
+    nodes: &[Node],
+    mut footprints: Option<&mut Footprints>,
+    findings: &mut Findings,
+) {
     let place = |node: usize| format!("block {number}, node {node}");
     if let Err(message) = in_order(nodes) {
         findings.push(Finding::error("order", format!("block {number}"), message));
@@ -192,14 +208,19 @@ pub fn check_portals(
     }
     let mut taken = vec![false; top.len()];
     for (number, (portal_of, _)) in roots.iter().enumerate() {
-        let at = portal_of.map(|at| at as usize).filter(|&at| top.get(at).is_some_and(Node::is_leaf));
+        let at =
+            portal_of.map(|at| at as usize).filter(|&at| top.get(at).is_some_and(Node::is_leaf));
         match at {
             Some(at) if !taken[at] => taken[at] = true,
             Some(at) => portal(format!("two blocks hang below node {at}")),
-            None => portal(format!("block {} hangs below {portal_of:?}, which is no leaf", number + 1)),
+            None => {
+                portal(format!("block {} hangs below {portal_of:?}, which is no leaf", number + 1))
+            }
         }
     }
-    for (index, _) in top.iter().enumerate().filter(|&(index, node)| node.is_leaf() && !taken[index]) {
+    for (index, _) in
+        top.iter().enumerate().filter(|&(index, node)| node.is_leaf() && !taken[index])
+    {
         portal(format!("no block hangs below node {index}"));
     }
     for (number, (portal_of, root)) in roots.iter().enumerate() {
@@ -218,17 +239,29 @@ fn fits(values: &[f32]) -> bool {
 
 /// Whether the numbers of a node's splat can be drawn.
 pub fn is_drawable(splat: &Splat) -> bool {
-    fits(&splat.center) && fits(&splat.factor) && (0.0..=Splat::MOST_OPTICAL_DEPTH).contains(&splat.strength)
+    fits(&splat.center)
+        && fits(&splat.factor)
+        && (0.0..=Splat::MOST_OPTICAL_DEPTH).contains(&splat.strength)
 }
 
 /// The fault that a node has by itself.
 pub fn fault(node: &Node) -> Option<String> {
     let Node { splat, center, radius, size, cone, .. } = node;
     let is_length = |value: f32| value >= 0.0 && value.is_finite();
-    if is_drawable(splat) && fits(center) && is_length(*radius) && is_length(*size) && (-1.0..=1.0).contains(cone) {
+    if is_drawable(splat)
+        && fits(center)
+        && is_length(*radius)
+        && is_length(*size)
+        && (-1.0..=1.0).contains(cone)
+    {
         return None;
     }
-    let numbers = splat.center.iter().chain(&splat.factor).chain(center).chain([&splat.strength, radius, size, cone]);
+    let numbers = splat.center.iter().chain(&splat.factor).chain(center).chain([
+        &splat.strength,
+        radius,
+        size,
+        cone,
+    ]);
     let most = Splat::MOST_OPTICAL_DEPTH;
     Some(if !numbers.copied().all(f32::is_finite) {
         "a value that is not finite".into()
@@ -245,7 +278,10 @@ pub fn fault(node: &Node) -> Option<String> {
 
 /// What is wrong with where a whole hierarchy is.
 pub fn fault_of_box(origin: DVec3, bounds: &Bounds) -> Option<&'static str> {
-    let is_sound = origin.is_finite() && bounds.min.is_finite() && bounds.max.is_finite() && !bounds.is_empty();
+    let is_sound = origin.is_finite()
+        && bounds.min.is_finite()
+        && bounds.max.is_finite()
+        && !bounds.is_empty();
     (!is_sound).then_some("its origin or its bounds are none")
 }
 
@@ -261,7 +297,9 @@ fn bounds(node: &Node, below: &Node, place: impl Fn() -> String, findings: &mut 
     let center: DVec3 = node.center().as_dvec3();
     let (reach, radius) = (reach(center, below), f64::from(node.radius));
     if reach > radius * (1.0 + 1e-6) {
-        let message = format!("its sphere ends {reach} from its parent's centre, whose own has radius {radius}");
+        let message = format!(
+            "its sphere ends {reach} from its parent's centre, whose own has radius {radius}"
+        );
         findings.push(Finding::error("sphere", place(), message));
     }
     if below.size > node.size {
@@ -273,8 +311,10 @@ fn bounds(node: &Node, below: &Node, place: impl Fn() -> String, findings: &mut 
         let cone = if below.is_leaf() && below.cone > -1.0 { 1.0 } else { below.cone };
         let wanted = libm::cos(joint_angle(node, &Node { cone, ..*below }));
         if f64::from(node.cone) > wanted + 1e-6 {
-            let message =
-                format!("its cone needs one of cosine {wanted} around its parent's normal, which has {}", node.cone);
+            let message = format!(
+                "its cone needs one of cosine {wanted} around its parent's normal, which has {}",
+                node.cone
+            );
             findings.push(Finding::error("cone", place(), message));
         }
     }

@@ -23,7 +23,12 @@ pub(super) struct Budget {
 
 impl Budget {
     pub fn new() -> Self {
-        Self { spent: AtomicU64::new(0), created: Instant::now(), begun: AtomicU64::new(0), files: Mutex::default() }
+        Self {
+            spent: AtomicU64::new(0),
+            created: Instant::now(),
+            begun: AtomicU64::new(0),
+            files: Mutex::default(),
+        }
     }
 
     /// Takes bytes for `what`. Nothing is given back: what is dropped while a file is read counts as well, so the sum is
@@ -58,7 +63,12 @@ impl Budget {
         if taken <= Duration::from_secs(limits.seconds) {
             return Ok(());
         }
-        limits.check(LimitKind::Seconds, file, "the time for reading, in seconds,", taken.as_secs() + 1)
+        limits.check(
+            LimitKind::Seconds,
+            file,
+            "the time for reading, in seconds,",
+            taken.as_secs() + 1,
+        )
     }
 
     /// Lets the time begin again.

@@ -48,7 +48,8 @@ impl Cloud {
 
 /// Intensities as greys: the darkest hundredth is black, the brightest white. Empty where they say nothing.
 pub(super) fn greys(intensities: &[f32]) -> Vec<[u8; 4]> {
-    let mut sorted: Vec<f32> = intensities.par_iter().copied().filter(|value| value.is_finite()).collect();
+    let mut sorted: Vec<f32> =
+        intensities.par_iter().copied().filter(|value| value.is_finite()).collect();
     if sorted.is_empty() {
         return Vec::new();
     }
@@ -70,7 +71,8 @@ pub(super) fn grey(value: f32, low: f32, high: f32) -> [u8; 4] {
 /// Colours of 16 bits as bytes. Some writers store bytes in the 16 bits: then none is larger than 255. Empty where all are
 /// black, as files without colours have them.
 pub(super) fn colors_of_16_bits(colors: &[[u16; 3]]) -> Vec<[u8; 4]> {
-    let largest = colors.par_iter().map(|color| color.iter().copied().max().unwrap_or(0)).max().unwrap_or(0);
+    let largest =
+        colors.par_iter().map(|color| color.iter().copied().max().unwrap_or(0)).max().unwrap_or(0);
     if largest == 0 {
         return Vec::new();
     }
@@ -79,7 +81,9 @@ pub(super) fn colors_of_16_bits(colors: &[[u16; 3]]) -> Vec<[u8; 4]> {
 
 /// One such colour, where the largest number of all is known.
 pub(super) fn color_of_16_bits(color: [u16; 3], largest: u16) -> [u8; 4] {
-    let byte = |value: u16| if largest > 255 { ((u32::from(value) * 255 + 32767) / 65535) as u8 } else { value as u8 };
+    let byte = |value: u16| {
+        if largest > 255 { ((u32::from(value) * 255 + 32767) / 65535) as u8 } else { value as u8 }
+    };
     let [r, g, b] = color.map(byte);
     [r, g, b, 255]
 }
@@ -101,7 +105,10 @@ mod tests {
     #[test]
     fn colors_of_16_bits_may_be_bytes() {
         assert_eq!(colors_of_16_bits(&[[0, 128, 255]]), [[0, 128, 255, 255]]);
-        assert_eq!(colors_of_16_bits(&[[0, 0x8080, 0xffff], [255, 256, 0]]), [[0, 128, 255, 255], [1, 1, 0, 255]]);
+        assert_eq!(
+            colors_of_16_bits(&[[0, 0x8080, 0xffff], [255, 256, 0]]),
+            [[0, 128, 255, 255], [1, 1, 0, 255]]
+        );
         assert!(colors_of_16_bits(&[[0; 3]; 4]).is_empty());
     }
 }

@@ -5,7 +5,10 @@
 //! What is needed as text is copied first and checked afterwards, by the functions of this module. Clippy refuses the standard
 //! library's borrowing conversions in all other modules of readers (`clippy.toml`).
 
-#![expect(clippy::disallowed_methods, reason = "the one place that checks text, after it is copied")]
+#![expect(
+    clippy::disallowed_methods,
+    reason = "the one place that checks text, after it is copied"
+)]
 
 use std::{hint::black_box, str::FromStr};
 
@@ -27,7 +30,8 @@ pub(crate) fn text(bytes: &[u8]) -> Result<String, usize> {
 
 /// A copy of the bytes as text, with a replacement character for what is not UTF-8.
 pub(crate) fn lossy(bytes: &[u8]) -> String {
-    String::from_utf8(copied(bytes)).unwrap_or_else(|error| String::from_utf8_lossy(error.as_bytes()).into_owned())
+    String::from_utf8(copied(bytes))
+        .unwrap_or_else(|error| String::from_utf8_lossy(error.as_bytes()).into_owned())
 }
 
 /// The beginning of a word, for an error message.
@@ -67,8 +71,15 @@ mod tests {
         assert_eq!(number::<f64>(b"-1.5e3"), Some(-1500.0));
         assert_eq!(number::<u64>(b"7"), Some(7));
         for length in [SHORT - 1, SHORT, SHORT + 1, 500] {
-            assert_eq!(number::<f64>(format!("{:0>length$}", "12.5").as_bytes()), Some(12.5), "{length}");
+            assert_eq!(
+                number::<f64>(format!("{:0>length$}", "12.5").as_bytes()),
+                Some(12.5),
+                "{length}"
+            );
         }
-        assert_eq!((number::<f64>(b""), number::<f64>(b"1\xff"), number::<u64>(b"-1")), (None, None, None));
+        assert_eq!(
+            (number::<f64>(b""), number::<f64>(b"1\xff"), number::<u64>(b"-1")),
+            (None, None, None)
+        );
     }
 }

@@ -31,10 +31,12 @@ pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
     source.spend("the size of the samples in bytes", Columns::ROW * count as u64)?;
     let columns = Columns {
         values: column(layout.value).collect(),
-        radii: layout.radius.map_or(Vec::new(), |radius| column(radius).map(|radius| radius as f32).collect()),
-        covariances: layout
-            .covariance
-            .map_or(Vec::new(), |terms| (0..count).map(|row| terms.map(|term| value(row, term) as f32)).collect()),
+        radii: layout
+            .radius
+            .map_or(Vec::new(), |radius| column(radius).map(|radius| radius as f32).collect()),
+        covariances: layout.covariance.map_or(Vec::new(), |terms| {
+            (0..count).map(|row| terms.map(|term| value(row, term) as f32)).collect()
+        }),
     };
     let [x, y, z] = layout.position;
     let position = |row| DVec3::new(value(row, x), value(row, y), value(row, z));
@@ -65,13 +67,17 @@ impl Layout {
     fn named(source: &Source, line: usize, names: &[String], scalar: Option<&str>) -> Result<Self> {
         let place = format!("line {line}");
         let at = |name: &str| names.iter().position(|other| other.eq_ignore_ascii_case(name));
-        let need = |name: &str| at(name).ok_or_else(|| source.error(&place, format!("names no column “{name}”")));
+        let need = |name: &str| {
+            at(name).ok_or_else(|| source.error(&place, format!("names no column “{name}”")))
+        };
         let position = [need("x")?, need("y")?, need("z")?];
         let radius = at("radius");
         let terms = COVARIANCE.map(|term| at(term).or_else(|| at(&format!("cov_{term}"))));
-        let covariance = terms.iter().all(Option::is_some).then(|| terms.map(Option::unwrap_or_default));
-        let taken =
-            |column: &usize| position.contains(column) || radius == Some(*column) || terms.contains(&Some(*column));
+        let covariance =
+            terms.iter().all(Option::is_some).then(|| terms.map(Option::unwrap_or_default));
+        let taken = |column: &usize| {
+            position.contains(column) || radius == Some(*column) || terms.contains(&Some(*column))
+        };
         let rest: Vec<usize> = (0..names.len()).filter(|column| !taken(column)).collect();
         let of_rest: Vec<&str> = rest.iter().map(|&column| names[column].as_str()).collect();
         let usual = || at("value").or_else(|| at("scalar")).filter(|_| scalar.is_none());
@@ -132,7 +138,10 @@ mod tests {
         let slanted = Points { covariances: vec![[4.0, 1.0, 0.0, 2.0, 0.0, 1.0]; 2], ..plain };
         assert_eq!(load("1 2 3 -0.5 4 1 0 2 0 1\n4 5 6 70 4 1 0 2 0 1", None).unwrap(), slanted);
         let names = "cov_xx cov_xy cov_xz cov_yy cov_yz cov_zz x y z v";
-        assert_eq!(load(&format!("{names}\n4 1 0 2 0 1 1 2 3 -0.5\n4 1 0 2 0 1 4 5 6 70"), None).unwrap(), slanted);
+        assert_eq!(
+            load(&format!("{names}\n4 1 0 2 0 1 1 2 3 -0.5\n4 1 0 2 0 1 4 5 6 70"), None).unwrap(),
+            slanted
+        );
     }
 
     #[test]
@@ -163,7 +172,10 @@ mod tests {
         let folder = Folder::new();
         let path = folder.write("a.csv", "1 2 3 4\n5 6 7 8\n");
         let limits = Limits { points: 1, ..Limits::default() };
-        assert!(matches!(read(&Source::open(&path, &limits).unwrap(), None), Err(Error::Limit { .. })));
+        assert!(matches!(
+            read(&Source::open(&path, &limits).unwrap(), None),
+            Err(Error::Limit { .. })
+        ));
     }
 
     /// A cut text is an error, or fewer lines, or one of its numbers shorter.

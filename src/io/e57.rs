@@ -30,8 +30,9 @@ const POINTS: u64 = 1 << 16;
 pub fn read(source: &Source) -> Result<Mesh> {
     // The crate asserts and clamps by numbers of the file, which may panic.
     let cloud = isolated(source, "scans", || {
-        let unreadable =
-            |error: ::e57::Error| source.error("file", format!("is no E57 file that can be read: {error}"));
+        let unreadable = |error: ::e57::Error| {
+            source.error("file", format!("is no E57 file that can be read: {error}"))
+        };
         let xml = E57Reader::raw_xml(Cursor::new(source.bytes())).map_err(unreadable)?;
         description::check(source, &xml)?;
         let mut file = E57Reader::new(Cursor::new(source.bytes())).map_err(unreadable)?;
@@ -48,7 +49,8 @@ pub fn read(source: &Source) -> Result<Mesh> {
             check(scan).map_err(|message| wrong(message.into()))?;
             streams::check(source, scan, number, streams::MOST_WAITING)?;
             let start = positions.len();
-            let mut points = file.pointcloud_simple(scan).map_err(|error| wrong(error.to_string()))?;
+            let mut points =
+                file.pointcloud_simple(scan).map_err(|error| wrong(error.to_string()))?;
             points.intensity_to_color(false);
             points.normalize_intensity(false);
             let mut index = 0u64;
@@ -92,7 +94,13 @@ pub fn read(source: &Source) -> Result<Mesh> {
         // Once more sorted by size.
         source.room::<f32>("the intensities", intensities.len())?;
         let colors = if has_colors { colors.into_inner() } else { greys(&intensities) };
-        Ok(Cloud { positions: positions.into_inner(), colors, sensors, z_is_up: true, ..Cloud::default() })
+        Ok(Cloud {
+            positions: positions.into_inner(),
+            colors,
+            sensors,
+            z_is_up: true,
+            ..Cloud::default()
+        })
     })?;
     cloud.into_mesh(source, |point| format!("point {point}"))
 }
@@ -100,7 +108,9 @@ pub fn read(source: &Source) -> Result<Mesh> {
 /// Refuses a scan whose values all take no bits: nothing would end what the crate makes of it.
 fn check(scan: &PointCloud) -> Result<(), &'static str> {
     let takes_bits = scan.prototype.iter().any(|record| match record.data_type {
-        RecordDataType::Integer { min, max } | RecordDataType::ScaledInteger { min, max, .. } => min < max,
+        RecordDataType::Integer { min, max } | RecordDataType::ScaledInteger { min, max, .. } => {
+            min < max
+        }
         _ => true,
     });
     if !takes_bits { Err("has points of no bits") } else { Ok(()) }
@@ -109,7 +119,8 @@ fn check(scan: &PointCloud) -> Result<(), &'static str> {
 /// Where the scanner of a scan stood.
 fn sensor(scan: &PointCloud) -> Option<DVec3> {
     let has = |name: RecordName| scan.prototype.iter().any(|record| record.name == name);
-    let as_scanned = has(RecordName::SphericalRange) || has(RecordName::RowIndex) && has(RecordName::ColumnIndex);
+    let as_scanned = has(RecordName::SphericalRange)
+        || has(RecordName::RowIndex) && has(RecordName::ColumnIndex);
     let place = scan.transform.as_ref().map(|pose| &pose.translation);
     let place = place.map_or(DVec3::ZERO, |place| DVec3::new(place.x, place.y, place.z));
     (place.is_finite() && (place != DVec3::ZERO || as_scanned)).then_some(place)

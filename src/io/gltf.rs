@@ -23,7 +23,8 @@ use std::{collections::HashMap, sync::Arc};
 
 /// Extensions that a file may require: those that are read (`KHR_materials_pbrSpecularGlossiness` among them), and those
 /// that change only the looks of a material in ways that splats do not show.
-const KNOWN: [&str; 4] = ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "KHR_materials_"];
+const KNOWN: [&str; 4] =
+    ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "KHR_materials_"];
 
 /// Reads a glTF or GLB file: the triangles of the default scene in its world frame (or its points, where it has no
 /// triangles), vertex colours, base colours and textures, with opacities as the alpha modes want them. Skins, morph targets
@@ -36,10 +37,14 @@ const KNOWN: [&str; 4] = ["KHR_mesh_quantization", "KHR_texture_transform", "KHR
 pub fn read(source: &Source) -> Result<Mesh> {
     let (text, binary) = buffers::split(source)?;
     // The copy of the text counts as well.
-    source.spend("the size of the scene's tree in bytes", tree_bytes(text).saturating_add(text.len() as u64))?;
-    let text = copy::text(text).map_err(|at| source.error("JSON", format!("byte {at} is not UTF-8 text")))?;
-    let root: json::Root =
-        json::deserialize::from_str(&text).map_err(|error| source.error("JSON", error.to_string()))?;
+    source.spend(
+        "the size of the scene's tree in bytes",
+        tree_bytes(text).saturating_add(text.len() as u64),
+    )?;
+    let text = copy::text(text)
+        .map_err(|at| source.error("JSON", format!("byte {at} is not UTF-8 text")))?;
+    let root: json::Root = json::deserialize::from_str(&text)
+        .map_err(|error| source.error("JSON", error.to_string()))?;
     for extension in &root.extensions_required {
         if !KNOWN.iter().any(|known| extension.starts_with(known)) {
             return Err(source
@@ -106,14 +111,24 @@ impl Builder<'_> {
         let of_primitive = |primitive: &json::mesh::Primitive| {
             let position = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
             let vertices = position.map_or(0, |accessor| self.buffers.claimed(accessor.value()));
-            let corners = primitive.indices.map_or(vertices, |accessor| self.buffers.claimed(accessor.value()));
+            let corners = primitive
+                .indices
+                .map_or(vertices, |accessor| self.buffers.claimed(accessor.value()));
             // A corner of a strip or fan makes a triangle.
-            let triangles = if primitive.mode == Checked::Valid(Mode::Triangles) { corners / 3 } else { corners };
+            let triangles = if primitive.mode == Checked::Valid(Mode::Triangles) {
+                corners / 3
+            } else {
+                corners
+            };
             [vertices, corners, triangles]
         };
         let add = |sum: [u64; 3], more: [u64; 3]| [0, 1, 2].map(|i| sum[i].saturating_add(more[i]));
-        let sizes: Vec<[u64; 3]> =
-            self.root.meshes.iter().map(|mesh| mesh.primitives.iter().map(of_primitive).fold([0; 3], add)).collect();
+        let sizes: Vec<[u64; 3]> = self
+            .root
+            .meshes
+            .iter()
+            .map(|mesh| mesh.primitives.iter().map(of_primitive).fold([0; 3], add))
+            .collect();
         let all = meshes.iter().filter_map(|(_, mesh)| sizes.get(*mesh)).copied().fold([0; 3], add);
         let [vertices, corners, triangles] = all;
         self.source.check_points("the number of vertices", vertices)?;
@@ -125,7 +140,10 @@ impl Builder<'_> {
     fn add_mesh(&mut self, transform: DMat4, index: usize) -> Result<()> {
         let root = self.root;
         let Some(mesh) = root.meshes.get(index) else {
-            return Err(self.source.error(format!("mesh {index}"), format!("there are {} meshes", root.meshes.len())));
+            return Err(self.source.error(
+                format!("mesh {index}"),
+                format!("there are {} meshes", root.meshes.len()),
+            ));
         };
         for (number, primitive) in mesh.primitives.iter().enumerate() {
             self.source.check_time()?;
@@ -134,7 +152,12 @@ impl Builder<'_> {
         Ok(())
     }
 
-    fn add_primitive(&mut self, transform: DMat4, primitive: &json::mesh::Primitive, place: &str) -> Result<()> {
+    fn add_primitive(
+        &mut self,
+        transform: DMat4,
+        primitive: &json::mesh::Primitive,
+        place: &str,
+    ) -> Result<()> {
         let Checked::Valid(mode) = primitive.mode else {
             return Err(self.source.error(place, "has an unknown mode"));
         };
@@ -142,15 +165,20 @@ impl Builder<'_> {
             tracing::warn!("{}: {place}: lines are not drawn", self.source.path.display());
             return Ok(());
         }
-        let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(|index| index.value());
+        let attribute = |semantic| {
+            primitive.attributes.get(&Checked::Valid(semantic)).map(|index| index.value())
+        };
         let Some(position) = attribute(Semantic::Positions) else { return Ok(()) };
         let points: Vec<[f32; 3]> = self.buffers.floats(position, place, false)?;
         let base = self.positions.len();
-        let total = self.source.check_points("the number of vertices", (base + points.len()) as u64)?;
+        let total =
+            self.source.check_points("the number of vertices", (base + points.len()) as u64)?;
         if u32::try_from(total).is_err() {
             return Err(self.source.error(place, "more vertices than 32-bit indices can name"));
         }
-        self.positions.extend(points.iter().map(|p| transform.transform_point3(Vec3::from_array(*p).as_dvec3())));
+        self.positions.extend(
+            points.iter().map(|p| transform.transform_point3(Vec3::from_array(*p).as_dvec3())),
+        );
         let count = points.len();
         drop(points);
         let material = primitive.material.map(|index| index.value());
@@ -171,7 +199,9 @@ impl Builder<'_> {
             let [x, y, z] = DMat3::from_mat4(transform).to_cols_array_2d().map(DVec3::from_array);
             let sign = if mirrors { -1.0 } else { 1.0 };
             let turn = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign;
-            let turned = normals.iter().map(|n| positions::unit((turn * Vec3::from_array(*n).as_dvec3()).as_vec3()));
+            let turned = normals
+                .iter()
+                .map(|n| positions::unit((turn * Vec3::from_array(*n).as_dvec3()).as_vec3()));
             self.mesh.normals.resize(base, Vec3::ZERO);
             self.mesh.normals.extend(turned);
         }
@@ -185,7 +215,10 @@ impl Builder<'_> {
             }));
         }
         if let Some(info) = base_color.texture {
-            let shift = info.extensions.as_ref().and_then(|extensions| extensions.texture_transform.as_ref());
+            let shift = info
+                .extensions
+                .as_ref()
+                .and_then(|extensions| extensions.texture_transform.as_ref());
             let set = shift.and_then(|shift| shift.tex_coord).unwrap_or(info.tex_coord);
             if let Some(accessor) = attribute(Semantic::TexCoords(set)) {
                 let mut uvs: Vec<[f32; 2]> = self.buffers.floats(accessor, place, false)?;
@@ -216,7 +249,8 @@ impl Builder<'_> {
                 let [a, b, c] = [a, b, c].map(|corner| corner + base as u32);
                 mesh.triangles.push(if mirrors { [a, c, b] } else { [a, b, c] });
             });
-            self.source.check_points("the number of triangles", self.mesh.triangles.len() as u64)?;
+            self.source
+                .check_points("the number of triangles", self.mesh.triangles.len() as u64)?;
             self.mesh.triangle_materials.resize(self.mesh.triangles.len(), material);
         }
         Ok(())
@@ -228,8 +262,12 @@ impl Builder<'_> {
             return Err(self.source.error("scene", "holds no meshes with positions"));
         }
         let positions = &self.positions;
-        (self.mesh.origin, self.mesh.positions) =
-            positions::settle(self.source, count, |i| positions[i], |i| format!("vertex {i} of the scene"))?;
+        (self.mesh.origin, self.mesh.positions) = positions::settle(
+            self.source,
+            count,
+            |i| positions[i],
+            |i| format!("vertex {i} of the scene"),
+        )?;
         if !self.mesh.normals.is_empty() {
             self.mesh.normals.resize(count, Vec3::ZERO);
         }
@@ -245,7 +283,8 @@ impl Builder<'_> {
 
 /// A colour as displayed (sRGB) from linear light; the opacity is unchanged.
 fn displayed([r, g, b, a]: [f32; 4]) -> [f32; 4] {
-    let encode = |v: f32| if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+    let encode =
+        |v: f32| if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
     [encode(r), encode(g), encode(b), a].map(|v| if v.is_nan() { 1.0 } else { v.clamp(0.0, 1.0) })
 }
 

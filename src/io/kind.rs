@@ -51,16 +51,29 @@ impl Kind {
         let extension = source.path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         let start = &source.bytes()[..source.bytes().len().min(1024)];
         let has = |word: &[u8]| start.windows(word.len()).any(|w| w == word);
-        let of_ply = || Ok(Some(if with_scalar && !ply::has_faces(source)? { Self::Samples } else { Self::Mesh }));
-        let of_vtk = || Ok(Some(if vtk::holds_volume(source)? { Self::Volume } else { Self::Samples }));
+        let of_ply = || {
+            Ok(Some(if with_scalar && !ply::has_faces(source)? {
+                Self::Samples
+            } else {
+                Self::Mesh
+            }))
+        };
+        let of_vtk =
+            || Ok(Some(if vtk::holds_volume(source)? { Self::Volume } else { Self::Samples }));
         match extension.as_deref() {
             Some("ply") => return of_ply(),
             Some("vtk") => return of_vtk(),
             Some("splk") => return Ok(Some(Self::Hierarchy)),
             Some("splv") => return Ok(Some(Self::Bricks)),
-            Some("obj" | "gltf" | "glb" | "stl" | "las" | "laz" | "e57" | "pcd") => return Ok(Some(Self::Mesh)),
-            Some("xyz" | "pts" | "asc") => return Ok(Some(if with_scalar { Self::Samples } else { Self::Mesh })),
-            Some("csv" | "txt") if !with_scalar && xyz::is_cloud(source) => return Ok(Some(Self::Mesh)),
+            Some("obj" | "gltf" | "glb" | "stl" | "las" | "laz" | "e57" | "pcd") => {
+                return Ok(Some(Self::Mesh));
+            }
+            Some("xyz" | "pts" | "asc") => {
+                return Ok(Some(if with_scalar { Self::Samples } else { Self::Mesh }));
+            }
+            Some("csv" | "txt") if !with_scalar && xyz::is_cloud(source) => {
+                return Ok(Some(Self::Mesh));
+            }
             Some("vti" | "vtr" | "nrrd" | "nhdr") => return Ok(Some(Self::Volume)),
             Some("vtu" | "vtp" | "csv" | "txt" | "xyzv" | "npy") => return Ok(Some(Self::Samples)),
             _ => {}
@@ -79,12 +92,19 @@ impl Kind {
             return of_vtk();
         }
         Ok(if has(b"<VTKFile") {
-            Some(if has(b"UnstructuredGrid") || has(b"PolyData") { Self::Samples } else { Self::Volume })
+            Some(if has(b"UnstructuredGrid") || has(b"PolyData") {
+                Self::Samples
+            } else {
+                Self::Volume
+            })
         } else if start.starts_with(b"NRRD") {
             Some(Self::Volume)
         } else if start.starts_with(b"\x93NUMPY") {
             Some(Self::Samples)
-        } else if text.starts_with(b"glTF") || text.starts_with(b"{") || MESHES.iter().any(|m| start.starts_with(m)) {
+        } else if text.starts_with(b"glTF")
+            || text.starts_with(b"{")
+            || MESHES.iter().any(|m| start.starts_with(m))
+        {
             Some(Self::Mesh)
         } else {
             None

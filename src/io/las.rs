@@ -28,7 +28,8 @@ use rayon::prelude::*;
 /// [`Error::Limit`](crate::Error::Limit) for more points than the limits allow.
 pub fn read(source: &Source) -> Result<Mesh> {
     let header = Header::read(source)?;
-    let points = if header.packed { packed::read(source, &header)? } else { plain(source, &header)? };
+    let points =
+        if header.packed { packed::read(source, &header)? } else { plain(source, &header)? };
     let left_out = header.points - points.len();
     if left_out > 0 {
         tracing::info!(points = left_out, "withheld points are left out");
@@ -37,10 +38,12 @@ pub fn read(source: &Source) -> Result<Mesh> {
     let positions = points.par_iter().map(|point| header.position(point)).collect();
     let mut cloud = Cloud { positions, z_is_up: true, ..Cloud::default() };
     if header.color_at.is_some() {
-        cloud.colors = colors_of_16_bits(&points.par_iter().map(|p| p.color).collect::<Vec<[u16; 3]>>());
+        cloud.colors =
+            colors_of_16_bits(&points.par_iter().map(|p| p.color).collect::<Vec<[u16; 3]>>());
     }
     if cloud.colors.is_empty() {
-        cloud.colors = greys(&points.par_iter().map(|p| f32::from(p.intensity)).collect::<Vec<f32>>());
+        cloud.colors =
+            greys(&points.par_iter().map(|p| f32::from(p.intensity)).collect::<Vec<f32>>());
     }
     cloud.into_mesh(source, |point| format!("point {point}"))
 }
@@ -116,7 +119,9 @@ impl Header {
         let (scale, offset): (DVec3, DVec3) = (three(131)?, three(155)?);
         let [major, minor] = field.at(24).map_err(wrong)?;
         if major != 1 {
-            return Err(wrong(format!("is of version {major}.{minor}, but only 1.0 to 1.4 are known")));
+            return Err(wrong(format!(
+                "is of version {major}.{minor}, but only 1.0 to 1.4 are known"
+            )));
         }
         // Version 1.4 has room for more points; what is older is still filled in where it suffices.
         if minor >= 4 && header_size >= 255 {
@@ -126,16 +131,21 @@ impl Header {
         let packed = format & 0xc0 != 0;
         let format = format & 0x3f;
         let Some(&least) = SIZES.get(usize::from(format)) else {
-            return Err(wrong(format!("has points of format {format}, but only 0 to 10 are known")));
+            return Err(wrong(format!(
+                "has points of format {format}, but only 0 to 10 are known"
+            )));
         };
         if size < least {
-            return Err(wrong(format!("has points of {size} bytes, but those of format {format} need {least}")));
+            return Err(wrong(format!(
+                "has points of {size} bytes, but those of format {format} need {least}"
+            )));
         }
         if !scale.is_finite() || !offset.is_finite() || scale.min_element() <= 0.0 {
             return Err(wrong(format!("has the scale {scale} and the offset {offset}")));
         }
         if start < header_size || start > bytes.len() {
-            let message = format!("puts the points at byte {start}, but the file has {}", bytes.len());
+            let message =
+                format!("puts the points at byte {start}, but the file has {}", bytes.len());
             return Err(wrong(message));
         }
         Ok(Self {
@@ -159,7 +169,8 @@ impl Header {
     /// A point from its bytes; none where it is withheld.
     fn point(&self, record: &[u8]) -> Option<Point> {
         let short = |at: usize| u16::from_le_bytes([record[at], record[at + 1]]);
-        let position = [0, 4, 8].map(|at| i32::from_le_bytes([0, 1, 2, 3].map(|byte| record[at + byte])));
+        let position =
+            [0, 4, 8].map(|at| i32::from_le_bytes([0, 1, 2, 3].map(|byte| record[at + byte])));
         let withheld = if self.format < 6 { record[15] & 0x80 } else { record[15] & 0x04 };
         (withheld == 0).then(|| Point {
             position,
@@ -182,6 +193,8 @@ struct Fields<'a> {
 impl Fields<'_> {
     fn at<const N: usize>(&self, at: usize) -> Result<[u8; N], String> {
         let found = self.bytes.get(at..).and_then(|rest| rest.first_chunk()).copied();
-        found.ok_or_else(|| format!("{} reaches to byte {}, but there are {}", self.place, at + N, self.bytes.len()))
+        found.ok_or_else(|| {
+            format!("{} reaches to byte {}, but there are {}", self.place, at + N, self.bytes.len())
+        })
     }
 }

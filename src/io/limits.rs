@@ -45,7 +45,13 @@ impl Limits {
 
     /// For what was never a file.
     pub(crate) fn none() -> Self {
-        Self { points: u64::MAX, bytes: u64::MAX, depth: usize::MAX, texels: u64::MAX, seconds: u64::MAX }
+        Self {
+            points: u64::MAX,
+            bytes: u64::MAX,
+            depth: usize::MAX,
+            texels: u64::MAX,
+            seconds: u64::MAX,
+        }
     }
 
     /// One of the limits.
@@ -60,7 +66,13 @@ impl Limits {
     }
 
     /// Refuses what is over one of the limits; `what` names it in the error.
-    pub(crate) fn check(&self, kind: LimitKind, file: &Path, what: impl Into<String>, found: u64) -> Result<()> {
+    pub(crate) fn check(
+        &self,
+        kind: LimitKind,
+        file: &Path,
+        what: impl Into<String>,
+        found: u64,
+    ) -> Result<()> {
         let limit = self.of(kind);
         if found <= limit {
             return Ok(());

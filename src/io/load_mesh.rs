@@ -24,7 +24,8 @@ pub fn read_mesh(source: &Source) -> Result<Mesh> {
 
 /// As [`read_mesh`], whatever becomes of the file meanwhile.
 pub(super) fn read(source: &Source) -> Result<Mesh> {
-    let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    let extension =
+        source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let start = source.bytes().trim_ascii_start();
     match extension.as_str() {
         "ply" => ply::read(source),

@@ -24,7 +24,8 @@ pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
 
 /// As [`read_samples`], whatever becomes of the file meanwhile.
 pub(super) fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
-    let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    let extension =
+        source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let start = &source.bytes()[..source.bytes().len().min(1024)];
     match extension.as_str() {
         "ply" => ply::read_samples(source, scalar),

@@ -107,6 +107,9 @@ fn volume_of(source: &Source, raw: Option<&RawLayout>) -> Result<Volume> {
 
 /// The error of texture coordinates that are not finite in 32 bits.
 fn uv_error(source: &Source, place: impl Into<String>, uv: glam::Vec2) -> crate::Error {
-    let message = format!("the texture coordinates {uv} are not finite; numbers up to 3e38 are expected");
-    source.error(place, message).hint("write the file again with finite texture coordinates, or without its pictures")
+    let message =
+        format!("the texture coordinates {uv} are not finite; numbers up to 3e38 are expected");
+    source
+        .error(place, message)
+        .hint("write the file again with finite texture coordinates, or without its pictures")
 }

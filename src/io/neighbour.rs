@@ -12,19 +12,27 @@ impl Source<'_> {
     pub fn neighbour(&self, place: &str, reference: &str) -> Result<PathBuf> {
         let refuse = |reason: &str| {
             let shown: String = reference.chars().take(80).collect();
-            self.error(place, format!("refers to “{shown}”, {reason}"))
-                .hint("put the file beside the one that names it and refer to it by a relative path")
+            self.error(place, format!("refers to “{shown}”, {reason}")).hint(
+                "put the file beside the one that names it and refer to it by a relative path",
+            )
         };
         if let Some(reason) = refusal(reference) {
             return Err(refuse(reason));
         }
         if self.is_in_memory() {
-            let message = format!("refers to “{reference}”, but was read from memory, where there are no other files");
-            return Err(self.error(place, message).hint("open the file by its path, beside those that it refers to"));
+            let message = format!(
+                "refers to “{reference}”, but was read from memory, where there are no other files"
+            );
+            return Err(self
+                .error(place, message)
+                .hint("open the file by its path, beside those that it refers to"));
         }
-        let folder = self.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder =
+            self.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let target = folder.join(reference);
-        let real = target.canonicalize().map_err(|e| self.error(place, format!("refers to “{reference}”: {e}")))?;
+        let real = target
+            .canonicalize()
+            .map_err(|e| self.error(place, format!("refers to “{reference}”: {e}")))?;
         let home = folder.canonicalize().map_err(|e| Error::file(folder, "resolve", e))?;
         if !real.starts_with(&home) {
             return Err(refuse("a link that leaves the file's own folder"));
@@ -83,7 +91,9 @@ mod tests {
         folder.write("outside.bin", "bytes");
         let limits = Limits::default();
         let source = Source::open(&path, &limits).unwrap();
-        for name in ["b.bin", "./b.bin", "below/c.bin", "below/./c.bin", "two words.bin", "x..y.bin"] {
+        for name in
+            ["b.bin", "./b.bin", "below/c.bin", "below/./c.bin", "two words.bin", "x..y.bin"]
+        {
             assert!(source.neighbour("buffer 0", name).is_ok(), "{name}");
         }
         let outside = folder.path().join("outside.bin");
@@ -150,7 +160,11 @@ mod tests {
         }
         // What waits for another process, or has no end, is not opened.
         let pipe = inside.join("pipe.bin");
-        if std::process::Command::new("mkfifo").arg(&pipe).status().is_ok_and(|status| status.success()) {
+        if std::process::Command::new("mkfifo")
+            .arg(&pipe)
+            .status()
+            .is_ok_and(|status| status.success())
+        {
             let message = source.neighbour("buffer 0", "pipe.bin").unwrap_err().to_string();
             assert!(message.contains("not a regular file"), "{message}");
             assert!(Source::open(&pipe, &limits).is_err());

@@ -15,8 +15,9 @@ use glam::DVec3;
 /// that are not finite, with the row; [`Error::Limit`](crate::Error::Limit) for more rows than points are allowed.
 pub fn read(source: &Source) -> Result<Points> {
     let bytes = source.bytes();
-    let (header, start) = header(bytes)
-        .ok_or_else(|| source.error("header", "is cut off, is longer than 1 MiB, or is none of NumPy's"))?;
+    let (header, start) = header(bytes).ok_or_else(|| {
+        source.error("header", "is cut off, is longer than 1 MiB, or is none of NumPy's")
+    })?;
     let wrong = |message: String| source.error("header", message);
     let field = |name: &str| field(&header, name).ok_or_else(|| wrong(format!("has no “{name}”")));
     let descr = field("descr")?;
@@ -25,7 +26,9 @@ pub fn read(source: &Source) -> Result<Points> {
         "'>f4'" => (SampleType::F32, Endian::Big),
         "'<f8'" => (SampleType::F64, Endian::Little),
         "'>f8'" => (SampleType::F64, Endian::Big),
-        other => return Err(wrong(format!("has the type {other}, but samples are floats, f4 or f8"))),
+        other => {
+            return Err(wrong(format!("has the type {other}, but samples are floats, f4 or f8")));
+        }
     };
     if field("fortran_order")? != "False" {
         return Err(wrong("is in Fortran's order".into()).hint("write the array in C's order"));
@@ -36,7 +39,9 @@ pub fn read(source: &Source) -> Result<Points> {
         inside.split(',').map(|size| size.trim().parse().ok()).collect()
     };
     let (rows, width) = match sizes().as_deref() {
-        Some(&[rows, width @ (4 | 5 | 10)]) => (source.check_points("the number of rows", rows)?, width as usize),
+        Some(&[rows, width @ (4 | 5 | 10)]) => {
+            (source.check_points("the number of rows", rows)?, width as usize)
+        }
         _ => {
             return Err(wrong(format!("has the shape {shape}"))
                 .hint("a sample is a row of x, y, z, value and then nothing, a radius, or xx, xy, xz, yy, yz, zz"));
@@ -45,7 +50,8 @@ pub fn read(source: &Source) -> Result<Points> {
     let size = kind.bytes_of([rows, width, 1]).unwrap_or(u64::MAX);
     let data = &bytes[start..];
     if data.len() as u64 != size {
-        return Err(source.error("data", format!("there are {} bytes where {size} were expected", data.len())));
+        return Err(source
+            .error("data", format!("there are {} bytes where {size} were expected", data.len())));
     }
     source.room::<f64>("the numbers", rows.saturating_mul(width))?;
     source.spend("the size of the samples in bytes", Columns::ROW * rows as u64)?;
@@ -53,14 +59,24 @@ pub fn read(source: &Source) -> Result<Points> {
     let row = |row: usize| &numbers[row * width..][..width];
     let columns = Columns {
         values: (0..rows).map(|index| row(index)[3]).collect(),
-        radii: if width == 5 { (0..rows).map(|index| row(index)[4] as f32).collect() } else { Vec::new() },
+        radii: if width == 5 {
+            (0..rows).map(|index| row(index)[4] as f32).collect()
+        } else {
+            Vec::new()
+        },
         covariances: if width == 10 {
             (0..rows).map(|index| std::array::from_fn(|term| row(index)[4 + term] as f32)).collect()
         } else {
             Vec::new()
         },
     };
-    gather(source, rows, |index| DVec3::from_slice(row(index)), |index| format!("row {index}"), columns)
+    gather(
+        source,
+        rows,
+        |index| DVec3::from_slice(row(index)),
+        |index| format!("row {index}"),
+        columns,
+    )
 }
 
 /// The header's text, and where the data begin.
@@ -78,7 +94,10 @@ fn header(bytes: &[u8]) -> Option<(String, usize)> {
 
 /// What stands behind a name in the header, a Python dictionary: up to the comma outside brackets.
 fn field<'a>(header: &'a str, name: &str) -> Option<&'a str> {
-    let rest = header.split_once(&format!("'{name}':")).or_else(|| header.split_once(&format!("\"{name}\":")))?.1;
+    let rest = header
+        .split_once(&format!("'{name}':"))
+        .or_else(|| header.split_once(&format!("\"{name}\":")))?
+        .1;
     let mut depth = 0;
     let end = rest.find(|c| {
         match c {
@@ -98,7 +117,8 @@ mod tests {
     use glam::Vec3;
 
     fn file(version: u8, descr: &str, order: &str, shape: &str, data: &[u8]) -> Vec<u8> {
-        let text = format!("{{'descr': {descr}, 'fortran_order': {order}, 'shape': {shape}, }}    \n");
+        let text =
+            format!("{{'descr': {descr}, 'fortran_order': {order}, 'shape': {shape}, }}    \n");
         let mut file = b"\x93NUMPY".to_vec();
         file.extend([version, 0]);
         match version {
@@ -118,18 +138,24 @@ mod tests {
     #[test]
     fn types_versions_and_shapes() {
         for (width, version) in [(4, 1), (5, 2), (10, 3)] {
-            let rows: [[f64; 10]; 2] =
-                [[1., 2., 3., -0.5, 4., 1., 0., 2., 0., 1.], [5., 6., 7., 8., 2., 0., 0., 2., 0., 2.]];
+            let rows: [[f64; 10]; 2] = [
+                [1., 2., 3., -0.5, 4., 1., 0., 2., 0., 1.],
+                [5., 6., 7., 8., 2., 0., 0., 2., 0., 2.],
+            ];
             let numbers: Vec<f64> = rows.iter().flat_map(|row| row[..width].to_vec()).collect();
-            let wide = |to: fn(f64) -> [u8; 8]| numbers.iter().flat_map(|&v| to(v)).collect::<Vec<u8>>();
-            let narrow = |to: fn(f32) -> [u8; 4]| numbers.iter().flat_map(|&v| to(v as f32)).collect::<Vec<u8>>();
+            let wide =
+                |to: fn(f64) -> [u8; 8]| numbers.iter().flat_map(|&v| to(v)).collect::<Vec<u8>>();
+            let narrow = |to: fn(f32) -> [u8; 4]| {
+                numbers.iter().flat_map(|&v| to(v as f32)).collect::<Vec<u8>>()
+            };
             for (descr, data) in [
                 ("'<f8'", wide(f64::to_le_bytes)),
                 ("'>f8'", wide(f64::to_be_bytes)),
                 ("'<f4'", narrow(f32::to_le_bytes)),
                 ("'>f4'", narrow(f32::to_be_bytes)),
             ] {
-                let points = load(&file(version, descr, "False", &format!("(2, {width})"), &data)).unwrap();
+                let points =
+                    load(&file(version, descr, "False", &format!("(2, {width})"), &data)).unwrap();
                 assert_eq!(points.positions, [Vec3::new(1.0, 2.0, 3.0), Vec3::new(5.0, 6.0, 7.0)]);
                 assert_eq!(points.values, [-0.5, 8.0]);
                 assert_eq!(points.radii, if width == 5 { vec![4.0, 2.0] } else { vec![] });
@@ -154,7 +180,10 @@ mod tests {
             (file(1, "'<f4'", "False", "(2, 4)", &data), "16 bytes where 32"),
             (file(1, "'<f4'", "False", "(0, 4)", &[]), "no samples"),
             (file(4, "'<f4'", "False", "(1, 4)", &data), "none of NumPy's"),
-            (file(1, "'<f4'", "False", "(1, 4)", &[0, 0, 192, 127].repeat(4)), "row 0: the value NaN"),
+            (
+                file(1, "'<f4'", "False", "(1, 4)", &[0, 0, 192, 127].repeat(4)),
+                "row 0: the value NaN",
+            ),
         ] {
             let message = load(&content).unwrap_err().to_string();
             assert!(message.contains(word), "{message}");

@@ -40,14 +40,22 @@ pub fn read(source: &Source) -> Result<Volume> {
     let rest = &source.bytes()[body..];
     let claimed = kind.bytes_of(dims).unwrap_or(u64::MAX);
     // No limit helps where raw samples are missing, so that is told first.
-    if header.data_file().is_none() && !header.has_skips() && header.is_raw()? && (rest.len() as u64) < claimed {
-        return Err(source.error("data", format!("there are {} bytes where {claimed} were expected", rest.len())));
+    if header.data_file().is_none()
+        && !header.has_skips()
+        && header.is_raw()?
+        && (rest.len() as u64) < claimed
+    {
+        return Err(source.error(
+            "data",
+            format!("there are {} bytes where {claimed} were expected", rest.len()),
+        ));
     }
     let size = source.check_bytes("the size of the samples in bytes", claimed)?;
     source.spend("the size of the samples in bytes", kind.decoded_bytes(size))?;
     let Some(field) = header.data_file() else {
         let (bytes, endian) = header.bytes(source, rest, kind, size)?;
-        return Volume::new(lattice, kind.decode(bytes, endian)).map_err(|message| source.error("samples", message));
+        return Volume::new(lattice, kind.decode(bytes, endian))
+            .map_err(|message| source.error("samples", message));
     };
     let names = files::names(source, field, rest, dims)?;
     let part = size / names.len();
@@ -55,7 +63,8 @@ pub fn read(source: &Source) -> Result<Volume> {
         let path = source.neighbour("data file", name)?;
         let data = source.open_beside(&path)?;
         let volume = header.bytes(&data, data.bytes(), kind, size).and_then(|(bytes, endian)| {
-            Volume::new(lattice, kind.decode(bytes, endian)).map_err(|message| data.error("samples", message))
+            Volume::new(lattice, kind.decode(bytes, endian))
+                .map_err(|message| data.error("samples", message))
         });
         return data.unless_changed(volume);
     }
@@ -70,7 +79,8 @@ pub fn read(source: &Source) -> Result<Volume> {
         order = endian;
         data.intact()?;
     }
-    Volume::new(lattice, kind.decode(all.into(), order)).map_err(|message| source.error("samples", message))
+    Volume::new(lattice, kind.decode(all.into(), order))
+        .map_err(|message| source.error("samples", message))
 }
 
 /// Where the samples of a file of raw encoding stand; `None` for other encodings, and where something is to be skipped or
@@ -139,7 +149,10 @@ impl<'a> Header<'a> {
             at += line.len();
             if at > LONGEST {
                 return Err(source
-                    .error(format!("line {}", number + 1), format!("the header is longer than {LONGEST} bytes"))
+                    .error(
+                        format!("line {}", number + 1),
+                        format!("the header is longer than {LONGEST} bytes"),
+                    )
                     .hint("an empty line must stand between the header and the data"));
             }
             // Comments may be in any encoding.
@@ -155,8 +168,11 @@ impl<'a> Header<'a> {
                 Some((key, value)) if value.starts_with('=') => {
                     let key = key.trim();
                     let is_read = key == "lattice" || key.starts_with("axis positions ");
-                    if keys.insert(key.to_owned(), value[1..].trim().to_owned()).is_some() && is_read {
-                        let message = format!("the key “{}” is given twice; it must stand once", shown(key));
+                    if keys.insert(key.to_owned(), value[1..].trim().to_owned()).is_some()
+                        && is_read
+                    {
+                        let message =
+                            format!("the key “{}” is given twice; it must stand once", shown(key));
                         return Err(source.error(format!("line {}", number + 1), message));
                     }
                 }
@@ -200,7 +216,8 @@ impl<'a> Header<'a> {
     }
 
     fn need(&self, name: &str) -> Result<&str> {
-        self.get(&[name]).ok_or_else(|| self.source.error("header", format!("has no field “{name}”")))
+        self.get(&[name])
+            .ok_or_else(|| self.source.error("header", format!("has no field “{name}”")))
     }
 
     /// Whether the samples stand as they are.
@@ -214,10 +231,15 @@ impl<'a> Header<'a> {
     }
 
     /// The numbers of a field, exactly `N`.
-    fn numbers<const N: usize, T: std::str::FromStr>(&self, name: &str, text: &str) -> Result<[T; N]> {
+    fn numbers<const N: usize, T: std::str::FromStr>(
+        &self,
+        name: &str,
+        text: &str,
+    ) -> Result<[T; N]> {
         let words = text.split_ascii_whitespace().take(N + 1);
         let numbers: Option<Vec<T>> = words.map(|word| word.parse().ok()).collect();
-        let wrong = |_| self.source.error(name, format!("“{}” is not a list of {N} numbers", shown(text)));
+        let wrong =
+            |_| self.source.error(name, format!("“{}” is not a list of {N} numbers", shown(text)));
         numbers.unwrap_or_default().try_into().map_err(wrong)
     }
 
@@ -230,11 +252,16 @@ impl<'a> Header<'a> {
             ));
         }
         // An axis of colours or vectors is none of space.
-        let several = ["color", "vector", "normal", "gradient", "matrix", "quaternion", "complex", "point"];
+        let several =
+            ["color", "vector", "normal", "gradient", "matrix", "quaternion", "complex", "point"];
         let kinds = self.get(&["kinds"]).unwrap_or_default().to_ascii_lowercase();
-        if let Some(kind) = kinds.split_ascii_whitespace().find(|kind| several.iter().any(|name| kind.contains(name))) {
-            let message =
-                format!("one axis holds values of the kind “{kind}”, but a volume has one scalar for each sample");
+        if let Some(kind) = kinds
+            .split_ascii_whitespace()
+            .find(|kind| several.iter().any(|name| kind.contains(name)))
+        {
+            let message = format!(
+                "one axis holds values of the kind “{kind}”, but a volume has one scalar for each sample"
+            );
             return Err(self
                 .source
                 .error("kinds", message)
@@ -262,11 +289,15 @@ impl<'a> Header<'a> {
         let lattice = match self.keys.get("lattice").map(String::as_str) {
             None => Lattice { dims, origin, axes, arrangement: self.arrangement()? },
             // Two layers make an edge.
-            Some("bcc") => {
-                Lattice::body_centred(dims, origin, DMat3::from_cols(axes.x_axis, axes.y_axis, 2.0 * axes.z_axis))
-            }
+            Some("bcc") => Lattice::body_centred(
+                dims,
+                origin,
+                DMat3::from_cols(axes.x_axis, axes.y_axis, 2.0 * axes.z_axis),
+            ),
             Some(other) => {
-                let error = self.source.error("lattice", format!("“{other}” is not a lattice that is known"));
+                let error = self
+                    .source
+                    .error("lattice", format!("“{other}” is not a lattice that is known"));
                 return Err(
                     error.hint("lattice:=bcc marks body-centred cubic lattices; Cartesian ones have no such key")
                 );
@@ -284,11 +315,14 @@ impl<'a> Header<'a> {
             None => Ok([f64::NAN; 3]),
         };
         let spacings = numbers(&["spacings"])?;
-        let (mins, maxs) = (numbers(&["axis mins", "axismins"])?, numbers(&["axis maxs", "axismaxs"])?);
+        let (mins, maxs) =
+            (numbers(&["axis mins", "axismins"])?, numbers(&["axis maxs", "axismaxs"])?);
         // Samples stand in the middle of cells where nothing tells that they are nodes.
         let centers = self.get(&["centers", "centerings"]).unwrap_or_default();
-        let is_node: Vec<bool> =
-            centers.split_ascii_whitespace().map(|word| word.eq_ignore_ascii_case("node")).collect();
+        let is_node: Vec<bool> = centers
+            .split_ascii_whitespace()
+            .map(|word| word.eq_ignore_ascii_case("node"))
+            .collect();
         Ok(std::array::from_fn(|axis| {
             let is_node = is_node.get(axis).copied().unwrap_or(false);
             let steps = dims[axis].saturating_sub(usize::from(is_node)).max(1) as f64;
@@ -307,11 +341,16 @@ impl<'a> Header<'a> {
         }
         let mut places = [const { Vec::new() }; 3];
         for (places, key) in places.iter_mut().zip(&keys) {
-            let text = self.keys.get(key).ok_or_else(|| self.source.error("header", format!("has no key “{key}”")))?;
+            let text = self
+                .keys
+                .get(key)
+                .ok_or_else(|| self.source.error("header", format!("has no key “{key}”")))?;
             let wrong = || self.source.error(key, "is not a list of numbers");
             self.source.room::<[f64; 2]>("the positions along an axis", text.len() / 2)?;
-            *places =
-                text.split_ascii_whitespace().map(|word| word.parse().map_err(|_| wrong())).collect::<Result<_>>()?;
+            *places = text
+                .split_ascii_whitespace()
+                .map(|word| word.parse().map_err(|_| wrong()))
+                .collect::<Result<_>>()?;
         }
         Ok(Arrangement::Rectilinear(Arc::new(places)))
     }
@@ -320,8 +359,13 @@ impl<'a> Header<'a> {
     fn vectors<const N: usize>(&self, name: &str, text: &str) -> Result<[DVec3; N]> {
         let wrong = || self.source.error(name, format!("“{}” is not {N} × (x,y,z)", shown(text)));
         let vector = |part: &str| {
-            let numbers: Option<Vec<f64>> =
-                part.trim().strip_prefix('(')?.split(',').take(4).map(|word| word.trim().parse().ok()).collect();
+            let numbers: Option<Vec<f64>> = part
+                .trim()
+                .strip_prefix('(')?
+                .split(',')
+                .take(4)
+                .map(|word| word.trim().parse().ok())
+                .collect();
             <[f64; 3]>::try_from(numbers?).ok().map(DVec3::from_array)
         };
         let (inside, rest) = text.rsplit_once(')').ok_or_else(wrong)?;
@@ -335,8 +379,12 @@ impl<'a> Header<'a> {
         Ok(match name.as_str() {
             "signed char" | "int8" | "int8_t" => SampleType::I8,
             "uchar" | "unsigned char" | "uint8" | "uint8_t" => SampleType::U8,
-            "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => SampleType::I16,
-            "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => SampleType::U16,
+            "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => {
+                SampleType::I16
+            }
+            "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => {
+                SampleType::U16
+            }
             "int" | "signed int" | "int32" | "int32_t" => SampleType::I32,
             "uint" | "unsigned int" | "uint32" | "uint32_t" => SampleType::U32,
             "longlong"
@@ -346,10 +394,18 @@ impl<'a> Header<'a> {
             | "signed long long int"
             | "int64"
             | "int64_t" => SampleType::I64,
-            "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => SampleType::U64,
+            "ulonglong"
+            | "unsigned long long"
+            | "unsigned long long int"
+            | "uint64"
+            | "uint64_t" => SampleType::U64,
             "float" => SampleType::F32,
             "double" => SampleType::F64,
-            _ => return Err(self.source.error("type", format!("“{}” is not a type of scalars", shown(&name)))),
+            _ => {
+                return Err(self
+                    .source
+                    .error("type", format!("“{}” is not a type of scalars", shown(&name))));
+            }
         })
     }
 
@@ -358,8 +414,12 @@ impl<'a> Header<'a> {
             Some("little") => Ok(Endian::Little),
             Some("big") => Ok(Endian::Big),
             None if kind.bytes() == 1 => Ok(Endian::Little),
-            None => Err(self.source.error("header", "has no field “endian”, which samples of several bytes need")),
-            Some(other) => Err(self.source.error("endian", format!("“{other}” is neither little nor big"))),
+            None => Err(self
+                .source
+                .error("header", "has no field “endian”, which samples of several bytes need")),
+            Some(other) => {
+                Err(self.source.error("endian", format!("“{other}” is neither little nor big")))
+            }
         }
     }
 
@@ -377,7 +437,11 @@ impl<'a> Header<'a> {
             None => Ok(0),
         };
         let lines = skip(&["line skip", "lineskip"])?;
-        let skipped: usize = data.split_inclusive(|&b| b == b'\n').take(lines.max(0) as usize).map(<[u8]>::len).sum();
+        let skipped: usize = data
+            .split_inclusive(|&b| b == b'\n')
+            .take(lines.max(0) as usize)
+            .map(<[u8]>::len)
+            .sum();
         let data = &data[skipped..];
         let skip = skip(&["byte skip", "byteskip"])?;
         if lines < 0 || skip < -1 {
@@ -386,11 +450,15 @@ impl<'a> Header<'a> {
         let encoding = self.need("encoding")?.to_ascii_lowercase();
         let from_end = skip == -1;
         if from_end && encoding != "raw" {
-            return Err(self.source.error("byte skip", "-1 counts from the end, which only raw data can"));
+            return Err(self
+                .source
+                .error("byte skip", "-1 counts from the end, which only raw data can"));
         }
         let skip = skip.max(0) as usize;
-        let after_skip =
-            || data.get(skip..).ok_or_else(|| file.error(place, format!("end before the {skip} bytes to skip do")));
+        let after_skip = || {
+            data.get(skip..)
+                .ok_or_else(|| file.error(place, format!("end before the {skip} bytes to skip do")))
+        };
         let text = || {
             let bytes = after_skip()?;
             file.room::<u8>("the text", bytes.len())?;
@@ -402,7 +470,8 @@ impl<'a> Header<'a> {
                 if !from_end && self.data_file().is_some() {
                     refuse_more(file.path, data.len().saturating_sub(skip) as u64, size as u64)?;
                 }
-                let found = start.and_then(|start| data.get(start..)).and_then(|rest| rest.get(..size));
+                let found =
+                    start.and_then(|start| data.get(start..)).and_then(|rest| rest.get(..size));
                 let found = found.ok_or_else(|| {
                     let there = data.len().saturating_sub(skip);
                     file.error(place, format!("there are {there} bytes where {size} were expected"))
@@ -411,18 +480,22 @@ impl<'a> Header<'a> {
             }
             // Skipped lines stand before the packed stream, skipped bytes inside it.
             "gzip" | "gz" => {
-                let mut unpacked = file.unpack(place, MultiGzDecoder::new(data), skip.saturating_add(size))?;
+                let mut unpacked =
+                    file.unpack(place, MultiGzDecoder::new(data), skip.saturating_add(size))?;
                 unpacked.drain(..skip);
                 (unpacked.into(), self.endian(kind)?)
             }
             "ascii" | "txt" | "text" => {
                 file.spend("the size of the numbers in bytes", size as u64)?;
-                let bytes = kind.parse(&text()?, size / kind.bytes()).map_err(|message| file.error(place, message))?;
+                let bytes = kind
+                    .parse(&text()?, size / kind.bytes())
+                    .map_err(|message| file.error(place, message))?;
                 (bytes.into(), Endian::Little)
             }
             "hex" => {
                 file.spend("the size of the digits in bytes", data.len() as u64)?;
-                let bytes = from_hex(&text()?, size).map_err(|message| file.error(place, message))?;
+                let bytes =
+                    from_hex(&text()?, size).map_err(|message| file.error(place, message))?;
                 (bytes.into(), self.endian(kind)?)
             }
             _ => {
@@ -437,7 +510,11 @@ impl<'a> Header<'a> {
 
 /// The beginning of a text, for an error.
 fn shown(text: &str) -> String {
-    if text.chars().nth(80).is_none() { text.to_owned() } else { text.chars().take(80).chain(['…']).collect() }
+    if text.chars().nth(80).is_none() {
+        text.to_owned()
+    } else {
+        text.chars().take(80).chain(['…']).collect()
+    }
 }
 
 /// Bytes of two hexadecimal digits each; white space does not count.
@@ -447,7 +524,11 @@ fn from_hex(text: &str, size: usize) -> Result<Vec<u8>, String> {
         digits.push(c.to_digit(16).ok_or_else(|| format!("“{c}” is no hexadecimal digit"))? as u8);
     }
     if digits.len() % 2 != 0 || digits.len() / 2 != size {
-        return Err(format!("there are {} hexadecimal digits where {} were expected", digits.len(), 2 * size as u64));
+        return Err(format!(
+            "there are {} hexadecimal digits where {} were expected",
+            digits.len(),
+            2 * size as u64
+        ));
     }
     Ok(digits.chunks_exact(2).map(|pair| pair[0] << 4 | pair[1]).collect())
 }
@@ -474,7 +555,10 @@ mod tests {
     }
 
     fn bytes_of(endian: Endian) -> Vec<u8> {
-        VALUES.iter().flat_map(|v| if endian == Endian::Little { v.to_le_bytes() } else { v.to_be_bytes() }).collect()
+        VALUES
+            .iter()
+            .flat_map(|v| if endian == Endian::Little { v.to_le_bytes() } else { v.to_be_bytes() })
+            .collect()
     }
 
     #[test]
@@ -493,8 +577,10 @@ mod tests {
                 ("hex", hex.into_bytes()),
             ] {
                 for (header, line_end) in [(0, "\n"), (1, "\r\n")] {
-                    let fields = format!("type: short\nsizes: 3 2 2\nencoding: {encoding}\nendian: {name}");
-                    let text = format!("NRRD000{}\nkey:=value\ndimension: 3\n{fields}\n\n", header + 4);
+                    let fields =
+                        format!("type: short\nsizes: 3 2 2\nencoding: {encoding}\nendian: {name}");
+                    let text =
+                        format!("NRRD000{}\nkey:=value\ndimension: 3\n{fields}\n\n", header + 4);
                     let mut content = text.replace('\n', line_end).into_bytes();
                     content.extend_from_slice(&data);
                     let volume = read_with(&folder.write("volume.nrrd", &content), read).unwrap();
@@ -509,22 +595,41 @@ mod tests {
     fn lattices() {
         let folder = Folder::new();
         let lattice = |fields: &str| {
-            let content = file(&format!("type: uint8\nsizes: 2 1 1\nencoding: raw\n{fields}"), &[1, 2]);
+            let content =
+                file(&format!("type: uint8\nsizes: 2 1 1\nencoding: raw\n{fields}"), &[1, 2]);
             read_with(&folder.write("volume.nrrd", &content), read).map(|volume| volume.lattice)
         };
-        let turned =
-            lattice("space: RAS\nspace directions: (0, 0.5,0) (-2,0,0)(0,0,3)\nspace origin: (10,20,-30.5)").unwrap();
+        let turned = lattice(
+            "space: RAS\nspace directions: (0, 0.5,0) (-2,0,0)(0,0,3)\nspace origin: (10,20,-30.5)",
+        )
+        .unwrap();
         assert_eq!(turned.origin, DVec3::new(10.0, 20.0, -30.5));
         assert_eq!(turned.position(DVec3::new(1.0, 1.0, 1.0)), DVec3::new(8.0, 20.5, -27.5));
         assert_eq!(lattice("spacings: 1 2.5 NaN").unwrap().spacing(), DVec3::new(1.0, 2.5, 1.0));
         for (fields, origin, spacing) in [
-            ("axis mins: 0 1 2\naxis maxs: 4 4 20\ncenters: node node cell", [0.0, 1.0, 11.0], [4.0, 3.0, 18.0]),
+            (
+                "axis mins: 0 1 2\naxis maxs: 4 4 20\ncenters: node node cell",
+                [0.0, 1.0, 11.0],
+                [4.0, 3.0, 18.0],
+            ),
             ("axis mins: 0 NaN 2\naxis maxs: 4 4 nan", [1.0, 0.0, 2.5], [2.0, 1.0, 1.0]),
-            ("axismins: 10 0 0\nspacings: 2 3 4\ncenterings: node node node", [10.0, 0.0, 0.0], [2.0, 3.0, 4.0]),
-            ("kinds: domain space time\nspace origin: (1,2,3)\naxis mins: 9 9 9", [1.0, 2.0, 3.0], [1.0; 3]),
+            (
+                "axismins: 10 0 0\nspacings: 2 3 4\ncenterings: node node node",
+                [10.0, 0.0, 0.0],
+                [2.0, 3.0, 4.0],
+            ),
+            (
+                "kinds: domain space time\nspace origin: (1,2,3)\naxis mins: 9 9 9",
+                [1.0, 2.0, 3.0],
+                [1.0; 3],
+            ),
         ] {
             let found = lattice(fields).unwrap();
-            assert_eq!((found.origin, found.spacing()), (origin.into(), spacing.into()), "{fields}");
+            assert_eq!(
+                (found.origin, found.spacing()),
+                (origin.into(), spacing.into()),
+                "{fields}"
+            );
         }
         let body_centred = lattice("lattice:=bcc\nspacings: 2 2 1").unwrap();
         assert_eq!(
@@ -569,7 +674,11 @@ mod tests {
             "encoding: raw\nline skip: 2\nbyte skip: 1\ndata file: lines.raw",
             "encoding: gzip\nlineskip: 1\nbyteskip: 1\ndata file: packed.raw.gz",
         ] {
-            assert_eq!(detached(fields).unwrap().samples, Samples::U8(vec![1, 2, 3, 4]), "{fields}");
+            assert_eq!(
+                detached(fields).unwrap().samples,
+                Samples::U8(vec![1, 2, 3, 4]),
+                "{fields}"
+            );
         }
         for (fields, word) in [
             ("encoding: raw\ndata file: missing.raw", "missing.raw"),
@@ -578,7 +687,10 @@ mod tests {
             ("encoding: raw\ndata file: slice%03d.raw 1 9 1", "9 files"),
             ("encoding: raw\nbyte skip: 99\ndata file: plain.raw", "0 bytes where 4"),
             ("encoding: raw\nbyte skip: -2\ndata file: plain.raw", "negative"),
-            ("encoding: raw\nbyte skip: 9223372036854775807\ndata file: plain.raw", "0 bytes where 4"),
+            (
+                "encoding: raw\nbyte skip: 9223372036854775807\ndata file: plain.raw",
+                "0 bytes where 4",
+            ),
             ("encoding: gzip\nbyte skip: 9223372036854775807\ndata file: packed.raw.gz", "limit"),
             ("encoding: gzip\nbyte skip: -1\ndata file: packed.raw.gz", "-1"),
             ("encoding: bzip2\ndata file: plain.raw", "bzip2"),
@@ -616,8 +728,10 @@ mod tests {
         let folder = Folder::new();
         let load = |keys: &str| {
             let fields = "space directions: (0,2,0) (1,0,0) (0,0,1)\nspace origin: (10,20,30)";
-            let content =
-                file(&format!("type: uint8\nsizes: 3 2 1\nencoding: raw\n{fields}\n{keys}"), &[0, 1, 2, 3, 4, 5]);
+            let content = file(
+                &format!("type: uint8\nsizes: 3 2 1\nencoding: raw\n{fields}\n{keys}"),
+                &[0, 1, 2, 3, 4, 5],
+            );
             read_with(&folder.write("volume.nrrd", &content), read)
         };
         let keys = "axis positions 0:=0 1 2.5\naxis positions 1:=-1 3\naxis positions 2:=7";
@@ -638,16 +752,23 @@ mod tests {
     fn cuts_and_lies_are_errors() {
         let folder = Folder::new();
         let fields = "type: short\nsizes: 3 2 2\nencoding";
-        for (encoding, data) in [("raw", bytes_of(Endian::Little)), ("gzip", gzip(&bytes_of(Endian::Little)))] {
+        for (encoding, data) in
+            [("raw", bytes_of(Endian::Little)), ("gzip", gzip(&bytes_of(Endian::Little)))]
+        {
             let content = file(&format!("{fields}: {encoding}\nendian: little"), &data);
             every_cut(&folder, "volume.nrrd", &content, read);
         }
-        let error =
-            |fields: &str, data: &[u8]| read_with(&folder.write("volume.nrrd", file(fields, data)), read).unwrap_err();
-        let sizes =
-            |sizes: &str| error(&format!("type: uint8\nsizes: {sizes}\nencoding: gzip"), &gzip(&vec![0; 1 << 20]));
+        let error = |fields: &str, data: &[u8]| {
+            read_with(&folder.write("volume.nrrd", file(fields, data)), read).unwrap_err()
+        };
+        let sizes = |sizes: &str| {
+            error(&format!("type: uint8\nsizes: {sizes}\nencoding: gzip"), &gzip(&vec![0; 1 << 20]))
+        };
         assert!(matches!(sizes("1099511627776 1 1"), Error::Limit { .. }));
-        assert!(matches!(sizes("4294967296 4294967296 2"), Error::Input { .. }), "more than memory indexes");
+        assert!(
+            matches!(sizes("4294967296 4294967296 2"), Error::Input { .. }),
+            "more than memory indexes"
+        );
         assert!(sizes("99999999999999999999 1 1").to_string().contains("sizes"));
         assert!(sizes("2147483648 4 1").to_string().contains("unpacks to 1048576 bytes"));
         assert!(sizes("2 2 2").to_string().contains("more bytes"));
@@ -697,14 +818,19 @@ mod tests {
         let folder = Folder::new();
         folder.write("a.raw", [9, 1, 2]);
         let detached = |fields: &str| {
-            let text = format!("NRRD0001\ntype: uchar\ndimension: 3\nsizes: 2 1 1\nencoding: raw\n{fields}\n");
+            let text = format!(
+                "NRRD0001\ntype: uchar\ndimension: 3\nsizes: 2 1 1\nencoding: raw\n{fields}\n"
+            );
             let path = folder.write("volume.nhdr", text);
             (read_with(&path, read), read_with(&path, plain).map(|found| found.is_some()))
         };
         let (whole, plain) = detached("data file: a.raw");
         for error in [whole.err(), plain.err()] {
             let message = error.unwrap().to_string();
-            assert!(message.ends_with("a.raw: data: there are 3 bytes where 2 were expected"), "{message}");
+            assert!(
+                message.ends_with("a.raw: data: there are 3 bytes where 2 were expected"),
+                "{message}"
+            );
         }
         for skip in ["byte skip: 1", "byte skip: -1"] {
             let (whole, plain) = detached(&format!("{skip}\ndata file: a.raw"));

@@ -36,21 +36,26 @@ pub fn read(source: &Source) -> Result<Mesh> {
     let failure: RefCell<Option<Error>> = RefCell::new(None);
     let mut feed = survey.feed(&text);
     // tobj's triangles are fans, which cover what is outside of a concave polygon.
-    let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
+    let options =
+        tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     let load = |path: &Path| {
         let loaded = library.borrow_mut().load(&path.to_string_lossy());
-        loaded.map(|(materials, index_of)| (materials, index_of.into_iter().collect())).map_err(|error| {
-            failure.borrow_mut().get_or_insert(error);
-            tobj::LoadError::OpenFileFailed
-        })
+        loaded.map(|(materials, index_of)| (materials, index_of.into_iter().collect())).map_err(
+            |error| {
+                failure.borrow_mut().get_or_insert(error);
+                tobj::LoadError::OpenFileFailed
+            },
+        )
     };
     // tobj does arithmetic on what it reads.
-    let loaded = isolated(source, "statements", || Ok(tobj::load_obj_buf(&mut feed, &options, load)))?;
+    let loaded =
+        isolated(source, "statements", || Ok(tobj::load_obj_buf(&mut feed, &options, load)))?;
     let line = feed.line();
     if let Some(error) = failure.into_inner() {
         return Err(error);
     }
-    let (models, materials) = loaded.map_err(|error| source.error(format!("line {line}"), error.to_string()))?;
+    let (models, materials) =
+        loaded.map_err(|error| source.error(format!("line {line}"), error.to_string()))?;
     let mut library = library.into_inner();
     let materials = materials.unwrap_or_default();
     let mut mesh = Mesh::default();
@@ -59,7 +64,8 @@ pub fn read(source: &Source) -> Result<Mesh> {
     for material in &materials {
         mesh.materials.push(library.finish(material)?);
     }
-    let textured: Vec<bool> = mesh.materials.iter().map(|material| material.texture.is_some()).collect();
+    let textured: Vec<bool> =
+        mesh.materials.iter().map(|material| material.texture.is_some()).collect();
     for model in models {
         let id = model.mesh.material_id;
         let with_uv = id.is_some_and(|id| textured.get(id) == Some(&true));
@@ -78,8 +84,12 @@ pub fn read(source: &Source) -> Result<Mesh> {
         return Err(source.error("file", "has faces, but none of three corners or more"));
     }
     let positions = &corners.positions;
-    (mesh.origin, mesh.positions) =
-        positions::settle(source, positions.len(), |i| positions[i], |i| format!("vertex {i} of the faces"))?;
+    (mesh.origin, mesh.positions) = positions::settle(
+        source,
+        positions.len(),
+        |i| positions[i],
+        |i| format!("vertex {i} of the faces"),
+    )?;
     mesh.normals = corners.normals;
     mesh.uvs = corners.uvs;
     mesh.colors = to_bytes(&corners.colors);
@@ -113,9 +123,17 @@ struct Corners {
 
 impl Corners {
     /// Adds a model. `with_uv`: its texture coordinates matter; `any_uv`: those of some model do.
-    fn add(&mut self, source: &Source, text: &str, mut mesh: tobj::Mesh, with_uv: bool, any_uv: bool) -> Result<()> {
+    fn add(
+        &mut self,
+        source: &Source,
+        text: &str,
+        mut mesh: tobj::Mesh,
+        with_uv: bool,
+        any_uv: bool,
+    ) -> Result<()> {
         let mut corners = std::mem::take(&mut mesh.indices);
-        let split = (with_uv && !mesh.texcoord_indices.is_empty()) || !mesh.normal_indices.is_empty();
+        let split =
+            (with_uv && !mesh.texcoord_indices.is_empty()) || !mesh.normal_indices.is_empty();
         if split {
             let first = self.uvs.len();
             self.add_split(&mesh, &mut corners, with_uv, any_uv);
@@ -126,7 +144,10 @@ impl Corners {
             let base = self.positions.len() as u32;
             self.positions.extend(mesh.positions.chunks_exact(3).map(DVec3::from_slice));
             self.colors.extend(mesh.vertex_color.chunks_exact(3).map(|c| [c[0], c[1], c[2]]));
-            self.uvs.extend(std::iter::repeat_n(Vec2::ZERO, if any_uv { mesh.positions.len() / 3 } else { 0 }));
+            self.uvs.extend(std::iter::repeat_n(
+                Vec2::ZERO,
+                if any_uv { mesh.positions.len() / 3 } else { 0 },
+            ));
             corners.iter_mut().for_each(|corner| *corner += base);
         }
         self.cut(source, &corners, &mesh.face_arities)
@@ -214,7 +235,9 @@ fn read_cloud(source: &Source, text: &str, survey: &Survey) -> Result<Mesh> {
         }
         let values: Vec<f64> = words.take(6).map_while(|word| word.parse().ok()).collect();
         if values.len() < 3 {
-            return Err(source.error(format!("line {}", number + 1), "a vertex needs three numbers"));
+            return Err(
+                source.error(format!("line {}", number + 1), "a vertex needs three numbers")
+            );
         }
         points.push((DVec3::from_slice(&values), number + 1));
         if survey.colors && values.len() >= 6 {
@@ -227,11 +250,18 @@ fn read_cloud(source: &Source, text: &str, survey: &Survey) -> Result<Mesh> {
     // Vertices come before faces: a mesh that is cut in its vertices looks like a cloud, but for its last line.
     if !source.bytes().ends_with(b"\n") {
         return Err(source
-            .error(format!("byte {}", source.bytes().len()), "the file ends within a line, before any face: it is cut")
+            .error(
+                format!("byte {}", source.bytes().len()),
+                "the file ends within a line, before any face: it is cut",
+            )
             .hint("if this is a whole point cloud, end its last line with a line break"));
     }
-    (mesh.origin, mesh.positions) =
-        positions::settle(source, points.len(), |i| points[i].0, |i| format!("line {}", points[i].1))?;
+    (mesh.origin, mesh.positions) = positions::settle(
+        source,
+        points.len(),
+        |i| points[i].0,
+        |i| format!("line {}", points[i].1),
+    )?;
     if colors.len() == points.len() {
         mesh.colors = to_bytes(&colors);
     }

@@ -27,7 +27,8 @@ const POINT: u64 = 8 + 24 + 12 + 4;
 pub fn read(source: &Source) -> Result<Mesh> {
     let header = header::read(source)?;
     let count = source.check_points("the number of points", header.points)?;
-    let find = |names: &[&str]| header.fields.iter().find(|field| names.contains(&field.name.as_str()));
+    let find =
+        |names: &[&str]| header.fields.iter().find(|field| names.contains(&field.name.as_str()));
     let triple = |names: [&[&str]; 3]| {
         let [a, b, c] = names.map(find);
         Some([a?, b?, c?])
@@ -39,13 +40,17 @@ pub fn read(source: &Source) -> Result<Mesh> {
     let color = find(&["rgb", "rgba"]);
     let rows = Rows::find(source, &header, count)?;
     source.spend("the size of the points in bytes", POINT * count as u64)?;
-    let three = |row: usize, fields: [&Field; 3]| DVec3::from_array(fields.map(|field| rows.number(row, field)));
-    let kept: Vec<usize> = (0..count).into_par_iter().filter(|&row| three(row, position).is_finite()).collect();
+    let three = |row: usize, fields: [&Field; 3]| {
+        DVec3::from_array(fields.map(|field| rows.number(row, field)))
+    };
+    let kept: Vec<usize> =
+        (0..count).into_par_iter().filter(|&row| three(row, position).is_finite()).collect();
     if kept.len() < count {
         tracing::info!(points = count - kept.len(), "points without a position are left out");
     }
     let each = || kept.par_iter().copied();
-    let normals = normal.map(|fields| each().map(|row| three(row, fields).as_vec3()).collect::<Vec<Vec3>>());
+    let normals =
+        normal.map(|fields| each().map(|row| three(row, fields).as_vec3()).collect::<Vec<Vec3>>());
     let colors = color.map(|field| {
         let bytes = |row| rows.bits(row, field).to_le_bytes();
         each().map(bytes).map(|[b, g, r, _]| [r, g, b, 255]).collect::<Vec<_>>()
@@ -74,13 +79,18 @@ impl<'a> Rows<'a> {
     fn find(source: &'a Source, header: &Header, count: usize) -> Result<Self> {
         let data = &source.bytes()[header.end..];
         let stride = header.fields.iter().map(Field::bytes).sum::<usize>();
-        let size =
-            source.check_bytes("the size of the points in bytes", (count as u64).saturating_mul(stride as u64))?;
+        let size = source.check_bytes(
+            "the size of the points in bytes",
+            (count as u64).saturating_mul(stride as u64),
+        )?;
         let sizes = |found: usize, wanted: usize| -> Result<()> {
             if found >= wanted {
                 return Ok(());
             }
-            Err(source.error("data", format!("{found} bytes follow the header where {wanted} were expected")))
+            Err(source.error(
+                "data",
+                format!("{found} bytes follow the header where {wanted} were expected"),
+            ))
         };
         match header.data {
             Data::Text => Self::of_text(source, header, data, count),
@@ -90,16 +100,23 @@ impl<'a> Rows<'a> {
             }
             Data::Packed => {
                 sizes(data.len(), 8)?;
-                let [packed, unpacked] =
-                    [0, 4].map(|at| u32::from_le_bytes([0, 1, 2, 3].map(|byte| data[at + byte])) as usize);
+                let [packed, unpacked] = [0, 4].map(|at| {
+                    u32::from_le_bytes([0, 1, 2, 3].map(|byte| data[at + byte])) as usize
+                });
                 sizes(data.len() - 8, packed)?;
                 if unpacked != size {
-                    return Err(source.error("data", format!("unpacks to {unpacked} bytes where {size} were expected")));
+                    return Err(source.error(
+                        "data",
+                        format!("unpacks to {unpacked} bytes where {size} were expected"),
+                    ));
                 }
                 source.room::<u8>("the unpacked points", size)?;
                 let bytes = lzf::unpack(&data[8..][..packed], size);
                 let bytes = bytes.map_err(|(at, message)| {
-                    source.error(format!("byte {}", header.end + 8 + at), format!("the packed data {message}"))
+                    source.error(
+                        format!("byte {}", header.end + 8 + at),
+                        format!("the packed data {message}"),
+                    )
                 })?;
                 Ok(Self::Bytes { bytes: bytes.into(), start: count, stride: None })
             }
@@ -132,7 +149,8 @@ impl<'a> Rows<'a> {
             }
         }
         if found < count {
-            return Err(source.error("data", format!("holds {found} points where the header claims {count}")));
+            return Err(source
+                .error("data", format!("holds {found} points where the header claims {count}")));
         }
         Ok(Self::Text { numbers: numbers.into_inner(), width })
     }
@@ -151,7 +169,9 @@ impl<'a> Rows<'a> {
                 let number = numbers[row * width + field.word];
                 if field.kind.is_float() { (number as f32).to_bits() } else { number as i64 as u32 }
             }
-            Self::Bytes { .. } => self.bytes(row, field).first_chunk().map_or(0, |&bytes| u32::from_le_bytes(bytes)),
+            Self::Bytes { .. } => {
+                self.bytes(row, field).first_chunk().map_or(0, |&bytes| u32::from_le_bytes(bytes))
+            }
         }
     }
 

@@ -55,7 +55,10 @@ pub fn read(source: &Source) -> Result<Mesh> {
     for element in &header.elements {
         let is_face = matches!(element.name.as_str(), "face" | "tristrips");
         if is_face || element.name == "vertex" {
-            source.check_points(&format!("the count of element “{}”", element.name), element.count as u64)?;
+            source.check_points(
+                &format!("the count of element “{}”", element.name),
+                element.count as u64,
+            )?;
         }
         let rows = Rows::find(source, element, header.encoding, &mut at)?;
         if vertices.is_some_and(|vertices| std::ptr::eq(vertices, element)) {
@@ -128,10 +131,13 @@ const ALPHA: usize = 9;
 const UV: usize = 10;
 
 fn read_vertices(source: &Source, element: &Element, rows: &Rows, mesh: &mut Mesh) -> Result<()> {
-    let columns = ROLES.map(|names| element.column(names).filter(|&c| element.columns[c].width().is_some()));
+    let columns =
+        ROLES.map(|names| element.column(names).filter(|&c| element.columns[c].width().is_some()));
     if let Some(missing) = (POSITION..POSITION + 3).find(|&role| columns[role].is_none()) {
         let name = ROLES[missing][0];
-        return Err(source.error("header", format!("the element “vertex” has no scalar property “{name}”")));
+        return Err(
+            source.error("header", format!("the element “vertex” has no scalar property “{name}”"))
+        );
     }
     let table = Table::read(source, element, rows, &columns)?;
     fill(source, element, rows, &columns, |row, role| table.value(row, role), mesh)
@@ -147,8 +153,10 @@ fn fill(
     mesh: &mut Mesh,
 ) -> Result<()> {
     let count = element.count;
-    let position = |row| DVec3::new(value(row, POSITION), value(row, POSITION + 1), value(row, POSITION + 2));
-    (mesh.origin, mesh.positions) = positions::settle(source, count, position, |row| rows.place(source, element, row))?;
+    let position =
+        |row| DVec3::new(value(row, POSITION), value(row, POSITION + 1), value(row, POSITION + 2));
+    (mesh.origin, mesh.positions) =
+        positions::settle(source, count, position, |row| rows.place(source, element, row))?;
     let has = |from: usize, number: usize| columns[from..from + number].iter().all(Option::is_some);
     if has(NORMAL, 3) {
         source.room::<Vec3>("the normals", count)?;
@@ -158,14 +166,17 @@ fn fill(
     if has(COLOR, 3) {
         source.room::<[u8; 4]>("the colours", count)?;
         let kinds = color_kind(element, columns);
-        let channel = |row, channel: usize| if kinds[channel].is_some() { value(row, COLOR + channel) } else { 0.0 };
+        let channel = |row, channel: usize| {
+            if kinds[channel].is_some() { value(row, COLOR + channel) } else { 0.0 }
+        };
         let mut largest = [0.0; 4];
         if kinds.iter().flatten().any(ColorKind::is_wide) {
             let of_row = |row| [0, 1, 2, 3].map(|c| channel(row, c));
             largest = (0..count).into_par_iter().map(of_row).reduce(|| [0.0; 4], larger);
         }
         let scale = color_scale(&kinds, largest);
-        mesh.colors = (0..count).into_par_iter().map(|row| color(scale, |c| channel(row, c))).collect();
+        mesh.colors =
+            (0..count).into_par_iter().map(|row| color(scale, |c| channel(row, c))).collect();
     }
     if has(UV, 2) {
         source.room::<Vec2>("the texture coordinates", count)?;
@@ -222,7 +233,9 @@ fn color_scale(kinds: &[Option<ColorKind>; 4], largest: [f64; 4]) -> [Option<f64
 
 /// A colour of scaled channels; what there is not is full.
 fn color(scale: [Option<f64>; 4], value: impl Fn(usize) -> f64) -> [u8; 4] {
-    std::array::from_fn(|channel| scale[channel].map_or(255, |scale| (value(channel) * scale).round() as u8))
+    std::array::from_fn(|channel| {
+        scale[channel].map_or(255, |scale| (value(channel) * scale).round() as u8)
+    })
 }
 
 /// The larger values of each channel.

@@ -41,7 +41,8 @@ pub(super) fn triangles(
 fn projection(corners: &[u32], position: impl Fn(u32) -> DVec3) -> Option<impl Fn(u32) -> DVec2> {
     let first = position(*corners.first()?);
     let spoke = move |corner| position(corner) - first;
-    let normal: DVec3 = corners[1..].windows(2).map(|side| spoke(side[0]).cross(spoke(side[1]))).sum();
+    let normal: DVec3 =
+        corners[1..].windows(2).map(|side| spoke(side[0]).cross(spoke(side[1]))).sum();
     if !normal.is_finite() || normal == DVec3::ZERO {
         return None;
     }
@@ -143,7 +144,9 @@ struct Ring {
 impl Ring {
     fn new(points: Vec<DVec2>) -> Self {
         let count = points.len();
-        let (low, high) = points.iter().fold((DVec2::MAX, DVec2::MIN), |(low, high), &p| (low.min(p), high.max(p)));
+        let (low, high) = points
+            .iter()
+            .fold((DVec2::MAX, DVec2::MIN), |(low, high), &p| (low.min(p), high.max(p)));
         let side = (count as f64 / 8.0).sqrt().clamp(1.0, 1024.0) as usize;
         let mut ring = Self {
             before: (0..count).map(|at| (at + count - 1) % count).collect(),
@@ -186,7 +189,8 @@ impl Ring {
     }
 
     fn is_ear(&mut self, at: usize, ban: Ban) -> bool {
-        self.turn(at) > 0.0 && (ban == Ban::Nothing || !self.is_entered(self.triangle(at), ban == Ban::Touching))
+        self.turn(at) > 0.0
+            && (ban == Ban::Nothing || !self.is_entered(self.triangle(at), ban == Ban::Touching))
     }
 
     /// Whether a concave corner is in a triangle, or on its border where `touching` counts.
@@ -199,7 +203,8 @@ impl Ring {
             };
             inside(a, b) && inside(b, c) && inside(c, a) && !triangle.contains(&p)
         };
-        let ([left, bottom], [right, top]) = (self.square(a.min(b).min(c)), self.square(a.max(b).max(c)));
+        let ([left, bottom], [right, top]) =
+            (self.square(a.min(b).min(c)), self.square(a.max(b).max(c)));
         for row in bottom..=top {
             for square in &mut self.squares[row * self.side..][left..=right] {
                 self.steps += 1;
@@ -220,7 +225,9 @@ impl Ring {
     }
 
     fn square(&self, point: DVec2) -> [usize; 2] {
-        ((point - self.low) * self.scale).to_array().map(|along| (along as usize).min(self.side - 1))
+        ((point - self.low) * self.scale)
+            .to_array()
+            .map(|along| (along as usize).min(self.side - 1))
     }
 
     fn remove(&mut self, at: usize) {
@@ -283,13 +290,17 @@ mod tests {
         let along: f64 = cuts.iter().map(|&cut| area(cut).dot(whole.normalize())).sum();
         let sizes: f64 = cuts.iter().map(|&cut| area(cut).length()).sum();
         let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b;
-        assert!(close(along, whole.length()) && close(sizes, whole.length()), "{along} {sizes} {whole}");
+        assert!(
+            close(along, whole.length()) && close(sizes, whole.length()),
+            "{along} {sizes} {whole}"
+        );
     }
 
     /// Cuts a polygon as it is, the other way round, from each of its first corners, and in other planes; checks the areas,
     /// and that all corners are met.
     fn check(outline: &[(f64, f64)]) {
-        for turn in [DVec3::Z, DVec3::new(1.0, 2.0, -3.0), DVec3::new(-1.0, 0.2, 0.1), DVec3::NEG_Y] {
+        for turn in [DVec3::Z, DVec3::new(1.0, 2.0, -3.0), DVec3::new(-1.0, 0.2, 0.1), DVec3::NEG_Y]
+        {
             let (u, v) = turn.normalize().any_orthonormal_pair();
             let mut points: Vec<DVec3> =
                 outline.iter().map(|&(x, y)| DVec3::new(4e5, 5e6, 100.0) + u * x + v * y).collect();
@@ -300,7 +311,10 @@ mod tests {
                 points.reverse();
                 let cuts = cut(&points);
                 assert_eq!(cuts.len(), points.len() - 2);
-                assert!((0..points.len() as u32).all(|corner| cuts.iter().flatten().any(|&met| met == corner)));
+                assert!(
+                    (0..points.len() as u32)
+                        .all(|corner| cuts.iter().flatten().any(|&met| met == corner))
+                );
                 // Coordinates of this size are rounded to a billionth, and areas with them.
                 let near: Vec<DVec3> = points.iter().map(|&p| p - points[0]).collect();
                 check_areas(&(0..points.len() as u32).collect::<Vec<_>>(), &near, &cuts);
@@ -308,13 +322,16 @@ mod tests {
         }
     }
 
-    const L: [(f64, f64); 6] = [(2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0), (0.0, 0.0)];
+    const L: [(f64, f64); 6] =
+        [(2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0), (0.0, 0.0)];
 
     #[test]
     fn convex_polygons_are_fans() {
         let round = |count: u32, tilt: f64| -> Vec<DVec3> {
             let angle = |at| f64::from(at) / f64::from(count) * std::f64::consts::TAU;
-            (0..count).map(|at| DVec3::new(angle(at).cos(), angle(at).sin(), tilt * angle(at).sin())).collect()
+            (0..count)
+                .map(|at| DVec3::new(angle(at).cos(), angle(at).sin(), tilt * angle(at).sin()))
+                .collect()
         };
         for count in [3, 4, 5, 17, 1000] {
             for tilt in [0.0, 0.7, 300.0] {
@@ -337,7 +354,16 @@ mod tests {
     fn concave_polygons_are_covered_and_nothing_else() {
         check(&[(0.0, 0.0), (2.0, 1.0), (0.0, 2.0), (0.5, 1.0)]);
         check(&L);
-        check(&[(0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (2.0, 3.0), (2.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)]);
+        check(&[
+            (0.0, 0.0),
+            (3.0, 0.0),
+            (3.0, 3.0),
+            (2.0, 3.0),
+            (2.0, 1.0),
+            (1.0, 1.0),
+            (1.0, 3.0),
+            (0.0, 3.0),
+        ]);
     }
 
     #[test]
@@ -352,7 +378,9 @@ mod tests {
         let cuts = cut(&points);
         assert_eq!(cuts.len(), points.len() - 2);
         check_areas(&(0..points.len() as u32).collect::<Vec<_>>(), &points, &cuts);
-        assert!((0..points.len() as u32).all(|corner| cuts.iter().flatten().any(|&met| met == corner)));
+        assert!(
+            (0..points.len() as u32).all(|corner| cuts.iter().flatten().any(|&met| met == corner))
+        );
     }
 
     #[test]
@@ -403,16 +431,23 @@ mod tests {
         assert_eq!(cut(&points), fan_of(6));
         assert_eq!(cut(&[DVec3::ONE; 5]), fan_of(5));
         assert_eq!(cut(&flat(&[(0.0, 0.0), (1.0, 0.0), (5.0, 0.0), (2.0, 0.0)])), fan_of(4));
-        assert!(cut(&[]).is_empty() && cut(&[DVec3::X]).is_empty() && cut(&[DVec3::X, DVec3::Y]).is_empty());
+        assert!(
+            cut(&[]).is_empty()
+                && cut(&[DVec3::X]).is_empty()
+                && cut(&[DVec3::X, DVec3::Y]).is_empty()
+        );
         // A bow tie, and corners that are strewn about.
         cut(&flat(&[(0.0, 0.0), (2.0, 2.0), (2.0, 0.0), (0.0, 1.0)]));
         for count in [5, 20, 300] {
             let mut state = count as u64;
             let mut random = || {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
                 (state >> 40) as f64 / 16_777_216.0
             };
-            let strewn: Vec<DVec3> = (0..count).map(|_| DVec3::new(random(), random(), random())).collect();
+            let strewn: Vec<DVec3> =
+                (0..count).map(|_| DVec3::new(random(), random(), random())).collect();
             cut(&strewn);
             // On a coarse grid, with many corners in one place and on one line.
             cut(&strewn.iter().map(|point| (point * 4.0).floor()).collect::<Vec<_>>());
@@ -423,7 +458,9 @@ mod tests {
     fn large_polygons_are_cut_in_time() {
         let teeth = 4000;
         let mut comb = vec![(f64::from(teeth), -1.0), (0.0, -1.0)];
-        comb.extend((0..teeth).flat_map(|tooth| [(f64::from(tooth), 0.0), (f64::from(tooth) + 0.5, 500.0)]));
+        comb.extend(
+            (0..teeth).flat_map(|tooth| [(f64::from(tooth), 0.0), (f64::from(tooth) + 0.5, 500.0)]),
+        );
         comb.reverse();
         // A ragged shore.
         let shore: Vec<(f64, f64)> = (0..10_000)

@@ -37,11 +37,16 @@ pub(super) fn settle(
 /// The origin for positions between two corners.
 pub(super) fn origin(source: &Source, low: DVec3, high: DVec3) -> Result<DVec3> {
     let (center, extent) = (low * 0.5 + high * 0.5, (high * 0.5 - low * 0.5).max_element());
-    let origin = if center.abs().max_element() > 16.0 * extent { center.round() } else { DVec3::ZERO };
+    let origin =
+        if center.abs().max_element() > 16.0 * extent { center.round() } else { DVec3::ZERO };
     if (low - origin).abs().max((high - origin).abs()).max_element() > LARGEST {
         return Err(source.error(
             "positions",
-            format!("spread from {:?} to {:?}, more than 32 bits can hold", low.to_array(), high.to_array()),
+            format!(
+                "spread from {:?} to {:?}, more than 32 bits can hold",
+                low.to_array(),
+                high.to_array()
+            ),
         ));
     }
     Ok(origin)

@@ -49,7 +49,10 @@ pub fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
         return Err(source.error("size", message).hint(guess(bytes.len() as u64, layout)));
     }
     let header = layout.header as usize;
-    source.spend("the size of the samples in bytes", layout.sample_type.decoded_bytes(wanted - header))?;
+    source.spend(
+        "the size of the samples in bytes",
+        layout.sample_type.decoded_bytes(wanted - header),
+    )?;
     match &mut unpacked {
         Cow::Borrowed(bytes) => *bytes = &bytes[header..],
         Cow::Owned(bytes) => drop(bytes.drain(..header)),
@@ -65,7 +68,13 @@ pub fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
 pub(super) fn plain(source: &Source, layout: &RawLayout) -> Result<Option<Plain>> {
     let (lattice, wanted) = whole(source, layout)?;
     let &RawLayout { sample_type, endian, header, .. } = layout;
-    let plain = Plain { path: source.path.to_owned(), start: header as usize, sample_type, endian, lattice };
+    let plain = Plain {
+        path: source.path.to_owned(),
+        start: header as usize,
+        sample_type,
+        endian,
+        lattice,
+    };
     Ok((source.bytes().len() == wanted && !is_packed(source, wanted)).then_some(plain))
 }
 
@@ -73,8 +82,10 @@ pub(super) fn plain(source: &Source, layout: &RawLayout) -> Result<Option<Plain>
 fn whole(source: &Source, layout: &RawLayout) -> Result<(Lattice, usize)> {
     let lattice = Lattice::with_spacing(layout.dims, layout.spacing);
     lattice.validate().map_err(Error::Argument)?;
-    let samples = layout.sample_type.bytes_of(layout.dims).and_then(|bytes| bytes.checked_add(layout.header));
-    let wanted = source.check_bytes("the size of header and samples in bytes", samples.unwrap_or(u64::MAX))?;
+    let samples =
+        layout.sample_type.bytes_of(layout.dims).and_then(|bytes| bytes.checked_add(layout.header));
+    let wanted = source
+        .check_bytes("the size of header and samples in bytes", samples.unwrap_or(u64::MAX))?;
     Ok((lattice, wanted))
 }
 
@@ -93,8 +104,14 @@ fn guess(size: u64, layout: &RawLayout) -> String {
     let count = (*nx as u64).saturating_mul(*ny as u64).saturating_mul(*nz as u64);
     let rest = size.saturating_sub(*header);
     for other in types {
-        if count.checked_mul(other.bytes() as u64) == Some(rest) && other.bytes() != sample_type.bytes() {
-            return format!("the size fits samples of {} bytes, such as {}", other.bytes(), other.name());
+        if count.checked_mul(other.bytes() as u64) == Some(rest)
+            && other.bytes() != sample_type.bytes()
+        {
+            return format!(
+                "the size fits samples of {} bytes, such as {}",
+                other.bytes(),
+                other.name()
+            );
         }
     }
     let found = rest / sample_type.bytes() as u64;
@@ -122,7 +139,13 @@ mod tests {
     use std::io::Write;
 
     fn layout(dims: [usize; 3], sample_type: SampleType) -> RawLayout {
-        RawLayout { dims, sample_type, spacing: DVec3::new(1.0, 2.0, 3.0), endian: Endian::Little, header: 0 }
+        RawLayout {
+            dims,
+            sample_type,
+            spacing: DVec3::new(1.0, 2.0, 3.0),
+            endian: Endian::Little,
+            header: 0,
+        }
     }
 
     fn gzip(bytes: &[u8]) -> Vec<u8> {
@@ -146,11 +169,19 @@ mod tests {
             for header in [0, 5] {
                 let mut bytes = vec![0x1f, 0x8b, 0, 0, 0][..header].to_vec();
                 for v in &values {
-                    bytes.extend(if endian == Endian::Little { v.to_le_bytes() } else { v.to_be_bytes() });
+                    bytes.extend(if endian == Endian::Little {
+                        v.to_le_bytes()
+                    } else {
+                        v.to_be_bytes()
+                    });
                 }
                 for content in [gzip(&bytes), bytes] {
                     let path = folder.write("volume.raw", &content);
-                    let layout = RawLayout { endian, header: header as u64, ..layout([2, 3, 4], SampleType::I16) };
+                    let layout = RawLayout {
+                        endian,
+                        header: header as u64,
+                        ..layout([2, 3, 4], SampleType::I16)
+                    };
                     let volume = read_with(&path, |source| read(source, &layout)).unwrap();
                     assert_eq!(volume.samples, Samples::I16(values.clone()));
                     assert_eq!(volume.range, [-9000.0, 14000.0]);
@@ -164,10 +195,13 @@ mod tests {
     fn a_size_that_does_not_fit_gives_a_guess() {
         let folder = Folder::new();
         let path = folder.write("volume.raw", [7; 128]);
-        let error = |layout: RawLayout| read_with(&path, |source| read(source, &layout)).unwrap_err();
+        let error =
+            |layout: RawLayout| read_with(&path, |source| read(source, &layout)).unwrap_err();
         let message = error(layout([4, 4, 4], SampleType::U8)).to_string();
         assert!(
-            message.contains("holds 128 bytes after the header, but 4 × 4 × 4 samples of type u8 need 64"),
+            message.contains(
+                "holds 128 bytes after the header, but 4 × 4 × 4 samples of type u8 need 64"
+            ),
             "{message}"
         );
         assert!(hint(error(layout([4, 4, 4], SampleType::U8))).contains("2 bytes, such as i16"));
@@ -175,7 +209,8 @@ mod tests {
         assert!(hint(error(layout([3, 5, 5], SampleType::I16))).contains("4 × 4 × 4"));
         assert!(hint(error(layout([5, 5, 5], SampleType::U8))).contains("header of 3 bytes"));
         let packed = folder.write("volume.raw.gz", gzip(&[7; 128]));
-        let error = read_with(&packed, |source| read(source, &layout([4, 4, 4], SampleType::U8))).unwrap_err();
+        let error = read_with(&packed, |source| read(source, &layout([4, 4, 4], SampleType::U8)))
+            .unwrap_err();
         assert!(hint(error).contains("2 bytes"));
     }
 
@@ -184,17 +219,27 @@ mod tests {
         let folder = Folder::new();
         let whole = gzip(&(0..64).collect::<Vec<u8>>());
         for (name, content) in [("volume.raw.gz", &whole[..]), ("volume.raw", &[9; 64])] {
-            every_cut(&folder, name, content, |source| read(source, &layout([4, 4, 4], SampleType::U8)));
+            every_cut(&folder, name, content, |source| {
+                read(source, &layout([4, 4, 4], SampleType::U8))
+            });
         }
         let path = folder.write("bomb.raw.gz", gzip(&vec![0; 1 << 20]));
-        let small = |layout: RawLayout| read_with(&path, |source| read(source, &layout)).unwrap_err();
+        let small =
+            |layout: RawLayout| read_with(&path, |source| read(source, &layout)).unwrap_err();
         assert!(small(layout([2, 2, 2], SampleType::U8)).to_string().contains("more bytes"));
         assert!(matches!(small(layout([1 << 40, 1, 1], SampleType::U8)), Error::Limit { .. }));
-        assert!(matches!(small(layout([1 << 31, 1 << 31, 1], SampleType::F64)), Error::Limit { .. }));
-        assert!(matches!(small(RawLayout { header: u64::MAX, ..layout([2; 3], SampleType::U8) }), Error::Limit { .. }));
+        assert!(matches!(
+            small(layout([1 << 31, 1 << 31, 1], SampleType::F64)),
+            Error::Limit { .. }
+        ));
+        assert!(matches!(
+            small(RawLayout { header: u64::MAX, ..layout([2; 3], SampleType::U8) }),
+            Error::Limit { .. }
+        ));
         assert!(matches!(small(layout([2, 0, 2], SampleType::U8)), Error::Argument(_)));
         let path = folder.write("nan.raw", [0, 0, 192, 127, 0, 0, 128, 63]);
-        let error = read_with(&path, |source| read(source, &layout([2, 1, 1], SampleType::F32))).unwrap_err();
+        let error = read_with(&path, |source| read(source, &layout([2, 1, 1], SampleType::F32)))
+            .unwrap_err();
         assert!(error.to_string().contains("1 of 2 samples are not finite, the first is sample 0"));
     }
 
@@ -203,8 +248,9 @@ mod tests {
         let folder = Folder::new();
         let nrrd = b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 1 1\nencoding: raw\n\n\x01\x02";
         let layout = layout([nrrd.len(), 1, 1], SampleType::U8);
-        let load =
-            |name: &str, raw| crate::io::load_volume(&folder.write(name, nrrd), &crate::io::Limits::default(), raw);
+        let load = |name: &str, raw| {
+            crate::io::load_volume(&folder.write(name, nrrd), &crate::io::Limits::default(), raw)
+        };
         assert_eq!(load("a.nrrd", Some(&layout)).unwrap().len(), 2);
         assert_eq!(load("a.data", Some(&layout)).unwrap().len(), nrrd.len());
         assert_eq!(load("a.data", None).unwrap().len(), 2);

@@ -190,7 +190,8 @@ fn parse<const N: usize, T: std::str::FromStr>(
     write: impl Fn(T) -> [u8; N],
 ) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
-    let words = text.split(|c: char| c.is_ascii_whitespace() || c == ',').filter(|word| !word.is_empty());
+    let words =
+        text.split(|c: char| c.is_ascii_whitespace() || c == ',').filter(|word| !word.is_empty());
     for (i, word) in words.enumerate() {
         if i == count {
             return Err(format!("there are more than the {count} numbers expected"));
@@ -231,11 +232,16 @@ mod tests {
             assert_eq!(SampleType::from_name(kind.name()), Some(kind));
             let little = kind.parse(" 1 2,\n127\t0 ", 4).unwrap();
             assert_eq!(little.len(), 4 * kind.bytes());
-            let big: Vec<u8> = little.chunks(kind.bytes()).flat_map(|n| n.iter().rev().copied()).collect();
+            let big: Vec<u8> =
+                little.chunks(kind.bytes()).flat_map(|n| n.iter().rev().copied()).collect();
             for (bytes, endian) in [(little, Endian::Little), (big, Endian::Big)] {
                 let doubles = kind.doubles(&bytes, endian);
                 let samples = kind.decode(bytes.into(), endian);
-                assert_eq!((0..4).map(|i| samples.value(i)).collect::<Vec<_>>(), [1.0, 2.0, 127.0, 0.0], "{kind:?}");
+                assert_eq!(
+                    (0..4).map(|i| samples.value(i)).collect::<Vec<_>>(),
+                    [1.0, 2.0, 127.0, 0.0],
+                    "{kind:?}"
+                );
                 assert_eq!(doubles, [1.0, 2.0, 127.0, 0.0], "{kind:?}");
             }
         }
@@ -243,11 +249,15 @@ mod tests {
 
     #[test]
     fn wide_types_keep_what_they_can() {
-        let of =
-            |kind: SampleType, text: &str, count| kind.decode(kind.parse(text, count).unwrap().into(), Endian::Little);
+        let of = |kind: SampleType, text: &str, count| {
+            kind.decode(kind.parse(text, count).unwrap().into(), Endian::Little)
+        };
         assert_eq!(of(SampleType::I8, "-128 127", 2), Samples::I16(vec![-128, 127]));
         assert_eq!(of(SampleType::U32, "0 2147483647", 2), Samples::I32(vec![0, i32::MAX]));
-        assert_eq!(of(SampleType::U32, "1 4294967295", 2), Samples::F32(vec![1.0, 4_294_967_295.0]));
+        assert_eq!(
+            of(SampleType::U32, "1 4294967295", 2),
+            Samples::F32(vec![1.0, 4_294_967_295.0])
+        );
         assert_eq!(of(SampleType::I64, "-2147483648", 1), Samples::I32(vec![i32::MIN]));
         assert_eq!(of(SampleType::I64, "-2147483649", 1), Samples::F32(vec![-2_147_483_648.0]));
         assert_eq!(of(SampleType::F64, "0.1 1e3", 2), Samples::F32(vec![0.1, 1000.0]));

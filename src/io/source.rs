@@ -73,7 +73,13 @@ impl<'a> Source<'a> {
     pub fn from_bytes(name: &'a Path, bytes: &'a [u8], limits: &'a Limits) -> Result<Self> {
         let budget = Arc::new(Budget::new());
         budget.spend(limits, name, "the file's size in bytes", bytes.len() as u64)?;
-        Ok(Self { path: name, limits, content: Content::Held(bytes), text: OnceLock::new(), budget })
+        Ok(Self {
+            path: name,
+            limits,
+            content: Content::Held(bytes),
+            text: OnceLock::new(),
+            budget,
+        })
     }
 
     /// Whether this is no file but bytes from elsewhere, which have no neighbours.
@@ -109,7 +115,9 @@ impl<'a> Source<'a> {
     pub fn small_text(&self, what: &str, most: usize) -> Result<String> {
         let size = self.bytes().len();
         if size > most {
-            return Err(self.error("file", format!("has {size} bytes, but {what} has {most} at most")));
+            return Err(
+                self.error("file", format!("has {size} bytes, but {what} has {most} at most"))
+            );
         }
         let text = copy::text(self.bytes());
         self.intact()?;
@@ -120,8 +128,8 @@ impl<'a> Source<'a> {
     /// the first text. `what` names it in errors.
     pub(super) fn keep_text(&self, bytes: &[u8], what: &str) -> Result<&str> {
         self.room::<u8>("the text", bytes.len())?;
-        let text =
-            copy::text(bytes).map_err(|at| self.error(format!("byte {at}"), format!("{what} is not UTF-8 text")))?;
+        let text = copy::text(bytes)
+            .map_err(|at| self.error(format!("byte {at}"), format!("{what} is not UTF-8 text")))?;
         Ok(self.text.get_or_init(|| text))
     }
 
@@ -162,7 +170,12 @@ impl<'a> Source<'a> {
 
     /// Checks a depth of nesting against [`Limits::depth`].
     pub(super) fn check_depth(&self, place: &str, depth: usize) -> Result<()> {
-        self.limits.check(LimitKind::Depth, self.path, format!("{place}: the depth of nesting"), depth as u64)
+        self.limits.check(
+            LimitKind::Depth,
+            self.path,
+            format!("{place}: the depth of nesting"),
+            depth as u64,
+        )
     }
 
     /// Checks that there is still time ([`Limits::seconds`]).
@@ -182,19 +195,26 @@ impl<'a> Source<'a> {
         if bytes < SMALL {
             return Ok(());
         }
-        let what = what.strip_prefix("the size of ").and_then(|what| what.strip_suffix(" in bytes")).unwrap_or(what);
+        let what = what
+            .strip_prefix("the size of ")
+            .and_then(|what| what.strip_suffix(" in bytes"))
+            .unwrap_or(what);
         memory::room(&format!("reading {what}"), bytes).map_err(|error| error.in_file(self.path))
     }
 
     /// As [`spend`](Self::spend), for an array: `what` names what it holds.
     pub(super) fn room<T>(&self, what: &str, count: usize) -> Result<()> {
-        self.spend(&format!("the size of {what} in bytes"), (count as u64).saturating_mul(size_of::<T>() as u64))
+        self.spend(
+            &format!("the size of {what} in bytes"),
+            (count as u64).saturating_mul(size_of::<T>() as u64),
+        )
     }
 
     fn check(&self, kind: LimitKind, what: &str, found: u64) -> Result<usize> {
         self.limits.check(kind, self.path, what, found)?;
         // A 32-bit machine counts less than a limit may allow.
-        usize::try_from(found).map_err(|_| self.error(what, format!("is {found}, more than this machine can count")))
+        usize::try_from(found)
+            .map_err(|_| self.error(what, format!("is {found}, more than this machine can count")))
     }
 
     /// Unpacks a stream whose unpacked size is known. A stream that ends early or holds more than `expected` is an
@@ -208,14 +228,18 @@ impl<'a> Source<'a> {
             let before = out.len();
             let most = PORTION.min(expected as u64 + 1 - before as u64);
             let read = stream.by_ref().take(most).read_to_end(&mut out);
-            read.map_err(|e| self.error(place, format!("cannot be unpacked after {} bytes: {e}", out.len())))?;
+            read.map_err(|e| {
+                self.error(place, format!("cannot be unpacked after {} bytes: {e}", out.len()))
+            })?;
             if out.len() == before || out.len() > expected {
                 break;
             }
         }
         if out.len() != expected {
-            let found = if out.len() > expected { "more".to_owned() } else { out.len().to_string() };
-            return Err(self.error(place, format!("unpacks to {found} bytes where {expected} were expected")));
+            let found =
+                if out.len() > expected { "more".to_owned() } else { out.len().to_string() };
+            return Err(self
+                .error(place, format!("unpacks to {found} bytes where {expected} were expected")));
         }
         Ok(out)
     }
@@ -225,7 +249,11 @@ fn map_within(path: &Path, limits: &Limits, budget: &Budget) -> Result<Mapping> 
     // Opening a pipe would wait for its other end, and opening a device may start it: so look first.
     let look = std::fs::metadata(path).map_err(|e| Error::file(path, "open", e))?;
     let regular = |meta: &std::fs::Metadata| {
-        if meta.is_file() { Ok(()) } else { Err(Error::input(path, "path", "is not a regular file")) }
+        if meta.is_file() {
+            Ok(())
+        } else {
+            Err(Error::input(path, "path", "is not a regular file"))
+        }
     };
     regular(&look)?;
     let file = File::open(path).map_err(|e| Error::file(path, "open", e))?;

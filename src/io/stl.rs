@@ -17,22 +17,31 @@ const FACET: usize = 50;
 /// for more facets than the limits allow.
 pub fn read(source: &Source) -> Result<Mesh> {
     let bytes = source.bytes();
-    let count = bytes.get(HEADER..).and_then(|rest| rest.first_chunk()).map(|&count| u32::from_le_bytes(count));
+    let count = bytes
+        .get(HEADER..)
+        .and_then(|rest| rest.first_chunk())
+        .map(|&count| u32::from_le_bytes(count));
     let size = count.map(|count| HEADER as u64 + 4 + u64::from(count) * FACET as u64);
     // Some writers end the file with a few bytes of their own.
     let fits = size.is_some_and(|size| (size..size + FACET as u64).contains(&(bytes.len() as u64)));
     // No text has a byte 0, and a count and three numbers have several.
-    let is_text =
-        bytes.trim_ascii_start().starts_with(b"solid") && !bytes.iter().take(HEADER + 4 + FACET).any(|&b| b == 0);
+    let is_text = bytes.trim_ascii_start().starts_with(b"solid")
+        && !bytes.iter().take(HEADER + 4 + FACET).any(|&b| b == 0);
     let (corners, lines) = if !fits && is_text {
         of_text(source)?
     } else {
         let (Some(count), Some(size)) = (count, size) else {
-            return Err(source.error("header", format!("ends after {} bytes, before its count of facets", bytes.len())));
+            return Err(source.error(
+                "header",
+                format!("ends after {} bytes, before its count of facets", bytes.len()),
+            ));
         };
         source.check_points("the count of facets", u64::from(count))?;
         if !fits {
-            let message = format!("counts {count} facets, which need {size} bytes, but the file has {}", bytes.len());
+            let message = format!(
+                "counts {count} facets, which need {size} bytes, but the file has {}",
+                bytes.len()
+            );
             return Err(source.error("header", message).hint("the file is cut, or another format"));
         }
         source.room::<[DVec3; 3]>("the corners", count as usize)?;
@@ -45,15 +54,19 @@ pub fn read(source: &Source) -> Result<Mesh> {
         Some(line) => format!("line {line}"),
         None => format!("facet {}", corner / 3),
     };
-    let (origin, positions) = positions::settle(source, corners.len(), |corner| corners[corner], place)?;
+    let (origin, positions) =
+        positions::settle(source, corners.len(), |corner| corners[corner], place)?;
     source.room::<u32>("the triangles", positions.len())?;
-    let triangles = (0..positions.len() as u32 / 3).map(|facet| [0, 1, 2].map(|corner| facet * 3 + corner)).collect();
+    let triangles = (0..positions.len() as u32 / 3)
+        .map(|facet| [0, 1, 2].map(|corner| facet * 3 + corner))
+        .collect();
     Ok(Mesh { origin, positions, triangles, ..Mesh::default() })
 }
 
 fn of_bytes(facets: &[u8], count: usize) -> Vec<DVec3> {
     let corners = facets.chunks_exact(FACET).take(count).flat_map(|facet| {
-        let number = |at: usize| f64::from(f32::from_le_bytes([0, 1, 2, 3].map(|byte| facet[at + byte])));
+        let number =
+            |at: usize| f64::from(f32::from_le_bytes([0, 1, 2, 3].map(|byte| facet[at + byte])));
         // After the normal.
         [12, 24, 36].map(|at| DVec3::new(number(at), number(at + 4), number(at + 8)))
     });
@@ -90,7 +103,10 @@ fn of_text(source: &Source) -> Result<(Vec<DVec3>, Vec<usize>)> {
             }
             ("endfacet", Some(first)) => {
                 if corners.len() - first != 3 {
-                    return Err(wrong(format!("the facet has {} corners, not 3", corners.len() - first)));
+                    return Err(wrong(format!(
+                        "the facet has {} corners, not 3",
+                        corners.len() - first
+                    )));
                 }
                 start = None;
             }
@@ -101,7 +117,9 @@ fn of_text(source: &Source) -> Result<(Vec<DVec3>, Vec<usize>)> {
         }
     }
     if in_solid || start.is_some() {
-        return Err(source.error(format!("line {last}"), "the file ends before “endsolid”: it is cut"));
+        return Err(
+            source.error(format!("line {last}"), "the file ends before “endsolid”: it is cut")
+        );
     }
     Ok((corners.into_inner(), lines.into_inner()))
 }
@@ -129,7 +147,8 @@ mod tests {
         file
     }
 
-    const FACETS: [[f32; 9]; 2] = [[0., 0., 0., 1., 0., 0., 0., 1., 0.], [1., 0., 0., 1., 1., 0., 0., 1., 0.]];
+    const FACETS: [[f32; 9]; 2] =
+        [[0., 0., 0., 1., 0., 0., 0., 1., 0.], [1., 0., 0., 1., 1., 0., 0., 1., 0.]];
     const TEXT: &str = "solid two of them\n facet normal 0 0 1\n outer loop\n vertex 0 0 0\n vertex 1 0 0\n vertex 0 1 0\n\
         endloop\n endfacet\n\nFACET NORMAL 0 0 1\r\nOUTER LOOP\r\nVERTEX 1e0 0 0\r\nVERTEX 1 1 0\r\nVERTEX 0 1 -0\r\n\
         ENDLOOP\r\nENDFACET\r\nendsolid";
@@ -141,7 +160,8 @@ mod tests {
 
     #[test]
     fn binary_and_text_say_the_same() {
-        for content in [binary(2, &FACETS), [binary(2, &FACETS), vec![0; 7]].concat(), TEXT.into()] {
+        for content in [binary(2, &FACETS), [binary(2, &FACETS), vec![0; 7]].concat(), TEXT.into()]
+        {
             let mesh = load(content).unwrap();
             assert_eq!(mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
             assert_eq!(mesh.positions[1..5], [Vec3::X, Vec3::Y, Vec3::X, Vec3::new(1.0, 1.0, 0.0)]);
@@ -163,7 +183,10 @@ mod tests {
             (binary(2, &[FACETS[0], [f32::NAN; 9]]), "facet 1: the position"),
             (TEXT.replace("1e0", "one").into(), "line 12: a vertex needs three numbers"),
             (TEXT.replace("VERTEX 1 1 0\r\n", "").into(), "line 15: the facet has 2 corners"),
-            (TEXT.replace("VERTEX 1 1 0", "edge 1 1 0").into(), "line 13: “edge” does not belong here"),
+            (
+                TEXT.replace("VERTEX 1 1 0", "edge 1 1 0").into(),
+                "line 13: “edge” does not belong here",
+            ),
             (TEXT.replace("VERTEX 1 1 0", "VERTEX 1 inf 0").into(), "line 13: the position"),
             (b"solid empty\nendsolid".to_vec(), "no facets"),
         ] {
@@ -173,7 +196,10 @@ mod tests {
         let limits = Limits { points: 1, ..Limits::default() };
         for content in [binary(2, &FACETS), TEXT.into()] {
             let path = folder.write("b.stl", content);
-            assert!(matches!(read(&Source::open(&path, &limits).unwrap()), Err(Error::Limit { .. })));
+            assert!(matches!(
+                read(&Source::open(&path, &limits).unwrap()),
+                Err(Error::Limit { .. })
+            ));
         }
         let all = binary(u32::MAX, &FACETS);
         assert!(matches!(load(all), Err(Error::Limit { .. })));

@@ -68,7 +68,8 @@ impl<'a> Stream<'a> {
     /// # Errors
     /// Those of [`open`](Self::open) but for opening.
     pub fn of(source: Source<'a>) -> Result<Option<Self>> {
-        let extension = source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+        let extension =
+            source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
         let form = match extension.as_str() {
             "ply" => ply::Pieces::find(&source).map(|pieces| pieces.map(Form::Ply)),
             "las" | "laz" => las::Pieces::find(&source).map(|pieces| pieces.map(Form::Las)),
@@ -107,9 +108,14 @@ impl<'a> Stream<'a> {
     pub(crate) fn settle(&mut self, watch: &dyn Fn(u64)) -> Result<()> {
         let counted = self.counts().points;
         if counted > u64::from(u32::MAX) {
-            let message =
-                format!("counts {counted} points, but a file that is read in pieces has {} at most", u32::MAX);
-            return Err(self.source.error("header", message).hint("cut it in several files and convert them together"));
+            let message = format!(
+                "counts {counted} points, but a file that is read in pieces has {} at most",
+                u32::MAX
+            );
+            return Err(self
+                .source
+                .error("header", message)
+                .hint("cut it in several files and convert them together"));
         }
         let (points, [low, high]) = match &mut self.form {
             Form::Las(pieces) => self.source.unless_changed(pieces.survey(&self.source, watch))?,
@@ -201,14 +207,16 @@ impl<'a> Stream<'a> {
             Form::Ply(pieces) => {
                 let of_piece = |piece: usize| {
                     let rows = pieces.rows(piece);
-                    let points: Vec<_> = rows.map(|row| settled(pieces.vertex(&self.source, row))).collect();
+                    let points: Vec<_> =
+                        rows.map(|row| settled(pieces.vertex(&self.source, row))).collect();
                     Ok(map(&points))
                 };
                 self.in_order(pieces.pieces()[0], of_piece, take)
             }
             Form::Las(pieces) => {
                 let of_piece = |piece: usize| {
-                    let points: Vec<_> = pieces.found(&self.source, piece)?.into_iter().map(settled).collect();
+                    let points: Vec<_> =
+                        pieces.found(&self.source, piece)?.into_iter().map(settled).collect();
                     Ok(map(&points))
                 };
                 self.in_order(pieces.pieces(), of_piece, take)
@@ -233,7 +241,9 @@ impl<'a> Stream<'a> {
     /// The place of a vertex of a mesh.
     pub(crate) fn position(&self, index: u32) -> Vec3 {
         match &self.form {
-            Form::Ply(pieces) => (pieces.position(&self.source, index as usize) - self.origin).as_vec3(),
+            Form::Ply(pieces) => {
+                (pieces.position(&self.source, index as usize) - self.origin).as_vec3()
+            }
             Form::Las(_) => Vec3::ZERO,
         }
     }
@@ -264,7 +274,8 @@ impl<'a> Stream<'a> {
         let batch = 2 * rayon::current_num_threads();
         for first in (0..pieces).step_by(batch) {
             self.source.restart_time();
-            let made: Vec<Result<T>> = (first..(first + batch).min(pieces)).into_par_iter().map(&make).collect();
+            let made: Vec<Result<T>> =
+                (first..(first + batch).min(pieces)).into_par_iter().map(&make).collect();
             // Nothing that was made of a file and half of another is taken.
             self.source.intact()?;
             for made in made {

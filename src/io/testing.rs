@@ -14,7 +14,8 @@ impl Folder {
     pub fn new() -> Self {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let number = COUNT.fetch_add(1, Ordering::Relaxed);
-        let path = std::env::temp_dir().join(format!("splatkit-test-{}-{number}", std::process::id()));
+        let path =
+            std::env::temp_dir().join(format!("splatkit-test-{}-{number}", std::process::id()));
         std::fs::create_dir_all(&path).unwrap();
         Self(path)
     }
@@ -46,7 +47,12 @@ pub fn read_with<T>(path: &Path, read: impl Fn(&Source) -> Result<T>) -> Result<
 }
 
 /// Reads the file cut off after every byte but the last: each must be an input error that names file and place.
-pub fn every_cut<T>(folder: &Folder, name: &str, bytes: &[u8], read: impl Fn(&Source) -> Result<T>) {
+pub fn every_cut<T>(
+    folder: &Folder,
+    name: &str,
+    bytes: &[u8],
+    read: impl Fn(&Source) -> Result<T>,
+) {
     for end in 0..bytes.len() {
         let path = folder.write(name, &bytes[..end]);
         match read_with(&path, &read) {
@@ -65,7 +71,8 @@ pub fn every_cut<T>(folder: &Folder, name: &str, bytes: &[u8], read: impl Fn(&So
 /// A PNG of these texels.
 pub fn png(width: u32, height: u32, texels: &[[u8; 4]]) -> Vec<u8> {
     let mut out = std::io::Cursor::new(Vec::new());
-    let picture = image::RgbaImage::from_raw(width, height, texels.concat()).expect("as many texels as the size says");
+    let picture = image::RgbaImage::from_raw(width, height, texels.concat())
+        .expect("as many texels as the size says");
     picture.write_to(&mut out, image::ImageFormat::Png).expect("encodes");
     out.into_inner()
 }

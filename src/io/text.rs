@@ -28,7 +28,10 @@ pub(super) struct Text<'a> {
 
 impl<'a> Text<'a> {
     /// Finds the lines of a file. Those that `skip` tells are passed over.
-    pub fn of(source: &'a Source, mut skip: impl FnMut(usize, &[u8]) -> Result<bool>) -> Result<Self> {
+    pub fn of(
+        source: &'a Source,
+        mut skip: impl FnMut(usize, &[u8]) -> Result<bool>,
+    ) -> Result<Self> {
         let mut lines: Growing<(usize, &[u8])> = Growing::new(source, "the places of the lines");
         for (number, line) in (1..).zip(lines_of(without_mark(source.bytes()))) {
             let line = line.trim_ascii();
@@ -37,11 +40,14 @@ impl<'a> Text<'a> {
             }
         }
         source.check_points("the number of lines", lines.len() as u64)?;
-        let Some(&(first, line)) = lines.first() else { return Err(source.error("file", "holds no lines of numbers")) };
+        let Some(&(first, line)) = lines.first() else {
+            return Err(source.error("file", "holds no lines of numbers"));
+        };
         let mut lines = lines.into_inner();
         let (separator, words) = split(line);
         if words.len() > MOST_COLUMNS {
-            return Err(source.error(format!("line {first}"), format!("has more than {MOST_COLUMNS} columns")));
+            return Err(source
+                .error(format!("line {first}"), format!("has more than {MOST_COLUMNS} columns")));
         }
         let names = has_names(&words).then(|| words.clone());
         if names.is_some() && !line.iter().any(|b| b.is_ascii_alphabetic() || !b.is_ascii()) {
@@ -70,7 +76,11 @@ impl<'a> Text<'a> {
 
     /// The numbers of all rows, one row after the other; zero in the columns that are not asked for, which may hold
     /// anything.
-    pub fn numbers(&self, source: &Source, asked: impl Fn(usize) -> bool + Sync) -> Result<Vec<f64>> {
+    pub fn numbers(
+        &self,
+        source: &Source,
+        asked: impl Fn(usize) -> bool + Sync,
+    ) -> Result<Vec<f64>> {
         let width = self.width;
         // Each number takes a byte at least. Where they cannot all be there, some line is too short.
         let numbers = self.rows.len().saturating_mul(width);
@@ -79,28 +89,36 @@ impl<'a> Text<'a> {
         }
         source.room::<f64>("the numbers", numbers)?;
         let mut table = vec![0.0f64; numbers];
-        table.par_chunks_mut(width).zip(&self.rows).enumerate().try_for_each(|(index, (row, &(number, line)))| {
-            if index.is_multiple_of(ROWS) {
-                source.check_time()?;
-            }
-            let place = || format!("line {number}");
-            let mut count = 0;
-            for word in words(line, self.separator) {
-                if let Some(slot) = row.get_mut(count).filter(|_| asked(count)) {
-                    let word = without_quotes(word);
-                    *slot = copy::number(word).ok_or_else(|| {
-                        let shown = copy::excerpt(word);
-                        let error = source.error(place(), format!("“{shown}” is not a number"));
-                        if shown.contains(',') { error.hint("numbers have points, no decimal commas") } else { error }
-                    })?;
-                    if !slot.is_finite() {
-                        return Err(source.error(place(), format!("number {} is {slot}", count + 1)));
-                    }
+        table.par_chunks_mut(width).zip(&self.rows).enumerate().try_for_each(
+            |(index, (row, &(number, line)))| {
+                if index.is_multiple_of(ROWS) {
+                    source.check_time()?;
                 }
-                count += 1;
-            }
-            if count != width { Err(self.wrong_width(source, number, count)) } else { Ok(()) }
-        })?;
+                let place = || format!("line {number}");
+                let mut count = 0;
+                for word in words(line, self.separator) {
+                    if let Some(slot) = row.get_mut(count).filter(|_| asked(count)) {
+                        let word = without_quotes(word);
+                        *slot = copy::number(word).ok_or_else(|| {
+                            let shown = copy::excerpt(word);
+                            let error = source.error(place(), format!("“{shown}” is not a number"));
+                            if shown.contains(',') {
+                                error.hint("numbers have points, no decimal commas")
+                            } else {
+                                error
+                            }
+                        })?;
+                        if !slot.is_finite() {
+                            return Err(
+                                source.error(place(), format!("number {} is {slot}", count + 1))
+                            );
+                        }
+                    }
+                    count += 1;
+                }
+                if count != width { Err(self.wrong_width(source, number, count)) } else { Ok(()) }
+            },
+        )?;
         Ok(table)
     }
 
@@ -119,7 +137,8 @@ impl<'a> Text<'a> {
 
 /// The words of the first line that counts, and whether they are names; none in a file without such a line.
 pub(super) fn first_words(bytes: &[u8]) -> Option<(Vec<String>, bool)> {
-    let line = lines_of(without_mark(bytes)).map(<[u8]>::trim_ascii).find(|line| is_row(line, true))?;
+    let line =
+        lines_of(without_mark(bytes)).map(<[u8]>::trim_ascii).find(|line| is_row(line, true))?;
     let words = split(line).1;
     let named = has_names(&words);
     Some((words, named))
@@ -127,7 +146,8 @@ pub(super) fn first_words(bytes: &[u8]) -> Option<(Vec<String>, bool)> {
 
 /// The lines of a text, which end as on any system: by a line feed, a carriage return, or both.
 pub(super) fn lines_of(text: &[u8]) -> impl Iterator<Item = &[u8]> {
-    text.split(|&b| b == b'\n').flat_map(|line| line.strip_suffix(b"\r").unwrap_or(line).split(|&b| b == b'\r'))
+    text.split(|&b| b == b'\n')
+        .flat_map(|line| line.strip_suffix(b"\r").unwrap_or(line).split(|&b| b == b'\r'))
 }
 
 /// Without quotation marks around it.

@@ -15,14 +15,25 @@ pub(crate) fn decode(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<T
 }
 
 fn decode_here(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture>> {
-    let broken = |e: image::ImageError| source.error(place, format!("the picture cannot be decoded: {e}"));
-    let reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| broken(e.into()))?;
+    let broken =
+        |e: image::ImageError| source.error(place, format!("the picture cannot be decoded: {e}"));
+    let reader = image::ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|e| broken(e.into()))?;
     let mut decoder = reader.into_decoder().map_err(broken)?;
     let (width, height) = image::ImageDecoder::dimensions(&decoder);
     let texels = u64::from(width) * u64::from(height);
-    source.limits.check(LimitKind::Texels, source.path, format!("{place}: the number of texels"), texels)?;
+    source.limits.check(
+        LimitKind::Texels,
+        source.path,
+        format!("{place}: the number of texels"),
+        texels,
+    )?;
     if texels > (bytes.len() as u64).saturating_mul(MOST_TEXELS) {
-        let message = format!("the picture claims {width} × {height} texels, more than {} bytes can hold", bytes.len());
+        let message = format!(
+            "the picture claims {width} × {height} texels, more than {} bytes can hold",
+            bytes.len()
+        );
         return Err(source.error(place, message));
     }
     source.spend("the size of a picture in bytes", texels * TEXEL)?;
@@ -39,7 +50,11 @@ fn decode_here(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture
 }
 
 /// Reads the picture that a file refers to. `None`, with a warning, where there is no such file.
-pub(super) fn read_reference(source: &Source, place: &str, reference: &str) -> Result<Option<Arc<Texture>>> {
+pub(super) fn read_reference(
+    source: &Source,
+    place: &str,
+    reference: &str,
+) -> Result<Option<Arc<Texture>>> {
     let Some(path) = find(source, place, reference)? else { return Ok(None) };
     let file = source.open_beside(&path)?;
     file.unless_changed(decode(&file, place, file.bytes())).map(Some)
@@ -53,9 +68,15 @@ pub(super) fn find(source: &Source, place: &str, reference: &str) -> Result<Opti
         Err(_)
             if is_inside(&reference)
                 && (source.is_in_memory()
-                    || source.path.parent().is_some_and(|folder| !folder.join(&reference).exists())) =>
+                    || source
+                        .path
+                        .parent()
+                        .is_some_and(|folder| !folder.join(&reference).exists())) =>
         {
-            tracing::warn!("{}: {place}: “{reference}” does not exist; drawn without it", source.path.display());
+            tracing::warn!(
+                "{}: {place}: “{reference}” does not exist; drawn without it",
+                source.path.display()
+            );
             Ok(None)
         }
         Err(error) => Err(error),

@@ -1,8 +1,8 @@
 //! Files that are cut while they are read, by every way of reading.
 
 use super::{
-    Endian, Limits, RawLayout, SampleType, Source, Stream, VolumeStream, load_mesh, load_samples, ply, testing::Folder,
-    volume_of,
+    Endian, Limits, RawLayout, SampleType, Source, Stream, VolumeStream, load_mesh, load_samples,
+    ply, testing::Folder, volume_of,
 };
 use crate::{
     Error, Result,
@@ -53,7 +53,8 @@ fn meshes_and_clouds() {
     let folder = Folder::new();
     let binary = folder.path().join("a.ply");
     ply::write(&Mesh::knot(80, 20), &binary).unwrap();
-    let header = "element vertex 3000\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+    let header =
+        "element vertex 3000\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
     let points = lines(3000, |i| format!("{} {} {}\n", i % 60, i / 60, i % 7));
     let mut stl = vec![0; 80];
     stl.extend(1000u32.to_le_bytes());
@@ -80,7 +81,10 @@ fn meshes_and_clouds() {
     let files: [(&str, Vec<u8>); 7] = [
         ("binary.ply", std::fs::read(&binary).unwrap()),
         ("text.ply", format!("ply\nformat ascii 1.0\n{header}{points}").into_bytes()),
-        ("a.obj", (lines(3000, |i| format!("v {} {} {}\n", i % 60, i / 60, i % 7)) + &faces).into_bytes()),
+        (
+            "a.obj",
+            (lines(3000, |i| format!("v {} {} {}\n", i % 60, i / 60, i % 7)) + &faces).into_bytes(),
+        ),
         ("a.stl", stl),
         ("a.las", las),
         ("a.pcd", format!("{pcd}{points}").into_bytes()),
@@ -106,12 +110,15 @@ fn volumes_and_samples() {
          SCALARS s int\nLOOKUP_TABLE d\n{values}"
     );
     let samples: Vec<u8> = (0..27_000).map(|i| (i % 200) as u8).collect();
-    let nrrd = [&b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 30 30 30\nencoding: raw\n\n"[..], &samples].concat();
+    let nrrd =
+        [&b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 30 30 30\nencoding: raw\n\n"[..], &samples]
+            .concat();
     cut_when_open("a.vti", vti, |source| volume_of(source, None));
     cut_when_open("a.vtk", vtk, |source| volume_of(source, None));
     cut_when_open("a.nrrd", nrrd, |source| volume_of(source, None));
     let (sample_type, spacing) = (SampleType::from_name("u8").unwrap(), DVec3::ONE);
-    let layout = RawLayout { dims: [30; 3], sample_type, spacing, endian: Endian::Little, header: 0 };
+    let layout =
+        RawLayout { dims: [30; 3], sample_type, spacing, endian: Endian::Little, header: 0 };
     cut_when_open("a.raw", &samples, |source| volume_of(source, Some(&layout)));
     let table = lines(3000, |i| format!("{},{},{},{}\n", i % 60, i / 60, i % 7, i % 11));
     cut_when_open("a.csv", table, |source| load_samples::read(source, None));

@@ -62,8 +62,10 @@ impl VolumeStream {
         source.intact()?;
         let file = if plain.path == path { source } else { source.open_beside(&plain.path)? };
         let Some(map) = file.into_mapping() else { return Ok(None) };
-        let bytes =
-            plain.sample_type.bytes_of(plain.lattice.dims).and_then(|bytes| bytes.checked_add(plain.start as u64));
+        let bytes = plain
+            .sample_type
+            .bytes_of(plain.lattice.dims)
+            .and_then(|bytes| bytes.checked_add(plain.start as u64));
         let is_whole = bytes.is_some_and(|bytes| bytes <= map.len() as u64) && !map.is_empty();
         Ok(is_whole.then_some(Self { plain, scalar, map }))
     }
@@ -93,7 +95,8 @@ impl VolumeStream {
     pub fn slices(&self, z: Range<usize>) -> Result<Samples> {
         let Plain { start, sample_type, endian, ref lattice, .. } = self.plain;
         let slice = lattice.dims[0] * lattice.dims[1] * sample_type.bytes();
-        let samples = sample_type.decode(self.map[start + z.start * slice..start + z.end * slice].into(), endian);
+        let samples = sample_type
+            .decode(self.map[start + z.start * slice..start + z.end * slice].into(), endian);
         self.map.release();
         intact(&self.map, &self.plain.path).map(|()| samples)
     }
@@ -131,7 +134,9 @@ mod tests {
         let little = sample_type.parse(&text.join(" "), text.len()).unwrap();
         match endian {
             Endian::Little => little,
-            Endian::Big => little.chunks(sample_type.bytes()).flat_map(|n| n.iter().rev().copied()).collect(),
+            Endian::Big => {
+                little.chunks(sample_type.bytes()).flat_map(|n| n.iter().rev().copied()).collect()
+            }
         }
     }
 
@@ -142,32 +147,53 @@ mod tests {
         assert_eq!((stream.lattice(), stream.scalar()), (&whole.lattice, whole.samples.scalar()));
         assert_eq!(stream.range(&|_, _| ()).unwrap(), whole.range);
         let slice = whole.lattice.dims[0] * whole.lattice.dims[1] * whole.samples.sample_bytes();
-        assert_eq!(stream.slices(3..7).unwrap().bytes(), &whole.samples.bytes()[3 * slice..7 * slice]);
+        assert_eq!(
+            stream.slices(3..7).unwrap().bytes(),
+            &whole.samples.bytes()[3 * slice..7 * slice]
+        );
         assert_eq!(stream.slices(0..19).unwrap(), whole.samples);
     }
 
     #[test]
     fn slices_are_those_of_the_whole() {
         let folder = Folder::new();
-        for sample_type in
-            ["u8", "i8", "u16", "i16", "i32", "f32", "f64"].map(|name| SampleType::from_name(name).unwrap())
+        for sample_type in ["u8", "i8", "u16", "i16", "i32", "f32", "f64"]
+            .map(|name| SampleType::from_name(name).unwrap())
         {
             for endian in [Endian::Little, Endian::Big] {
                 let samples = bytes(sample_type, endian);
-                let layout = RawLayout { dims: [3, 4, 19], sample_type, spacing: DVec3::ONE, endian, header: 7 };
+                let layout = RawLayout {
+                    dims: [3, 4, 19],
+                    sample_type,
+                    spacing: DVec3::ONE,
+                    endian,
+                    header: 7,
+                };
                 let path = folder.write("a.raw", [&[0; 7], &samples[..]].concat());
                 compare(&path, Some(&layout));
                 let order = if endian == Endian::Big { "big" } else { "little" };
                 let name = match sample_type.name() {
                     "f32" => "float".into(),
                     "f64" => "double".into(),
-                    name => name.replace('u', "uint").replacen('i', "int", usize::from(name.starts_with('i'))),
+                    name => name.replace('u', "uint").replacen(
+                        'i',
+                        "int",
+                        usize::from(name.starts_with('i')),
+                    ),
                 };
-                let fields = format!("type: {name}\ndimension: 3\nsizes: 3 4 19\nendian: {order}\nencoding: raw");
-                let path = folder.write("a.nrrd", [format!("NRRD0004\n{fields}\n\n").as_bytes(), &samples].concat());
+                let fields = format!(
+                    "type: {name}\ndimension: 3\nsizes: 3 4 19\nendian: {order}\nencoding: raw"
+                );
+                let path = folder.write(
+                    "a.nrrd",
+                    [format!("NRRD0004\n{fields}\n\n").as_bytes(), &samples].concat(),
+                );
                 compare(&path, None);
                 folder.write("b.bin", &samples);
-                compare(&folder.write("b.nhdr", format!("NRRD0004\n{fields}\ndata file: b.bin\n")), None);
+                compare(
+                    &folder.write("b.nhdr", format!("NRRD0004\n{fields}\ndata file: b.bin\n")),
+                    None,
+                );
             }
         }
     }
@@ -184,20 +210,31 @@ mod tests {
             header: 0,
         };
         let path = folder.write("a.raw", [0; 16]);
-        for (sample_type, is_plain) in [(SampleType::F32, true), (SampleType::U32, false), (SampleType::U8, false)] {
+        for (sample_type, is_plain) in
+            [(SampleType::F32, true), (SampleType::U32, false), (SampleType::U8, false)]
+        {
             let stream = VolumeStream::open(&path, &limits, Some(&layout(sample_type))).unwrap();
             assert_eq!(stream.is_some(), is_plain, "{sample_type:?}");
         }
         for encoding in ["gzip", "raw\nbyte skip: 1", "raw\nline skip: 1", "ascii"] {
-            let text = format!("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1 1 1\nencoding: {encoding}\n\n 1");
+            let text = format!(
+                "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1 1 1\nencoding: {encoding}\n\n 1"
+            );
             let path = folder.write("a.nrrd", text);
             assert!(VolumeStream::open(&path, &limits, None).unwrap().is_none(), "{encoding}");
         }
-        let cut = folder.write("a.nrrd", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 9 9 9\nencoding: raw\n\n12");
+        let cut = folder.write(
+            "a.nrrd",
+            "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 9 9 9\nencoding: raw\n\n12",
+        );
         assert!(VolumeStream::open(&cut, &limits, None).unwrap().is_none());
         let path = folder.write("a.raw", [1f32, 2.0, f32::NAN, 3.0].map(f32::to_le_bytes).concat());
-        let stream = VolumeStream::open(&path, &limits, Some(&layout(SampleType::F32))).unwrap().unwrap();
+        let stream =
+            VolumeStream::open(&path, &limits, Some(&layout(SampleType::F32))).unwrap().unwrap();
         let message = stream.range(&|_, _| ()).unwrap_err().to_string();
-        assert!(message.contains("a.raw: samples of the slices 0 to 1: 1 of 4 samples are not finite"), "{message}");
+        assert!(
+            message.contains("a.raw: samples of the slices 0 to 1: 1 of 4 samples are not finite"),
+            "{message}"
+        );
     }
 }

@@ -28,7 +28,10 @@ pub fn read(source: &Source) -> Result<Volume> {
 
 /// The extent of all pieces together.
 pub(super) fn whole_extent(source: &Source, document: &Document, kind: &str) -> Result<Extent> {
-    let text = document.attributes.get("WholeExtent").ok_or_else(|| source.error(kind, "has no WholeExtent"))?;
+    let text = document
+        .attributes
+        .get("WholeExtent")
+        .ok_or_else(|| source.error(kind, "has no WholeExtent"))?;
     extent(source, kind, text)
 }
 
@@ -43,16 +46,25 @@ fn lattice(source: &Source, document: &Document, whole: Extent) -> Result<Lattic
     };
     let axes = directions * DMat3::from_diagonal(vector("Spacing", DVec3::ONE)?);
     let first = DVec3::from_array(whole.map(|[first, _]| first as f64));
-    let lattice = Lattice::cartesian(dims(source, &whole)?, vector("Origin", DVec3::ZERO)? + axes * first, axes);
+    let lattice = Lattice::cartesian(
+        dims(source, &whole)?,
+        vector("Origin", DVec3::ZERO)? + axes * first,
+        axes,
+    );
     lattice.validate().map_err(|message| source.error("ImageData", message))?;
     Ok(lattice)
 }
 
 /// The active scalars of all pieces.
-pub(super) fn samples<'a>(source: &Source, document: &'a Document, whole: Extent) -> Result<Part<'a>> {
+pub(super) fn samples<'a>(
+    source: &Source,
+    document: &'a Document,
+    whole: Extent,
+) -> Result<Part<'a>> {
     let mut parts = Vec::new();
     for piece in &document.pieces {
-        let text = piece.attributes.get("Extent").ok_or_else(|| source.error("Piece", "has no Extent"))?;
+        let text =
+            piece.attributes.get("Extent").ok_or_else(|| source.error("Piece", "has no Extent"))?;
         let extent = extent(source, "Piece", text)?;
         let array = piece.section("PointData").scalars().ok_or_else(|| {
             source
@@ -60,7 +72,8 @@ pub(super) fn samples<'a>(source: &Source, document: &'a Document, whole: Extent
                 .hint("values of cells are not read; turn them into values of points")
         })?;
         if array.components() != "1" {
-            let message = format!("has {} components, but a volume is made of scalars", array.components());
+            let message =
+                format!("has {} components, but a volume is made of scalars", array.components());
             return Err(source.error(array.place(), message));
         }
         let count = dims(source, &extent)?.iter().map(|&n| n as u64).product();
@@ -74,14 +87,21 @@ pub(super) fn samples<'a>(source: &Source, document: &'a Document, whole: Extent
 const MOST_TIMES: u64 = 64;
 
 /// Puts pieces together to the whole extent. Neighbouring pieces share the points between them.
-fn assemble<'a>(source: &Source, whole: Extent, parts: Vec<(Extent, Part<'a>)>) -> Result<Part<'a>> {
+fn assemble<'a>(
+    source: &Source,
+    whole: Extent,
+    parts: Vec<(Extent, Part<'a>)>,
+) -> Result<Part<'a>> {
     let wrong = |message: &str| source.error("Piece", message);
     let size = dims(source, &whole)?;
     let count: u64 = size.iter().map(|&n| n as u64).product();
     let mut held = 0u64;
     let (mut kind, mut endian) = (SampleType::U8, Endian::Little);
     for (i, (extent, part)) in parts.iter().enumerate() {
-        let inside = extent.iter().zip(&whole).all(|(piece, whole)| whole[0] <= piece[0] && piece[1] <= whole[1]);
+        let inside = extent
+            .iter()
+            .zip(&whole)
+            .all(|(piece, whole)| whole[0] <= piece[0] && piece[1] <= whole[1]);
         if !inside {
             return Err(wrong(&format!("{i} reaches out of the whole extent")));
         }
@@ -93,10 +113,14 @@ fn assemble<'a>(source: &Source, whole: Extent, parts: Vec<(Extent, Part<'a>)>) 
     }
     // Before anything is allocated: the pieces must hold enough to fill the whole.
     if held < count {
-        return Err(wrong(&format!("holds {held} points with all others, but the whole extent has {count}")));
+        return Err(wrong(&format!(
+            "holds {held} points with all others, but the whole extent has {count}"
+        )));
     }
     if held / MOST_TIMES > count {
-        return Err(wrong(&format!("holds {held} points with all others, too many for an extent of {count}")));
+        return Err(wrong(&format!(
+            "holds {held} points with all others, too many for an extent of {count}"
+        )));
     }
     if parts.len() == 1 {
         let mut parts = parts;
@@ -110,7 +134,8 @@ fn assemble<'a>(source: &Source, whole: Extent, parts: Vec<(Extent, Part<'a>)>) 
     for (extent, part) in &parts {
         source.check_time()?;
         let [nx, ny, nz] = dims(source, extent)?;
-        let first: [usize; 3] = std::array::from_fn(|axis| (extent[axis][0] - whole[axis][0]) as usize);
+        let first: [usize; 3] =
+            std::array::from_fn(|axis| (extent[axis][0] - whole[axis][0]) as usize);
         for (row, values) in part.bytes.chunks_exact(nx * width).enumerate().take(ny * nz) {
             let (j, k) = (first[1] + row % ny, first[2] + row / ny);
             let start = (k * size[1] + j) * size[0] + first[0];

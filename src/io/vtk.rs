@@ -80,7 +80,10 @@ pub fn read_volume(source: &Source) -> Result<Volume> {
         vtr::volume(data.places, samples)
     } else {
         let dims = data.dims.map(|count| count as usize);
-        Volume::new(Lattice::cartesian(dims, data.origin, DMat3::from_diagonal(data.spacing)), samples)
+        Volume::new(
+            Lattice::cartesian(dims, data.origin, DMat3::from_diagonal(data.spacing)),
+            samples,
+        )
     };
     volume.map_err(|message| source.error("samples", message))
 }
@@ -92,7 +95,9 @@ pub fn read_volume(source: &Source) -> Result<Volume> {
 pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
     let data = DataSet::read(source)?;
     if is_volume(&data.kind) {
-        return Err(source.error("DATASET", format!("is {}, a volume and no scattered samples", data.kind)));
+        return Err(
+            source.error("DATASET", format!("is {}, a volume and no scattered samples", data.kind))
+        );
     }
     let wanted = |attributes: &Attributes| {
         let is = |name: &String| scalar.is_none_or(|scalar| scalar == name);
@@ -100,7 +105,11 @@ pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
     };
     let count = |place: &str, there: usize, attributes: &Attributes| -> Result<(), Error> {
         let claim = attributes.count;
-        if there == claim { Ok(()) } else { Err(source.error(place, format!("claims {claim} of {there}"))) }
+        if there == claim {
+            Ok(())
+        } else {
+            Err(source.error(place, format!("claims {claim} of {there}")))
+        }
     };
     if let Some(index) = wanted(&data.points) {
         count("POINT_DATA", data.cells.points.len(), &data.points)?;
@@ -108,7 +117,9 @@ pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
     }
     if let Some(index) = wanted(&data.of_cells) {
         count("CELL_DATA", data.cells.ends.len(), &data.of_cells)?;
-        return data.cells.samples_at_centres(source, data.of_cells.arrays[index].1.doubles(source)?);
+        return data
+            .cells
+            .samples_at_centres(source, data.of_cells.arrays[index].1.doubles(source)?);
     }
     let arrays = data.points.arrays.iter().chain(&data.of_cells.arrays);
     let names: Vec<&str> = arrays.map(|(name, _)| name.as_str()).collect();
@@ -129,31 +140,43 @@ impl<'a> DataSet<'a> {
             let keyword = words[0].to_ascii_uppercase();
             match (keyword.as_str(), &words[1..]) {
                 ("DIMENSIONS", sizes) => data.dims = parser.three(&place, sizes)?,
-                ("ORIGIN", numbers) => data.origin = DVec3::from_array(parser.three(&place, numbers)?),
+                ("ORIGIN", numbers) => {
+                    data.origin = DVec3::from_array(parser.three(&place, numbers)?)
+                }
                 ("SPACING" | "ASPECT_RATIO", numbers) => {
                     data.spacing = DVec3::from_array(parser.three(&place, numbers)?);
                 }
                 ("X_COORDINATES" | "Y_COORDINATES" | "Z_COORDINATES", [count, kind]) => {
                     let axis = usize::from(keyword.as_bytes()[0] - b'X');
-                    data.places[axis] = parser.array(&place, parser.count(&place, count)?, kind)?.doubles(source)?;
+                    data.places[axis] = parser
+                        .array(&place, parser.count(&place, count)?, kind)?
+                        .doubles(source)?;
                 }
                 // Cells that were read refer to points that were there.
-                ("POINTS", _) if !(data.cells.points.is_empty() && data.cells.corners.is_empty()) => {
+                ("POINTS", _)
+                    if !(data.cells.points.is_empty() && data.cells.corners.is_empty()) =>
+                {
                     return Err(wrong("POINTS are given twice, or behind the cells".into()));
                 }
                 ("POINTS", [count, kind]) => {
                     let count = parser.count(&place, count)?;
-                    let numbers = parser.array(&place, count.saturating_mul(3), kind)?.doubles(source)?;
+                    let numbers =
+                        parser.array(&place, count.saturating_mul(3), kind)?.doubles(source)?;
                     source.room::<DVec3>("the points", count)?;
                     data.cells.points = numbers.chunks_exact(3).map(DVec3::from_slice).collect();
                 }
-                ("CELLS" | "VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS", [count, size]) => {
+                (
+                    "CELLS" | "VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS",
+                    [count, size],
+                ) => {
                     let (count, size) = (parser.count(&place, count)?, parser.count(&place, size)?);
                     let (corners, ends) = parser.cells(&place, count, size)?;
                     data.cells.room(source, corners.len(), ends.len())?;
                     data.cells.add(&corners, &ends, 0).map_err(wrong)?;
                 }
-                ("CELL_TYPES", [count]) => drop(parser.array(&place, parser.count(&place, count)?, "int")?),
+                ("CELL_TYPES", [count]) => {
+                    drop(parser.array(&place, parser.count(&place, count)?, "int")?)
+                }
                 ("POINT_DATA", [count]) => {
                     data.points.count = parser.count(&place, count)?;
                     attributes = Some(false);
@@ -163,7 +186,9 @@ impl<'a> DataSet<'a> {
                     attributes = Some(true);
                 }
                 ("METADATA", _) => parser.skip_to_blank()?,
-                ("LOOKUP_TABLE", [_, count]) => parser.skip_colors(&place, parser.count(&place, count)?, 4)?,
+                ("LOOKUP_TABLE", [_, count]) => {
+                    parser.skip_colors(&place, parser.count(&place, count)?, 4)?
+                }
                 ("FIELD", [_, arrays]) => {
                     for _ in 0..parser.count(&place, arrays)? {
                         let (name, components, part) = parser.field()?;
@@ -177,16 +202,22 @@ impl<'a> DataSet<'a> {
                 }
                 (_, [name, rest @ ..]) => {
                     let Some(attributes) = data.attributes(attributes) else {
-                        return Err(wrong(format!("“{keyword}” is not known before POINT_DATA or CELL_DATA")));
+                        return Err(wrong(format!(
+                            "“{keyword}” is not known before POINT_DATA or CELL_DATA"
+                        )));
                     };
                     let count = attributes.count;
                     let (components, kind) = match (keyword.as_str(), rest) {
                         ("SCALARS", [kind]) => (1, *kind),
-                        ("SCALARS", [kind, components]) => (parser.count(&place, components)?, *kind),
+                        ("SCALARS", [kind, components]) => {
+                            (parser.count(&place, components)?, *kind)
+                        }
                         ("VECTORS" | "NORMALS", [kind]) => (3, *kind),
                         ("TENSORS", [kind]) => (9, *kind),
                         ("TENSORS6", [kind]) => (6, *kind),
-                        ("TEXTURE_COORDINATES", [components, kind]) => (parser.count(&place, components)?, *kind),
+                        ("TEXTURE_COORDINATES", [components, kind]) => {
+                            (parser.count(&place, components)?, *kind)
+                        }
                         ("GLOBAL_IDS" | "PEDIGREE_IDS" | "EDGE_FLAGS", [kind]) => (1, *kind),
                         ("COLOR_SCALARS", [components]) => {
                             parser.skip_colors(&place, count, parser.count(&place, components)?)?;
@@ -202,16 +233,25 @@ impl<'a> DataSet<'a> {
                         attributes.arrays.push((parser::unescaped(name), part));
                     }
                 }
-                _ => return Err(wrong(format!("“{}” is not known", line.chars().take(40).collect::<String>()))),
+                _ => {
+                    return Err(wrong(format!(
+                        "“{}” is not known",
+                        line.chars().take(40).collect::<String>()
+                    )));
+                }
             }
         }
         let points = if data.cells.points.is_empty() {
-            data.dims.iter().try_fold(1u64, |product, &n| product.checked_mul(n)).unwrap_or(u64::MAX)
+            data.dims
+                .iter()
+                .try_fold(1u64, |product, &n| product.checked_mul(n))
+                .unwrap_or(u64::MAX)
         } else {
             data.cells.points.len() as u64
         };
         if !data.points.arrays.is_empty() && points != data.points.count as u64 {
-            let message = format!("claims {} points, but the data set has {points}", data.points.count);
+            let message =
+                format!("claims {} points, but the data set has {points}", data.points.count);
             return Err(source.error("POINT_DATA", message));
         }
         Ok(data)

@@ -23,17 +23,28 @@ const DEFLATE_RATIO: u64 = 1032;
 impl ArrayEncoding {
     /// The array of `size` bytes that `bytes` begin with, its counts first; whatever follows it is left out. `place` names
     /// it in errors.
-    pub fn array<'b>(&self, source: &Source, place: &str, bytes: Cow<'b, [u8]>, size: usize) -> Result<Cow<'b, [u8]>> {
+    pub fn array<'b>(
+        &self,
+        source: &Source,
+        place: &str,
+        bytes: Cow<'b, [u8]>,
+        size: usize,
+    ) -> Result<Cow<'b, [u8]>> {
         if self.packed {
             return self.unpack(source, place, &bytes, size).map(Cow::Owned);
         }
-        let claim = self.count(&bytes, 0).ok_or_else(|| source.error(place, "ends before its data begin"))?;
+        let claim = self
+            .count(&bytes, 0)
+            .ok_or_else(|| source.error(place, "ends before its data begin"))?;
         if claim != size as u64 {
-            return Err(source.error(place, format!("claims {claim} bytes where {size} were expected")));
+            return Err(
+                source.error(place, format!("claims {claim} bytes where {size} were expected"))
+            );
         }
         let start = self.count_bytes();
         if bytes.len() - start < size {
-            let message = format!("there are {} bytes where {size} were expected", bytes.len() - start);
+            let message =
+                format!("there are {} bytes where {size} were expected", bytes.len() - start);
             return Err(source.error(place, message));
         }
         Ok(match bytes {
@@ -60,37 +71,52 @@ impl ArrayEncoding {
                 "claims {blocks} blocks of {block} bytes, the last of {last}, where {size} bytes were expected"
             )));
         }
-        let sizes_end = blocks.checked_add(3).and_then(|n| n.checked_mul(self.count_bytes() as u64));
-        let sizes_end = sizes_end.filter(|&end| end <= bytes.len() as u64).ok_or_else(cut)? as usize;
+        let sizes_end =
+            blocks.checked_add(3).and_then(|n| n.checked_mul(self.count_bytes() as u64));
+        let sizes_end =
+            sizes_end.filter(|&end| end <= bytes.len() as u64).ok_or_else(cut)? as usize;
         let mut rest = &bytes[sizes_end..];
         source.room::<&[u8]>("the places of the blocks", blocks as usize)?;
         let mut packed = Vec::with_capacity(blocks as usize);
         for i in 0..blocks as usize {
             let length = head(3 + i)?;
-            let Some((block, after)) = usize::try_from(length).ok().and_then(|length| rest.split_at_checked(length))
+            let Some((block, after)) =
+                usize::try_from(length).ok().and_then(|length| rest.split_at_checked(length))
             else {
-                return Err(wrong(format!("block {i} claims {length} bytes, but {} are left", rest.len())));
+                return Err(wrong(format!(
+                    "block {i} claims {length} bytes, but {} are left",
+                    rest.len()
+                )));
             };
             packed.push(block);
             rest = after;
         }
         let present: u64 = packed.iter().map(|block| block.len() as u64).sum();
         if present.saturating_mul(DEFLATE_RATIO) < size as u64 {
-            return Err(wrong(format!("claims {size} bytes, which {present} packed ones cannot hold")));
+            return Err(wrong(format!(
+                "claims {size} bytes, which {present} packed ones cannot hold"
+            )));
         }
         source.spend("the unpacked size in bytes", size as u64)?;
         let mut unpacked = vec![0; size];
         // `size` is over 0, so `block` is; with `last` at most `block` there are as many parts as blocks.
-        unpacked.par_chunks_mut(block as usize).zip(packed).enumerate().try_for_each(|(i, (part, packed))| {
-            source.check_time()?;
-            let mut stream = ZlibDecoder::new(packed);
-            stream.read_exact(part).map_err(|e| wrong(format!("block {i} cannot be unpacked: {e}")))?;
-            match stream.read(&mut [0]) {
-                Ok(0) => Ok(()),
-                Ok(_) => Err(wrong(format!("block {i} unpacks to more than its {} bytes", part.len()))),
-                Err(e) => Err(wrong(format!("block {i} cannot be unpacked: {e}"))),
-            }
-        })?;
+        unpacked.par_chunks_mut(block as usize).zip(packed).enumerate().try_for_each(
+            |(i, (part, packed))| {
+                source.check_time()?;
+                let mut stream = ZlibDecoder::new(packed);
+                stream
+                    .read_exact(part)
+                    .map_err(|e| wrong(format!("block {i} cannot be unpacked: {e}")))?;
+                match stream.read(&mut [0]) {
+                    Ok(0) => Ok(()),
+                    Ok(_) => Err(wrong(format!(
+                        "block {i} unpacks to more than its {} bytes",
+                        part.len()
+                    ))),
+                    Err(e) => Err(wrong(format!("block {i} cannot be unpacked: {e}"))),
+                }
+            },
+        )?;
         Ok(unpacked)
     }
 
@@ -121,9 +147,9 @@ pub fn from_base64(source: &Source, place: &str, text: &[u8]) -> Result<Vec<u8>>
         let padded = rest.iter().position(|&b| b == b'=');
         let end = padded.map_or(rest.len(), |at| rest.len().min((at / 4 + 1) * 4));
         let (part, after) = rest.split_at(end);
-        STANDARD
-            .decode_vec(part, &mut bytes)
-            .map_err(|e| source.error(place, format!("is no base64 (after {} bytes): {e}", bytes.len())))?;
+        STANDARD.decode_vec(part, &mut bytes).map_err(|e| {
+            source.error(place, format!("is no base64 (after {} bytes): {e}", bytes.len()))
+        })?;
         rest = after;
     }
     Ok(bytes)

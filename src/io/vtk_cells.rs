@@ -37,14 +37,19 @@ impl Cells {
         for (cell, &end) in ends.iter().enumerate() {
             let before = self.ends.last().map_or(start, |&end| end.max(start)) - start;
             if !(end >= before as f64 && end <= corners.len() as f64 && end.fract() == 0.0) {
-                return Err(format!("cell {cell} ends at corner {end}, of {} and after {before}", corners.len()));
+                return Err(format!(
+                    "cell {cell} ends at corner {end}, of {} and after {before}",
+                    corners.len()
+                ));
             }
             self.ends.push(start + end as usize);
         }
         for &corner in corners {
             let count = self.points.len() - first_point;
             if !(corner >= 0.0 && corner < count as f64 && corner.fract() == 0.0) {
-                return Err(format!("a cell has the corner {corner}, but there are {count} points"));
+                return Err(format!(
+                    "a cell has the corner {corner}, but there are {count} points"
+                ));
             }
             self.corners.push(first_point + corner as usize);
         }
@@ -54,7 +59,13 @@ impl Cells {
     /// Samples at the points.
     pub fn samples_at_points(self, source: &Source, values: Vec<f64>) -> Result<Points> {
         let place = |row| format!("point {row}");
-        gather(source, self.points.len(), |row| self.points[row], place, Columns { values, ..Columns::default() })
+        gather(
+            source,
+            self.points.len(),
+            |row| self.points[row],
+            place,
+            Columns { values, ..Columns::default() },
+        )
     }
 
     /// Samples at the cells' centres, the means of their corners. Their radii are from the sizes of the cells, unless a cell
@@ -65,11 +76,15 @@ impl Cells {
         for (cell, &end) in self.ends.iter().enumerate() {
             let corners = || self.corners[start..end].iter().map(|&corner| self.points[corner]);
             if start == end {
-                return Err(source.error(format!("cell {cell}"), "has no corners, so a value of it has no place"));
+                return Err(source.error(
+                    format!("cell {cell}"),
+                    "has no corners, so a value of it has no place",
+                ));
             }
             let count = (end - start) as f64;
             let centre = corners().sum::<DVec3>() / count;
-            let square = corners().map(|corner| corner.distance_squared(centre)).sum::<f64>() / count;
+            let square =
+                corners().map(|corner| corner.distance_squared(centre)).sum::<f64>() / count;
             centres.push(centre);
             radii.push((REACH * square.sqrt()) as f32);
             start = end;

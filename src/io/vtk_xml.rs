@@ -81,7 +81,9 @@ impl<'a> Document<'a> {
         let bytes = source.bytes();
         let end = b"</VTKFile>";
         if !bytes[bytes.len().saturating_sub(1024)..].windows(end.len()).any(|w| w == end) {
-            return Err(source.error(format!("byte {}", bytes.len()), "the file ends before </VTKFile>"));
+            return Err(
+                source.error(format!("byte {}", bytes.len()), "the file ends before </VTKFile>")
+            );
         }
         let (xml, appended) = Appended::split(source)?;
         let xml = source.keep_text(xml, "the XML")?;
@@ -122,7 +124,9 @@ impl<'a> Document<'a> {
                 Ok(Event::End(_)) => depth -= 1,
                 _ => {}
             }
-            match event.map_err(|e| source.error(format!("byte {at}"), format!("is no XML: {e}")))? {
+            match event
+                .map_err(|e| source.error(format!("byte {at}"), format!("is no XML: {e}")))?
+            {
                 Event::Start(tag) => match (&mut array, &section) {
                     (Some((_, depth)), _) => *depth += 1,
                     (None, inside) => {
@@ -133,8 +137,14 @@ impl<'a> Document<'a> {
                                 self.offsets.push(number(source, "offset", offset)?);
                             }
                             array = Some((Array { attributes, text: Cow::Borrowed("") }, 0));
-                        } else if inside.is_none() && !self.element(name.as_ref(), kind, &attributes)? {
-                            section = Some(Section { name: name.as_ref().into(), attributes, arrays: Vec::new() });
+                        } else if inside.is_none()
+                            && !self.element(name.as_ref(), kind, &attributes)?
+                        {
+                            section = Some(Section {
+                                name: name.as_ref().into(),
+                                attributes,
+                                arrays: Vec::new(),
+                            });
                         }
                     }
                 },
@@ -184,30 +194,38 @@ impl<'a> Document<'a> {
         let source = self.source;
         let place = array.place();
         let name = array.get("type").unwrap_or_default();
-        let kind = sample_type(name).ok_or_else(|| source.error(&place, format!("type “{name}” is not supported")))?;
+        let kind = sample_type(name)
+            .ok_or_else(|| source.error(&place, format!("type “{name}” is not supported")))?;
         let needed = count.checked_mul(kind.bytes() as u64);
-        let size = source.check_bytes("the size of the samples in bytes", needed.unwrap_or(u64::MAX))?;
+        let size =
+            source.check_bytes("the size of the samples in bytes", needed.unwrap_or(u64::MAX))?;
         let mut endian = self.encoding.endian;
         let packed = match array.get("format").unwrap_or("ascii") {
             "ascii" => {
                 endian = Endian::Little;
                 source.spend("the size of the numbers in bytes", size as u64)?;
-                let bytes =
-                    kind.parse(&array.text, size / kind.bytes()).map_err(|message| source.error(&place, message))?;
+                let bytes = kind
+                    .parse(&array.text, size / kind.bytes())
+                    .map_err(|message| source.error(&place, message))?;
                 return Ok(Part { kind, endian, bytes: bytes.into() });
             }
             "binary" => from_base64(source, &place, array.text.as_bytes())?.into(),
             "appended" => {
                 let appended = self.appended.as_ref();
-                let appended = appended.ok_or_else(|| source.error(&place, "is appended, but nothing is"))?;
-                let offset = array.get("offset").ok_or_else(|| source.error(&place, "has no offset"))?;
+                let appended =
+                    appended.ok_or_else(|| source.error(&place, "is appended, but nothing is"))?;
+                let offset =
+                    array.get("offset").ok_or_else(|| source.error(&place, "has no offset"))?;
                 appended.array(source, &place, number(source, &place, offset)?, &self.offsets)?
             }
             other => return Err(source.error(place, format!("format “{other}” is not supported"))),
         };
         // Nothing is not written with counts by all writers.
-        let bytes =
-            if size == 0 { Cow::Borrowed(&[][..]) } else { self.encoding.array(source, &place, packed, size)? };
+        let bytes = if size == 0 {
+            Cow::Borrowed(&[][..])
+        } else {
+            self.encoding.array(source, &place, packed, size)?
+        };
         Ok(Part { kind, endian, bytes })
     }
 }
@@ -298,7 +316,10 @@ impl<'a> Appended<'a> {
         };
         let place = "AppendedData";
         let (xml, section) = bytes.split_at(at);
-        let close = section.iter().position(|&b| b == b'>').ok_or_else(|| source.error(place, "is cut off"))?;
+        let close = section
+            .iter()
+            .position(|&b| b == b'>')
+            .ok_or_else(|| source.error(place, "is cut off"))?;
         let (tag, data) = section.split_at(close + 1);
         let tag = copy::lossy(tag);
         let base64 = if tag.contains("\"raw\"") || tag.contains("'raw'") {
@@ -306,19 +327,33 @@ impl<'a> Appended<'a> {
         } else if tag.contains("\"base64\"") || tag.contains("'base64'") {
             true
         } else {
-            return Err(source.error(place, format!("“{tag}” has an encoding that is neither raw nor base64")));
+            return Err(source
+                .error(place, format!("“{tag}” has an encoding that is neither raw nor base64")));
         };
         let end = b"</AppendedData";
         let end = data.windows(end.len()).rposition(|w| w == end);
         let data = data[..end.ok_or_else(|| source.error(place, "has no end"))?].trim_ascii_start();
-        let data = data.strip_prefix(b"_").ok_or_else(|| source.error(place, "does not begin with an underscore"))?;
+        let data = data
+            .strip_prefix(b"_")
+            .ok_or_else(|| source.error(place, "does not begin with an underscore"))?;
         Ok((xml, Some(Self { base64, data })))
     }
 
     /// The bytes from an offset on. Base64 ends with the section or where the next array begins, raw bytes say
     /// themselves how many there are.
-    fn array(&self, source: &Source, place: &str, offset: usize, offsets: &[usize]) -> Result<Cow<'a, [u8]>> {
-        let message = || format!("begins at offset {offset}, but the appended data have {} bytes", self.data.len());
+    fn array(
+        &self,
+        source: &Source,
+        place: &str,
+        offset: usize,
+        offsets: &[usize],
+    ) -> Result<Cow<'a, [u8]>> {
+        let message = || {
+            format!(
+                "begins at offset {offset}, but the appended data have {} bytes",
+                self.data.len()
+            )
+        };
         let data = self.data.get(offset..).ok_or_else(|| source.error(place, message()))?;
         if !self.base64 {
             return Ok(data.into());
@@ -349,7 +384,8 @@ fn sample_type(name: &str) -> Option<SampleType> {
 const MOST_ATTRIBUTES: usize = 64;
 
 fn attributes(source: &Source, at: u64, tag: &BytesStart) -> Result<Attributes> {
-    let wrong = |e: String| source.error(format!("byte {at}"), format!("has a wrong attribute: {e}"));
+    let wrong =
+        |e: String| source.error(format!("byte {at}"), format!("has a wrong attribute: {e}"));
     let mut attributes = Attributes::new();
     for attribute in tag.attributes() {
         // Each is compared with all before it.
@@ -357,20 +393,30 @@ fn attributes(source: &Source, at: u64, tag: &BytesStart) -> Result<Attributes> 
             return Err(wrong(format!("there are more than {MOST_ATTRIBUTES}")));
         }
         let attribute = attribute.map_err(|e| wrong(e.to_string()))?;
-        let value = attribute.normalized_value(XmlVersion::Implicit1_0).map_err(|e| wrong(e.to_string()))?;
+        let value = attribute
+            .normalized_value(XmlVersion::Implicit1_0)
+            .map_err(|e| wrong(e.to_string()))?;
         attributes.insert(attribute.key.as_ref().to_owned(), value.into_owned());
     }
     Ok(attributes)
 }
 
 pub fn number<T: std::str::FromStr>(source: &Source, place: &str, text: &str) -> Result<T> {
-    text.trim().parse().map_err(|_| source.error(place, format!("“{text}” is not a number that fits here")))
+    text.trim()
+        .parse()
+        .map_err(|_| source.error(place, format!("“{text}” is not a number that fits here")))
 }
 
-pub fn numbers<const N: usize, T: std::str::FromStr>(source: &Source, place: &str, text: &str) -> Result<[T; N]> {
+pub fn numbers<const N: usize, T: std::str::FromStr>(
+    source: &Source,
+    place: &str,
+    text: &str,
+) -> Result<[T; N]> {
     let numbers: Result<Vec<T>> =
         text.split_ascii_whitespace().take(N + 1).map(|word| number(source, place, word)).collect();
-    numbers?.try_into().map_err(|_| source.error(place, format!("“{text}” is not a list of {N} numbers")))
+    numbers?
+        .try_into()
+        .map_err(|_| source.error(place, format!("“{text}” is not a list of {N} numbers")))
 }
 
 pub fn extent(source: &Source, place: &str, text: &str) -> Result<Extent> {
@@ -383,10 +429,13 @@ pub fn dims(source: &Source, extent: &Extent) -> Result<[usize; 3]> {
     let mut dims = [0; 3];
     let mut points = 1u64;
     for (dim, [first, last]) in dims.iter_mut().zip(extent) {
-        let length = last.checked_sub(*first).and_then(|n| n.checked_add(1)).and_then(|n| u64::try_from(n).ok());
-        let length = length
-            .filter(|&n| n > 0)
-            .ok_or_else(|| -> Error { source.error("extent", format!("{first} to {last} holds no points")) })?;
+        let length = last
+            .checked_sub(*first)
+            .and_then(|n| n.checked_add(1))
+            .and_then(|n| u64::try_from(n).ok());
+        let length = length.filter(|&n| n > 0).ok_or_else(|| -> Error {
+            source.error("extent", format!("{first} to {last} holds no points"))
+        })?;
         points = points.saturating_mul(length);
         *dim = source.check_bytes("the number of points", points).map(|_| length as usize)?;
     }

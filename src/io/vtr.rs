@@ -27,7 +27,10 @@ pub fn read(source: &Source) -> Result<Volume> {
 }
 
 /// A volume with samples at these coordinates along x, y and z.
-pub(super) fn volume(places: [Vec<f64>; 3], samples: crate::volume::Samples) -> Result<Volume, String> {
+pub(super) fn volume(
+    places: [Vec<f64>; 3],
+    samples: crate::volume::Samples,
+) -> Result<Volume, String> {
     let dims = places.each_ref().map(Vec::len);
     let arrangement = Arrangement::Rectilinear(Arc::new(places));
     Volume::new(Lattice { dims, origin: DVec3::ZERO, axes: DMat3::IDENTITY, arrangement }, samples)
@@ -46,7 +49,8 @@ fn coordinates(source: &Source, document: &Document, whole: Extent) -> Result<[V
         let counts = dims(source, &extent)?;
         let arrays = &piece.section("Coordinates").arrays;
         if arrays.len() != 3 {
-            let message = format!("holds {} arrays where one for each of 3 axes was expected", arrays.len());
+            let message =
+                format!("holds {} arrays where one for each of 3 axes was expected", arrays.len());
             return Err(source.error("Coordinates", message));
         }
         for (axis, (array, count)) in arrays.iter().zip(counts).enumerate() {
@@ -90,7 +94,10 @@ mod tests {
         let whole = grid("0 2 0 1 0 0", &[("0 2 0 1 0 0", ["0 1 5", "-1 1", "7"], "0 1 2 3 4 5")]);
         let pieces = grid(
             "0 2 0 1 0 0",
-            &[("0 1 0 1 0 0", ["0 1", "-1 1", "7"], "0 1 3 4"), ("1 2 0 1 0 0", ["1 5", "-1 1", "7"], "1 2 4 5")],
+            &[
+                ("0 1 0 1 0 0", ["0 1", "-1 1", "7"], "0 1 3 4"),
+                ("1 2 0 1 0 0", ["1 5", "-1 1", "7"], "1 2 4 5"),
+            ],
         );
         for text in [&whole, &pieces] {
             let volume = load(text).unwrap();
@@ -103,12 +110,16 @@ mod tests {
 
     #[test]
     fn wrong_coordinates_are_told() {
-        let with =
-            |x: &str| load(&grid("0 2 0 0 0 0", &[("0 2 0 0 0 0", [x, "0", "0"], "0 1 2")])).unwrap_err().to_string();
+        let with = |x: &str| {
+            load(&grid("0 2 0 0 0 0", &[("0 2 0 0 0 0", [x, "0", "0"], "0 1 2")]))
+                .unwrap_err()
+                .to_string()
+        };
         assert!(with("0 2 2").contains("must ascend"));
         assert!(with("0 2").contains("2 numbers where 3"));
         assert!(with("0 2 nan").contains("ascend"));
-        let none = grid("0 0 0 0 0 0", &[("0 0 0 0 0 0", ["0", "0", "0"], "0")]).replace("Coordinates", "Places");
+        let none = grid("0 0 0 0 0 0", &[("0 0 0 0 0 0", ["0", "0", "0"], "0")])
+            .replace("Coordinates", "Places");
         assert!(load(&none).unwrap_err().to_string().contains("0 arrays"));
     }
 }

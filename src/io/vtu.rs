@@ -13,8 +13,12 @@ use glam::DVec3;
 /// The sections of a piece that hold cells, in the order in which data of cells count them, and the attributes with their
 /// numbers of cells.
 const UNSTRUCTURED: &[[&str; 2]] = &[["Cells", "NumberOfCells"]];
-const POLYGONS: &[[&str; 2]] =
-    &[["Verts", "NumberOfVerts"], ["Lines", "NumberOfLines"], ["Polys", "NumberOfPolys"], ["Strips", "NumberOfStrips"]];
+const POLYGONS: &[[&str; 2]] = &[
+    ["Verts", "NumberOfVerts"],
+    ["Lines", "NumberOfLines"],
+    ["Polys", "NumberOfPolys"],
+    ["Strips", "NumberOfStrips"],
+];
 
 /// Reads an unstructured grid or polygons. The values are the array that `scalar` names, among those of points and then of
 /// cells; else the active scalars of the points (those that `Scalars` names, or the first with one component), else of the
@@ -27,7 +31,8 @@ const POLYGONS: &[[&str; 2]] =
 pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
     let start = &source.bytes()[..source.bytes().len().min(1024)];
     let polygons = start.windows(8).any(|w| w == b"PolyData");
-    let (kind, sections) = if polygons { ("PolyData", POLYGONS) } else { ("UnstructuredGrid", UNSTRUCTURED) };
+    let (kind, sections) =
+        if polygons { ("PolyData", POLYGONS) } else { ("UnstructuredGrid", UNSTRUCTURED) };
     let document = Document::read(source, kind)?;
     let (of_cells, name) = choose(source, &document.pieces, scalar)?;
     let mut cells = Cells::default();
@@ -41,19 +46,36 @@ pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
         for [section, attribute] in sections {
             let count = piece.count(source, attribute)?;
             cell_count = cell_count.saturating_add(count);
-            source.check_points("the number of cells", cell_count.saturating_add(cells.ends.len() as u64))?;
+            source.check_points(
+                "the number of cells",
+                cell_count.saturating_add(cells.ends.len() as u64),
+            )?;
             if of_cells && count > 0 {
-                add_cells(source, &document, piece.section(section), count, first_point, &mut cells)?;
+                add_cells(
+                    source,
+                    &document,
+                    piece.section(section),
+                    count,
+                    first_point,
+                    &mut cells,
+                )?;
             }
         }
-        let (section, count) = if of_cells { ("CellData", cell_count) } else { ("PointData", count) };
+        let (section, count) =
+            if of_cells { ("CellData", cell_count) } else { ("PointData", count) };
         let array = piece.section(section).array(&name);
         if count > 0 {
-            let array = array.ok_or_else(|| source.error(section, format!("has no array “{name}” in every piece")))?;
+            let array = array.ok_or_else(|| {
+                source.error(section, format!("has no array “{name}” in every piece"))
+            })?;
             values.extend(document.part(array, count)?.doubles(source)?);
         }
     }
-    if of_cells { cells.samples_at_centres(source, values) } else { cells.samples_at_points(source, values) }
+    if of_cells {
+        cells.samples_at_centres(source, values)
+    } else {
+        cells.samples_at_points(source, values)
+    }
 }
 
 /// The array to be shown: whether it is one of cells, and its name. Pieces all have the same arrays.
@@ -64,19 +86,32 @@ fn choose(source: &Source, pieces: &[Piece], scalar: Option<&str>) -> Result<(bo
         let array = scalar.map_or_else(|| section.scalars(), |name| section.array(name));
         if let Some(array) = array {
             if array.components() != "1" {
-                let message = format!("has {} components, but samples are made of scalars", array.components());
+                let message = format!(
+                    "has {} components, but samples are made of scalars",
+                    array.components()
+                );
                 return Err(source.error(array.place(), message));
             }
             return Ok((of_cells, array.get("Name").unwrap_or_default().to_owned()));
         }
         names.extend(
-            section.arrays.iter().filter(|array| array.components() == "1").filter_map(|array| array.get("Name")),
+            section
+                .arrays
+                .iter()
+                .filter(|array| array.components() == "1")
+                .filter_map(|array| array.get("Name")),
         );
     }
     Err(which_scalar(source, "PointData and CellData", scalar, &names))
 }
 
-fn add_points(source: &Source, document: &Document, piece: &Piece, count: u64, cells: &mut Cells) -> Result<()> {
+fn add_points(
+    source: &Source,
+    document: &Document,
+    piece: &Piece,
+    count: u64,
+    cells: &mut Cells,
+) -> Result<()> {
     if count == 0 {
         return Ok(());
     }
@@ -101,10 +136,14 @@ fn add_cells(
     first_point: usize,
     cells: &mut Cells,
 ) -> Result<()> {
-    let need = |name: &str| section.array(name).ok_or_else(|| source.error("Cells", format!("hold no array “{name}”")));
+    let need = |name: &str| {
+        section.array(name).ok_or_else(|| source.error("Cells", format!("hold no array “{name}”")))
+    };
     let ends = document.part(need("offsets")?, count)?.doubles(source)?;
     // The last offset is the number of corners; the cast saturates.
-    let corners = document.part(need("connectivity")?, ends.last().map_or(0, |&end| end as u64))?.doubles(source)?;
+    let corners = document
+        .part(need("connectivity")?, ends.last().map_or(0, |&end| end as u64))?
+        .doubles(source)?;
     cells.room(source, corners.len(), ends.len())?;
     cells.add(&corners, &ends, first_point).map_err(|message| source.error("Cells", message))
 }
@@ -121,7 +160,10 @@ mod tests {
 
     /// A tetrahedron of edge 2 and a square beside it.
     fn grid(point_data: &str, cell_data: &str) -> String {
-        let points = array("type='Float32' NumberOfComponents='3'", "0 0 0 2 0 0 0 2 0 0 0 2  5 0 0 7 0 0 7 2 0 5 2 0");
+        let points = array(
+            "type='Float32' NumberOfComponents='3'",
+            "0 0 0 2 0 0 0 2 0 0 0 2  5 0 0 7 0 0 7 2 0 5 2 0",
+        );
         let corners = array("type='Int64' Name='connectivity'", "0 1 2 3 4 5 6 7");
         let ends = array("type='Int64' Name='offsets'", "4 8");
         let kinds = array("type='UInt8' Name='types'", "10 9");
@@ -144,7 +186,10 @@ mod tests {
         let of_cells = array("type='Int32' Name='c'", "10 -20");
         let both = grid(&format!("{vector}{of_points}"), &of_cells);
         let points = load(&both, None).unwrap();
-        assert_eq!((points.len(), points.positions[6], points.values[6]), (8, Vec3::new(7.0, 2.0, 0.0), 7.0));
+        assert_eq!(
+            (points.len(), points.positions[6], points.values[6]),
+            (8, Vec3::new(7.0, 2.0, 0.0), 7.0)
+        );
         assert!(points.radii.is_empty());
         for points in [load(&both, Some("c")).unwrap(), load(&grid("", &of_cells), None).unwrap()] {
             assert_eq!(points.positions, [Vec3::splat(0.5), Vec3::new(6.0, 1.0, 0.0)]);
@@ -173,16 +218,21 @@ mod tests {
             let message = load(text, scalar).unwrap_err().to_string();
             assert!(message.contains(word), "{message}");
         }
-        let lie = load(&whole.replace("NumberOfPoints='8'", "NumberOfPoints='99999999999'"), None).unwrap_err();
+        let lie = load(&whole.replace("NumberOfPoints='8'", "NumberOfPoints='99999999999'"), None)
+            .unwrap_err();
         assert!(matches!(lie, Error::Limit { .. }));
     }
 
     #[test]
     fn polygons_in_pieces() {
         let piece = |x: f64, values: &str| {
-            let points = array("type='Float32' NumberOfComponents='3'", &format!("{x} 0 0 {x} 3 0 {x} 0 3 {x} 3 3"));
+            let points = array(
+                "type='Float32' NumberOfComponents='3'",
+                &format!("{x} 0 0 {x} 3 0 {x} 0 3 {x} 3 3"),
+            );
             let cells = |corners: &str, ends: &str| {
-                array("type='Int32' Name='connectivity'", corners) + &array("type='Int32' Name='offsets'", ends)
+                array("type='Int32' Name='connectivity'", corners)
+                    + &array("type='Int32' Name='offsets'", ends)
             };
             format!(
                 "<Piece NumberOfPoints='4' NumberOfVerts='1' NumberOfLines='0' NumberOfPolys='2'>\

@@ -17,8 +17,11 @@ const POINT: u64 = 24 + 12 + 8;
 /// The names of what a point has; names are compared without regard to case.
 const POSITION: [&[&str]; 3] = [&["x"], &["y"], &["z"]];
 const COLOR: [&[&str]; 3] = [&["r", "red"], &["g", "green"], &["b", "blue"]];
-const NORMAL: [&[&str]; 3] =
-    [&["nx", "normal_x", "normalx"], &["ny", "normal_y", "normaly"], &["nz", "normal_z", "normalz"]];
+const NORMAL: [&[&str]; 3] = [
+    &["nx", "normal_x", "normalx"],
+    &["ny", "normal_y", "normaly"],
+    &["nz", "normal_z", "normalz"],
+];
 const INTENSITY: &[&str] = &["intensity", "i", "grey", "gray", "reflectance"];
 
 /// Reads a cloud. With names: `x`, `y`, `z` and if there are some `r`, `g`, `b` (or `red`, …), `nx`, `ny`, `nz` (or
@@ -40,7 +43,10 @@ pub fn read(source: &Source) -> Result<Mesh> {
     let counted = counts.iter().fold(0u64, |sum, &(_, count)| sum.saturating_add(count));
     if let Some(&(line, _)) = counts.first().filter(|_| counted != text.len() as u64) {
         return Err(source
-            .error(format!("line {line}"), format!("counts {counted} points, but there are {}", text.len()))
+            .error(
+                format!("line {line}"),
+                format!("counts {counted} points, but there are {}", text.len()),
+            )
             .hint("the file is cut, or a line has a single number"));
     }
     let mut layout = match &text.names {
@@ -50,7 +56,9 @@ pub fn read(source: &Source) -> Result<Mesh> {
     let table = text.numbers(source, |column| layout.uses(column))?;
     let value = |row: usize, column: usize| table[row * text.width + column];
     let rows = || 0..text.len();
-    let three = |row: usize, columns: [usize; 3]| DVec3::from_array(columns.map(|column| value(row, column)));
+    let three = |row: usize, columns: [usize; 3]| {
+        DVec3::from_array(columns.map(|column| value(row, column)))
+    };
     // Without names the numbers tell what they are.
     let is_normal = |columns: [usize; 3]| {
         let mut all = rows().map(|row| three(row, columns));
@@ -62,7 +70,10 @@ pub fn read(source: &Source) -> Result<Mesh> {
         let slot = if is_normal(columns) { &mut layout.normal } else { &mut layout.color };
         if slot.replace(columns).is_some() {
             return Err(source
-                .error(format!("line {}", text.first), "has two colours or two normals behind the position")
+                .error(
+                    format!("line {}", text.first),
+                    "has two colours or two normals behind the position",
+                )
                 .hint("name the columns in the first line"));
         }
     }
@@ -98,7 +109,8 @@ pub(super) fn is_cloud(source: &Source) -> bool {
     }
     let has = |names: &[&str]| find(&words, names).is_some();
     let is_sample = has(&["value", "scalar"]);
-    !is_sample && (triple(&words, COLOR).is_some() || triple(&words, NORMAL).is_some() || words.len() == 3)
+    !is_sample
+        && (triple(&words, COLOR).is_some() || triple(&words, NORMAL).is_some() || words.len() == 3)
 }
 
 /// Which column means what.
@@ -115,8 +127,11 @@ struct Layout {
 impl Layout {
     fn named(source: &Source, line: usize, names: &[String]) -> Result<Self> {
         let Some(position) = triple(names, POSITION) else {
-            let missing = POSITION.iter().find(|name| find(names, name).is_none()).map_or("", |name| name[0]);
-            return Err(source.error(format!("line {line}"), format!("names no column “{missing}”")));
+            let missing =
+                POSITION.iter().find(|name| find(names, name).is_none()).map_or("", |name| name[0]);
+            return Err(
+                source.error(format!("line {line}"), format!("names no column “{missing}”"))
+            );
         };
         Ok(Self {
             position,
@@ -191,7 +206,11 @@ mod tests {
             ("name;blue;green;red;z;y;x\nfirst;0;128;255;3;2;1\n;51;0;0;6;5;4", true, false),
         ] {
             let mesh = load(text).unwrap_or_else(|error| panic!("{text}: {error}"));
-            assert_eq!(mesh.positions, [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)], "{text}");
+            assert_eq!(
+                mesh.positions,
+                [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)],
+                "{text}"
+            );
             assert_eq!(mesh.colors, if colored { &colors[..] } else { &[] }, "{text}");
             assert_eq!(mesh.normals.len(), if normal { 2 } else { 0 }, "{text}");
             assert!(!normal || mesh.normals[0].distance(Vec3::new(0.0, 0.6, 0.8)) < 1e-6, "{text}");
@@ -224,7 +243,10 @@ mod tests {
             ("1 2 3\r4 nan 6\r", "line 2: number 2 is NaN"),
             ("1 2 3\n4 five 6", "line 2: “five” is not a number"),
             ("3\n1 2 3\n4 5 6\n", "line 1: counts 3 points, but there are 2"),
-            ("18446744073709551615\n1 2 3\n18446744073709551615\n4 5 6\n", "line 1: counts 18446744073709551615"),
+            (
+                "18446744073709551615\n1 2 3\n18446744073709551615\n4 5 6\n",
+                "line 1: counts 18446744073709551615",
+            ),
             ("0\n1 2 3\n", "counts 0 points"),
             ("1 2 3 1 0 0 0 1 0", "two colours or two normals"),
         ] {
@@ -274,7 +296,11 @@ mod tests {
         ] {
             let path = folder.write(name, text);
             let kind = |scalar| Kind::of(&path, &Limits::default(), scalar).unwrap();
-            assert_eq!(kind(false), Some(if cloud { Kind::Mesh } else { Kind::Samples }), "{name}: {text}");
+            assert_eq!(
+                kind(false),
+                Some(if cloud { Kind::Mesh } else { Kind::Samples }),
+                "{name}: {text}"
+            );
             assert_eq!(kind(true), Some(Kind::Samples), "{name}: {text}");
             assert!(!cloud || load_mesh(&path, &Limits::default()).is_ok(), "{name}: {text}");
         }

@@ -82,7 +82,13 @@ impl Camera {
     }
 
     /// As [`framing`](Self::framing), with a vertical view angle in degrees, between 0 and 180.
-    pub fn framing_with(bounds: &Bounds, direction: DVec3, view_up: DVec3, aspect: f64, view_angle: f64) -> Self {
+    pub fn framing_with(
+        bounds: &Bounds,
+        direction: DVec3,
+        view_up: DVec3,
+        aspect: f64,
+        view_angle: f64,
+    ) -> Self {
         // The camera stands far enough from a single point that its coordinates differ.
         let least = f64::MIN_POSITIVE.sqrt().max(1e-13 * bounds.center().abs().max_element());
         let radius = (0.5 * bounds.diagonal()).max(least);
@@ -112,7 +118,8 @@ impl Camera {
                 return Ok(());
             }
             let depth = if view.perspective { p.z } else { 1.0 };
-            widest = widest.max((view.scale * p.truncate() / depth / view.center).abs().max_element());
+            widest =
+                widest.max((view.scale * p.truncate() / depth / view.center).abs().max_element());
         }
         let factor = (1.0 - 2.0 * margin) / widest;
         if factor.is_finite() && factor > 0.0 {
@@ -140,7 +147,10 @@ impl Camera {
     pub fn elevation(&mut self, degrees: f64) {
         let Some(forward) = (self.focal_point - self.position).try_normalize() else { return };
         // Along the view-up axis any horizontal axis will do.
-        let right = forward.cross(self.view_up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
+        let right = forward
+            .cross(self.view_up)
+            .try_normalize()
+            .unwrap_or_else(|| forward.any_orthonormal_vector());
         let turn = glam::DQuat::from_axis_angle(right, -degrees.to_radians());
         self.position = self.focal_point + turn * (self.position - self.focal_point);
         // Past a pole the old up would point along the view; the turned one never does.
@@ -159,8 +169,9 @@ impl Camera {
     pub fn make_orthographic(&mut self) {
         if let Projection::Perspective { view_angle } = self.projection {
             let distance = (self.focal_point - self.position).length();
-            self.projection =
-                Projection::Orthographic { height: 2.0 * distance * (0.5 * view_angle).to_radians().tan() };
+            self.projection = Projection::Orthographic {
+                height: 2.0 * distance * (0.5 * view_angle).to_radians().tan(),
+            };
         }
     }
 
@@ -168,9 +179,13 @@ impl Camera {
     pub fn view(&self, size: [u32; 2]) -> Result<View> {
         let bad = |what: &str| Err(Error::Argument(format!("the camera {what}")));
         if size[0] == 0 || size[1] == 0 {
-            return Err(Error::Argument(format!("a picture of {}x{} has no pixels", size[0], size[1])));
+            return Err(Error::Argument(format!(
+                "a picture of {}x{} has no pixels",
+                size[0], size[1]
+            )));
         }
-        if !(self.position.is_finite() && self.focal_point.is_finite() && self.view_up.is_finite()) {
+        if !(self.position.is_finite() && self.focal_point.is_finite() && self.view_up.is_finite())
+        {
             return bad("has a coordinate that is not a finite number");
         }
         let forward = match (self.focal_point - self.position).try_normalize() {
@@ -178,15 +193,20 @@ impl Camera {
             None => return bad("stands in its own focal point"),
         };
         // A view-up along the view direction has no meaning; any perpendicular one serves better than an error.
-        let right = (forward.cross(self.view_up).try_normalize()).unwrap_or_else(|| forward.any_orthonormal_vector());
+        let right = (forward.cross(self.view_up).try_normalize())
+            .unwrap_or_else(|| forward.any_orthonormal_vector());
         let down = forward.cross(right);
         let height = f64::from(size[1]);
         let (perspective, scale) = match self.projection {
             Projection::Perspective { view_angle } if view_angle > 0.0 && view_angle < 180.0 => {
                 (true, 0.5 * height / (0.5 * view_angle).to_radians().tan())
             }
-            Projection::Orthographic { height: world } if world > 0.0 && world.is_finite() => (false, height / world),
-            Projection::Perspective { .. } => return bad("needs a view angle between 0 and 180 degrees"),
+            Projection::Orthographic { height: world } if world > 0.0 && world.is_finite() => {
+                (false, height / world)
+            }
+            Projection::Perspective { .. } => {
+                return bad("needs a view angle between 0 and 180 degrees");
+            }
             Projection::Orthographic { .. } => return bad("needs a height above 0"),
         };
         Ok(View {
@@ -229,11 +249,16 @@ impl View {
         let wrong = |message: String| Err(Error::Argument(format!("the camera {message}")));
         // NaN is no more.
         if far.is_nan() || far > FARTHEST {
-            return wrong(format!("is {far:e} away from the far side of the scene; {FARTHEST:e} is the most"));
+            return wrong(format!(
+                "is {far:e} away from the far side of the scene; {FARTHEST:e} is the most"
+            ));
         }
         if !(1.0 / FARTHEST..=FARTHEST).contains(&self.scale) {
             let least = 1.0 / FARTHEST;
-            return wrong(format!("shows a length of 1 by {:e} pixels; {least:e} to {FARTHEST:e} can be", self.scale));
+            return wrong(format!(
+                "shows a length of 1 by {:e} pixels; {least:e} to {FARTHEST:e} can be",
+                self.scale
+            ));
         }
         Ok(())
     }
@@ -266,7 +291,11 @@ impl View {
     /// this origin: from the eye in perspective, from the plane z = 0 in orthographic views.
     pub fn ray(&self, pixel: DVec2) -> (DVec3, DVec3) {
         let p = (pixel - self.center) / self.scale;
-        if self.perspective { (DVec3::ZERO, p.extend(1.0).normalize()) } else { (p.extend(0.0), DVec3::Z) }
+        if self.perspective {
+            (DVec3::ZERO, p.extend(1.0).normalize())
+        } else {
+            (p.extend(0.0), DVec3::Z)
+        }
     }
 
     /// Smallest and largest distance from the view's origin (perspective) or from its plane (orthographic) in a box.
@@ -318,7 +347,9 @@ mod tests {
             let view = camera.view([640, 480]).unwrap();
             let reach = bounds.corners().map(|corner| {
                 let p = view.to_view(corner);
-                (view.scale * p.truncate() / if orthographic { 1.0 } else { p.z } / view.center).abs().max_element()
+                (view.scale * p.truncate() / if orthographic { 1.0 } else { p.z } / view.center)
+                    .abs()
+                    .max_element()
             });
             let widest = reach.into_iter().fold(0.0, f64::max);
             assert!((widest - 0.9).abs() < 1e-9, "{widest}");
@@ -357,7 +388,9 @@ mod tests {
     }
     #[test]
     fn a_single_point_is_looked_at() {
-        for place in [DVec3::ZERO, DVec3::new(1.0, -2.0, 3.0), DVec3::splat(1e8), DVec3::splat(-1e150)] {
+        for place in
+            [DVec3::ZERO, DVec3::new(1.0, -2.0, 3.0), DVec3::splat(1e8), DVec3::splat(-1e150)]
+        {
             let bounds = Bounds { min: place, max: place };
             let camera = Camera::framing(&bounds, DVec3::Y, DVec3::Z, 1.5);
             assert_eq!(camera.focal_point, place);

@@ -16,7 +16,11 @@ const TILE: usize = 8;
 ///
 /// # Panics
 /// Where the field has another number of samples.
-pub fn filter(values: &mut [f64], dims: [usize; 3], factor: impl Fn([usize; 2], &mut [f64]) + Sync) {
+pub fn filter(
+    values: &mut [f64],
+    dims: [usize; 3],
+    factor: impl Fn([usize; 2], &mut [f64]) + Sync,
+) {
     assert_eq!(values.len(), dims.iter().product::<usize>(), "a field of {dims:?} samples");
     if values.is_empty() {
         return;
@@ -60,7 +64,9 @@ fn transform(values: &mut [f64], [nx, ny, _]: [usize; 3], plans: &[Plan; 3]) {
         });
     }
     if let Some(plan) = &plans[1] {
-        values.par_chunks_mut(nx * ny).for_each(|slice| across(plan.as_ref(), slice.chunks_mut(nx).collect()));
+        values
+            .par_chunks_mut(nx * ny)
+            .for_each(|slice| across(plan.as_ref(), slice.chunks_mut(nx).collect()));
     }
     if let Some(plan) = &plans[2] {
         let mut planes: Vec<Vec<&mut [f64]>> = (0..ny).map(|_| Vec::new()).collect();
@@ -111,7 +117,10 @@ mod tests {
 
     #[test]
     fn mirrors_keep_the_ends_single() {
-        assert_eq!([-5, -4, -1, 0, 2, 3, 4, 5, 6, 7].map(|at| mirrored(at, 4)), [1, 2, 1, 0, 2, 3, 2, 1, 0, 1]);
+        assert_eq!(
+            [-5, -4, -1, 0, 2, 3, 4, 5, 6, 7].map(|at| mirrored(at, 4)),
+            [1, 2, 1, 0, 2, 3, 2, 1, 0, 1]
+        );
         assert_eq!([-3, 0, 2].map(|at| mirrored(at, 1)), [0; 3]);
     }
 
@@ -120,7 +129,8 @@ mod tests {
     fn filters_as_convolution_does() {
         let weights = [0.5, 0.25, -0.125];
         for dims in [[7, 6, 5], [1, 9, 2], [2, 1, 3], [1, 1, 1], [11, 8, 1]] {
-            let field: Vec<f64> = (0..dims.iter().product()).map(|i: usize| ((i * i) as f64 * 0.37).sin()).collect();
+            let field: Vec<f64> =
+                (0..dims.iter().product()).map(|i: usize| ((i * i) as f64 * 0.37).sin()).collect();
             let at = |place: [isize; 3]| {
                 let [i, j, k] = std::array::from_fn(|axis| mirrored(place[axis], dims[axis]));
                 field[(k * dims[1] + j) * dims[0] + i]
@@ -131,12 +141,17 @@ mod tests {
                     for (i, value) in row.iter_mut().enumerate() {
                         let angle = frequency([i, j, k][axis], dims[axis]);
                         *value *= (0..3)
-                            .map(|m| f64::from(1 + i32::from(m > 0)) * weights[m] * (m as f64 * angle).cos())
+                            .map(|m| {
+                                f64::from(1 + i32::from(m > 0))
+                                    * weights[m]
+                                    * (m as f64 * angle).cos()
+                            })
                             .sum::<f64>();
                     }
                 });
                 for (index, found) in filtered.into_iter().enumerate() {
-                    let place = [index % dims[0], index / dims[0] % dims[1], index / dims[0] / dims[1]];
+                    let place =
+                        [index % dims[0], index / dims[0] % dims[1], index / dims[0] / dims[1]];
                     let expected: f64 = (-2..=2isize)
                         .map(|m| {
                             let mut place = place.map(|at| at as isize);
@@ -144,7 +159,10 @@ mod tests {
                             weights[m.unsigned_abs()] * at(place)
                         })
                         .sum();
-                    assert!((found - expected).abs() < 1e-12, "{dims:?}, axis {axis}, sample {index}");
+                    assert!(
+                        (found - expected).abs() < 1e-12,
+                        "{dims:?}, axis {axis}, sample {index}"
+                    );
                 }
             }
         }

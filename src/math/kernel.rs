@@ -70,7 +70,9 @@ impl Kernel {
     pub fn table(values: Vec<f64>, extent: f64) -> Result<Self> {
         let (count, most) = (values.len(), Self::MAX_TABLE);
         if !(2..=most).contains(&count) || !values.iter().all(|value| value.is_finite()) {
-            return Err(Error::Argument(format!("a kernel's table has 2 to {most} finite values, found {count}")));
+            return Err(Error::Argument(format!(
+                "a kernel's table has 2 to {most} finite values, found {count}"
+            )));
         }
         let kernel = Self::with_extent(Profile::Table(values.into()), extent)?;
         if kernel.integral() <= 0.0 {
@@ -110,7 +112,9 @@ impl Kernel {
             Profile::Table(values) => Self::table(values.to_vec(), self.extent),
             Profile::Tensor(tensor) if self.extent != tensor.extent() => {
                 let (name, own, found) = (tensor.name(), tensor.extent(), self.extent);
-                Err(Error::Argument(format!("the extent of the kernel {name} is {own} samples, found {found}")))
+                Err(Error::Argument(format!(
+                    "the extent of the kernel {name} is {own} samples, found {found}"
+                )))
             }
             profile => Self::with_extent(profile.clone(), self.extent),
         }
@@ -140,12 +144,20 @@ impl Kernel {
             Profile::Gaussian(sigma) => (-0.5 * (r / sigma).powi(2)).exp(),
             Profile::BSpline => {
                 let t = 2.0 * r / self.extent;
-                if t < 1.0 { 1.0 - 1.5 * t * t + 0.75 * t * t * t } else { 0.25 * (2.0 - t).powi(3) }
+                if t < 1.0 {
+                    1.0 - 1.5 * t * t + 0.75 * t * t * t
+                } else {
+                    0.25 * (2.0 - t).powi(3)
+                }
             }
             Profile::Hann => {
                 let x = PI * r;
                 // Near 0 the difference cancels; the series does not.
-                let filter = if x < 0.02 { 1.0 - 0.1 * x * x } else { 3.0 * (x.sin() - x * x.cos()) / x.powi(3) };
+                let filter = if x < 0.02 {
+                    1.0 - 0.1 * x * x
+                } else {
+                    3.0 * (x.sin() - x * x.cos()) / x.powi(3)
+                };
                 filter * (0.5 * PI * r / self.extent).cos().powi(2)
             }
             Profile::Table(values) => {
@@ -269,13 +281,19 @@ impl Tensor {
     pub fn polynomials(self) -> [[f64; 4]; 4] {
         match self {
             Self::Linear => [[0.0; 4], [1.0, -1.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0; 4]],
-            Self::CatmullRom => {
-                [[0.0, -0.5, 1.0, -0.5], [1.0, 0.0, -2.5, 1.5], [0.0, 0.5, 2.0, -1.5], [0.0, 0.0, -0.5, 0.5]]
-            }
-            Self::CubicBSpline => {
-                [[1.0, -3.0, 3.0, -1.0], [4.0, 0.0, -6.0, 3.0], [1.0, 3.0, 3.0, -3.0], [0.0, 0.0, 0.0, 1.0]]
-                    .map(|row| row.map(|factor| factor / 6.0))
-            }
+            Self::CatmullRom => [
+                [0.0, -0.5, 1.0, -0.5],
+                [1.0, 0.0, -2.5, 1.5],
+                [0.0, 0.5, 2.0, -1.5],
+                [0.0, 0.0, -0.5, 0.5],
+            ],
+            Self::CubicBSpline => [
+                [1.0, -3.0, 3.0, -1.0],
+                [4.0, 0.0, -6.0, 3.0],
+                [1.0, 3.0, 3.0, -3.0],
+                [0.0, 0.0, 0.0, 1.0],
+            ]
+            .map(|row| row.map(|factor| factor / 6.0)),
         }
     }
 }
@@ -291,11 +309,17 @@ mod tests {
                 let t = f64::from(step) / 64.0;
                 let own = tensor.polynomials().map(|[a, b, c, d]| ((d * t + c) * t + b) * t + a);
                 let by_value = [t + 1.0, t, t - 1.0, t - 2.0].map(|x| tensor.value(x));
-                assert!((own.iter().sum::<f64>() - 1.0).abs() < 1e-15, "{tensor:?} at {t}: {own:?}");
+                assert!(
+                    (own.iter().sum::<f64>() - 1.0).abs() < 1e-15,
+                    "{tensor:?} at {t}: {own:?}"
+                );
                 for (own, value) in own.iter().zip(by_value) {
                     assert!((own - value).abs() < 1e-15, "{tensor:?} at {t}: {own} {value}");
                 }
-                assert!(own.iter().map(|weight| weight.abs()).sum::<f64>().powi(3) <= tensor.lebesgue() + 1e-12);
+                assert!(
+                    own.iter().map(|weight| weight.abs()).sum::<f64>().powi(3)
+                        <= tensor.lebesgue() + 1e-12
+                );
             }
             for x in [-2.3, -1.7, -1.2, -0.6, -0.1, 0.2, 0.5, 0.9, 1.1, 1.8, 2.1] {
                 let step = 1e-6;
@@ -308,7 +332,13 @@ mod tests {
             let kernel = Kernel::tensor(tensor);
             kernel.validate().unwrap();
             assert!(kernel.integral() == 1.0 && kernel.least_sum() < 1e-3);
-            assert!(Kernel { extent: 1.5, ..kernel }.validate().unwrap_err().to_string().contains(tensor.name()));
+            assert!(
+                Kernel { extent: 1.5, ..kernel }
+                    .validate()
+                    .unwrap_err()
+                    .to_string()
+                    .contains(tensor.name())
+            );
         }
         // By hand: ⅔ and ⅙; 9/16 and −1/16.
         assert_eq!([0.0, 1.0].map(|x| Tensor::CubicBSpline.value(x)), [2.0 / 3.0, 1.0 / 6.0]);
@@ -324,12 +354,19 @@ mod tests {
         assert_eq!([0.0, 1.0, 2.0].map(|r| spline.value(r)), [1.0, 0.25, 0.0]);
         let hann = Kernel::hann(3.0).unwrap();
         // 3/π² · cos²(π/6); beyond the first zero, at 1.43, it is negative.
-        assert!((hann.value(1.0) - 2.25 / (PI * PI)).abs() < 1e-12 && hann.value(1.4) > 0.0 && hann.value(1.5) < 0.0);
+        assert!(
+            (hann.value(1.0) - 2.25 / (PI * PI)).abs() < 1e-12
+                && hann.value(1.4) > 0.0
+                && hann.value(1.5) < 0.0
+        );
         assert!((hann.value(0.02 / PI) - hann.value(0.019_999 / PI)).abs() < 1e-6);
         // 6/π without the window.
         assert!((hann.integral() - 6.0 / PI).abs() < 0.02);
         let table = Kernel::table(vec![1.0, 0.5, 0.0], 4.0).unwrap();
-        assert_eq!([0.0, 1.0, 2.0, 3.0, 4.0, 4.1].map(|r| table.value(r)), [1.0, 0.75, 0.5, 0.25, 0.0, 0.0]);
+        assert_eq!(
+            [0.0, 1.0, 2.0, 3.0, 4.0, 4.1].map(|r| table.value(r)),
+            [1.0, 0.75, 0.5, 0.25, 0.0, 0.0]
+        );
         // A cone of height 1 and radius 4: its integral over a ball is π·4³/3.
         assert!((table.integral() / (PI * 64.0 / 3.0) - 1.0).abs() < 1e-6);
         // 4π (⅓ − 3/10 + ⅛ + 11/120)

@@ -12,7 +12,11 @@ use rayon::prelude::*;
 use std::num::NonZero;
 
 /// Turns space and makes it `SCALE` times as large.
-const TURN: DMat3 = DMat3::from_cols(DVec3::new(2.0, 3.0, 6.0), DVec3::new(3.0, -6.0, 2.0), DVec3::new(6.0, 2.0, -3.0));
+const TURN: DMat3 = DMat3::from_cols(
+    DVec3::new(2.0, 3.0, 6.0),
+    DVec3::new(3.0, -6.0, 2.0),
+    DVec3::new(6.0, 2.0, -3.0),
+);
 const SCALE: f64 = 7.0;
 
 pub(crate) struct Neighbours<'a> {
@@ -32,7 +36,9 @@ impl<'a> Neighbours<'a> {
     /// For each point the index of the first at the same place, as far as a tree tells places apart: for points that differ by
     /// less than 64 bits hold beside their distance from the origin, too.
     pub fn first_of_equals(points: &[Vec3]) -> Vec<u32> {
-        first_of(points.len(), |index| turned(points[index as usize]).map(|value| (value + 0.0).to_bits()))
+        first_of(points.len(), |index| {
+            turned(points[index as usize]).map(|value| (value + 0.0).to_bits())
+        })
     }
 
     /// The points' indices in an order in which neighbours are near each other: asking in it is about twice as fast.
@@ -62,17 +68,22 @@ mod tests {
     fn check(points: &[Vec3], step: usize) {
         let tree = Neighbours::new(points);
         for index in (0..points.len()).step_by(step) {
-            let mut all: Vec<f64> = points.iter().map(|p| p.as_dvec3().distance(points[index].as_dvec3())).collect();
+            let mut all: Vec<f64> =
+                points.iter().map(|p| p.as_dvec3().distance(points[index].as_dvec3())).collect();
             all.sort_by(f64::total_cmp);
             for count in [1, 4, 16, 64] {
                 let found = tree.of(index as u32, count);
                 assert_eq!(found.len(), count.min(points.len() - 1));
                 for (&(distance, neighbour), &expected) in found.iter().zip(&all[1..]) {
-                    assert!((f64::from(distance) - expected).abs() <= 1e-6 * expected, "{distance} for {expected}");
+                    assert!(
+                        (f64::from(distance) - expected).abs() <= 1e-6 * expected,
+                        "{distance} for {expected}"
+                    );
                     let own = points[neighbour as usize].distance(points[index]);
                     assert!((distance - own).abs() <= 1e-6 * own, "{distance} to a point at {own}");
                 }
-                let mut indices: Vec<u32> = found.iter().map(|&(_, index)| index).chain([index as u32]).collect();
+                let mut indices: Vec<u32> =
+                    found.iter().map(|&(_, index)| index).chain([index as u32]).collect();
                 indices.sort_unstable();
                 assert!(indices.array_windows().all(|[a, b]| a < b), "{indices:?}");
             }
@@ -83,13 +94,18 @@ mod tests {
     #[test]
     fn what_the_tree_cannot_tell_apart_is_one() {
         let near = |i: usize| Vec3::new(1e10, i as f32 * 1e-14, 0.0);
-        let points: Vec<Vec3> =
-            (0..1000).map(near).chain([Vec3::new(-1e10, 0.0, 0.0), Vec3::ZERO, -Vec3::ZERO]).collect();
+        let points: Vec<Vec3> = (0..1000)
+            .map(near)
+            .chain([Vec3::new(-1e10, 0.0, 0.0), Vec3::ZERO, -Vec3::ZERO])
+            .collect();
         let first = Neighbours::first_of_equals(&points);
         assert!(first[..1000].iter().all(|&first| first == 0));
         assert_eq!(first[1000..], [1000, 1001, 1001]);
         let apart = random(500, Vec3::ONE);
-        assert_eq!(Neighbours::first_of_equals(&apart), super::super::weld::first_of_equals(&apart));
+        assert_eq!(
+            Neighbours::first_of_equals(&apart),
+            super::super::weld::first_of_equals(&apart)
+        );
     }
 
     fn random(count: usize, extent: Vec3) -> Vec<Vec3> {
@@ -102,13 +118,18 @@ mod tests {
     }
 
     fn grid(x: usize, y: usize, z: usize) -> Vec<Vec3> {
-        (0..x * y * z).map(|i| Vec3::new((i % x) as f32, (i / x % y) as f32, (i / x / y) as f32)).collect()
+        (0..x * y * z)
+            .map(|i| Vec3::new((i % x) as f32, (i / x % y) as f32, (i / x / y) as f32))
+            .collect()
     }
 
     #[test]
     fn finds_what_a_search_through_all_finds() {
         check(&random(3000, Vec3::new(1.0, 0.1, 3.0)), 7);
-        check(&random(3000, Vec3::new(1.0, 1e-4, 1e4)).iter().map(|p| p + 100.0).collect::<Vec<_>>(), 7);
+        check(
+            &random(3000, Vec3::new(1.0, 1e-4, 1e4)).iter().map(|p| p + 100.0).collect::<Vec<_>>(),
+            7,
+        );
         // On a plane, on a line, on grids, and many at few places.
         check(&random(3000, Vec3::new(1.0, 0.0, 1.0)), 7);
         check(&random(3000, Vec3::Y), 7);

@@ -28,7 +28,12 @@ impl Sheets {
 
     /// Sheets from `near` to `far` (world units), at most `thickness` thick, and at most `pixels` pixels thick
     /// (`None`: no such bound). At least one of the two must bind.
-    pub fn new(view: &View, [near, far]: [f64; 2], thickness: Option<f64>, pixels: Option<f64>) -> Self {
+    pub fn new(
+        view: &View,
+        [near, far]: [f64; 2],
+        thickness: Option<f64>,
+        pixels: Option<f64>,
+    ) -> Self {
         let far = far.max(near + f64::EPSILON * near.abs().max(1.0));
         let mut coarser = 1.0;
         loop {
@@ -96,7 +101,8 @@ mod tests {
         } else {
             Projection::Orthographic { height: 10.0 }
         };
-        let camera = Camera { position: DVec3::ZERO, focal_point: DVec3::X, view_up: DVec3::Z, projection };
+        let camera =
+            Camera { position: DVec3::ZERO, focal_point: DVec3::X, view_up: DVec3::Z, projection };
         camera.view([100, 100]).unwrap()
     }
 
@@ -104,7 +110,9 @@ mod tests {
     fn sheets_are_monotone_cover_the_range_and_keep_both_bounds() {
         for perspective in [false, true] {
             let view = view(perspective);
-            for (thickness, pixels) in [(Some(0.5), None), (None, Some(4.0)), (Some(0.5), Some(4.0))] {
+            for (thickness, pixels) in
+                [(Some(0.5), None), (None, Some(4.0)), (Some(0.5), Some(4.0))]
+            {
                 let sheets = Sheets::new(&view, [2.0, 50.0], thickness, pixels);
                 assert!(sheets.planes[0] <= 2.0 && *sheets.planes.last().unwrap() >= 50.0 - 1e-9);
                 for pair in sheets.planes.windows(2) {

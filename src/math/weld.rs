@@ -6,7 +6,9 @@ use rayon::prelude::*;
 /// For each position the index of the first one that is equal to it (often itself).
 pub(crate) fn first_of_equals(positions: &[Vec3]) -> Vec<u32> {
     // Adding zero makes the two zeros one.
-    first_of(positions.len(), |index| (positions[index as usize] + Vec3::ZERO).to_array().map(f32::to_bits))
+    first_of(positions.len(), |index| {
+        (positions[index as usize] + Vec3::ZERO).to_array().map(f32::to_bits)
+    })
 }
 
 /// For each of `count` things the index of the first one of the same key.

@@ -78,7 +78,9 @@ mod tests {
         };
         let classifier = Classifier::new(&transfer);
         // Extinction 4 from 2 to 4.
-        for (a, b, extinction, blue) in [(1.0, 2.5, 4.0 / 3.0, 0.0), (3.5, 1.5, 3.0, 1.0 / 3.0), (0.0, 5.0, 1.6, 0.5)] {
+        for (a, b, extinction, blue) in
+            [(1.0, 2.5, 4.0 / 3.0, 0.0), (3.5, 1.5, 3.0, 1.0 / 3.0), (0.0, 5.0, 1.6, 0.5)]
+        {
             let (found, color) = classifier.between(a, b);
             assert!((found - extinction).abs() < 1e-12, "{found}");
             assert!((color - DVec3::new(1.0 - blue, 0.0, blue)).length() < 1e-12, "{color}");

@@ -13,7 +13,9 @@ pub(super) fn allowed(ray: &Ray, view: &View, clips: &[Clip]) -> Vec<[f64; 2]> {
     let (origin, direction) = in_world(ray, view);
     clips.iter().fold(vec![[f64::NEG_INFINITY, f64::INFINITY]], |parts, clip| {
         let inside = match clip.shape {
-            ClipShape::HalfSpace { normal, offset } => half_space(offset - normal.dot(origin), normal.dot(direction)),
+            ClipShape::HalfSpace { normal, offset } => {
+                half_space(offset - normal.dot(origin), normal.dot(direction))
+            }
             ClipShape::Box(bounds) => within(origin, direction, [bounds.min, bounds.max]),
         };
         if clip.inside { intersection(&parts, inside) } else { difference(&parts, inside) }
@@ -77,7 +79,8 @@ fn within(origin: DVec3, direction: DVec3, [low, high]: [DVec3; 2]) -> Option<[f
             half_space(high[axis] - origin[axis], direction[axis]),
             half_space(origin[axis] - low[axis], -direction[axis]),
         ] {
-            interval = interval.and_then(|interval| intersection(&[interval], side).first().copied());
+            interval =
+                interval.and_then(|interval| intersection(&[interval], side).first().copied());
         }
     }
     interval
@@ -91,35 +94,52 @@ mod tests {
 
     #[test]
     fn a_ray_crosses_a_skewed_box_where_its_faces_are() {
-        let axes = DMat3::from_cols(DVec3::new(0.3, 0.1, 0.0), DVec3::new(0.0, 0.2, 0.1), DVec3::new(0.05, 0.0, 0.4));
+        let axes = DMat3::from_cols(
+            DVec3::new(0.3, 0.1, 0.0),
+            DVec3::new(0.0, 0.2, 0.1),
+            DVec3::new(0.05, 0.0, 0.4),
+        );
         let lattice = Lattice::cartesian([5, 4, 1], DVec3::new(0.1, 0.2, 0.3), axes);
         for view in views() {
             let center = view.to_view(lattice.position(DVec3::new(2.0, 1.5, 0.0)));
-            let flat = if view.perspective { center.truncate() / center.z } else { center.truncate() };
+            let flat =
+                if view.perspective { center.truncate() / center.z } else { center.truncate() };
             let ray = Ray::new(&view, view.center + view.scale * flat);
             let interval = sample_box(&ray, &view, &lattice).unwrap();
             for s in interval {
                 let world = view.rotation.transpose() * ray.point(s) + view.position;
                 let index = lattice.axes.inverse() * (world - lattice.origin);
-                let faces = [index.x, index.x - 4.0, index.y, index.y - 3.0, index.z - 0.5, index.z + 0.5];
+                let faces =
+                    [index.x, index.x - 4.0, index.y, index.y - 3.0, index.z - 0.5, index.z + 0.5];
                 assert!(faces.iter().any(|f| f.abs() < 1e-9), "{index}");
             }
             let middle = ray.point(0.5 * (interval[0] + interval[1]));
             let along = (center - middle).length();
             assert!(along < interval[1] - interval[0]);
-            assert!(sample_box(&Ray::new(&view, DVec2::new(-900.0, 900.0)), &view, &lattice).is_none());
+            assert!(
+                sample_box(&Ray::new(&view, DVec2::new(-900.0, 900.0)), &view, &lattice).is_none()
+            );
         }
     }
 
     #[test]
     fn allowed_parts_are_those_whose_points_are_allowed() {
         let clips = [
-            Clip { shape: ClipShape::HalfSpace { normal: DVec3::new(1.0, 2.0, -0.5), offset: 1.0 }, inside: true },
             Clip {
-                shape: ClipShape::Box(Bounds { min: DVec3::splat(0.2), max: DVec3::new(0.9, 0.7, 0.8) }),
+                shape: ClipShape::HalfSpace { normal: DVec3::new(1.0, 2.0, -0.5), offset: 1.0 },
+                inside: true,
+            },
+            Clip {
+                shape: ClipShape::Box(Bounds {
+                    min: DVec3::splat(0.2),
+                    max: DVec3::new(0.9, 0.7, 0.8),
+                }),
                 inside: false,
             },
-            Clip { shape: ClipShape::Box(Bounds { min: DVec3::splat(-2.0), max: DVec3::splat(2.5) }), inside: true },
+            Clip {
+                shape: ClipShape::Box(Bounds { min: DVec3::splat(-2.0), max: DVec3::splat(2.5) }),
+                inside: true,
+            },
         ];
         let mut most = 0;
         for view in views() {
@@ -130,7 +150,8 @@ mod tests {
                 for step in 0..1000 {
                     let s = 0.01 * f64::from(step) + 0.003_141;
                     let p = view.rotation.transpose() * ray.point(s) + view.position;
-                    let inside = |[low, high]: [DVec3; 2]| p.cmpge(low).all() && p.cmple(high).all();
+                    let inside =
+                        |[low, high]: [DVec3; 2]| p.cmpge(low).all() && p.cmple(high).all();
                     let expected = p.dot(DVec3::new(1.0, 2.0, -0.5)) <= 1.0
                         && !inside([DVec3::splat(0.2), DVec3::new(0.9, 0.7, 0.8)])
                         && inside([DVec3::splat(-2.0), DVec3::splat(2.5)]);

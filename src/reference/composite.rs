@@ -45,7 +45,8 @@ pub(super) struct Composite {
 }
 
 impl Composite {
-    pub const EMPTY: Self = Self { color: DVec3::ZERO, opacity: 0.0, depth: 0.0, half: f64::INFINITY };
+    pub const EMPTY: Self =
+        Self { color: DVec3::ZERO, opacity: 0.0, depth: 0.0, half: f64::INFINITY };
 
     /// Passes a medium that grows evenly between two distances.
     pub fn pass(&mut self, medium: Medium, span: [f64; 2]) {

@@ -46,10 +46,19 @@ impl Face {
 
     /// The gradient of the value at distance s, its part across the picture from the values in the pixels to the left, right,
     /// above and below.
-    pub fn central_gradient(&self, least: f64, ray: &Ray, s: f64, around: [Option<f64>; 4]) -> Option<DVec3> {
+    pub fn central_gradient(
+        &self,
+        least: f64,
+        ray: &Ray,
+        s: f64,
+        around: [Option<f64>; 4],
+    ) -> Option<DVec3> {
         let along = self.gradient(least)?.dot(ray.direction);
         let [left, right, above, below] = around;
-        let across = DVec2::new(slope([left, self.value(least), right]), slope([above, self.value(least), below]));
+        let across = DVec2::new(
+            slope([left, self.value(least), right]),
+            slope([above, self.value(least), below]),
+        );
         ray.gradient(s, across, along)
     }
 }

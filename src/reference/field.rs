@@ -53,8 +53,10 @@ impl Field<'_> {
 
     /// The surfaces that a part passes, each with its share of the part, in the order met.
     fn met(&self, [a, b]: [f64; 2]) -> Vec<(f64, &Isosurface)> {
-        let crossed = self.surfaces.iter().filter(|surface| (a < surface.value) != (b < surface.value));
-        let mut met: Vec<_> = crossed.map(|surface| ((surface.value - a) / (b - a), surface)).collect();
+        let crossed =
+            self.surfaces.iter().filter(|surface| (a < surface.value) != (b < surface.value));
+        let mut met: Vec<_> =
+            crossed.map(|surface| ((surface.value - a) / (b - a), surface)).collect();
         // The sort is stable: equal values stay in the order of the list.
         met.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         met
@@ -70,7 +72,9 @@ impl Layer {
     pub fn value(&self, u: f64) -> f64 {
         let [front, back] = self.faces.map(|face| face.unwrap_or(self.mean));
         let middle = 1.5 * self.mean - 0.25 * (front + back);
-        front * (1.0 - u) * (1.0 - 2.0 * u) + 4.0 * middle * u * (1.0 - u) + back * u * (2.0 * u - 1.0)
+        front * (1.0 - u) * (1.0 - 2.0 * u)
+            + 4.0 * middle * u * (1.0 - u)
+            + back * u * (2.0 * u - 1.0)
     }
 
     /// The gradient at a place: across the ray between those of the faces, along it the parabola's own.
@@ -117,30 +121,46 @@ impl Layer {
     }
 
     /// What the pieces of the ray put on it: all together, and one after another.
-    pub fn shine(&self, field: &Field, direction: DVec3, pieces: &[[f64; 2]]) -> (Medium, Vec<Step>) {
+    pub fn shine(
+        &self,
+        field: &Field,
+        direction: DVec3,
+        pieces: &[[f64; 2]],
+    ) -> (Medium, Vec<Step>) {
         let mut steps = Vec::new();
         let mut light = 1.0;
         // Lit colours, weighted by opacity.
         let mut color = DVec3::ZERO;
         for Part { places: [start, end], values: [a, b] } in self.parts(field, pieces) {
             let gradient = self.gradient(0.5 * (start + end), direction);
-            let (extinction, medium) =
-                if field.inside { field.classifier.between(a, b) } else { field.classifier.at(self.mean) };
+            let (extinction, medium) = if field.inside {
+                field.classifier.between(a, b)
+            } else {
+                field.classifier.at(self.mean)
+            };
             let factor = field.classifier.transfer.gradient_factor(gradient.length());
             let medium = field.lit(medium, gradient, direction);
             let length = self.distance(end) - self.distance(start);
             let depth = extinction * factor * length * self.filling;
             let at = |share: f64| start + share * (end - start);
             let mut before = 0.0;
-            let surfaces_met = field.met([a, b]).into_iter().map(|(share, surface)| (share, Some(surface)));
+            let surfaces_met =
+                field.met([a, b]).into_iter().map(|(share, surface)| (share, Some(surface)));
             for (share, surface) in surfaces_met.chain([(1.0, None)]) {
                 let depth = depth * (share - before);
                 let alpha = -(-depth).exp_m1();
                 color += light * alpha * medium;
                 light *= 1.0 - alpha;
-                steps.push(Step { depth, span: [before, share].map(|share| self.distance(at(share))) });
+                steps.push(Step {
+                    depth,
+                    span: [before, share].map(|share| self.distance(at(share))),
+                });
                 if let Some(surface) = surface {
-                    let lit = field.lit(DVec3::from(surface.color), self.gradient(at(share), direction), direction);
+                    let lit = field.lit(
+                        DVec3::from(surface.color),
+                        self.gradient(at(share), direction),
+                        direction,
+                    );
                     color += light * surface.opacity * lit;
                     light *= 1.0 - surface.opacity;
                     let depth = -(1.0 - surface.opacity).ln();
@@ -168,25 +188,37 @@ mod tests {
 
     #[test]
     fn the_parabola_has_its_faces_and_its_mean() {
-        for (faces, mean) in [([Some(1.0), Some(3.0)], 2.0), ([Some(-1.0), Some(0.5)], 4.0), ([None, Some(7.0)], 2.0)] {
+        for (faces, mean) in [
+            ([Some(1.0), Some(3.0)], 2.0),
+            ([Some(-1.0), Some(0.5)], 4.0),
+            ([None, Some(7.0)], 2.0),
+        ] {
             let layer = layer(faces, mean);
             let steps = 1000;
-            let sum: f64 = (0..steps).map(|i| layer.value((f64::from(i) + 0.5) / f64::from(steps))).sum();
+            let sum: f64 =
+                (0..steps).map(|i| layer.value((f64::from(i) + 0.5) / f64::from(steps))).sum();
             assert!((sum / f64::from(steps) - mean).abs() < 1e-5);
             assert!((layer.value(0.0) - faces[0].unwrap_or(mean)).abs() < 1e-12);
             assert!((layer.value(1.0) - faces[1].unwrap_or(mean)).abs() < 1e-12);
         }
-        assert!((layer([Some(1.0), Some(3.0)], 2.0).value(0.25) - 1.5).abs() < 1e-12, "a line stays a line");
+        assert!(
+            (layer([Some(1.0), Some(3.0)], 2.0).value(0.25) - 1.5).abs() < 1e-12,
+            "a line stays a line"
+        );
     }
 
     #[test]
     fn surfaces_and_medium_by_hand() {
         // Extinction 1 everywhere; a value from 0 to 8 passes two surfaces, listed the other way round.
-        let surface = |value: f64, color: [f64; 3], opacity: f64| Isosurface { value, color, opacity };
+        let surface =
+            |value: f64, color: [f64; 3], opacity: f64| Isosurface { value, color, opacity };
         let transfer = TransferFunction {
             color: vec![(0.0, [0.0, 0.0, 1.0])],
             opacity: vec![(0.0, 1.0 - (-1.0_f64).exp())],
-            isosurfaces: vec![surface(6.0, [0.0, 1.0, 0.0], 1.0), surface(2.0, [1.0, 0.0, 0.0], 0.5)],
+            isosurfaces: vec![
+                surface(6.0, [0.0, 1.0, 0.0], 1.0),
+                surface(2.0, [1.0, 0.0, 0.0], 0.5),
+            ],
             ..TransferFunction::default()
         };
         let field = |inside: bool| Field {
@@ -204,24 +236,36 @@ mod tests {
             let red = through * 0.5;
             let green = red * (-1.0_f64).exp();
             let blue = 1.0 - through + red * (1.0 - (-1.0_f64).exp());
-            assert!((medium.color - DVec3::new(red, green, blue)).length() < 1e-12, "{}", medium.color);
-            let places: Vec<f64> =
-                steps.iter().filter(|s| s.span[0] == s.span[1] && s.depth > 0.0).map(|s| s.span[0]).collect();
+            assert!(
+                (medium.color - DVec3::new(red, green, blue)).length() < 1e-12,
+                "{}",
+                medium.color
+            );
+            let places: Vec<f64> = steps
+                .iter()
+                .filter(|s| s.span[0] == s.span[1] && s.depth > 0.0)
+                .map(|s| s.span[0])
+                .collect();
             assert_eq!(places, [3.5, 4.5]);
             // Backwards, and cut to its second half.
-            let (back, _) =
-                Layer { faces: [Some(8.0), Some(0.0)], ..layer }.shine(&field(inside), DVec3::Z, &[[4.0, 5.0]]);
+            let (back, _) = Layer { faces: [Some(8.0), Some(0.0)], ..layer }.shine(
+                &field(inside),
+                DVec3::Z,
+                &[[4.0, 5.0]],
+            );
             assert!((back.depth - 1.0 - 2.0_f64.ln()).abs() < 1e-12);
         }
     }
 
     #[test]
     fn surfaces_are_met_in_order() {
-        let surface = |value: f64, red: f64| Isosurface { value, color: [red, 0.0, 0.0], opacity: 1.0 };
+        let surface =
+            |value: f64, red: f64| Isosurface { value, color: [red, 0.0, 0.0], opacity: 1.0 };
         let surfaces = [surface(3.0, 0.1), surface(2.0, 0.2), surface(2.0, 0.3), surface(5.0, 0.4)];
         let transfer = TransferFunction::default();
         let classifier = Classifier::new(&transfer);
-        let field = Field { classifier, lattice: None, shade: None, surfaces: &surfaces, inside: true };
+        let field =
+            Field { classifier, lattice: None, shade: None, surfaces: &surfaces, inside: true };
         let met = |ends: [f64; 2]| -> Vec<(f64, f64)> {
             field.met(ends).into_iter().map(|(share, surface)| (share, surface.color[0])).collect()
         };

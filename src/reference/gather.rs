@@ -24,14 +24,15 @@ pub(super) fn gather<'a>(scene: &'a Scene, view: &View, before: Option<Before>) 
     let mut kernels = Vec::new();
     for item in &scene.items {
         match item {
-            Item::Radiance(set) => {
-                kernels.extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, None, view)))
-            }
+            Item::Radiance(set) => kernels
+                .extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, None, view))),
             // Its cut is a set of its own by now.
             Item::Hierarchy(_) | Item::Bricks(..) => {}
             Item::Scalar(set, transfer) => {
                 let before = before.map(|before| (before, transfer));
-                kernels.extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, before, view)));
+                kernels.extend(
+                    set.splats.iter().filter_map(|splat| from_splat(set, splat, before, view)),
+                );
             }
             // No radial functions: its field is asked for point by point.
             Item::Volume(_, kernel, _) if kernel.as_tensor().is_some() => {}
@@ -92,16 +93,21 @@ fn from_splat<'a>(
             let thinner = (sharp.determinant() / factor.determinant()).abs();
             let (value, weight) = (f64::from(splat.strength), f64::from(weight) * thinner);
             // A slope across a flat kernel has no meaning in space.
-            let slope = Some(sharp.inverse().transpose() * slope.as_dvec3()).filter(|slope| slope.is_finite());
+            let slope = Some(sharp.inverse().transpose() * slope.as_dvec3())
+                .filter(|slope| slope.is_finite());
             let slope = slope.unwrap_or(DVec3::ZERO);
             match before {
-                Some(before) => classified(value, weight / f64::from(set.overlap), slope, center, before, view),
+                Some(before) => {
+                    classified(value, weight / f64::from(set.overlap), slope, center, before, view)
+                }
                 None => Load::Sample(Sample { value, weight, slope }),
             }
         }
         Payload::Radiance => {
-            let [red, green, blue, opacity] = splat.color.to_le_bytes().map(|byte| f64::from(byte) / 255.0);
-            let normal = decode_normal(splat.normal).map(|normal| view.rotation * normal.as_dvec3());
+            let [red, green, blue, opacity] =
+                splat.color.to_le_bytes().map(|byte| f64::from(byte) / 255.0);
+            let normal =
+                decode_normal(splat.normal).map(|normal| view.rotation * normal.as_dvec3());
             if let Some(normal) = normal {
                 let thickness = |factor: DMat3| (factor.transpose() * normal).length();
                 center -= STEP_BACK * (thickness(factor) - thickness(sharp)) * normal;
@@ -152,7 +158,9 @@ fn from_volume<'a>(
 fn overlap(shape: &math::Kernel, lattice: &Lattice) -> f64 {
     match lattice.arrangement {
         // Two samples in each cubic cell, and kernels in units of √½ of its edge.
-        Arrangement::BodyCentred => shape.integral() * std::f64::consts::FRAC_1_SQRT_2.powi(3) / 0.5,
+        Arrangement::BodyCentred => {
+            shape.integral() * std::f64::consts::FRAC_1_SQRT_2.powi(3) / 0.5
+        }
         Arrangement::Cartesian | Arrangement::Rectilinear(_) => shape.integral(),
     }
 }
@@ -197,7 +205,11 @@ fn cholesky(matrix: DMat3) -> Option<DMat3> {
     let l11 = pivot(row(1, 1) - l10 * l10)?;
     let l21 = (row(2, 1) - l20 * l10) / l11;
     let l22 = pivot(row(2, 2) - l20 * l20 - l21 * l21)?;
-    Some(DMat3::from_cols(DVec3::new(l00, l10, l20), DVec3::new(0.0, l11, l21), DVec3::new(0.0, 0.0, l22)))
+    Some(DMat3::from_cols(
+        DVec3::new(l00, l10, l20),
+        DVec3::new(0.0, l11, l21),
+        DVec3::new(0.0, 0.0, l22),
+    ))
 }
 
 #[cfg(test)]
@@ -226,14 +238,18 @@ mod tests {
             extent: 8.0,
             overlap: 1.0,
         };
-        for projection in [Projection::Perspective { view_angle: 50.0 }, Projection::Orthographic { height: 3.0 }] {
+        for projection in
+            [Projection::Perspective { view_angle: 50.0 }, Projection::Orthographic { height: 3.0 }]
+        {
             let position = DVec3::new(2.0, -2.5, 1.0);
-            let camera = Camera { position, focal_point: DVec3::ZERO, view_up: DVec3::Z, projection };
+            let camera =
+                Camera { position, focal_point: DVec3::ZERO, view_up: DVec3::Z, projection };
             let view = camera.view([40, 30]).unwrap();
             let kernel = from_splat(&set, &set.splats[0], None, &view).unwrap();
             let pixel = if view.perspective { kernel.center.length() } else { 1.0 } / view.scale;
             // Rows of B give Σ along the world's axes: x has 0.5², x and y share −0.1.
-            let covariance = |a: DVec3, b: DVec3| kernel.covariance(view.rotation * a, view.rotation * b);
+            let covariance =
+                |a: DVec3, b: DVec3| kernel.covariance(view.rotation * a, view.rotation * b);
             assert!((covariance(DVec3::X, DVec3::X) - 0.25 - (0.35 * pixel).powi(2)).abs() < 1e-9);
             assert!((covariance(DVec3::X, DVec3::Y) + 0.1).abs() < 1e-7);
         }
@@ -243,13 +259,22 @@ mod tests {
 
     #[test]
     fn slopes_of_linear_fields_are_exact_on_every_lattice() {
-        let axes = DMat3::from_cols(DVec3::new(0.3, 0.1, 0.0), DVec3::new(0.0, 0.2, 0.1), DVec3::new(0.05, 0.0, 0.4));
+        let axes = DMat3::from_cols(
+            DVec3::new(0.3, 0.1, 0.0),
+            DVec3::new(0.0, 0.2, 0.1),
+            DVec3::new(0.05, 0.0, 0.4),
+        );
         let gradient = DVec3::new(1.0, -2.0, 0.5);
-        let places = Arc::new([vec![0.0, 1.0, 1.5, 4.0], vec![-1.0, 0.5, 1.0], vec![0.0, 0.1, 3.0, 3.5]]);
-        for arrangement in [Arrangement::Cartesian, Arrangement::BodyCentred, Arrangement::Rectilinear(places)] {
-            let lattice = Lattice { arrangement, ..Lattice::cartesian([4, 3, 4], DVec3::ONE, axes) };
-            let values: Vec<f32> =
-                (0..lattice.len()).map(|at| gradient.dot(lattice.sample_position(at)) as f32).collect();
+        let places =
+            Arc::new([vec![0.0, 1.0, 1.5, 4.0], vec![-1.0, 0.5, 1.0], vec![0.0, 0.1, 3.0, 3.5]]);
+        for arrangement in
+            [Arrangement::Cartesian, Arrangement::BodyCentred, Arrangement::Rectilinear(places)]
+        {
+            let lattice =
+                Lattice { arrangement, ..Lattice::cartesian([4, 3, 4], DVec3::ONE, axes) };
+            let values: Vec<f32> = (0..lattice.len())
+                .map(|at| gradient.dot(lattice.sample_position(at)) as f32)
+                .collect();
             let volume = Volume::new(lattice, Samples::F32(values)).unwrap();
             for at in 0..volume.len() {
                 let found = slope(&volume.lattice, at, |at| volume.value(at));
@@ -259,7 +284,8 @@ mod tests {
         // Of a parabola too, between unequal neighbours.
         let places = Arc::new([vec![0.0, 1.0, 4.0], vec![0.0], vec![0.0]]);
         let arrangement = Arrangement::Rectilinear(places);
-        let lattice = Lattice { arrangement, ..Lattice::with_spacing([3, 1, 1], DVec3::splat(0.5)) };
+        let lattice =
+            Lattice { arrangement, ..Lattice::with_spacing([3, 1, 1], DVec3::splat(0.5)) };
         let found = slope(&lattice, 1, |at| lattice.sample_position(at).x.powi(2));
         assert!((found - DVec3::X).length() < 1e-12, "{found}");
     }

@@ -19,7 +19,8 @@ impl Frame<'_> {
     /// Draws a row.
     pub(super) fn row_of_sheets(&self, row: i64) -> Vec<Composite> {
         let kernels = self.kernels_of_row(row);
-        let central = self.gradient == Gradient::Central && self.field.as_ref().is_some_and(Field::needs_gradients);
+        let central = self.gradient == Gradient::Central
+            && self.field.as_ref().is_some_and(Field::needs_gradients);
         let beside = central.then(|| [row - 1, row + 1].map(|row| self.kernels_of_row(row)));
         let pixel = |column: i64| {
             let ray = self.ray(column, row);
@@ -31,7 +32,10 @@ impl Frame<'_> {
                     (column, row + 1, below),
                 ];
                 neighbours.map(|(column, row, kernels)| {
-                    self.faces(&self.ray(column, row), kernels).iter().map(|face| face.value(self.least_sum)).collect()
+                    self.faces(&self.ray(column, row), kernels)
+                        .iter()
+                        .map(|face| face.value(self.least_sum))
+                        .collect()
                 })
             });
             self.pixel_of_sheets(&ray, &kernels, around)
@@ -54,7 +58,9 @@ impl Frame<'_> {
                         sheet.light.add(radiance, crossing.optical_depth(radiance.amount, part));
                     }
                     Load::Radiance(_) => {}
-                    Load::Sample(sample) => sheet.mean.add(sample, kernel.center, &crossing, ray, part),
+                    Load::Sample(sample) => {
+                        sheet.mean.add(sample, kernel.center, &crossing, ray, part)
+                    }
                 }
             }
         }
@@ -84,12 +90,20 @@ impl Frame<'_> {
     }
 
     /// Colours a pixel's sheets and composites them.
-    pub(super) fn pixel_of_sheets(&self, ray: &Ray, kernels: &[&Kernel], around: Option<Around>) -> Composite {
+    pub(super) fn pixel_of_sheets(
+        &self,
+        ray: &Ray,
+        kernels: &[&Kernel],
+        around: Option<Around>,
+    ) -> Composite {
         let allowed = clip::allowed(ray, &self.view, &self.clips);
         let sheets = self.sheets(ray, kernels, &allowed);
         let Some(field) = &self.field else {
             let mut composite = Composite::EMPTY;
-            sheets.iter().enumerate().for_each(|(k, sheet)| composite.pass(self.surface(sheet, ray), self.span(k)));
+            sheets
+                .iter()
+                .enumerate()
+                .for_each(|(k, sheet)| composite.pass(self.surface(sheet, ray), self.span(k)));
             return composite;
         };
         let faces = self.faces(ray, kernels);
@@ -98,14 +112,19 @@ impl Frame<'_> {
             .zip(&self.planes)
             .enumerate()
             .map(|(i, (face, &plane))| match &around {
-                Some(around) => {
-                    face.central_gradient(self.least_sum, ray, plane, around.each_ref().map(|values| values[i]))
-                }
+                Some(around) => face.central_gradient(
+                    self.least_sum,
+                    ray,
+                    plane,
+                    around.each_ref().map(|values| values[i]),
+                ),
                 None => face.gradient(self.least_sum),
             })
             .collect();
         let held = match field.lattice {
-            Some(lattice) => clip::intersection(&allowed, clip::sample_box(ray, &self.view, lattice)),
+            Some(lattice) => {
+                clip::intersection(&allowed, clip::sample_box(ray, &self.view, lattice))
+            }
             None => allowed,
         };
         let layer = |k: usize| {
@@ -116,7 +135,8 @@ impl Frame<'_> {
                 Some(product) => product.mean(ray, [from, to]),
                 None => sheets[k].mean,
             };
-            let filling = if field.lattice.is_some() { 1.0 } else { (mean.weight / (to - from)).min(1.0) };
+            let filling =
+                if field.lattice.is_some() { 1.0 } else { (mean.weight / (to - from)).min(1.0) };
             let layer = Layer {
                 span: [from, to],
                 mean: mean.value(self.least_sum, to - from)?,
@@ -127,9 +147,11 @@ impl Frame<'_> {
             Some((layer, pieces))
         };
         if self.optics == Optics::Maximum {
-            let values =
-                (0..self.count()).filter_map(|k| layer(k).and_then(|(layer, pieces)| layer.largest(field, &pieces)));
-            return values.reduce(f64::max).map_or(Composite::EMPTY, |value| self.largest(field, value));
+            let values = (0..self.count())
+                .filter_map(|k| layer(k).and_then(|(layer, pieces)| layer.largest(field, &pieces)));
+            return values
+                .reduce(f64::max)
+                .map_or(Composite::EMPTY, |value| self.largest(field, value));
         }
         let mut composite = Composite::EMPTY;
         for (k, sheet) in sheets.iter().enumerate() {
@@ -156,11 +178,19 @@ impl Frame<'_> {
     fn largest(&self, field: &Field, value: f64) -> Composite {
         let transfer = field.classifier.transfer;
         let opacity = transfer.opacity(value);
-        Composite { color: opacity * DVec3::from(transfer.color(value)), opacity, ..Composite::EMPTY }
+        Composite {
+            color: opacity * DVec3::from(transfer.color(value)),
+            opacity,
+            ..Composite::EMPTY
+        }
     }
 
     /// The radiance of a sheet, lit once.
     pub(super) fn surface(&self, sheet: &Sheet, ray: &Ray) -> Medium {
-        if sheet.light.depth < LEAST_DEPTH { Medium::default() } else { self.lit(&sheet.light, ray) }
+        if sheet.light.depth < LEAST_DEPTH {
+            Medium::default()
+        } else {
+            self.lit(&sheet.light, ray)
+        }
     }
 }

@@ -72,7 +72,13 @@ pub(super) struct Crossing<'a> {
 }
 
 impl<'a> Kernel<'a> {
-    pub fn new(center: DVec3, factor: DMat3, radius: f64, profile: Profile<'a>, load: Load) -> Self {
+    pub fn new(
+        center: DVec3,
+        factor: DMat3,
+        radius: f64,
+        profile: Profile<'a>,
+        load: Load,
+    ) -> Self {
         Self { center, factor, whitening: factor.inverse(), radius, profile, load }
     }
 
@@ -145,15 +151,21 @@ mod tests {
     use glam::DVec2;
 
     fn views() -> [View; 2] {
-        [Projection::Perspective { view_angle: 50.0 }, Projection::Orthographic { height: 3.0 }].map(|projection| {
-            let position = DVec3::new(2.0, -2.5, 1.0);
-            let camera = Camera { position, focal_point: DVec3::ZERO, view_up: DVec3::Z, projection };
-            camera.view([40, 30]).unwrap()
-        })
+        [Projection::Perspective { view_angle: 50.0 }, Projection::Orthographic { height: 3.0 }]
+            .map(|projection| {
+                let position = DVec3::new(2.0, -2.5, 1.0);
+                let camera =
+                    Camera { position, focal_point: DVec3::ZERO, view_up: DVec3::Z, projection };
+                camera.view([40, 30]).unwrap()
+            })
     }
 
     fn skewed<'a>(view: &View, radius: f64, profile: Profile<'a>) -> Kernel<'a> {
-        let sharp = DMat3::from_cols(DVec3::new(0.5, -0.2, 0.4), DVec3::new(0.0, 0.3, 0.1), DVec3::new(0.0, 0.0, 0.25));
+        let sharp = DMat3::from_cols(
+            DVec3::new(0.5, -0.2, 0.4),
+            DVec3::new(0.0, 0.3, 0.1),
+            DVec3::new(0.0, 0.0, 0.25),
+        );
         let center = view.to_view(DVec3::new(0.5, -0.1, 0.5));
         let load = Load::Sample(Sample { value: 1.0, weight: 1.0, slope: DVec3::ZERO });
         Kernel::new(center, view.rotation * sharp, radius, profile, load)
@@ -167,7 +179,8 @@ mod tests {
                 let kernel = skewed(&view, radius, profile);
                 let ray = Ray::new(&view, DVec2::new(23.5, 13.5));
                 let crossing = kernel.cross(&ray).unwrap();
-                let value = |p: DVec3| profile.value((kernel.whitening * (p - kernel.center)).length());
+                let value =
+                    |p: DVec3| profile.value((kernel.whitening * (p - kernel.center)).length());
                 let (largest, _) = crossing.at(crossing.closest);
                 for s in [crossing.closest - 0.01, crossing.closest, crossing.closest + 0.2] {
                     let (found, gradient) = crossing.at(s);
@@ -175,20 +188,28 @@ mod tests {
                     assert!((found - value(p)).abs() < 1e-12 && found <= largest);
                     let step = 1e-5;
                     for axis in DVec3::AXES {
-                        let expected = (value(p + step * axis) - value(p - step * axis)) / (2.0 * step);
-                        assert!((gradient.dot(axis) - expected).abs() < 1e-7, "{gradient} {expected}");
+                        let expected =
+                            (value(p + step * axis) - value(p - step * axis)) / (2.0 * step);
+                        assert!(
+                            (gradient.dot(axis) - expected).abs() < 1e-7,
+                            "{gradient} {expected}"
+                        );
                     }
                 }
                 let part = [crossing.closest - 0.1, crossing.closest + 0.3];
                 let steps = 100_000;
                 let mut expected = [0.0; 2];
                 for step in 0..steps {
-                    let s = part[0] + (part[1] - part[0]) * (f64::from(step) + 0.5) / f64::from(steps);
+                    let s =
+                        part[0] + (part[1] - part[0]) * (f64::from(step) + 0.5) / f64::from(steps);
                     let h = value(ray.point(s)) * (part[1] - part[0]) / f64::from(steps);
-                    (expected[0], expected[1]) = (expected[0] + h, expected[1] + (s - crossing.closest) * h);
+                    (expected[0], expected[1]) =
+                        (expected[0] + h, expected[1] + (s - crossing.closest) * h);
                 }
                 let found = crossing.moments(part);
-                assert!((found[0] - expected[0]).abs() < 1e-9 && (found[1] - expected[1]).abs() < 1e-9);
+                assert!(
+                    (found[0] - expected[0]).abs() < 1e-9 && (found[1] - expected[1]).abs() < 1e-9
+                );
                 let [from, to] = crossing.span();
                 assert!(crossing.at(from - 1e-9).0 < 1e-15 && crossing.at(to + 1e-9).0 < 1e-15);
             }
@@ -201,8 +222,10 @@ mod tests {
             let kernel = skewed(&view, 1.5, Profile::Gaussian);
             let mut met = 0;
             for row in -10..50 {
-                let [left, right] = [-50.0, 90.0].map(|x| Ray::new(&view, DVec2::new(x, f64::from(row) + 0.5)));
-                let normal = if view.perspective { left.direction.cross(right.direction) } else { DVec3::Y };
+                let [left, right] =
+                    [-50.0, 90.0].map(|x| Ray::new(&view, DVec2::new(x, f64::from(row) + 0.5)));
+                let normal =
+                    if view.perspective { left.direction.cross(right.direction) } else { DVec3::Y };
                 let plane = kernel.meets_plane(normal, left.origin.dot(normal));
                 let rays = (0..400).filter(|&i| {
                     let pixel = DVec2::new(-50.0 + 0.35 * f64::from(i), f64::from(row) + 0.5);

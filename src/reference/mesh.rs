@@ -55,8 +55,10 @@ pub fn trace(
         let pixel = |column: u32| {
             let mut sum = Composite::EMPTY;
             for i in 0..side * side {
-                let within = (DVec2::new((i % side).into(), (i / side).into()) + 0.5) / f64::from(side);
-                let found = traced.follow(&Ray::new(&view, DVec2::new(column.into(), row.into()) + within));
+                let within =
+                    (DVec2::new((i % side).into(), (i / side).into()) + 0.5) / f64::from(side);
+                let found =
+                    traced.follow(&Ray::new(&view, DVec2::new(column.into(), row.into()) + within));
                 sum.color += found.color;
                 sum.opacity += found.opacity;
                 sum.half = sum.half.min(found.half);
@@ -98,7 +100,12 @@ impl Boundable for Around {
 }
 
 impl<'a> Traced<'a> {
-    fn new(mesh: &'a Mesh, crease_angle_degrees: f32, view: &View, settings: &'a Settings) -> Result<Self> {
+    fn new(
+        mesh: &'a Mesh,
+        crease_angle_degrees: f32,
+        view: &View,
+        settings: &'a Settings,
+    ) -> Result<Self> {
         let eye = view.position - mesh.origin;
         let size = mesh.positions.iter().fold(0.0f32, |size, p| size.max(p.abs().max_element()));
         // Boxes are met in 32 bits: a margin for what that rounds.
@@ -127,14 +134,19 @@ impl<'a> Traced<'a> {
         let mut from = 0.0;
         while composite.opacity < 1.0 - LEAST_LIGHT {
             let Some((triangle, met)) = self.nearest(origin, direction, from) else { break };
-            let [red, green, blue, opacity] = color_at(self.mesh, triangle, met.weights.map(|w| w as f32));
-            let normal: DVec3 = self.normals[triangle].iter().zip(met.weights).map(|(n, w)| n.as_dvec3() * w).sum();
+            let [red, green, blue, opacity] =
+                color_at(self.mesh, triangle, met.weights.map(|w| w as f32));
+            let normal: DVec3 =
+                self.normals[triangle].iter().zip(met.weights).map(|(n, w)| n.as_dvec3() * w).sum();
             let color = DVec3::new(red.into(), green.into(), blue.into());
             let color = match &self.settings.surface_shade {
                 Some(shade) => shade::lit(color, normal, direction, shade),
                 None => color,
             };
-            composite.pass(Medium { depth: -(1.0 - f64::from(opacity.min(1.0))).ln(), color }, [met.distance; 2]);
+            composite.pass(
+                Medium { depth: -(1.0 - f64::from(opacity.min(1.0))).ln(), color },
+                [met.distance; 2],
+            );
             from = met.distance + 1e-9 * (met.distance + self.size);
         }
         composite
@@ -146,8 +158,10 @@ impl<'a> Traced<'a> {
         let mut nearest: Option<(usize, Met)> = None;
         self.boxes.ray_traverse(line, &mut RayHit::none(), |_, slot| {
             let triangle = self.boxes.primitive_indices[slot] as usize;
-            let corners = self.mesh.triangles[triangle].map(|vertex| self.mesh.positions[vertex as usize].as_dvec3());
-            let Some(met) = meet(origin, direction, corners).filter(|met| met.distance > from) else {
+            let corners = self.mesh.triangles[triangle]
+                .map(|vertex| self.mesh.positions[vertex as usize].as_dvec3());
+            let Some(met) = meet(origin, direction, corners).filter(|met| met.distance > from)
+            else {
                 return f32::INFINITY;
             };
             if nearest.is_none_or(|(_, before)| met.distance < before.distance) {
@@ -185,8 +199,8 @@ fn meet(origin: DVec3, direction: DVec3, [a, b, c]: [DVec3; 3]) -> Option<Met> {
 mod tests {
     use super::*;
     use crate::{
-        compare::compare_pictures, math::Projection, reference::render, scene::Scene, surface::SurfelOptions,
-        volume::Shade,
+        compare::compare_pictures, math::Projection, reference::render, scene::Scene,
+        surface::SurfelOptions, volume::Shade,
     };
 
     fn camera(projection: Projection) -> Camera {
@@ -204,13 +218,17 @@ mod tests {
         settings.surface_shade = Some(shade);
         let picture = trace(&sphere, 60.0, &camera, &settings, 1).unwrap();
         for (at, pixel) in picture.color.iter().enumerate() {
-            let place = (DVec2::new((at % 48) as f64, (at / 48) as f64) + 0.5 - DVec2::new(24.0, 18.0)) / 12.0;
+            let place = (DVec2::new((at % 48) as f64, (at / 48) as f64) + 0.5
+                - DVec2::new(24.0, 18.0))
+                / 12.0;
             let radius = place.length();
             if radius < 0.97 {
                 let cosine = (1.0 - radius * radius).sqrt();
                 let red = 0.7_f64.min(0.1 + 0.6 * cosine) + 0.2 * cosine.powi(8);
                 assert!((f64::from(pixel[0]) - red).abs() < 0.01, "{place} {pixel:?} {red}");
-                assert!((f64::from(pixel[2]) - 0.2 * cosine.powi(8)).abs() < 0.01 && pixel[3] > 0.999);
+                assert!(
+                    (f64::from(pixel[2]) - 0.2 * cosine.powi(8)).abs() < 0.01 && pixel[3] > 0.999
+                );
                 let depth = camera.position.length() - cosine;
                 assert!((f64::from(picture.depth[at]) - depth).abs() < 0.01);
             } else if radius > 1.01 {
@@ -222,7 +240,9 @@ mod tests {
     #[test]
     fn rays_are_spread_over_pixels_and_pass_what_is_thin() {
         // A square from 0 to 1 whose edge cuts pixels in half, half opaque, with another behind it.
-        let square = |z: f32| [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| Vec3::new(x, y, z));
+        let square = |z: f32| {
+            [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| Vec3::new(x, y, z))
+        };
         let mesh = Mesh {
             positions: [square(0.0), square(-1.0)].concat(),
             colors: [[[255, 255, 255, 128]; 4], [[0, 0, 0, 255]; 4]].concat(),
@@ -242,7 +262,10 @@ mod tests {
         let half = 128.0 / 255.0;
         assert!((row[4][0] - half).abs() < 1e-6 && row[4][3] == 1.0, "{:?}", row[4]);
         for edge in [row[0], row[8]] {
-            assert!((edge[3] - 0.5).abs() < 1e-6 && (edge[0] - 0.5 * half).abs() < 1e-6, "{edge:?}");
+            assert!(
+                (edge[3] - 0.5).abs() < 1e-6 && (edge[0] - 0.5 * half).abs() < 1e-6,
+                "{edge:?}"
+            );
         }
     }
 
@@ -250,13 +273,18 @@ mod tests {
     fn surfels_show_their_mesh() {
         let camera = camera(Projection::Perspective { view_angle: 38.0 });
         let settings = Settings::new([96, 96]);
-        for (name, mesh, least) in
-            [("sphere", Mesh::sphere(3), 30.0), ("knot", knot(), 26.0), ("cube", Mesh::cube(1.4), 24.5)]
-        {
+        for (name, mesh, least) in [
+            ("sphere", Mesh::sphere(3), 30.0),
+            ("knot", knot(), 26.0),
+            ("cube", Mesh::cube(1.4), 24.5),
+        ] {
             let options = SurfelOptions { largest_spacing: 1.0 / 24.0, ..SurfelOptions::default() };
             let scene = Scene::new().with_splats(mesh.surfels(&options).unwrap());
             let truth = trace(&mesh, options.crease_angle_degrees, &camera, &settings, 4).unwrap();
-            let found = compare_pictures(&render(&scene, &camera, &settings).unwrap(), &truth).unwrap().psnr.unwrap();
+            let found = compare_pictures(&render(&scene, &camera, &settings).unwrap(), &truth)
+                .unwrap()
+                .psnr
+                .unwrap();
             assert!(found > least, "{name}: {found} dB");
         }
     }
@@ -274,8 +302,13 @@ mod tests {
     fn what_cannot_be_traced_is_told() {
         let camera = camera(Projection::Perspective { view_angle: 30.0 });
         let settings = Settings::new([4, 4]);
-        assert!(matches!(trace(&Mesh::default(), 60.0, &camera, &settings, 1), Err(Error::NothingToDraw(_))));
-        let told = |mesh: &Mesh, settings: &Settings, side: u32| match trace(mesh, 60.0, &camera, settings, side) {
+        assert!(matches!(
+            trace(&Mesh::default(), 60.0, &camera, &settings, 1),
+            Err(Error::NothingToDraw(_))
+        ));
+        let told = |mesh: &Mesh, settings: &Settings, side: u32| match trace(
+            mesh, 60.0, &camera, settings, side,
+        ) {
             Err(Error::Argument(message)) => message,
             other => panic!("{:?}", other.map(|_| ())),
         };

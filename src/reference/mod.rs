@@ -195,7 +195,11 @@ fn picture(view: &View, rows: Vec<Vec<Composite>>) -> Picture {
             // An infinite distance along a ray parallel to the picture would give no number.
             let ray = Ray::new(view, DVec2::new(column as f64, row as f64) + 0.5);
             let half = composite.half;
-            picture.depth.push(if half.is_finite() { ray.point(half).z as f32 } else { f32::INFINITY });
+            picture.depth.push(if half.is_finite() {
+                ray.point(half).z as f32
+            } else {
+                f32::INFINITY
+            });
         }
     }
     picture
@@ -243,7 +247,8 @@ impl<'a> Frame<'a> {
             Item::Volume(volume, _, transfer) => Some((transfer, Some(&volume.lattice))),
         });
         let dark = settings.optics == Optics::XRay;
-        let before = settings.mode != Mode::Sheets || settings.classification == Classification::Pre;
+        let before =
+            settings.mode != Mode::Sheets || settings.classification == Classification::Pre;
         let shade = samples.and_then(|(transfer, _)| settings.shade_of(transfer)).filter(|_| !dark);
         let field = samples.filter(|_| !before).map(|(transfer, lattice)| Field {
             classifier: Classifier::new(transfer),
@@ -286,11 +291,15 @@ impl<'a> Frame<'a> {
             Mode::AxisSheets => {
                 let kernels = self.kernels_of_row(row);
                 let axis = whole::sheet_axis(&self.view, self.lattice);
-                columns.map(|column| self.pixel_of_axis_sheets(&self.ray(column, row), &kernels, axis)).collect()
+                columns
+                    .map(|column| self.pixel_of_axis_sheets(&self.ray(column, row), &kernels, axis))
+                    .collect()
             }
             Mode::Splats(order) => {
                 let kernels = self.kernels_of_row(row);
-                columns.map(|column| self.pixel_of_splats(&self.ray(column, row), &kernels, order)).collect()
+                columns
+                    .map(|column| self.pixel_of_splats(&self.ray(column, row), &kernels, order))
+                    .collect()
             }
         }
     }
@@ -298,7 +307,8 @@ impl<'a> Frame<'a> {
     /// The kernels that the rays of a row can meet: the rays of a row lie in one plane.
     fn kernels_of_row(&self, row: i64) -> Vec<&Kernel<'a>> {
         let [left, right] = [0, i64::from(self.view.size[0])].map(|column| self.ray(column, row));
-        let normal = if self.view.perspective { left.direction.cross(right.direction) } else { DVec3::Y };
+        let normal =
+            if self.view.perspective { left.direction.cross(right.direction) } else { DVec3::Y };
         let offset = left.origin.dot(normal);
         self.kernels.iter().filter(|kernel| kernel.meets_plane(normal, offset)).collect()
     }

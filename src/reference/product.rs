@@ -78,16 +78,23 @@ impl<'a> Product<'a> {
 
     /// ∫ of the field over a part of a ray. The field is a polynomial between planes of samples, of the ninth degree at most.
     pub fn mean(&self, ray: &Ray, [from, to]: [f64; 2]) -> Mean {
-        let (start, way) = (self.to_steps * (ray.origin - self.origin), self.to_steps * ray.direction);
+        let (start, way) =
+            (self.to_steps * (ray.origin - self.origin), self.to_steps * ray.direction);
         let mut cuts = vec![from, to];
         for axis in 0..3 {
             let ends = [from, to].map(|s| start[axis] + s * way[axis]);
             let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
             let planes = low.floor() as i64 + 1..high.ceil() as i64;
-            cuts.extend(planes.map(|plane| (plane as f64 - start[axis]) / way[axis]).filter(|s| from < *s && *s < to));
+            cuts.extend(
+                planes
+                    .map(|plane| (plane as f64 - start[axis]) / way[axis])
+                    .filter(|s| from < *s && *s < to),
+            );
         }
         cuts.sort_by(f64::total_cmp);
-        let parts = cuts.windows(2).map(|part| quadrature([part[0], part[1]], |s| [self.at(ray.point(s)).0])[0]);
+        let parts = cuts
+            .windows(2)
+            .map(|part| quadrature([part[0], part[1]], |s| [self.at(ray.point(s)).0])[0]);
         Mean::new(to - from, parts.sum())
     }
 }
@@ -101,8 +108,11 @@ mod tests {
     /// Three lattices: sheared, of two samples along an axis, and of one.
     fn volumes() -> [Volume; 3] {
         [[5, 4, 6], [2, 5, 3], [4, 1, 3]].map(|dims| {
-            let axes =
-                DMat3::from_cols(DVec3::new(0.3, 0.1, 0.0), DVec3::new(0.0, 0.2, 0.1), DVec3::new(0.05, 0.0, 0.4));
+            let axes = DMat3::from_cols(
+                DVec3::new(0.3, 0.1, 0.0),
+                DVec3::new(0.0, 0.2, 0.1),
+                DVec3::new(0.05, 0.0, 0.4),
+            );
             let lattice = Lattice::cartesian(dims, DVec3::new(0.1, 0.2, 0.3), axes);
             let values = (0..lattice.len()).map(|at| ((at * at) as f32).sin()).collect();
             Volume::new(lattice, Samples::F32(values)).unwrap()
@@ -126,7 +136,10 @@ mod tests {
                         // Not quite at the sample, where rounding would choose a cell.
                         let place = view.to_view(volume.lattice.sample_position(at));
                         let (found, _) = field.at(place + DVec3::splat(1e-9));
-                        assert!((found - volume.value(at)).abs() < 2e-6, "{tensor:?} at {at}: {found}");
+                        assert!(
+                            (found - volume.value(at)).abs() < 2e-6,
+                            "{tensor:?} at {at}: {found}"
+                        );
                     }
                 });
             }
@@ -141,13 +154,17 @@ mod tests {
                     for at in 0..20 {
                         let place = |shift: f64| (f64::from(at) + shift).sin() * 0.4 + 0.5;
                         // Also beyond the samples.
-                        let point = view.to_view(DVec3::new(place(0.3), place(1.7), place(4.0)) * 1.4);
+                        let point =
+                            view.to_view(DVec3::new(place(0.3), place(1.7), place(4.0)) * 1.4);
                         let (_, gradient) = field.at(point);
                         let step = 1e-6;
                         for axis in DVec3::AXES {
                             let values = [-step, step].map(|by| field.at(point + by * axis).0);
                             let expected = (values[1] - values[0]) / (2.0 * step);
-                            assert!((gradient.dot(axis) - expected).abs() < 1e-5, "{tensor:?}: {gradient} {expected}");
+                            assert!(
+                                (gradient.dot(axis) - expected).abs() < 1e-5,
+                                "{tensor:?}: {gradient} {expected}"
+                            );
                         }
                     }
                 });
@@ -163,10 +180,15 @@ mod tests {
             fields(&volume, &view, |tensor, field| {
                 for part in [[3.0, 3.1], [3.2, 4.4], [2.0, 5.0]] {
                     let steps = 20_000;
-                    let place = |i: i32| part[0] + (part[1] - part[0]) * (f64::from(i) + 0.5) / f64::from(steps);
+                    let place = |i: i32| {
+                        part[0] + (part[1] - part[0]) * (f64::from(i) + 0.5) / f64::from(steps)
+                    };
                     let sum: f64 = (0..steps).map(|i| field.at(ray.point(place(i))).0).sum();
                     let found = field.mean(&ray, part).value(0.1, part[1] - part[0]).unwrap();
-                    assert!((found - sum / f64::from(steps)).abs() < 1e-6, "{tensor:?} {part:?}: {found}");
+                    assert!(
+                        (found - sum / f64::from(steps)).abs() < 1e-6,
+                        "{tensor:?} {part:?}: {found}"
+                    );
                 }
             });
         }

@@ -57,7 +57,9 @@ impl<'a> Profile<'a> {
                 let (sin, cos) = x.sin_cos();
                 let filter = 3.0 * (sin - x * cos) / x.powi(3);
                 let window = (w * r).cos().powi(2);
-                (PI * (3.0 * sin / x.powi(2) - 3.0 * filter / x) * window - filter * w * (2.0 * w * r).sin()) / r
+                (PI * (3.0 * sin / x.powi(2) - 3.0 * filter / x) * window
+                    - filter * w * (2.0 * w * r).sin())
+                    / r
             }
             math::Profile::Table(values) => {
                 let scale = (values.len() - 1) as f64 / extent;
@@ -91,12 +93,16 @@ impl<'a> Profile<'a> {
         }
         // Smooth pieces at most one unit long.
         let mut cuts = vec![from, to];
-        let kinks = kinks(kernel).into_iter().filter(|kink| *kink > rho).map(|kink| (kink * kink - rho * rho).sqrt());
+        let kinks = kinks(kernel)
+            .into_iter()
+            .filter(|kink| *kink > rho)
+            .map(|kink| (kink * kink - rho * rho).sqrt());
         let inner = kinks.flat_map(|t| [-t, t]).chain([0.0]).filter(|t| from < *t && *t < to);
         cuts.extend(inner);
         if let math::Profile::Table(_) = kernel.profile {
             // Tables may have a peak, near which r turns within ρ.
-            let around = std::iter::successors(Some(rho.max(1e-3)), |t| Some(4.0 * t)).take_while(|t| *t < reach);
+            let around = std::iter::successors(Some(rho.max(1e-3)), |t| Some(4.0 * t))
+                .take_while(|t| *t < reach);
             cuts.extend(around.flat_map(|t| [-t, t]).filter(|t| from < *t && *t < to));
         }
         cuts.extend((from.floor() as i64 + 1..to.ceil() as i64).map(|t| t as f64));
@@ -176,12 +182,16 @@ mod tests {
                     }
                     let found = profile.moments(rho, [from, to]);
                     for i in 0..2 {
-                        assert!((found[i] - expected[i]).abs() < 2e-6, "{kernel:?} {rho}: {found:?} {expected:?}");
+                        assert!(
+                            (found[i] - expected[i]).abs() < 2e-6,
+                            "{kernel:?} {rho}: {found:?} {expected:?}"
+                        );
                     }
                 }
                 let whole = profile.moments(rho, [-30.0, 30.0]);
                 let cuts = [-30.0, -1.4, -0.3, 0.0, 0.1, 2.2, 30.0];
-                let parts: f64 = cuts.windows(2).map(|cut| profile.moments(rho, [cut[0], cut[1]])[0]).sum();
+                let parts: f64 =
+                    cuts.windows(2).map(|cut| profile.moments(rho, [cut[0], cut[1]])[0]).sum();
                 assert!((whole[0] - parts).abs() < 1e-6 && whole[1].abs() < 1e-12);
             }
         }
@@ -194,7 +204,10 @@ mod tests {
             for r in [3e-5, 2e-4, 0.3, 0.8, 1.1, 1.6] {
                 let step = 1e-5;
                 let expected = (profile.value(r + step) - profile.value(r - step)) / (2.0 * step);
-                assert!((profile.slope(r) * r - expected).abs() < 1e-6, "{kernel:?} at {r}: {expected}");
+                assert!(
+                    (profile.slope(r) * r - expected).abs() < 1e-6,
+                    "{kernel:?} at {r}: {expected}"
+                );
             }
         }
     }

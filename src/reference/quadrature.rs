@@ -10,7 +10,10 @@ const RULE: [(f64, f64); 4] = [
 ];
 
 /// ∫ of some functions at once between `from` and `to`, none of which is asked for its value at the ends.
-pub(super) fn quadrature<const N: usize>([from, to]: [f64; 2], values: impl Fn(f64) -> [f64; N]) -> [f64; N] {
+pub(super) fn quadrature<const N: usize>(
+    [from, to]: [f64; 2],
+    values: impl Fn(f64) -> [f64; N],
+) -> [f64; N] {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     let mut sums = [0.0; N];
     for (place, weight) in RULE {

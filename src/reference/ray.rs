@@ -21,11 +21,17 @@ impl Ray {
         let (origin, direction) = view.ray(pixel);
         let steps = [DVec3::X, DVec3::Y].map(|axis| axis / view.scale);
         if !view.perspective {
-            return Self { origin, direction, origin_across: steps, direction_across: [DVec3::ZERO; 2] };
+            return Self {
+                origin,
+                direction,
+                origin_across: steps,
+                direction_across: [DVec3::ZERO; 2],
+            };
         }
         // The direction is b/|b| with b = (x, y, 1): its derivative is what is across it in the derivative of b.
         let inverse_length = direction.z;
-        let direction_across = steps.map(|step| inverse_length * (step - direction * direction.dot(step)));
+        let direction_across =
+            steps.map(|step| inverse_length * (step - direction * direction.dot(step)));
         Self { origin, direction, origin_across: [DVec3::ZERO; 2], direction_across }
     }
 
@@ -56,7 +62,10 @@ pub(super) mod tests {
 
     /// Both projections, from a slant.
     pub fn views() -> [View; 2] {
-        let projections = [Projection::Perspective { view_angle: 70.0 }, Projection::Orthographic { height: 3.0 }];
+        let projections = [
+            Projection::Perspective { view_angle: 70.0 },
+            Projection::Orthographic { height: 3.0 },
+        ];
         projections.map(|projection| {
             let camera = Camera {
                 position: DVec3::new(3.0, -2.0, 1.0),
@@ -75,7 +84,8 @@ pub(super) mod tests {
             let ray = Ray::new(&view, pixel);
             let step = 1e-5;
             for (axis, moved) in [DVec2::X, DVec2::Y].into_iter().zip(ray.across(2.5)) {
-                let [before, after] = [-step, step].map(|d| Ray::new(&view, pixel + d * axis).point(2.5));
+                let [before, after] =
+                    [-step, step].map(|d| Ray::new(&view, pixel + d * axis).point(2.5));
                 assert!(((after - before) / (2.0 * step) - moved).length() < 1e-8);
             }
         }

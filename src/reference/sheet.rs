@@ -59,11 +59,19 @@ impl Mean {
     }
 
     /// Adds the part of a kernel that lies between two distances along the ray.
-    pub fn add(&mut self, sample: &Sample, center: DVec3, crossing: &Crossing, ray: &Ray, part: [f64; 2]) {
+    pub fn add(
+        &mut self,
+        sample: &Sample,
+        center: DVec3,
+        crossing: &Crossing,
+        ray: &Ray,
+        part: [f64; 2],
+    ) {
         let [length, first] = crossing.moments(part);
         let at_closest = sample.value + sample.slope.dot(ray.point(crossing.closest) - center);
         self.weight += sample.weight * length;
-        self.value += sample.weight * (at_closest * length + sample.slope.dot(ray.direction) * first);
+        self.value +=
+            sample.weight * (at_closest * length + sample.slope.dot(ray.direction) * first);
     }
 
     /// f̄; none where next to no kernel reaches into the sheet.

@@ -30,20 +30,31 @@ use rayon::prelude::*;
 /// # Errors
 /// As [`render`](super::render); [`Error::Argument`] for a scene that is not one volume on a Cartesian or body-centred
 /// lattice, for other optics, and for a step that is no length, or of which a ray would hold more than 2²⁰.
-pub fn integrate(scene: &Scene, camera: &Camera, settings: &Settings, step: f64) -> Result<Picture> {
+pub fn integrate(
+    scene: &Scene,
+    camera: &Camera,
+    settings: &Settings,
+    step: f64,
+) -> Result<Picture> {
     scene.validate()?;
     scene.validate_settings(settings)?;
     let [Item::Volume(volume, kernel, transfer)] = &scene.items[..] else {
         return Err(Error::Argument("rays are integrated through one volume alone".into()));
     };
     if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_)) {
-        return Err(Error::Argument("rays are integrated on lattices of equal cells, not on rectilinear ones".into()));
+        return Err(Error::Argument(
+            "rays are integrated on lattices of equal cells, not on rectilinear ones".into(),
+        ));
     }
     if settings.optics != Optics::EmissionAbsorption {
-        return Err(Error::Argument("rays are integrated for emission and absorption alone".into()));
+        return Err(Error::Argument(
+            "rays are integrated for emission and absorption alone".into(),
+        ));
     }
     if !(step > 0.0 && step.is_finite()) {
-        return Err(Error::Argument(format!("rays are integrated in steps of a length, found {step}")));
+        return Err(Error::Argument(format!(
+            "rays are integrated in steps of a length, found {step}"
+        )));
     }
     let points = scene.bounds().diagonal() / step;
     if points > MOST_POINTS {
@@ -62,7 +73,12 @@ pub fn integrate(scene: &Scene, camera: &Camera, settings: &Settings, step: f64)
             let ray = Ray::new(&view, DVec2::new(column.into(), row.into()) + 0.5);
             let allowed = clip::allowed(&ray, &view, &settings.clips);
             let held = clip::intersection(&allowed, clip::sample_box(&ray, &view, &volume.lattice));
-            field.pixel(&ray, &clip::intersection(&held, Some([near, f64::INFINITY])), step, &mut points)
+            field.pixel(
+                &ray,
+                &clip::intersection(&held, Some([near, f64::INFINITY])),
+                step,
+                &mut points,
+            )
         };
         (0..width).map(pixel).collect()
     };
@@ -167,7 +183,8 @@ impl<'a> Pointwise<'a> {
             let mut last = None;
             for first in (0..count).step_by(block) {
                 let (block, at) = (block.min(count - first), place(first));
-                let shown = |i: f64| self.visible.at((origin + (at + i * step) * direction) * self.unit);
+                let shown =
+                    |i: f64| self.visible.at((origin + (at + i * step) * direction) * self.unit);
                 points.reset(block, shown);
                 let Some([start, end]) = points.ends() else {
                     last = None;
@@ -180,14 +197,23 @@ impl<'a> Pointwise<'a> {
                     let s = place(first + i);
                     if let Some((value, gradient)) = here {
                         if let Some((before, _)) = last {
-                            self.meet_surfaces(&mut composite, [before, value], gradient, ray, [s - step, s]);
+                            self.meet_surfaces(
+                                &mut composite,
+                                [before, value],
+                                gradient,
+                                ray,
+                                [s - step, s],
+                            );
                         }
                         let (extinction, color) = self.classifier.at(value);
-                        let extinction = extinction * self.classifier.transfer.gradient_factor(gradient.length());
+                        let extinction = extinction
+                            * self.classifier.transfer.gradient_factor(gradient.length());
                         if extinction > 0.0 {
                             let color = self.lit(color, gradient, ray);
-                            composite
-                                .pass(Medium { depth: extinction * step, color }, [s - 0.5 * step, s + 0.5 * step]);
+                            composite.pass(
+                                Medium { depth: extinction * step, color },
+                                [s - 0.5 * step, s + 0.5 * step],
+                            );
                         }
                     }
                     last = here;
@@ -213,7 +239,8 @@ impl<'a> Pointwise<'a> {
         [from, to]: [f64; 2],
     ) {
         let surfaces = &self.classifier.transfer.isosurfaces;
-        let mut met: Vec<_> = surfaces.iter().filter(|surface| (a < surface.value) != (b < surface.value)).collect();
+        let mut met: Vec<_> =
+            surfaces.iter().filter(|surface| (a < surface.value) != (b < surface.value)).collect();
         met.sort_by(|x, y| (x.value - a).abs().total_cmp(&(y.value - a).abs()));
         for surface in met {
             let color = self.lit(DVec3::from(surface.color), gradient, ray);
@@ -257,43 +284,51 @@ impl<'a> Pointwise<'a> {
         let (first, stride) = ((at + start as f64 * step) * density, step * density);
         let last = first + (end - start) as f64 * stride;
         let gradients = self.needs_gradients();
-        self.each_sample_around(origin, along, [first - self.tail, last + self.tail], |sample, offset, closest| {
-            let rho = offset.length();
-            let reach = self.tail.min(self.profile.reach(rho));
-            let begin = ((closest - reach - first) / stride).ceil().max(0.0) as usize;
-            let past = ((closest + reach - first) / stride).floor() + 1.0;
-            let past = (past.max(0.0) as usize).min(end - start + 1);
-            if begin >= past {
-                return;
-            }
-            let value = self.volume.drawn_value(sample);
-            let mut t = first + begin as f64 * stride - closest;
-            // A Gaussian's next value is its last one times a factor, which itself changes by a factor.
-            let mut bell = (-0.5 * (rho * rho + t * t)).exp();
-            let mut factor = (-stride * (t + 0.5 * stride)).exp();
-            let change = (-stride * stride).exp();
-            for i in start + begin..start + past {
-                let (h, slope) = match self.profile {
-                    Profile::Gaussian => (bell, -bell),
-                    Profile::Compact(_) => {
-                        let r = rho.hypot(t);
-                        (self.profile.value(r), if gradients { self.profile.slope(r) } else { 0.0 })
-                    }
-                };
-                let [weight, sum] = &mut points.sums[i];
-                *weight += h;
-                *sum += value * h;
-                if gradients {
-                    let turned = slope * (offset - t * along);
-                    let [slopes, value_slopes] = &mut points.slopes[i];
-                    *slopes -= turned;
-                    *value_slopes -= value * turned;
+        self.each_sample_around(
+            origin,
+            along,
+            [first - self.tail, last + self.tail],
+            |sample, offset, closest| {
+                let rho = offset.length();
+                let reach = self.tail.min(self.profile.reach(rho));
+                let begin = ((closest - reach - first) / stride).ceil().max(0.0) as usize;
+                let past = ((closest + reach - first) / stride).floor() + 1.0;
+                let past = (past.max(0.0) as usize).min(end - start + 1);
+                if begin >= past {
+                    return;
                 }
-                t += stride;
-                bell *= factor;
-                factor *= change;
-            }
-        });
+                let value = self.volume.drawn_value(sample);
+                let mut t = first + begin as f64 * stride - closest;
+                // A Gaussian's next value is its last one times a factor, which itself changes by a factor.
+                let mut bell = (-0.5 * (rho * rho + t * t)).exp();
+                let mut factor = (-stride * (t + 0.5 * stride)).exp();
+                let change = (-stride * stride).exp();
+                for i in start + begin..start + past {
+                    let (h, slope) = match self.profile {
+                        Profile::Gaussian => (bell, -bell),
+                        Profile::Compact(_) => {
+                            let r = rho.hypot(t);
+                            (
+                                self.profile.value(r),
+                                if gradients { self.profile.slope(r) } else { 0.0 },
+                            )
+                        }
+                    };
+                    let [weight, sum] = &mut points.sums[i];
+                    *weight += h;
+                    *sum += value * h;
+                    if gradients {
+                        let turned = slope * (offset - t * along);
+                        let [slopes, value_slopes] = &mut points.slopes[i];
+                        *slopes -= turned;
+                        *value_slopes -= value * turned;
+                    }
+                    t += stride;
+                    bell *= factor;
+                    factor *= change;
+                }
+            },
+        );
     }
 
     /// Calls `add` with every sample whose footprint a ray meets, closest between two distances in kernel space: its index,
@@ -306,11 +341,15 @@ impl<'a> Pointwise<'a> {
         mut add: impl FnMut(usize, DVec3, f64),
     ) {
         // The slices of samples that the ray crosses most steeply; in each, an ellipse around the crossing.
-        let steep =
-            if along.abs().max_element() == along.abs().x { 0 } else { 1 + usize::from(along.y.abs() < along.z.abs()) };
+        let steep = if along.abs().max_element() == along.abs().x {
+            0
+        } else {
+            1 + usize::from(along.y.abs() < along.z.abs())
+        };
         let [b, c] = [(steep + 1) % 3, (steep + 2) % 3];
-        let half_width =
-            |other: usize| self.radius * (1.0 - along[other] * along[other]).max(0.0).sqrt() / along[steep].abs();
+        let half_width = |other: usize| {
+            self.radius * (1.0 - along[other] * along[other]).max(0.0).sqrt() / along[steep].abs()
+        };
         let (half_b, half_c) = (half_width(c), half_width(b));
         let lean = self.radius * (1.0 - along[steep] * along[steep]).max(0.0).sqrt();
         let [nx, ny, nz] = self.lattice.dims;
@@ -370,7 +409,10 @@ impl Points {
 
     /// The first and the last point that show something.
     fn ends(&self) -> Option<[usize; 2]> {
-        Some([self.shown.iter().position(|shown| *shown)?, self.shown.iter().rposition(|shown| *shown)?])
+        Some([
+            self.shown.iter().position(|shown| *shown)?,
+            self.shown.iter().rposition(|shown| *shown)?,
+        ])
     }
 }
 

@@ -15,9 +15,14 @@ use glam::{DMat3, DVec3};
 /// which make it point into the picture most; the world's axes without a lattice.
 pub(super) fn sheet_axis(view: &View, lattice: Option<&Lattice>) -> DVec3 {
     let axes = lattice.map_or(DMat3::IDENTITY, |lattice| lattice.axes);
-    let normals =
-        axes.inverse().transpose().to_cols_array_2d().map(|normal| view.rotation * DVec3::from(normal).normalize());
-    let best = normals.into_iter().fold(DVec3::ZERO, |best, n| if n.z.abs() > best.z.abs() { n } else { best });
+    let normals = axes
+        .inverse()
+        .transpose()
+        .to_cols_array_2d()
+        .map(|normal| view.rotation * DVec3::from(normal).normalize());
+    let best = normals
+        .into_iter()
+        .fold(DVec3::ZERO, |best, n| if n.z.abs() > best.z.abs() { n } else { best });
     best * best.z.signum()
 }
 
@@ -31,19 +36,30 @@ impl Frame<'_> {
             return None;
         }
         let mut light = Light::default();
-        light.add(radiance, crossing.optical_depth(radiance.amount, [f64::NEG_INFINITY, f64::INFINITY]));
+        light.add(
+            radiance,
+            crossing.optical_depth(radiance.amount, [f64::NEG_INFINITY, f64::INFINITY]),
+        );
         Some((light, crossing.closest))
     }
 
     /// A pixel of axis-aligned sheets.
-    pub(super) fn pixel_of_axis_sheets(&self, ray: &Ray, kernels: &[&Kernel], axis: DVec3) -> Composite {
+    pub(super) fn pixel_of_axis_sheets(
+        &self,
+        ray: &Ray,
+        kernels: &[&Kernel],
+        axis: DVec3,
+    ) -> Composite {
         let allowed = clip::allowed(ray, &self.view, &self.clips);
         let mut sheets = vec![Sheet::default(); self.count()];
         for kernel in kernels {
             let key = axis.dot(kernel.center);
             let key = if self.view.perspective { key.abs() } else { key };
-            let Some(k) =
-                self.planes.partition_point(|&plane| plane <= key).checked_sub(1).filter(|k| *k < self.count())
+            let Some(k) = self
+                .planes
+                .partition_point(|&plane| plane <= key)
+                .checked_sub(1)
+                .filter(|k| *k < self.count())
             else {
                 continue;
             };
@@ -53,7 +69,11 @@ impl Frame<'_> {
         }
         let slope = axis.dot(ray.direction);
         let distance = |key: f64| {
-            if self.view.perspective { key / slope.abs() } else { (key - axis.dot(ray.origin)) / slope }
+            if self.view.perspective {
+                key / slope.abs()
+            } else {
+                (key - axis.dot(ray.origin)) / slope
+            }
         };
         let mut composite = Composite::EMPTY;
         for (k, sheet) in sheets.iter().enumerate() {
@@ -63,9 +83,16 @@ impl Frame<'_> {
     }
 
     /// A pixel of single splats.
-    pub(super) fn pixel_of_splats(&self, ray: &Ray, kernels: &[&Kernel], order: Order) -> Composite {
+    pub(super) fn pixel_of_splats(
+        &self,
+        ray: &Ray,
+        kernels: &[&Kernel],
+        order: Order,
+    ) -> Composite {
         let allowed = clip::allowed(ray, &self.view, &self.clips);
-        let distance = |kernel: &Kernel| if self.view.perspective { kernel.center.length() } else { kernel.center.z };
+        let distance = |kernel: &Kernel| {
+            if self.view.perspective { kernel.center.length() } else { kernel.center.z }
+        };
         let mut splats: Vec<(f64, f64, Medium)> = kernels
             .iter()
             .filter(|kernel| distance(kernel) >= self.near)

@@ -21,7 +21,8 @@ pub(crate) fn merged(set: &SplatSet, edge: f64) -> SplatSet {
         return set.clone();
     }
     let key = |splat: &Splat| {
-        let [x, y, z] = ((Vec3::from_array(splat.center).as_dvec3() / edge).floor() - first).to_array();
+        let [x, y, z] =
+            ((Vec3::from_array(splat.center).as_dvec3() / edge).floor() - first).to_array();
         (x as u64) << 42 | (y as u64) << 21 | z as u64
     };
     let numbered = set.splats.par_iter().zip(0..set.splats.len() as u32);
@@ -51,18 +52,21 @@ fn one_of(set: &SplatSet, cell: &[(u64, u32)]) -> Splat {
     for part in own().map(Part::of) {
         let d = part.center - middle;
         let share = part.mass / mass;
-        covariance += share * (part.factor * part.factor.transpose() + DMat3::from_cols(d * d.x, d * d.y, d * d.z));
+        covariance += share
+            * (part.factor * part.factor.transpose() + DMat3::from_cols(d * d.x, d * d.y, d * d.z));
         // The kernel's own part of it is Σ·g with g = B⁻ᵀ·s.
         rise += share * ((part.value - value) * d + part.factor * part.slope);
     }
     let DMat3 { x_axis, y_axis, z_axis } = covariance;
-    let terms = [x_axis.x, x_axis.y, x_axis.z, y_axis.y, y_axis.z, z_axis.z].map(|term| term as f32);
+    let terms =
+        [x_axis.x, x_axis.y, x_axis.z, y_axis.y, y_axis.z, z_axis.z].map(|term| term as f32);
     let Some([b00, b10, b11, b20, b21, b22]) = factor(&terms) else { return *first };
     // Slopes are per whitened length: B⁻¹ of what values rise with place.
     let x = rise.x / b00;
     let y = (rise.y - b10 * x) / b11;
     let z = (rise.z - b20 * x - b21 * y) / b22;
-    let slope = DVec3::new(x, y, z).clamp(DVec3::splat(-LARGEST_SLOPE), DVec3::splat(LARGEST_SLOPE));
+    let slope =
+        DVec3::new(x, y, z).clamp(DVec3::splat(-LARGEST_SLOPE), DVec3::splat(LARGEST_SLOPE));
     let weight = (mass / (b00 * b11 * b22)).clamp(1e-4, LARGEST_SLOPE);
     let factor = [b00, b10, b11, b20, b21, b22].map(|term| term as f32);
     Splat::sample(middle.as_vec3(), value as f32, factor, weight as f32, slope.as_vec3())
@@ -86,7 +90,11 @@ impl Part {
             mass: (f64::from(weight) * b00 * b11 * b22).abs().max(f64::MIN_POSITIVE),
             center: DVec3::from_array(splat.center.map(f64::from)),
             value: f64::from(splat.strength),
-            factor: DMat3::from_cols(DVec3::new(b00, b10, b20), DVec3::new(0.0, b11, b21), DVec3::new(0.0, 0.0, b22)),
+            factor: DMat3::from_cols(
+                DVec3::new(b00, b10, b20),
+                DVec3::new(0.0, b11, b21),
+                DVec3::new(0.0, 0.0, b22),
+            ),
             slope: slope.as_dvec3(),
         }
     }
@@ -101,14 +109,16 @@ mod tests {
     #[test]
     fn merged_samples_keep_a_linear_field() {
         let field = |p: Vec3| 3.0 + 2.0 * p.x - p.y + 0.5 * p.z;
-        let place = |i: u32| Vec3::new((i % 16) as f32, (i / 16 % 16) as f32, (i / 256) as f32) * 0.11;
+        let place =
+            |i: u32| Vec3::new((i % 16) as f32, (i / 16 % 16) as f32, (i / 256) as f32) * 0.11;
         let positions: Vec<Vec3> = (0..16 * 16 * 16).map(place).collect();
         let values = positions.iter().map(|&p| field(p)).collect();
         let points = Points { positions, values, ..Points::default() };
         let set = points.to_splats(&SampleOptions::default()).expect("splats");
         let few = merged(&set, 0.5);
         assert!(few.splats.len() * 27 < set.splats.len() * 2, "{}", few.splats.len());
-        let mass = |set: &SplatSet| set.splats.iter().map(|splat| Part::of(splat).mass).sum::<f64>();
+        let mass =
+            |set: &SplatSet| set.splats.iter().map(|splat| Part::of(splat).mass).sum::<f64>();
         assert!((mass(&few) / mass(&set) - 1.0).abs() < 2e-3, "{} {}", mass(&few), mass(&set));
         for splat in &few.splats {
             let part = Part::of(splat);
@@ -116,7 +126,11 @@ mod tests {
             assert!((part.value - truth).abs() < 2e-2, "{} {truth}", part.value);
             // The slope along whitened axes is Bᵀ times the gradient.
             let slope = part.factor.transpose() * DVec3::new(2.0, -1.0, 0.5);
-            assert!((part.slope - slope).length() < 0.05 * slope.length(), "{} {slope}", part.slope);
+            assert!(
+                (part.slope - slope).length() < 0.05 * slope.length(),
+                "{} {slope}",
+                part.slope
+            );
         }
     }
 
@@ -124,7 +138,9 @@ mod tests {
     fn a_set_over_too_many_cells_stays_as_it_is() {
         let positions = vec![Vec3::ZERO, Vec3::splat(1e-3), Vec3::splat(1e9)];
         let points = Points { positions, values: vec![1.0; 3], ..Points::default() };
-        let set = points.to_splats(&SampleOptions { slopes: false, ..SampleOptions::default() }).expect("splats");
+        let set = points
+            .to_splats(&SampleOptions { slopes: false, ..SampleOptions::default() })
+            .expect("splats");
         assert_eq!(merged(&set, 1e-2).splats, set.splats);
         assert_eq!(merged(&set, 1e4).splats.len(), 2);
     }

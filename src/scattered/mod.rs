@@ -59,19 +59,33 @@ impl Points {
         if !self.origin.is_finite() {
             return Err(format!("the origin {} is not finite", self.origin));
         }
-        let first = |bad: &(dyn Fn(usize) -> bool + Sync)| (0..count).into_par_iter().find_first(|&index| bad(index));
+        let first = |bad: &(dyn Fn(usize) -> bool + Sync)| {
+            (0..count).into_par_iter().find_first(|&index| bad(index))
+        };
         if let Some(index) = first(&|index| !self.positions[index].is_finite()) {
-            return Err(format!("the position {} of sample {index} is not finite", self.positions[index]));
+            return Err(format!(
+                "the position {} of sample {index} is not finite",
+                self.positions[index]
+            ));
         }
         if let Some(index) = first(&|index| !self.values[index].is_finite()) {
             return Err(format!("the value of sample {index} is {}", self.values[index]));
         }
-        if let Some(index) = self.radii.par_iter().position_first(|radius| !(radius.is_normal() && *radius > 0.0)) {
-            return Err(format!("the radius of sample {index} is {}, but radii are above 0", self.radii[index]));
+        if let Some(index) =
+            self.radii.par_iter().position_first(|radius| !(radius.is_normal() && *radius > 0.0))
+        {
+            return Err(format!(
+                "the radius of sample {index} is {}, but radii are above 0",
+                self.radii[index]
+            ));
         }
-        if let Some(index) = self.covariances.par_iter().position_first(|terms| splats::factor(terms).is_none()) {
+        if let Some(index) =
+            self.covariances.par_iter().position_first(|terms| splats::factor(terms).is_none())
+        {
             let terms = self.covariances[index];
-            return Err(format!("the covariance {terms:?} of sample {index} is not positive definite"));
+            return Err(format!(
+                "the covariance {terms:?} of sample {index} is not positive definite"
+            ));
         }
         Ok(())
     }

@@ -35,7 +35,11 @@ pub(super) struct Place {
 ///
 /// # Errors
 /// [`Error::Timeout`](crate::Error::Timeout).
-pub(super) fn places(points: &Points, neighbours: usize, deadline: Deadline) -> Result<(Vec<Place>, Vec<u32>)> {
+pub(super) fn places(
+    points: &Points,
+    neighbours: usize,
+    deadline: Deadline,
+) -> Result<(Vec<Place>, Vec<u32>)> {
     let first = Neighbours::first_of_equals(&points.positions);
     let mut place_of = vec![0; points.len()];
     let mut positions = Vec::new();
@@ -79,16 +83,19 @@ struct Surroundings<'a> {
 impl Surroundings<'_> {
     fn place(&self, index: u32, samples: u32) -> Place {
         let (center, own) = (self.positions[index as usize], self.values[index as usize]);
-        let nearest = self.tree.of(index, self.neighbours).into_iter().map(|(distance, neighbour)| {
-            let offset = (self.positions[neighbour as usize] - center).as_dvec3();
-            (offset, self.values[neighbour as usize] - own, f64::from(distance))
-        });
+        let nearest =
+            self.tree.of(index, self.neighbours).into_iter().map(|(distance, neighbour)| {
+                let offset = (self.positions[neighbour as usize] - center).as_dvec3();
+                (offset, self.values[neighbour as usize] - own, f64::from(distance))
+            });
         let around: Vec<(DVec3, f64, f64)> = nearest.collect();
         let Some(&(.., farthest)) = around.last() else {
             return Place { samples, spacing: 0.0, gradient: DVec3::ZERO, width: 0.0 };
         };
         let fit = Fit::new(&around, farthest);
-        let [low, high] = around.iter().fold([0.0f64; 2], |[low, high], &(_, rise, _)| [low.min(rise), high.max(rise)]);
+        let [low, high] = around
+            .iter()
+            .fold([0.0f64; 2], |[low, high], &(_, rise, _)| [low.min(rise), high.max(rise)]);
         // The ball, disc or line to the k-th neighbour holds k samples besides the own one in its middle.
         let k = around.len() as f64;
         let spacing = match fit.dimensions {
@@ -98,7 +105,12 @@ impl Surroundings<'_> {
         };
         // A few samples all lie on the border, and so have less room.
         let spacing = farthest * spacing.min(1.0);
-        Place { samples, spacing, gradient: limited(fit.gradient, &around, [low, high]), width: high - low }
+        Place {
+            samples,
+            spacing,
+            gradient: limited(fit.gradient, &around, [low, high]),
+            width: high - low,
+        }
     }
 }
 
@@ -116,7 +128,12 @@ impl Fit {
     fn new(around: &[(DVec3, f64, f64)], farthest: f64) -> Self {
         let weight = |distance: f64| 1.0 - 0.64 * (distance / farthest).powi(2);
         let own = (DVec3::ZERO, 0.0, 0.0);
-        let all = || around.iter().chain([&own]).map(|&(offset, rise, distance)| (offset, rise, weight(distance)));
+        let all = || {
+            around
+                .iter()
+                .chain([&own])
+                .map(|&(offset, rise, distance)| (offset, rise, weight(distance)))
+        };
         let (mut sum, mut mean, mut mean_rise) = (0.0, DVec3::ZERO, 0.0);
         for (offset, rise, weight) in all() {
             sum += weight;
@@ -136,7 +153,8 @@ impl Fit {
             return Self { dimensions: 3, gradient: scatter.inverse() * trend };
         }
         let (variances, axes) = eigen(scatter);
-        let dimensions = variances.iter().filter(|&&variance| variance > FLAT * variances[0]).count();
+        let dimensions =
+            variances.iter().filter(|&&variance| variance > FLAT * variances[0]).count();
         let along = |axis: usize| axes[axis] * (axes[axis].dot(trend) / variances[axis]);
         Self { dimensions, gradient: (0..dimensions).map(along).sum() }
     }

@@ -45,7 +45,13 @@ pub struct SampleOptions {
 
 impl Default for SampleOptions {
     fn default() -> Self {
-        Self { neighbours: 16, radius: None, deviations: 2.0, slopes: true, deadline: Deadline::NEVER }
+        Self {
+            neighbours: 16,
+            radius: None,
+            deviations: 2.0,
+            slopes: true,
+            deadline: Deadline::NEVER,
+        }
     }
 }
 
@@ -83,13 +89,16 @@ impl Points {
         // 32-bit coordinates cannot tell distances below this: a kernel so narrow would only hide in rounding.
         let [low, high] = self.bounds();
         let finest = ((high - low).length() * 1e-7).max(f64::from(f32::MIN_POSITIVE));
-        let mut shapes: Vec<Shape> =
-            (0..self.len()).into_par_iter().map(|index| self.shape(options, index, place(index), finest)).collect();
+        let mut shapes: Vec<Shape> = (0..self.len())
+            .into_par_iter()
+            .map(|index| self.shape(options, index, place(index), finest))
+            .collect();
         settle_weights(&mut shapes);
         let slope = |index: usize| slope(&shapes[index].factor, &place(index));
         let slope = |index: usize| if options.slopes { slope(index) } else { DVec3::ZERO };
-        if let Some(index) =
-            (0..self.len()).into_par_iter().find_first(|&index| slope(index).abs().max_element() > LARGEST_SLOPE)
+        if let Some(index) = (0..self.len())
+            .into_par_iter()
+            .find_first(|&index| slope(index).abs().max_element() > LARGEST_SLOPE)
         {
             return Err(Error::Argument(format!(
                 "around sample {index} the values change by {:.3e} within a kernel, but 16 bits hold slopes up to \
@@ -100,12 +109,24 @@ impl Points {
         let splat = |index: usize| {
             let Shape { factor, weight } = &shapes[index];
             let factor = factor.map(|term| term as f32);
-            Splat::sample(self.positions[index], self.values[index], factor, *weight as f32, slope(index).as_vec3())
+            Splat::sample(
+                self.positions[index],
+                self.values[index],
+                factor,
+                *weight as f32,
+                slope(index).as_vec3(),
+            )
         };
         let splats: Vec<Splat> = (0..self.len()).into_par_iter().map(splat).collect();
         options.deadline.check("comparing kernels")?;
         let overlap = overlap(&splats);
-        Ok(SplatSet { origin: self.origin, payload: Payload::Scalar, splats, extent: EXTENT, overlap })
+        Ok(SplatSet {
+            origin: self.origin,
+            payload: Payload::Scalar,
+            splats,
+            extent: EXTENT,
+            overlap,
+        })
     }
 
     /// The kernel of a sample, with its weight up to a common factor.
@@ -138,9 +159,14 @@ impl SampleOptions {
     fn validate(&self) -> Result<()> {
         let wrong = |message: String| Err(Error::Argument(message));
         if !(4..=MOST).contains(&self.neighbours) {
-            return wrong(format!("samples are judged by 4 to {MOST} neighbours, found {}", self.neighbours));
+            return wrong(format!(
+                "samples are judged by 4 to {MOST} neighbours, found {}",
+                self.neighbours
+            ));
         }
-        for (name, value) in [("a radius", self.radius.unwrap_or(1.0)), ("deviations", self.deviations)] {
+        for (name, value) in
+            [("a radius", self.radius.unwrap_or(1.0)), ("deviations", self.deviations)]
+        {
             if !(value > 0.0 && value.is_finite()) {
                 return wrong(format!("samples need {name} above 0, found {value}"));
             }
@@ -170,7 +196,9 @@ fn settle_weights(shapes: &mut [Shape]) {
     let middle = weights.len() / 2;
     let median = *weights.select_nth_unstable_by(middle, f64::total_cmp).1;
     let unit = median.min(std::f64::consts::TAU.powf(1.5));
-    shapes.par_iter_mut().for_each(|shape| shape.weight = (shape.weight / unit).clamp(WEIGHTS[0], WEIGHTS[1]));
+    shapes
+        .par_iter_mut()
+        .for_each(|shape| shape.weight = (shape.weight / unit).clamp(WEIGHTS[0], WEIGHTS[1]));
 }
 
 /// The slope in the kernel's whitened space, Bᵀ·g.
@@ -185,7 +213,9 @@ fn slope([b00, b10, b11, b20, b21, b22]: &[f64; 6], place: &Place) -> DVec3 {
 fn overlap(splats: &[Splat]) -> f32 {
     let tried = ((1 << 26) / splats.len()).clamp(16, 512).min(splats.len());
     let sums = (0..tried).into_par_iter().map(|sample| {
-        let at = Vec3::from(splats[(sample as u64 * splats.len() as u64 / tried as u64) as usize].center);
+        let at = Vec3::from(
+            splats[(sample as u64 * splats.len() as u64 / tried as u64) as usize].center,
+        );
         splats.iter().map(|splat| weighted_kernel(splat, at)).sum::<f64>()
     });
     (sums.sum::<f64>() / tried as f64) as f32
@@ -203,5 +233,9 @@ fn weighted_kernel(splat: &Splat, at: Vec3) -> f64 {
     let y = (d.y - b10 * x) / b11;
     let z = (d.z - b20 * x - b21 * y) / b22;
     let squared = x * x + y * y + z * z;
-    if squared > EXTENT * EXTENT { 0.0 } else { f64::from(splat.weight_and_slope().0 * (-0.5 * squared).exp()) }
+    if squared > EXTENT * EXTENT {
+        0.0
+    } else {
+        f64::from(splat.weight_and_slope().0 * (-0.5 * squared).exp())
+    }
 }

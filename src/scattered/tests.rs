@@ -9,7 +9,8 @@ struct Random(u64);
 
 impl Random {
     fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f32 / (1 << 24) as f32
     }
 
@@ -60,7 +61,9 @@ fn deviation(set: &SplatSet, index: usize) -> f32 {
 #[test]
 fn kernels_follow_the_room_between_samples() {
     let grid = |n: [usize; 3]| {
-        let place = |i: usize| Vec3::new((i % n[0]) as f32, (i / n[0] % n[1]) as f32, (i / n[0] / n[1]) as f32) * 10.0;
+        let place = |i: usize| {
+            Vec3::new((i % n[0]) as f32, (i / n[0] % n[1]) as f32, (i / n[0] / n[1]) as f32) * 10.0
+        };
         splats(&points((0..n[0] * n[1] * n[2]).map(place).collect(), |_| 1.0))
     };
     // 16 neighbours: in space the farthest is √2 steps away, in a plane √5, on a line 8.
@@ -87,7 +90,11 @@ fn no_place_inside_is_left_out() {
     assert!(least > 0.5, "{least}");
     let mean = sums.iter().sum::<f64>() / sums.len() as f64;
     // (2π)^1.5 · 0.7³ = 5.4, and each sample's own kernel where it is measured at the samples.
-    assert!((5.0..6.5).contains(&mean) && (f64::from(set.overlap) - mean).abs() < 1.5, "{mean} {}", set.overlap);
+    assert!(
+        (5.0..6.5).contains(&mean) && (f64::from(set.overlap) - mean).abs() < 1.5,
+        "{mean} {}",
+        set.overlap
+    );
 }
 
 /// A linear field comes out linear, at the border and beyond it too. What is left is that 16 bits round slopes to 2⁻¹²:
@@ -131,15 +138,20 @@ fn the_density_of_samples_does_not_show() {
     // Mean and largest error in the sheet around the border.
     let error = |set: &SplatSet| {
         let mut random = Random(5);
-        let places = (0..400).map(|_| random.place() * Vec3::new(0.1, 0.6, 0.6) + Vec3::new(0.45, 0.2, 0.2));
+        let places =
+            (0..400).map(|_| random.place() * Vec3::new(0.1, 0.6, 0.6) + Vec3::new(0.45, 0.2, 0.2));
         let errors: Vec<f64> = places.map(|at| field(set, at).1 - f64::from(truth(at))).collect();
-        (errors.iter().sum::<f64>() / 400.0, errors.iter().fold(0.0f64, |most, error| most.max(error.abs())))
+        (
+            errors.iter().sum::<f64>() / 400.0,
+            errors.iter().fold(0.0f64, |most, error| most.max(error.abs())),
+        )
     };
     let (shift, most) = error(&splats(&samples));
     assert!(shift.abs() < 2e-5 && most < 3e-4, "{shift} {most}");
     // Kernels of one size: without slopes only the weights keep the dense side from pulling the mean to its own values.
     samples.radii = vec![0.15; samples.len()];
-    let mut set = samples.to_splats(&SampleOptions { slopes: false, ..SampleOptions::default() }).unwrap();
+    let mut set =
+        samples.to_splats(&SampleOptions { slopes: false, ..SampleOptions::default() }).unwrap();
     let mean_weight = |dense: bool| {
         let of_side = set.splats.iter().filter(|splat| (splat.center[0] < 0.5) == dense);
         let weights: Vec<f32> = of_side.map(|splat| splat.weight_and_slope().0).collect();
@@ -175,7 +187,10 @@ fn coincident_samples_give_their_mean_and_no_trouble() {
 #[test]
 fn few_samples_and_flat_ones_are_fine() {
     let one = splats(&points(vec![Vec3::X], |_| 7.0));
-    assert_eq!((deviation(&one, 0), one.splats[0].weight_and_slope(), one.overlap), (0.5, (1.0, Vec3::ZERO), 1.0));
+    assert_eq!(
+        (deviation(&one, 0), one.splats[0].weight_and_slope(), one.overlap),
+        (0.5, (1.0, Vec3::ZERO), 1.0)
+    );
     let given = SampleOptions { radius: Some(3.0), ..SampleOptions::default() };
     let one = points(vec![Vec3::X], |_| 7.0).to_splats(&given).unwrap();
     assert_eq!((deviation(&one, 0), one.splats[0].weight_and_slope().0), (1.5, 1.0));
@@ -194,7 +209,11 @@ fn few_samples_and_flat_ones_are_fine() {
         assert!((field(&set, at).1 - f64::from(at.x)).abs() < 1e-3);
         let slope = set.splats[7].weight_and_slope().1;
         assert!(slope.length() > 0.0);
-        let across = if flat == DVec3::ZERO { Vec3::new(1.0, 1.0, 0.0) } else { Vec3::new(0.25, -0.25, -1.0) };
+        let across = if flat == DVec3::ZERO {
+            Vec3::new(1.0, 1.0, 0.0)
+        } else {
+            Vec3::new(0.25, -0.25, -1.0)
+        };
         assert!(slope.dot(across).abs() < 1e-3 * slope.length(), "{slope}");
     }
 }
@@ -225,7 +244,8 @@ fn radii_of_any_ratio_are_no_trouble() {
 #[test]
 fn covariances_become_factors() {
     let terms = [4.0, 1.0, -2.0, 3.0, 0.5, 6.0];
-    let samples = Points { covariances: vec![terms; 2], ..points(vec![Vec3::ZERO, Vec3::X], |p| p.x) };
+    let samples =
+        Points { covariances: vec![terms; 2], ..points(vec![Vec3::ZERO, Vec3::X], |p| p.x) };
     let [b00, b10, b11, b20, b21, b22] = splats(&samples).splats[0].factor;
     let found = [
         b00 * b00,
@@ -237,7 +257,9 @@ fn covariances_become_factors() {
     ];
     assert!(found.iter().zip(terms).all(|(a, b)| (a - b).abs() < 1e-5), "{found:?}");
     // A radius of the caller's own counts before.
-    let round = samples.to_splats(&SampleOptions { radius: Some(1.0), ..SampleOptions::default() }).unwrap();
+    let round = samples
+        .to_splats(&SampleOptions { radius: Some(1.0), ..SampleOptions::default() })
+        .unwrap();
     assert_eq!(deviation(&round, 0), 0.5);
 }
 
@@ -266,10 +288,16 @@ fn what_is_wrong_is_told() {
         (Points { positions: vec![Vec3::INFINITY; 3], ..good.clone() }, "position"),
         (Points { origin: DVec3::NAN, ..good.clone() }, "origin"),
         (
-            Points { covariances: vec![identity, [1.0, 1.0, 0.0, 1.0, 0.0, 1.0], identity], ..good.clone() },
+            Points {
+                covariances: vec![identity, [1.0, 1.0, 0.0, 1.0, 0.0, 1.0], identity],
+                ..good.clone()
+            },
             "sample 1 is not",
         ),
-        (Points { covariances: vec![[f32::NAN; 6]; 3], ..good.clone() }, "sample 0 is not positive definite"),
+        (
+            Points { covariances: vec![[f32::NAN; 6]; 3], ..good.clone() },
+            "sample 0 is not positive definite",
+        ),
     ] {
         let message = match bad.to_splats(&SampleOptions::default()) {
             Err(Error::Argument(message)) => message,

@@ -24,7 +24,9 @@ pub(super) fn of_item(number: usize) -> impl Fn(String) -> Error {
 pub(super) fn check_transfer(item: &Item) -> Result<(), String> {
     match item {
         Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => {
-            transfer.validate_numbers().map_err(|message| format!("the transfer function: {message}"))
+            transfer
+                .validate_numbers()
+                .map_err(|message| format!("the transfer function: {message}"))
         }
         Item::Radiance(_) | Item::Hierarchy(_) => Ok(()),
     }
@@ -64,7 +66,8 @@ pub(super) fn check_item(item: &Item) -> Result<(), String> {
     let Bounds { min, max } = item.bounds();
     let holds = |v: f64| v.abs() <= f64::from(f32::MAX);
     // Nothing at all has bounds of its own, which are not finite.
-    let is_none = matches!(item, Item::Radiance(set) | Item::Scalar(set, _) if set.splats.is_empty());
+    let is_none =
+        matches!(item, Item::Radiance(set) | Item::Scalar(set, _) if set.splats.is_empty());
     if !is_none && ![min, max, max - min].iter().all(|v| v.to_array().into_iter().all(holds)) {
         return Err(format!("it reaches from {min} to {max}, beyond what 32-bit numbers hold"));
     }
@@ -97,10 +100,12 @@ fn fault(splat: &Splat, payload: Payload) -> Option<String> {
         return Some(format!("the factor {factor:?} is not finite"));
     }
     match payload {
-        Payload::Radiance if !(0.0..=Splat::MOST_OPTICAL_DEPTH).contains(strength) => Some(format!(
-            "the optical depth is {strength}, but those from 0 to {:e} can be drawn",
-            Splat::MOST_OPTICAL_DEPTH
-        )),
+        Payload::Radiance if !(0.0..=Splat::MOST_OPTICAL_DEPTH).contains(strength) => {
+            Some(format!(
+                "the optical depth is {strength}, but those from 0 to {:e} can be drawn",
+                Splat::MOST_OPTICAL_DEPTH
+            ))
+        }
         // A field's kernel needs a volume; radiance is widened to a pixel.
         Payload::Scalar if [factor[0], factor[2], factor[5]].contains(&0.0) => {
             Some(format!("the factor {factor:?} is that of a flat kernel"))
@@ -120,7 +125,9 @@ pub(super) fn check_settings(settings: &Settings) -> Result<()> {
     let positive = |v: f64| v > 0.0 && v.is_finite();
     let wrong = |message: String| Err(Error::Argument(message));
     if let Some(thickness) = settings.sheet_thickness.filter(|v| !positive(*v)) {
-        return wrong(format!("the thickness of sheets is {thickness}; a positive number is needed"));
+        return wrong(format!(
+            "the thickness of sheets is {thickness}; a positive number is needed"
+        ));
     }
     if !positive(settings.sheet_pixels) {
         return wrong(format!(
@@ -132,15 +139,22 @@ pub(super) fn check_settings(settings: &Settings) -> Result<()> {
         return wrong(format!("the nearest distance is {near}; a number from 0 on is needed"));
     }
     match settings.detail {
-        Detail::Pixels(value) | Detail::Milliseconds(value) if !(value >= 0.0 && value.is_finite()) => {
-            return wrong(format!("the detail is {:?}; a number from 0 on is needed", settings.detail));
+        Detail::Pixels(value) | Detail::Milliseconds(value)
+            if !(value >= 0.0 && value.is_finite()) =>
+        {
+            return wrong(format!(
+                "the detail is {:?}; a number from 0 on is needed",
+                settings.detail
+            ));
         }
         _ => {}
     }
     for shade in [settings.surface_shade, settings.volume_shade.flatten()].into_iter().flatten() {
         let Shade { ambient, diffuse, specular, power } = shade;
         if ![ambient, diffuse, specular, power].iter().all(|v| *v >= 0.0 && v.is_finite()) {
-            return wrong(format!("the light's coefficients must be finite and not negative, found {shade:?}"));
+            return wrong(format!(
+                "the light's coefficients must be finite and not negative, found {shade:?}"
+            ));
         }
     }
     Ok(())

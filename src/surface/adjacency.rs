@@ -87,9 +87,13 @@ impl<'a> Connected<'a> {
     /// [`Error::Memory`](crate::Error::Memory).
     pub fn new(mesh: &'a Mesh, is_split: bool) -> Result<Self> {
         // The corners and where those of each vertex begin; with `is_split`, the order of the places and the triangles by them.
-        let [vertices, triangles] = [mesh.positions.len(), mesh.triangles.len()].map(|count| count as u64);
+        let [vertices, triangles] =
+            [mesh.positions.len(), mesh.triangles.len()].map(|count| count as u64);
         let (of_vertex, of_triangle) = if is_split { (12, 24) } else { (4, 12) };
-        memory::room("finding the triangles at each vertex", of_vertex * vertices + of_triangle * triangles)?;
+        memory::room(
+            "finding the triangles at each vertex",
+            of_vertex * vertices + of_triangle * triangles,
+        )?;
         let places: Cow<[[u32; 3]]> = if is_split {
             let first = first_of_equals(&mesh.positions);
             mesh.triangles.par_iter().map(|t| t.map(|i| first[i as usize])).collect()

@@ -92,9 +92,13 @@ impl<'a> Judged<'a> {
     fn new(mesh: &'a Mesh, mut known: Known, deadline: Deadline) -> Result<Self> {
         memory::room(WORK, OF_POINT.saturating_mul(mesh.positions.len() as u64))?;
         let first = Neighbours::first_of_equals(&mesh.positions);
-        let kept: Vec<u32> =
-            (0..).zip(first).filter(|&(index, first)| index == first).map(|(index, _)| index).collect();
-        let points: Vec<Vec3> = kept.par_iter().map(|&index| mesh.positions[index as usize]).collect();
+        let kept: Vec<u32> = (0..)
+            .zip(first)
+            .filter(|&(index, first)| index == first)
+            .map(|(index, _)| index)
+            .collect();
+        let points: Vec<Vec3> =
+            kept.par_iter().map(|&index| mesh.positions[index as usize]).collect();
         deadline.check(WORK)?;
         let tree = Neighbours::new(&points);
         // All that follows is in the tree's order, where neighbours are near each other in memory too.
@@ -104,7 +108,11 @@ impl<'a> Judged<'a> {
         let clock = Clock::new(deadline);
         let surroundings = |place: usize| {
             let is_over = clock.is_over(place);
-            if is_over { Default::default() } else { surroundings(&points, &tree, order[place], &places) }
+            if is_over {
+                Default::default()
+            } else {
+                surroundings(&points, &tree, order[place], &places)
+            }
         };
         let (nearest, around): (Vec<Nearest>, Vec<Surroundings>) =
             (0..order.len()).into_par_iter().map(surroundings).unzip();
@@ -132,10 +140,12 @@ impl<'a> Judged<'a> {
     /// The surfel of the point at a place in the order.
     fn surfel(&self, at: usize, options: &SurfelOptions) -> Splat {
         // Points as near as the least numbers still have a width.
-        let width = f64::from((self.spacing[at] * SPREAD * options.radius_scale).max(f32::MIN_POSITIVE));
+        let width =
+            f64::from((self.spacing[at] * SPREAD * options.radius_scale).max(f32::MIN_POSITIVE));
         // The plane of a lone point's neighbours is not its own.
         let known = !self.lone[at] || !self.free[at];
-        let normal = Some(self.normals[at].as_dvec3()).filter(|normal| known && *normal != DVec3::ZERO);
+        let normal =
+            Some(self.normals[at].as_dvec3()).filter(|normal| known && *normal != DVec3::ZERO);
         Splat {
             center: self.points[at].to_array(),
             strength: options.optical_depth,
@@ -147,11 +157,19 @@ impl<'a> Judged<'a> {
 }
 
 /// How far apart the points are around each, where about so much is typical, and which are lone: those take the spacing of their neighbours.
-fn spacings(around: &[Surroundings], nearest: &[Nearest], typical: Option<f32>) -> (Vec<f32>, Vec<bool>) {
+fn spacings(
+    around: &[Surroundings],
+    nearest: &[Nearest],
+    typical: Option<f32>,
+) -> (Vec<f32>, Vec<bool>) {
     let median = || {
         let mut distances: Vec<f32> = around.par_iter().map(|around| around.distance).collect();
         let middle = distances.len() / 2;
-        if distances.is_empty() { 0.0 } else { *distances.select_nth_unstable_by(middle, f32::total_cmp).1 }
+        if distances.is_empty() {
+            0.0
+        } else {
+            *distances.select_nth_unstable_by(middle, f32::total_cmp).1
+        }
     };
     let typical = typical.unwrap_or_else(median);
     // A single point has no scale of its own; it becomes a ball of about unit diameter.
@@ -184,7 +202,8 @@ fn settle_known(mesh: &Mesh, kept: &[u32], normals: &mut [Vec3]) -> Vec<bool> {
         |((normal, free), &index)| {
             let at = mesh.sensors.partition_point(|sensor| sensor.points.start <= index as usize);
             let sensor = at.checked_sub(1).map(|at| &mesh.sensors[at]);
-            if let Some(sensor) = sensor.filter(|sensor| sensor.points.contains(&(index as usize))) {
+            if let Some(sensor) = sensor.filter(|sensor| sensor.points.contains(&(index as usize)))
+            {
                 let sight = sensor.position - mesh.positions[index as usize];
                 *normal = if normal.dot(sight) < 0.0 { -*normal } else { *normal };
                 *free = false;
@@ -207,16 +226,25 @@ fn report(coincident: usize, lone: &[bool]) {
 /// The factor of a point's surfel: a disc in the plane of its normal, drawn out where the neighbours lie further apart in
 /// one direction; a ball where there is no normal.
 fn shape(around: &Surroundings, width: f64, normal: Option<DVec3>) -> [f32; 6] {
-    let Some(normal) = normal else { return lower([DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * width)) };
+    let Some(normal) = normal else {
+        return lower([DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * width));
+    };
     let long = around.long.as_dvec3();
-    let x = (long - normal * normal.dot(long)).try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+    let x = (long - normal * normal.dot(long))
+        .try_normalize()
+        .unwrap_or_else(|| normal.any_orthonormal_vector());
     let (variance, stretch) = (width * width, f64::from(around.stretch));
     let tensor = Tensor { xx: variance * stretch, xy: 0.0, yy: variance / stretch };
     factor(tensor, x, normal.cross(x), normal)
 }
 
 /// What is around a point; `places` numbers its neighbours.
-fn surroundings(points: &[Vec3], tree: &Neighbours, index: u32, places: &[u32]) -> (Nearest, Surroundings) {
+fn surroundings(
+    points: &[Vec3],
+    tree: &Neighbours,
+    index: u32,
+    places: &[u32],
+) -> (Nearest, Surroundings) {
     let found = tree.of(index, COUNT);
     let center = points[index as usize];
     let offsets = || found.iter().map(|&(_, index)| (points[index as usize] - center).as_dvec3());

@@ -35,7 +35,10 @@ impl Moments {
     pub fn ellipse(&self, around_mean: bool, spread: f32) -> Ellipse {
         let share = spread / self.area;
         let center = if around_mean { self.place / self.area } else { Vec2::ZERO };
-        let (xx, yy) = (self.xx * share - spread * center.x * center.x, self.yy * share - spread * center.y * center.y);
+        let (xx, yy) = (
+            self.xx * share - spread * center.x * center.x,
+            self.yy * share - spread * center.y * center.y,
+        );
         // Never thinner than 1 : 300, whatever rounding made of a needle.
         let least = (xx + yy).max(0.0) * 1e-5 + f32::MIN_POSITIVE;
         let xy = self.xy * share - spread * center.x * center.y;
@@ -124,7 +127,11 @@ mod tests {
         let mean = square().ellipse(true, 1.0);
         assert!((mean.center - 0.5).length() < 1e-6);
         let twelfth = 1.0 / 12.0;
-        assert!((mean.xx - twelfth).abs() < 1e-5 && (mean.yy - twelfth).abs() < 1e-5 && mean.xy.abs() < 1e-6);
+        assert!(
+            (mean.xx - twelfth).abs() < 1e-5
+                && (mean.yy - twelfth).abs() < 1e-5
+                && mean.xy.abs() < 1e-6
+        );
         let corner = square().ellipse(false, 0.5);
         assert_eq!(corner.center, Vec2::ZERO);
         assert!((corner.xx - 1.0 / 6.0).abs() < 1e-5 && (corner.xy - 0.125).abs() < 1e-6);
@@ -143,8 +150,11 @@ mod tests {
         assert!((square / ellipse.determinant() - 4.0).abs() < 1e-4);
         // Across that direction it is as wide as before.
         let across = d.perp().normalize();
-        let wide =
-            |e: &Ellipse| e.xx * across.x * across.x + 2.0 * e.xy * across.x * across.y + e.yy * across.y * across.y;
+        let wide = |e: &Ellipse| {
+            e.xx * across.x * across.x
+                + 2.0 * e.xy * across.x * across.y
+                + e.yy * across.y * across.y
+        };
         assert!((wide(&ellipse) - wide(&before)).abs() < 1e-5);
     }
 
@@ -155,7 +165,8 @@ mod tests {
         let ellipse = Ellipse { center: Vec2::ZERO, xx: 4.0, xy: 1.0, yy: 2.0 };
         assert!((ellipse.narrowest().powi(2) - (3.0 - 2f32.sqrt())).abs() < 1e-5);
         let b = ellipse.factor([x, y, normal], 3.0, 0.5);
-        let rows = [Vec3::new(b[0], 0.0, 0.0), Vec3::new(b[1], b[2], 0.0), Vec3::new(b[3], b[4], b[5])];
+        let rows =
+            [Vec3::new(b[0], 0.0, 0.0), Vec3::new(b[1], b[2], 0.0), Vec3::new(b[3], b[4], b[5])];
         for i in 0..3 {
             for j in 0..3 {
                 let flat = 4.0 * x[i] * x[j] + x[i] * y[j] + y[i] * x[j] + 2.0 * y[i] * y[j];

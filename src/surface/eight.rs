@@ -3,7 +3,8 @@
 //! to the last bit.
 
 use super::fan::{
-    ALIKE, CENTROID, CORNER, LEAST_RATIO_SQUARED, LEAST_SQUARE, MIDDLE, SAG, SPREAD, STEEP, THICKNESS, mixed,
+    ALIKE, CENTROID, CORNER, LEAST_RATIO_SQUARED, LEAST_SQUARE, MIDDLE, SAG, SPREAD, STEEP,
+    THICKNESS, mixed,
 };
 use crate::splat::STEP_BACK;
 use fearless_simd::{Simd, f32x8, mask32x8, prelude::*};
@@ -108,7 +109,8 @@ impl Fans {
             let b = scaled(difference(load(simd, &corner.last), here), per_unit);
             let across = product(a, b);
             let (square, longer) = (dot(across, across), dot(a, a).max(dot(b, b)));
-            let is_line = square.simd_le((longer * longer * LEAST_RATIO_SQUARED).max(number(LEAST_SQUARE)));
+            let is_line =
+                square.simd_le((longer * longer * LEAST_RATIO_SQUARED).max(number(LEAST_SQUARE)));
             let is_triangle = !is_line & square.simd_lt(f32::INFINITY);
             is_made &= is_triangle | !has;
             let has = has & is_triangle;
@@ -142,7 +144,8 @@ impl Fans {
         let scale = number(common.radius_scale);
         let determinant = ellipse.determinant();
         let mean = (ellipse.xx + ellipse.yy) * 0.5;
-        let narrowest = (determinant / (mean + (mean * mean - determinant).max(none).sqrt())).sqrt();
+        let narrowest =
+            (determinant / (mean + (mean * mean - determinant).max(none).sqrt())).sqrt();
         let thickness = narrowest * THICKNESS * scale;
         let outward = scaled(normal, number(common.outward));
         let sag = is_open.select(number(1.0), number(SAG)) * height / (moment_area * 3.0);
@@ -166,7 +169,12 @@ impl Fans {
 
     /// Lays the edges on the plane of the first two axes, and gives the sum of the heights over it, weighted by area.
     #[inline(always)]
-    fn lay<S: Simd>(&mut self, simd: S, [x, y, normal]: [Triple<S>; 3], per_unit: Lanes<S>) -> Lanes<S> {
+    fn lay<S: Simd>(
+        &mut self,
+        simd: S,
+        [x, y, normal]: [Triple<S>; 3],
+        per_unit: Lanes<S>,
+    ) -> Lanes<S> {
         let here = load(simd, &self.here);
         let mut height = Lanes::splat(simd, 0.0);
         for corner in &mut self.corners[..self.most] {
@@ -233,7 +241,13 @@ impl Fans {
 
     /// Widens the ellipse as far as the triangles ask for.
     #[inline(always)]
-    fn widen<S: Simd>(&self, simd: S, ellipse: &mut Ellipse<S>, is_open: mask32x8<S>, counts: Lanes<S>) {
+    fn widen<S: Simd>(
+        &self,
+        simd: S,
+        ellipse: &mut Ellipse<S>,
+        is_open: mask32x8<S>,
+        counts: Lanes<S>,
+    ) {
         let none = Lanes::splat(simd, 0.0);
         ellipse.reach(simd, [none; 2], CORNER, is_open);
         for (at, corner) in self.corners[..self.most].iter().enumerate() {
@@ -285,12 +299,18 @@ impl<S: Simd> Ellipse<S> {
     }
 
     #[inline(always)]
-    fn factor(&self, [x, y, normal]: [Triple<S>; 3], scale: Lanes<S>, thickness: Lanes<S>) -> [Lanes<S>; 6] {
+    fn factor(
+        &self,
+        [x, y, normal]: [Triple<S>; 3],
+        scale: Lanes<S>,
+        thickness: Lanes<S>,
+    ) -> [Lanes<S>; 6] {
         let determinant = self.determinant();
         let l00 = self.xx.sqrt() * scale;
         let l10 = self.xy / self.xx * l00;
         let l11 = (determinant / self.xx).sqrt() * scale;
-        let (u, v, w) = (sum(scaled(x, l00), scaled(y, l10)), scaled(y, l11), scaled(normal, thickness));
+        let (u, v, w) =
+            (sum(scaled(x, l00), scaled(y, l10)), scaled(y, l11), scaled(normal, thickness));
         let (r0, r1, r2) = ([u[0], v[0], w[0]], [u[1], v[1], w[1]], [u[2], v[2], w[2]]);
         let b00 = dot(r0, r0).sqrt();
         let q0 = [r0[0] / b00, r0[1] / b00, r0[2] / b00];

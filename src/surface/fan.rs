@@ -128,7 +128,8 @@ impl Maker<'_> {
             } else {
                 let mut rest = &rows[..];
                 for &vertex in few {
-                    let (own, after) = rest.split_at(self.connected.adjacency.corners(vertex).len());
+                    let (own, after) =
+                        rest.split_at(self.connected.adjacency.corners(vertex).len());
                     self.vertex(vertex, own, made);
                     rest = after;
                 }
@@ -175,13 +176,21 @@ impl Maker<'_> {
 
     /// Puts a vertex in a lane, with the triangles of its corners; one of too many in none.
     #[inline(always)]
-    fn gather(&self, fan: &mut Fans, lane: usize, vertex: usize, corners: &[u32], rows: &[[u32; 3]]) {
+    fn gather(
+        &self,
+        fan: &mut Fans,
+        lane: usize,
+        vertex: usize,
+        corners: &[u32],
+        rows: &[[u32; 3]],
+    ) {
         let here = self.mesh.positions[vertex];
         let count = if corners.len() <= MOST_CORNERS { corners.len() } else { 0 };
         fan.begin(lane, here, count);
         for (at, (&corner, &row)) in corners.iter().zip(rows).enumerate().take(count) {
             let [_, next, last] = turned(row, corner);
-            let [_, next_number, last_number] = turned(self.connected.places[corner as usize / 3], corner);
+            let [_, next_number, last_number] =
+                turned(self.connected.places[corner as usize / 3], corner);
             let places = [self.mesh.positions[next as usize], self.mesh.positions[last as usize]];
             fan.put(lane, at, places, [next_number, last_number]);
         }
@@ -282,7 +291,8 @@ impl Maker<'_> {
     /// The surfel of a group of triangles; `shading` is their normal, of any length, where it is not their mean.
     fn surfel(&self, vertex: usize, group: &mut [Around], shading: Option<Vec3>) -> Option<Splat> {
         let first = group.first()?.normal;
-        let own = group.iter().map(|t| t.normal * t.angle).sum::<Vec3>().try_normalize().unwrap_or(first);
+        let own =
+            group.iter().map(|t| t.normal * t.angle).sum::<Vec3>().try_normalize().unwrap_or(first);
         let given = self.mesh.given_normal(vertex);
         let shading = given.or_else(|| shading.and_then(Vec3::try_normalize)).unwrap_or(own);
         let normal = if shading.dot(own).abs() >= ALIKE { shading } else { own };
@@ -297,7 +307,8 @@ impl Maker<'_> {
             // Seen along a steep triangle's normal the surfel must be wide enough, so edges are laid on its plane in that
             // direction.
             if slope.abs() < STEEP {
-                let down = Vec2::new(t.normal.dot(x), t.normal.dot(y)) / (slope.signum() * slope.abs().max(0.5));
+                let down = Vec2::new(t.normal.dot(x), t.normal.dot(y))
+                    / (slope.signum() * slope.abs().max(0.5));
                 t.laid = [0, 1].map(|i| t.laid[i] - down * normal.dot(t.edges[i]));
             }
             moments.add(t.area, t.laid[0], t.laid[1]);
@@ -339,7 +350,11 @@ impl Maker<'_> {
     fn color(&self, vertex: usize, group: &[Around], area: f32) -> u32 {
         if self.plain {
             // Packed as it is in memory, red lowest.
-            return self.mesh.colors.get(vertex).map_or_else(|| pack(NEUTRAL), |color| u32::from_le_bytes(*color));
+            return self
+                .mesh
+                .colors
+                .get(vertex)
+                .map_or_else(|| pack(NEUTRAL), |color| u32::from_le_bytes(*color));
         }
         let mut color = [0.0; 4];
         for t in group {
@@ -419,7 +434,8 @@ impl Sums {
     }
 
     fn side_beyond(&self, part: f64, unit: f32) -> i8 {
-        let volume = (self.volume - self.cross.dot(self.place) / self.area) / (9.0 * f64::from(unit));
+        let volume =
+            (self.volume - self.cross.dot(self.place) / self.area) / (9.0 * f64::from(unit));
         let least = part * (self.area / 3.0).powf(1.5);
         i8::from(volume > least) - i8::from(volume < -least)
     }
@@ -438,7 +454,8 @@ fn angle(sine: f32, cosine: f32) -> f32 {
     let steep = cosine.abs();
     let t = sine.min(steep) / sine.max(steep);
     let s = t * t;
-    let sharp = t * (0.999_866 + s * (-0.330_299_5 + s * (0.180_141 + s * (-0.085_133 + s * 0.020_835_1))));
+    let sharp =
+        t * (0.999_866 + s * (-0.330_299_5 + s * (0.180_141 + s * (-0.085_133 + s * 0.020_835_1))));
     let acute = if sine > steep { FRAC_PI_2 - sharp } else { sharp };
     if cosine < 0.0 { PI - acute } else { acute }
 }
@@ -451,7 +468,10 @@ mod tests {
     fn angles_are_near_enough() {
         for step in 0..=255 {
             let expected = f32::from(step as u8) * std::f32::consts::PI / 255.0;
-            assert!((angle(expected.sin().max(0.0) * 7.0, expected.cos() * 7.0) - expected).abs() < 2e-5);
+            assert!(
+                (angle(expected.sin().max(0.0) * 7.0, expected.cos() * 7.0) - expected).abs()
+                    < 2e-5
+            );
         }
     }
 }

@@ -45,7 +45,8 @@ pub(super) fn orient<const N: usize>(
         sets.join(from as u32, to as u32, normals[from].dot(normals[to]) < 0.0);
     }
     let taking_part: Vec<usize> = (0..points.len()).filter(|&index| free[index]).collect();
-    let own_center = || points.iter().map(|p| p.as_dvec3()).sum::<DVec3>() / points.len().max(1) as f64;
+    let own_center =
+        || points.iter().map(|p| p.as_dvec3()).sum::<DVec3>() / points.len().max(1) as f64;
     let center = known.center.unwrap_or_else(own_center);
     let mut parts = vec![0u32; points.len()];
     let mut votes: Vec<Votes> = Vec::new();
@@ -61,11 +62,16 @@ pub(super) fn orient<const N: usize>(
             parts[root] = votes.len() as u32;
         }
         let area = f64::from(spacing[index]).powi(2);
-        votes[parts[root] as usize - 1].add(points[index].as_dvec3() - center, normals[index].as_dvec3(), area);
+        votes[parts[root] as usize - 1].add(
+            points[index].as_dvec3() - center,
+            normals[index].as_dvec3(),
+            area,
+        );
     }
     for &(index, settled) in known.normals.iter().filter(|(index, _)| free[*index as usize]) {
         let (root, _) = sets.find(index);
-        votes[parts[root as usize] as usize - 1].settled += f64::from(normals[index as usize].dot(settled));
+        votes[parts[root as usize] as usize - 1].settled +=
+            f64::from(normals[index as usize].dot(settled));
     }
     let inward: Vec<bool> = votes.iter().map(Votes::face_inward).collect();
     for index in taking_part {
@@ -118,7 +124,11 @@ struct Sets {
 
 impl Sets {
     fn new(count: usize) -> Self {
-        Self { parent: (0..count as u32).collect(), turned: vec![false; count], size: vec![1; count] }
+        Self {
+            parent: (0..count as u32).collect(),
+            turned: vec![false; count],
+            size: vec![1; count],
+        }
     }
 
     /// The root of a point's set, and whether the point is turned against it.
@@ -145,7 +155,8 @@ impl Sets {
         if a == b {
             return;
         }
-        let (root, child) = if self.size[a as usize] >= self.size[b as usize] { (a, b) } else { (b, a) };
+        let (root, child) =
+            if self.size[a as usize] >= self.size[b as usize] { (a, b) } else { (b, a) };
         self.parent[child as usize] = root;
         self.turned[child as usize] = opposed ^ a_turned ^ b_turned;
         self.size[root as usize] += self.size[child as usize];
@@ -183,7 +194,8 @@ impl Votes {
         let closed = self.normals.length() < CLOSED * self.area;
         let center = if closed { own_center } else { DVec3::ZERO };
         let flux = self.fluxes - center.dot(self.normals);
-        let squares = self.squares - 2.0 * center.dot(self.positions) + center.length_squared() * self.area;
+        let squares =
+            self.squares - 2.0 * center.dot(self.positions) + center.length_squared() * self.area;
         let largest = (squares.max(0.0) * self.area).sqrt();
         if flux.abs() > LEAST_VOTE * largest { flux < 0.0 } else { self.normals.z < 0.0 }
     }

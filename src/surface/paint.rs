@@ -19,7 +19,9 @@ impl Texture {
         let mut sum = [0.0; 4];
         for i in 0..rows {
             for j in 0..columns {
-                let at = uv + a * ((i as f32 + 0.5) / rows as f32) + b * ((j as f32 + 0.5) / columns as f32);
+                let at = uv
+                    + a * ((i as f32 + 0.5) / rows as f32)
+                    + b * ((j as f32 + 0.5) / columns as f32);
                 sum.iter_mut().zip(self.sample(at)).for_each(|(sum, part)| *sum += part);
             }
         }
@@ -53,8 +55,10 @@ impl Texture {
 
 /// The colour that a triangle shows around one of its corners; channels in 0 … 1.
 pub(super) fn corner_color(mesh: &Mesh, triangle: usize, corner: usize) -> [f32; 4] {
-    let [vertex, next, last] = [0, 1, 2].map(|i| mesh.triangles[triangle][(corner + i) % 3] as usize);
-    let material = mesh.triangle_materials.get(triangle).map(|&index| &mesh.materials[index as usize]);
+    let [vertex, next, last] =
+        [0, 1, 2].map(|i| mesh.triangles[triangle][(corner + i) % 3] as usize);
+    let material =
+        mesh.triangle_materials.get(triangle).map(|&index| &mesh.materials[index as usize]);
     let mut color = base_color(mesh, material);
     let mut multiply = |by: [f32; 4]| color.iter_mut().zip(by).for_each(|(part, by)| *part *= by);
     if let Some(own) = mesh.colors.get(vertex) {
@@ -70,16 +74,23 @@ pub(super) fn corner_color(mesh: &Mesh, triangle: usize, corner: usize) -> [f32;
 /// The colour at a place of a triangle, given by barycentric coordinates; channels in 0 … 1.
 pub(crate) fn color_at(mesh: &Mesh, triangle: usize, weights: [f32; 3]) -> [f32; 4] {
     let vertices = mesh.triangles[triangle].map(|vertex| vertex as usize);
-    let material = mesh.triangle_materials.get(triangle).map(|&index| &mesh.materials[index as usize]);
+    let material =
+        mesh.triangle_materials.get(triangle).map(|&index| &mesh.materials[index as usize]);
     let mut color = base_color(mesh, material);
     let mut multiply = |by: [f32; 4]| color.iter_mut().zip(by).for_each(|(part, by)| *part *= by);
     if !mesh.colors.is_empty() {
         let part = |i: usize, v: usize| f32::from(mesh.colors[v][i]) / 255.0;
-        multiply(std::array::from_fn(|i| vertices.iter().zip(weights).map(|(&v, weight)| weight * part(i, v)).sum()));
+        multiply(std::array::from_fn(|i| {
+            vertices.iter().zip(weights).map(|(&v, weight)| weight * part(i, v)).sum()
+        }));
     }
     let texture = material.and_then(|material| material.texture.as_ref());
     if let Some(texture) = texture.filter(|_| !mesh.uvs.is_empty()) {
-        multiply(texture.sample(vertices.iter().zip(weights).map(|(&v, weight)| weight * mesh.uvs[v]).sum()));
+        multiply(
+            texture.sample(
+                vertices.iter().zip(weights).map(|(&v, weight)| weight * mesh.uvs[v]).sum(),
+            ),
+        );
     }
     color
 }
@@ -112,10 +123,16 @@ mod tests {
         for (width, height, count) in [(0, 0, 0), (0, 3, 3), (3, 0, 3), (u32::MAX, u32::MAX, 1)] {
             let texture = Texture { width, height, texels: vec![[255; 4]; count] };
             let found = [0.0, 0.9].map(|at| texture.sample(Vec2::splat(at)));
-            assert!(found.iter().all(|color| color.iter().all(|part| (0.0..=1.0).contains(part))), "{found:?}");
+            assert!(
+                found.iter().all(|color| color.iter().all(|part| (0.0..=1.0).contains(part))),
+                "{found:?}"
+            );
         }
         let short = Texture { width: 2, height: 2, texels: vec![[255; 4]; 1] };
-        assert_eq!((short.sample(Vec2::splat(0.25)), short.sample(Vec2::splat(0.75))), ([1.0; 4], clear));
+        assert_eq!(
+            (short.sample(Vec2::splat(0.25)), short.sample(Vec2::splat(0.75))),
+            ([1.0; 4], clear)
+        );
         let whole = Texture { width: 3, height: 2, texels: vec![[51; 4]; 6] };
         for uv in [f32::NAN, f32::INFINITY, f32::MAX, -1e-30] {
             assert_eq!(whole.sample(Vec2::splat(uv)), [0.2; 4], "{uv}");

@@ -61,11 +61,14 @@ impl Joining {
                 }
             }
             for triangle in 0..few.len() as u32 {
-                self.0.0[(first + triangle) as usize].store(first + root(&mut own, triangle), Relaxed);
+                self.0.0[(first + triangle) as usize]
+                    .store(first + root(&mut own, triangle), Relaxed);
             }
             // What has as many triangles of one direction as of the other is closed there, whatever else is.
             let left = table.iter().filter(|place| place.balance != 0);
-            open.extend(left.map(|place| Open::from(place.edge) << 32 | Open::from(first + place.triangle)));
+            open.extend(
+                left.map(|place| Open::from(place.edge) << 32 | Open::from(first + place.triangle)),
+            );
         }
         open
     }
@@ -186,8 +189,9 @@ mod tests {
     fn parts(triangles: &[[u32; 3]], few: usize) -> Parts {
         let joining = Joining::new(triangles.len());
         let chunks = triangles.par_chunks(few).enumerate().rev();
-        let open =
-            chunks.flat_map_iter(|(chunk, triangles)| joining.add((chunk * few) as u32, triangles, |vertex| vertex));
+        let open = chunks.flat_map_iter(|(chunk, triangles)| {
+            joining.add((chunk * few) as u32, triangles, |vertex| vertex)
+        });
         let open = open.collect();
         joining.parts(open)
     }
@@ -197,12 +201,17 @@ mod tests {
         let sphere = crate::surface::Mesh::sphere(2);
         let per_sphere = sphere.positions.len() as u32;
         // Each hangs by a vertex at the one before.
-        let shifted = |i: u32| sphere.triangles.iter().map(move |t| t.map(|vertex| vertex + i * (per_sphere - 1)));
+        let shifted = |i: u32| {
+            sphere.triangles.iter().map(move |t| t.map(|vertex| vertex + i * (per_sphere - 1)))
+        };
         let triangles: Vec<[u32; 3]> = (0..40).flat_map(shifted).collect();
         for few in [1, 7, 500, triangles.len()] {
             let parts = parts(&triangles, few);
             assert_eq!(parts.count(), 40, "{few}");
-            assert!((0..triangles.len()).all(|number| parts.of(number) as usize == number / sphere.triangles.len()));
+            assert!(
+                (0..triangles.len())
+                    .all(|number| parts.of(number) as usize == number / sphere.triangles.len())
+            );
         }
     }
 

@@ -41,7 +41,9 @@ impl Triangles {
         let [p, q, r] = corners;
         let sums = [
             edge(a, b).wrapping_add(edge(b, c)).wrapping_add(edge(c, a)),
-            edge_of_places(p, q).wrapping_add(edge_of_places(q, r)).wrapping_add(edge_of_places(r, p)),
+            edge_of_places(p, q)
+                .wrapping_add(edge_of_places(q, r))
+                .wrapping_add(edge_of_places(r, p)),
         ];
         self.edges.iter_mut().zip(sums).for_each(|(sum, more)| *sum = sum.wrapping_add(more));
         self.sums.add_triangle(corners);
@@ -66,7 +68,10 @@ impl Triangles {
 
     pub fn join(&mut self, other: Self) {
         other.bounds.into_iter().for_each(|bounds| self.surround(bounds));
-        self.edges.iter_mut().zip(other.edges).for_each(|(sum, more)| *sum = sum.wrapping_add(more));
+        self.edges
+            .iter_mut()
+            .zip(other.edges)
+            .for_each(|(sum, more)| *sum = sum.wrapping_add(more));
         self.sums = self.sums.with(other.sums);
         self.expected += other.expected;
         self.long.extend(other.long);
@@ -81,10 +86,14 @@ impl Triangles {
         vertices.par_sort_unstable();
         vertices.dedup();
         let place = |name: u32| vertices.binary_search(&name).unwrap_or(0) as u32;
-        let triangles: Vec<[u32; 3]> = self.names.par_iter().map(|names| names.map(place)).collect();
+        let triangles: Vec<[u32; 3]> =
+            self.names.par_iter().map(|names| names.map(place)).collect();
         let mut positions = vec![Vec3::ZERO; vertices.len()];
         for (triangle, corners) in triangles.iter().zip(&self.long) {
-            triangle.iter().zip(corners).for_each(|(&vertex, corner)| positions[vertex as usize] = *corner);
+            triangle
+                .iter()
+                .zip(corners)
+                .for_each(|(&vertex, corner)| positions[vertex as usize] = *corner);
         }
         let long = Mesh { positions, triangles, ..Mesh::default() };
         self.cut = count_once_cut(&long, length, room, deadline)?;
@@ -149,14 +158,22 @@ impl MeshPieces {
         let closing = if seen.edges[0] == 0 {
             Some(PiecesClosing::Vertices)
         } else {
-            let is_closed = seen.edges[1] == 0 && may_be_split(has_uvs || has_normals, points, triangles);
+            let is_closed =
+                seen.edges[1] == 0 && may_be_split(has_uvs || has_normals, points, triangles);
             is_closed.then_some(PiecesClosing::Places)
         };
         let outward = if seen.sums.side(1.0) < 0 { -1.0 } else { 1.0 };
         let is_coarse = seen.excess > 1.0;
         let closing = closing.filter(|_| triangles > 0);
         Ok((
-            Self { is_coarse, is_split: may_be_split(has_uvs, points, triangles), unit, outward, length, closing },
+            Self {
+                is_coarse,
+                is_split: may_be_split(has_uvs, points, triangles),
+                unit,
+                outward,
+                length,
+                closing,
+            },
             seen,
         ))
     }
@@ -168,11 +185,25 @@ impl MeshPieces {
 
     /// The surfels of those vertices of a part that are `owned`; all triangles at them must be in it. Where `is_long`, also
     /// those that cutting long edges adds; then all triangles that are cut must be in it.
-    pub fn surfels(&self, part: &Mesh, owned: &[bool], is_long: bool, options: &SurfelOptions) -> Result<Vec<Splat>> {
+    pub fn surfels(
+        &self,
+        part: &Mesh,
+        owned: &[bool],
+        is_long: bool,
+        options: &SurfelOptions,
+    ) -> Result<Vec<Splat>> {
         part.check(options)?;
         let is_wanted = |vertex: usize| owned.get(vertex).is_none_or(|&owned| owned);
         let cut = is_long.then_some(self.length);
-        of_part(part, self.is_split, options, [self.unit, self.outward], self.is_coarse, cut, is_wanted)
+        of_part(
+            part,
+            self.is_split,
+            options,
+            [self.unit, self.outward],
+            self.is_coarse,
+            cut,
+            is_wanted,
+        )
     }
 }
 
@@ -206,7 +237,8 @@ mod tests {
     fn the_long_ones_of_a_large_scan_are_cut() {
         let mut mesh = Mesh::cube(1.0);
         let scan = Mesh::sphere(5);
-        mesh.triangles.extend(scan.triangles.iter().map(|triangle| triangle.map(|vertex| vertex + 8)));
+        mesh.triangles
+            .extend(scan.triangles.iter().map(|triangle| triangle.map(|vertex| vertex + 8)));
         mesh.positions.extend(scan.positions.iter().map(|place| *place * 0.02));
         let counts = [mesh.positions.len(), mesh.triangles.len()];
         let options = SurfelOptions { most_triangles: counts[1], ..SurfelOptions::default() };
@@ -215,8 +247,15 @@ mod tests {
             looks += 1;
             Ok(seen(&mesh, length))
         };
-        let (pieces, told) =
-            MeshPieces::new(counts, [false; 2], [Vec3::splat(-1.0), Vec3::ONE], &options, usize::MAX, look).unwrap();
+        let (pieces, told) = MeshPieces::new(
+            counts,
+            [false; 2],
+            [Vec3::splat(-1.0), Vec3::ONE],
+            &options,
+            usize::MAX,
+            look,
+        )
+        .unwrap();
         assert!(pieces.unit < 0.1 && told.cut > counts[1] / 20, "{} and {}", pieces.unit, told.cut);
         assert!(looks < 8, "{looks} looks");
         let fine = mesh.triangles_once_cut(&options, usize::MAX).unwrap();
@@ -228,26 +267,46 @@ mod tests {
     fn the_budget_is_that_of_the_whole() {
         let mut mixed = Mesh::cube(1.0);
         let small = Mesh::sphere(2);
-        mixed.triangles.extend(small.triangles.iter().map(|triangle| triangle.map(|vertex| vertex + 8)));
+        mixed
+            .triangles
+            .extend(small.triangles.iter().map(|triangle| triangle.map(|vertex| vertex + 8)));
         mixed.positions.extend(small.positions.iter().map(|place| *place * 0.2));
         for mesh in [Mesh::cube(1.0), Mesh::sphere(1), mixed] {
             for most_triangles in [300, 500, 900, 1000, 1500, 2000, 5000] {
-                let options = SurfelOptions { most_triangles, largest_spacing: 1e-3, ..SurfelOptions::default() };
+                let options = SurfelOptions {
+                    most_triangles,
+                    largest_spacing: 1e-3,
+                    ..SurfelOptions::default()
+                };
                 let bounds = [
                     mesh.positions.iter().copied().reduce(Vec3::min),
                     mesh.positions.iter().copied().reduce(Vec3::max),
                 ];
                 let pieces = |room: usize| {
                     let counts = [mesh.positions.len(), mesh.triangles.len()];
-                    MeshPieces::new(counts, [false; 2], bounds.map(Option::unwrap), &options, room, |length| {
-                        Ok(seen(&mesh, length))
-                    })
+                    MeshPieces::new(
+                        counts,
+                        [false; 2],
+                        bounds.map(Option::unwrap),
+                        &options,
+                        room,
+                        |length| Ok(seen(&mesh, length)),
+                    )
                 };
                 let (pieces_of_all, told) = pieces(usize::MAX).unwrap();
                 let count = mesh.triangles.len() - told.long.len() + told.cut;
-                let whole = count_of_refined(&mesh, pieces_of_all.unit, most_triangles, usize::MAX, Deadline::NEVER);
+                let whole = count_of_refined(
+                    &mesh,
+                    pieces_of_all.unit,
+                    most_triangles,
+                    usize::MAX,
+                    Deadline::NEVER,
+                );
                 assert_eq!(count, whole.unwrap());
-                assert!(count <= options.most_once_cut(mesh.triangles.len()), "{count} of {most_triangles}");
+                assert!(
+                    count <= options.most_once_cut(mesh.triangles.len()),
+                    "{count} of {most_triangles}"
+                );
                 let (_, told) = pieces(count - 1).unwrap();
                 assert!(mesh.triangles.len() - told.long.len() + told.cut >= count);
             }

@@ -56,15 +56,23 @@ pub(super) struct Refined<'a> {
 ///
 /// # Errors
 /// [`Error::Timeout`](crate::Error::Timeout) and [`Error::Memory`](crate::Error::Memory).
-pub(super) fn refine(mesh: &Mesh, length: f32, most: usize, deadline: Deadline) -> Result<Refined<'_>> {
+pub(super) fn refine(
+    mesh: &Mesh,
+    length: f32,
+    most: usize,
+    deadline: Deadline,
+) -> Result<Refined<'_>> {
     let mut fine = match refined(mesh, length, most, usize::MAX, deadline) {
         Ok(Some(fine)) => fine,
-        Ok(None) | Err(Stop::TooMany(_)) => return Ok(Refined { mesh: Cow::Borrowed(mesh), sources: None }),
+        Ok(None) | Err(Stop::TooMany(_)) => {
+            return Ok(Refined { mesh: Cow::Borrowed(mesh), sources: None });
+        }
         Err(Stop::Failed(error)) => return Err(error),
     };
     let sources = std::mem::take(&mut fine.triangle_materials);
     if !mesh.triangle_materials.is_empty() {
-        fine.triangle_materials = sources.par_iter().map(|&source| mesh.triangle_materials[source as usize]).collect();
+        fine.triangle_materials =
+            sources.par_iter().map(|&source| mesh.triangle_materials[source as usize]).collect();
     }
     Ok(Refined { mesh: Cow::Owned(fine), sources: Some(sources) })
 }
@@ -149,7 +157,8 @@ fn refined(
         }
         // A triangle is also cut where its neighbours are, so that only cutting tells how many there are.
         memory::room(WORK, mesh.bytes().saturating_add(4 * mesh.triangles.len() as u64))?;
-        let mut fine = Mesh { triangle_materials: (0..mesh.triangles.len() as u32).collect(), ..mesh.clone() };
+        let mut fine =
+            Mesh { triangle_materials: (0..mesh.triangles.len() as u32).collect(), ..mesh.clone() };
         match cut_all(&mut fine, &wanted, budget.min(room), deadline) {
             Ok(()) => return Ok(Some(fine)),
             Err(Stop::TooMany(_)) if room < budget => {
@@ -172,19 +181,32 @@ pub(super) struct Origin<'a> {
 }
 
 impl<'a> Origin<'a> {
-    pub fn new(mesh: &'a Mesh, sources: Vec<u32>, crease_angle_degrees: f32, deadline: Deadline) -> Result<Self> {
+    pub fn new(
+        mesh: &'a Mesh,
+        sources: Vec<u32>,
+        crease_angle_degrees: f32,
+        deadline: Deadline,
+    ) -> Result<Self> {
         Ok(Self { mesh, sources, normals: corner_normals(mesh, crease_angle_degrees, deadline)? })
     }
 
     /// The normal at a corner of the `fine` mesh, interpolated between those of the whole triangle; of any length.
     pub fn normal(&self, fine: &Mesh, at: u32) -> Vec3 {
         let source = self.sources[at as usize / 3] as usize;
-        let [a, b, c] = self.mesh.triangles[source].map(|vertex| self.mesh.positions[vertex as usize].as_dvec3());
-        let place = fine.positions[fine.triangles[at as usize / 3][at as usize % 3] as usize].as_dvec3();
+        let [a, b, c] = self.mesh.triangles[source]
+            .map(|vertex| self.mesh.positions[vertex as usize].as_dvec3());
+        let place =
+            fine.positions[fine.triangles[at as usize / 3][at as usize % 3] as usize].as_dvec3();
         let cross = (b - a).cross(c - a);
-        let part = |from: DVec3, to: DVec3| (from - place).cross(to - place).dot(cross) / cross.length_squared();
+        let part = |from: DVec3, to: DVec3| {
+            (from - place).cross(to - place).dot(cross) / cross.length_squared()
+        };
         let weights = [part(b, c), part(c, a), part(a, b)];
-        self.normals[source].iter().zip(weights).map(|(normal, weight)| *normal * weight as f32).sum()
+        self.normals[source]
+            .iter()
+            .zip(weights)
+            .map(|(normal, weight)| *normal * weight as f32)
+            .sum()
     }
 }
 
@@ -225,7 +247,12 @@ pub(super) fn count_of_refined(
 ///
 /// # Errors
 /// Those of [`refine`].
-pub(super) fn count_once_cut(mesh: &Mesh, length: f32, room: usize, deadline: Deadline) -> Result<usize> {
+pub(super) fn count_once_cut(
+    mesh: &Mesh,
+    length: f32,
+    room: usize,
+    deadline: Deadline,
+) -> Result<usize> {
     count_of_refined(mesh, length, usize::MAX, room, deadline)
 }
 
@@ -264,7 +291,12 @@ fn coarser(steps: i32) -> f32 {
 ///
 /// # Errors
 /// [`Stop::TooMany`] for more than `most` triangles, before there are as many.
-fn cut_all(fine: &mut Mesh, wanted: &Wanted, most: usize, deadline: Deadline) -> std::result::Result<(), Stop> {
+fn cut_all(
+    fine: &mut Mesh,
+    wanted: &Wanted,
+    most: usize,
+    deadline: Deadline,
+) -> std::result::Result<(), Stop> {
     // Triangles before `settled` have no long edge.
     let mut settled = 0;
     loop {
@@ -285,7 +317,8 @@ fn cut_all(fine: &mut Mesh, wanted: &Wanted, most: usize, deadline: Deadline) ->
 
 impl<'a> Wanted<'a> {
     fn new(mesh: &'a Mesh, length: f32) -> Self {
-        let mut wanted = Self { mesh, asked: length, length, coarser: 1.0, steps: 0, is_blurred: Vec::new() };
+        let mut wanted =
+            Self { mesh, asked: length, length, coarser: 1.0, steps: 0, is_blurred: Vec::new() };
         wanted.coarsen(0);
         if wanted.is_textured() {
             let triangles = mesh.triangles.par_iter().enumerate();
@@ -302,7 +335,9 @@ impl<'a> Wanted<'a> {
         [(0, 1), (1, 2), (2, 0)].iter().any(|&(i, j)| {
             let ends = [t[i] as usize, t[j] as usize];
             let [a, b] = ends.map(|vertex| self.mesh.positions[vertex].as_dvec3());
-            let [Some(from), Some(to)] = ends.map(|vertex| self.mesh.uvs.get(vertex)) else { return false };
+            let [Some(from), Some(to)] = ends.map(|vertex| self.mesh.uvs.get(vertex)) else {
+                return false;
+            };
             let texels = ((from.as_dvec2() - to.as_dvec2()) * size).length();
             // Shorter edges are not cut anyway.
             let parts = a.distance(b) / finest;
@@ -317,7 +352,8 @@ impl<'a> Wanted<'a> {
     }
 
     fn is_textured(&self) -> bool {
-        !self.mesh.uvs.is_empty() && self.mesh.materials.iter().any(|material| material.texture.is_some())
+        !self.mesh.uvs.is_empty()
+            && self.mesh.materials.iter().any(|material| material.texture.is_some())
     }
 
     /// Takes so many steps. Those of a texture's triangles come first, up to the length of others.
@@ -330,8 +366,12 @@ impl<'a> Wanted<'a> {
 
     /// The size of a texel along an edge, in texels: how long it is in its triangle's texture; 0 without one.
     fn texels(&self, mesh: &Mesh, source: usize, a: u32, b: u32) -> f32 {
-        let Some(texture) = self.texture(source).filter(|_| !self.is_blurred[source]) else { return 0.0 };
-        let (Some(&a), Some(&b)) = (mesh.uvs.get(a as usize), mesh.uvs.get(b as usize)) else { return 0.0 };
+        let Some(texture) = self.texture(source).filter(|_| !self.is_blurred[source]) else {
+            return 0.0;
+        };
+        let (Some(&a), Some(&b)) = (mesh.uvs.get(a as usize), mesh.uvs.get(b as usize)) else {
+            return 0.0;
+        };
         ((a - b) * Vec2::new(texture.width as f32, texture.height as f32)).length()
     }
 
@@ -382,7 +422,12 @@ impl<'a> Wanted<'a> {
                 Expected { whole: 0.0, cut: most_pieces(excess) }
             }
         };
-        self.mesh.triangles.par_iter().enumerate().map(parts).reduce(Expected::default, Expected::with)
+        self.mesh
+            .triangles
+            .par_iter()
+            .enumerate()
+            .map(parts)
+            .reduce(Expected::default, Expected::with)
     }
 }
 
@@ -429,7 +474,12 @@ struct Needle {
 ///
 /// # Errors
 /// [`Stop::TooMany`] for more than `most` triangles, before there are as many.
-fn slice_needles(mesh: &mut Mesh, wanted: &Wanted, settled: usize, most: usize) -> std::result::Result<(), Stop> {
+fn slice_needles(
+    mesh: &mut Mesh,
+    wanted: &Wanted,
+    settled: usize,
+    most: usize,
+) -> std::result::Result<(), Stop> {
     let needle = |(index, &t): (usize, &[u32; 3])| {
         let triangle = settled + index;
         let source = mesh.triangle_materials[triangle] as usize;
@@ -441,19 +491,26 @@ fn slice_needles(mesh: &mut Mesh, wanted: &Wanted, settled: usize, most: usize) 
         let step = (1.0 - excess[short] * excess[short]).max(0.0).sqrt();
         let is_needle = excess[short] < 0.8 && least > 1.0 && longest > 2.0;
         let corners = [t[(short + 2) % 3], t[short], t[(short + 1) % 3]];
-        is_needle.then(|| Needle { triangle, corners, parts: (longest / step).ceil().min(1e6) as u32 })
+        is_needle.then(|| Needle {
+            triangle,
+            corners,
+            parts: (longest / step).ceil().min(1e6) as u32,
+        })
     };
     // A list in parts, and as a whole; then the edges of each needle.
     let open = (mesh.triangles.len() - settled) as u64;
     memory::room(WORK, open.saturating_mul(2 * size_of::<Needle>() as u64))?;
-    let needles: Vec<Needle> = mesh.triangles[settled..].par_iter().enumerate().filter_map(needle).collect();
+    let needles: Vec<Needle> =
+        mesh.triangles[settled..].par_iter().enumerate().filter_map(needle).collect();
     if needles.is_empty() {
         return Ok(());
     }
     // The long edges with the parts that the more demanding neighbour asks for, and where each one's new vertices begin.
     memory::room(WORK, needles.len() as u64 * 4 * size_of::<((u32, u32), u32)>() as u64)?;
-    let mut edges: Vec<((u32, u32), u32)> =
-        needles.iter().flat_map(|n| [1, 2].map(|i| (sorted((n.corners[0], n.corners[i])), n.parts))).collect();
+    let mut edges: Vec<((u32, u32), u32)> = needles
+        .iter()
+        .flat_map(|n| [1, 2].map(|i| (sorted((n.corners[0], n.corners[i])), n.parts)))
+        .collect();
     edges.par_sort_unstable_by_key(|&(edge, parts)| (edge, std::cmp::Reverse(parts)));
     edges.dedup_by_key(|&mut (edge, _)| edge);
     let rank = |edge: (u32, u32)| edges.binary_search_by_key(&edge, |&(edge, _)| edge).unwrap_or(0);
@@ -501,8 +558,9 @@ fn slice_needles(mesh: &mut Mesh, wanted: &Wanted, settled: usize, most: usize) 
         mesh.triangles[needle.triangle] = [tip, left_at(1), right_at(1)];
         let (mut i, mut j) = (1, 1);
         while i < left || j < right {
-            let on_left =
-                j == right || (i < left && u64::from(i + 1) * u64::from(right) <= u64::from(j + 1) * u64::from(left));
+            let on_left = j == right
+                || (i < left
+                    && u64::from(i + 1) * u64::from(right) <= u64::from(j + 1) * u64::from(left));
             let (l, r) = (left_at(i), right_at(j));
             if on_left {
                 i += 1;
@@ -528,7 +586,10 @@ fn marked_edges(mesh: &Mesh, wanted: &Wanted, settled: usize) -> Vec<(u32, u32)>
             let excess = wanted.excesses(mesh, source, t);
             // Only the longest, and those about as long: a flat triangle is cut along its length first.
             let least = (excess.iter().fold(0.0, |a: f32, &b| a.max(b)) * 0.7).max(1.0);
-            edges.into_iter().zip(excess).filter_map(move |(edge, excess)| (excess > least).then_some(sorted(edge)))
+            edges
+                .into_iter()
+                .zip(excess)
+                .filter_map(move |(edge, excess)| (excess > least).then_some(sorted(edge)))
         })
         .collect()
 }
@@ -545,7 +606,12 @@ type Pieces = (([[u32; 3]; 4], usize), u32);
 ///
 /// # Errors
 /// [`Stop::TooMany`] for more than `most` triangles, before there are as many.
-fn cut(mesh: &mut Mesh, marked: &[(u32, u32)], settled: usize, most: usize) -> std::result::Result<usize, Stop> {
+fn cut(
+    mesh: &mut Mesh,
+    marked: &[(u32, u32)],
+    settled: usize,
+    most: usize,
+) -> std::result::Result<usize, Stop> {
     let base = mesh.positions.len() as u32;
     let halves = |t: [u32; 3]| {
         [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]
@@ -567,7 +633,8 @@ fn cut(mesh: &mut Mesh, marked: &[(u32, u32)], settled: usize, most: usize) -> s
     let positions = &mesh.positions;
     let open = mesh.triangles[settled..].par_iter().zip(&mesh.triangle_materials[settled..]);
     memory::room(WORK, open.len() as u64 * size_of::<Pieces>() as u64)?;
-    let parts: Vec<Pieces> = open.map(|(&t, &source)| (split(t, halves(t), positions), source)).collect();
+    let parts: Vec<Pieces> =
+        open.map(|(&t, &source)| (split(t, halves(t), positions), source)).collect();
     mesh.triangles.truncate(settled);
     mesh.triangle_materials.truncate(settled);
     let mut now_settled = settled;
@@ -595,7 +662,8 @@ fn add_vertices(mesh: &mut Mesh, new: &[(u32, u32, f32)]) -> Result<()> {
         if !values.is_empty() {
             memory::reserve(values, new.len(), WORK)?;
             memory::room(WORK, size_of_val(new) as u64)?;
-            let between = |&(a, b, part): &(u32, u32, f32)| mix(values[a as usize], values[b as usize], part);
+            let between =
+                |&(a, b, part): &(u32, u32, f32)| mix(values[a as usize], values[b as usize], part);
             let more: Vec<T> = new.par_iter().map(between).collect();
             values.extend(more);
         }
@@ -606,7 +674,9 @@ fn add_vertices(mesh: &mut Mesh, new: &[(u32, u32, f32)]) -> Result<()> {
     extend(&mut mesh.normals, new, |a: Vec3, b, part| a.lerp(b, part).normalize_or_zero())?;
     extend(&mut mesh.uvs, new, |a: Vec2, b, part| a.lerp(b, part))?;
     extend(&mut mesh.colors, new, |a: [u8; 4], b, part| {
-        std::array::from_fn(|i| (f32::from(a[i]) * (1.0 - part) + f32::from(b[i]) * part).round() as u8)
+        std::array::from_fn(|i| {
+            (f32::from(a[i]) * (1.0 - part) + f32::from(b[i]) * part).round() as u8
+        })
     })
 }
 
@@ -626,9 +696,12 @@ fn split(t: [u32; 3], halves: [Option<u32>; 3], positions: &[Vec3]) -> ([[u32; 3
             });
             let by = by.unwrap_or(0);
             let [a, b, c] = turn(by);
-            let (Some(x), second) = (halves[by], halves[(by + 1) % 3]) else { return ([t, none, none, none], 1) };
+            let (Some(x), second) = (halves[by], halves[(by + 1) % 3]) else {
+                return ([t, none, none, none], 1);
+            };
             let Some(y) = second else { return ([[a, x, c], [x, b, c], none, none], 2) };
-            let length = |i: u32, j: u32| positions[i as usize].distance_squared(positions[j as usize]);
+            let length =
+                |i: u32, j: u32| positions[i as usize].distance_squared(positions[j as usize]);
             if length(a, y) <= length(x, c) {
                 ([[x, b, y], [a, x, y], [a, y, c], none], 3)
             } else {
@@ -646,21 +719,30 @@ mod tests {
 
     fn area(mesh: &Mesh) -> f32 {
         let corner = |i: u32| mesh.positions[i as usize];
-        mesh.triangles.iter().map(|t| (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).z * 0.5).sum()
+        mesh.triangles
+            .iter()
+            .map(|t| (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).z * 0.5)
+            .sum()
     }
 
     fn one(c: Vec3) -> Mesh {
-        Mesh { positions: vec![Vec3::ZERO, Vec3::X, c], triangles: vec![[0, 1, 2]], ..Mesh::default() }
+        Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, c],
+            triangles: vec![[0, 1, 2]],
+            ..Mesh::default()
+        }
     }
 
     #[test]
     fn no_edge_stays_long_and_the_area_is_kept() {
-        for apex in [Vec3::new(0.3, 0.8, 0.0), Vec3::new(0.5, 1e-3, 0.0), Vec3::new(0.0, 3.0, 0.0)] {
+        for apex in [Vec3::new(0.3, 0.8, 0.0), Vec3::new(0.5, 1e-3, 0.0), Vec3::new(0.0, 3.0, 0.0)]
+        {
             let mesh = one(apex);
             let fine = refine(&mesh, 0.1, 1 << 20, NEVER).unwrap().mesh;
             for t in &fine.triangles {
-                let edges = [(0, 1), (1, 2), (2, 0)]
-                    .map(|(i, j)| fine.positions[t[i] as usize].distance(fine.positions[t[j] as usize]));
+                let edges = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| {
+                    fine.positions[t[i] as usize].distance(fine.positions[t[j] as usize])
+                });
                 let most = if edges.iter().any(|edge| *edge <= 0.1 / 8.0) { 0.25 } else { 0.1 };
                 assert!(edges.iter().all(|edge| *edge <= most * 1.001), "{edges:?}");
             }
@@ -677,15 +759,29 @@ mod tests {
     /// Whatever the triangles are like, and however little there is too much of.
     #[test]
     fn the_budget_holds() {
-        let apexes = [[0.3, 0.8], [0.5, 0.87], [0.0, 1.0], [0.5, 0.01], [0.02, 0.5], [-3.0, 0.5], [0.9, 1e-4]];
+        let apexes = [
+            [0.3, 0.8],
+            [0.5, 0.87],
+            [0.0, 1.0],
+            [0.5, 0.01],
+            [0.02, 0.5],
+            [-3.0, 0.5],
+            [0.9, 1e-4],
+        ];
         let meshes = apexes.map(|[x, y]| one(Vec3::new(x, y, 0.0))).into_iter();
         for (number, mesh) in meshes.chain([Mesh::sphere(2), Mesh::cube(1.0)]).enumerate() {
             let most = 2_000 + mesh.triangles.len();
             for length in [0.1, 0.05, 0.03, 0.025, 0.02, 0.015, 1e-2, 1e-3, 1e-4, 1e-9] {
                 let fine = refine(&mesh, length, most, NEVER).unwrap().mesh;
                 let count = fine.triangles.len();
-                assert!(count <= most && (length > 1e-3 || count > most / 6), "{number}, {length}: {count}");
-                assert_eq!(count_of_refined(&mesh, length, most, usize::MAX, NEVER).unwrap(), count);
+                assert!(
+                    count <= most && (length > 1e-3 || count > most / 6),
+                    "{number}, {length}: {count}"
+                );
+                assert_eq!(
+                    count_of_refined(&mesh, length, most, usize::MAX, NEVER).unwrap(),
+                    count
+                );
                 assert!(count_of_refined(&mesh, length, most, count - 1, NEVER).unwrap() >= count);
             }
         }
@@ -705,7 +801,10 @@ mod tests {
             for (corner, &vertex) in triangle.iter().enumerate() {
                 // Normals that change linearly over a triangle, as its places do, go on being the same.
                 let found = origin.normal(&fine.mesh, (3 * index + corner) as u32).normalize();
-                assert!(found.dot(fine.mesh.positions[vertex as usize].normalize()) > 0.9999, "{found}");
+                assert!(
+                    found.dot(fine.mesh.positions[vertex as usize].normalize()) > 0.9999,
+                    "{found}"
+                );
             }
         }
     }

@@ -35,7 +35,9 @@ impl Mesh {
                 for c in b + 1..12 {
                     if near(a, b) && near(b, c) && near(c, a) {
                         let out = positions[a].dot(positions[b].cross(positions[c])) > 0.0;
-                        triangles.push(if out { [a, b, c] } else { [a, c, b] }.map(|index| index as u32));
+                        triangles.push(
+                            if out { [a, b, c] } else { [a, c, b] }.map(|index| index as u32),
+                        );
                     }
                 }
             }
@@ -63,7 +65,8 @@ impl Mesh {
     pub fn cube(size: f32) -> Self {
         let half = |bit: usize| if bit == 0 { -size / 2.0 } else { size / 2.0 };
         let positions = (0..8).map(|i| Vec3::new(half(i & 1), half(i & 2), half(i & 4))).collect();
-        let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let sides =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         let triangles = sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
         Self { positions, triangles, ..Self::default() }
     }
@@ -97,7 +100,8 @@ impl Mesh {
         for i in 0..along {
             for j in 0..around {
                 let index = |i: u32, j: u32| (i % along) * around + j % around;
-                let (a, b, c, d) = (index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1));
+                let (a, b, c, d) =
+                    (index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1));
                 mesh.triangles.push([a, b, c]);
                 mesh.triangles.push([a, c, d]);
             }

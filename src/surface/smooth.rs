@@ -64,7 +64,11 @@ impl Groups {
 ///
 /// # Errors
 /// [`Error::Timeout`](crate::Error::Timeout) and [`Error::Memory`](crate::Error::Memory).
-pub(crate) fn corner_normals(mesh: &Mesh, crease_angle_degrees: f32, deadline: Deadline) -> Result<Vec<[Vec3; 3]>> {
+pub(crate) fn corner_normals(
+    mesh: &Mesh,
+    crease_angle_degrees: f32,
+    deadline: Deadline,
+) -> Result<Vec<[Vec3; 3]>> {
     let adjacency = Connected::new(mesh, is_split(mesh))?.adjacency;
     memory::room(WORK, 48 * mesh.positions.len() as u64 + 120 * mesh.triangles.len() as u64)?;
     let clock = Clock::new(deadline);
@@ -85,7 +89,8 @@ pub(crate) fn corner_normals(mesh: &Mesh, crease_angle_degrees: f32, deadline: D
                     })
                     .collect();
                 let sum = |group| around.iter().filter(|t| t.1 == group).map(|t| t.2).sum::<Vec3>();
-                let normals: Vec<Vec3> = (0..groups.len()).map(|group| sum(group).normalize_or_zero()).collect();
+                let normals: Vec<Vec3> =
+                    (0..groups.len()).map(|group| sum(group).normalize_or_zero()).collect();
                 around.iter().map(|&(at, group, _)| (at, normals[group])).collect()
             },
         )
@@ -108,11 +113,13 @@ pub(crate) fn corner_normals(mesh: &Mesh, crease_angle_degrees: f32, deadline: D
 /// A triangle's unit normal, and its angle (radians) at a corner; none where it has no area.
 fn at_corner(mesh: &Mesh, at: u32) -> Option<(Vec3, f32)> {
     let indices = mesh.triangles[at as usize / 3];
-    let [a, b, c] = [0, 1, 2].map(|i| mesh.positions[indices[(at as usize + i) % 3] as usize].as_dvec3());
+    let [a, b, c] =
+        [0, 1, 2].map(|i| mesh.positions[indices[(at as usize + i) % 3] as usize].as_dvec3());
     let cross = (b - a).cross(c - a);
     let twice_area = cross.length();
     let longest = (b - a).length_squared().max((c - a).length_squared());
-    (twice_area > longest * 1e-6).then(|| ((cross / twice_area).as_vec3(), twice_area.atan2((b - a).dot(c - a)) as f32))
+    (twice_area > longest * 1e-6)
+        .then(|| ((cross / twice_area).as_vec3(), twice_area.atan2((b - a).dot(c - a)) as f32))
 }
 
 #[cfg(test)]
@@ -122,8 +129,12 @@ mod tests {
     #[test]
     fn groups_are_cones_around_their_first() {
         let mut groups = Groups::new(30.0);
-        let turned = |degrees: f32| Vec3::new(degrees.to_radians().cos(), degrees.to_radians().sin(), 0.0);
-        assert_eq!([0.0, 29.0, 31.0, 16.0, 14.0, 62.0].map(|angle| groups.place(turned(angle))), [0, 0, 1, 1, 0, 2]);
+        let turned =
+            |degrees: f32| Vec3::new(degrees.to_radians().cos(), degrees.to_radians().sin(), 0.0);
+        assert_eq!(
+            [0.0, 29.0, 31.0, 16.0, 14.0, 62.0].map(|angle| groups.place(turned(angle))),
+            [0, 0, 1, 1, 0, 2]
+        );
         groups.clear();
         assert_eq!((groups.place(turned(90.0)), groups.len()), (0, 1));
     }
@@ -131,13 +142,16 @@ mod tests {
     #[test]
     fn corners_have_the_normals_of_their_side() {
         let cube = Mesh::cube(2.0);
-        for (triangle, normals) in cube.triangles.iter().zip(corner_normals(&cube, 75.0, Deadline::NEVER).unwrap()) {
+        for (triangle, normals) in
+            cube.triangles.iter().zip(corner_normals(&cube, 75.0, Deadline::NEVER).unwrap())
+        {
             let [a, b, c] = triangle.map(|vertex| cube.positions[vertex as usize]);
             let flat = (b - a).cross(c - a).normalize();
             assert!(normals.iter().all(|normal| normal.dot(flat) > 0.9999));
         }
         let sphere = Mesh::sphere(3);
-        for (triangle, normals) in sphere.triangles.iter().zip(corner_normals(&sphere, 75.0, Deadline::NEVER).unwrap())
+        for (triangle, normals) in
+            sphere.triangles.iter().zip(corner_normals(&sphere, 75.0, Deadline::NEVER).unwrap())
         {
             for (normal, &vertex) in normals.iter().zip(triangle) {
                 assert!(normal.dot(sphere.positions[vertex as usize].normalize()) > 0.999);

@@ -143,7 +143,9 @@ impl Mesh {
         // The part of each triangle, and the edges at which others are to come. Where they do not fit, nothing is left out of
         // pictures.
         if memory::room("joining the parts of a mesh", 40 * self.triangles.len() as u64).is_err() {
-            tracing::warn!("too little memory to tell whether all parts are turned outward: backs will be drawn");
+            tracing::warn!(
+                "too little memory to tell whether all parts are turned outward: backs will be drawn"
+            );
             return false;
         }
         let name = |vertex: u32| match &closing {
@@ -152,18 +154,26 @@ impl Mesh {
         };
         let chunks: Vec<(usize, &[[u32; 3]])> = self.triangles.chunks(CHUNK).enumerate().collect();
         let joining = Joining::new(self.triangles.len());
-        let open =
-            chunks.par_iter().flat_map_iter(|(chunk, triangles)| joining.add((chunk * CHUNK) as u32, triangles, name));
+        let open = chunks.par_iter().flat_map_iter(|(chunk, triangles)| {
+            joining.add((chunk * CHUNK) as u32, triangles, name)
+        });
         let open = open.collect();
         let parts = joining.parts(open);
         let told = |(chunk, triangles): (usize, &[[u32; 3]])| {
             let mut told = Told::default();
             for (number, triangle) in (chunk * CHUNK..).zip(triangles) {
                 let at = triangle.map(|vertex| vertex as usize);
-                let normals = at.map(|vertex| self.normals.get(vertex).copied().unwrap_or(NO_DIRECTION));
-                let is_opaque =
-                    at.iter().all(|&vertex| self.colors.get(vertex).map_or(OPAQUE, |color| color[3]) == OPAQUE);
-                told.add(parts.of(number), at.map(|vertex| self.positions[vertex]), normals, is_opaque);
+                let normals =
+                    at.map(|vertex| self.normals.get(vertex).copied().unwrap_or(NO_DIRECTION));
+                let is_opaque = at.iter().all(|&vertex| {
+                    self.colors.get(vertex).map_or(OPAQUE, |color| color[3]) == OPAQUE
+                });
+                told.add(
+                    parts.of(number),
+                    at.map(|vertex| self.positions[vertex]),
+                    normals,
+                    is_opaque,
+                );
             }
             told
         };
@@ -186,7 +196,8 @@ impl Mesh {
         self.materials.iter().zip(is_used).filter(|(_, used)| *used).all(|(material, _)| {
             let is_opaque = |texel: &[u8; 4]| texel[3] == 255;
             let texture = material.texture.as_deref();
-            material.color[3] >= 1.0 && texture.is_none_or(|texture| texture.texels.par_iter().all(is_opaque))
+            material.color[3] >= 1.0
+                && texture.is_none_or(|texture| texture.texels.par_iter().all(is_opaque))
         })
     }
 }
@@ -209,7 +220,8 @@ mod tests {
         let first = one.positions.len() as u32;
         one.positions.extend(other.positions);
         one.normals.extend(other.normals);
-        one.triangles.extend(other.triangles.iter().map(|triangle| triangle.map(|vertex| vertex + first)));
+        one.triangles
+            .extend(other.triangles.iter().map(|triangle| triangle.map(|vertex| vertex + first)));
         one
     }
 
@@ -223,14 +235,20 @@ mod tests {
         let corners = mesh.triangles.iter().flatten();
         Mesh {
             positions: corners.map(|&corner| mesh.positions[corner as usize]).collect(),
-            triangles: (0..mesh.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+            triangles: (0..mesh.triangles.len() as u32)
+                .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
+                .collect(),
             ..Mesh::default()
         }
     }
 
     /// With the normals of a sphere around a place, or the opposite.
     fn with_normals(mut mesh: Mesh, center: f32, sign: f32) -> Mesh {
-        mesh.normals = mesh.positions.iter().map(|place| (place - Vec3::X * center).normalize() * sign).collect();
+        mesh.normals = mesh
+            .positions
+            .iter()
+            .map(|place| (place - Vec3::X * center).normalize() * sign)
+            .collect();
         mesh
     }
 
@@ -257,9 +275,12 @@ mod tests {
     fn hanging(one: Mesh, mut other: Mesh) -> Mesh {
         let farthest = |mesh: &Mesh, sign: f32| {
             let along = |vertex: &u32| mesh.positions[*vertex as usize].x * sign;
-            (0..mesh.positions.len() as u32).max_by(|a, b| along(a).total_cmp(&along(b))).expect("a vertex")
+            (0..mesh.positions.len() as u32)
+                .max_by(|a, b| along(a).total_cmp(&along(b)))
+                .expect("a vertex")
         };
-        let (shared, hung, count) = (farthest(&one, 1.0), farthest(&other, -1.0), one.positions.len() as u32);
+        let (shared, hung, count) =
+            (farthest(&one, 1.0), farthest(&other, -1.0), one.positions.len() as u32);
         let shift = one.positions[shared as usize] - other.positions[hung as usize];
         other.positions.iter_mut().for_each(|place| *place += shift);
         let mut both = both(one, other);
@@ -271,7 +292,10 @@ mod tests {
     /// As one part the larger would hide that the smaller is inside out.
     #[test]
     fn parts_that_share_a_vertex_are_told_apart() {
-        let small = || Mesh { positions: sphere(0.0).positions.iter().map(|p| *p * 0.5).collect(), ..sphere(0.0) };
+        let small = || Mesh {
+            positions: sphere(0.0).positions.iter().map(|p| *p * 0.5).collect(),
+            ..sphere(0.0)
+        };
         assert!(hanging(sphere(0.0), small()).is_solid());
         let hidden = hanging(sphere(0.0), turned(small()));
         assert!(hidden.is_closed() && !hidden.is_solid());
@@ -335,9 +359,13 @@ mod tests {
         let mut mesh = sphere(0.0);
         mesh.triangle_materials = vec![0; mesh.triangles.len()];
         mesh.uvs = vec![Vec2::ZERO; mesh.positions.len()];
-        let texture = |alpha| Some(Arc::new(Texture { width: 1, height: 1, texels: vec![[9, 9, 9, alpha]] }));
-        let material =
-            |opacity, alpha| Material { name: String::new(), color: [1.0, 1.0, 1.0, opacity], texture: texture(alpha) };
+        let texture =
+            |alpha| Some(Arc::new(Texture { width: 1, height: 1, texels: vec![[9, 9, 9, alpha]] }));
+        let material = |opacity, alpha| Material {
+            name: String::new(),
+            color: [1.0, 1.0, 1.0, opacity],
+            texture: texture(alpha),
+        };
         // The last one is not used.
         for (opacity, alpha, is_solid) in [(1.0, 255, true), (0.9, 255, false), (1.0, 99, false)] {
             mesh.materials = vec![material(opacity, alpha), material(0.0, 0)];

@@ -94,12 +94,21 @@ impl Mesh {
     pub fn surfels(&self, options: &SurfelOptions) -> Result<SplatSet> {
         let _span = tracing::info_span!("surfels").entered();
         self.check(options)?;
-        let splats =
-            if self.triangles.is_empty() { cloud::surfels(self, options)? } else { of_triangles(self, options)? };
+        let splats = if self.triangles.is_empty() {
+            cloud::surfels(self, options)?
+        } else {
+            of_triangles(self, options)?
+        };
         if splats.is_empty() {
             return Err(self.nothing());
         }
-        Ok(SplatSet { origin: self.origin, payload: Payload::Radiance, splats, extent: EXTENT, overlap: 1.0 })
+        Ok(SplatSet {
+            origin: self.origin,
+            payload: Payload::Radiance,
+            splats,
+            extent: EXTENT,
+            overlap: 1.0,
+        })
     }
 
     /// The smallest and the largest world coordinates of what is drawn: of the corners of all triangles, or of all positions
@@ -116,9 +125,12 @@ impl Mesh {
         let (low, high) = if self.triangles.is_empty() {
             self.positions.par_iter().fold(none, with).reduce(none, union)
         } else {
-            let places = |triangle: &[u32; 3]| triangle.map(|vertex| self.positions.get(vertex as usize));
+            let places =
+                |triangle: &[u32; 3]| triangle.map(|vertex| self.positions.get(vertex as usize));
             let triangles = self.triangles.par_iter();
-            triangles.fold(none, |all, t| places(t).into_iter().flatten().fold(all, with)).reduce(none, union)
+            triangles
+                .fold(none, |all, t| places(t).into_iter().flatten().fold(all, with))
+                .reduce(none, union)
         };
         low.cmple(high).all().then_some([low, high])
     }
@@ -154,7 +166,9 @@ impl Mesh {
         ];
         for (name, value) in values {
             if !(value > 0.0 && value.is_finite()) {
-                return Err(Error::Argument(format!("{name} is {value}; a positive number is needed")));
+                return Err(Error::Argument(format!(
+                    "{name} is {value}; a positive number is needed"
+                )));
             }
         }
         for (name, value, range) in [
@@ -164,7 +178,9 @@ impl Mesh {
         ] {
             if !range.contains(&value) {
                 let (least, most) = (range.start(), range.end());
-                return Err(Error::Argument(format!("{name} is {value:e}; {least:e} to {most:e} can be")));
+                return Err(Error::Argument(format!(
+                    "{name} is {value:e}; {least:e} to {most:e} can be"
+                )));
             }
         }
         self.validate()
@@ -173,7 +189,10 @@ impl Mesh {
     /// Refuses a mesh that was put together by hand and contradicts itself, or whose places are not finite.
     pub(crate) fn validate(&self) -> Result<()> {
         if !self.origin.is_finite() {
-            return Err(Error::Argument(format!("the origin {} of the mesh is not finite", self.origin)));
+            return Err(Error::Argument(format!(
+                "the origin {} of the mesh is not finite",
+                self.origin
+            )));
         }
         let count = self.positions.len();
         for (name, length, wanted) in [
@@ -183,34 +202,49 @@ impl Mesh {
             ("triangle_materials", self.triangle_materials.len(), self.triangles.len()),
         ] {
             if length != 0 && length != wanted {
-                return Err(Error::Argument(format!("the mesh has {length} {name} where {wanted} are needed")));
+                return Err(Error::Argument(format!(
+                    "the mesh has {length} {name} where {wanted} are needed"
+                )));
             }
         }
         if u32::try_from(count).is_err() || self.triangles.len() > u32::MAX as usize / 3 {
-            return Err(Error::Argument("the mesh has more vertices or corners than 32 bits can name".into()));
+            return Err(Error::Argument(
+                "the mesh has more vertices or corners than 32 bits can name".into(),
+            ));
         }
         if !self.triangles.par_iter().all(|t| t.iter().all(|&index| (index as usize) < count)) {
-            return Err(Error::Argument(format!("a triangle refers beyond the mesh's {count} vertices")));
+            return Err(Error::Argument(format!(
+                "a triangle refers beyond the mesh's {count} vertices"
+            )));
         }
-        if !self.triangle_materials.par_iter().all(|&index| (index as usize) < self.materials.len()) {
-            return Err(Error::Argument("a triangle refers to a material that is not there".into()));
+        if !self.triangle_materials.par_iter().all(|&index| (index as usize) < self.materials.len())
+        {
+            return Err(Error::Argument(
+                "a triangle refers to a material that is not there".into(),
+            ));
         }
-        let whole = |t: &super::Texture| !t.texels.is_empty() && t.texels.len() == t.width as usize * t.height as usize;
+        let whole = |t: &super::Texture| {
+            !t.texels.is_empty() && t.texels.len() == t.width as usize * t.height as usize
+        };
         if !self.materials.iter().filter_map(|material| material.texture.as_deref()).all(whole) {
             return Err(Error::Argument("a texture's size is not that of its texels".into()));
         }
         // Squares of these fit in 32 bits.
         let fits = |p: &Vec3| p.abs().max_element() <= 1e18 && p.is_finite();
         if let Some(vertex) = self.positions.par_iter().position_first(|p| !fits(p)) {
-            let message =
-                format!("the position {} of vertex {vertex} is not finite, or beyond 1e18", self.positions[vertex]);
+            let message = format!(
+                "the position {} of vertex {vertex} is not finite, or beyond 1e18",
+                self.positions[vertex]
+            );
             return Err(Error::Argument(message));
         }
         let is_textured = self.materials.iter().any(|material| material.texture.is_some());
         let not_finite = || self.uvs.par_iter().position_first(|uv| !uv.is_finite());
         if let Some(vertex) = is_textured.then(not_finite).flatten() {
             let uv = self.uvs[vertex];
-            return Err(Error::Argument(format!("the texture coordinates {uv} of vertex {vertex} are not finite")));
+            return Err(Error::Argument(format!(
+                "the texture coordinates {uv} of vertex {vertex} are not finite"
+            )));
         }
         Ok(())
     }
@@ -219,19 +253,29 @@ impl Mesh {
     /// This is known before any is cut.
     fn check_extent(&self, unit: f32) -> Result<()> {
         let unit = f64::from(unit);
-        let [least_area, least_ratio] = [LEAST_SQUARE, LEAST_RATIO_SQUARED].map(|square| f64::from(square).sqrt());
+        let [least_area, least_ratio] =
+            [LEAST_SQUARE, LEAST_RATIO_SQUARED].map(|square| f64::from(square).sqrt());
         // What cutting leaves of an edge, in units; for a texture it cuts into finer ones.
         let is_textured = self.materials.iter().any(|material| material.texture.is_some());
         let finest = if is_textured { 1.0 / 32.0 } else { 0.3 };
         let is_left = |triangle: &[u32; 3]| {
-            let [a, b, c] = triangle.map(|vertex| self.positions[vertex as usize].as_dvec3() / unit);
-            let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared()).sqrt();
+            let [a, b, c] =
+                triangle.map(|vertex| self.positions[vertex as usize].as_dvec3() / unit);
+            let longest = (b - a)
+                .length_squared()
+                .max((c - b).length_squared())
+                .max((a - c).length_squared())
+                .sqrt();
             // Cutting keeps the height of a needle. Surfels ask for twice these bounds.
             let height = (b - a).cross(c - a).length() / longest;
             let edge = longest.min(1.0);
             height > 0.5 * least_ratio * edge.min(finest) && height * edge > 0.5 * least_area
         };
-        if self.triangles.is_empty() || self.triangles.par_iter().any(is_left) { Ok(()) } else { Err(self.nothing()) }
+        if self.triangles.is_empty() || self.triangles.par_iter().any(is_left) {
+            Ok(())
+        } else {
+            Err(self.nothing())
+        }
     }
 
     /// The error of a mesh or cloud of which nothing is left to draw.
@@ -244,7 +288,9 @@ impl Mesh {
         let center = used().map(place).sum::<DVec3>() / (3 * self.triangles.len()).max(1) as f64;
         let distance = |vertex: &u32| place(*vertex).distance_squared(center);
         let farthest = used().max_by(|a, b| distance(a).total_cmp(&distance(b)).then(b.cmp(a)));
-        let what = match farthest.filter(|_| self.triangles.par_iter().any(|&triangle| has_area(self, triangle))) {
+        let what = match farthest
+            .filter(|_| self.triangles.par_iter().any(|&triangle| has_area(self, triangle)))
+        {
             Some(vertex) => {
                 let at = (self.origin + place(vertex)).as_vec3();
                 format!(
@@ -268,7 +314,8 @@ pub(super) fn largest_edge([low, high]: [Vec3; 2], area: f64, options: &SurfelOp
     // In 64 bits squares of the smallest are not lost.
     let diagonal = (high.as_dvec3() - low.as_dvec3()).length();
     // Whoever adds up the area in another order finds the same power of two.
-    let longest = if area > 0.0 { area.sqrt().log2().ceil().exp2() * LONGEST } else { f64::INFINITY };
+    let longest =
+        if area > 0.0 { area.sqrt().log2().ceil().exp2() * LONGEST } else { f64::INFINITY };
     // No edge is longer than the diagonal: a longer one would only be a unit that is too coarse for them.
     (diagonal.min(longest) as f32 * options.largest_spacing.min(1.0)).max(f32::MIN_POSITIVE)
 }
@@ -280,7 +327,8 @@ fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Result<Vec<Splat>> {
     // Most large meshes are fine enough, and right side out. One look at the triangles finds that out and makes the surfels.
     let parts = make(mesh, None, is_split(mesh), options, [largest, 1.0], |_| true)?;
     let is_coarse = parts.iter().any(|part| part.longest > 1.0) && !is_fine(mesh, largest);
-    let is_textured = !mesh.uvs.is_empty() && mesh.materials.iter().any(|material| material.texture.is_some());
+    let is_textured =
+        !mesh.uvs.is_empty() && mesh.materials.iter().any(|material| material.texture.is_some());
     let sums = parts.iter().fold(Sums::default(), |sums, part| sums.with(part.sums));
     let outward = if sums.side(largest) < 0 { -1.0 } else { 1.0 };
     if !is_coarse && !is_textured && outward == 1.0 {
@@ -289,7 +337,9 @@ fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Result<Vec<Splat>> {
     drop(parts);
     let fine = refine(mesh, largest, options.most_triangles, options.deadline)?;
     let origin = fine.sources.map(|sources| origin_of(mesh, sources, options)).transpose()?;
-    joined(make(&fine.mesh, origin.as_ref(), is_split(mesh), options, [largest, outward], |_| true)?)
+    joined(make(&fine.mesh, origin.as_ref(), is_split(mesh), options, [largest, outward], |_| {
+        true
+    })?)
 }
 
 /// What the triangles of a refined mesh were cut from.
@@ -313,7 +363,14 @@ pub(super) fn of_part(
     let Some(length) = cut else {
         let sources = (0..part.triangles.len() as u32).collect();
         let origin = is_coarse.then(|| origin_of(part, sources, options)).transpose()?;
-        return joined(make(part, origin.as_ref(), is_split, options, [largest, outward], is_wanted)?);
+        return joined(make(
+            part,
+            origin.as_ref(),
+            is_split,
+            options,
+            [largest, outward],
+            is_wanted,
+        )?);
     };
     // Whoever chose the length has kept to the budget.
     let fine = refine(part, length, usize::MAX >> 1, options.deadline)?;
@@ -334,7 +391,8 @@ fn make(
     let connected = Connected::new(mesh, is_split)?;
     memory::room(WORK, (size_of::<Splat>() * mesh.positions.len()) as u64)?;
     let clock = Clock::new(options.deadline);
-    let plain = mesh.materials.is_empty() && (mesh.colors.is_empty() || matches!(connected.places, Cow::Borrowed(_)));
+    let plain = mesh.materials.is_empty()
+        && (mesh.colors.is_empty() || matches!(connected.places, Cow::Borrowed(_)));
     let maker = Maker { mesh, connected: &connected, options, origin, unit, outward, plain };
     let made = (0..mesh.positions.len().div_ceil(CHUNK))
         .into_par_iter()

@@ -40,8 +40,9 @@ impl Mesh {
 
     /// What closes the surface; `None` where it is not closed.
     pub(super) fn closing(&self) -> Option<Closing> {
-        let refers_beyond =
-            |triangle: &[u32; 3]| triangle.iter().any(|&vertex| vertex as usize >= self.positions.len());
+        let refers_beyond = |triangle: &[u32; 3]| {
+            triangle.iter().any(|&vertex| vertex as usize >= self.positions.len())
+        };
         if self.triangles.is_empty() || self.triangles.par_iter().any(refers_beyond) {
             return None;
         }
@@ -78,7 +79,11 @@ impl Mesh {
         Survey {
             not_finite: self.positions.par_iter().filter(|p| !p.is_finite()).count(),
             duplicates: (0..).zip(&first).filter(|(index, first)| *index != **first).count(),
-            without_area: self.triangles.par_iter().filter(|&&triangle| !has_area(self, triangle)).count(),
+            without_area: self
+                .triangles
+                .par_iter()
+                .filter(|&&triangle| !has_area(self, triangle))
+                .count(),
             unused: if self.triangles.is_empty() { 0 } else { self.positions.len() - used },
         }
     }
@@ -86,9 +91,13 @@ impl Mesh {
 
 /// Whether a triangle is more than a line, at the precision of its coordinates.
 pub(super) fn has_area(mesh: &Mesh, triangle: [u32; 3]) -> bool {
-    let [Some(a), Some(b), Some(c)] = triangle.map(|index| mesh.positions.get(index as usize)) else { return false };
+    let [Some(a), Some(b), Some(c)] = triangle.map(|index| mesh.positions.get(index as usize))
+    else {
+        return false;
+    };
     let [a, b, c] = [a, b, c].map(|place| place.as_dvec3());
-    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+    let longest =
+        (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
     (b - a).cross(c - a).length() > longest * 1e-10
 }
 

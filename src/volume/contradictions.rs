@@ -1,7 +1,8 @@
 //! Volumes and kernels that were put together by hand and make no sense: whoever takes one tells why it does not.
 
 use super::{
-    Arrangement, Coefficients, Lattice, Reconstruction, Samples, TransferFunction, Volume, body_centred,
+    Arrangement, Coefficients, Lattice, Reconstruction, Samples, TransferFunction, Volume,
+    body_centred,
     bricks::{self, Bricks},
 };
 use crate::{
@@ -92,7 +93,8 @@ fn volumes_are_refused_where_they_come_in() {
         refused_by_all("samples", word, &volume);
         refused("sharpened", word, volume.sharpened(&Kernel::default()));
     }
-    for range in [[f64::NAN; 2], [1.0, 0.0], [0.0, f64::INFINITY], [0.0, 0.5], [-1.7e308, 1.7e308]] {
+    for range in [[f64::NAN; 2], [1.0, 0.0], [0.0, f64::INFINITY], [0.0, 0.5], [-1.7e308, 1.7e308]]
+    {
         let volume = Volume { range, ..good() };
         refused_by_all(&format!("{range:?}"), "the range is", &volume);
         refused("sharpened", "the range is", volume.sharpened(&Kernel::default()));
@@ -129,8 +131,10 @@ fn coefficients_are_looked_at() {
     let mut moved = sharp.clone();
     moved.lattice.origin += shift;
     refused("moved", "continued", scene(moved.clone(), kernel.clone()).validate());
-    let along =
-        Volume { lattice: moved.lattice.clone(), ..changed(|c| c.lattice.origin += DVec3::new(1e6, -3e5, 0.1)) };
+    let along = Volume {
+        lattice: moved.lattice.clone(),
+        ..changed(|c| c.lattice.origin += DVec3::new(1e6, -3e5, 0.1))
+    };
     scene(along, kernel.clone()).validate().unwrap();
     // It is made sharp anew.
     let again = moved.sharpened(&kernel).unwrap();
@@ -139,10 +143,16 @@ fn coefficients_are_looked_at() {
 
 #[test]
 fn kernels_are_refused_where_they_come_in() {
-    let profiles = [Profile::Gaussian(0.6), Profile::BSpline, Profile::Hann, Profile::Table([1.0, 0.0].into())];
+    let profiles = [
+        Profile::Gaussian(0.6),
+        Profile::BSpline,
+        Profile::Hann,
+        Profile::Table([1.0, 0.0].into()),
+    ];
     let profiles = profiles.into_iter().chain(Tensor::ALL.map(Profile::Tensor));
     let extents = [0.0, -1.0, f64::NAN, f64::INFINITY, 1e9];
-    let kernels = profiles.flat_map(|profile| extents.map(|extent| Kernel { profile: profile.clone(), extent }));
+    let kernels = profiles
+        .flat_map(|profile| extents.map(|extent| Kernel { profile: profile.clone(), extent }));
     let odd = [
         Profile::Gaussian(0.0),
         Profile::Gaussian(f64::NAN),
@@ -164,7 +174,9 @@ fn bricks_in_a_scene_are_looked_at() {
     let told = |volume: Volume, kernel: Kernel, change: fn(&mut TransferFunction)| {
         let mut transfer = TransferFunction::automatic(&good());
         change(&mut transfer);
-        Scene::new().with_bricks(Bricks::from_volume(Arc::new(volume)).unwrap(), kernel, transfer).validate()
+        Scene::new()
+            .with_bricks(Bricks::from_volume(Arc::new(volume)).unwrap(), kernel, transfer)
+            .validate()
     };
     let far = |x: f64| {
         let mut volume = good();
@@ -176,8 +188,16 @@ fn bricks_in_a_scene_are_looked_at() {
     refused("far", "beyond what 32-bit numbers hold", told(far(1e39), Kernel::default(), |_| ()));
     let wide = Kernel { extent: f64::INFINITY, ..Kernel::default() };
     refused("kernel", "extent", told(good(), wide, |_| ()));
-    refused("unit", "transfer function", told(good(), Kernel::default(), |transfer| transfer.unit = f64::NAN));
-    refused("opacity", "transfer function", told(good(), Kernel::default(), |t| t.opacity[0].1 = f64::NAN));
+    refused(
+        "unit",
+        "transfer function",
+        told(good(), Kernel::default(), |transfer| transfer.unit = f64::NAN),
+    );
+    refused(
+        "opacity",
+        "transfer function",
+        told(good(), Kernel::default(), |t| t.opacity[0].1 = f64::NAN),
+    );
     let steep: fn(&mut TransferFunction) = |transfer| {
         transfer.color = vec![(0.0, [1.0; 3])];
         transfer.opacity = vec![(0.0, 0.0), (1e-9, 1.0)];

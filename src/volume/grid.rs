@@ -102,7 +102,11 @@ impl Grid {
 /// The value of a kernel at a distance in kernel units. On the rim of the footprint, where a cut kernel jumps, it is the mean of
 /// both sides, so that no rounding decides.
 pub fn weight(kernel: &Kernel, distance: f64) -> f64 {
-    if (distance - kernel.extent).abs() < 1e-9 { 0.5 * kernel.value(kernel.extent) } else { kernel.value(distance) }
+    if (distance - kernel.extent).abs() < 1e-9 {
+        0.5 * kernel.value(kernel.extent)
+    } else {
+        kernel.value(distance)
+    }
 }
 
 /// The sum over a lattice's samples of a kernel times a wave, for every wave that a grid can hold; 1 for a constant.
@@ -123,7 +127,9 @@ impl Response {
         for k in 0..reach {
             for j in 0..reach {
                 for i in 0..reach {
-                    let images = [i, j, k].iter().fold(1.0, |images, &at| if at > 0 { 2.0 * images } else { images });
+                    let images = [i, j, k]
+                        .iter()
+                        .fold(1.0, |images, &at| if at > 0 { 2.0 * images } else { images });
                     let distance = ((i * i + j * j + k * k) as f64).sqrt() * grid.step();
                     let inside = grid.connects([i, j, k].map(|at| at as isize));
                     weights.push(if inside { images * weight(kernel, distance) } else { 0.0 });
@@ -133,13 +139,19 @@ impl Response {
         let sum: f64 = weights.iter().sum();
         weights.iter_mut().for_each(|weight| *weight /= sum);
         let cosines = grid.dims.map(|count| {
-            (0..count).flat_map(|at| (0..reach).map(move |m| (m as f64 * frequency(at, count)).cos())).collect()
+            (0..count)
+                .flat_map(|at| (0..reach).map(move |m| (m as f64 * frequency(at, count)).cos()))
+                .collect()
         });
         Self { grid, reach, weights, cosines }
     }
 
     /// Calls a function with the responses at the frequencies (0 …, j, k).
-    fn row<T>(&self, [j, k]: [usize; 2], take: impl FnOnce(&mut dyn Iterator<Item = f64>) -> T) -> T {
+    fn row<T>(
+        &self,
+        [j, k]: [usize; 2],
+        take: impl FnOnce(&mut dyn Iterator<Item = f64>) -> T,
+    ) -> T {
         let reach = self.reach;
         let [x, y, z] = &self.cosines;
         let (y, z) = (&y[j * reach..][..reach], &z[k * reach..][..reach]);
@@ -154,14 +166,18 @@ impl Response {
     /// The least response: how much of some wave the kernel leaves.
     pub fn least(&self) -> f64 {
         let [_, ny, nz] = self.grid.dims;
-        let row = |row: usize| self.row([row % ny, row / ny], |responses| responses.fold(f64::INFINITY, f64::min));
+        let row = |row: usize| {
+            self.row([row % ny, row / ny], |responses| responses.fold(f64::INFINITY, f64::min))
+        };
         (0..ny * nz).into_par_iter().map(row).reduce(|| f64::INFINITY, f64::min)
     }
 
     /// Divides a field on the grid by the response.
     pub fn divide(&self, values: &mut [f64]) {
         cosine::filter(values, self.grid.dims, |place, spectrum| {
-            self.row(place, |responses| spectrum.iter_mut().zip(responses).for_each(|(value, part)| *value /= part));
+            self.row(place, |responses| {
+                spectrum.iter_mut().zip(responses).for_each(|(value, part)| *value /= part)
+            });
         });
     }
 }

@@ -21,7 +21,8 @@ pub fn head(p: DVec3) -> f64 {
     let neck = tube(p, &[[0.0, 0.14, -0.2], [0.0, 0.2, -1.2]], 0.36);
     let nose = ellipsoid(p, [0.0, -0.74, -0.02], [0.11, 0.18, 0.2]);
     let ear = ellipsoid(mirrored(p), [0.66, 0.1, 0.05], [0.07, 0.13, 0.18]);
-    let skin = [skull - 0.08, jaw - 0.07, neck, nose, ear].into_iter().fold(f64::INFINITY, f64::min);
+    let skin =
+        [skull - 0.08, jaw - 0.07, neck, nose, ear].into_iter().fold(f64::INFINITY, f64::min);
     let sockets = ellipsoid(mirrored(p), [0.26, -0.64, 0.12], [0.17, 0.2, 0.15]);
     let nasal = ellipsoid(p, [0.0, -0.62, -0.08], [0.1, 0.26, 0.2]);
 
@@ -35,7 +36,8 @@ pub fn head(p: DVec3) -> f64 {
     // The jaw: a bow of bone with teeth along it.
     let bow = [[0.36, 0.1, -0.2], [0.38, -0.05, -0.5], [0.26, -0.42, -0.58], [0.0, -0.58, -0.6]];
     value = fill(value, BONE, tube(mirrored(p), &bow, 0.075));
-    let teeth = tube(mirrored(p), &[[0.26, -0.34, -0.46], [0.16, -0.52, -0.46], [0.0, -0.58, -0.46]], 0.06);
+    let teeth =
+        tube(mirrored(p), &[[0.26, -0.34, -0.46], [0.16, -0.52, -0.46], [0.0, -0.58, -0.46]], 0.06);
     value = fill(value, TOOTH, teeth.max(0.03 - (22.0 * p.x).sin().abs() * 0.06));
     value = fill(value, AIR, nasal.max(skin + 0.04));
     // The spine, with its canal.
@@ -58,7 +60,13 @@ fn arteries(p: DVec3, value: f64) -> f64 {
         [0.14, -0.1, -0.06],
         [0.12, -0.06, 0.04],
     ];
-    let front = [[0.12, -0.06, 0.04], [0.03, -0.26, 0.08], [0.03, -0.5, 0.3], [0.03, -0.3, 0.62], [0.03, 0.2, 0.68]];
+    let front = [
+        [0.12, -0.06, 0.04],
+        [0.03, -0.26, 0.08],
+        [0.03, -0.5, 0.3],
+        [0.03, -0.3, 0.62],
+        [0.03, 0.2, 0.68],
+    ];
     let middle = [[0.12, -0.06, 0.04], [0.38, -0.1, 0.1], [0.5, 0.06, 0.3], [0.42, 0.3, 0.5]];
     let back = [[0.12, -0.06, 0.04], [0.1, 0.14, 0.02], [0.14, 0.42, 0.1], [0.1, 0.66, 0.24]];
     let value = fill(value, CONTRAST, tube(side, &carotid, 0.042));

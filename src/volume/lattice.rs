@@ -103,7 +103,11 @@ impl Lattice {
             Arrangement::Rectilinear(places) => DVec3::from_array(std::array::from_fn(|axis| {
                 let (places, at) = (&places[axis], index[axis]);
                 let (before, after) = (at.saturating_sub(1), (at + 1).min(places.len() - 1));
-                if before == after { 1.0 } else { (places[after] - places[before]) / (after - before) as f64 }
+                if before == after {
+                    1.0
+                } else {
+                    (places[after] - places[before]) / (after - before) as f64
+                }
             })),
         }
     }
@@ -151,7 +155,11 @@ impl Lattice {
             Arrangement::Cartesian => [extent.ceil() as usize; 3],
             Arrangement::BodyCentred => {
                 let edges = extent * std::f64::consts::FRAC_1_SQRT_2;
-                [(edges + 0.5).ceil() as usize, (edges + 0.5).ceil() as usize, (2.0 * edges).ceil() as usize]
+                [
+                    (edges + 0.5).ceil() as usize,
+                    (edges + 0.5).ceil() as usize,
+                    (2.0 * edges).ceil() as usize,
+                ]
             }
             Arrangement::Rectilinear(places) => std::array::from_fn(|axis| {
                 let places = &places[axis];
@@ -206,10 +214,16 @@ impl Lattice {
     pub fn bounds(&self) -> [DVec3; 2] {
         let [first, last] = self.step_range();
         let corners = (0..8).map(|corner| {
-            let at_end = DVec3::new(f64::from(corner & 1), f64::from(corner >> 1 & 1), f64::from(corner >> 2));
+            let at_end = DVec3::new(
+                f64::from(corner & 1),
+                f64::from(corner >> 1 & 1),
+                f64::from(corner >> 2),
+            );
             self.position(first + (last - first) * at_end)
         });
-        corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
+        corners.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| {
+            [low.min(p), high.max(p)]
+        })
     }
 
     /// Says in words why samples cannot lie so: no samples, more than memory could index, or steps that are not finite
@@ -227,13 +241,17 @@ impl Lattice {
             return Err("the origin and the steps between samples must be finite".into());
         }
         if let Arrangement::Rectilinear(places) = &self.arrangement {
-            for (axis, (places, count)) in ["x", "y", "z"].iter().zip(places.iter().zip(self.dims)) {
+            for (axis, (places, count)) in ["x", "y", "z"].iter().zip(places.iter().zip(self.dims))
+            {
                 if places.len() != count {
-                    return Err(format!("{} coordinates along {axis} for {count} samples", places.len()));
+                    return Err(format!(
+                        "{} coordinates along {axis} for {count} samples",
+                        places.len()
+                    ));
                 }
-                if let Some(at) =
-                    places.windows(2).position(|pair| pair[0].partial_cmp(&pair[1]) != Some(std::cmp::Ordering::Less))
-                {
+                if let Some(at) = places.windows(2).position(|pair| {
+                    pair[0].partial_cmp(&pair[1]) != Some(std::cmp::Ordering::Less)
+                }) {
                     let (a, b) = (places[at], places[at + 1]);
                     return Err(format!(
                         "coordinates along {axis} must ascend, but number {at} is {a} and the next {b}"
@@ -253,7 +271,10 @@ impl Lattice {
             ));
         }
         let directions = DMat3::from_cols_array_2d(
-            &self.axes.to_cols_array_2d().map(|axis| DVec3::from_array(axis).normalize().to_array()),
+            &self
+                .axes
+                .to_cols_array_2d()
+                .map(|axis| DVec3::from_array(axis).normalize().to_array()),
         );
         if directions.determinant().abs() < 1e-6 {
             return Err("the directions of the axes lie in one plane".into());
@@ -272,7 +293,8 @@ mod tests {
 
     #[test]
     fn bounds_take_all_corners() {
-        let axes = DMat3::from_cols(DVec3::new(0.0, 1.0, 0.0), DVec3::new(-2.0, 0.5, 0.0), DVec3::Z);
+        let axes =
+            DMat3::from_cols(DVec3::new(0.0, 1.0, 0.0), DVec3::new(-2.0, 0.5, 0.0), DVec3::Z);
         let lattice = Lattice::cartesian([3, 2, 1], DVec3::new(10.0, 0.0, 0.0), axes);
         assert_eq!(lattice.bounds(), [DVec3::new(8.0, 0.0, 0.0), DVec3::new(10.0, 2.5, 0.0)]);
         assert_eq!(lattice.spacing(), DVec3::new(1.0, 4.25f64.sqrt(), 1.0));
@@ -285,7 +307,9 @@ mod tests {
         good.validate().unwrap();
         // Coordinates far apart are no flat axes.
         let far = std::array::from_fn(|_| vec![0.0, 1e6]);
-        Lattice { arrangement: Arrangement::Rectilinear(Arc::new(far)), ..good.clone() }.validate().unwrap();
+        Lattice { arrangement: Arrangement::Rectilinear(Arc::new(far)), ..good.clone() }
+            .validate()
+            .unwrap();
         let flat = DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::X + DVec3::Y);
         for (bad, word) in [
             (Lattice { dims: [2, 0, 2], ..good.clone() }, "none"),

@@ -32,7 +32,11 @@ impl Overshoot {
         impulse[grid.offset(centre)] = 1.0;
         Response::new(grid, kernel).divide(&mut impulse);
         // Mirrors, and the axes in any order, leave the lattice as it is.
-        let quarters = || (0..=4).map(|quarter| f64::from(quarter) / 4.0).filter(|&at| at <= grid.symmetric_part());
+        let quarters = || {
+            (0..=4)
+                .map(|quarter| f64::from(quarter) / 4.0)
+                .filter(|&at| at <= grid.symmetric_part())
+        };
         let places: Vec<[f64; 3]> = quarters()
             .flat_map(|x| quarters().flat_map(move |y| quarters().map(move |z| [x, y, z])))
             .filter(|[x, y, z]| x <= y && y <= z)
@@ -100,7 +104,9 @@ fn shells(grid: Grid, kernel: &Kernel, impulse: &[f64], place: [f64; 3]) -> [f64
             for i in (-half..=half).filter(|&i| grid.connects([i, j, k])) {
                 let from = [i, j, k];
                 let value = |&(offset, share): &([isize; 3], f64)| {
-                    let point = std::array::from_fn(|axis| mirrored(middle[axis] + from[axis] + offset[axis], SIDE));
+                    let point = std::array::from_fn(|axis| {
+                        mirrored(middle[axis] + from[axis] + offset[axis], SIDE)
+                    });
                     share * impulse[grid.offset(point)]
                 };
                 let value = weights.iter().map(value).sum::<f64>() / sum;
@@ -132,7 +138,10 @@ mod tests {
         let cone = Kernel::table(vec![1.0, 0.0], 1.0).unwrap();
         let grid = Grid::of(&Lattice::cartesian([4; 3], DVec3::ZERO, DMat3::IDENTITY)).unwrap();
         let found = Overshoot::new(grid, &cone);
-        assert!((found.lebesgue - MARGIN).abs() < 1e-9 && found.tails.last().unwrap().1 == 0.0, "{found:?}");
+        assert!(
+            (found.lebesgue - MARGIN).abs() < 1e-9 && found.tails.last().unwrap().1 == 0.0,
+            "{found:?}"
+        );
     }
 
     #[test]
@@ -147,7 +156,10 @@ mod tests {
     #[test]
     fn gaussians_ring_more_the_wider_they_are() {
         let found = |sigma: f64, lattice: &Lattice| {
-            let found = Overshoot::new(Grid::of(lattice).unwrap(), &Kernel::gaussian(sigma, 4.0 * sigma).unwrap());
+            let found = Overshoot::new(
+                Grid::of(lattice).unwrap(),
+                &Kernel::gaussian(sigma, 4.0 * sigma).unwrap(),
+            );
             println!("σ {sigma}: {found:?}");
             assert!(found.tails.windows(2).all(|pair| pair[0].1 >= pair[1].1));
             found.lebesgue
@@ -155,7 +167,10 @@ mod tests {
         let cartesian = Lattice::cartesian([4; 3], DVec3::ZERO, DMat3::IDENTITY);
         let body_centred = Lattice::body_centred([4; 3], DVec3::ZERO, DMat3::IDENTITY);
         for lattice in [&cartesian, &body_centred] {
-            assert!(found(0.5, lattice) < found(0.6, lattice) && found(0.6, lattice) < found(0.7, lattice));
+            assert!(
+                found(0.5, lattice) < found(0.6, lattice)
+                    && found(0.6, lattice) < found(0.7, lattice)
+            );
         }
         assert!(found(0.6, &body_centred) < found(0.6, &cartesian));
     }

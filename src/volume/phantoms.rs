@@ -90,7 +90,11 @@ impl Phantom {
         Ok(ByteSlices { phantom: self, lattice })
     }
 
-    fn fill<T: Send>(self, lattice: &Lattice, turn: impl Fn(f64) -> T + Sync) -> Result<Vec<T>, String> {
+    fn fill<T: Send>(
+        self,
+        lattice: &Lattice,
+        turn: impl Fn(f64) -> T + Sync,
+    ) -> Result<Vec<T>, String> {
         let [nx, ny, nz] = lattice.dims;
         let bytes = (lattice.len() as u64).saturating_mul(size_of::<T>() as u64);
         memory::check(&format!("a volume of {nx} × {ny} × {nz} samples"), bytes)?;
@@ -115,7 +119,9 @@ impl ByteSlices {
     /// The samples of a slice.
     pub fn slice(&self, k: usize) -> Vec<u8> {
         let Lattice { dims: [nx, ny, _], .. } = self.lattice;
-        let sample = |index: usize| byte(self.phantom.value(self.lattice.sample_position(k * nx * ny + index)));
+        let sample = |index: usize| {
+            byte(self.phantom.value(self.lattice.sample_position(k * nx * ny + index)))
+        };
         (0..nx * ny).into_par_iter().map(sample).collect()
     }
 }
@@ -193,13 +199,19 @@ mod tests {
         assert!((Phantom::MarschnerLobb.value(DVec3::ZERO) - 0.6).abs() < 1e-12);
         assert!((Phantom::MarschnerLobb.value(DVec3::Z) - 0.2).abs() < 1e-12);
         assert_eq!((Phantom::Ball.value(DVec3::ZERO), Phantom::Ball.value(DVec3::X)), (1.0, 0.0));
-        assert_eq!((Phantom::Specimen.value(DVec3::ZERO), Phantom::Specimen.value(DVec3::ONE)), (1.0, 0.0));
+        assert_eq!(
+            (Phantom::Specimen.value(DVec3::ZERO), Phantom::Specimen.value(DVec3::ONE)),
+            (1.0, 0.0)
+        );
         assert!((Phantom::Specimen.value(DVec3::NEG_X * 0.865) - 0.35).abs() < 1e-9);
     }
 
     #[test]
     fn every_name_has_a_phantom() {
-        assert!(Phantom::NAMES.iter().all(|name| Phantom::named(name).is_some()) && Phantom::named("knot").is_none());
+        assert!(
+            Phantom::NAMES.iter().all(|name| Phantom::named(name).is_some())
+                && Phantom::named("knot").is_none()
+        );
         assert_eq!(Phantom::named("ball"), Some(Phantom::Ball));
         let slab = |z: f64| Phantom::Slabs.value(DVec3::new(0.3, -0.3, z));
         assert_eq!([0.2, 0.1, 0.0, -0.2, -0.4].map(slab), [0.5, 1.0, 0.0, 0.0, 0.5]);
@@ -213,7 +225,8 @@ mod tests {
         assert_eq!(Phantom::Constant(0.5).sample_bytes([2, 2, 2]).unwrap().range, [128.0, 128.0]);
         assert!(Phantom::Ball.sample([0, 2, 2]).is_err());
         for dims in [[1 << 20; 3], [1 << 21; 3], [usize::MAX, 1, 1]] {
-            let told = [Phantom::Ball.sample(dims), Phantom::Ball.sample_bytes(dims)].map(|volume| volume.unwrap_err());
+            let told = [Phantom::Ball.sample(dims), Phantom::Ball.sample_bytes(dims)]
+                .map(|volume| volume.unwrap_err());
             assert!(told.iter().all(|message| message.contains("memory")), "{told:?}");
         }
         let lattice = Lattice::body_centred([usize::MAX, 1, 1], DVec3::ZERO, DMat3::IDENTITY);
@@ -233,7 +246,11 @@ mod tests {
         // The first sample of the middle layer is displaced by half an edge: to the ball's centre.
         assert_eq!((volume.value(4), volume.len()), (1.0, 12));
         assert_eq!(volume.value(0), Phantom::Ball.value(DVec3::splat(-0.5)) as f32 as f64);
-        assert!(Phantom::Ball.sample_on(Lattice::body_centred([0, 1, 1], DVec3::ZERO, DMat3::IDENTITY)).is_err());
+        assert!(
+            Phantom::Ball
+                .sample_on(Lattice::body_centred([0, 1, 1], DVec3::ZERO, DMat3::IDENTITY))
+                .is_err()
+        );
     }
 
     #[test]
@@ -241,7 +258,10 @@ mod tests {
         let volume = Phantom::Specimen.sample_bytes([48; 3]).unwrap();
         assert_eq!(volume.range, [0.0, 255.0]);
         let counts = volume.histogram(10).unwrap();
-        assert!(counts[0] > 40_000 && [1, 3, 7].iter().all(|&bin| counts[bin] > 1000), "{counts:?}");
+        assert!(
+            counts[0] > 40_000 && [1, 3, 7].iter().all(|&bin| counts[bin] > 1000),
+            "{counts:?}"
+        );
         let transfer = TransferFunction::automatic(&volume);
         assert_eq!(transfer.opacity(0.0), 0.0);
         assert!(transfer.opacity(0.75 * 255.0) > 0.1);

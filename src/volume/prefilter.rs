@@ -41,7 +41,8 @@ pub fn cubic(samples: &Samples, dims: [usize; 3]) -> Vec<f32> {
 /// The powers of the pole by which the first forward term sums the samples of a mirrored axis, each with its sample.
 fn first_terms(count: usize) -> impl Iterator<Item = (usize, f32)> {
     let period = 2 * (count - 1);
-    let (terms, whole) = if period <= HORIZON { (period, 1.0 - POLE.powi(period as i32)) } else { (HORIZON, 1.0) };
+    let (terms, whole) =
+        if period <= HORIZON { (period, 1.0 - POLE.powi(period as i32)) } else { (HORIZON, 1.0) };
     (0..terms).map(move |at| (mirrored(at as isize, count), GAIN * POLE.powi(at as i32) / whole))
 }
 
@@ -93,15 +94,21 @@ fn across_rows(rows: &mut [&mut [f32]]) {
     rows[0].copy_from_slice(&first);
     for at in 1..count {
         if let [.., before, own] = &mut rows[..=at] {
-            own.iter_mut().zip(&**before).for_each(|(value, before)| *value = POLE * before + GAIN * *value);
+            own.iter_mut()
+                .zip(&**before)
+                .for_each(|(value, before)| *value = POLE * before + GAIN * *value);
         }
     }
     if let [.., before, last] = rows {
-        last.iter_mut().zip(&**before).for_each(|(value, before)| *value = turn() * (*value + POLE * before));
+        last.iter_mut()
+            .zip(&**before)
+            .for_each(|(value, before)| *value = turn() * (*value + POLE * before));
     }
     for at in (0..count - 1).rev() {
         if let [own, after, ..] = &mut rows[at..] {
-            own.iter_mut().zip(&**after).for_each(|(value, after)| *value = POLE * (after - *value));
+            own.iter_mut()
+                .zip(&**after)
+                .for_each(|(value, after)| *value = POLE * (after - *value));
         }
     }
 }
@@ -112,7 +119,9 @@ mod tests {
 
     #[test]
     fn the_spline_passes_through_the_samples() {
-        for dims in [[1, 1, 1], [2, 1, 3], [1, 2, 1], [3, 2, 2], [4, 10, 11], [40, 3, 9], [5, 33, 12]] {
+        for dims in
+            [[1, 1, 1], [2, 1, 3], [1, 2, 1], [3, 2, 2], [4, 10, 11], [40, 3, 9], [5, 33, 12]]
+        {
             let [nx, ny, nz] = dims;
             let value = |at: usize| ((at * at) as f32).sin() * 100.0 + 50.0;
             let samples = Samples::F32((0..nx * ny * nz).map(value).collect());
@@ -123,8 +132,12 @@ mod tests {
                 let mut sum = 0.0;
                 for tap in 0..27 {
                     let shift = [tap % 3, tap / 3 % 3, tap / 9];
-                    let weight: f64 = shift.iter().map(|&by| if by == 1 { 2.0 / 3.0 } else { 1.0 / 6.0 }).product();
-                    let [i, j, k] = [0, 1, 2].map(|n| mirrored((place[n] + shift[n]) as isize - 1, dims[n]));
+                    let weight: f64 = shift
+                        .iter()
+                        .map(|&by| if by == 1 { 2.0 / 3.0 } else { 1.0 / 6.0 })
+                        .product();
+                    let [i, j, k] =
+                        [0, 1, 2].map(|n| mirrored((place[n] + shift[n]) as isize - 1, dims[n]));
                     sum += weight * f64::from(found[(k * ny + j) * nx + i]);
                 }
                 most = most.max((sum - samples.value(at)).abs());

@@ -54,7 +54,8 @@ const BINS: usize = 256;
 
 impl TransferFunction {
     /// The names that [`named`](Self::named) knows.
-    pub const NAMES: [&'static str; 6] = ["ct-bone", "ct-soft-tissue", "ct-lung", "ct-angiography", "mri", "generic"];
+    pub const NAMES: [&'static str; 6] =
+        ["ct-bone", "ct-soft-tissue", "ct-lung", "ct-angiography", "mri", "generic"];
 
     /// A preset. The CT ones hold for Hounsfield units and millimetres; "mri" and "generic" spread over `range`, and
     /// their opacity is per world unit: set `unit` where the volume's world is not in millimetres or voxels.
@@ -75,7 +76,9 @@ impl TransferFunction {
             "generic" => (GENERIC, low, high - low),
             _ => {
                 let names = Self::NAMES.join(", ");
-                return Err(Error::Argument(format!("there is no transfer function “{name}”; there are {names}")));
+                return Err(Error::Argument(format!(
+                    "there is no transfer function “{name}”; there are {names}"
+                )));
             }
         };
         Ok(Self {
@@ -100,7 +103,8 @@ impl TransferFunction {
         }
         let [first, last] = volume.bounds();
         let diagonal = (last - first).length();
-        let unit = if diagonal > 0.0 { diagonal / 100.0 } else { volume.lattice.spacing().max_element() };
+        let unit =
+            if diagonal > 0.0 { diagonal / 100.0 } else { volume.lattice.spacing().max_element() };
         let counts = volume.counts(BINS);
         let bright = bright_border(volume, otsu(&counts));
         Self::of_histogram(counts, volume.range, unit, bright)
@@ -140,7 +144,8 @@ impl TransferFunction {
                 (low + (high - low) * if bright { 1.0 - share } else { share }, opacity)
             })
             .collect();
-        let colors = [[0.25, 0.06, 0.05], [0.70, 0.28, 0.15], [0.92, 0.66, 0.36], [1.0, 0.98, 0.92]];
+        let colors =
+            [[0.25, 0.06, 0.05], [0.70, 0.28, 0.15], [0.92, 0.66, 0.36], [1.0, 0.98, 0.92]];
         let mut color: Vec<_> = points.iter().zip(colors).map(|(p, rgb)| (p.0, rgb)).collect();
         if bright {
             points.reverse();
@@ -196,9 +201,14 @@ fn ramp(counts: &[u64]) -> [(f64, f64); 4] {
     let threshold = otsu(counts);
     let (background, rest) = counts.split_at(threshold + 1);
     let total = background.iter().sum::<u64>() as f64;
-    let mean = background.iter().enumerate().map(|(i, &n)| i as f64 * n as f64).sum::<f64>() / total;
-    let variance =
-        background.iter().enumerate().map(|(i, &n)| (i as f64 - mean).powi(2) * n as f64).sum::<f64>() / total;
+    let mean =
+        background.iter().enumerate().map(|(i, &n)| i as f64 * n as f64).sum::<f64>() / total;
+    let variance = background
+        .iter()
+        .enumerate()
+        .map(|(i, &n)| (i as f64 - mean).powi(2) * n as f64)
+        .sum::<f64>()
+        / total;
     let mode = background.iter().enumerate().max_by_key(|&(_, &n)| n).map_or(0, |(i, _)| i);
     // One bin above the mode at least, so that the background itself is clear, and below the threshold's upper side.
     let start = (mode as f64 + 1.0 + 3.0 * variance.sqrt()).min(threshold as f64 + 1.0);
@@ -225,7 +235,8 @@ mod tests {
     fn ball(inside: u8, outside: u8) -> Volume {
         let n = 24usize;
         let value = |i: usize| {
-            let p = DVec3::new((i % n) as f64, (i / n % n) as f64, (i / n / n) as f64) - DVec3::splat(11.5);
+            let p = DVec3::new((i % n) as f64, (i / n % n) as f64, (i / n / n) as f64)
+                - DVec3::splat(11.5);
             let noise = (i.wrapping_mul(2_654_435_761) >> 13) % 7;
             (if p.length() < 8.0 { inside } else { outside }) + noise as u8
         };
@@ -241,7 +252,12 @@ mod tests {
                 t.validate().unwrap();
             }
         }
-        assert!(TransferFunction::named("bone", [0.0, 1.0]).unwrap_err().to_string().contains("ct-bone"));
+        assert!(
+            TransferFunction::named("bone", [0.0, 1.0])
+                .unwrap_err()
+                .to_string()
+                .contains("ct-bone")
+        );
         assert!(TransferFunction::named("mri", [f64::NAN, 1.0]).is_err());
         let t = TransferFunction::named("generic", [100.0, 200.0]).unwrap();
         assert_eq!((t.opacity(110.0), t.opacity(200.0)), (0.0, 0.7));
@@ -273,11 +289,15 @@ mod tests {
         for dims in [[3, 3, 3], [1, 1, 1]] {
             let lattice = Lattice::with_spacing(dims, DVec3::ONE);
             let count = lattice.len();
-            let t = TransferFunction::automatic(&Volume::new(lattice, Samples::I16(vec![-5; count])).unwrap());
+            let t = TransferFunction::automatic(
+                &Volume::new(lattice, Samples::I16(vec![-5; count])).unwrap(),
+            );
             t.validate().unwrap();
             assert!(t.visible([-5.0, -5.0]));
         }
         let lattice = Lattice::with_spacing([2, 1, 1], DVec3::ONE);
-        TransferFunction::automatic(&Volume::new(lattice, Samples::U8(vec![0, 1])).unwrap()).validate().unwrap();
+        TransferFunction::automatic(&Volume::new(lattice, Samples::U8(vec![0, 1])).unwrap())
+            .validate()
+            .unwrap();
     }
 }

@@ -158,7 +158,8 @@ mod tests {
                         }
                     }
                 }
-                let expected = [((low - lowest) * scale).floor(), ((high - lowest) * scale).ceil().min(255.0)];
+                let expected =
+                    [((low - lowest) * scale).floor(), ((high - lowest) * scale).ceil().min(255.0)];
                 assert_eq!(
                     range.map(f64::from),
                     expected,
@@ -177,7 +178,10 @@ mod tests {
         // From 0 on, 31 is the first value that shows; from 50 on it is 201; above, all do.
         assert_eq!((first[0], first[30], first[35], first[50], first[200]), (31, 31, 35, 201, 201));
         // A label's step, at values that 255 steps of the range miss by rounding.
-        let label = TransferFunction::from_json(r#"{"color": [[0, 1, 1, 1]], "opacity": [[2, 0], [2, 1]]}"#).unwrap();
+        let label = TransferFunction::from_json(
+            r#"{"color": [[0, 1, 1, 1]], "opacity": [[2, 0], [2, 1]]}"#,
+        )
+        .unwrap();
         for range in [[-3.6, 13.2], [0.0, 3.0]] {
             let volume = Volume::new(
                 Lattice::with_spacing([3, 1, 1], DVec3::ONE),
@@ -185,7 +189,10 @@ mod tests {
             );
             let volume = volume.unwrap();
             let [low, high] = neighbourhood_ranges(&volume, [0; 3])[1];
-            assert!(u16::from(high) >= first_visible(&label, volume.range)[usize::from(low)], "{range:?}");
+            assert!(
+                u16::from(high) >= first_visible(&label, volume.range)[usize::from(low)],
+                "{range:?}"
+            );
         }
         assert_eq!(first_visible(&transfer, [0.0, 20.0]), [256; 256]);
         assert_eq!(first_visible(&transfer, [40.0, 40.0])[0], 0);

@@ -24,13 +24,17 @@ impl<'a> Reconstruction<'a> {
         volume.validate().map_err(Error::Argument)?;
         kernel.validate()?;
         if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_)) {
-            return Err(Error::Argument("a rectilinear lattice cannot be reconstructed at single positions".into()));
+            return Err(Error::Argument(
+                "a rectilinear lattice cannot be reconstructed at single positions".into(),
+            ));
         }
         if volume.coefficients.as_ref().is_some_and(|coefficients| coefficients.kernel != *kernel) {
             return Err(Error::Argument("the volume was made sharp for another kernel".into()));
         }
         if kernel.as_tensor().is_some() && volume.lattice.arrangement != Arrangement::Cartesian {
-            return Err(Error::Argument("tensor products are kernels of Cartesian lattices".into()));
+            return Err(Error::Argument(
+                "tensor products are kernels of Cartesian lattices".into(),
+            ));
         }
         Ok(Self { volume, kernel, inverse: volume.lattice.axes.inverse() })
     }
@@ -51,7 +55,8 @@ impl<'a> Reconstruction<'a> {
             let displaced = if body_centred { 0.5 * (k % 2) as f64 } else { 0.0 };
             for j in within(steps.y - displaced, reach, lattice.dims[1]) {
                 for i in within(steps.x - displaced, reach, lattice.dims[0]) {
-                    let share = weight(self.kernel, lattice.steps([i, j, k]).distance(steps) / unit);
+                    let share =
+                        weight(self.kernel, lattice.steps([i, j, k]).distance(steps) / unit);
                     if share != 0.0 {
                         sum += share * self.volume.drawn_value(offset(lattice, [i, j, k]));
                         weights += share;

@@ -37,7 +37,9 @@ pub fn body_centred(volume: &Volume) -> Result<Volume> {
     volume.validate().map_err(Error::Argument)?;
     let [nx, ny, nz] = volume.lattice.dims;
     if volume.lattice.arrangement != Arrangement::Cartesian {
-        return Err(Error::Argument("only Cartesian volumes can be resampled on a body-centred lattice".into()));
+        return Err(Error::Argument(
+            "only Cartesian volumes can be resampled on a body-centred lattice".into(),
+        ));
     }
     if nx.min(ny).min(nz) < 2 {
         return Err(Error::Argument(format!(
@@ -52,26 +54,31 @@ pub fn body_centred(volume: &Volume) -> Result<Volume> {
     let taps = |axis: usize, place: f64| Taps::new(first[axis] + place, volume.lattice.dims[axis]);
     let displaced = |layer: usize| FRAC_1_SQRT_2 * (layer % 2) as f64;
     let along = |axis: usize, layer: usize| -> Vec<Taps> {
-        (0..lattice.dims[axis]).map(|at| taps(axis, SQRT_2 * at as f64 + displaced(layer))).collect()
+        (0..lattice.dims[axis])
+            .map(|at| taps(axis, SQRT_2 * at as f64 + displaced(layer)))
+            .collect()
     };
     let [even, odd] = [0, 1].map(|layer| (along(0, layer), along(1, layer)));
 
-    let fill = |layer: usize, slice: &mut Vec<f64>, row: &mut Vec<f64>, put: &mut dyn FnMut(f64)| {
-        let (columns, rows) = if layer.is_multiple_of(2) { &even } else { &odd };
-        slice.clear();
-        slice.resize(nx * ny, 0.0);
-        for (at, share) in taps(2, FRAC_1_SQRT_2 * layer as f64).iter() {
-            add(slice, &coefficients[at * nx * ny..][..nx * ny], share);
-        }
-        for taps in rows {
-            row.clear();
-            row.resize(nx, 0.0);
-            for (at, share) in taps.iter() {
-                add(row, &slice[at * nx..][..nx], share);
+    let fill =
+        |layer: usize, slice: &mut Vec<f64>, row: &mut Vec<f64>, put: &mut dyn FnMut(f64)| {
+            let (columns, rows) = if layer.is_multiple_of(2) { &even } else { &odd };
+            slice.clear();
+            slice.resize(nx * ny, 0.0);
+            for (at, share) in taps(2, FRAC_1_SQRT_2 * layer as f64).iter() {
+                add(slice, &coefficients[at * nx * ny..][..nx * ny], share);
             }
-            columns.iter().for_each(|taps| put(taps.iter().map(|(at, share)| share * row[at]).sum()));
-        }
-    };
+            for taps in rows {
+                row.clear();
+                row.resize(nx, 0.0);
+                for (at, share) in taps.iter() {
+                    add(row, &slice[at * nx..][..nx], share);
+                }
+                columns
+                    .iter()
+                    .for_each(|taps| put(taps.iter().map(|(at, share)| share * row[at]).sum()));
+            }
+        };
     let layers = Layers { count: lattice.dims[2], size: width * height, fill };
     let [low, high] = volume.range;
     let samples = match &volume.samples {
@@ -106,7 +113,8 @@ fn coefficients(volume: &Volume) -> Vec<f64> {
         let wave = |at: usize| frequency(at, count);
         (0..count).map(|at| (wave(at), response(wave(at)))).collect::<Vec<_>>()
     });
-    let mut values: Vec<f64> = (0..volume.len()).into_par_iter().map(|index| volume.value(index)).collect();
+    let mut values: Vec<f64> =
+        (0..volume.len()).into_par_iter().map(|index| volume.value(index)).collect();
     cosine::filter(&mut values, dims, |[j, k], spectrum| {
         let [(y, along_y), (z, along_z)] = [waves[1][j], waves[2][k]];
         for (value, (x, along_x)) in spectrum.iter_mut().zip(&waves[0]) {
@@ -129,7 +137,9 @@ fn gaussian(distance: f64) -> f64 {
 
 /// What the sum of Gaussians at all samples of an axis leaves of a wave.
 fn response(wave: f64) -> f64 {
-    let sum = |wave: f64| (1..=REACH).map(|m| m as f64).map(|m| 2.0 * gaussian(m) * (wave * m).cos()).sum::<f64>();
+    let sum = |wave: f64| {
+        (1..=REACH).map(|m| m as f64).map(|m| 2.0 * gaussian(m) * (wave * m).cos()).sum::<f64>()
+    };
     (1.0 + sum(wave)) / (1.0 + sum(0.0))
 }
 
@@ -171,14 +181,17 @@ impl<F: Fn(usize, &mut Vec<f64>, &mut Vec<f64>, &mut dyn FnMut(f64)) + Sync> Lay
     fn of<T: Copy + Default + Send>(&self, turn: impl Fn(f64) -> T + Sync) -> Vec<T> {
         let mut samples = vec![T::default(); self.count * self.size];
         let scratch = || (Vec::new(), Vec::new());
-        samples.par_chunks_mut(self.size).enumerate().for_each_init(scratch, |(slice, row), (layer, out)| {
-            let mut out = out.iter_mut();
-            (self.fill)(layer, slice, row, &mut |value| {
-                if let Some(out) = out.next() {
-                    *out = turn(value);
-                }
-            });
-        });
+        samples.par_chunks_mut(self.size).enumerate().for_each_init(
+            scratch,
+            |(slice, row), (layer, out)| {
+                let mut out = out.iter_mut();
+                (self.fill)(layer, slice, row, &mut |value| {
+                    if let Some(out) = out.next() {
+                        *out = turn(value);
+                    }
+                });
+            },
+        );
         samples
     }
 }
@@ -189,7 +202,11 @@ mod tests {
     use glam::DMat3;
 
     fn sheared() -> DMat3 {
-        DMat3::from_cols(DVec3::new(0.3, 0.1, 0.0), DVec3::new(0.0, 2.0, -0.4), DVec3::new(0.2, 0.0, 1.1))
+        DMat3::from_cols(
+            DVec3::new(0.3, 0.1, 0.0),
+            DVec3::new(0.0, 2.0, -0.4),
+            DVec3::new(0.2, 0.0, 1.1),
+        )
     }
 
     /// A wave that goes on mirrored at the borders comes out as it is, in every type, on axes of any kind.
@@ -197,11 +214,13 @@ mod tests {
     fn waves_keep_their_values() {
         let dims = [14, 9, 11];
         let wave = |place: DVec3| {
-            let [x, y, z] = std::array::from_fn(|axis| (frequency(axis + 2, dims[axis]) * place[axis]).cos());
+            let [x, y, z] =
+                std::array::from_fn(|axis| (frequency(axis + 2, dims[axis]) * place[axis]).cos());
             100.0 + 80.0 * x * y * z
         };
         let lattice = Lattice::cartesian(dims, DVec3::new(3.0, -2.0, 1.0), sheared());
-        let values: Vec<f64> = (0..lattice.len()).map(|i| wave(lattice.steps(lattice.index(i)))).collect();
+        let values: Vec<f64> =
+            (0..lattice.len()).map(|i| wave(lattice.steps(lattice.index(i)))).collect();
         let types = [
             (Samples::U8(values.iter().map(|v| v.round() as u8).collect()), 1.6),
             (Samples::U16(values.iter().map(|v| (v * 200.0) as u16).collect()), 2.0),
@@ -214,7 +233,10 @@ mod tests {
             let name = samples.type_name();
             let volume = Volume::new(lattice.clone(), samples).unwrap();
             let resampled = body_centred(&volume).unwrap();
-            assert_eq!((resampled.samples.type_name(), resampled.lattice.dims), (name, [10, 6, 15]));
+            assert_eq!(
+                (resampled.samples.type_name(), resampled.lattice.dims),
+                (name, [10, 6, 15])
+            );
             assert_eq!(resampled.lattice.axes, sheared() * SQRT_2);
             let inverse = sheared().inverse();
             let mut inside = 0;
@@ -259,6 +281,9 @@ mod tests {
             body_centred(&Volume::new(lattice, samples).unwrap()).unwrap_err().to_string()
         };
         assert!(message(Lattice::with_spacing([4, 1, 4], DVec3::ONE)).contains("4 × 1 × 4"));
-        assert!(message(Lattice::body_centred([4; 3], DVec3::ZERO, sheared())).contains("only Cartesian"));
+        assert!(
+            message(Lattice::body_centred([4; 3], DVec3::ZERO, sheared()))
+                .contains("only Cartesian")
+        );
     }
 }

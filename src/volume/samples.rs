@@ -93,8 +93,13 @@ impl Samples {
 
     /// Smallest and largest value, or why there is none: no samples, or some that are not finite.
     pub(crate) fn range(&self) -> Result<[f64; 2], String> {
-        fn extremes<T: Copy + PartialOrd + Send + Sync + Into<f64>>(values: &[T], first: T) -> [f64; 2] {
-            let wider = |[low, high]: [T; 2], v: T| [if v < low { v } else { low }, if v > high { v } else { high }];
+        fn extremes<T: Copy + PartialOrd + Send + Sync + Into<f64>>(
+            values: &[T],
+            first: T,
+        ) -> [f64; 2] {
+            let wider = |[low, high]: [T; 2], v: T| {
+                [if v < low { v } else { low }, if v > high { v } else { high }]
+            };
             let ends = values
                 .par_chunks(CHUNK)
                 .map(|chunk| chunk.iter().copied().fold([first, first], wider))
@@ -103,7 +108,8 @@ impl Samples {
         }
         if let Self::F32(values) = self {
             let bad = |v: &f32| !v.is_finite();
-            let count: usize = values.par_chunks(CHUNK).map(|chunk| chunk.iter().filter(|v| bad(v)).count()).sum();
+            let count: usize =
+                values.par_chunks(CHUNK).map(|chunk| chunk.iter().filter(|v| bad(v)).count()).sum();
             if let Some(first) = values.iter().position(bad).filter(|_| count > 0) {
                 return Err(format!(
                     "{count} of {} samples are not finite, the first is sample {first} ({})",
@@ -156,7 +162,10 @@ impl Volume {
         lattice.validate()?;
         if samples.len() != lattice.len() {
             let [nx, ny, nz] = lattice.dims;
-            return Err(format!("{} samples do not fill a volume of {nx} × {ny} × {nz}", samples.len()));
+            return Err(format!(
+                "{} samples do not fill a volume of {nx} × {ny} × {nz}",
+                samples.len()
+            ));
         }
         let range = samples.range()?;
         Ok(Self { lattice, samples, range, coefficients: None })
@@ -167,14 +176,22 @@ impl Volume {
     pub(crate) fn validate(&self) -> Result<(), String> {
         self.lattice.validate()?;
         if self.samples.len() != self.lattice.len() {
-            return Err(format!("{} samples do not fill a lattice of {}", self.samples.len(), self.lattice.len()));
+            return Err(format!(
+                "{} samples do not fill a lattice of {}",
+                self.samples.len(),
+                self.lattice.len()
+            ));
         }
         let [low, high] = self.samples.range()?;
         let [stated_low, stated_high] = self.range;
         if !(stated_low <= low && high <= stated_high && (stated_high - stated_low).is_finite()) {
-            return Err(format!("the range is {stated_low} … {stated_high}, but values are in {low} … {high}"));
+            return Err(format!(
+                "the range is {stated_low} … {stated_high}, but values are in {low} … {high}"
+            ));
         }
-        self.coefficients.as_ref().map_or(Ok(()), |coefficients| coefficients.validate(&self.lattice))
+        self.coefficients
+            .as_ref()
+            .map_or(Ok(()), |coefficients| coefficients.validate(&self.lattice))
     }
 
     /// Number of samples.
@@ -204,7 +221,9 @@ impl Volume {
     /// # Panics
     /// Where `index` is not below that lattice's number of samples.
     pub fn drawn_value(&self, index: usize) -> f64 {
-        self.coefficients.as_ref().map_or_else(|| self.value(index), |drawn| f64::from(drawn.values[index]))
+        self.coefficients
+            .as_ref()
+            .map_or_else(|| self.value(index), |drawn| f64::from(drawn.values[index]))
     }
 
     /// For each sample of [`drawn_lattice`](Self::drawn_lattice) the range of the values around it
@@ -221,7 +240,9 @@ impl Volume {
                 let lebesgue = kernel.as_tensor().map_or(1.0, Tensor::lebesgue);
                 if lebesgue > 1.0 {
                     let overshoot = Overshoot { lebesgue, tails: Vec::new() };
-                    ranges.par_iter_mut().for_each(|range| *range = overshoot.widen([*range].into_iter()));
+                    ranges
+                        .par_iter_mut()
+                        .for_each(|range| *range = overshoot.widen([*range].into_iter()));
                 }
                 Cow::Owned(ranges)
             }
@@ -251,7 +272,10 @@ impl Volume {
     /// Refuses more bins than a histogram may have.
     pub(crate) fn check_bins(bins: usize) -> Result<()> {
         if bins > Self::MAX_BINS {
-            return Err(Error::Argument(format!("{bins} bins of values are more than {}", Self::MAX_BINS)));
+            return Err(Error::Argument(format!(
+                "{bins} bins of values are more than {}",
+                Self::MAX_BINS
+            )));
         }
         Ok(())
     }
@@ -304,7 +328,8 @@ mod tests {
         assert_eq!(v.histogram(4).unwrap(), [1, 0, 2, 3]);
         assert_eq!(v.value(4), 1.0);
         assert_eq!((v.samples.type_name(), v.samples.sample_bytes()), ("i16", 2));
-        let large = volume([300, 300, 3], Samples::F32((0..270_000).map(|i| i as f32).collect())).unwrap();
+        let large =
+            volume([300, 300, 3], Samples::F32((0..270_000).map(|i| i as f32).collect())).unwrap();
         assert_eq!(large.range, [0.0, 269_999.0]);
         assert_eq!(large.histogram(3).unwrap().iter().sum::<u64>(), 270_000);
         assert!(v.histogram(0).unwrap().is_empty());
@@ -321,7 +346,8 @@ mod tests {
     #[test]
     fn bad_samples_are_told() {
         assert!(volume([2, 2, 2], Samples::U8(vec![0; 7])).unwrap_err().contains("7 samples"));
-        let message = volume([2, 2, 1], Samples::F32(vec![0.0, f32::NAN, 1.0, f32::NEG_INFINITY])).unwrap_err();
+        let message = volume([2, 2, 1], Samples::F32(vec![0.0, f32::NAN, 1.0, f32::NEG_INFINITY]))
+            .unwrap_err();
         assert_eq!(message, "2 of 4 samples are not finite, the first is sample 1 (NaN)");
     }
 }

@@ -51,8 +51,11 @@ impl Volume {
         let grid = Grid::of(&volume.lattice)?;
         let (lattice, margin) = continued(&volume.lattice, kernel);
         let (points, drawn) = (grid.len() as u64, lattice.len() as u64);
-        memory::check("a sharp volume", points.saturating_mul(8).saturating_add(drawn.saturating_mul(14)))
-            .map_err(Error::Argument)?;
+        memory::check(
+            "a sharp volume",
+            points.saturating_mul(8).saturating_add(drawn.saturating_mul(14)),
+        )
+        .map_err(Error::Argument)?;
         let response = Response::new(grid, kernel);
         let least = response.least();
         // A kernel whose values at the samples sum to nothing has no response: infinity stands for it.
@@ -76,7 +79,8 @@ impl Volume {
         response.divide(&mut points);
         let overshoot = Overshoot::new(grid, kernel);
         let reach = |(further, _): &(f64, f64)| volume.lattice.reach(kernel.extent + further);
-        let boxes: Vec<_> = overshoot.tails.iter().map(|tail| neighbourhood_ranges(&volume, reach(tail))).collect();
+        let boxes: Vec<_> =
+            overshoot.tails.iter().map(|tail| neighbourhood_ranges(&volume, reach(tail))).collect();
 
         let [nx, ny, _] = volume.lattice.dims;
         let [width, height, _] = lattice.dims;
@@ -86,7 +90,8 @@ impl Volume {
         rows.for_each(|(row, (values, ranges))| {
             for (column, (value, range)) in values.iter_mut().zip(ranges).enumerate() {
                 let index = [column, row % height, row / height];
-                let index = std::array::from_fn(|axis| index[axis] as isize - margin[axis] as isize);
+                let index =
+                    std::array::from_fn(|axis| index[axis] as isize - margin[axis] as isize);
                 // A mirror image has the range of what it mirrors.
                 let point = grid.point(index);
                 let [i, j, k] = grid.index(point);
@@ -110,7 +115,8 @@ impl Volume {
         if tensor.interpolates() {
             return Ok(self);
         }
-        memory::check("a sharp volume", (self.len() as u64).saturating_mul(6)).map_err(Error::Argument)?;
+        memory::check("a sharp volume", (self.len() as u64).saturating_mul(6))
+            .map_err(Error::Argument)?;
         let largest = self.range[0].abs().max(self.range[1].abs());
         // The filter leaves a third of the finest detail along each axis.
         if largest * 27.0 > f64::from(f32::MAX) {
@@ -138,7 +144,9 @@ impl Coefficients {
     pub(super) fn validate(&self, lattice: &Lattice) -> Result<(), String> {
         const REMEDY: &str = "make the volume sharp again";
         Grid::of(lattice).map_err(|error| error.to_string())?;
-        self.kernel.validate().map_err(|error| format!("the kernel of the coefficients: {error}"))?;
+        self.kernel
+            .validate()
+            .map_err(|error| format!("the kernel of the coefficients: {error}"))?;
         let (wanted, _) = continued(lattice, &self.kernel);
         // Where both have been moved or turned, by the same, they may differ by roundings.
         let step = lattice.edges().max_element();
@@ -200,7 +208,9 @@ mod tests {
         ] {
             let sharp = volume(lattice.clone()).sharpened(&kernel).unwrap();
             let drawn = sharp.drawn_lattice();
-            let at = |index: [usize; 3]| (index[2] * drawn.dims[1] + index[1]) * drawn.dims[0] + index[0];
+            let at = |index: [usize; 3]| {
+                (index[2] * drawn.dims[1] + index[1]) * drawn.dims[0] + index[0]
+            };
             // The volume's first sample lies where it did, and sees the same on both sides.
             assert!(drawn.sample_position(at(margin)).distance(lattice.origin) < 1e-12);
             let [x, y, z] = margin;
@@ -223,12 +233,17 @@ mod tests {
         volume(cartesian()).sharpened(&Kernel::gaussian(0.79, 4.0).unwrap()).unwrap();
         assert!(message(cartesian(), Kernel::gaussian(0.9, 4.0)).contains("smaller sigma"));
         assert!(message(cartesian(), Kernel::b_spline(4.0)).contains("narrower"));
-        assert!(message(cartesian(), Kernel::table(vec![1.0, 0.0, -1.0, 8.0, 0.0], 3.0)).contains("narrower"));
+        assert!(
+            message(cartesian(), Kernel::table(vec![1.0, 0.0, -1.0, 8.0, 0.0], 3.0))
+                .contains("narrower")
+        );
         let single = Lattice::body_centred([3, 3, 1], DVec3::ZERO, DMat3::IDENTITY);
         assert!(message(single, Ok(Kernel::default())).contains("two layers"));
         let places = Arc::new([vec![0.0, 1.0], vec![0.0, 1.0], vec![0.0, 2.0]]);
-        let uneven =
-            Lattice { arrangement: Arrangement::Rectilinear(places), ..Lattice::with_spacing([2; 3], DVec3::ONE) };
+        let uneven = Lattice {
+            arrangement: Arrangement::Rectilinear(places),
+            ..Lattice::with_spacing([2; 3], DVec3::ONE)
+        };
         assert!(message(uneven, Ok(Kernel::default())).contains("rectilinear"));
         let large = Volume::new(cartesian(), Samples::F32(vec![1e38; 729])).unwrap();
         assert!(large.sharpened(&Kernel::default()).unwrap_err().to_string().contains("1.0e38"));

@@ -43,9 +43,15 @@ impl Steps {
 
     /// The steps of samples, given by their bytes, as many as there is room for.
     pub fn write(&self, samples: &[u8], out: &mut [[u8; 2]]) {
-        fn each<T: AnyBitPattern>(samples: &[u8], out: &mut [[u8; 2]], step: impl Fn(T) -> [u8; 2]) {
+        fn each<T: AnyBitPattern>(
+            samples: &[u8],
+            out: &mut [[u8; 2]],
+            step: impl Fn(T) -> [u8; 2],
+        ) {
             let samples = samples.chunks_exact(size_of::<T>());
-            out.iter_mut().zip(samples).for_each(|(out, bytes)| *out = step(bytemuck::pod_read_unaligned(bytes)));
+            out.iter_mut()
+                .zip(samples)
+                .for_each(|(out, bytes)| *out = step(bytemuck::pod_read_unaligned(bytes)));
         }
         let table = &self.table;
         match self.scalar {

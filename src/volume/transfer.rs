@@ -120,7 +120,11 @@ impl TransferFunction {
             opacity: document.opacity.iter().map(|&[value, opacity]| (value, opacity)).collect(),
             unit: document.unit,
             shade: document.shade,
-            gradient: document.gradient.iter().map(|&[magnitude, factor]| (magnitude, factor)).collect(),
+            gradient: document
+                .gradient
+                .iter()
+                .map(|&[magnitude, factor]| (magnitude, factor))
+                .collect(),
             isosurfaces: document.isosurfaces,
         };
         transfer.validate()?;
@@ -134,7 +138,11 @@ impl TransferFunction {
             opacity: self.opacity.iter().map(|&(value, opacity)| [value, opacity]).collect(),
             unit: self.unit,
             shade: self.shade,
-            gradient: self.gradient.iter().map(|&(magnitude, factor)| [magnitude, factor]).collect(),
+            gradient: self
+                .gradient
+                .iter()
+                .map(|&(magnitude, factor)| [magnitude, factor])
+                .collect(),
             isosurfaces: self.isosurfaces.clone(),
         };
         serde_json::json!(document).to_string()
@@ -160,7 +168,9 @@ impl TransferFunction {
     pub fn validate(&self) -> Result<(), String> {
         self.validate_numbers()?;
         if self.opacity.iter().all(|p| p.1 == 0.0) && self.isosurfaces.is_empty() {
-            return Err("a transfer function without opacity shows nothing: every opacity is 0".into());
+            return Err(
+                "a transfer function without opacity shows nothing: every opacity is 0".into()
+            );
         }
         Ok(())
     }
@@ -171,15 +181,23 @@ impl TransferFunction {
         check_values("opacity", self.opacity.iter().map(|p| p.0))?;
         let inside = |v: &f64| (0.0..=1.0).contains(v);
         if let Some(i) = self.color.iter().position(|(_, rgb)| !rgb.iter().all(inside)) {
-            return Err(format!("color point {i} is {:?}, but channels lie in 0 … 1", self.color[i].1));
+            return Err(format!(
+                "color point {i} is {:?}, but channels lie in 0 … 1",
+                self.color[i].1
+            ));
         }
         if let Some(i) = self.opacity.iter().position(|(_, opacity)| !inside(opacity)) {
-            return Err(format!("opacity point {i} is {}, but opacities lie in 0 … 1", self.opacity[i].1));
+            return Err(format!(
+                "opacity point {i} is {}, but opacities lie in 0 … 1",
+                self.opacity[i].1
+            ));
         }
         if !self.gradient.is_empty() {
             check_values("gradient", self.gradient.iter().map(|p| p.0))?;
         }
-        if let Some(i) = self.gradient.iter().position(|(magnitude, factor)| *magnitude < 0.0 || !inside(factor)) {
+        if let Some(i) =
+            self.gradient.iter().position(|(magnitude, factor)| *magnitude < 0.0 || !inside(factor))
+        {
             let (magnitude, factor) = self.gradient[i];
             return Err(format!(
                 "gradient point {i} is {factor} at {magnitude}, but magnitudes are 0 or more and factors lie in 0 … 1"
@@ -187,10 +205,14 @@ impl TransferFunction {
         }
         let most = Self::MAX_ISOSURFACES;
         if self.isosurfaces.len() > most {
-            return Err(format!("there are {} isosurfaces, more than {most}", self.isosurfaces.len()));
+            return Err(format!(
+                "there are {} isosurfaces, more than {most}",
+                self.isosurfaces.len()
+            ));
         }
         for (i, Isosurface { value, color, opacity }) in self.isosurfaces.iter().enumerate() {
-            if !(value.is_finite() && color.iter().all(inside) && *opacity > 0.0 && *opacity <= 1.0) {
+            if !(value.is_finite() && color.iter().all(inside) && *opacity > 0.0 && *opacity <= 1.0)
+            {
                 return Err(format!(
                     "isosurface {i} has value {value}, colour {color:?} and opacity {opacity}, but colours lie in 0 … 1 \
                      and opacities above 0 and up to 1"
@@ -236,7 +258,8 @@ impl TransferFunction {
         let first = self.opacity.iter().position(|p| p.1 > 0.0);
         let last = self.opacity.iter().rposition(|p| p.1 > 0.0);
         let seen = first.zip(last).map(|(first, last)| {
-            let low = first.checked_sub(1).map_or(f64::NEG_INFINITY, |before| self.opacity[before].0);
+            let low =
+                first.checked_sub(1).map_or(f64::NEG_INFINITY, |before| self.opacity[before].0);
             let high = self.opacity.get(last + 1).map_or(f64::INFINITY, |after| after.0);
             [low, high]
         });
@@ -302,7 +325,10 @@ impl TransferFunction {
         self.isosurfaces.iter().any(|surface| low <= surface.value && surface.value <= high)
             || self.opacity(low) > 0.0
             || self.opacity(high) > 0.0
-            || self.opacity.iter().any(|&(value, opacity)| opacity > 0.0 && low <= value && value <= high)
+            || self
+                .opacity
+                .iter()
+                .any(|&(value, opacity)| opacity > 0.0 && low <= value && value <= high)
     }
 }
 
@@ -313,7 +339,9 @@ fn check_values(what: &str, values: impl Iterator<Item = f64>) -> Result<(), Str
             return Err(format!("the value of {what} point {i} is {value}"));
         }
         if let Some(previous) = previous.filter(|p| value < *p) {
-            return Err(format!("{what} point {i} is at {value}, before the previous one at {previous}"));
+            return Err(format!(
+                "{what} point {i} is at {value}, before the previous one at {previous}"
+            ));
         }
         previous = Some(value);
     }
@@ -334,7 +362,11 @@ fn segment<T: Copy + Default>(points: &[(f64, T)], value: f64) -> (T, T, f64) {
 /// How far between two numbers a third one lies, 0 … 1, also where they are farther apart than the largest number.
 fn share(low: f64, high: f64, value: f64) -> f64 {
     let width = high - low;
-    if width.is_finite() { (value - low) / width } else { (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) }
+    if width.is_finite() {
+        (value - low) / width
+    } else {
+        (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low)
+    }
 }
 
 fn mix(a: f64, b: f64, t: f64) -> f64 {
@@ -425,7 +457,10 @@ mod tests {
     #[test]
     fn what_is_wrong_is_told() {
         let with = |color: &str, opacity: &str, rest: &str| {
-            TransferFunction::from_json(&format!("{{\"color\": {color}, \"opacity\": {opacity}{rest}}}")).unwrap_err()
+            TransferFunction::from_json(&format!(
+                "{{\"color\": {color}, \"opacity\": {opacity}{rest}}}"
+            ))
+            .unwrap_err()
         };
         let (color, opacity) = ("[[0,1,1,1]]", "[[0,1]]");
         for (message, word) in [
@@ -441,7 +476,11 @@ mod tests {
             (with(color, opacity, ", \"unit\": 0"), "unit is 0"),
             (with(color, opacity, ", \"units\": 1"), "unknown field"),
             (
-                with(color, opacity, ", \"shade\": {\"ambient\": -1, \"diffuse\": 0, \"specular\": 0, \"power\": 1}"),
+                with(
+                    color,
+                    opacity,
+                    ", \"shade\": {\"ambient\": -1, \"diffuse\": 0, \"specular\": 0, \"power\": 1}",
+                ),
                 "shade",
             ),
         ] {

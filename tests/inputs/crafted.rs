@@ -61,7 +61,9 @@ pub fn with_node_bytes(place: usize, value: &[u8]) -> Vec<u8> {
 
 /// A hierarchy of three pages and more, all of the same nodes.
 pub fn long_splk() -> Vec<u8> {
-    let positions = (0..100 * 100).map(|i| Vec3::new((i % 100) as f32, (i / 100) as f32, (i % 7) as f32)).collect();
+    let positions = (0..100 * 100)
+        .map(|i| Vec3::new((i % 100) as f32, (i / 100) as f32, (i % 7) as f32))
+        .collect();
     let mesh = Mesh { positions, ..Mesh::default() };
     let splats = mesh.surfels(&SurfelOptions::default()).expect("surfels");
     let tree = Tree::build(&splats, &BuildOptions::default(), &|_, _| ()).expect("a tree");
@@ -83,7 +85,8 @@ pub fn swapped(is_told: bool) -> Vec<u8> {
     places.sort();
     let [(start, before), (_, behind)] = places;
     let mut out = bytes.clone();
-    out[start..start + before.len() + behind.len()].copy_from_slice(&[&behind[..], &before].concat());
+    out[start..start + before.len() + behind.len()]
+        .copy_from_slice(&[&behind[..], &before].concat());
     if !is_told {
         return out;
     }
@@ -141,7 +144,9 @@ pub fn pages_of_one_node(full: u32) -> Vec<u8> {
         begin += own;
         // In the order of the file.
         directory.extend(u64::from(number).to_le_bytes());
-        directory.extend([content.len() as u32, 0, own, first_child].iter().flat_map(|v| v.to_le_bytes()));
+        directory.extend(
+            [content.len() as u32, 0, own, first_child].iter().flat_map(|v| v.to_le_bytes()),
+        );
         let around = if number == 0 { f32::INFINITY } else { 1.0 };
         directory.extend([0f32, 0.0, 0.0, around, around].iter().flat_map(|v| v.to_le_bytes()));
         contents.extend(content);
@@ -182,7 +187,11 @@ pub fn with_dims(dims: [u64; 3]) -> Vec<u8> {
     let mut bytes = splv(&Folder::new());
     let end = 192 + word(&bytes, 172) + word(&bytes, 176);
     bytes[24..48].copy_from_slice(&dims.map(u64::to_le_bytes).concat());
-    let levels = 1 + dims.map(|n| n.div_ceil(32)).into_iter().max().map_or(0, |most| most.next_power_of_two().ilog2());
+    let levels = 1 + dims
+        .map(|n| n.div_ceil(32))
+        .into_iter()
+        .max()
+        .map_or(0, |most| most.next_power_of_two().ilog2());
     bytes[160..164].copy_from_slice(&levels.to_le_bytes());
     let sum = crc32fast::hash(&bytes[..end]);
     bytes[end..end + 4].copy_from_slice(&sum.to_le_bytes());

@@ -23,7 +23,8 @@ impl Folder {
     pub fn new() -> Self {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let number = COUNT.fetch_add(1, Ordering::Relaxed);
-        let path = std::env::temp_dir().join(format!("splatkit-inputs-{}-{number}", std::process::id()));
+        let path =
+            std::env::temp_dir().join(format!("splatkit-inputs-{}-{number}", std::process::id()));
         std::fs::create_dir_all(&path).expect("a folder");
         Self(path)
     }
@@ -81,7 +82,8 @@ pub fn load(path: &Path, limits: &Limits) -> Result<String> {
         None => return Err(Error::input(path, "file", "is of no kind")),
         Some(Kind::Mesh) => {
             let mesh = io::load_mesh(path, limits)?;
-            let pictures = mesh.materials.iter().filter(|material| material.texture.is_some()).count();
+            let pictures =
+                mesh.materials.iter().filter(|material| material.texture.is_some()).count();
             format!("mesh {} {} {pictures}", mesh.positions.len(), mesh.triangles.len())
         }
         Some(Kind::Volume) => of_volume(&io::load_volume(path, limits, raw.as_ref())?),
@@ -145,13 +147,20 @@ fn base64(bytes: &[u8]) -> String {
 
 /// A triangle whose buffer is in the text.
 pub fn gltf() -> String {
-    gltf_with(&format!("data:application/octet-stream;base64,{}", base64(&triangle_bytes())), r#"{"mesh":0}"#)
+    gltf_with(
+        &format!("data:application/octet-stream;base64,{}", base64(&triangle_bytes())),
+        r#"{"mesh":0}"#,
+    )
 }
 
 pub fn triangle_bytes() -> Vec<u8> {
     let corners = [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let indices = [0u16, 1, 2];
-    corners.iter().flat_map(|v| v.to_le_bytes()).chain(indices.iter().flat_map(|v| v.to_le_bytes())).collect()
+    corners
+        .iter()
+        .flat_map(|v| v.to_le_bytes())
+        .chain(indices.iter().flat_map(|v| v.to_le_bytes()))
+        .collect()
 }
 
 /// The same with a buffer elsewhere and other nodes, of which node 0 is the scene's.
@@ -179,7 +188,11 @@ pub fn glb() -> Vec<u8> {
 pub fn stl() -> Vec<u8> {
     let mut bytes = vec![b' '; 80];
     bytes.extend(1u32.to_le_bytes());
-    bytes.extend([0f32, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|v| v.to_le_bytes()));
+    bytes.extend(
+        [0f32, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+            .iter()
+            .flat_map(|v| v.to_le_bytes()),
+    );
     bytes.extend([0, 0]);
     bytes
 }
@@ -205,7 +218,9 @@ fn las_header(format: u8, start: usize, records: u32, points: u32) -> Vec<u8> {
 fn las_points() -> Vec<[u8; 20]> {
     let point = |i: i32| {
         let mut point = [0; 20];
-        (0..3).for_each(|axis| point[4 * axis..][..4].copy_from_slice(&(i * (axis as i32 + 1)).to_le_bytes()));
+        (0..3).for_each(|axis| {
+            point[4 * axis..][..4].copy_from_slice(&(i * (axis as i32 + 1)).to_le_bytes())
+        });
         point[14] = 0b1001;
         point
     };
@@ -268,7 +283,8 @@ pub fn npy(shape: &str, values: &[f32]) -> Vec<u8> {
 }
 
 pub fn nrrd(sizes: &str, fields: &str, data: &[u8]) -> Vec<u8> {
-    [format!("NRRD0004\ntype: uint8\ndimension: 3\nsizes: {sizes}\n{fields}\n\n").as_bytes(), data].concat()
+    [format!("NRRD0004\ntype: uint8\ndimension: 3\nsizes: {sizes}\n{fields}\n\n").as_bytes(), data]
+        .concat()
 }
 
 /// A VTK file of XML: `kind` around `pieces`.
@@ -290,7 +306,8 @@ pub fn array(attributes: &str, content: &str) -> String {
 /// Four bytes packed by zlib in one block, with their counts.
 fn packed_block() -> Vec<u8> {
     let packed = zlib(&[1, 2, 3, 4]);
-    let mut bytes: Vec<u8> = [1, 4, 0, packed.len() as u32].iter().flat_map(|n| n.to_le_bytes()).collect();
+    let mut bytes: Vec<u8> =
+        [1, 4, 0, packed.len() as u32].iter().flat_map(|n| n.to_le_bytes()).collect();
     bytes.extend(packed);
     bytes
 }
@@ -335,7 +352,8 @@ pub fn tree() -> Tree {
 }
 
 pub fn splk(lossless: bool) -> Vec<u8> {
-    let options = file::WriteOptions { lossless, unit: "m".into(), ..file::WriteOptions::default() };
+    let options =
+        file::WriteOptions { lossless, unit: "m".into(), ..file::WriteOptions::default() };
     file::to_bytes(&tree(), &options).expect("bytes")
 }
 
@@ -351,7 +369,8 @@ pub fn splv(folder: &Folder) -> Vec<u8> {
 }
 
 pub const TRANSFER: &str = r#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 0], [9, 0.5]]}"#;
-pub const OBJ: &str = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+pub const OBJ: &str =
+    "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
 pub const MTL: &str = "newmtl m\nKd 0.5 0.5 0.5\nmap_Kd a.png\n";
 
 /// The name of a file, its bytes, and whether it may load where it is cut before a byte.
@@ -375,17 +394,23 @@ pub fn every_format(folder: &Folder) -> Vec<Format> {
     }
     let raw: Vec<u8> = (0..64).collect();
     let triangle = "3 0 1 2\n";
-    let face = format!("element vertex 3\n{FLOATS}element face 1\nproperty list uchar int vertex_indices\n");
-    let floats: Vec<u8> = [1f32, 2.0, 3.0, 4.0, 5.0, 6.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+    let face = format!(
+        "element vertex 3\n{FLOATS}element face 1\nproperty list uchar int vertex_indices\n"
+    );
+    let floats: Vec<u8> =
+        [1f32, 2.0, 3.0, 4.0, 5.0, 6.0].iter().flat_map(|v| v.to_le_bytes()).collect();
     // LZF: a run of 24 bytes as they are; fields stand one behind the other.
     let lzf = [&[23u8][..], &floats].concat();
     let packed = [&(lzf.len() as u32).to_le_bytes()[..], &24u32.to_le_bytes(), &lzf].concat();
     let text = "0 0 0\n1 0 0\n0 1 0\n";
-    let of_vti = |attributes: &str, array: &str| vtk_xml("ImageData", attributes, &vti_piece(array));
+    let of_vti =
+        |attributes: &str, array: &str| vtk_xml("ImageData", attributes, &vti_piece(array));
     let mut counted = 4u32.to_le_bytes().to_vec();
     counted.extend([1, 2, 3, 4]);
     let zlib_file = " compressor='vtkZLibDataCompressor'";
-    let places = |axis: &str| format!("<DataArray type='Float32' Name='x' format='ascii'>{axis}</DataArray>");
+    let places = |axis: &str| {
+        format!("<DataArray type='Float32' Name='x' format='ascii'>{axis}</DataArray>")
+    };
     let vtr_piece = format!(
         "<Piece Extent='0 1 0 1 0 0'><PointData Scalars='v'>{}</PointData><Coordinates>{}{}{}</Coordinates></Piece>",
         array("format='ascii'", "1 2 3 4"),
@@ -398,10 +423,16 @@ pub fn every_format(folder: &Folder) -> Vec<Format> {
     folder.write("a.mtl", MTL);
     folder.write("a.png", png(2, 2));
     vec![
-        ("ascii.ply", ply(&face, &format!("{text}{triangle}")), last_number as fn(&[u8], usize) -> bool),
+        (
+            "ascii.ply",
+            ply(&face, &format!("{text}{triangle}")),
+            last_number as fn(&[u8], usize) -> bool,
+        ),
         ("little.ply", binary_ply(false), never),
         ("big.ply", binary_ply(true), never),
-        ("a.obj", OBJ.into(), |bytes, at| bytes[..at].ends_with(b"\n") || bytes[..at].windows(2).any(|w| w == b"f ")),
+        ("a.obj", OBJ.into(), |bytes, at| {
+            bytes[..at].ends_with(b"\n") || bytes[..at].windows(2).any(|w| w == b"f ")
+        }),
         ("binary.stl", stl(), never),
         ("text.stl", STL_TEXT.into(), |bytes, at| at >= bytes.len() - 3),
         ("a.gltf", gltf().into(), never),
@@ -422,7 +453,11 @@ pub fn every_format(folder: &Folder) -> Vec<Format> {
         ("ascii.nrrd", nrrd("2 2 1", "encoding: ascii", b"1 2 3 44\n"), last_number),
         ("hex.nrrd", nrrd("2 2 1", "encoding: hex", b"01020304\n"), but_for_spaces),
         // The name of the data may be cut to none that is there, and the empty line is not needed.
-        ("detached.nhdr", nrrd("2 2 1", "encoding: raw\ndata file: beside.raw", b""), but_for_spaces),
+        (
+            "detached.nhdr",
+            nrrd("2 2 1", "encoding: raw\ndata file: beside.raw", b""),
+            but_for_spaces,
+        ),
         ("ascii.vti", of_vti("", &array("format='ascii'", "1 2 3 4")).into(), never),
         ("binary.vti", of_vti("", &array("format='binary'", &base64(&counted))).into(), never),
         (
@@ -437,10 +472,18 @@ pub fn every_format(folder: &Folder) -> Vec<Format> {
             .into(),
             never,
         ),
-        ("appended.vti", appended(&of_vti("", &array("format='appended' offset='0'", "")), "raw", &counted), never),
+        (
+            "appended.vti",
+            appended(&of_vti("", &array("format='appended' offset='0'", "")), "raw", &counted),
+            never,
+        ),
         (
             "packed.vti",
-            appended(&of_vti(zlib_file, &array("format='appended' offset='0'", "")), "raw", &packed_block()),
+            appended(
+                &of_vti(zlib_file, &array("format='appended' offset='0'", "")),
+                "raw",
+                &packed_block(),
+            ),
             never,
         ),
         ("a.vtr", vtk_xml("RectilinearGrid", "", &vtr_piece).into(), never),

@@ -96,21 +96,41 @@ fn sound_mesh(mesh: &Mesh) {
     assert!(mesh.origin.is_finite(), "origin {}", mesh.origin);
     assert!(mesh.positions.iter().all(|p| p.is_finite()), "a position is not finite");
     assert!(mesh.normals.iter().all(|n| n.is_finite()), "a normal is not finite");
-    assert!(fits(mesh.normals.len(), count) && fits(mesh.colors.len(), count) && fits(mesh.uvs.len(), count));
+    assert!(
+        fits(mesh.normals.len(), count)
+            && fits(mesh.colors.len(), count)
+            && fits(mesh.uvs.len(), count)
+    );
     assert!(fits(mesh.triangle_materials.len(), mesh.triangles.len()));
-    assert!(mesh.triangles.iter().flatten().all(|&index| (index as usize) < count), "an index is out of range");
+    assert!(
+        mesh.triangles.iter().flatten().all(|&index| (index as usize) < count),
+        "an index is out of range"
+    );
     assert!(mesh.triangle_materials.iter().all(|&index| (index as usize) < mesh.materials.len()));
-    assert!(mesh.sensors.iter().all(|sensor| sensor.position.is_finite() && sensor.points.end <= count));
+    assert!(
+        mesh.sensors.iter().all(|sensor| sensor.position.is_finite() && sensor.points.end <= count)
+    );
     for material in &mesh.materials {
-        assert!(material.color.iter().all(|v| (0.0..=1.0).contains(v)), "the colour {:?}", material.color);
-        let whole = |t: &splatkit::surface::Texture| t.texels.len() == t.width as usize * t.height as usize;
-        assert!(material.texture.as_deref().is_none_or(whole), "a texture of another size than its texels");
+        assert!(
+            material.color.iter().all(|v| (0.0..=1.0).contains(v)),
+            "the colour {:?}",
+            material.color
+        );
+        let whole =
+            |t: &splatkit::surface::Texture| t.texels.len() == t.width as usize * t.height as usize;
+        assert!(
+            material.texture.as_deref().is_none_or(whole),
+            "a texture of another size than its texels"
+        );
     }
 }
 
 fn sound_samples(points: &Points) {
     points.validate().expect("what was read is sound");
-    assert!(points.bounds().iter().all(|p| p.is_finite()) && points.range().iter().all(|v| v.is_finite()));
+    assert!(
+        points.bounds().iter().all(|p| p.is_finite())
+            && points.range().iter().all(|v| v.is_finite())
+    );
 }
 
 fn sound_volume(volume: &Volume) {
@@ -120,7 +140,10 @@ fn sound_volume(volume: &Volume) {
     let [low, high] = volume.range;
     assert!(low.is_finite() && high.is_finite() && low <= high, "range {low} … {high}");
     for index in (0..volume.len()).step_by(volume.len().div_ceil(64)) {
-        assert!((low..=high).contains(&volume.value(index)), "sample {index} lies beyond the range");
+        assert!(
+            (low..=high).contains(&volume.value(index)),
+            "sample {index} lies beyond the range"
+        );
     }
 }
 
@@ -146,7 +169,10 @@ fn stream(name: &str, bytes: &[u8], whole: Option<&Mesh>) {
     let stream = accepted(Stream::of(source)).flatten();
     if let (Some(stream), Some(whole)) = (stream, whole) {
         assert!(whole.positions.len() as u64 <= stream.counts().points, "{:?}", stream.counts());
-        assert!(whole.triangles.len() as u64 <= stream.counts().triangles || stream.counts().triangles == 0);
+        assert!(
+            whole.triangles.len() as u64 <= stream.counts().triangles
+                || stream.counts().triangles == 0
+        );
     }
 }
 
@@ -168,12 +194,18 @@ pub fn obj(bytes: &[u8]) {
 }
 
 /// Reads a mesh whose file refers to others beside it.
-fn mesh_beside((name, bytes): (&str, &[u8]), others: &[(&str, &[u8])], reader: fn(&Source) -> Result<Mesh>) {
+fn mesh_beside(
+    (name, bytes): (&str, &[u8]),
+    others: &[(&str, &[u8])],
+    reader: fn(&Source) -> Result<Mesh>,
+) {
     let folder = Folder::new();
     others.iter().for_each(|(name, bytes)| drop(folder.write(name, bytes)));
     let path = folder.write(name, bytes);
     let limits = limits();
-    accepted(Source::open(&path, &limits).and_then(|source| reader(&source))).iter().for_each(sound_mesh);
+    accepted(Source::open(&path, &limits).and_then(|source| reader(&source)))
+        .iter()
+        .for_each(sound_mesh);
 }
 
 fn cut<'a>(bytes: &'a [u8], mark: &[u8]) -> Option<(&'a [u8], &'a [u8])> {
@@ -188,7 +220,8 @@ impl Folder {
     fn new() -> Self {
         let thread = format!("{:?}", std::thread::current().id());
         let number: String = thread.chars().filter(char::is_ascii_digit).collect();
-        let path = std::env::temp_dir().join(format!("splatkit-regressions-{}-{number}", std::process::id()));
+        let path = std::env::temp_dir()
+            .join(format!("splatkit-regressions-{}-{number}", std::process::id()));
         std::fs::create_dir_all(&path).expect("a place for temporary files");
         Self(path)
     }
@@ -278,7 +311,10 @@ pub fn nrrd(bytes: &[u8]) {
     }
     others.push(rest);
     let folder = Folder::new();
-    others.iter().enumerate().for_each(|(number, data)| drop(folder.write(&format!("{number}.raw"), data)));
+    others
+        .iter()
+        .enumerate()
+        .for_each(|(number, data)| drop(folder.write(&format!("{number}.raw"), data)));
     let path = folder.write("input.nhdr", header);
     let limits = limits();
     let whole = accepted(io::load_volume(&path, &limits, None));
@@ -310,9 +346,17 @@ pub fn vtk(bytes: &[u8]) {
 
 /// A raw volume: six numbers of 8 bits tell how it lies (three sizes, type, spacing, bytes to skip), then come its bytes.
 pub fn raw(bytes: &[u8]) {
-    const TYPES: [SampleType; 6] =
-        [SampleType::U8, SampleType::I16, SampleType::U16, SampleType::I32, SampleType::F32, SampleType::F64];
-    let Some((&[nx, ny, nz, kind, spacing, header], bytes)) = bytes.split_first_chunk() else { return };
+    const TYPES: [SampleType; 6] = [
+        SampleType::U8,
+        SampleType::I16,
+        SampleType::U16,
+        SampleType::I32,
+        SampleType::F32,
+        SampleType::F64,
+    ];
+    let Some((&[nx, ny, nz, kind, spacing, header], bytes)) = bytes.split_first_chunk() else {
+        return;
+    };
     // The largest sizes stand for sizes beyond all memory.
     let size = |n: u8| if n == 255 { usize::MAX >> 3 } else { usize::from(n) };
     let layout = RawLayout {
@@ -327,7 +371,8 @@ pub fn raw(bytes: &[u8]) {
 
 /// A file whose name does not tell its format.
 pub fn any(bytes: &[u8]) {
-    let kind = |with_scalar| read("input", bytes, |source| Kind::of_source(source, with_scalar)).flatten();
+    let kind =
+        |with_scalar| read("input", bytes, |source| Kind::of_source(source, with_scalar)).flatten();
     for kind in [kind(false), kind(true)] {
         match kind {
             Some(Kind::Mesh) => read("input", bytes, io::read_mesh).iter().for_each(sound_mesh),
@@ -343,16 +388,34 @@ pub fn any(bytes: &[u8]) {
 /// A PLY file, or else a LAS or LAZ file, converted region by region: has as many points as one that is read as a whole.
 pub fn regions(bytes: &[u8]) {
     let folder = Folder::new();
-    let path = folder.write(if bytes.starts_with(b"ply") { "input.ply" } else { "input.laz" }, bytes);
+    let path =
+        folder.write(if bytes.starts_with(b"ply") { "input.ply" } else { "input.laz" }, bytes);
     let made = folder.0.join("made.splk");
     let limits = limits();
-    let options = ExternalOptions { memory: 1, preset: Preset::default(), block_splats: 64, surfels: surfel_options() };
+    let options = ExternalOptions {
+        memory: 1,
+        preset: Preset::default(),
+        block_splats: 64,
+        surfels: surfel_options(),
+    };
     let whole = accepted(io::load_mesh(&path, &limits));
-    let converted =
-        accepted(external::convert(&[path], &limits, &made, &options, &WriteOptions::default(), &|_, _, _| {}));
-    let Some(converted) = converted else { return assert!(!made.exists(), "a file beside an error") };
+    let converted = accepted(external::convert(
+        &[path],
+        &limits,
+        &made,
+        &options,
+        &WriteOptions::default(),
+        &|_, _, _| {},
+    ));
+    let Some(converted) = converted else {
+        return assert!(!made.exists(), "a file beside an error");
+    };
     if let Some(whole) = whole {
-        assert_eq!(converted.points, whole.positions.len() as u64, "points in pieces, and as a whole");
+        assert_eq!(
+            converted.points,
+            whole.positions.len() as u64,
+            "points in pieces, and as a whole"
+        );
     }
     let hierarchy = Hierarchy::open(&made, &limits).expect("what was written");
     let report = hierarchy.check();
@@ -362,7 +425,9 @@ pub fn regions(bytes: &[u8]) {
 
 /// A hierarchy's bytes as they are: what opens can be read or tells what is wrong, and what is found sound can be read.
 pub fn splk(bytes: &[u8]) {
-    let Some(hierarchy) = accepted(Hierarchy::from_bytes(bytes.to_vec(), Path::new("input.splk"), &limits())) else {
+    let Some(hierarchy) =
+        accepted(Hierarchy::from_bytes(bytes.to_vec(), Path::new("input.splk"), &limits()))
+    else {
         return;
     };
     let is_sound = hierarchy.check().is_sound();
@@ -394,7 +459,9 @@ pub fn splk_summed(bytes: &[u8]) {
 
 /// A bricked volume's bytes as they are.
 pub fn splv(bytes: &[u8]) {
-    let Some(bricks) = accepted(Bricks::from_bytes(bytes.to_vec(), Path::new("input.splv"))) else { return };
+    let Some(bricks) = accepted(Bricks::from_bytes(bytes.to_vec(), Path::new("input.splv"))) else {
+        return;
+    };
     // A few bytes may stand for bricks of one value; more than these take their time.
     if bricks.levels().iter().map(|level| level.bricks()).sum::<usize>() > MOST_SAMPLES >> 15 {
         return;
@@ -427,19 +494,31 @@ pub fn transfer(bytes: &[u8]) {
         Ok(transfer) => transfer,
         Err(message) => return assert!(!message.is_empty(), "an error without words"),
     };
-    let again = TransferFunction::from_json(&transfer.to_json()).expect("what was written can be read");
+    let again =
+        TransferFunction::from_json(&transfer.to_json()).expect("what was written can be read");
     assert_eq!(again, transfer);
     let inside = |v: f64| (0.0..=1.0).contains(&v);
     let points = transfer.color.iter().map(|p| p.0).chain(transfer.opacity.iter().map(|p| p.0));
     for value in points.chain([0.0, 0.5, -1e30, 1e30, f64::MIN, f64::MAX]) {
-        assert!(transfer.color(value).into_iter().all(inside), "colour {:?} at {value}", transfer.color(value));
+        assert!(
+            transfer.color(value).into_iter().all(inside),
+            "colour {:?} at {value}",
+            transfer.color(value)
+        );
         assert!(inside(transfer.opacity(value)), "opacity {} at {value}", transfer.opacity(value));
         assert!(inside(transfer.gradient_factor(value.abs())), "factor at {value}");
-        assert!(transfer.extinction(value) >= 0.0, "extinction {} at {value}", transfer.extinction(value));
+        assert!(
+            transfer.extinction(value) >= 0.0,
+            "extinction {} at {value}",
+            transfer.extinction(value)
+        );
     }
     for range in [[-1.0, 1.0], [0.0, 1e30], [7.0, 7.0]] {
         let finite = |entry: &[f32; 4]| entry.iter().all(|v| !v.is_nan());
-        assert!(transfer.table(range, 16).iter().all(finite), "a table over {range:?} has no numbers");
+        assert!(
+            transfer.table(range, 16).iter().all(finite),
+            "a table over {range:?} has no numbers"
+        );
         transfer.visible(range);
         let spread = transfer.clone().spread_over(range);
         assert!(spread.validate().is_ok(), "spread over {range:?}: {:?}", spread.validate());
@@ -506,7 +585,9 @@ pub fn convert_render(bytes: &[u8]) {
     };
     let usual = surfel_options();
     let radius_scale = model.radius_scale.map_or(usual.radius_scale, |scale| scale.value());
-    let Some(set) = accepted(mesh.surfels(&SurfelOptions { radius_scale, ..usual })) else { return };
+    let Some(set) = accepted(mesh.surfels(&SurfelOptions { radius_scale, ..usual })) else {
+        return;
+    };
     for splat in &set.splats {
         let numbers = splat.center.iter().chain(&splat.factor).chain([&splat.strength]);
         assert!(numbers.copied().all(f32::is_finite), "{splat:?} is not finite");
@@ -517,7 +598,8 @@ pub fn convert_render(bytes: &[u8]) {
     assert!(findings.is_empty(), "the tree that was built: {findings:?}");
     let options = WriteOptions { lossless: model.is_lossless, ..WriteOptions::default() };
     let Some(written) = accepted(to_bytes(&tree, &options)) else { return };
-    let hierarchy = Hierarchy::from_bytes(written, Path::new("model.splk"), &limits()).expect("what was written");
+    let hierarchy = Hierarchy::from_bytes(written, Path::new("model.splk"), &limits())
+        .expect("what was written");
     let report = hierarchy.check();
     assert!(report.is_sound(), "the file that was written: {:?}", report.findings);
     let camera = framing(hierarchy.bounds(), model.is_perspective);
@@ -534,7 +616,8 @@ pub fn convert_render(bytes: &[u8]) {
 fn framing(bounds: splatkit::math::Bounds, is_perspective: bool) -> Camera {
     let mut camera = Camera::framing(&bounds, DVec3::new(0.3, 0.2, -1.0), DVec3::Y, 1.0);
     if !is_perspective {
-        camera.projection = Projection::Orthographic { height: bounds.diagonal().max(f64::MIN_POSITIVE) };
+        camera.projection =
+            Projection::Orthographic { height: bounds.diagonal().max(f64::MIN_POSITIVE) };
     }
     camera
 }

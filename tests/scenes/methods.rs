@@ -22,7 +22,8 @@ fn blobs_on(dims: [usize; 3], axes: DMat3, arrangement: Arrangement) -> Volume {
     let mut lattice = Lattice { dims, origin: DVec3::ZERO, axes, arrangement };
     let [low, high] = lattice.step_range();
     lattice.origin = ORIGIN - axes * (0.5 * (low + high));
-    let values = (0..lattice.len()).map(|i| blobs(lattice.sample_position(i) - ORIGIN) as f32).collect();
+    let values =
+        (0..lattice.len()).map(|i| blobs(lattice.sample_position(i) - ORIGIN) as f32).collect();
     Volume::new(lattice, Samples::F32(values)).expect("the samples fill the lattice")
 }
 
@@ -39,7 +40,8 @@ fn steep() -> TransferFunction {
 }
 
 fn surfaces(list: &[(f64, [f64; 3], f64)]) -> TransferFunction {
-    let isosurfaces = list.iter().map(|&(value, color, opacity)| Isosurface { value, color, opacity }).collect();
+    let isosurfaces =
+        list.iter().map(|&(value, color, opacity)| Isosurface { value, color, opacity }).collect();
     TransferFunction { shade: Some(Shade::default()), isosurfaces, ..TransferFunction::default() }
 }
 
@@ -48,7 +50,11 @@ fn body_centred_volume() -> Volume {
 }
 
 pub fn body_centred() -> Case {
-    let scene = volume_scene(body_centred_volume(), Kernel::default(), transfer(1.0, Some(Shade::default())));
+    let scene = volume_scene(
+        body_centred_volume(),
+        Kernel::default(),
+        transfer(1.0, Some(Shade::default())),
+    );
     case("body_centred", scene, settings())
 }
 
@@ -78,19 +84,32 @@ pub fn rectilinear() -> Case {
     let axes = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.4)
         * DMat3::from_cols(DVec3::X, DVec3::new(0.2, 1.0, 0.0), DVec3::Z);
     let volume = blobs_on([16, 18, 14], axes, Arrangement::Rectilinear(coordinates));
-    case("rectilinear", volume_scene(volume, Kernel::default(), transfer(1.0, Some(Shade::default()))), settings())
+    case(
+        "rectilinear",
+        volume_scene(volume, Kernel::default(), transfer(1.0, Some(Shade::default()))),
+        settings(),
+    )
 }
 
 pub fn b_spline() -> Case {
     let kernel = Kernel::b_spline(2.0).expect("a kernel");
-    case("b_spline", volume_scene(cubic(), kernel, transfer(1.0, Some(Shade::default()))), settings())
+    case(
+        "b_spline",
+        volume_scene(cubic(), kernel, transfer(1.0, Some(Shade::default()))),
+        settings(),
+    )
 }
 
 /// A Gaussian from a table, cut so far out that it is the one in closed form.
 pub fn table_of_a_gaussian() -> Case {
-    let values = (0..=512).map(|i| (-0.5 * (f64::from(i) / 512.0 * 2.7 / 0.6).powi(2)).exp()).collect();
+    let values =
+        (0..=512).map(|i| (-0.5 * (f64::from(i) / 512.0 * 2.7 / 0.6).powi(2)).exp()).collect();
     let kernel = Kernel::table(values, 2.7).expect("a kernel");
-    case("table_of_a_gaussian", volume_scene(cubic(), kernel, transfer(1.0, Some(Shade::default()))), settings())
+    case(
+        "table_of_a_gaussian",
+        volume_scene(cubic(), kernel, transfer(1.0, Some(Shade::default()))),
+        settings(),
+    )
 }
 
 /// The same with the closed form.
@@ -107,20 +126,24 @@ pub fn thin_shells() -> Case {
 /// The same where the sample of one corner is that of a broken sensor: the function stands for a small part of the range.
 pub fn one_value_far_off() -> Case {
     let mut volume = cubic();
-    let values = (0..volume.len()).map(|i| if i == 0 { -20_000.0 } else { volume.value(i) as f32 }).collect();
+    let values = (0..volume.len())
+        .map(|i| if i == 0 { -20_000.0 } else { volume.value(i) as f32 })
+        .collect();
     volume = Volume::new(volume.lattice, Samples::F32(values)).expect("as many samples");
     case("one_value_far_off", volume_scene(volume, Kernel::default(), steep()), settings())
 }
 
 /// The same with points of all functions that are far off, and nothing that shows changes up to there.
 pub fn points_far_off() -> Case {
-    let mut transfer = TransferFunction { gradient: vec![(0.2, 0.0), (1.5, 1.0), (3e5, 1.0)], ..steep() };
+    let mut transfer =
+        TransferFunction { gradient: vec![(0.2, 0.0), (1.5, 1.0), (3e5, 1.0)], ..steep() };
     let last = transfer.opacity[transfer.opacity.len() - 1].1;
     transfer.opacity.push((4e5, last));
     transfer.color.push((2e5, transfer.color[transfer.color.len() - 1].1));
     transfer.color.insert(0, (-3e5, [0.0; 3]));
     let mut volume = cubic();
-    let values = (0..volume.len()).map(|i| if i == 0 { 1e5 } else { volume.value(i) as f32 }).collect();
+    let values =
+        (0..volume.len()).map(|i| if i == 0 { 1e5 } else { volume.value(i) as f32 }).collect();
     volume = Volume::new(volume.lattice, Samples::F32(values)).expect("as many samples");
     case("points_far_off", volume_scene(volume, Kernel::default(), transfer), settings())
 }
@@ -132,12 +155,20 @@ pub fn post_classified() -> Case {
 
 pub fn pre_classified() -> Case {
     let settings = Settings { classification: Classification::Pre, ..settings() };
-    case("pre_classified", volume_scene(cubic(), Kernel::default(), transfer(1.0, Some(Shade::default()))), settings)
+    case(
+        "pre_classified",
+        volume_scene(cubic(), Kernel::default(), transfer(1.0, Some(Shade::default()))),
+        settings,
+    )
 }
 
 pub fn axis_sheets() -> Case {
     let settings = Settings { mode: Mode::AxisSheets, ..settings() };
-    case("axis_sheets", volume_scene(cubic(), Kernel::default(), transfer(1.0, Some(Shade::default()))), settings)
+    case(
+        "axis_sheets",
+        volume_scene(cubic(), Kernel::default(), transfer(1.0, Some(Shade::default()))),
+        settings,
+    )
 }
 
 pub fn axis_sheets_body_centred_orthographic() -> Case {
@@ -149,7 +180,11 @@ pub fn axis_sheets_body_centred_orthographic() -> Case {
 
 pub fn single_splats(order: Order) -> Case {
     let settings = Settings { mode: Mode::Splats(order), ..settings() };
-    case("single_splats", volume_scene(cubic(), Kernel::default(), transfer(1.0, Some(Shade::default()))), settings)
+    case(
+        "single_splats",
+        volume_scene(cubic(), Kernel::default(), transfer(1.0, Some(Shade::default()))),
+        settings,
+    )
 }
 
 pub fn single_ellipsoids() -> Case {
@@ -164,7 +199,10 @@ pub fn orthographic(case: Case) -> Case {
 
 /// The same from within.
 pub fn from_inside(case: Case) -> Case {
-    Case { camera: camera(DVec3::new(0.5, -0.4, 0.35), Projection::Perspective { view_angle: 75.0 }), ..case }
+    Case {
+        camera: camera(DVec3::new(0.5, -0.4, 0.35), Projection::Perspective { view_angle: 75.0 }),
+        ..case
+    }
 }
 
 /// Scattered samples that count differently and have slopes, classified after interpolation or before.
@@ -173,7 +211,13 @@ pub fn samples_with_slopes(classification: Classification) -> Case {
     let mut set = scattered();
     for splat in &mut set.splats {
         let slope = random.point(0.05);
-        *splat = Splat::sample(splat.center.into(), splat.strength, splat.factor, random.within(0.3, 2.0), slope);
+        *splat = Splat::sample(
+            splat.center.into(),
+            splat.strength,
+            splat.factor,
+            random.within(0.3, 2.0),
+            slope,
+        );
     }
     set.overlap = 3.0;
     let scene = Scene::new().with_samples(set, transfer(1.0, Some(Shade::default())));
@@ -181,7 +225,8 @@ pub fn samples_with_slopes(classification: Classification) -> Case {
 }
 
 pub fn gradient_opacity() -> Case {
-    let transfer = TransferFunction { gradient: vec![(0.2, 0.0), (1.5, 1.0)], ..transfer(1.0, None) };
+    let transfer =
+        TransferFunction { gradient: vec![(0.2, 0.0), (1.5, 1.0)], ..transfer(1.0, None) };
     case("gradient_opacity", volume_scene(cubic(), Kernel::default(), transfer), settings())
 }
 
@@ -192,31 +237,57 @@ pub fn one_isosurface() -> Case {
 
 /// Two translucent surfaces and an opaque one within what the transfer function shows.
 pub fn isosurfaces_in_fog() -> Case {
-    let list = [(0.5, [0.2, 0.9, 0.3], 0.5), (0.2, [0.9, 0.3, 0.2], 0.3), (0.7, [0.2, 0.3, 0.9], 1.0)];
-    let transfer =
-        TransferFunction { isosurfaces: surfaces(&list).isosurfaces, ..transfer(1.0, Some(Shade::default())) };
+    let list =
+        [(0.5, [0.2, 0.9, 0.3], 0.5), (0.2, [0.9, 0.3, 0.2], 0.3), (0.7, [0.2, 0.3, 0.9], 1.0)];
+    let transfer = TransferFunction {
+        isosurfaces: surfaces(&list).isosurfaces,
+        ..transfer(1.0, Some(Shade::default()))
+    };
     let scene = volume_scene(cubic(), Kernel::default(), transfer);
-    Case { name: "isosurfaces_in_fog", scene, camera: camera(SLANT, ORTHOGRAPHIC), settings: settings() }
+    Case {
+        name: "isosurfaces_in_fog",
+        scene,
+        camera: camera(SLANT, ORTHOGRAPHIC),
+        settings: settings(),
+    }
 }
 
 pub fn maximum() -> Case {
     let settings = Settings { optics: Optics::Maximum, ..settings() };
-    case("maximum", volume_scene(cubic(), Kernel::default(), transfer(1.0, Some(Shade::default()))), settings)
+    case(
+        "maximum",
+        volume_scene(cubic(), Kernel::default(), transfer(1.0, Some(Shade::default()))),
+        settings,
+    )
 }
 
 pub fn x_ray() -> Case {
     let settings = Settings { optics: Optics::XRay, ..settings() };
-    case("x_ray", volume_scene(cubic(), Kernel::default(), transfer(1.0, Some(Shade::default()))), settings)
+    case(
+        "x_ray",
+        volume_scene(cubic(), Kernel::default(), transfer(1.0, Some(Shade::default()))),
+        settings,
+    )
 }
 
 fn clips() -> Vec<Clip> {
-    let box_of = |low: DVec3, high: DVec3| ClipShape::Box(Bounds { min: ORIGIN + low, max: ORIGIN + high });
+    let box_of =
+        |low: DVec3, high: DVec3| ClipShape::Box(Bounds { min: ORIGIN + low, max: ORIGIN + high });
     let normal = DVec3::new(1.0, -1.0, 0.5);
     vec![
-        Clip { shape: ClipShape::HalfSpace { normal, offset: normal.dot(ORIGIN) + 0.4 }, inside: true },
+        Clip {
+            shape: ClipShape::HalfSpace { normal, offset: normal.dot(ORIGIN) + 0.4 },
+            inside: true,
+        },
         Clip { shape: box_of(DVec3::splat(-0.8), DVec3::new(0.8, 0.75, 0.7)), inside: true },
-        Clip { shape: box_of(DVec3::new(-0.2, -0.9, -0.3), DVec3::new(0.5, 0.1, 0.4)), inside: false },
-        Clip { shape: box_of(DVec3::new(0.3, -0.5, 0.1), DVec3::new(0.9, 0.3, 0.9)), inside: false },
+        Clip {
+            shape: box_of(DVec3::new(-0.2, -0.9, -0.3), DVec3::new(0.5, 0.1, 0.4)),
+            inside: false,
+        },
+        Clip {
+            shape: box_of(DVec3::new(0.3, -0.5, 0.1), DVec3::new(0.9, 0.3, 0.9)),
+            inside: false,
+        },
     ]
 }
 

@@ -94,17 +94,32 @@ fn ellipsoids() -> SplatSet {
 /// Skewed ellipsoids with normals.
 pub fn ellipsoids_in_perspective() -> Case {
     let scene = Scene::new().with_splats(ellipsoids());
-    Case { name: "ellipsoids_in_perspective", scene, camera: camera(SLANT, PERSPECTIVE), settings: settings() }
+    Case {
+        name: "ellipsoids_in_perspective",
+        scene,
+        camera: camera(SLANT, PERSPECTIVE),
+        settings: settings(),
+    }
 }
 
 pub fn ellipsoids_orthographic() -> Case {
     let scene = Scene::new().with_splats(ellipsoids());
-    Case { name: "ellipsoids_orthographic", scene, camera: camera(SLANT, ORTHOGRAPHIC), settings: settings() }
+    Case {
+        name: "ellipsoids_orthographic",
+        scene,
+        camera: camera(SLANT, ORTHOGRAPHIC),
+        settings: settings(),
+    }
 }
 
 pub fn ellipsoids_unlit() -> Case {
     let scene = Scene::new().with_splats(ellipsoids());
-    Case { name: "ellipsoids_unlit", scene, camera: camera(SLANT, PERSPECTIVE), settings: unshaded() }
+    Case {
+        name: "ellipsoids_unlit",
+        scene,
+        camera: camera(SLANT, PERSPECTIVE),
+        settings: unshaded(),
+    }
 }
 
 /// Splats without normals, half of them translucent, in sheets of one pixel.
@@ -112,11 +127,17 @@ pub fn ellipsoids_without_normals() -> Case {
     let mut splats = ellipsoids();
     for (i, splat) in splats.splats.iter_mut().enumerate() {
         splat.normal = NO_NORMAL;
-        splat.color = splat.color & 0x00ff_ffff | if i % 2 == 0 { 0x4000_0000 } else { 0xff00_0000 };
+        splat.color =
+            splat.color & 0x00ff_ffff | if i % 2 == 0 { 0x4000_0000 } else { 0xff00_0000 };
     }
     let settings = Settings { sheet_pixels: 1.0, ..settings() };
     let scene = Scene::new().with_splats(splats);
-    Case { name: "ellipsoids_without_normals", scene, camera: camera(SLANT, ORTHOGRAPHIC), settings }
+    Case {
+        name: "ellipsoids_without_normals",
+        scene,
+        camera: camera(SLANT, ORTHOGRAPHIC),
+        settings,
+    }
 }
 
 /// Ellipsoids as large as the scene, that lie in most of its sheets, among small ones.
@@ -130,7 +151,12 @@ pub fn huge_among_small() -> Case {
         splats.splats.push(Splat { strength: 0.2 * huge.strength, ..huge });
     }
     let scene = Scene::new().with_splats(splats);
-    Case { name: "huge_among_small", scene, camera: camera(SLANT, PERSPECTIVE), settings: settings() }
+    Case {
+        name: "huge_among_small",
+        scene,
+        camera: camera(SLANT, PERSPECTIVE),
+        settings: settings(),
+    }
 }
 
 /// Splats far smaller than a pixel.
@@ -142,7 +168,12 @@ pub fn splats_below_a_pixel() -> Case {
         Splat { strength: 1.5, normal: encode_normal(center), ..splat }
     });
     let scene = Scene::new().with_splats(set(Payload::Radiance, 3.0, splats.collect()));
-    Case { name: "splats_below_a_pixel", scene, camera: camera(SLANT, PERSPECTIVE), settings: settings() }
+    Case {
+        name: "splats_below_a_pixel",
+        scene,
+        camera: camera(SLANT, PERSPECTIVE),
+        settings: settings(),
+    }
 }
 
 /// A wall of flat discs that faces the camera.
@@ -182,7 +213,11 @@ pub fn wide_angle() -> Case {
 /// Colours from blue to red and opacity that grows, over values of 0 … 1 times `scale`.
 fn transfer(scale: f64, shade: Option<Shade>) -> TransferFunction {
     TransferFunction {
-        color: vec![(0.0, [0.1, 0.2, 0.9]), (0.5 * scale, [0.9, 0.8, 0.3]), (scale, [0.9, 0.1, 0.1])],
+        color: vec![
+            (0.0, [0.1, 0.2, 0.9]),
+            (0.5 * scale, [0.9, 0.8, 0.3]),
+            (scale, [0.9, 0.1, 0.1]),
+        ],
         opacity: vec![(0.1 * scale, 0.0), (0.6 * scale, 0.7), (scale, 0.95)],
         unit: 0.3,
         shade,
@@ -196,7 +231,8 @@ fn blobs(at: DVec3) -> f64 {
         let squared = (at - DVec3::new(x, y, z)).length_squared() / (size * size);
         (1.0 - squared).max(0.0).powi(2)
     };
-    (blob(0.2, 0.1, -0.1, 1.0) + 0.9 * blob(-0.5, -0.3, 0.4, 0.8) + 0.7 * blob(0.1, 0.6, -0.5, 0.8)).min(1.0)
+    (blob(0.2, 0.1, -0.1, 1.0) + 0.9 * blob(-0.5, -0.3, 0.4, 0.8) + 0.7 * blob(0.1, 0.6, -0.5, 0.8))
+        .min(1.0)
 }
 
 /// Samples scattered where the blobs are.
@@ -212,19 +248,34 @@ fn scattered() -> SplatSet {
 
 pub fn scattered_samples() -> Case {
     let scene = Scene::new().with_samples(scattered(), transfer(1.0, Some(Shade::default())));
-    Case { name: "scattered_samples", scene, camera: camera(SLANT, PERSPECTIVE), settings: settings() }
+    Case {
+        name: "scattered_samples",
+        scene,
+        camera: camera(SLANT, PERSPECTIVE),
+        settings: settings(),
+    }
 }
 
 pub fn scattered_samples_orthographic() -> Case {
     let scene = Scene::new().with_samples(scattered(), transfer(1.0, None));
-    Case { name: "scattered_samples_orthographic", scene, camera: camera(SLANT, ORTHOGRAPHIC), settings: settings() }
+    Case {
+        name: "scattered_samples_orthographic",
+        scene,
+        camera: camera(SLANT, ORTHOGRAPHIC),
+        settings: settings(),
+    }
 }
 
 /// A lattice about the scenes' middle with given steps, and what a function of the place has on it.
 fn sampled<T>(dims: [usize; 3], axes: DMat3, value: impl Fn(DVec3) -> T) -> (Lattice, Vec<T>) {
     let start = -0.5 * (axes * DVec3::from(dims.map(|n| n as f64 - 1.0)));
-    let index =
-        |i: usize| DVec3::new((i % dims[0]) as f64, (i / dims[0] % dims[1]) as f64, (i / dims[0] / dims[1]) as f64);
+    let index = |i: usize| {
+        DVec3::new(
+            (i % dims[0]) as f64,
+            (i / dims[0] % dims[1]) as f64,
+            (i / dims[0] / dims[1]) as f64,
+        )
+    };
     let values = (0..dims.iter().product()).map(|i| value(start + axes * index(i))).collect();
     (Lattice::cartesian(dims, ORIGIN + start, axes), values)
 }
@@ -238,20 +289,40 @@ fn blob_scene() -> Scene {
 }
 
 pub fn blobs_analytic() -> Case {
-    Case { name: "blobs_analytic", scene: blob_scene(), camera: camera(SLANT, PERSPECTIVE), settings: settings() }
+    Case {
+        name: "blobs_analytic",
+        scene: blob_scene(),
+        camera: camera(SLANT, PERSPECTIVE),
+        settings: settings(),
+    }
 }
 
 pub fn blobs_central() -> Case {
     let settings = Settings { gradient: Gradient::Central, size: [60, 48], ..settings() };
-    Case { name: "blobs_central", scene: blob_scene(), camera: camera(SLANT, PERSPECTIVE), settings }
+    Case {
+        name: "blobs_central",
+        scene: blob_scene(),
+        camera: camera(SLANT, PERSPECTIVE),
+        settings,
+    }
 }
 
 pub fn blobs_orthographic() -> Case {
-    Case { name: "blobs_orthographic", scene: blob_scene(), camera: camera(SLANT, ORTHOGRAPHIC), settings: settings() }
+    Case {
+        name: "blobs_orthographic",
+        scene: blob_scene(),
+        camera: camera(SLANT, ORTHOGRAPHIC),
+        settings: settings(),
+    }
 }
 
 pub fn blobs_unshaded() -> Case {
-    Case { name: "blobs_unshaded", scene: blob_scene(), camera: camera(SLANT, PERSPECTIVE), settings: unshaded() }
+    Case {
+        name: "blobs_unshaded",
+        scene: blob_scene(),
+        camera: camera(SLANT, PERSPECTIVE),
+        settings: unshaded(),
+    }
 }
 
 /// Seen from inside the lattice.
@@ -271,14 +342,18 @@ pub fn marschner_lobb() -> Case {
     };
     let (lattice, values) = sampled([24, 24, 24], axes, signal);
     let volume = Volume::new(lattice, Samples::F32(values)).expect("the samples fill the lattice");
-    let scene = Scene::new().with_volume(volume, Kernel::default(), transfer(1.0, Some(Shade::default())));
+    let scene =
+        Scene::new().with_volume(volume, Kernel::default(), transfer(1.0, Some(Shade::default())));
     Case { name: "marschner_lobb", scene, camera: camera(SLANT, PERSPECTIVE), settings: settings() }
 }
 
 /// Blobs as floats on a sheared lattice of unequal steps.
 fn sheared_scene() -> Scene {
-    let axes =
-        DMat3::from_cols(DVec3::new(0.11, 0.02, 0.0), DVec3::new(-0.02, 0.08, 0.03), DVec3::new(0.0, 0.04, 0.17));
+    let axes = DMat3::from_cols(
+        DVec3::new(0.11, 0.02, 0.0),
+        DVec3::new(-0.02, 0.08, 0.03),
+        DVec3::new(0.0, 0.04, 0.17),
+    );
     let (lattice, values) = sampled([18, 22, 12], axes, |at| blobs(at) as f32);
     let volume = Volume::new(lattice, Samples::F32(values)).expect("the samples fill the lattice");
     let kernel = Kernel::gaussian(0.7, 2.5).expect("a kernel");
@@ -286,12 +361,22 @@ fn sheared_scene() -> Scene {
 }
 
 pub fn sheared_lattice() -> Case {
-    Case { name: "sheared_lattice", scene: sheared_scene(), camera: camera(SLANT, PERSPECTIVE), settings: settings() }
+    Case {
+        name: "sheared_lattice",
+        scene: sheared_scene(),
+        camera: camera(SLANT, PERSPECTIVE),
+        settings: settings(),
+    }
 }
 
 pub fn sheared_lattice_central() -> Case {
     let settings = Settings { gradient: Gradient::Central, size: [60, 48], ..settings() };
-    Case { name: "sheared_lattice_central", scene: sheared_scene(), camera: camera(SLANT, ORTHOGRAPHIC), settings }
+    Case {
+        name: "sheared_lattice_central",
+        scene: sheared_scene(),
+        camera: camera(SLANT, ORTHOGRAPHIC),
+        settings,
+    }
 }
 
 /// One value everywhere. Unlit: the gradient of a constant is nothing but rounding.
@@ -308,17 +393,30 @@ fn mixed_scene() -> Scene {
     let mut random = Random(7);
     let balls = (0..400).map(|_| {
         let outward = random.point(1.0).normalize();
-        let splat = Splat { factor: [0.05, 0.0, 0.05, 0.0, 0.0, 0.05], ..random.ellipsoid(0.5 * outward, 0.05) };
+        let splat = Splat {
+            factor: [0.05, 0.0, 0.05, 0.0, 0.0, 0.05],
+            ..random.ellipsoid(0.5 * outward, 0.05)
+        };
         Splat { strength: 4.0, normal: encode_normal(outward), ..splat }
     });
     blob_scene().with_splats(set(Payload::Radiance, 3.0, balls.collect()))
 }
 
 pub fn surface_in_a_volume() -> Case {
-    Case { name: "surface_in_a_volume", scene: mixed_scene(), camera: camera(SLANT, PERSPECTIVE), settings: settings() }
+    Case {
+        name: "surface_in_a_volume",
+        scene: mixed_scene(),
+        camera: camera(SLANT, PERSPECTIVE),
+        settings: settings(),
+    }
 }
 
 pub fn surface_in_a_volume_orthographic() -> Case {
     let camera = camera(SLANT, ORTHOGRAPHIC);
-    Case { name: "surface_in_a_volume_orthographic", scene: mixed_scene(), camera, settings: settings() }
+    Case {
+        name: "surface_in_a_volume_orthographic",
+        scene: mixed_scene(),
+        camera,
+        settings: settings(),
+    }
 }

@@ -66,7 +66,9 @@ impl Bench {
         let start = Instant::now();
         let mut renderer = Renderer::new(&device, &loaded.scene)?;
         let upload_ms = milliseconds(start);
-        let camera = |frame: u32| self.camera.turned(&loaded.subject, settings.size, STEP * f64::from(frame));
+        let camera = |frame: u32| {
+            self.camera.turned(&loaded.subject, settings.size, STEP * f64::from(frame))
+        };
 
         let mut frame = |number: u32| {
             progress.stage(format!("Frame {number} of {frames}"));
@@ -76,7 +78,9 @@ impl Bench {
         };
         let (first_ms, stats) = frame(0)?;
         if stats.splats == 0 && stats.gathered == 0 {
-            return Err(Error::NothingToDraw("the camera sees no splat that has opacity".into()).into());
+            return Err(
+                Error::NothingToDraw("the camera sees no splat that has opacity".into()).into()
+            );
         }
         let mut times = Vec::new();
         for number in 1..=frames {
@@ -115,11 +119,17 @@ impl Bench {
                 "settings": describe::settings(&loaded.scene, &settings),
             }));
         }
-        output::line(format_args!("{} at {width}x{height} on {}", self.scene.name(), device.name()))?;
+        output::line(format_args!(
+            "{} at {width}x{height} on {}",
+            self.scene.name(),
+            device.name()
+        ))?;
         output::line(format_args!("load      {:10.1} ms", loaded.load_ms))?;
         output::line(format_args!("upload    {upload_ms:10.1} ms"))?;
         output::line(format_args!("first     {first_ms:10.1} ms"))?;
-        output::line(format_args!("frame     {median:10.1} ms  ({min:.1} to {max:.1}, {frames} frames)"))?;
+        output::line(format_args!(
+            "frame     {median:10.1} ms  ({min:.1} to {max:.1}, {frames} frames)"
+        ))?;
         for (name, ms) in &profile.steps {
             output::line(format_args!("  {name:<10}{ms:8.1} ms"))?;
         }
@@ -132,10 +142,14 @@ impl Bench {
             stats.gpu_bytes >> 20
         ))?;
         if is_gathered {
-            output::line(format_args!("gathered in {} pairs of a tile and a sheet", stats.gathered))?;
+            output::line(format_args!(
+                "gathered in {} pairs of a tile and a sheet",
+                stats.gathered
+            ))?;
         }
         if stats.bricks > 0 {
-            let (drawn, read, level, mib) = (stats.bricks, stats.read_bricks, stats.lambda, stats.brick_bytes >> 20);
+            let (drawn, read, level, mib) =
+                (stats.bricks, stats.read_bricks, stats.lambda, stats.brick_bytes >> 20);
             output::line(format_args!(
                 "{drawn} bricks drawn of level {level:.2}, {read} of them read, {mib} MiB of slots"
             ))?;

@@ -74,7 +74,8 @@ impl CameraFlags {
         let view_up = self.view_up.unwrap_or(up);
         let view_angle = self.view_angle.unwrap_or(Camera::DEFAULT_VIEW_ANGLE);
         let aspect = f64::from(size[0]) / f64::from(size[1]);
-        let mut camera = Camera::framing_with(&subject.bounds, front(up), view_up, aspect, view_angle);
+        let mut camera =
+            Camera::framing_with(&subject.bounds, front(up), view_up, aspect, view_angle);
         if let Some(focal_point) = self.focal_point {
             camera.position += focal_point - camera.focal_point;
             camera.focal_point = focal_point;

@@ -43,7 +43,9 @@ impl Check {
                 bricks::check(&self.file, &limits, &watch).findings
             }
             _ => match self.load.open(&self.file)? {
-                Input::Mesh(mesh) => of_mesh(&mesh, deadline).map_err(|error| in_file(&self.file, error))?,
+                Input::Mesh(mesh) => {
+                    of_mesh(&mesh, deadline).map_err(|error| in_file(&self.file, error))?
+                }
                 // What is wrong with others is an error on reading.
                 _ => Vec::new(),
             },
@@ -61,7 +63,11 @@ impl Check {
             }
             output::line(if ok { "sound" } else { "damaged" })?;
         }
-        if ok { Ok(()) } else { Err(Failure::Damaged { file: self.file, findings: findings.len() }) }
+        if ok {
+            Ok(())
+        } else {
+            Err(Failure::Damaged { file: self.file, findings: findings.len() })
+        }
     }
 }
 
@@ -91,26 +97,47 @@ fn of_mesh(mesh: &Mesh, deadline: Deadline) -> splatkit::Result<Vec<Finding>> {
     let of = |count: usize, all: usize| format!("{count} of {all}");
     let (points, triangles) = (mesh.positions.len(), mesh.triangles.len());
     if survey.not_finite > 0 {
-        warn("not-finite", "positions", format!("{} are not finite", of(survey.not_finite, points)));
+        warn(
+            "not-finite",
+            "positions",
+            format!("{} are not finite", of(survey.not_finite, points)),
+        );
     }
     if survey.duplicates > 0 {
-        warn("duplicates", "positions", format!("{} are at the place of another", of(survey.duplicates, points)));
+        warn(
+            "duplicates",
+            "positions",
+            format!("{} are at the place of another", of(survey.duplicates, points)),
+        );
     }
     if survey.without_area > 0 {
-        warn("no-area", "triangles", format!("{} have no area", of(survey.without_area, triangles)));
+        warn(
+            "no-area",
+            "triangles",
+            format!("{} have no area", of(survey.without_area, triangles)),
+        );
     }
     if survey.unused > 0 {
         warn("unused", "positions", format!("{} belong to no triangle", of(survey.unused, points)));
     }
     if triangles > 0 && !mesh.is_closed() {
-        warn("open", "triangles", "the surface has borders; its back can be seen through them".into());
+        warn(
+            "open",
+            "triangles",
+            "the surface has borders; its back can be seen through them".into(),
+        );
     }
     match mesh.surfels(&SurfelOptions { deadline, ..SurfelOptions::default() }) {
         // These say nothing about the file.
         Err(error @ (Error::Timeout { .. } | Error::Memory { .. })) => return Err(error),
         Err(error) => {
             let message = error.to_string();
-            findings.push(Finding { code: "nothing", severity: Severity::Error, place: "content".into(), message });
+            findings.push(Finding {
+                code: "nothing",
+                severity: Severity::Error,
+                place: "content".into(),
+                message,
+            });
         }
         Ok(_) => {}
     }

@@ -48,7 +48,9 @@ impl ClipFlags {
     pub fn check(&self) -> Result<(), Failure> {
         let (count, most) = (self.clip.len() + self.cut_out.len(), Settings::MAX_CLIPS);
         if count > most {
-            return Err(Failure::Usage(format!("{count} shapes of --clip and --cut-out are more than {most}")));
+            return Err(Failure::Usage(format!(
+                "{count} shapes of --clip and --cut-out are more than {most}"
+            )));
         }
         Ok(())
     }
@@ -74,7 +76,8 @@ impl ClipFlags {
 
     /// The flags as they were given, for messages; `None` without any.
     pub fn text(&self) -> Option<String> {
-        let texts: Vec<_> = self.shapes().map(|(flag, _, shape)| format!("{flag} '{}'", shape.text)).collect();
+        let texts: Vec<_> =
+            self.shapes().map(|(flag, _, shape)| format!("{flag} '{}'", shape.text)).collect();
         (!texts.is_empty()).then(|| texts.join(" "))
     }
 
@@ -97,7 +100,8 @@ impl Shape {
 
 /// `NX,NY,NZ,OFFSET`.
 fn plane(text: &str) -> Result<Form, String> {
-    let [x, y, z, offset] = parse::numbers(text, ',', "plane:NX,NY,NZ,OFFSET, such as plane:1,0,0,12.5")?;
+    let [x, y, z, offset] =
+        parse::numbers(text, ',', "plane:NX,NY,NZ,OFFSET, such as plane:1,0,0,12.5")?;
     let normal = DVec3::new(x, y, z);
     if !(normal.is_finite() && f64::is_finite(offset)) {
         return Err("the numbers must be finite".into());
@@ -107,7 +111,10 @@ fn plane(text: &str) -> Result<Form, String> {
     }
     // What is beyond has a length of 0 or ∞ once squared.
     if !(1e-150..=1e150).contains(&normal.length()) {
-        return Err("a plane's direction needs a length from 1e-150 to 1e150; only where it points counts".into());
+        return Err(
+            "a plane's direction needs a length from 1e-150 to 1e150; only where it points counts"
+                .into(),
+        );
     }
     Ok(Form::Plane { normal, offset })
 }
@@ -123,8 +130,12 @@ fn cuboid(text: &str) -> Result<Form, String> {
     let corners @ [low, high] = [corner(low)?, corner(high)?];
     for (low, high) in low.iter().zip(high) {
         match (*low, high) {
-            (Place::World(low), Place::World(high)) | (Place::Share(low), Place::Share(high)) if low >= high => {
-                return Err("the first corner of a box must lie below the second on every axis".into());
+            (Place::World(low), Place::World(high)) | (Place::Share(low), Place::Share(high))
+                if low >= high =>
+            {
+                return Err(
+                    "the first corner of a box must lie below the second on every axis".into()
+                );
             }
             _ => {}
         }
@@ -175,8 +186,9 @@ impl Form {
                 ClipShape::HalfSpace { normal, offset: sign * at.in_world(axis, bounds) }
             }
             Self::Box(corners) => {
-                let [min, max] =
-                    corners.map(|places| DVec3::from_array([0, 1, 2].map(|axis| places[axis].in_world(axis, bounds))));
+                let [min, max] = corners.map(|places| {
+                    DVec3::from_array([0, 1, 2].map(|axis| places[axis].in_world(axis, bounds)))
+                });
                 ClipShape::Box(Bounds { min, max })
             }
         }
@@ -212,7 +224,10 @@ mod tests {
 
     #[test]
     fn shapes_are_read() {
-        assert_eq!(world("plane:0,0,2,5"), ClipShape::HalfSpace { normal: 2.0 * DVec3::Z, offset: 5.0 });
+        assert_eq!(
+            world("plane:0,0,2,5"),
+            ClipShape::HalfSpace { normal: 2.0 * DVec3::Z, offset: 5.0 }
+        );
         assert_eq!(world("x<50%"), ClipShape::HalfSpace { normal: DVec3::X, offset: 5.0 });
         assert_eq!(world("Z > -4"), ClipShape::HalfSpace { normal: DVec3::NEG_Z, offset: 4.0 });
         let half = Bounds { min: DVec3::new(1.0, 0.0, 0.0), max: DVec3::new(5.0, 20.0, 20.0) };
@@ -223,7 +238,10 @@ mod tests {
     fn wrong_shapes_are_told() {
         let message = |text: &str| Shape::parse(text).unwrap_err();
         assert!(message("plane:0,0,0,1").contains("direction"));
-        assert!(message("plane:1e200,0,0,1").contains("length") && message("plane:0,1e-200,0,1").contains("length"));
+        assert!(
+            message("plane:1e200,0,0,1").contains("length")
+                && message("plane:0,1e-200,0,1").contains("length")
+        );
         assert!(message("plane:1,0,0").contains("plane:NX,NY,NZ,OFFSET"));
         assert!(message("plane:1,0,0,inf").contains("finite"));
         assert!(message("box:0,0,0").contains("box:X0"));
@@ -238,10 +256,15 @@ mod tests {
 
     #[test]
     fn what_leaves_nothing_is_known() {
-        let nothing = |text: &str, inside| leaves_nothing(&Clip { shape: world(text), inside }, &SCENE);
-        assert!(nothing("x<-1", true) && nothing("x>-1", false) && nothing("box:-9,0,0:-1,9,9", true));
+        let nothing =
+            |text: &str, inside| leaves_nothing(&Clip { shape: world(text), inside }, &SCENE);
+        assert!(
+            nothing("x<-1", true) && nothing("x>-1", false) && nothing("box:-9,0,0:-1,9,9", true)
+        );
         assert!(nothing("box:0,0,0:100%,100%,100%", false));
-        assert!(!nothing("x<0", true) && !nothing("x<1", false) && !nothing("box:1,1,1:2,2,2", true));
+        assert!(
+            !nothing("x<0", true) && !nothing("x<1", false) && !nothing("box:1,1,1:2,2,2", true)
+        );
         assert!(!nothing("box:0,0,0:100%,100%,99%", false));
     }
 }

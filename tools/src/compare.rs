@@ -23,11 +23,14 @@ pub struct Compare {
 
 impl Compare {
     pub fn run(self) -> Result<(), Failure> {
-        let found = compare_files(&self.a, &self.b, &self.limits.limits()).map_err(|error| match error {
-            // Of all that can be wrong with arguments, here it can only be the sizes: the pictures differ.
-            Error::Argument(message) => Failure::Comparison(message),
-            other => other.into(),
-        })?;
+        let found =
+            compare_files(&self.a, &self.b, &self.limits.limits()).map_err(
+                |error| match error {
+                    // Of all that can be wrong with arguments, here it can only be the sizes: the pictures differ.
+                    Error::Argument(message) => Failure::Comparison(message),
+                    other => other.into(),
+                },
+            )?;
         if self.json {
             output::json(&serde_json::json!({
                 "psnr": found.psnr,
@@ -43,9 +46,9 @@ impl Compare {
             output::line(format_args!("different pixels  {}", found.different_pixels))?;
         }
         match (found.psnr, self.threshold) {
-            (Some(psnr), Some(threshold)) if psnr < threshold => {
-                Err(Failure::Comparison(format!("the pictures' PSNR is {psnr:.2} dB, below {threshold} dB")))
-            }
+            (Some(psnr), Some(threshold)) if psnr < threshold => Err(Failure::Comparison(format!(
+                "the pictures' PSNR is {psnr:.2} dB, below {threshold} dB"
+            ))),
             _ => Ok(()),
         }
     }

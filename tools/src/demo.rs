@@ -61,7 +61,11 @@ struct Shot {
 }
 
 const SHOTS: [Shot; 4] = [
-    Shot { name: "mesh.png", inputs: &[MESH], arguments: "--size 800x600 --azimuth 0 --elevation 20 --zoom 1.3" },
+    Shot {
+        name: "mesh.png",
+        inputs: &[MESH],
+        arguments: "--size 800x600 --azimuth 0 --elevation 20 --zoom 1.3",
+    },
     // Coarse enough to see what a hierarchy is made of.
     Shot {
         name: "hierarchy.png",
@@ -102,7 +106,9 @@ impl Demo {
 
     fn make_inputs(&self, progress: &Progress) -> Result<(), Failure> {
         std::fs::create_dir_all(&self.folder).map_err(|e| Failure::output(&self.folder, e))?;
-        for name in [MESH, TREE, VOLUME, TRANSFER].into_iter().chain(SHOTS.iter().map(|shot| shot.name)) {
+        for name in
+            [MESH, TREE, VOLUME, TRANSFER].into_iter().chain(SHOTS.iter().map(|shot| shot.name))
+        {
             output::check(&self.folder.join(name), self.overwrite)?;
         }
         progress.stage("Making a mesh and a volume");
@@ -161,7 +167,12 @@ impl Demo {
             stats.splats,
             loaded.load_ms
         ))?;
-        let arguments: Vec<_> = arguments.iter().map(|argument| argument.to_string_lossy()).collect();
-        output::line(format_args!("  splatkit {} -o {} --background '#10141c'", arguments.join(" "), shot.name))
+        let arguments: Vec<_> =
+            arguments.iter().map(|argument| argument.to_string_lossy()).collect();
+        output::line(format_args!(
+            "  splatkit {} -o {} --background '#10141c'",
+            arguments.join(" "),
+            shot.name
+        ))
     }
 }

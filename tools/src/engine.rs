@@ -1,6 +1,8 @@
 //! The engine's flags: the adapter, and the settings of a picture.
 
-use crate::{clip::ClipFlags, failure::Failure, method::MethodFlags, parse, samples::Samples, scene::Loaded};
+use crate::{
+    clip::ClipFlags, failure::Failure, method::MethodFlags, parse, samples::Samples, scene::Loaded,
+};
 use clap::{Args, ValueEnum};
 use splatkit::{
     Device, Error,
@@ -127,7 +129,10 @@ impl EngineFlags {
     /// Opens the adapter.
     fn gpu(&self) -> splatkit::Result<Gpu> {
         // Any text is a choice: the conversion cannot fail.
-        let choice = self.gpu.as_deref().map_or(AdapterChoice::Automatic, |text| text.parse().unwrap_or_default());
+        let choice = self
+            .gpu
+            .as_deref()
+            .map_or(AdapterChoice::Automatic, |text| text.parse().unwrap_or_default());
         let mut gpu = Gpu::headless(&choice)?;
         if let Some(seconds) = self.gpu_timeout {
             gpu = gpu.with_patience(Duration::from_secs_f64(seconds.min(LONGEST)));
@@ -149,13 +154,17 @@ impl EngineFlags {
 
     /// Whether an option of the GPU engine alone is set.
     fn asks_gpu(&self) -> bool {
-        self.gpu.is_some() || self.gpu_timeout.is_some() || self.gpu_memory.is_some() || self.pass_entries.is_some()
+        self.gpu.is_some()
+            || self.gpu_timeout.is_some()
+            || self.gpu_memory.is_some()
+            || self.pass_entries.is_some()
     }
 
     /// What is wrong whatever the scene.
     pub fn check(&self) -> Result<(), Failure> {
         if self.engine == Engine::Cpu && self.asks_gpu() {
-            let message = "--engine cpu takes none of --gpu, --gpu-timeout, --gpu-memory and --pass-entries";
+            let message =
+                "--engine cpu takes none of --gpu, --gpu-timeout, --gpu-memory and --pass-entries";
             return Err(Failure::Usage(message.into()));
         }
         self.method.check()?;
@@ -192,9 +201,9 @@ impl EngineFlags {
         }
         if self.shade {
             let own = loaded.scene.items.iter().find_map(|item| match item {
-                Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => {
-                    transfer.shade
-                }
+                Item::Scalar(_, transfer)
+                | Item::Volume(_, _, transfer)
+                | Item::Bricks(_, _, transfer) => transfer.shade,
                 Item::Radiance(_) | Item::Hierarchy(_) => None,
             });
             settings.volume_shade = Some(Some(own.unwrap_or_default()));
@@ -220,8 +229,11 @@ impl EngineFlags {
         if picture.color.iter().any(|pixel| pixel[3] >= 0.5 / 255.0) {
             return Ok(());
         }
-        let left = self.clip.text().map_or(String::new(), |clips| format!(" in what {clips} leaves"));
-        Err(Error::NothingToDraw(format!("the picture is empty: the camera sees no splat that has opacity{left}"))
-            .into())
+        let left =
+            self.clip.text().map_or(String::new(), |clips| format!(" in what {clips} leaves"));
+        Err(Error::NothingToDraw(format!(
+            "the picture is empty: the camera sees no splat that has opacity{left}"
+        ))
+        .into())
     }
 }

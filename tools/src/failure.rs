@@ -35,14 +35,23 @@ pub enum Failure {
 impl Failure {
     /// A result that the operating system would not take.
     pub fn output(file: &Path, error: impl fmt::Display) -> Self {
-        Self::Output { file: file.to_owned(), message: format!("cannot be written: {error}"), hint: None }
+        Self::Output {
+            file: file.to_owned(),
+            message: format!("cannot be written: {error}"),
+            hint: None,
+        }
     }
 
     fn code(&self) -> u8 {
         match self {
-            Self::Output { .. } | Self::Library(Error::Output { .. }) | Self::Incomplete { .. } | Self::Threads(_) => 1,
+            Self::Output { .. }
+            | Self::Library(Error::Output { .. })
+            | Self::Incomplete { .. }
+            | Self::Threads(_) => 1,
             Self::Usage(_) | Self::Library(Error::Argument(_)) => 2,
-            Self::Library(Error::NoAdapter(_) | Error::Gpu(_) | Error::DeviceLost(_) | Error::Memory { .. }) => 4,
+            Self::Library(
+                Error::NoAdapter(_) | Error::Gpu(_) | Error::DeviceLost(_) | Error::Memory { .. },
+            ) => 4,
             Self::Library(
                 Error::Input { .. }
                 | Error::Limit { .. }
@@ -76,19 +85,23 @@ impl Failure {
             Self::Library(Error::Gpu(message)) if message.ends_with("may be taken") => Some(
                 "--gpu-memory allows more; `splatkit convert` makes .splk and .splv files, of which --cut and --budget draw less",
             ),
-            Self::Library(Error::Gpu(_)) => {
-                Some("try a smaller --size, or another --gpu (`software` is one); --gpu-timeout waits longer")
-            }
+            Self::Library(Error::Gpu(_)) => Some(
+                "try a smaller --size, or another --gpu (`software` is one); --gpu-timeout waits longer",
+            ),
             Self::Library(Error::DeviceLost(_)) => Some(
                 "the driver was reset, or its memory ran out: try again, a smaller --size, or another --gpu (`software` is one)",
             ),
             Self::Library(Error::NothingToDraw(_)) => Some(
                 "`splatkit info` tells what a file holds; --transfer, --range, --clip and the camera decide what is seen",
             ),
-            Self::Library(Error::Argument(_)) | Self::Usage(_) => Some("`splatkit help` lists the options"),
+            Self::Library(Error::Argument(_)) | Self::Usage(_) => {
+                Some("`splatkit help` lists the options")
+            }
             Self::Library(Error::File { .. }) | Self::Comparison(_) => None,
             Self::Damaged { .. } => Some("make it again from its source, or fetch it again"),
-            Self::Threads(_) => Some("end other programs, raise `ulimit -u`, or set RAYON_NUM_THREADS=1"),
+            Self::Threads(_) => {
+                Some("end other programs, raise `ulimit -u`, or set RAYON_NUM_THREADS=1")
+            }
             Self::Incomplete { .. } => Some("the tables tell the reason of each"),
             Self::Output { hint, .. } => *hint,
         };
@@ -99,8 +112,10 @@ impl Failure {
     pub fn report(self) -> ExitCode {
         let is_terminal = io::stderr().is_terminal();
         // An error only where there is a hook already.
-        miette::set_hook(Box::new(move |_| Box::new(miette::MietteHandlerOpts::new().wrap_lines(is_terminal).build())))
-            .ok();
+        miette::set_hook(Box::new(move |_| {
+            Box::new(miette::MietteHandlerOpts::new().wrap_lines(is_terminal).build())
+        }))
+        .ok();
         // Who reads stderr may be gone already.
         writeln!(io::stderr(), "{:?}", miette::Report::new(Printed::of(&self))).ok();
         ExitCode::from(self.code())
@@ -124,7 +139,10 @@ impl Printed {
     fn of(failure: &Failure) -> Self {
         let message = failure.to_string();
         let message = if failure.has_lines() { safe_lines(&message) } else { safe(&message) };
-        Self { message: message.into_owned(), hint: failure.hint().map(|hint| safe(&hint).into_owned()) }
+        Self {
+            message: message.into_owned(),
+            hint: failure.hint().map(|hint| safe(&hint).into_owned()),
+        }
     }
 }
 
@@ -168,7 +186,9 @@ impl fmt::Display for Failure {
             Self::Library(error) => error.fmt(out),
             Self::Usage(message) | Self::Comparison(message) => out.write_str(message),
             Self::Threads(reason) => write!(out, "no threads can be started: {reason}"),
-            Self::Damaged { file, findings } => write!(out, "{}: {findings} findings", file.display()),
+            Self::Damaged { file, findings } => {
+                write!(out, "{}: {findings} findings", file.display())
+            }
             Self::Incomplete { failed, kept } => {
                 write!(out, "{failed} of the cases could not be drawn")?;
                 kept.iter().try_for_each(|file| write!(out, "; {} is as it was", file.display()))

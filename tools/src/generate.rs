@@ -64,7 +64,9 @@ fn what(name: &str) -> Result<What, String> {
     if name == "scan" {
         return Ok(What::Scan);
     }
-    Phantom::named(name).map(What::Phantom).ok_or_else(|| format!("use {} or scan", Phantom::NAMES.join(", ")))
+    Phantom::named(name)
+        .map(What::Phantom)
+        .ok_or_else(|| format!("use {} or scan", Phantom::NAMES.join(", ")))
 }
 
 fn target(text: &str) -> Result<PathBuf, String> {
@@ -80,7 +82,8 @@ impl Generate {
         output::check(&self.output, self.overwrite)?;
         output::try_writing(&self.output, self.from.as_slice())?;
         progress.stage(format!("Making {}", self.output.display()));
-        let extension = self.output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+        let extension =
+            self.output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
         match (self.what, &self.from, extension) {
             (What::Scan, Some(from), "ply") => {
                 let limits = LimitFlags::default().whole(memory::most());
@@ -88,13 +91,20 @@ impl Generate {
                 let mesh = io::read_mesh(&source)?;
                 output::check_unneeded(&self.output, &source.files())?;
                 if mesh.triangles.is_empty() {
-                    let message = format!("{} has no triangles that could be cut in more", from.display());
+                    let message =
+                        format!("{} has no triangles that could be cut in more", from.display());
                     return Err(Error::Argument(message).into());
                 }
                 disk::write(&self.output, &scan::ply(&scan::scan(&mesh, self.points as usize)))?;
             }
-            (What::Scan, ..) => return Err(Failure::Usage("a scan is made --from a mesh and written as .ply".into())),
-            (_, _, "ply") => return Err(Failure::Usage("phantoms are written as .nrrd, .vtr or .csv".into())),
+            (What::Scan, ..) => {
+                return Err(Failure::Usage(
+                    "a scan is made --from a mesh and written as .ply".into(),
+                ));
+            }
+            (_, _, "ply") => {
+                return Err(Failure::Usage("phantoms are written as .nrrd, .vtr or .csv".into()));
+            }
             (What::Phantom(phantom), _, "csv") => {
                 disk::write_with(&self.output, |out| scattered(phantom, self.points, out))?;
             }
@@ -102,10 +112,15 @@ impl Generate {
                 check_dims(self.dims, AS_TEXT)?;
                 disk::write_with(&self.output, |out| rectilinear(phantom, self.dims, out))?;
             }
-            (What::Phantom(phantom), ..) if self.sample_type == Type::U8 => self.bytes(phantom, progress)?,
+            (What::Phantom(phantom), ..) if self.sample_type == Type::U8 => {
+                self.bytes(phantom, progress)?
+            }
             (What::Phantom(phantom), ..) => {
                 let [x, ..] = self.dims;
-                check_dims(if matches!(self.lattice, Places::Bcc) { [x; 3] } else { self.dims }, AS_NUMBERS)?;
+                check_dims(
+                    if matches!(self.lattice, Places::Bcc) { [x; 3] } else { self.dims },
+                    AS_NUMBERS,
+                )?;
                 let volume = self.volume(phantom).map_err(Error::Argument)?;
                 io::nrrd::write(&volume, &self.output)?;
             }
@@ -116,8 +131,7 @@ impl Generate {
     /// Writes bytes slice by slice.
     fn bytes(&self, phantom: Phantom, progress: &Progress) -> Result<(), Failure> {
         if matches!(self.lattice, Places::Bcc) || phantom == Phantom::Head {
-            let message =
-                "--type u8 is for Cartesian lattices and for phantoms with values in 0 to 1: not for bcc and head";
+            let message = "--type u8 is for Cartesian lattices and for phantoms with values in 0 to 1: not for bcc and head";
             return Err(Failure::Usage(message.into()));
         }
         // A slice at a time.
@@ -150,13 +164,17 @@ const AS_TEXT: u64 = 64;
 fn check_dims(dims: [usize; 3], bytes: u64) -> Result<(), Failure> {
     if dims.contains(&0) {
         let [x, y, z] = dims;
-        return Err(Failure::Usage(format!("--dims: a volume of {x} × {y} × {z} samples holds none")));
+        return Err(Failure::Usage(format!(
+            "--dims: a volume of {x} × {y} × {z} samples holds none"
+        )));
     }
     let samples = dims.iter().try_fold(1u64, |all, &n| all.checked_mul(n as u64));
     let most = memory::most().unwrap_or(u64::MAX).min(io::Limits::default().bytes) / bytes;
     match samples.filter(|&samples| samples <= most) {
         Some(_) => Ok(()),
-        None => Err(Failure::Usage(format!("--dims: from 1 to {most} samples can be made at once"))),
+        None => {
+            Err(Failure::Usage(format!("--dims: from 1 to {most} samples can be made at once")))
+        }
     }
 }
 
@@ -188,7 +206,9 @@ fn rectilinear(phantom: Phantom, dims: [usize; 3], out: &mut impl Write) -> std:
          <RectilinearGrid WholeExtent=\"{extent}\">\n<Piece Extent=\"{extent}\">\n<PointData Scalars=\"value\">"
     )?;
     let [x, y, z] = &places;
-    let points = z.iter().flat_map(|z| y.iter().flat_map(move |y| x.iter().map(move |x| DVec3::new(*x, *y, *z))));
+    let points = z
+        .iter()
+        .flat_map(|z| y.iter().flat_map(move |y| x.iter().map(move |x| DVec3::new(*x, *y, *z))));
     array("Float32", "value", points.map(|p| phantom.value(p)), out)?;
     writeln!(out, "</PointData>\n<Coordinates>")?;
     for (name, places) in ["x", "y", "z"].iter().zip(&places) {
@@ -197,7 +217,12 @@ fn rectilinear(phantom: Phantom, dims: [usize; 3], out: &mut impl Write) -> std:
     writeln!(out, "</Coordinates>\n</Piece>\n</RectilinearGrid>\n</VTKFile>")
 }
 
-fn array(kind: &str, name: &str, values: impl Iterator<Item = f64>, out: &mut impl Write) -> std::io::Result<()> {
+fn array(
+    kind: &str,
+    name: &str,
+    values: impl Iterator<Item = f64>,
+    out: &mut impl Write,
+) -> std::io::Result<()> {
     write!(out, "<DataArray type=\"{kind}\" Name=\"{name}\" format=\"ascii\">")?;
     for (number, value) in values.enumerate() {
         write!(out, "{}{value:.7}", if number > 0 { " " } else { "" })?;
@@ -255,6 +280,11 @@ mod tests {
     fn scattered_samples_are_a_table() {
         let table = text(|out| scattered(Phantom::Ball, 3, out));
         assert_eq!((table.lines().count(), table.lines().next()), (4, Some("x,y,z,value")));
-        assert!(table.lines().skip(1).all(|line| line.split(',').all(|part| part.parse::<f64>().is_ok())));
+        assert!(
+            table
+                .lines()
+                .skip(1)
+                .all(|line| line.split(',').all(|part| part.parse::<f64>().is_ok()))
+        );
     }
 }

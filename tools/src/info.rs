@@ -39,7 +39,9 @@ impl Info {
             Input::Mesh(mesh) => (mesh.positions.len(), of_mesh(mesh)),
             Input::Volume(volume) => (volume.len(), of_volume(volume)),
             Input::Samples(points) => (points.len(), of_samples(points)),
-            Input::Hierarchy(hierarchy) => (hierarchy.header().source_points as usize, of_hierarchy(hierarchy)),
+            Input::Hierarchy(hierarchy) => {
+                (hierarchy.header().source_points as usize, of_hierarchy(hierarchy))
+            }
             Input::Bricks(bricks) => (bricks.header().lattice.len(), of_bricks(bricks)),
         };
         facts.insert("file".into(), json!(self.file.to_string_lossy()));
@@ -104,7 +106,10 @@ fn of_mesh(mesh: &Mesh) -> Map<String, Value> {
     facts.insert("triangles".into(), json!(mesh.triangles.len()));
     facts.insert("attributes".into(), json!(attributes));
     facts.insert("materials".into(), json!(mesh.materials.len()));
-    facts.insert("textures".into(), json!(mesh.materials.iter().filter(|m| m.texture.is_some()).count()));
+    facts.insert(
+        "textures".into(),
+        json!(mesh.materials.iter().filter(|m| m.texture.is_some()).count()),
+    );
     facts.insert("bounds".into(), bounds(mesh.bounds()));
     facts
 }
@@ -131,7 +136,10 @@ fn of_bricks(bricks: &Bricks) -> Map<String, Value> {
     facts.insert("type".into(), json!(header.scalar.name()));
     facts.insert("range".into(), json!(header.range));
     facts.insert("levels".into(), json!(bricks.levels().len()));
-    facts.insert("bricks".into(), json!(bricks.levels().iter().map(|level| level.bricks()).sum::<usize>()));
+    facts.insert(
+        "bricks".into(),
+        json!(bricks.levels().iter().map(|level| level.bricks()).sum::<usize>()),
+    );
     for (name, text) in [("unit", &header.unit), ("source", &header.source)] {
         if !text.is_empty() {
             facts.insert(name.into(), json!(text));
@@ -144,10 +152,11 @@ fn of_bricks(bricks: &Bricks) -> Map<String, Value> {
 
 fn of_hierarchy(hierarchy: &Hierarchy) -> Map<String, Value> {
     let header = hierarchy.header();
-    let attributes: Vec<&str> = [("position", true), ("normal", header.has_normals), ("color", header.has_color)]
-        .into_iter()
-        .filter_map(|(name, present)| present.then_some(name))
-        .collect();
+    let attributes: Vec<&str> =
+        [("position", true), ("normal", header.has_normals), ("color", header.has_color)]
+            .into_iter()
+            .filter_map(|(name, present)| present.then_some(name))
+            .collect();
     let mut facts = Map::new();
     facts.insert("kind".into(), json!("hierarchy"));
     facts.insert("splats".into(), json!(header.leaves));
@@ -193,9 +202,11 @@ fn plain(value: &Value) -> String {
     match value {
         Value::String(text) => safe(text).into_owned(),
         Value::Array(values) => values.iter().map(plain).collect::<Vec<_>>().join(", "),
-        Value::Object(map) => {
-            map.iter().map(|(name, value)| format!("{name} {}", plain(value))).collect::<Vec<_>>().join("; ")
-        }
+        Value::Object(map) => map
+            .iter()
+            .map(|(name, value)| format!("{name} {}", plain(value)))
+            .collect::<Vec<_>>()
+            .join("; "),
         Value::Number(number) => match number.as_f64().filter(|_| number.is_f64()) {
             Some(float) => format!("{}", (float * 1e6).round() / 1e6),
             None => number.to_string(),

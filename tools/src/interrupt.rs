@@ -12,7 +12,9 @@ const INTERRUPTED: i32 = 130;
 pub fn answer() {
     // Without a thread to run on, a handler would only keep the signal from ending the process.
     if !threads::is_available() {
-        tracing::warn!("the system gives no thread to answer Ctrl-C on: it may leave files that are not whole");
+        tracing::warn!(
+            "the system gives no thread to answer Ctrl-C on: it may leave files that are not whole"
+        );
         return survive_large_files();
     }
     let set = ctrlc::set_handler(|| {

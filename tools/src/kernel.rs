@@ -28,7 +28,8 @@ pub struct KernelFlags {
     sharp: bool,
 }
 
-const NAMES: [&str; 6] = ["gaussian", "b-spline", "hann", "linear", "catmull-rom", "cubic-b-spline"];
+const NAMES: [&str; 6] =
+    ["gaussian", "b-spline", "hann", "linear", "catmull-rom", "cubic-b-spline"];
 
 /// A table of this many bytes is no kernel.
 const MOST_BYTES: usize = 4 << 20;
@@ -37,13 +38,15 @@ impl KernelFlags {
     pub fn kernel(&self, limits: &Limits) -> Result<Kernel, Failure> {
         let name = self.kernel.as_deref().unwrap_or("gaussian");
         if self.sigma.is_some() && name != "gaussian" {
-            return Err(Failure::Usage(format!("--sigma is the Gaussian's; the kernel {name} has none")));
+            return Err(Failure::Usage(format!(
+                "--sigma is the Gaussian's; the kernel {name} has none"
+            )));
         }
         if let Some(tensor) = Tensor::ALL.into_iter().find(|tensor| tensor.name() == name) {
             return match self.extent {
-                Some(_) => {
-                    Err(Failure::Usage(format!("the kernel {name} has an extent of its own; leave out --extent")))
-                }
+                Some(_) => Err(Failure::Usage(format!(
+                    "the kernel {name} has an extent of its own; leave out --extent"
+                ))),
                 None => Ok(Kernel::tensor(tensor)),
             };
         }
@@ -53,17 +56,22 @@ impl KernelFlags {
             "hann" => Kernel::hann(self.extent.unwrap_or(3.0))?,
             file if Path::new(file).extension().is_some() || Path::new(file).exists() => {
                 let extent = self.extent.ok_or_else(|| {
-                    Failure::Usage(format!("{file}: a kernel of one's own needs --extent, where its last value lies"))
+                    Failure::Usage(format!(
+                        "{file}: a kernel of one's own needs --extent, where its last value lies"
+                    ))
                 })?;
                 // An extent that is wrong is not the file's fault.
                 Kernel::table(vec![1.0, 0.0], extent)?;
                 let file = Path::new(file);
-                Kernel::table(read_table(file, limits)?, extent)
-                    .map_err(|error| in_file(file, error).hint("the form is a JSON array, or one number in a line"))?
+                Kernel::table(read_table(file, limits)?, extent).map_err(|error| {
+                    in_file(file, error).hint("the form is a JSON array, or one number in a line")
+                })?
             }
             _ => {
                 let names = NAMES.join(", ");
-                return Err(Failure::Usage(format!("there is no kernel “{name}”; there are {names}, and files")));
+                return Err(Failure::Usage(format!(
+                    "there is no kernel “{name}”; there are {names}, and files"
+                )));
             }
         })
     }
@@ -98,8 +106,10 @@ fn read_table(path: &Path, limits: &Limits) -> splatkit::Result<Vec<f64>> {
     let text = text.replace("\r\n", "\n").replace('\r', "\n");
     let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let number = |(at, line): (usize, &str)| {
-        let error = || source.error(format!("line {}", at + 1), format!("“{}” is no number", line.trim()));
-        parse::finite(line.trim()).map_err(|_| error().hint("the form is a JSON array, or one number in a line"))
+        let error =
+            || source.error(format!("line {}", at + 1), format!("“{}” is no number", line.trim()));
+        parse::finite(line.trim())
+            .map_err(|_| error().hint("the form is a JSON array, or one number in a line"))
     };
     lines.map(number).collect()
 }

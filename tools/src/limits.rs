@@ -77,8 +77,9 @@ pub fn hint(file: &Path, kind: LimitKind, found: u64) -> String {
 /// The bytes of a file that are far too few for what it claims.
 fn too_few_bytes(file: &Path, kind: LimitKind, found: u64) -> Option<u64> {
     // The data of these may be in other files.
-    let refers =
-        file.extension().is_some_and(|e| ["gltf", "nrrd", "nhdr", "obj"].iter().any(|o| e.eq_ignore_ascii_case(o)));
+    let refers = file
+        .extension()
+        .is_some_and(|e| ["gltf", "nrrd", "nhdr", "obj"].iter().any(|o| e.eq_ignore_ascii_case(o)));
     // A packed point takes a part of a byte at least. A byte unpacks to a thousand, which may take several hundred each.
     let most = if kind == LimitKind::Points { 64 } else { 1 << 20 };
     let bytes = file.metadata().ok()?.len();
@@ -102,7 +103,8 @@ mod tests {
             (LimitKind::Texels, "limit-texels"),
             (LimitKind::Seconds, "limit-seconds"),
         ] {
-            let flag = command.get_arguments().find(|flag| flag.get_long() == Some(name)).expect(name);
+            let flag =
+                command.get_arguments().find(|flag| flag.get_long() == Some(name)).expect(name);
             let help = flag.get_help().expect("a text").to_string();
             assert!(help.ends_with(&format!("[default: {}]", default.of(kind))), "{help}");
             let told = hint(Path::new("none"), kind, 7);

@@ -75,12 +75,21 @@ impl LoadFlags {
 
     /// Reads a file; where it is read as a whole it may take so many bytes of memory, unless a flag allows more. Adds the file
     /// and those that it refers to to those that were `read`.
-    pub fn open_within(&self, path: &Path, memory: Option<u64>, read: &mut Vec<PathBuf>) -> Result<Input, Failure> {
+    pub fn open_within(
+        &self,
+        path: &Path,
+        memory: Option<u64>,
+        read: &mut Vec<PathBuf>,
+    ) -> Result<Input, Failure> {
         let (limits, whole) = (self.limits(), self.limits.whole(memory));
         let (input, files) = match self.kind(path)? {
             // These refer to no others.
-            Kind::Bricks => (Input::Bricks(Arc::new(Bricks::open(path, &limits)?)), vec![path.to_owned()]),
-            Kind::Hierarchy => (Input::Hierarchy(Arc::new(Hierarchy::open(path, &limits)?)), vec![path.to_owned()]),
+            Kind::Bricks => {
+                (Input::Bricks(Arc::new(Bricks::open(path, &limits)?)), vec![path.to_owned()])
+            }
+            Kind::Hierarchy => {
+                (Input::Hierarchy(Arc::new(Hierarchy::open(path, &limits)?)), vec![path.to_owned()])
+            }
             Kind::Mesh => {
                 let source = Source::open(path, &whole)?;
                 (Input::Mesh(io::read_mesh(&source)?), source.files())
@@ -101,7 +110,9 @@ impl LoadFlags {
     /// What a file holds, sound or not.
     pub fn kind(&self, path: &Path) -> Result<Kind, Failure> {
         let raw = self.layout().map(|_| Kind::Volume);
-        Ok(Kind::of(path, &self.limits(), self.scalar.is_some())?.or(raw).ok_or_else(|| unknown(path))?)
+        Ok(Kind::of(path, &self.limits(), self.scalar.is_some())?
+            .or(raw)
+            .ok_or_else(|| unknown(path))?)
     }
 
     /// Opens a volume that can be read slice by slice; none where it is read as a whole.

@@ -125,7 +125,10 @@ fn main() -> ExitCode {
 }
 
 /// Mesa's drivers complain on stderr where the folder for a user's sockets is not set, as on servers. They need none.
-#[cfg_attr(unix, expect(unsafe_code, reason = "the environment may be changed while there is one thread"))]
+#[cfg_attr(
+    unix,
+    expect(unsafe_code, reason = "the environment may be changed while there is one thread")
+)]
 fn quiet_drivers() {
     #[cfg(unix)]
     if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
@@ -138,17 +141,21 @@ fn quiet_drivers() {
 /// Prints what clap answers instead of a command: a help text, the version, or what is wrong with the arguments.
 fn tell(answer: &clap::Error) -> ExitCode {
     if answer.use_stderr() {
-        let is_plain = |argument: std::ffi::OsString| terminal::is_safe(&argument.to_string_lossy());
+        let is_plain =
+            |argument: std::ffi::OsString| terminal::is_safe(&argument.to_string_lossy());
         if std::env::args_os().all(is_plain) {
             answer.print().ok();
         } else {
             // Without colours, since those cannot be told from what arguments hold.
-            write!(std::io::stderr(), "{}", terminal::safe_lines(&answer.render().to_string())).ok();
+            write!(std::io::stderr(), "{}", terminal::safe_lines(&answer.render().to_string()))
+                .ok();
         }
         return u8::try_from(answer.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from);
     }
     match answer.print().and_then(|()| std::io::stdout().flush()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Failure::output(Path::new("stdout"), error).report(),
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Failure::output(Path::new("stdout"), error).report()
+        }
         _ => ExitCode::SUCCESS,
     }
 }
@@ -161,8 +168,10 @@ fn start_log(command: &Command) {
         (_, 1) => "error,splatkit=info",
         (_, _) => "warn,splatkit=trace",
     };
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| default.into());
-    let colored = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
+    let filter =
+        tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| default.into());
+    let colored = std::io::stderr().is_terminal()
+        && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .fmt_fields(terminal::SafeFields)

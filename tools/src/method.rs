@@ -65,7 +65,9 @@ impl MethodFlags {
     /// What is wrong whatever the scene.
     pub fn check(&self) -> Result<(), Failure> {
         if self.back_to_front && self.mode != Mode::Splats {
-            return Err(Failure::Usage("--back-to-front is an order of single splats: it needs --mode splats".into()));
+            return Err(Failure::Usage(
+                "--back-to-front is an order of single splats: it needs --mode splats".into(),
+            ));
         }
         Ok(())
     }

@@ -62,8 +62,9 @@ impl Target {
 
 /// Refuses a file that is there already, and a folder that is not, before the work is done.
 pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
-    let refuse =
-        |message: &str, hint| Err(Failure::Output { file: path.to_owned(), message: message.into(), hint: Some(hint) });
+    let refuse = |message: &str, hint| {
+        Err(Failure::Output { file: path.to_owned(), message: message.into(), hint: Some(hint) })
+    };
     if path.is_dir() {
         return refuse("is a folder", "give the name of a file");
     }
@@ -112,7 +113,9 @@ fn folder(path: &Path) -> &Path {
 pub fn stdout(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::output(Path::new("stdout"), e)),
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Failure::output(Path::new("stdout"), e))
+        }
         _ => Ok(()),
     }
 }

@@ -8,15 +8,24 @@ use splatkit::{
 use std::str::FromStr;
 
 /// Numbers with a separator, exactly as many as asked for.
-pub fn numbers<T: FromStr, const N: usize>(text: &str, separator: char, form: &str) -> Result<[T; N], String> {
-    let parts: Option<Vec<T>> = text.split(separator).map(|part| part.trim().parse().ok()).collect();
+pub fn numbers<T: FromStr, const N: usize>(
+    text: &str,
+    separator: char,
+    form: &str,
+) -> Result<[T; N], String> {
+    let parts: Option<Vec<T>> =
+        text.split(separator).map(|part| part.trim().parse().ok()).collect();
     parts.and_then(|parts| parts.try_into().ok()).ok_or_else(|| format!("the form is {form}"))
 }
 
 /// `1280x720`.
 pub fn size(text: &str) -> Result<[u32; 2], String> {
     let size = numbers(text, 'x', "WIDTHxHEIGHT, such as 1280x720")?;
-    if size.contains(&0) { Err("a picture needs a width and a height above 0".into()) } else { Ok(size) }
+    if size.contains(&0) {
+        Err("a picture needs a width and a height above 0".into())
+    } else {
+        Ok(size)
+    }
 }
 
 /// `256x256x128`, or with commas.
@@ -47,7 +56,11 @@ pub fn range(text: &str) -> Result<[f64; 2], String> {
         return Err("a range is LOW,HIGH with LOW not above HIGH".into());
     }
     // Places in the range are shares of its width.
-    if (high - low).is_finite() { Ok([low, high]) } else { Err("LOW and HIGH are too far apart to subtract".into()) }
+    if (high - low).is_finite() {
+        Ok([low, high])
+    } else {
+        Err("LOW and HIGH are too far apart to subtract".into())
+    }
 }
 
 /// `#rrggbb`, with or without `#`; `none` keeps the picture's opacity.
@@ -61,7 +74,9 @@ pub fn background(text: &str) -> Result<Background, String> {
 /// `#rrggbb`, with or without `#`.
 pub fn color(text: &str) -> Result<[f32; 3], String> {
     let digits = text.strip_prefix('#').unwrap_or(text);
-    let bytes = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6 && !digits.starts_with('+'));
+    let bytes = u32::from_str_radix(digits, 16)
+        .ok()
+        .filter(|_| digits.len() == 6 && !digits.starts_with('+'));
     let [_, red, green, blue] = bytes.ok_or("the form is '#rrggbb'")?.to_be_bytes();
     Ok([red, green, blue].map(|channel| f32::from(channel) / 255.0))
 }
@@ -87,29 +102,41 @@ pub fn axis(text: &str) -> Result<DVec3, String> {
 
 /// A number above 0.
 pub fn positive(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite()).ok_or_else(|| "a number above 0 is needed".into())
+    text.parse()
+        .ok()
+        .filter(|v: &f64| *v > 0.0 && v.is_finite())
+        .ok_or_else(|| "a number above 0 is needed".into())
 }
 
 /// A factor on radii.
 pub fn radius_scale(text: &str) -> Result<f32, String> {
     let scales = SurfelOptions::RADIUS_SCALES;
     let fits = text.parse().ok().filter(|scale| scales.contains(scale));
-    fits.ok_or_else(|| format!("a number from {:e} to {:e} is needed", scales.start(), scales.end()))
+    fits.ok_or_else(|| {
+        format!("a number from {:e} to {:e} is needed", scales.start(), scales.end())
+    })
 }
 
 /// Neighbours of a sample.
 pub fn neighbours(text: &str) -> Result<usize, String> {
-    text.parse().ok().filter(|count| (4..=64).contains(count)).ok_or_else(|| "a number from 4 to 64 is needed".into())
+    text.parse()
+        .ok()
+        .filter(|count| (4..=64).contains(count))
+        .ok_or_else(|| "a number from 4 to 64 is needed".into())
 }
 
 /// A number that is not below 0.
 pub fn not_negative(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|v: &f64| *v >= 0.0 && v.is_finite()).ok_or_else(|| "a number from 0 on is needed".into())
+    text.parse()
+        .ok()
+        .filter(|v: &f64| *v >= 0.0 && v.is_finite())
+        .ok_or_else(|| "a number from 0 on is needed".into())
 }
 
 /// `1000000`, `512MiB`, `1.5GiB`, …
 pub fn bytes(text: &str) -> Result<u64, String> {
-    let (number, unit) = text.split_at(text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len()));
+    let (number, unit) =
+        text.split_at(text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len()));
     let factor = match unit.to_ascii_lowercase().as_str() {
         "" | "b" => 1.0,
         "k" | "kib" => 1024.0,
@@ -117,7 +144,8 @@ pub fn bytes(text: &str) -> Result<u64, String> {
         "g" | "gib" => 1024.0 * 1024.0 * 1024.0,
         _ => return Err("the units are KiB, MiB and GiB".into()),
     };
-    let number = positive(number.trim()).map_err(|_| "a number of bytes, such as 512MiB, is needed".to_owned())?;
+    let number = positive(number.trim())
+        .map_err(|_| "a number of bytes, such as 512MiB, is needed".to_owned())?;
     Ok((number * factor) as u64)
 }
 
@@ -136,7 +164,8 @@ pub fn view_angle(text: &str) -> Result<f64, String> {
 
 /// `u8`, `i16`, `f32`, …
 pub fn sample_type(text: &str) -> Result<SampleType, String> {
-    SampleType::from_name(text).ok_or_else(|| "use u8, i8, u16, i16, u32, i32, u64, i64, f32 or f64".into())
+    SampleType::from_name(text)
+        .ok_or_else(|| "use u8, i8, u16, i16, u32, i32, u64, i64, f32 or f64".into())
 }
 
 /// `little` or `big`.
@@ -172,8 +201,15 @@ mod tests {
     fn colours_and_axes() {
         assert_eq!(background("#ff0080"), Ok(Background(Some([1.0, 0.0, 128.0 / 255.0]))));
         assert_eq!(background("NONE"), Ok(Background(None)));
-        assert!(background("#ff00").is_err() && background("+ff008").is_err() && background("#gg0000").is_err());
-        assert_eq!((axis("+Z"), axis("-x"), axis("Y")), (Ok(DVec3::Z), Ok(DVec3::NEG_X), Ok(DVec3::Y)));
+        assert!(
+            background("#ff00").is_err()
+                && background("+ff008").is_err()
+                && background("#gg0000").is_err()
+        );
+        assert_eq!(
+            (axis("+Z"), axis("-x"), axis("Y")),
+            (Ok(DVec3::Z), Ok(DVec3::NEG_X), Ok(DVec3::Y))
+        );
         assert!(axis("+W").is_err() && axis("").is_err());
     }
 }

@@ -12,7 +12,9 @@ use crate::{
     scene::{Loaded, SceneFlags},
 };
 use clap::Args;
-use splatkit::{Renderer, disk, engine::FrameStats, math::Camera, picture::Picture, reference, scene::Settings};
+use splatkit::{
+    Renderer, disk, engine::FrameStats, math::Camera, picture::Picture, reference, scene::Settings,
+};
 use std::{
     path::{Path, PathBuf},
     time::Instant,
@@ -62,7 +64,11 @@ pub enum Drawer {
 
 impl Drawer {
     /// An engine with a scene prepared.
-    pub fn engine(flags: &EngineFlags, loaded: &Loaded, progress: &Progress) -> Result<Self, Failure> {
+    pub fn engine(
+        flags: &EngineFlags,
+        loaded: &Loaded,
+        progress: &Progress,
+    ) -> Result<Self, Failure> {
         progress.stage("Opening the device");
         let device = flags.device(&loaded.scene)?;
         progress.stage("Preparing the scene");
@@ -85,7 +91,9 @@ impl Drawer {
     ) -> splatkit::Result<(Picture, FrameStats)> {
         match self {
             Self::Engine(renderer) => renderer.render(camera, settings),
-            Self::Reference => Ok((reference::render(&loaded.scene, camera, settings)?, FrameStats::default())),
+            Self::Reference => {
+                Ok((reference::render(&loaded.scene, camera, settings)?, FrameStats::default()))
+            }
         }
     }
 }
@@ -175,17 +183,26 @@ impl Render {
             return Err(Failure::Usage("the frames of a turntable cannot go to stdout".into()));
         }
         if let Some(depth) = &self.depth {
-            if splatkit::picture::PictureFormat::of(depth)? != splatkit::picture::PictureFormat::Png {
-                return Err(Failure::Usage(format!("{}: depths are written as .png", depth.display())));
+            if splatkit::picture::PictureFormat::of(depth)? != splatkit::picture::PictureFormat::Png
+            {
+                return Err(Failure::Usage(format!(
+                    "{}: depths are written as .png",
+                    depth.display()
+                )));
             }
             output::check(depth, self.overwrite)?;
         }
         let names: Vec<PathBuf> = match self.turntable {
             None => vec![self.output.clone()],
-            Some(_) => (0..frames).map(|frame| numbered(&self.output, frame)).collect::<Result<_, _>>()?,
+            Some(_) => {
+                (0..frames).map(|frame| numbered(&self.output, frame)).collect::<Result<_, _>>()?
+            }
         };
-        if let Some(depth) = self.depth.as_ref().filter(|depth| names.iter().any(|name| is_same(name, depth))) {
-            let message = format!("{}: the picture and its depths would be one file", depth.display());
+        if let Some(depth) =
+            self.depth.as_ref().filter(|depth| names.iter().any(|name| is_same(name, depth)))
+        {
+            let message =
+                format!("{}: the picture and its depths would be one file", depth.display());
             return Err(Failure::Usage(message));
         }
         let targets: Vec<Target> =
@@ -201,7 +218,8 @@ impl Render {
 /// Whether two paths, of which the files may not be there yet, are one: by their folders and their names.
 fn is_same(a: &Path, b: &Path) -> bool {
     let folder = |path: &Path| {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder =
+            path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         folder.canonicalize().unwrap_or_else(|_| folder.to_owned())
     };
     a.file_name() == b.file_name() && folder(a) == folder(b)
@@ -229,7 +247,9 @@ fn numbered(path: &Path, frame: u32) -> Result<PathBuf, Failure> {
         Some(digits) => digits.parse().ok().filter(|width| *width <= 20),
     });
     match (parts, width) {
-        (Some((_, after)), Some(width)) => Ok(path.with_file_name(format!("{before}{frame:0width$}{after}"))),
+        (Some((_, after)), Some(width)) => {
+            Ok(path.with_file_name(format!("{before}{frame:0width$}{after}")))
+        }
         _ => Err(Failure::Usage(format!("{}: write {{frame}} or {{frame:04}}", path.display()))),
     }
 }
@@ -240,11 +260,16 @@ mod tests {
 
     #[test]
     fn frames_are_numbered() {
-        let name = |text: &str| numbered(Path::new(text), 7).map(|path| path.display().to_string()).ok();
+        let name =
+            |text: &str| numbered(Path::new(text), 7).map(|path| path.display().to_string()).ok();
         assert_eq!(name("a/out.png").as_deref(), Some("a/out_0007.png"));
         assert_eq!(name("a/{frame}.png").as_deref(), Some("a/7.png"));
         assert_eq!(name("a/x{frame:03}y.jpg").as_deref(), Some("a/x007y.jpg"));
-        assert!(name("{frame:x}.png").is_none() && name("{frames}.png").is_none() && name("{frame.png").is_none());
+        assert!(
+            name("{frame:x}.png").is_none()
+                && name("{frames}.png").is_none()
+                && name("{frame.png").is_none()
+        );
         assert!(name("{frame:99999}.png").is_none());
     }
 

@@ -62,13 +62,17 @@ impl Table {
     }
 
     pub fn markdown(&self) -> String {
-        let line = |cells: &mut dyn Iterator<Item = String>| format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "));
+        let line = |cells: &mut dyn Iterator<Item = String>| {
+            format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
+        };
         let rule = |at: usize| if at == 0 { "---".to_owned() } else { "---:".to_owned() };
         let mut text = format!("**{}** {}\n\n", self.title, self.note);
         text += &line(&mut self.columns.iter().cloned());
         text += &line(&mut (0..self.columns.len()).map(rule));
         for (name, cells) in &self.rows {
-            text += &line(&mut std::iter::once(name.clone()).chain(cells.iter().map(|cell| cell.text())));
+            text += &line(
+                &mut std::iter::once(name.clone()).chain(cells.iter().map(|cell| cell.text())),
+            );
         }
         text
     }
@@ -92,7 +96,9 @@ impl Report {
 
     /// A page of tables with these in place of those of the same titles, or behind them all; the others stay.
     pub fn among(&self, page: &str) -> String {
-        let title = |text: &str| text.strip_prefix("**").and_then(|text| Some(text.split_once("**")?.0.to_owned()));
+        let title = |text: &str| {
+            text.strip_prefix("**").and_then(|text| Some(text.split_once("**")?.0.to_owned()))
+        };
         let mut parts: Vec<(Option<String>, String)> = Vec::new();
         for line in page.lines() {
             match (title(line), parts.last_mut()) {
@@ -107,7 +113,11 @@ impl Report {
                 None => parts.push((Some(table.title.to_owned()), text)),
             }
         }
-        parts.iter().map(|(_, part)| format!("{}\n", part.trim_end())).collect::<Vec<_>>().join("\n")
+        parts
+            .iter()
+            .map(|(_, part)| format!("{}\n", part.trim_end()))
+            .collect::<Vec<_>>()
+            .join("\n")
     }
 
     pub fn json(&self) -> Value {
@@ -156,7 +166,8 @@ impl Block {
     fn parts(&self) -> Result<[String; 3], Failure> {
         let Self { path, name, start, end } = self;
         let text = Source::open(path, &Limits::default())?.small_text("a document", MOST_BYTES)?;
-        let missing = || Error::input(path, *name, format!("there are no lines “{start}” and “{end}”"));
+        let missing =
+            || Error::input(path, *name, format!("there are no lines “{start}” and “{end}”"));
         let (before, rest) = text.split_once(start).ok_or_else(missing)?;
         let (inside, after) = rest.split_once(end).ok_or_else(missing)?;
         Ok([before, inside.trim(), after].map(str::to_owned))
@@ -171,7 +182,10 @@ mod tests {
     fn tables_are_markdown_and_json() {
         let mut table = Table::new("A", "b.", &["case", "x", "y"]);
         table.row("one", vec![Cell::Number(1.25, 1), Cell::None]);
-        assert_eq!(table.markdown(), "**A** b.\n\n| case | x | y |\n| --- | ---: | ---: |\n| one | 1.2 | – |\n");
+        assert_eq!(
+            table.markdown(),
+            "**A** b.\n\n| case | x | y |\n| --- | ---: | ---: |\n| one | 1.2 | – |\n"
+        );
         assert_eq!(table.json()["rows"][0], json!({ "name": "one", "x": 1.25, "y": null }));
     }
 
@@ -188,7 +202,10 @@ mod tests {
         assert_eq!(all.among(&page), page);
         let some = report(vec![table("A", 3.0)]).among(page.trim());
         assert_eq!(some, report(vec![table("A", 3.0), table("B", 2.0)]).markdown());
-        assert_eq!(report(vec![table("C", 4.0)]).among(&some), some + "\n" + &table("C", 4.0).markdown());
+        assert_eq!(
+            report(vec![table("C", 4.0)]).among(&some),
+            some + "\n" + &table("C", 4.0).markdown()
+        );
         assert_eq!(all.among(""), page);
     }
 
@@ -196,7 +213,9 @@ mod tests {
     fn what_is_edited_meanwhile_stays() {
         let path = std::env::temp_dir().join(format!("splatkit-report-{}.md", std::process::id()));
         let page = |before: &str, inside: &str| {
-            format!("{before}\n<!-- a: written by `splatkit b --write` -->\n\n{inside}\n<!-- end of a -->\nafter\n")
+            format!(
+                "{before}\n<!-- a: written by `splatkit b --write` -->\n\n{inside}\n<!-- end of a -->\nafter\n"
+            )
         };
         std::fs::write(&path, page("before", "old")).unwrap();
         let block = Block::open(&path, "a", "b").unwrap();

@@ -20,7 +20,9 @@ impl Samples {
         let drawn = |factor: u32| u64::from(factor * factor) * u64::from(width) * u64::from(height);
         let most = if has_splats { 8 } else { 4 };
         match self {
-            Self::Auto => (2..=most).rev().find(|factor| drawn(*factor) <= Self::MOST_PIXELS).unwrap_or(1),
+            Self::Auto => {
+                (2..=most).rev().find(|factor| drawn(*factor) <= Self::MOST_PIXELS).unwrap_or(1)
+            }
             Self::Factor(factor) => factor,
         }
     }
@@ -48,7 +50,8 @@ mod tests {
 
     #[test]
     fn small_pictures_take_more_pixels() {
-        let factor = |text: &str, size| Samples::from_str(text).map(|samples| samples.factor(size, true));
+        let factor =
+            |text: &str, size| Samples::from_str(text).map(|samples| samples.factor(size, true));
         assert_eq!(factor("auto", [1, 1]), Ok(8));
         assert_eq!(factor("auto", [64, 64]), Ok(8));
         assert_eq!(factor("auto", [128, 128]), Ok(4));

@@ -12,7 +12,11 @@ const LENGTHS: [f32; 3] = [1.3, 2.1, 3.7];
 /// smooth waves. Positions and triangles alone.
 pub fn scan(mesh: &Mesh, most: usize) -> Mesh {
     let edge = mean_edge(mesh);
-    let mut fine = Mesh { positions: mesh.positions.clone(), triangles: mesh.triangles.clone(), ..Mesh::default() };
+    let mut fine = Mesh {
+        positions: mesh.positions.clone(),
+        triangles: mesh.triangles.clone(),
+        ..Mesh::default()
+    };
     fine.origin = mesh.origin;
     // An edge of a closed mesh belongs to two triangles.
     while fine.positions.len() + fine.triangles.len() * 3 / 2 <= most {
@@ -31,7 +35,8 @@ pub fn scan(mesh: &Mesh, most: usize) -> Mesh {
 }
 
 fn mean_edge(mesh: &Mesh) -> f32 {
-    let first = |t: &[u32; 3]| mesh.positions[t[0] as usize].distance(mesh.positions[t[1] as usize]);
+    let first =
+        |t: &[u32; 3]| mesh.positions[t[0] as usize].distance(mesh.positions[t[1] as usize]);
     mesh.triangles.iter().map(first).sum::<f32>() / mesh.triangles.len().max(1) as f32
 }
 
@@ -41,7 +46,8 @@ fn cut_in_four(mesh: &mut Mesh) {
     for &[a, b, c] in &mesh.triangles {
         let mut middle = |p: u32, q: u32| {
             *middles.entry([p.min(q), p.max(q)]).or_insert_with(|| {
-                mesh.positions.push((mesh.positions[p as usize] + mesh.positions[q as usize]) * 0.5);
+                mesh.positions
+                    .push((mesh.positions[p as usize] + mesh.positions[q as usize]) * 0.5);
                 mesh.positions.len() as u32 - 1
             })
         };

@@ -74,7 +74,8 @@ impl SceneFlags {
                     let mut options = SurfelOptions { deadline, ..SurfelOptions::default() };
                     options.radius_scale *= self.show.radius_scale.unwrap_or(1.0);
                     let splats = mesh.surfels(&options).map_err(|e| in_file(path, e))?;
-                    let bounds = mesh.bounds().map_or(splats.bounds(), |[min, max]| Bounds { min, max });
+                    let bounds =
+                        mesh.bounds().map_or(splats.bounds(), |[min, max]| Bounds { min, max });
                     loaded.add(bounds, splats.splats.len());
                     loaded.scene = loaded.scene.with_splats(splats);
                     if !mesh.z_is_up {
@@ -94,17 +95,22 @@ impl SceneFlags {
                 }
                 Input::Bricks(bricks) => {
                     if show.sharp {
-                        let error = Error::input(path, "content", "a volume in bricks cannot be sharpened");
-                        return Err(error.hint("leave out --sharp, or draw the volume that it was made from").into());
+                        let error =
+                            Error::input(path, "content", "a volume in bricks cannot be sharpened");
+                        return Err(error
+                            .hint("leave out --sharp, or draw the volume that it was made from")
+                            .into());
                     }
                     let overview = bricks.volume(overview(&bricks))?;
                     let range = bricks.header().range;
-                    let transfer = show.transfer(path, range, || TransferFunction::automatic(&overview))?;
+                    let transfer =
+                        show.transfer(path, range, || TransferFunction::automatic(&overview))?;
                     loaded.add(bricks.bounds(), bricks.level(0).dims.iter().product());
                     loaded.scene = loaded.scene.with_bricks(bricks, show.kernel.clone(), transfer);
                 }
                 Input::Volume(volume) => {
-                    let transfer = show.transfer(path, volume.range, || TransferFunction::automatic(&volume))?;
+                    let transfer =
+                        show.transfer(path, volume.range, || TransferFunction::automatic(&volume))?;
                     let [min, max] = volume.bounds();
                     loaded.add(Bounds { min, max }, volume.len());
                     let volume = if show.sharp {
@@ -119,7 +125,9 @@ impl SceneFlags {
                     let automatic = || TransferFunction::automatic_for_points(&points);
                     let transfer = show.transfer(path, points.range(), automatic)?;
                     progress.stage(format!("Making splats of {}", path.display()));
-                    let splats = points.to_splats(&self.load.sample_options(deadline)).map_err(|e| in_file(path, e))?;
+                    let splats = points
+                        .to_splats(&self.load.sample_options(deadline))
+                        .map_err(|e| in_file(path, e))?;
                     let [min, max] = points.bounds();
                     loaded.add(Bounds { min, max }.union(splats.bounds()), points.len());
                     loaded.scene = loaded.scene.with_samples(splats, transfer);
@@ -136,15 +144,21 @@ impl SceneFlags {
         // What cannot be drawn by itself is the fault of its file, or of the flags that say how it is shown.
         let at_fault = |error: Error| -> Failure {
             let items = self.inputs.iter().zip(&loaded.scene.items);
-            let found = items.into_iter().find_map(|(path, item)| Some((path, item.validate().err()?)));
+            let found =
+                items.into_iter().find_map(|(path, item)| Some((path, item.validate().err()?)));
             match (found, self.show.transfer_text()) {
                 (None, _) => error.into(),
-                (Some((path, Error::Argument(what))), Some(flags)) if what.starts_with("the transfer function") => {
+                (Some((path, Error::Argument(what))), Some(flags))
+                    if what.starts_with("the transfer function") =>
+                {
                     if let Some(file) = self.show.own_transfer() {
                         let message = format!("{what}; the values are those of {}", path.display());
                         return Error::input(file, "content", message).into();
                     }
-                    Failure::Usage(format!("{flags}: {what}; the values are those of {}", path.display()))
+                    Failure::Usage(format!(
+                        "{flags}: {what}; the values are those of {}",
+                        path.display()
+                    ))
                 }
                 (Some((path, own)), _) => in_file(path, own).into(),
             }

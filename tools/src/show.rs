@@ -80,13 +80,15 @@ impl ShowFlags {
     /// The file of the transfer function, where no other flag changes what it says.
     pub fn own_transfer(&self) -> Option<&Path> {
         let is_changed = self.range.is_some() || self.opacity_unit.is_some();
-        let named = |name: &&String| !TransferFunction::NAMES.contains(&name.as_str()) && is_file(name);
+        let named =
+            |name: &&String| !TransferFunction::NAMES.contains(&name.as_str()) && is_file(name);
         self.transfer.as_ref().filter(named).filter(|_| !is_changed).map(Path::new)
     }
 
     /// The files that flags name.
     pub fn files(&self) -> Vec<PathBuf> {
-        let transfer = self.transfer.as_ref().filter(|transfer| is_file(transfer)).map(PathBuf::from);
+        let transfer =
+            self.transfer.as_ref().filter(|transfer| is_file(transfer)).map(PathBuf::from);
         transfer.into_iter().chain(self.kernel.file()).collect()
     }
 
@@ -110,13 +112,22 @@ impl ShowFlags {
         if count > most {
             return Err(Failure::Usage(format!("{count} isosurfaces are more than {most}")));
         }
-        Ok(Show { flags: self, kernel: self.kernel.kernel(limits)?, sharp: self.kernel.is_sharp(), transfer })
+        Ok(Show {
+            flags: self,
+            kernel: self.kernel.kernel(limits)?,
+            sharp: self.kernel.is_sharp(),
+            transfer,
+        })
     }
 }
 
 /// A number as one types it.
 fn plain(value: f64) -> String {
-    if value == 0.0 || (1e-4..1e16).contains(&value.abs()) { format!("{value}") } else { format!("{value:e}") }
+    if value == 0.0 || (1e-4..1e16).contains(&value.abs()) {
+        format!("{value}")
+    } else {
+        format!("{value:e}")
+    }
 }
 
 fn is_file(text: &str) -> bool {
@@ -154,7 +165,10 @@ impl Show<'_> {
                 Some([from, to]) => format!("shows values between {from} and {to}"),
                 None => "shows no value".to_owned(),
             };
-            let spread = self.flags.range_text().map_or(String::new(), |range| format!("spread over {range}, "));
+            let spread = self
+                .flags
+                .range_text()
+                .map_or(String::new(), |range| format!("spread over {range}, "));
             return Err(Error::NothingToDraw(format!(
                 "{spread}the transfer function {shown}, but those of {} lie between {low} and {high}",
                 path.display()
@@ -203,10 +217,13 @@ impl Factors {
     /// `0,0:50,0.2:200,1`.
     fn parse(text: &str) -> Result<Self, String> {
         let form = "MAGNITUDE,FACTOR:MAGNITUDE,FACTOR…, such as 0,0:200,1";
-        let points = text.split(':').map(|point| parse::numbers(point, ',', form).map(|[m, factor]| (m, factor)));
+        let points = text
+            .split(':')
+            .map(|point| parse::numbers(point, ',', form).map(|[m, factor]| (m, factor)));
         let gradient = points.collect::<Result<Vec<(f64, f64)>, String>>()?;
         // The library knows what a right one is.
-        let whole = TransferFunction { opacity: vec![(0.0, 1.0)], gradient, ..TransferFunction::default() };
+        let whole =
+            TransferFunction { opacity: vec![(0.0, 1.0)], gradient, ..TransferFunction::default() };
         whole.validate()?;
         Ok(Self(whole.gradient))
     }
@@ -221,17 +238,30 @@ mod tests {
         let surface = |text| Surface::parse(text);
         assert_eq!(surface("-500"), Ok(Surface { value: -500.0, color: None, opacity: 1.0 }));
         assert_eq!(surface("0.5:0.25"), Ok(Surface { value: 0.5, color: None, opacity: 0.25 }));
-        assert_eq!(surface("80:#ff0000"), Ok(Surface { value: 80.0, color: Some([1.0, 0.0, 0.0]), opacity: 1.0 }));
-        assert_eq!(surface("80:#00ff00:0.5"), Ok(Surface { value: 80.0, color: Some([0.0, 1.0, 0.0]), opacity: 0.5 }));
-        for bad in ["", "x", "80:", "80:#ff", "80:0", "80:2", "80:0.5:#ffffff", "80:#ffffff:1:1", "nan"] {
+        assert_eq!(
+            surface("80:#ff0000"),
+            Ok(Surface { value: 80.0, color: Some([1.0, 0.0, 0.0]), opacity: 1.0 })
+        );
+        assert_eq!(
+            surface("80:#00ff00:0.5"),
+            Ok(Surface { value: 80.0, color: Some([0.0, 1.0, 0.0]), opacity: 0.5 })
+        );
+        for bad in
+            ["", "x", "80:", "80:#ff", "80:0", "80:2", "80:0.5:#ffffff", "80:#ffffff:1:1", "nan"]
+        {
             assert!(surface(bad).is_err(), "{bad}");
         }
     }
 
     #[test]
     fn factors_are_read() {
-        assert_eq!(Factors::parse("0,0:50,0.2:200,1"), Ok(Factors(vec![(0.0, 0.0), (50.0, 0.2), (200.0, 1.0)])));
-        for (bad, word) in [("1", "the form is"), ("2,0:1,1", "before"), ("0,2", "0 … 1"), ("-1,0", "0 or more")] {
+        assert_eq!(
+            Factors::parse("0,0:50,0.2:200,1"),
+            Ok(Factors(vec![(0.0, 0.0), (50.0, 0.2), (200.0, 1.0)]))
+        );
+        for (bad, word) in
+            [("1", "the form is"), ("2,0:1,1", "before"), ("0,2", "0 … 1"), ("-1,0", "0 or more")]
+        {
             assert!(Factors::parse(bad).unwrap_err().contains(word), "{bad}");
         }
     }

@@ -126,7 +126,11 @@ impl Line<'_> {
 
 impl Visit for Line<'_> {
     fn record_str(&mut self, field: &Field, value: &str) {
-        if field.name() == "message" { self.add(field, value) } else { self.record_debug(field, &value) }
+        if field.name() == "message" {
+            self.add(field, value)
+        } else {
+            self.record_debug(field, &value)
+        }
     }
 
     fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
@@ -167,7 +171,10 @@ mod tests {
         let text = format!("begin{}end", "µ".repeat(5000));
         let shown = safe(&text);
         assert!(shown.starts_with("beginµ") && shown.ends_with("µend"), "{shown}");
-        assert!(shown.contains("(3008 characters left out)") && shown.chars().count() < MOST + 50, "{shown}");
+        assert!(
+            shown.contains("(3008 characters left out)") && shown.chars().count() < MOST + 50,
+            "{shown}"
+        );
         let text = "µ".repeat(MOST);
         assert_eq!(safe(&text), text);
     }

@@ -14,12 +14,15 @@ const MOST: usize = 1024;
 /// [`Failure::Threads`] where there are threads at first, and then none.
 pub fn start(threads: Option<u32>) -> Result<(), Failure> {
     let processors = thread::available_parallelism().map_or(1, NonZero::get);
-    let variable = || std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.trim().parse().ok());
+    let variable =
+        || std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.trim().parse().ok());
     let asked = threads.map(|threads| threads as usize).or_else(variable);
     let count = count(asked, processors);
     if let Some(asked) = asked.filter(|&asked| asked > count) {
         let name = if threads.is_some() { "--threads " } else { "RAYON_NUM_THREADS=" };
-        tracing::warn!("{name}{asked} is more than {processors} processors can use: {count} threads work");
+        tracing::warn!(
+            "{name}{asked} is more than {processors} processors can use: {count} threads work"
+        );
     }
     // A pool that cannot be built cannot be tried again.
     let had = available(count);
@@ -69,8 +72,14 @@ mod tests {
 
     #[test]
     fn numbers_of_threads_are_sensible() {
-        assert_eq!([None, Some(0), Some(3), Some(100_000)].map(|asked| count(asked, 2)), [2, 2, 3, 8]);
-        assert_eq!([None, Some(1), Some(usize::MAX)].map(|asked| count(asked, 1000)), [1000, 1, 1024]);
+        assert_eq!(
+            [None, Some(0), Some(3), Some(100_000)].map(|asked| count(asked, 2)),
+            [2, 2, 3, 8]
+        );
+        assert_eq!(
+            [None, Some(1), Some(usize::MAX)].map(|asked| count(asked, 1000)),
+            [1000, 1, 1024]
+        );
         assert_eq!(count(None, 2000), 1024);
         assert_eq!(available(4), 4);
     }

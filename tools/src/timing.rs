@@ -13,7 +13,11 @@ impl Times {
     pub fn of(mut times: Vec<f64>) -> Self {
         times.sort_by(f64::total_cmp);
         let middle = times.len() / 2;
-        let median = if times.len() % 2 == 1 { times[middle] } else { 0.5 * (times[middle - 1] + times[middle]) };
+        let median = if times.len() % 2 == 1 {
+            times[middle]
+        } else {
+            0.5 * (times[middle - 1] + times[middle])
+        };
         Self { min: times[0], median, max: times[times.len() - 1] }
     }
 

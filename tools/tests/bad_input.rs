@@ -17,7 +17,10 @@ fn folder(name: &str) -> Folder {
     folder.put("a.ply", PLY);
     folder.put("far.nrrd", floats(|i| if i == 7 { 1e30 } else { i as f32 }));
     folder.put("clear.json", r#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 0], [255, 0]]}"#);
-    folder.put("steep.json", r#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 1]], "gradient": [[5, 1], [2, 0]]}"#);
+    folder.put(
+        "steep.json",
+        r#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 1]], "gradient": [[5, 1], [2, 0]]}"#,
+    );
     folder.put("cone.csv", "1\n0.5\n0\n");
     folder.put("cone.json", "[1, 0.5, 0]");
     folder.put("words.csv", "1\none half\n");
@@ -46,10 +49,14 @@ fn folder(name: &str) -> Folder {
     );
     folder.put("none.pcd", format!("{fields}POINTS 1\nDATA ascii\nnan nan nan\n"));
     folder.put("single.csv", "1\n");
-    folder.put("sudden.json", r#"{"color": [[0, 1, 1, 1], [1e-30, 1, 0, 0]], "opacity": [[0, 1]]}"#);
+    folder
+        .put("sudden.json", r#"{"color": [[0, 1, 1, 1], [1e-30, 1, 0, 0]], "opacity": [[0, 1]]}"#);
     let volume = |lines: &str| format!("NRRD0004\ntype: uint8\ndimension: 3\n{lines}\n");
     folder.put("twice.nrrd", volume("sizes: 2 2 2\nsizes: 2 2 1\nencoding: raw\n") + "12345678");
-    folder.put("twice.nhdr", volume("sizes: 2 2 2\nencoding: raw\ndata file: long.raw\ndatafile: other.raw"));
+    folder.put(
+        "twice.nhdr",
+        volume("sizes: 2 2 2\nencoding: raw\ndata file: long.raw\ndatafile: other.raw"),
+    );
     folder.put("long.nhdr", volume("sizes: 2 2 2\nencoding: raw\ndata file: long.raw"));
     folder.put("long.raw", "123456789");
     folder.put("huge.nrrd", volume("sizes: 1048576 1048576 1\nencoding: raw\n") + "12345678");
@@ -69,7 +76,11 @@ const WRONG: &[(&str, i32, &str)] = &[
         "clear.json: transfer function: a transfer function without opacity shows nothing: every opacity is 0",
     ),
     ("a.nrrd --transfer steep.json", 3, "gradient point 1 is at 2, before the previous one at 5"),
-    ("nan.nrrd", 3, "nan.nrrd: samples: 41 of 4096 samples are not finite, the first is sample 7 (NaN)"),
+    (
+        "nan.nrrd",
+        3,
+        "nan.nrrd: samples: 41 of 4096 samples are not finite, the first is sample 7 (NaN)",
+    ),
     (
         "flat.nrrd --transfer ct-bone",
         3,
@@ -103,12 +114,28 @@ const WRONG: &[(&str, i32, &str)] = &[
     ("comma.xyz", 3, "numbers have points, no decimal commas"),
     ("comma.obj", 3, "comma.obj: line 1: “1,5” is not a number"),
     ("corner.obj", 3, "corner.obj: file: has faces, but none of three corners or more"),
-    ("a.nrrd --transfer lists.json", 3, "lists.json: transfer function: invalid type: sequence, expected f64"),
+    (
+        "a.nrrd --transfer lists.json",
+        3,
+        "lists.json: transfer function: invalid type: sequence, expected f64",
+    ),
     ("lists.gltf", 3, "lists.gltf: JSON: invalid type: sequence"),
-    ("list.nhdr", 3, "list.nhdr: data file: refers to “../a.raw”, which leads out of the file's own folder"),
+    (
+        "list.nhdr",
+        3,
+        "list.nhdr: data file: refers to “../a.raw”, which leads out of the file's own folder",
+    ),
     // Kernels.
-    ("a.nrrd --sigma 0", 2, "invalid value '0' for '--sigma <SAMPLES>': a number above 0 is needed"),
-    ("a.nrrd --sigma 3 --extent 1", 2, "a Gaussian of sigma 3 cut at 1 samples is a block; cut it at 3 or more"),
+    (
+        "a.nrrd --sigma 0",
+        2,
+        "invalid value '0' for '--sigma <SAMPLES>': a number above 0 is needed",
+    ),
+    (
+        "a.nrrd --sigma 3 --extent 1",
+        2,
+        "a Gaussian of sigma 3 cut at 1 samples is a block; cut it at 3 or more",
+    ),
     ("a.nrrd --extent 1000", 2, "a kernel's extent must lie in 0.71 … 16 samples, found 1000"),
     ("a.nrrd --extent 0.5", 2, "a kernel's extent must lie in 0.71 … 16 samples, found 0.5"),
     (
@@ -117,9 +144,17 @@ const WRONG: &[(&str, i32, &str)] = &[
         "there is no kernel “sinc”; there are gaussian, b-spline, hann, linear, catmull-rom, cubic-b-spline, and files",
     ),
     ("a.nrrd --kernel linear --extent 1", 2, "leave out --extent"),
-    ("a.nrrd --kernel linear --classify pre", 2, "the kernel linear is classified after interpolation"),
+    (
+        "a.nrrd --kernel linear --classify pre",
+        2,
+        "the kernel linear is classified after interpolation",
+    ),
     ("a.nrrd --kernel hann --sigma 1", 2, "--sigma is the Gaussian's; the kernel hann has none"),
-    ("a.nrrd --kernel cone.csv", 2, "cone.csv: a kernel of one's own needs --extent, where its last value lies"),
+    (
+        "a.nrrd --kernel cone.csv",
+        2,
+        "cone.csv: a kernel of one's own needs --extent, where its last value lies",
+    ),
     ("a.nrrd --kernel none.csv --extent 2", 3, "none.csv: cannot open"),
     ("a.nrrd --kernel words.csv --extent 2", 3, "words.csv: line 2: “one half” is no number"),
     ("a.nrrd --kernel old.csv --extent 2", 3, "old.csv: line 3: “one half” is no number"),
@@ -128,9 +163,17 @@ const WRONG: &[(&str, i32, &str)] = &[
         3,
         "negative.json: content: a kernel's values must add up to more than 0 help: the form is a JSON array",
     ),
-    ("a.nrrd --kernel single.csv --extent 2", 3, "single.csv: content: a kernel's table has 2 to 65536 finite values"),
+    (
+        "a.nrrd --kernel single.csv --extent 2",
+        3,
+        "single.csv: content: a kernel's table has 2 to 65536 finite values",
+    ),
     ("a.nrrd --kernel negative.json --extent 99", 2, "a kernel's extent must lie in 0.71"),
-    ("a.ply far.nrrd --range 0,4096", 2, "--range 0,4096: the transfer function changes from 0 to 4096, too close"),
+    (
+        "a.ply far.nrrd --range 0,4096",
+        2,
+        "--range 0,4096: the transfer function changes from 0 to 4096, too close",
+    ),
     ("a.nrrd --range 0,1e-9", 2, "the values are those of a.nrrd"),
     (
         "a.nrrd --transfer generic --opacity-unit 1e-300",
@@ -142,9 +185,17 @@ const WRONG: &[(&str, i32, &str)] = &[
         3,
         "sudden.json: content: the transfer function changes from 0 to 0.000000000000000000000000000001, too close together",
     ),
-    ("a.nrrd --transfer sudden.json --range 0,1e-9", 2, "--transfer sudden.json --range 0,1e-9: the transfer"),
+    (
+        "a.nrrd --transfer sudden.json --range 0,1e-9",
+        2,
+        "--transfer sudden.json --range 0,1e-9: the transfer",
+    ),
     // NRRD.
-    ("twice.nrrd", 3, "twice.nrrd: line 5: the field “sizes” is given twice, in line 4 too; it must stand once"),
+    (
+        "twice.nrrd",
+        3,
+        "twice.nrrd: line 5: the field “sizes” is given twice, in line 4 too; it must stand once",
+    ),
     ("twice.nhdr", 3, "twice.nhdr: line 7: the field “datafile” is given twice, in line 6 too"),
     (
         "long.nhdr",
@@ -164,20 +215,44 @@ const WRONG: &[(&str, i32, &str)] = &[
         "nothing to draw: --clip 'box:20,20,20:30,30,30' leaves nothing of the scene, which lies between [0, 0, 0] and [15, 15, 15]",
     ),
     ("a.nrrd --clip x<-100%", 3, "nothing to draw: --clip 'x<-100%' leaves nothing of the scene"),
-    ("a.nrrd --cut-out plane:0,0,1,99", 3, "nothing to draw: --cut-out 'plane:0,0,1,99' leaves nothing of the scene"),
-    ("a.nrrd --clip box:1,1,1:0,2,2", 2, "the first corner of a box must lie below the second on every axis"),
-    ("a.nrrd --clip box:50%,0,0:1,9,9", 2, "a clip box from [7.5, 0, 0] to [1, 9, 9] holds nothing"),
+    (
+        "a.nrrd --cut-out plane:0,0,1,99",
+        3,
+        "nothing to draw: --cut-out 'plane:0,0,1,99' leaves nothing of the scene",
+    ),
+    (
+        "a.nrrd --clip box:1,1,1:0,2,2",
+        2,
+        "the first corner of a box must lie below the second on every axis",
+    ),
+    (
+        "a.nrrd --clip box:50%,0,0:1,9,9",
+        2,
+        "a clip box from [7.5, 0, 0] to [1, 9, 9] holds nothing",
+    ),
     ("a.nrrd --clip plane:0,0,0,1", 2, "a plane needs a direction that is not 0,0,0"),
-    ("a.nrrd --clip plane:1e200,0,0,1", 2, "a plane's direction needs a length from 1e-150 to 1e150"),
+    (
+        "a.nrrd --clip plane:1e200,0,0,1",
+        2,
+        "a plane's direction needs a length from 1e-150 to 1e150",
+    ),
     ("a.nrrd --range=-1e308,1e308", 2, "LOW and HIGH are too far apart to subtract"),
-    ("a.nrrd --clip w<3", 2, "the forms are plane:NX,NY,NZ,OFFSET, box:X0,Y0,Z0:X1,Y1,Z1 and 'x<AT' or 'x>AT'"),
+    (
+        "a.nrrd --clip w<3",
+        2,
+        "the forms are plane:NX,NY,NZ,OFFSET, box:X0,Y0,Z0:X1,Y1,Z1 and 'x<AT' or 'x>AT'",
+    ),
     (
         "a.nrrd --clip x<9 --clip x<9 --clip x<9 --clip x<9 --clip x<9 --cut-out x<1 --cut-out x<1 --cut-out x<1 --cut-out x<1",
         2,
         "9 shapes of --clip and --cut-out are more than 8",
     ),
     // What does not go together.
-    ("a.nrrd --back-to-front", 2, "--back-to-front is an order of single splats: it needs --mode splats"),
+    (
+        "a.nrrd --back-to-front",
+        2,
+        "--back-to-front is an order of single splats: it needs --mode splats",
+    ),
     ("a.nrrd --mip --x-ray", 2, "the argument '--mip' cannot be used with '--x-ray'"),
     (
         "a.nrrd --mode splats --iso 50",
@@ -200,7 +275,11 @@ const WRONG: &[(&str, i32, &str)] = &[
     ("a.nrrd --depth ./out.png", 2, "the picture and its depths would be one file"),
     ("a.nrrd --iso 1,2,3,4,5,6,7,8,9", 2, "9 isosurfaces are more than 8"),
     ("a.nrrd --iso 50:2", 2, "the opacity of a surface lies above 0 and up to 1"),
-    ("a.nrrd --gradient-opacity 5,0:2,1", 2, "gradient point 1 is at 2, before the previous one at 5"),
+    (
+        "a.nrrd --gradient-opacity 5,0:2,1",
+        2,
+        "gradient point 1 is at 2, before the previous one at 5",
+    ),
 ];
 
 #[test]
@@ -219,7 +298,10 @@ fn what_cannot_be_generated_is_told() {
     for (arguments, message) in [
         ("ball -o a.nrrd --dims 18446744073709551615x1x1", "samples can be made at once"),
         ("ball -o a.nrrd --dims 100000x100000x100000", "samples can be made at once"),
-        ("specimen -o a.nrrd --type u8 --dims 4294967295x4294967295x1", "samples can be made at once"),
+        (
+            "specimen -o a.nrrd --type u8 --dims 4294967295x4294967295x1",
+            "samples can be made at once",
+        ),
         ("ball -o a.nrrd --lattice bcc --dims 100000x1x1", "samples can be made at once"),
         ("ball -o a.vtr --dims 1000x1000x1000", "samples can be made at once"),
         ("scan --from cloud.xyz -o a.ply", "cloud.xyz has no triangles that could be cut in more"),
@@ -231,13 +313,21 @@ fn what_cannot_be_generated_is_told() {
 
 /// What is read under a limit that it is over: the arguments, the message, and the flag that the hint names.
 const OVER: &[(&str, &str, &str)] = &[
-    ("info a.ply --limit-points 3", "a.ply: the count of element “vertex” is 4, over the limit of 3", "--limit-points"),
+    (
+        "info a.ply --limit-points 3",
+        "a.ply: the count of element “vertex” is 4, over the limit of 3",
+        "--limit-points",
+    ),
     (
         "check a.ply --limit-points 3",
         "a.ply: the count of element “vertex” is 4, over the limit of 3",
         "--limit-points",
     ),
-    ("render a.ply -o out.png --limit-bytes 99", "a.ply: the file's size in bytes is", "--limit-bytes"),
+    (
+        "render a.ply -o out.png --limit-bytes 99",
+        "a.ply: the file's size in bytes is",
+        "--limit-bytes",
+    ),
     (
         "info a.nrrd --limit-bytes 5000",
         "the size of the header in bytes together with what was read before is 5012, over the limit of 5000",
@@ -253,7 +343,11 @@ const OVER: &[(&str, &str, &str)] = &[
         "deep.gltf: node 2: the depth of nesting is 3, over the limit of 2",
         "--limit-depth",
     ),
-    ("info a.glb --limit-texels 3", "a.glb: image 0: the number of texels is 4, over the limit of 3", "--limit-texels"),
+    (
+        "info a.glb --limit-texels 3",
+        "a.glb: image 0: the number of texels is 4, over the limit of 3",
+        "--limit-texels",
+    ),
     (
         "info a.ply --limit-seconds 0",
         "a.ply: the time for reading, in seconds, is 1, over the limit of 0",
@@ -269,8 +363,16 @@ const OVER: &[(&str, &str, &str)] = &[
         "the time for reading, in seconds, is 1, over the limit of 0",
         "--limit-seconds",
     ),
-    ("info points.csv --limit-points 1", "points.csv: the number of lines is 3, over the limit of 1", "--limit-points"),
-    ("render a.nrrd -o out.png --transfer clear.json --limit-bytes 9", "over the limit of 9", "--limit-bytes"),
+    (
+        "info points.csv --limit-points 1",
+        "points.csv: the number of lines is 3, over the limit of 1",
+        "--limit-points",
+    ),
+    (
+        "render a.nrrd -o out.png --transfer clear.json --limit-bytes 9",
+        "over the limit of 9",
+        "--limit-bytes",
+    ),
     ("info a.splk --limit-points 1", "a.splk: the number of leaves is", "--limit-points"),
     ("info a.splk --limit-bytes 99", "a.splk: the file's size in bytes is", "--limit-bytes"),
     ("info a.splv --limit-bytes 99", "a.splv: the file's size in bytes is", "--limit-bytes"),
@@ -287,11 +389,20 @@ fn each_limit_names_its_flag() {
     folder.put("a.ply", PLY);
     folder.put("a.glb", glb());
     folder.put("points.csv", "x,y,z\n1,2,3\n4,5,6\n");
-    folder.put("deep.gltf", r#"{"asset":{"version":"2.0"},"nodes":[{"children":[1]},{"children":[2]},{}]}"#);
-    let picture = splatkit::picture::Picture { width: 2, height: 2, color: vec![[1.0; 4]; 4], depth: Vec::new() };
+    folder.put(
+        "deep.gltf",
+        r#"{"asset":{"version":"2.0"},"nodes":[{"children":[1]},{"children":[2]},{}]}"#,
+    );
+    let picture = splatkit::picture::Picture {
+        width: 2,
+        height: 2,
+        color: vec![[1.0; 4]; 4],
+        depth: Vec::new(),
+    };
     folder.put("a.png", picture.encode(splatkit::picture::PictureFormat::Png, None).unwrap());
     // 4096 bytes of 7, packed by gzip: stored as they are.
-    let stored = [&[0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 3, 1, 0x00, 0x10, 0xff, 0xef][..], &[7; 4096]].concat();
+    let stored =
+        [&[0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 3, 1, 0x00, 0x10, 0xff, 0xef][..], &[7; 4096]].concat();
     folder.put("packed.gz", stored);
     folder.run("convert a.ply -o a.splk").ok();
     folder.run("convert a.nrrd -o a.splv").ok();
@@ -301,7 +412,8 @@ fn each_limit_names_its_flag() {
         run.fails(3, &[message, &format!("raise {flag}")]);
         // What the hint asks for is enough for what was met.
         let number = |text: &str| text.split(' ').find_map(|word| word.parse::<u64>().ok());
-        let least = told.split_once(&format!("raise {flag} to ")).and_then(|(_, rest)| number(rest));
+        let least =
+            told.split_once(&format!("raise {flag} to ")).and_then(|(_, rest)| number(rest));
         assert!(least.is_some() || flag == &"--limit-seconds", "{arguments}: {told}");
         if let (Some(least), Some((start, _))) = (least, arguments.rsplit_once(' ')) {
             let again = folder.run(&format!("{start} {}", least + 1)).stderr();
@@ -319,21 +431,33 @@ fn pipes_devices_and_folders_are_refused() {
     folder.run("info folder.ply").fails(3, &["folder.ply: path: is not a regular file"]);
     std::os::unix::fs::symlink("/dev/zero", folder.path("zero.ply")).unwrap();
     folder.run("info zero.ply").fails(3, &["zero.ply: path: is not a regular file"]);
-    if std::process::Command::new("mkfifo").arg(folder.path("pipe.ply")).status().is_ok_and(|status| status.success()) {
+    if std::process::Command::new("mkfifo")
+        .arg(folder.path("pipe.ply"))
+        .status()
+        .is_ok_and(|status| status.success())
+    {
         folder.run("info pipe.ply").fails(3, &["pipe.ply: path: is not a regular file"]);
         folder.put("pipe.obj", "mtllib pipe.ply\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-        folder.run("info pipe.obj").fails(3, &["pipe.obj: mtllib: refers to “pipe.ply”, which is not a regular file"]);
+        folder
+            .run("info pipe.obj")
+            .fails(3, &["pipe.obj: mtllib: refers to “pipe.ply”, which is not a regular file"]);
     }
     folder.put("up.obj", "mtllib ../up.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    folder.run("info up.obj").fails(3, &["which leads out of the file's own folder", "put the file beside the one"]);
+    folder
+        .run("info up.obj")
+        .fails(3, &["which leads out of the file's own folder", "put the file beside the one"]);
 }
 
 #[test]
 fn clouds_of_every_text_draw() {
     let folder = Folder::new("clouds");
-    let points: Vec<[usize; 3]> = (0..400).map(|i| [i % 20, i / 20, (i % 20) * (i / 20) / 20]).collect();
-    let lines = |end: &str| points.iter().map(|[x, y, z]| format!("{x} {y} {z}{end}\n")).collect::<String>();
-    let fields = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nVIEWPOINT 9 9 99 1 0 0 0\nPOINTS 400\nDATA ascii\n";
+    let points: Vec<[usize; 3]> =
+        (0..400).map(|i| [i % 20, i / 20, (i % 20) * (i / 20) / 20]).collect();
+    let lines = |end: &str| {
+        points.iter().map(|[x, y, z]| format!("{x} {y} {z}{end}\n")).collect::<String>()
+    };
+    let fields =
+        "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nVIEWPOINT 9 9 99 1 0 0 0\nPOINTS 400\nDATA ascii\n";
     for (name, content) in [
         ("a.xyz", lines("")),
         ("a.txt", lines(" 255 128 0")),
@@ -374,24 +498,30 @@ fn what_is_unusual_draws() {
         "a.nrrd --x-ray",
         "a.nrrd --clip plane:1,1,0,15 --clip y>20% --cut-out box:0,0,0:50%,50%,50%",
     ] {
-        let found = folder.json(&format!("render {arguments} -o out.png --overwrite --json --size 32x24"));
+        let found =
+            folder.json(&format!("render {arguments} -o out.png --overwrite --json --size 32x24"));
         let settings = &found["settings"];
         for name in ["mode", "classify", "optics", "clips"] {
             assert!(!settings[name].is_null(), "{arguments}: {name}: {found}");
         }
-        assert!(arguments.contains("twins") || settings["field"]["kernel"]["extent"].is_f64(), "{found}");
+        assert!(
+            arguments.contains("twins") || settings["field"]["kernel"]["extent"].is_f64(),
+            "{found}"
+        );
     }
     // What several clips leave together is known by the picture.
-    folder
-        .run("render a.nrrd -o none.png --size 32x24 --clip x<30% --clip x>70%")
-        .fails(3, &["the camera sees no splat that has opacity in what --clip 'x<30%' --clip 'x>70%' leaves"]);
+    folder.run("render a.nrrd -o none.png --size 32x24 --clip x<30% --clip x>70%").fails(
+        3,
+        &["the camera sees no splat that has opacity in what --clip 'x<30%' --clip 'x>70%' leaves"],
+    );
 }
 
 /// Scripts cut what a command says: its exit code stays what it is.
 #[test]
 fn errors_that_nobody_reads_keep_their_code() {
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_splatkit"));
-    let mut child = command.args(["info", "gone.ply"]).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    let mut child =
+        command.args(["info", "gone.ply"]).stderr(std::process::Stdio::piped()).spawn().unwrap();
     drop(child.stderr.take());
     assert_eq!(child.wait().unwrap().code(), Some(3));
     // What it logs on the way as well.
@@ -413,15 +543,32 @@ fn hostile_files(folder: &Folder) {
     let rows = "0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n";
     for (name, text) in [
         ("name.ply", format!("ply\nformat ascii 1.0\nelement vertex {HOSTILE}\nend_header\n")),
-        ("comment.ply", format!("ply\nformat ascii 1.0\ncomment TextureFile {HOSTILE}.png\n{elements}{rows}")),
+        (
+            "comment.ply",
+            format!("ply\nformat ascii 1.0\ncomment TextureFile {HOSTILE}.png\n{elements}{rows}"),
+        ),
         ("a.pcd", format!("{HOSTILE} x y z\n")),
         ("a.obj", format!("v 0 0 {HOSTILE}\n")),
         ("b.obj", format!("mtllib {HOSTILE}.mtl\n{OBJ}")),
-        ("a.nrrd", format!("NRRD0004\ntype: {HOSTILE}\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n\n12345678")),
+        (
+            "a.nrrd",
+            format!(
+                "NRRD0004\ntype: {HOSTILE}\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n\n12345678"
+            ),
+        ),
         ("a.csv", format!("x,y,z,value\n1,2,3,{HOSTILE}\n")),
-        ("a.vtk", format!("# vtk DataFile Version 3.0\n\nASCII\nDATASET STRUCTURED_POINTS\n{HOSTILE} 1 2 3\n")),
+        (
+            "a.vtk",
+            format!(
+                "# vtk DataFile Version 3.0\n\nASCII\nDATASET STRUCTURED_POINTS\n{HOSTILE} 1 2 3\n"
+            ),
+        ),
         ("a.vti", "<VTKFile type=\"\u{9b}31m\u{7f}\u{202e}\"></VTKFile>".into()),
-        ("a.gltf", r#"{"asset": {"version": "2.0"}, "extensionsRequired": ["\u001b[31m\u009b32m"]}"#.into()),
+        (
+            "a.gltf",
+            r#"{"asset": {"version": "2.0"}, "extensionsRequired": ["\u001b[31m\u009b32m"]}"#
+                .into(),
+        ),
         ("a.json", r#"{"color": [], "opacity": [], "\u001b[31m\u009b32m": 1}"#.into()),
     ] {
         folder.put(name, text);
@@ -436,12 +583,25 @@ fn no_text_of_a_file_commands_the_terminal() {
     hostile_files(&folder);
     let is_quiet = |run: &Run, what: &str| {
         let printed = run.printed();
-        let found = printed.chars().find(|&c| (c.is_control() && c != '\n') || ('\u{202a}'..='\u{202e}').contains(&c));
+        let found = printed
+            .chars()
+            .find(|&c| (c.is_control() && c != '\n') || ('\u{202a}'..='\u{202e}').contains(&c));
         assert_eq!(found, None, "{what}: {printed:?}");
         printed
     };
     let mut warned = 0;
-    for name in ["name.ply", "comment.ply", "a.pcd", "a.obj", "b.obj", "a.nrrd", "a.csv", "a.vtk", "a.vti", "a.gltf"] {
+    for name in [
+        "name.ply",
+        "comment.ply",
+        "a.pcd",
+        "a.obj",
+        "b.obj",
+        "a.nrrd",
+        "a.csv",
+        "a.vtk",
+        "a.vti",
+        "a.gltf",
+    ] {
         let run = folder.run(&format!("info {name}"));
         let printed = is_quiet(&run, name);
         assert!(printed.contains(r"\u{9b}3"), "{name}: {printed}");
@@ -478,16 +638,30 @@ fn messages_are_whole_lines_and_not_too_long() {
     let folder = Folder::new("lines");
     folder.put(
         "a.gltf",
-        format!(r#"{{"asset": {{"version": "2.0"}}, "extensionsRequired": ["{}"]}}"#, "long ".repeat(50)),
+        format!(
+            r#"{{"asset": {{"version": "2.0"}}, "extensionsRequired": ["{}"]}}"#,
+            "long ".repeat(50)
+        ),
     );
     let run = folder.run("info a.gltf");
-    assert!(run.printed().lines().next().unwrap().ends_with("long  is not supported"), "{}", run.printed());
+    assert!(
+        run.printed().lines().next().unwrap().ends_with("long  is not supported"),
+        "{}",
+        run.printed()
+    );
     folder.put(
         "b.gltf",
-        format!(r#"{{"asset": {{"version": "2.0"}}, "extensionsRequired": ["{}"]}}"#, "x".repeat(1 << 20)),
+        format!(
+            r#"{{"asset": {{"version": "2.0"}}, "extensionsRequired": ["{}"]}}"#,
+            "x".repeat(1 << 20)
+        ),
     );
     let run = folder.run("info b.gltf");
-    assert!(run.printed().len() < 4096 && run.printed().contains("characters left out"), "{}", run.printed().len());
+    assert!(
+        run.printed().len() < 4096 && run.printed().contains("characters left out"),
+        "{}",
+        run.printed().len()
+    );
     run.fails(3, &["b.gltf: extensionsRequired: the extension xxx", "is not supported"]);
 }
 
@@ -497,12 +671,18 @@ fn points_at_one_place_draw() {
     folder.put("one.xyz", "1 2 3\n");
     folder.put("three.xyz", "1 2 3\n1 2 3\n1 2 3\n");
     folder.put("far.xyz", "1e8 2e8 3e8\n1e8 2e8 3e8\n");
-    folder.put("one.nrrd", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1 1 1\nencoding: raw\n\n\x07");
+    folder.put(
+        "one.nrrd",
+        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1 1 1\nencoding: raw\n\n\x07",
+    );
     for name in ["one.xyz", "three.xyz", "far.xyz", "one.nrrd"] {
-        let found = folder.json(&format!("render {name} -o out.png --overwrite --json --size 32x24 --reference"));
+        let found = folder
+            .json(&format!("render {name} -o out.png --overwrite --json --size 32x24 --reference"));
         let number = |vector: &serde_json::Value, axis: usize| vector[axis].as_f64().unwrap();
         let camera = &found["camera"];
-        let way = (0..3).map(|axis| (number(&camera["position"], axis) - number(&camera["focal_point"], axis)).powi(2));
+        let way = (0..3).map(|axis| {
+            (number(&camera["position"], axis) - number(&camera["focal_point"], axis)).powi(2)
+        });
         let distance = way.sum::<f64>().sqrt();
         assert!((1.0..100.0).contains(&distance), "{name}: {found}");
         let file = std::fs::read(folder.path("out.png")).unwrap();
@@ -522,7 +702,11 @@ fn trained_gaussians_are_told() {
         drawn as points";
     for arguments in ["info gaussians.ply", "convert gaussians.ply -o a.splk"] {
         let run = folder.run(arguments);
-        assert!(run.code() == Some(0) && run.stderr().matches(warning).count() == 1, "{arguments}: {}", run.stderr());
+        assert!(
+            run.code() == Some(0) && run.stderr().matches(warning).count() == 1,
+            "{arguments}: {}",
+            run.stderr()
+        );
     }
     assert!(!folder.run("info a.ply").stderr().contains("Gaussians"));
 }
@@ -533,20 +717,34 @@ fn trained_gaussians_are_told() {
 fn a_full_disk_fails_what_is_printed() {
     let folder = Folder::new("full");
     folder.put("a.ply", PLY);
-    for arguments in
-        ["help", "--help", "--version", "help info", "render --help", "info a.ply", "info --json a.ply", "check a.ply"]
-    {
+    for arguments in [
+        "help",
+        "--help",
+        "--version",
+        "help info",
+        "render --help",
+        "info a.ply",
+        "info --json a.ply",
+        "check a.ply",
+    ] {
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_splatkit"));
         command.args(arguments.split(' ')).current_dir(folder.path("")).env("NO_COLOR", "1");
         let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
         let output = command.stdout(full).output().unwrap();
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{arguments}: {message}");
-        assert!(message.contains("stdout: cannot be written: No space left on device"), "{arguments}: {message}");
+        assert!(
+            message.contains("stdout: cannot be written: No space left on device"),
+            "{arguments}: {message}"
+        );
     }
     for arguments in ["help", "--version", "render --help"] {
         let run = folder.run(arguments);
-        assert!(run.code() == Some(0) && run.stdout().contains("splatkit"), "{arguments}: {}", run.printed());
+        assert!(
+            run.code() == Some(0) && run.stdout().contains("splatkit"),
+            "{arguments}: {}",
+            run.printed()
+        );
     }
 }
 
@@ -563,12 +761,29 @@ fn headers_of_two_gigabytes_are_refused_soon() {
         ),
         ("a.nrrd", b"NRRD0004\n# ", "a.nrrd: line 2: the header is longer than 67108864 bytes"),
         ("a.pcd", b"FIELDS x", "a.pcd: line 1: the line is longer than 1048576 bytes"),
-        ("a.vtk", b"# vtk DataFile Version 3.0\n", "a.vtk: byte 27: the line is longer than 1048576 bytes"),
-        ("b.vtk", b"# vtk DataFile Version 3.0\n\nASCII\n", "b.vtk: byte 34: the line is longer than 1048576 bytes"),
-        ("a.npy", b"\x93NUMPY\x02\x00\xf0\xff\xff\x7f", "a.npy: header: is cut off, is longer than 1 MiB"),
+        (
+            "a.vtk",
+            b"# vtk DataFile Version 3.0\n",
+            "a.vtk: byte 27: the line is longer than 1048576 bytes",
+        ),
+        (
+            "b.vtk",
+            b"# vtk DataFile Version 3.0\n\nASCII\n",
+            "b.vtk: byte 34: the line is longer than 1048576 bytes",
+        ),
+        (
+            "a.npy",
+            b"\x93NUMPY\x02\x00\xf0\xff\xff\x7f",
+            "a.npy: header: is cut off, is longer than 1 MiB",
+        ),
     ] {
         folder.put(name, start);
-        std::fs::File::options().write(true).open(folder.path(name)).unwrap().set_len(2 << 30).unwrap();
+        std::fs::File::options()
+            .write(true)
+            .open(folder.path(name))
+            .unwrap()
+            .set_len(2 << 30)
+            .unwrap();
         let begun = std::time::Instant::now();
         let run = folder.run(&format!("info {name}"));
         assert!(begun.elapsed().as_secs() < 8, "{name}: {:?}", begun.elapsed());
@@ -578,5 +793,7 @@ fn headers_of_two_gigabytes_are_refused_soon() {
     }
     // No limit helps a file of a few bytes that claims many points; one helps that has them.
     folder.put("many.ply", PLY.replace("vertex 4", "vertex 4000000000"));
-    folder.run("info many.ply").fails(3, &["over the limit", "cannot hold that: it is cut or damaged"]);
+    folder
+        .run("info many.ply")
+        .fails(3, &["over the limit", "cannot hold that: it is cut or damaged"]);
 }

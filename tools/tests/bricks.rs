@@ -18,10 +18,16 @@ fn volumes_of_any_format_become_bricks() {
     let range = folder.json("info a.vti --json")["range"].clone();
     let slice_by_slice = |arguments: &str| {
         let told = folder.json(&format!("convert {arguments} -o a.splv --overwrite --json"));
-        assert_eq!((told["dims"].clone(), told["type"].as_str()), (serde_json::json!([16, 16, 16]), Some("u8")));
+        assert_eq!(
+            (told["dims"].clone(), told["type"].as_str()),
+            (serde_json::json!([16, 16, 16]), Some("u8"))
+        );
         folder.run("check a.splv").ok();
         let told_of = folder.json("info a.splv --json");
-        assert_eq!((told_of["kind"].as_str(), &told_of["range"]), (Some("volume in bricks"), &range));
+        assert_eq!(
+            (told_of["kind"].as_str(), &told_of["range"]),
+            (Some("volume in bricks"), &range)
+        );
         told["slice_by_slice"].as_bool().unwrap()
     };
     assert!(slice_by_slice("a.raw --dims 16x16x16 --type u8"));
@@ -35,7 +41,10 @@ fn bricks_tell_what_they_hold() {
     folder.put("a.raw", bytes());
     let arguments = "convert a.raw --dims 100x40x70 --type u8 --spacing 1,2,3 -o a.splv --unit mm";
     let expected = folder.json(&format!("{arguments} --dry-run --json"));
-    assert_eq!((expected["slice_by_slice"].as_bool(), expected["type"].as_str()), (Some(true), Some("u8")));
+    assert_eq!(
+        (expected["slice_by_slice"].as_bool(), expected["type"].as_str()),
+        (Some(true), Some("u8"))
+    );
     assert!(!folder.path("a.splv").exists());
     let text = folder.run(arguments).ok().stdout;
     assert!(String::from_utf8_lossy(&text).contains("280000 (100 × 40 × 70, u8)"));
@@ -67,7 +76,10 @@ fn damaged_bricks_are_found() {
     folder.put("flip.splv", &damaged);
     let run = folder.run("check flip.splv");
     let told = run.stdout();
-    assert!(told.contains("error (hash)") && told.contains("error (brick) level 0, brick 23"), "{told}");
+    assert!(
+        told.contains("error (hash)") && told.contains("error (brick) level 0, brick 23"),
+        "{told}"
+    );
     folder.put("cut.splv", &whole[..whole.len() - 7]);
     folder.run("info cut.splv").fails(3, &["cut.splv", "the file is incomplete"]);
     folder.put("not.splv", "text");
@@ -86,11 +98,15 @@ fn what_cannot_be_cut_in_bricks_is_told() {
     folder.run("convert a.nrrd a.nrrd -o a.splv").fails(2, &["one by one"]);
     folder.run("convert a.nrrd -o a.splv --lattice bcc").fails(2, &["--lattice is for"]);
     folder.run("convert a.nrrd -o a.splv --memory 1MiB").fails(2, &["--memory allows more"]);
-    folder.run("convert a.raw --dims 16x16x17 --type u8 -o a.splv").fails(3, &["a.raw", "16 × 16 × 17"]);
-    let nan: Vec<u8> = (0..4096).flat_map(|i| (if i == 7 { f32::NAN } else { 1.0 }).to_le_bytes()).collect();
+    folder
+        .run("convert a.raw --dims 16x16x17 --type u8 -o a.splv")
+        .fails(3, &["a.raw", "16 × 16 × 17"]);
+    let nan: Vec<u8> =
+        (0..4096).flat_map(|i| (if i == 7 { f32::NAN } else { 1.0 }).to_le_bytes()).collect();
     folder.put("nan.nrrd", nrrd("float", &nan));
     folder.run("convert nan.nrrd -o a.splv").fails(3, &["nan.nrrd", "slices 0 to 7", "not finite"]);
-    let mut names: Vec<_> = std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    let mut names: Vec<_> =
+        std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     names.sort();
     assert_eq!(names, ["a.nrrd", "a.ply", "a.raw", "bcc.nrrd", "nan.nrrd"]);
 }

@@ -17,12 +17,20 @@ fn volume(folder: &Folder, name: &str) -> Volume {
 fn volumes_of_any_format_become_nrrd() {
     let folder = Folder::new("convert");
     folder.put("a.raw", ball());
-    for input in
-        [folder.put("a.vti", vti()), folder.put("a.nrrd", nrrd("uint8", &ball())), "a.raw --dims 16x16x16 --type u8"]
-    {
+    for input in [
+        folder.put("a.vti", vti()),
+        folder.put("a.nrrd", nrrd("uint8", &ball())),
+        "a.raw --dims 16x16x16 --type u8",
+    ] {
         let told = folder.json(&format!("convert {input} -o out.nrrd --overwrite --json"));
-        assert_eq!((told["samples_read"].as_u64(), told["samples_written"].as_u64()), (Some(4096), Some(4096)));
-        assert_eq!((told["lattice"].as_str(), told["type"].as_str()), (Some("cartesian"), Some("u8")));
+        assert_eq!(
+            (told["samples_read"].as_u64(), told["samples_written"].as_u64()),
+            (Some(4096), Some(4096))
+        );
+        assert_eq!(
+            (told["lattice"].as_str(), told["type"].as_str()),
+            (Some("cartesian"), Some("u8"))
+        );
         let (read, written) = (volume(&folder, "a.nrrd"), volume(&folder, "out.nrrd"));
         assert_eq!((&read.samples, &read.lattice), (&written.samples, &written.lattice));
     }
@@ -34,14 +42,19 @@ fn body_centred_volumes_are_written_and_read() {
     folder.put("a.vti", vti());
     let text = folder.run("convert a.vti -o bcc.nrrd --lattice bcc").ok().stdout;
     let written = volume(&folder, "bcc.nrrd");
-    assert_eq!((&written.lattice.arrangement, written.lattice.dims), (&Arrangement::BodyCentred, [11, 11, 22]));
+    assert_eq!(
+        (&written.lattice.arrangement, written.lattice.dims),
+        (&Arrangement::BodyCentred, [11, 11, 22])
+    );
     assert!(String::from_utf8_lossy(&text).contains("2662 (11 × 11 × 22, bcc)"));
     // A lattice of the file's own stays.
     folder.run("convert bcc.nrrd -o again.nrrd").ok();
     let again = volume(&folder, "again.nrrd");
     assert_eq!((&again.samples, &again.lattice), (&written.samples, &written.lattice));
     folder.run("convert bcc.nrrd -o again.nrrd --overwrite --lattice bcc").ok();
-    folder.run("convert bcc.nrrd -o cartesian.nrrd --lattice cartesian").fails(2, &["bcc", "cartesian"]);
+    folder
+        .run("convert bcc.nrrd -o cartesian.nrrd --lattice cartesian")
+        .fails(2, &["bcc", "cartesian"]);
 }
 
 #[test]
@@ -54,17 +67,24 @@ fn a_hierarchy_of_a_hierarchy_keeps_what_is_told_of_it() {
     let (a, b) = (open("a.splk"), open("b.splk"));
     assert_eq!((b.header().up, b.header().unit.as_str()), (a.header().up, "mm"));
     let widths = |hierarchy: &Hierarchy| {
-        let mut widths: Vec<f32> = hierarchy.leaves().unwrap().splats.iter().map(|splat| splat.factor[0]).collect();
+        let mut widths: Vec<f32> =
+            hierarchy.leaves().unwrap().splats.iter().map(|splat| splat.factor[0]).collect();
         widths.sort_by(f32::total_cmp);
         widths
     };
     let doubled: Vec<f32> = widths(&a).iter().map(|width| width * 2.0).collect();
     assert_eq!(widths(&b), doubled);
-    folder.run("render a.splk -o a.png --radius-scale 2").fails(2, &["a.splk", "convert it with --radius-scale"]);
+    folder
+        .run("render a.splk -o a.png --radius-scale 2")
+        .fails(2, &["a.splk", "convert it with --radius-scale"]);
     for scale in ["1e-7", "2e6", "0", "-1", "nan"] {
         let number = format!("--radius-scale={scale}");
-        folder.run(&format!("convert a.ply -o c.splk {number}")).fails(2, &["a number from 1e-6 to 1e6 is needed"]);
-        folder.run(&format!("render a.ply -o c.png {number}")).fails(2, &["a number from 1e-6 to 1e6 is needed"]);
+        folder
+            .run(&format!("convert a.ply -o c.splk {number}"))
+            .fails(2, &["a number from 1e-6 to 1e6 is needed"]);
+        folder
+            .run(&format!("render a.ply -o c.png {number}"))
+            .fails(2, &["a number from 1e-6 to 1e6 is needed"]);
     }
 }
 
@@ -77,7 +97,9 @@ fn what_cannot_be_converted_is_told() {
     folder.run("convert a.nrrd -o none/b.nrrd").fails(1, &["folder does not exist"]);
     folder.run("convert a.ply -o b.nrrd").fails(2, &["a.ply", "holds no volume"]);
     for output in ["b.splk", "b.ply"] {
-        folder.run(&format!("convert a.nrrd -o {output}")).fails(2, &["hierarchies are made of meshes and clouds"]);
+        folder
+            .run(&format!("convert a.nrrd -o {output}"))
+            .fails(2, &["hierarchies are made of meshes and clouds"]);
     }
     for output in ["b", "-"] {
         folder
@@ -85,15 +107,17 @@ fn what_cannot_be_converted_is_told() {
             .fails(2, &["only .splk, .ply, .nrrd and .splv files can be written"]);
     }
     folder.put("samples.csv", "x,y,z,value\n1,2,3,4\n5,6,7,8\n");
-    folder
-        .run("convert samples.csv -o b.nrrd")
-        .fails(2, &["samples.csv holds no volume of which this can be made, but scattered samples"]);
+    folder.run("convert samples.csv -o b.nrrd").fails(
+        2,
+        &["samples.csv holds no volume of which this can be made, but scattered samples"],
+    );
     std::fs::remove_file(folder.path("samples.csv")).unwrap();
     folder.run("convert a.nrrd -o a.splv").ok();
     for output in ["b.nrrd", "b.splv"] {
-        folder
-            .run(&format!("convert a.splv -o {output}"))
-            .fails(2, &["a.splv holds no volume of which this can be made: it is in bricks already"]);
+        folder.run(&format!("convert a.splv -o {output}")).fails(
+            2,
+            &["a.splv holds no volume of which this can be made: it is in bricks already"],
+        );
     }
     std::fs::remove_file(folder.path("a.splv")).unwrap();
     for (arguments, flag) in [
@@ -110,7 +134,10 @@ fn what_cannot_be_converted_is_told() {
     let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 4 1\nencoding: raw\n\n";
     folder.put("flat.nrrd", [header.as_bytes(), &[1; 16]].concat());
     folder.run("convert flat.nrrd -o b.nrrd --lattice bcc").fails(2, &["4 × 4 × 1", "2 or more"]);
-    folder.put("odd.nrrd", [header.replace("raw", "raw\nlattice:=fcc").as_bytes(), &[1; 16]].concat());
+    folder.put(
+        "odd.nrrd",
+        [header.replace("raw", "raw\nlattice:=fcc").as_bytes(), &[1; 16]].concat(),
+    );
     folder.run("convert odd.nrrd -o b.nrrd").fails(3, &["odd.nrrd", "lattice", "fcc"]);
     // Nor may what an input refers to be replaced.
     let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 16 16 16\nencoding: raw\ndata file: data.nrrd\n";
@@ -124,15 +151,24 @@ fn what_cannot_be_converted_is_told() {
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
         "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}], "scene": 0}"#;
     folder.put("a.gltf", gltf);
-    folder.put("away.ply", [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes).concat());
+    folder.put(
+        "away.ply",
+        [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes).concat(),
+    );
     folder
         .run("generate scan --from a.gltf -o away.ply --overwrite")
         .fails(1, &["away.ply: is read too: an input or a flag refers to it"]);
-    for (input, output) in [("away.nhdr", "data.nrrd"), ("text.nhdr", "text.nrrd"), ("a.gltf", "away.ply")] {
+    for (input, output) in
+        [("away.nhdr", "data.nrrd"), ("text.nhdr", "text.nrrd"), ("a.gltf", "away.ply")]
+    {
         let before = std::fs::read(folder.path(output)).unwrap();
-        folder
-            .run(&format!("convert {input} -o ./{output} --overwrite"))
-            .fails(1, &[&format!("{output}: is read too: an input or a flag refers to it"), "give another name"]);
+        folder.run(&format!("convert {input} -o ./{output} --overwrite")).fails(
+            1,
+            &[
+                &format!("{output}: is read too: an input or a flag refers to it"),
+                "give another name",
+            ],
+        );
         assert_eq!(std::fs::read(folder.path(output)).unwrap(), before);
         let other = format!("other-{output}");
         folder.run(&format!("convert {input} -o {other}")).ok();
@@ -141,7 +177,8 @@ fn what_cannot_be_converted_is_told() {
         }
     }
     // Nothing half done is left.
-    let mut names: Vec<_> = std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    let mut names: Vec<_> =
+        std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     names.sort();
     assert_eq!(names, ["a.nrrd", "a.ply", "flat.nrrd", "odd.nrrd"]);
 }

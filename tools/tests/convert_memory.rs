@@ -33,16 +33,21 @@ fn what_can_only_be_read_as_a_whole_is_told() {
     let last = lost.len() - 1;
     lost[last] = 77;
     folder.put("lost.ply", lost);
-    folder.run("convert lost.ply -o a.splk --memory 1MiB").fails(3, &["lost.ply", "refers to vertex"]);
-    let mut names: Vec<_> = std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    folder
+        .run("convert lost.ply -o a.splk --memory 1MiB")
+        .fails(3, &["lost.ply", "refers to vertex"]);
+    let mut names: Vec<_> =
+        std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     names.sort();
     assert_eq!(names, ["a.obj", "cut.ply", "lost.ply"]);
 }
 
 /// So many large triangles, each above the other, as PLY and as OBJ.
 fn long(count: u32) -> (Vec<u8>, String) {
-    let corners: Vec<[f32; 3]> =
-        (0..count).map(|i| i as f32 * 0.4).flat_map(|z| [[0.0, 0.0, z], [100.0, 0.0, z], [0.0, 100.0, z]]).collect();
+    let corners: Vec<[f32; 3]> = (0..count)
+        .map(|i| i as f32 * 0.4)
+        .flat_map(|z| [[0.0, 0.0, z], [100.0, 0.0, z], [0.0, 100.0, z]])
+        .collect();
     let mut ply = format!(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
          element face {count}\nproperty list uchar int vertex_indices\nend_header\n",
@@ -66,12 +71,16 @@ fn cutting_keeps_to_the_memory() {
     let (ply, obj) = long(150);
     folder.put("a.ply", ply);
     folder.put("a.obj", obj);
-    folder.run("convert a.obj -o a.splk --memory 40MiB").fails(2, &["a.obj: this takes about", "--memory allows more"]);
+    folder
+        .run("convert a.obj -o a.splk --memory 40MiB")
+        .fails(2, &["a.obj: this takes about", "--memory allows more"]);
     // A dry run tells the same.
-    for arguments in ["--memory 40MiB", "--memory 40MiB --dry-run", "--memory 100 --dry-run --json"] {
-        folder
-            .run(&format!("convert a.ply -o a.splk {arguments}"))
-            .fails(3, &["a.ply: triangles: 150 of them have edges longer than", "allow more memory"]);
+    for arguments in ["--memory 40MiB", "--memory 40MiB --dry-run", "--memory 100 --dry-run --json"]
+    {
+        folder.run(&format!("convert a.ply -o a.splk {arguments}")).fails(
+            3,
+            &["a.ply: triangles: 150 of them have edges longer than", "allow more memory"],
+        );
     }
     assert!(!folder.path("a.splk").exists());
 }
@@ -86,7 +95,8 @@ fn inputs_keep_to_the_memory_together() {
         folder.put(&format!("{name}.obj"), &obj);
     }
     let in_regions = |arguments: &str| {
-        let told = folder.json(&format!("convert {arguments} -o a.splk --memory 260MiB --dry-run --json"));
+        let told =
+            folder.json(&format!("convert {arguments} -o a.splk --memory 260MiB --dry-run --json"));
         told["in_regions"].as_bool() == Some(true)
     };
     assert!(!in_regions("a.ply b.ply") && in_regions("a.ply b.ply c.ply"));
@@ -102,8 +112,12 @@ fn volumes_keep_to_the_memory() {
     folder.put("a.nrrd", nrrd("uint8", &ball()));
     folder.run("convert a.nrrd -o packed.nrrd --memory 5000").ok();
     // The samples alone, and with what they are resampled from.
-    folder.run("convert a.nrrd -o b.nrrd --memory 4000").fails(2, &["a.nrrd: this takes", "--memory allows more"]);
-    folder.run("convert a.nrrd -o b.nrrd --memory 5000 --lattice bcc").fails(2, &["--memory allows more"]);
+    folder
+        .run("convert a.nrrd -o b.nrrd --memory 4000")
+        .fails(2, &["a.nrrd: this takes", "--memory allows more"]);
+    folder
+        .run("convert a.nrrd -o b.nrrd --memory 5000 --lattice bcc")
+        .fails(2, &["--memory allows more"]);
     folder.run("convert a.nrrd -o b.nrrd --memory 50000 --lattice bcc").ok();
     let packed = std::fs::metadata(folder.path("packed.nrrd")).unwrap().len();
     assert!(packed < 4000, "{packed} bytes");
@@ -114,5 +128,7 @@ fn volumes_keep_to_the_memory() {
     folder
         .run(&format!("convert packed.nrrd -o c.splv --memory {most}"))
         .fails(3, &["over the limit", "--limit-bytes"]);
-    folder.run("render a.nrrd -o a.png --size 32x32 --gpu-memory 1KiB").fails(4, &["may be taken", "--gpu-memory"]);
+    folder
+        .run("render a.nrrd -o a.png --size 32x32 --gpu-memory 1KiB")
+        .fails(4, &["may be taken", "--gpu-memory"]);
 }

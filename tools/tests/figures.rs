@@ -9,7 +9,10 @@ fn phantoms_become_files() {
     let folder = Folder::new("generate");
     folder.run("generate ball -o ball.nrrd --dims 9x7x5").ok();
     let found = folder.json("info ball.nrrd --json");
-    assert_eq!((&found["dims"], found["type"].as_str()), (&serde_json::json!([9, 7, 5]), Some("f32")));
+    assert_eq!(
+        (&found["dims"], found["type"].as_str()),
+        (&serde_json::json!([9, 7, 5]), Some("f32"))
+    );
     assert_eq!(found["bounds"]["max"], serde_json::json!([1.0, 1.0, 1.0]));
     folder.run("generate ball -o ball.csv --points 12").ok();
     assert_eq!(std::fs::read_to_string(folder.path("ball.csv")).unwrap().lines().count(), 13);
@@ -29,8 +32,10 @@ fn figure(table: &serde_json::Value, row: &str, column: &str) -> f64 {
 #[test]
 fn figures_are_measured_and_written() {
     let folder = Folder::new("figures");
-    let marks = ["<!-- figures: written by `splatkit figures --write` -->", "<!-- end of figures -->"];
-    folder.put("page.md", format!("before\n{}\n**Another.** Kept.\n{}\nafter\n", marks[0], marks[1]));
+    let marks =
+        ["<!-- figures: written by `splatkit figures --write` -->", "<!-- end of figures -->"];
+    folder
+        .put("page.md", format!("before\n{}\n**Another.** Kept.\n{}\nafter\n", marks[0], marks[1]));
     folder.put("plain.md", "no marks");
     folder.run("figures --only ripple --write plain.md").fails(3, &["plain.md", "end of figures"]);
     folder.run("figures --only ripple --write page.md").ok();
@@ -42,7 +47,8 @@ fn figures_are_measured_and_written() {
     let bleeding = &found["tables"][0];
     // Slices of the data along the other axis hold both slabs side by side.
     assert!(
-        figure(bleeding, "axis-aligned sheets", "50°") > 2.0 * figure(bleeding, "image-aligned sheets", "50°"),
+        figure(bleeding, "axis-aligned sheets", "50°")
+            > 2.0 * figure(bleeding, "image-aligned sheets", "50°"),
         "{found}"
     );
 }
@@ -63,7 +69,11 @@ fn wrong_inputs_and_outputs_of_figures_are_told_first() {
         ("--surfaces a.obj a.nrrd", 3, ["a.nrrd: file: is no mesh", ""]),
         ("--detail a.obj a.nrrd", 3, ["a.nrrd: file: is no mesh, cloud or hierarchy", ""]),
         ("--surfaces a.obj --pictures none", 1, ["none/a_truth.png", "make the folder first"]),
-        ("--surfaces a.obj a.ply --pictures .", 2, ["a_truth.png would be the picture of a.obj and of a.ply", ""]),
+        (
+            "--surfaces a.obj a.ply --pictures .",
+            2,
+            ["a_truth.png would be the picture of a.obj and of a.ply", ""],
+        ),
         ("--surfaces b.obj --pictures .", 1, ["b_splats.png: exists already", "--overwrite"]),
         ("--surfaces b.obj --pictures . --overwrite", 4, ["no usable GPU", ""]),
         ("--surfaces b.obj --overwrite", 2, ["--pictures", ""]),
@@ -86,7 +96,9 @@ fn pages_that_are_no_files_are_refused() {
     }
     for page in pages {
         for command in ["figures --only ripple", "bench --suite --effort quick"] {
-            folder.run(&format!("{command} --write {page}")).fails(3, &[page, "is not a regular file"]);
+            folder
+                .run(&format!("{command} --write {page}"))
+                .fails(3, &[page, "is not a regular file"]);
         }
     }
 }

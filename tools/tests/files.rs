@@ -15,8 +15,12 @@ fn info_tells_what_a_file_holds() {
     assert_eq!(mesh["bounds"]["max"], serde_json::json!([7.0, 7.0, 7.0]));
     assert_eq!(mesh["attributes"], serde_json::json!(["position", "color"]));
     assert_eq!(mesh["bytes"].as_u64(), Some(PLY.len() as u64));
-    let cloud = PLY.replace("face 4", "face 0").split_inclusive("255 255 255\n").next().unwrap().to_owned();
-    assert_eq!(folder.json(&format!("info {} --json", folder.put("cloud.ply", cloud)))["kind"], "cloud");
+    let cloud =
+        PLY.replace("face 4", "face 0").split_inclusive("255 255 255\n").next().unwrap().to_owned();
+    assert_eq!(
+        folder.json(&format!("info {} --json", folder.put("cloud.ply", cloud)))["kind"],
+        "cloud"
+    );
     let textured = folder.json(&format!("info {} --json", folder.put("a.glb", glb())));
     assert_eq!(textured["textures"].as_u64(), Some(1));
     folder.put("a.raw", ball());
@@ -29,7 +33,16 @@ fn info_tells_what_a_file_holds() {
         assert_eq!(volume["kind"], "volume");
         assert_eq!(volume["dims"], serde_json::json!([16, 16, 16]));
         assert_eq!((volume["count"].as_u64(), volume["type"].as_str()), (Some(4096), Some("u8")));
-        for name in ["file", "bounds", "attributes", "bytes", "bytes_per_point", "levels", "range", "spacing"] {
+        for name in [
+            "file",
+            "bounds",
+            "attributes",
+            "bytes",
+            "bytes_per_point",
+            "levels",
+            "range",
+            "spacing",
+        ] {
             assert!(!volume[name].is_null(), "{arguments}: {name}");
         }
     }
@@ -58,15 +71,29 @@ fn scattered_samples_are_told_from_clouds_and_volumes() {
     assert_eq!(samples["range"], serde_json::json!([5.0, 6.0]));
     assert_eq!(samples["attributes"], serde_json::json!(["position", "value", "radius"]));
     folder.run("info a.ply --scalar t").fails(3, &["a.ply", "no scalar “t”"]);
-    assert_eq!(folder.json(&format!("info {} --json --scalar q", folder.put("b.ply", PLY)))["kind"], "mesh");
-    assert_eq!(folder.json(&format!("info {} --json", folder.put("a.csv", "1,2,3,4\n5,6,7,8\n")))["kind"], "samples");
+    assert_eq!(
+        folder.json(&format!("info {} --json --scalar q", folder.put("b.ply", PLY)))["kind"],
+        "mesh"
+    );
+    assert_eq!(
+        folder.json(&format!("info {} --json", folder.put("a.csv", "1,2,3,4\n5,6,7,8\n")))["kind"],
+        "samples"
+    );
     let header = "# vtk DataFile Version 3.0\n\nASCII\nDATASET";
-    let image =
-        format!("{header} STRUCTURED_POINTS\nDIMENSIONS 2 1 1\nPOINT_DATA 2\nSCALARS s int\nLOOKUP_TABLE d\n1 2\n");
-    assert_eq!(folder.json(&format!("info {} --json", folder.put("image.vtk", image)))["kind"], "volume");
-    let points =
-        format!("{header} POLYDATA\nPOINTS 2 float\n0 0 0 1 1 1\nPOINT_DATA 2\nSCALARS s int\nLOOKUP_TABLE d\n1 2\n");
-    assert_eq!(folder.json(&format!("info {} --json", folder.put("points.vtk", points)))["kind"], "samples");
+    let image = format!(
+        "{header} STRUCTURED_POINTS\nDIMENSIONS 2 1 1\nPOINT_DATA 2\nSCALARS s int\nLOOKUP_TABLE d\n1 2\n"
+    );
+    assert_eq!(
+        folder.json(&format!("info {} --json", folder.put("image.vtk", image)))["kind"],
+        "volume"
+    );
+    let points = format!(
+        "{header} POLYDATA\nPOINTS 2 float\n0 0 0 1 1 1\nPOINT_DATA 2\nSCALARS s int\nLOOKUP_TABLE d\n1 2\n"
+    );
+    assert_eq!(
+        folder.json(&format!("info {} --json", folder.put("points.vtk", points)))["kind"],
+        "samples"
+    );
     folder.run("info a.csv --neighbours 3").fails(2, &["4 to 64"]);
 }
 
@@ -78,7 +105,8 @@ fn pictures_do_not_replace_what_the_scene_is_read_from() {
     folder.put("a.obj", text);
     folder.put("a.mtl", "newmtl m\nmap_Kd a.png\n");
     let pixels = vec![[1.0; 4]; 4];
-    let texture = splatkit::picture::Picture { width: 2, height: 2, color: pixels, depth: vec![1.0; 4] };
+    let texture =
+        splatkit::picture::Picture { width: 2, height: 2, color: pixels, depth: vec![1.0; 4] };
     let png = texture.encode(splatkit::picture::PictureFormat::Png, None).unwrap();
     folder.put("a.png", &png);
     folder.put("a_0001.png", &png);
@@ -86,9 +114,13 @@ fn pictures_do_not_replace_what_the_scene_is_read_from() {
     std::fs::create_dir(folder.path("below")).unwrap();
     let needed = ["is read too: an input or a flag refers to it", "give another name"];
     for arguments in ["a.obj -o a.png", "a.obj -o below/../a.png", "a.obj -o b.png --depth a.png"] {
-        folder.run(&format!("render {arguments} --overwrite --reference --size 8x8")).fails(1, &needed[1..]);
+        folder
+            .run(&format!("render {arguments} --overwrite --reference --size 8x8"))
+            .fails(1, &needed[1..]);
     }
-    folder.run("render a.obj -o a.png --overwrite --reference --size 8x8").fails(1, &[needed[0], "a.png"]);
+    folder
+        .run("render a.obj -o a.png --overwrite --reference --size 8x8")
+        .fails(1, &[needed[0], "a.png"]);
     folder.put("a.mtl", "newmtl m\nmap_Kd a_0001.png\n");
     folder
         .run("render a.obj -o a.png --turntable 2 --overwrite --reference --size 8x8")
@@ -108,7 +140,8 @@ fn pictures_do_not_replace_what_the_scene_is_read_from() {
 fn bad_inputs_are_named() {
     let folder = Folder::new("bad");
     let cut = |bytes: &[u8]| bytes[..bytes.len() * 3 / 4].to_vec();
-    let nan: Vec<u8> = (0..4096).flat_map(|i| (if i == 7 { f32::NAN } else { 1.0 }).to_le_bytes()).collect();
+    let nan: Vec<u8> =
+        (0..4096).flat_map(|i| (if i == 7 { f32::NAN } else { 1.0 }).to_le_bytes()).collect();
     let files: Vec<(&str, Vec<u8>)> = vec![
         ("cut.ply", cut(PLY.as_bytes())),
         ("cut.obj", b"v 0 0 0\nv 1 0 0\nf 1 2 3\n".to_vec()),
@@ -127,7 +160,10 @@ fn bad_inputs_are_named() {
         ("empty.vti", Vec::new()),
         (
             "flat.ply",
-            PLY.replace("0 7 0 0", "0 0 0 0").replace("0 0 7", "0 0 0").replace("7 0 0 0", "0 0 0 0").into_bytes(),
+            PLY.replace("0 7 0 0", "0 0 0 0")
+                .replace("0 0 7", "0 0 0")
+                .replace("7 0 0 0", "0 0 0 0")
+                .into_bytes(),
         ),
     ];
     for (name, bytes) in files {
@@ -155,14 +191,18 @@ fn pictures_are_compared() {
     let folder = Folder::new("compare");
     let picture = |name: &str, size: u32, value: f32| {
         let color = vec![[value, value, value, 1.0]; (size * size) as usize];
-        let picture = splatkit::picture::Picture { width: size, height: size, color, depth: Vec::new() };
+        let picture =
+            splatkit::picture::Picture { width: size, height: size, color, depth: Vec::new() };
         picture.save(&folder.path(name), None).unwrap();
     };
     picture("a.png", 16, 0.5);
     picture("b.png", 16, 0.6);
     picture("c.png", 8, 0.5);
     let same = folder.json("compare a.png a.png --json --threshold 99");
-    assert_eq!((&same["psnr"], same["different_pixels"].as_u64()), (&serde_json::Value::Null, Some(0)));
+    assert_eq!(
+        (&same["psnr"], same["different_pixels"].as_u64()),
+        (&serde_json::Value::Null, Some(0))
+    );
     let found = folder.json("compare a.png b.png --json");
     assert!((found["psnr"].as_f64().unwrap() - 20.0).abs() < 0.5, "{found}");
     assert_eq!(found["different_pixels"].as_u64(), Some(256));
@@ -183,7 +223,9 @@ fn the_cpu_engine_needs_no_adapter() {
     let found = folder.json("bench a.ply --engine cpu --size 64x48 --frames 1 --threads 1 --json");
     assert_eq!(found["adapter"], "CPU");
     assert!(found["splats"].as_u64() > Some(0) && found["entries"].as_u64() > Some(0), "{found}");
-    folder.run("render a.ply -o b.png --engine cpu --pass-entries 100").fails(2, &["--engine cpu takes none of"]);
+    folder
+        .run("render a.ply -o b.png --engine cpu --pass-entries 100")
+        .fails(2, &["--engine cpu takes none of"]);
 }
 
 #[test]
@@ -219,9 +261,11 @@ fn wrong_usage_is_told() {
 fn names_that_are_no_text_are_told() {
     use std::{ffi::OsStr, os::unix::ffi::OsStrExt};
     let folder = Folder::new("no-text");
-    for (name, bytes) in
-        [(&b"\xff.ply"[..], PLY.into()), (b"\xff.nrrd", nrrd("uint8", &ball())), (b"s\xff.ply", sheet(300))]
-    {
+    for (name, bytes) in [
+        (&b"\xff.ply"[..], PLY.into()),
+        (b"\xff.nrrd", nrrd("uint8", &ball())),
+        (b"s\xff.ply", sheet(300)),
+    ] {
         std::fs::write(folder.0.join(OsStr::from_bytes(name)), bytes).unwrap();
     }
     for (arguments, told) in [
@@ -233,12 +277,15 @@ fn names_that_are_no_text_are_told() {
         (b"convert \xff.nrrd -o b\xff.nrrd --json", "b\u{fffd}.nrrd"),
         (b"render \xff.ply -o \xff.png --reference --size 8x6 --json", "\u{fffd}.png"),
     ] {
-        let arguments: Vec<_> = arguments.split(|byte| *byte == b' ').map(OsStr::from_bytes).collect();
+        let arguments: Vec<_> =
+            arguments.split(|byte| *byte == b' ').map(OsStr::from_bytes).collect();
         let run = folder.run_with(&arguments);
         assert!(run.stdout().contains(told), "{arguments:?}: {}", run.stderr());
         run.ok();
     }
     let turntable = b"render \xff.ply -o t\xff.png --turntable 2 --reference --size 8x6";
-    folder.run_with(&turntable.split(|byte| *byte == b' ').map(OsStr::from_bytes).collect::<Vec<_>>()).ok();
+    folder
+        .run_with(&turntable.split(|byte| *byte == b' ').map(OsStr::from_bytes).collect::<Vec<_>>())
+        .ok();
     assert!(folder.0.join(OsStr::from_bytes(b"t\xff_0001.png")).exists());
 }

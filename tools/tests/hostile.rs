@@ -17,12 +17,18 @@ const SOON: Duration = Duration::from_secs(20);
 
 /// A sheet of `side`² squares with a picture, as OBJ; vertex 7 has these texture coordinates.
 fn textured(folder: &Folder, name: &str, side: usize, coordinates: &str) {
-    let picture =
-        splatkit::picture::Picture { width: 8, height: 8, color: vec![[0.5, 0.2, 0.1, 1.0]; 64], depth: vec![] };
+    let picture = splatkit::picture::Picture {
+        width: 8,
+        height: 8,
+        color: vec![[0.5, 0.2, 0.1, 1.0]; 64],
+        depth: vec![],
+    };
     folder.put("t.png", picture.encode(splatkit::picture::PictureFormat::Png, None).unwrap());
     folder.put("m.mtl", "newmtl a\nmap_Kd t.png\n");
     let mut out = "mtllib m.mtl\nusemtl a\n".to_owned();
-    let at = |vertex: usize| [(vertex % (side + 1)) as f64, (vertex / (side + 1)) as f64].map(|v| v / side as f64);
+    let at = |vertex: usize| {
+        [(vertex % (side + 1)) as f64, (vertex / (side + 1)) as f64].map(|v| v / side as f64)
+    };
     for vertex in 0..(side + 1).pow(2) {
         let [x, y] = at(vertex);
         out += &format!("v {x} {y} {}\n", 0.05 * (x + y).sin());
@@ -53,11 +59,17 @@ fn with_far_vertex(x: f32) -> Vec<u8> {
 #[test]
 fn texture_coordinates_do_not_keep_it_busy() {
     let folder = Folder::new("texture");
-    for [coordinates, told] in [["inf 0.5", "[inf"], ["nan 0.5", "[NaN"], ["0.5 -1e39", "inf]"], ["1e400 0", "[inf"]] {
+    for [coordinates, told] in
+        [["inf 0.5", "[inf"], ["nan 0.5", "[NaN"], ["0.5 -1e39", "inf]"], ["1e400 0", "[inf"]]
+    {
         textured(&folder, "a.obj", 12, coordinates);
         // The first line of coordinates comes after 2 others and 169 vertices.
         let words = ["a.obj", "line 179", "texture coordinates", "are not finite", "are expected"];
-        for command in ["check a.obj", "convert a.obj -o a.splk --dry-run", "render a.obj -o a.png --reference"] {
+        for command in [
+            "check a.obj",
+            "convert a.obj -o a.splk --dry-run",
+            "render a.obj -o a.png --reference",
+        ] {
             let begin = Instant::now();
             let run = folder.run(command);
             assert!(run.stderr().contains(told), "{coordinates}: {}", run.stderr());
@@ -140,7 +152,9 @@ fn two_commands_write_one_file() {
     });
     let start = |name: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_splatkit"));
-        command.args(["convert", &format!("{name}.ply"), "--overwrite", "-o", "out.splk"]).current_dir(&folder.0);
+        command
+            .args(["convert", &format!("{name}.ply"), "--overwrite", "-o", "out.splk"])
+            .current_dir(&folder.0);
         command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
     };
     for round in 0..12 {
@@ -159,7 +173,9 @@ fn two_commands_write_one_file() {
         // The name of the source is within.
         assert!(whole.contains(&found), "round {round}: neither of them");
     }
-    let names = std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let names = std::fs::read_dir(&folder.0)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap());
     let left: Vec<_> = names.filter(|name| name.ends_with("part")).collect();
     assert_eq!(left, [""; 0]);
 }
@@ -170,7 +186,11 @@ fn links_and_permissions_stay() {
     folder.put("a.ply", PLY);
     std::fs::create_dir(folder.path("other")).unwrap();
     folder.put("other/real.splk", "old");
-    std::fs::set_permissions(folder.path("other/real.splk"), std::fs::Permissions::from_mode(0o600)).unwrap();
+    std::fs::set_permissions(
+        folder.path("other/real.splk"),
+        std::fs::Permissions::from_mode(0o600),
+    )
+    .unwrap();
     symlink("other/real.splk", folder.path("link.splk")).unwrap();
     folder.run("convert a.ply -o link.splk").fails(1, &["link.splk", "exists already"]);
     folder.run("convert a.ply -o link.splk --overwrite").ok();
@@ -186,7 +206,12 @@ fn links_and_permissions_stay() {
 /// Runs a command by a shell, with this before it.
 fn run_by(folder: &Folder, before: &str, arguments: &str) -> Output {
     let script = format!("{before} '{}' {arguments}", env!("CARGO_BIN_EXE_splatkit"));
-    Command::new("sh").args(["-c", &script]).current_dir(&folder.0).env("NO_COLOR", "1").output().unwrap()
+    Command::new("sh")
+        .args(["-c", &script])
+        .current_dir(&folder.0)
+        .env("NO_COLOR", "1")
+        .output()
+        .unwrap()
 }
 
 #[test]
@@ -197,9 +222,13 @@ fn without_threads_one_does_the_work() {
     let whole = std::fs::read(folder.path("a.splk")).unwrap();
     // Stacks that no address space holds: no thread can be started. Many threads for few processors. As another user, who may
     // have one process.
-    let mut cases = vec!["RUST_MIN_STACK=70368744177664", "RAYON_NUM_THREADS=100000", "RAYON_NUM_THREADS=0"];
+    let mut cases =
+        vec!["RUST_MIN_STACK=70368744177664", "RAYON_NUM_THREADS=100000", "RAYON_NUM_THREADS=0"];
     let limited = "setpriv --reuid 65534 --regid 65534 --clear-groups prlimit --nproc=1";
-    if run_by(&folder, "setpriv --reuid 65534 --regid 65534 --clear-groups", "--version").status.success() {
+    if run_by(&folder, "setpriv --reuid 65534 --regid 65534 --clear-groups", "--version")
+        .status
+        .success()
+    {
         std::fs::set_permissions(&folder.0, std::fs::Permissions::from_mode(0o777)).unwrap();
         cases.push(limited);
     }

@@ -80,7 +80,10 @@ fn stop(
             let took = begin.elapsed();
             let found = std::fs::read(folder.path(file)).ok();
             let is_old = found.as_deref() == has_old.then_some(OLD);
-            assert!(is_old || found.as_ref() == Some(&new), "{output}, moment {moment}: neither old nor new");
+            assert!(
+                is_old || found.as_ref() == Some(&new),
+                "{output}, moment {moment}: neither old nor new"
+            );
             finished += u32::from(!is_old);
             stopped += u32::from(is_old);
             if !is_old {
@@ -93,8 +96,15 @@ fn stop(
             }
         }
         folder.run(&arguments).ok();
-        assert!(std::fs::read(folder.path(file)).unwrap() == new, "{output}: not the same after all this");
-        assert_eq!(left(&folder, file), [""; 0], "{output}: nothing is left over after one that was not stopped");
+        assert!(
+            std::fs::read(folder.path(file)).unwrap() == new,
+            "{output}: not the same after all this"
+        );
+        assert_eq!(
+            left(&folder, file),
+            [""; 0],
+            "{output}: nothing is left over after one that was not stopped"
+        );
         std::fs::remove_file(folder.path(file)).unwrap();
     }
     println!("{name}: {stopped} stopped, {finished} finished before");
@@ -106,7 +116,10 @@ fn who_is_killed_leaves_the_old_file_or_the_new_one() {
     let kill = |_, child: &mut Child| child.kill().unwrap();
     let [stopped, _] = stop("killed", 12, kill, |_, left, folder, file| {
         for name in left {
-            assert!(name.starts_with(&format!(".{file}.")) && name.ends_with(".splatkit-part"), "{name}");
+            assert!(
+                name.starts_with(&format!(".{file}.")) && name.ends_with(".splatkit-part"),
+                "{name}"
+            );
             // It is not read for what it is not: a file with all its checksums, or none.
             if file.ends_with(".splk") || file.ends_with(".splv") {
                 std::fs::copy(folder.path(name), folder.path(&format!("copy.{file}"))).unwrap();
@@ -121,7 +134,9 @@ fn who_is_killed_leaves_the_old_file_or_the_new_one() {
 
 #[test]
 fn who_is_interrupted_leaves_nothing() {
-    let interrupt = |moment: u32, child: &mut Child| signal(child, ["INT", "TERM", "INT", "HUP"][moment as usize % 4]);
+    let interrupt = |moment: u32, child: &mut Child| {
+        signal(child, ["INT", "TERM", "INT", "HUP"][moment as usize % 4])
+    };
     let sent = [2, 15, 1].map(Some);
     let [stopped, _] = stop("interrupted", 12, interrupt, |status, left, _, file| {
         // At the first moments the handler may not be there yet, nor may any file.
@@ -176,7 +191,10 @@ fn who_finds_no_room_says_so() {
         folder.put(file, OLD);
         for room in [0, 1, blocks / 2, blocks - 1] {
             let (code, told) = with_room_for(&folder, room, &arguments);
-            assert!(code == Some(1) && told.contains(file) && told.contains("make room"), "{output}: {code:?} {told}");
+            assert!(
+                code == Some(1) && told.contains(file) && told.contains("make room"),
+                "{output}: {code:?} {told}"
+            );
             assert_eq!(std::fs::read(folder.path(file)).unwrap(), OLD, "{output}");
             assert_eq!(left(&folder, file), [""; 0], "{output}");
         }
@@ -200,13 +218,16 @@ fn who_finds_no_memory_says_so_or_ends() {
         std::fs::remove_file(folder.path("a.png")).ok();
         let kibibytes = mebibytes << 10;
         let script = format!("ulimit -v {kibibytes}; exec timeout 100 '{command}' {arguments}");
-        let output = Command::new("sh").args(["-c", &script]).current_dir(&folder.0).output().unwrap();
+        let output =
+            Command::new("sh").args(["-c", &script]).current_dir(&folder.0).output().unwrap();
         let code = output.status.code();
         let told = String::from_utf8_lossy(&output.stderr);
         let picture = std::fs::read(folder.path("a.png")).ok();
         println!("{mebibytes} MiB: {code:?} {}", told.lines().last().unwrap_or_default());
         match code {
-            Some(0) => assert!(picture.as_ref() == Some(&whole), "{mebibytes} MiB: another picture"),
+            Some(0) => {
+                assert!(picture.as_ref() == Some(&whole), "{mebibytes} MiB: another picture")
+            }
             // The shell tells a signal by 128 and its number; 124 is a process that did not end.
             Some(3 | 4 | 134 | 135 | 139) | None => {
                 assert!(picture.is_none(), "{mebibytes} MiB: {code:?}, with a picture")
@@ -223,7 +244,8 @@ fn who_finds_no_memory_says_so_or_ends() {
 fn where_nothing_can_be_written_it_is_told() {
     let folder = folder("nowhere");
     std::fs::create_dir(folder.path("folder.splk")).unwrap();
-    let own = format!("a.nrrd -o ../{}/a.nrrd --overwrite", folder.0.file_name().unwrap().display());
+    let own =
+        format!("a.nrrd -o ../{}/a.nrrd --overwrite", folder.0.file_name().unwrap().display());
     for (arguments, told) in [
         ("a.ply -o none/a.splk", ["none/a.splk", "make the folder first"]),
         ("a.ply -o folder.splk --overwrite", ["folder.splk", "is a folder"]),
@@ -236,10 +258,16 @@ fn where_nothing_can_be_written_it_is_told() {
     if cfg!(target_os = "linux") && Path::new("/sys/kernel").is_dir() {
         for output in ["/sys/kernel/a.splk", "/sys/kernel/a.splv"] {
             let input = if output.ends_with('k') { "a.ply" } else { "a.nrrd" };
-            folder.run(&format!("convert {input} -o {output}")).fails(1, &[output, "write to another folder"]);
+            folder
+                .run(&format!("convert {input} -o {output}"))
+                .fails(1, &[output, "write to another folder"]);
         }
-        folder.run("render a.nrrd -o /sys/kernel/a.png").fails(1, &["/sys/kernel/a.png", "write to another folder"]);
-        folder.run("generate ball -o /sys/kernel/a.nrrd").fails(1, &["/sys/kernel/a.nrrd", "another folder"]);
+        folder
+            .run("render a.nrrd -o /sys/kernel/a.png")
+            .fails(1, &["/sys/kernel/a.png", "write to another folder"]);
+        folder
+            .run("generate ball -o /sys/kernel/a.nrrd")
+            .fails(1, &["/sys/kernel/a.nrrd", "another folder"]);
     }
     assert_eq!(left(&folder, "folder.splk"), [""; 0]);
 }
@@ -252,9 +280,11 @@ fn inputs_that_are_cut_meanwhile_are_told() {
     let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 128 128 128\nencoding: raw\n\n";
     let volume = [header.as_bytes(), &samples].concat();
     let (mut told, mut codes) = (0, Vec::new());
-    for (name, bytes, output) in
-        [("in.ply", &mesh, "a.splk --memory 8MiB"), ("in.nrrd", &volume, "a.splv"), ("in.ply", &mesh, "b.splk")]
-    {
+    for (name, bytes, output) in [
+        ("in.ply", &mesh, "a.splk --memory 8MiB"),
+        ("in.nrrd", &volume, "a.splv"),
+        ("in.ply", &mesh, "b.splk"),
+    ] {
         let arguments = format!("convert {name} --overwrite -o {output}");
         folder.put(name, bytes);
         let begin = Instant::now();
@@ -269,7 +299,11 @@ fn inputs_that_are_cut_meanwhile_are_told() {
             folder.put(name, bytes);
             let begin = Instant::now();
             let mut command = Command::new(env!("CARGO_BIN_EXE_splatkit"));
-            command.args(arguments.split(' ')).current_dir(&folder.0).stdout(Stdio::null()).stderr(Stdio::piped());
+            command
+                .args(arguments.split(' '))
+                .current_dir(&folder.0)
+                .stdout(Stdio::null())
+                .stderr(Stdio::piped());
             let child = command.spawn().unwrap();
             std::thread::sleep(whole * moment / 10 + Duration::from_millis(3));
             let file = std::fs::File::options().write(true).open(folder.path(name)).unwrap();

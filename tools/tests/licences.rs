@@ -54,12 +54,19 @@ fn one(words: &[&str], at: &mut usize, allowed: &[&str]) -> bool {
 #[test]
 fn expressions_are_understood() {
     let allowed = ["MIT", "Zlib"];
-    for expression in
-        ["MIT", "GPL-3.0 OR MIT", "MIT/Apache-2.0", "(MIT OR X) AND Zlib", "X OR MIT AND Zlib", "MIT WITH Y"]
-    {
+    for expression in [
+        "MIT",
+        "GPL-3.0 OR MIT",
+        "MIT/Apache-2.0",
+        "(MIT OR X) AND Zlib",
+        "X OR MIT AND Zlib",
+        "MIT WITH Y",
+    ] {
         assert!(is_met(expression, &allowed), "{expression}");
     }
-    for expression in ["", "X", "MIT AND X", "(X OR Y) AND MIT", "X OR MIT AND Y", "MIT MIT", "X WITH Y"] {
+    for expression in
+        ["", "X", "MIT AND X", "(X OR Y) AND MIT", "X OR MIT AND Y", "MIT MIT", "X WITH Y"]
+    {
         assert!(!is_met(expression, &allowed), "{expression}");
     }
 }
@@ -67,22 +74,32 @@ fn expressions_are_understood() {
 #[test]
 fn what_is_built_in_may_be_passed_on() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let told = |command: &mut Command| String::from_utf8(command.current_dir(&root).output().unwrap().stdout).unwrap();
-    let machine = told(Command::new(std::env::var_os("RUSTC").unwrap_or("rustc".into())).arg("-vV"));
+    let told = |command: &mut Command| {
+        String::from_utf8(command.current_dir(&root).output().unwrap().stdout).unwrap()
+    };
+    let machine =
+        told(Command::new(std::env::var_os("RUSTC").unwrap_or("rustc".into())).arg("-vV"));
     let machine = machine.lines().find_map(|line| line.strip_prefix("host: ")).unwrap();
     let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
     let arguments = ["metadata", "--locked", "--format-version", "1", "--filter-platform", machine];
     let found: Value = serde_json::from_str(&told(Command::new(cargo).args(arguments))).unwrap();
     let rules = std::fs::read_to_string(root.join("deny.toml")).unwrap();
     let allowed = allowed(&rules);
-    assert!(allowed.contains(&"MIT") && allowed.iter().all(|name| !name.contains(' ')), "{allowed:?}");
+    assert!(
+        allowed.contains(&"MIT") && allowed.iter().all(|name| !name.contains(' ')),
+        "{allowed:?}"
+    );
     let packages = found["packages"].as_array().unwrap();
     assert!(packages.len() > 50);
     for package in packages {
         let (name, licence) = (&package["name"], package["license"].as_str().unwrap_or_default());
-        assert!(is_met(licence, &allowed), "{name} is of the licence “{licence}”, which deny.toml does not allow");
+        assert!(
+            is_met(licence, &allowed),
+            "{name} is of the licence “{licence}”, which deny.toml does not allow"
+        );
         let source = package["source"].as_str();
-        let is_known = source.is_none_or(|source| source == "registry+https://github.com/rust-lang/crates.io-index");
+        let is_known = source
+            .is_none_or(|source| source == "registry+https://github.com/rust-lang/crates.io-index");
         assert!(is_known, "{name} is from {source:?}");
     }
 }

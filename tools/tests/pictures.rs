@@ -20,14 +20,25 @@ fn folder(name: &str) -> Folder {
 #[test]
 fn every_format_gives_a_picture() {
     let folder = folder("formats");
-    for input in ["a.ply", "a.obj", "a.glb", "a.nrrd", "a.vti", "a.raw --dims 16x16x16 --type u8 --spacing 1,1,1"] {
+    for input in [
+        "a.ply",
+        "a.obj",
+        "a.glb",
+        "a.nrrd",
+        "a.vti",
+        "a.raw --dims 16x16x16 --type u8 --spacing 1,1,1",
+    ] {
         let found = folder.json(&format!("render {input} -o out.png --overwrite --json {SMALL}"));
         assert!(is_png(&std::fs::read(folder.path("out.png")).unwrap(), 64, 48), "{input}");
         assert_eq!((found["width"].as_u64(), found["height"].as_u64()), (Some(64), Some(48)));
         assert_eq!(found["output"].as_str(), Some("out.png"));
         let shows = found["entries"].as_u64() > Some(0) || found["gathered"].as_u64() > Some(0);
         assert!(shows && found["gpu_bytes"].as_u64() > Some(0), "{input}: {found}");
-        assert!(found["frame_ms"].as_f64() > Some(0.0) && found["load_ms"].is_f64() && found["adapter"].is_string());
+        assert!(
+            found["frame_ms"].as_f64() > Some(0.0)
+                && found["load_ms"].is_f64()
+                && found["adapter"].is_string()
+        );
     }
     // The same bytes under a name that says nothing are known by their content.
     std::fs::copy(folder.path("a.ply"), folder.path("mesh")).unwrap();
@@ -55,30 +66,41 @@ fn stdout_takes_a_picture_and_nothing_else() {
 fn files_are_not_replaced_unasked() {
     let folder = folder("overwrite");
     folder.put("out.png", "mine");
-    folder.run(&format!("render a.ply -o out.png {SMALL}")).fails(1, &["out.png", "exists", "--overwrite"]);
+    folder
+        .run(&format!("render a.ply -o out.png {SMALL}"))
+        .fails(1, &["out.png", "exists", "--overwrite"]);
     assert_eq!(std::fs::read(folder.path("out.png")).unwrap(), b"mine");
     folder.run(&format!("render a.ply -o out.png --overwrite {SMALL}")).ok();
     assert!(is_png(&std::fs::read(folder.path("out.png")).unwrap(), 64, 48));
     folder.run("render a.ply -o none/out.png").fails(1, &["folder"]);
     folder.run("render a.ply -o out.xyz").fails(2, &[".png"]);
     let parts = std::fs::read_dir(&folder.0).unwrap().flatten();
-    assert_eq!(parts.filter(|entry| entry.file_name().to_string_lossy().contains(".part")).count(), 0);
+    assert_eq!(
+        parts.filter(|entry| entry.file_name().to_string_lossy().contains(".part")).count(),
+        0
+    );
 }
 
 #[test]
 fn what_shows_nothing_is_no_picture() {
     let folder = folder("nothing");
     let away = "--camera-position 0,0,100 --focal-point 0,0,200 --view-up 0,1,0";
-    folder.run(&format!("render a.ply -o out.png {SMALL} {away}")).fails(3, &["nothing to draw", "camera"]);
+    folder
+        .run(&format!("render a.ply -o out.png {SMALL} {away}"))
+        .fails(3, &["nothing to draw", "camera"]);
     folder.run(&format!("bench a.ply {SMALL} {away}")).fails(3, &["nothing to draw"]);
     folder.put("clear.json", r#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 0], [255, 0]]}"#);
-    folder.run("render a.vti -o out.png --transfer clear.json").fails(3, &["clear.json", "without opacity"]);
+    folder
+        .run("render a.vti -o out.png --transfer clear.json")
+        .fails(3, &["clear.json", "without opacity"]);
     folder.put("high.json", r#"{"color": [[0, 1, 1, 1]], "opacity": [[300, 0], [400, 1]]}"#);
     folder
         .run("render a.vti -o out.png --transfer high.json")
         .fails(3, &["nothing to draw", "300", "a.vti", "--transfer"]);
     folder.run(&format!("render a.vti -o out.png --transfer high.json --range 0,255 {SMALL}")).ok();
-    folder.run("render a.vti -o out.png --transfer ct-wood --overwrite").fails(2, &["ct-wood", "ct-bone"]);
+    folder
+        .run("render a.vti -o out.png --transfer ct-wood --overwrite")
+        .fails(2, &["ct-wood", "ct-bone"]);
     folder.put("empty.ply", PLY.replace("vertex 4", "vertex 0").replace("face 4", "face 0"));
     folder.run("render empty.ply -o none.png").fails(3, &["empty.ply"]);
 }
@@ -110,9 +132,13 @@ fn cameras_and_pictures_follow_their_flags() {
     // What VTK has for a box of 15³ after ResetCamera, Azimuth(30), Elevation(20), Zoom(1.3).
     let distance = 7.5 * 3f64.sqrt() / 15f64.to_radians().sin();
     let [azimuth, elevation] = [30f64, 20.0].map(f64::to_radians);
-    let expected = [azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos()];
+    let expected =
+        [azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos()];
     for (axis, expected) in expected.iter().enumerate() {
-        assert!((camera["position"][axis].as_f64().unwrap() - 7.5 - distance * expected).abs() < 1e-9, "{camera}");
+        assert!(
+            (camera["position"][axis].as_f64().unwrap() - 7.5 - distance * expected).abs() < 1e-9,
+            "{camera}"
+        );
     }
     assert!((camera["view_angle"].as_f64().unwrap() - 30.0 / 1.3).abs() < 1e-12);
     let same = format!(
@@ -130,8 +156,12 @@ fn cameras_and_pictures_follow_their_flags() {
     folder.run("compare a.png c.png --threshold 60").fails(5, &["dB"]);
     folder.run(&format!("render a.ply -o turn.jpg --turntable 3 {SMALL}")).ok();
     assert!((0..3).all(|frame| folder.path(&format!("turn_000{frame}.jpg")).is_file()));
-    folder.run(&format!("render a.ply -o turn.jpg --turntable 3 {SMALL}")).fails(1, &["turn_0000.jpg"]);
-    folder.run("render a.ply -o d.png --camera-position 1,2,3 --focal-point 1,2,3").fails(2, &["camera"]);
+    folder
+        .run(&format!("render a.ply -o turn.jpg --turntable 3 {SMALL}"))
+        .fails(1, &["turn_0000.jpg"]);
+    folder
+        .run("render a.ply -o d.png --camera-position 1,2,3 --focal-point 1,2,3")
+        .fails(2, &["camera"]);
     folder.run("render a.ply -o d.png --size 100000x100000").fails(2, &["100000"]);
     folder.run("render a.vti a.nrrd -o d.png").fails(2, &["one volume"]);
 }
@@ -142,11 +172,24 @@ fn bench_measures() {
     let found = folder.json(&format!("bench a.ply a.vti --frames 2 --json {SMALL}"));
     let ms = |name: &str| found["frame_ms"][name].as_f64().unwrap();
     assert!(0.0 < ms("min") && ms("min") <= ms("median") && ms("median") <= ms("max"), "{found}");
-    for name in ["scene", "adapter", "width", "height", "frames", "splats", "entries", "culled", "gpu_bytes"] {
+    for name in [
+        "scene",
+        "adapter",
+        "width",
+        "height",
+        "frames",
+        "splats",
+        "entries",
+        "culled",
+        "gpu_bytes",
+    ] {
         assert!(!found[name].is_null(), "{name}: {found}");
     }
     let passes = found["passes"].as_array().unwrap();
-    assert!(passes.iter().any(|pass| pass["name"] == "march" && pass["ms"].as_f64() > Some(0.0)), "{found}");
+    assert!(
+        passes.iter().any(|pass| pass["name"] == "march" && pass["ms"].as_f64() > Some(0.0)),
+        "{found}"
+    );
 }
 
 #[test]
@@ -156,7 +199,9 @@ fn adapters_are_listed_and_chosen() {
     assert!(list[0]["name"].is_string() && list[0]["max_binding_bytes"].is_u64());
     let output = folder.run("gpus").ok();
     assert!(String::from_utf8_lossy(&output.stdout).contains(list[0]["name"].as_str().unwrap()));
-    folder.run("render a.ply -o a.png --gpu nonexistent").fails(4, &["nonexistent", "splatkit gpus"]);
+    folder
+        .run("render a.ply -o a.png --gpu nonexistent")
+        .fails(4, &["nonexistent", "splatkit gpus"]);
     folder.run("render a.ply -o a.png --gpu 99").fails(4, &["99"]);
     folder.run(&format!("render a.ply -o a.png --gpu 0 --pass-entries 100000 {SMALL}")).ok();
     // The budget is told by the name of its flag.
@@ -192,7 +237,15 @@ fn real_scans_are_drawn() {
         ("headsq_64x64x93_int16le.raw.gz", "--dims 64,64,93 --type i16"),
     ] {
         let path = data.join(name);
-        let mut arguments = vec!["render", path.to_str().unwrap(), "-o", "out.png", "--overwrite", "--size", "96x64"];
+        let mut arguments = vec![
+            "render",
+            path.to_str().unwrap(),
+            "-o",
+            "out.png",
+            "--overwrite",
+            "--size",
+            "96x64",
+        ];
         arguments.extend(flags.split_whitespace());
         folder.run_with(&arguments).ok();
         assert!(is_png(&std::fs::read(folder.path("out.png")).unwrap(), 96, 64), "{name}");

@@ -7,10 +7,20 @@ use serde_json::Value;
 
 /// Whether a case tells everything that it should.
 fn is_whole(case: &Value) -> bool {
-    let numbers = ["effective_splats", "splats", "entries", "depth_passes", "fps", "splats_per_second", "gpu_bytes"];
+    let numbers = [
+        "effective_splats",
+        "splats",
+        "entries",
+        "depth_passes",
+        "fps",
+        "splats_per_second",
+        "gpu_bytes",
+    ];
     let times = ["min", "median", "max"].map(|time| case["frame_ms"][time].as_f64().unwrap_or(0.0));
     let passes = case["passes"].as_array().unwrap();
-    let has_pass = |name: &str| passes.iter().any(|pass| pass["name"] == name && pass["ms"].as_f64() > Some(0.0));
+    let has_pass = |name: &str| {
+        passes.iter().any(|pass| pass["name"] == name && pass["ms"].as_f64() > Some(0.0))
+    };
     numbers.iter().all(|name| case[*name].as_f64().is_some_and(|number| number > 0.0))
         && 0.0 < times[0]
         && times.is_sorted()
@@ -27,21 +37,35 @@ fn the_suite_measures_growth() {
     );
     let found = folder
         .json("bench --suite --engine gpu --effort quick --only growth --frames 1 --repeat 2 --json --write page.md");
-    assert!(!found["machine"]["adapter"].as_str().unwrap().is_empty() && found["machine"]["cores"].as_u64() > Some(0));
+    assert!(
+        !found["machine"]["adapter"].as_str().unwrap().is_empty()
+            && found["machine"]["cores"].as_u64() > Some(0)
+    );
     let [growth] = &found["parts"].as_array().unwrap()[..] else { panic!("{found}") };
     let cases = growth["cases"].as_array().unwrap();
     assert_eq!((growth["name"].as_str(), cases.len()), (Some("growth"), 6));
     for case in cases {
         assert!(is_whole(case), "{case}");
         assert_eq!(case["same_bytes"], true, "{case}");
-        assert!(cfg!(not(target_os = "linux")) || case["cpu_peak_bytes"].as_u64() > Some(1 << 20), "{case}");
+        assert!(
+            cfg!(not(target_os = "linux")) || case["cpu_peak_bytes"].as_u64() > Some(1 << 20),
+            "{case}"
+        );
     }
     let drawn: Vec<u64> = cases.iter().map(|case| case["splats"].as_u64().unwrap()).collect();
     assert!(drawn[..3].is_sorted() && drawn[3..].is_sorted_by(|a, b| a > b), "{drawn:?}");
     let slopes = growth["slopes"].as_array().unwrap();
-    assert!(slopes.len() == 2 && slopes.iter().all(|slope| slope["power"].is_number()), "{slopes:?}");
+    assert!(
+        slopes.len() == 2 && slopes.iter().all(|slope| slope["power"].is_number()),
+        "{slopes:?}"
+    );
     let page = std::fs::read_to_string(folder.path("page.md")).unwrap();
-    assert!(page.starts_with("a\n<!--") && page.ends_with("-->\nb\n") && page.contains("### other\n\nkept"), "{page}");
+    assert!(
+        page.starts_with("a\n<!--")
+            && page.ends_with("-->\nb\n")
+            && page.contains("### other\n\nkept"),
+        "{page}"
+    );
     assert!(page.contains("| specimen, 16³ | generated: specimen, in bricks |"), "{page}");
     // Another part alone would take the place of this one.
     folder
@@ -53,14 +77,19 @@ fn the_suite_measures_growth() {
 #[test]
 fn tables_with_failed_cases_are_not_written() {
     let folder = Folder::new("suite-lost");
-    let page = "<!-- suite: written by `splatkit bench --suite --write` -->\nold\n<!-- end of suite -->\n";
+    let page =
+        "<!-- suite: written by `splatkit bench --suite --write` -->\nold\n<!-- end of suite -->\n";
     folder.put("page.md", page);
     // Every case loses its device, which is opened anew for the next.
     let run = folder.run(
         "bench --suite --engine gpu --effort quick --only growth --frames 1 --gpu-timeout 0.000000001 --write page.md",
     );
     assert_eq!(run.code(), Some(1), "{}", run.stderr());
-    assert!(run.stderr().contains("cases could not be drawn; page.md is as it was"), "{}", run.stderr());
+    assert!(
+        run.stderr().contains("cases could not be drawn; page.md is as it was"),
+        "{}",
+        run.stderr()
+    );
     assert!(run.stdout().contains("not drawn: GPU:"), "{}", run.stdout());
     assert_eq!(std::fs::read_to_string(folder.path("page.md")).unwrap(), page);
 }
@@ -70,7 +99,8 @@ fn the_classic_table_takes_files() {
     let folder = Folder::new("suite-data");
     folder.put("aneurism.nrrd", nrrd("uint8", &ball()));
     folder.put("foot.nrrd", "no volume");
-    let run = folder.run("bench --suite --engine gpu --effort quick --only seed --data . --frames 1 --json");
+    let run = folder
+        .run("bench --suite --engine gpu --effort quick --only seed --data . --frames 1 --json");
     assert_eq!(run.code(), Some(1), "{}", run.stderr());
     let found: Value = serde_json::from_str(&run.stdout()).unwrap();
     let cases = found["parts"][0]["cases"].as_array().unwrap();

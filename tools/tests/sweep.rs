@@ -20,14 +20,19 @@ fn the_sweep_compares_neighbours() {
         assert_eq!(step["beside"], before["name"]);
         let ratio = step["pixels"].as_f64().unwrap() / before["pixels"].as_f64().unwrap();
         assert!((3.0..5.0).contains(&ratio), "{step}");
-        assert!(step["frame_ms"]["min"].as_f64() > Some(0.0) && step["beyond"].as_f64() > Some(0.0), "{step}");
+        assert!(
+            step["frame_ms"]["min"].as_f64() > Some(0.0) && step["beyond"].as_f64() > Some(0.0),
+            "{step}"
+        );
     }
     for step in &kernel["steps"].as_array().unwrap()[1..] {
         assert_eq!(step["beside"], "gaussian");
     }
     let written = std::fs::read_to_string(folder.path("page.md")).unwrap();
     assert!(
-        written.starts_with("a\n<!--") && written.contains("**Kernel.**") && written.contains("**Cliffs.**"),
+        written.starts_with("a\n<!--")
+            && written.contains("**Kernel.**")
+            && written.contains("**Cliffs.**"),
         "{written}"
     );
     folder.run("bench --sweep --suite").fails(2, &["cannot be used with"]);

@@ -70,7 +70,10 @@ impl Seeds {
     }
 
     /// What a writer writes to a path.
-    fn written<E: Error + 'static>(&self, write: impl FnOnce(&Path) -> std::result::Result<(), E>) -> Result<Vec<u8>> {
+    fn written<E: Error + 'static>(
+        &self,
+        write: impl FnOnce(&Path) -> std::result::Result<(), E>,
+    ) -> Result<Vec<u8>> {
         fs::create_dir_all(&self.folder)?;
         let path = self.folder.join("written.nrrd.ply.splv");
         write(&path)?;
@@ -132,7 +135,8 @@ fn ply(seeds: &mut Seeds) -> Result<()> {
 
 fn picture(format: image::ImageFormat) -> Result<Vec<u8>> {
     let mut out = Cursor::new(Vec::new());
-    let picture = image::RgbImage::from_fn(5, 4, |x, y| image::Rgb([x as u8 * 50, y as u8 * 60, 7]));
+    let picture =
+        image::RgbImage::from_fn(5, 4, |x, y| image::Rgb([x as u8 * 50, y as u8 * 60, 7]));
     picture.write_to(&mut out, format)?;
     Ok(out.into_inner())
 }
@@ -144,7 +148,9 @@ fn obj(seeds: &mut Seeds) -> Result<()> {
     seeds.put("obj", "v 1e3 -2 .5\r\nv 1 2 3 \\\r\n 4\r\nv 0 0 0\r\n# text\r\nf 1 2 3\r\n")?;
     let materials = "newmtl red\nKd 1 0 0\nd 0.5\nmap_Kd -s 1 1 1 input.png\nnewmtl plain\nKd 0.5\nTr 0.25\nillum 2\n";
     for format in [image::ImageFormat::Png, image::ImageFormat::Jpeg] {
-        let parts = [square.as_bytes(), b"\n#mtl\n", materials.as_bytes(), b"\n#png\n", &picture(format)?].concat();
+        let parts =
+            [square.as_bytes(), b"\n#mtl\n", materials.as_bytes(), b"\n#png\n", &picture(format)?]
+                .concat();
         seeds.put("obj", parts)?;
     }
     Ok(())
@@ -199,7 +205,10 @@ fn gltf(seeds: &mut Seeds) -> Result<()> {
         binary.extend(chunk);
     }
     seeds.known("gltf", binary)?;
-    seeds.known("gltf", document(&format!(",\"uri\":\"data:application/octet-stream;base64,{}\"", base64(&data))))?;
+    seeds.known(
+        "gltf",
+        document(&format!(",\"uri\":\"data:application/octet-stream;base64,{}\"", base64(&data))),
+    )?;
     let beside = document(",\"uri\":\"input.bin\"")
         .replace("\"bufferView\":4,\"mimeType\":\"image/png\"", "\"uri\":\"input.png\"");
     seeds.put("gltf", [beside.as_bytes(), b"\n#bin\n", &data, b"\n#png\n", &picture].concat())?;
@@ -212,8 +221,11 @@ fn gltf(seeds: &mut Seeds) -> Result<()> {
 fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let group = |part: &[u8]| {
-        let bits = (0..3).fold(0usize, |bits, at| bits << 8 | usize::from(part.get(at).copied().unwrap_or(0)));
-        let letter = |at: usize| if at > part.len() { '=' } else { char::from(LETTERS[bits >> (18 - 6 * at) & 63]) };
+        let bits = (0..3)
+            .fold(0usize, |bits, at| bits << 8 | usize::from(part.get(at).copied().unwrap_or(0)));
+        let letter = |at: usize| {
+            if at > part.len() { '=' } else { char::from(LETTERS[bits >> (18 - 6 * at) & 63]) }
+        };
         (0..4).map(letter).collect::<String>()
     };
     bytes.chunks(3).map(group).collect()
@@ -266,8 +278,12 @@ fn las(seeds: &mut Seeds) -> Result<()> {
 
         let items = laz::LazItemRecordBuilder::default_for_point_format_id(format, 0)?;
         let builder = laz::LazVlrBuilder::new(items);
-        let layout =
-            if format < 6 { builder.with_fixed_chunk_size(4) } else { builder.with_variable_chunk_size() }.build();
+        let layout = if format < 6 {
+            builder.with_fixed_chunk_size(4)
+        } else {
+            builder.with_variable_chunk_size()
+        }
+        .build();
         let mut described = Vec::new();
         layout.write_to(&mut described)?;
         let mut before = vec![0; 54];
@@ -321,7 +337,9 @@ fn e57(seeds: &mut Seeds) -> Result<()> {
     for kind in kinds {
         let mut out = Cursor::new(Vec::new());
         let mut writer = E57Writer::new(&mut out, "file")?;
-        let records = kind.iter().map(|(name, data_type)| Record { name: name.clone(), data_type: data_type.clone() });
+        let records = kind
+            .iter()
+            .map(|(name, data_type)| Record { name: name.clone(), data_type: data_type.clone() });
         let mut scan = writer.add_pointcloud("scan", records.collect())?;
         for point in 0..3 {
             let value = |(_, data_type): &(RecordName, RecordDataType)| match data_type {
@@ -376,7 +394,8 @@ fn pcd(seeds: &mut Seeds) -> Result<()> {
     seeds.known("pcd", [header("ascii"), b"1 2 3 255 0 0 1\n4 5 6 7 0 1 0\n".to_vec()].concat())?;
     let rows = floats((0..14).map(|v| v as f32));
     seeds.known("pcd", [header("binary"), rows.clone()].concat())?;
-    let runs: Vec<u8> = rows.chunks(32).flat_map(|run| [&[run.len() as u8 - 1], run].concat()).collect();
+    let runs: Vec<u8> =
+        rows.chunks(32).flat_map(|run| [&[run.len() as u8 - 1], run].concat()).collect();
     let sizes = [runs.len(), rows.len()].map(|size| (size as u32).to_le_bytes()).concat();
     seeds.known("pcd", [header("binary_compressed"), sizes, runs].concat())?;
     // A copy of what came before, which overlaps itself.
@@ -386,7 +405,9 @@ fn pcd(seeds: &mut Seeds) -> Result<()> {
 }
 
 fn npy(seeds: &mut Seeds) -> Result<()> {
-    for (version, kind, shape, count) in [(1, "<f4", "(2, 4)", 8), (2, "<f4", "(1, 5)", 5), (1, "<f8", "(1, 4)", 4)] {
+    for (version, kind, shape, count) in
+        [(1, "<f4", "(2, 4)", 8), (2, "<f4", "(1, 5)", 5), (1, "<f8", "(1, 4)", 4)]
+    {
         let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
         let mut bytes = b"\x93NUMPY".to_vec();
         bytes.extend([version, 0]);
@@ -454,13 +475,15 @@ fn vtk(seeds: &mut Seeds) -> Result<()> {
         "{image}<DataArray type=\"UInt8\" Name=\"s\" format=\"appended\" offset=\"0\"/></PointData></Piece></ImageData>\
          <AppendedData encoding=\"raw\">_"
     );
-    let data = [&6u32.to_le_bytes()[..], &[0, 1, 2, 3, 4, 5], b"</AppendedData></VTKFile>"].concat();
+    let data =
+        [&6u32.to_le_bytes()[..], &[0, 1, 2, 3, 4, 5], b"</AppendedData></VTKFile>"].concat();
     seeds.known("vti", [appended.as_bytes(), &data].concat())?;
     let mut packer = flate2::write::ZlibEncoder::new(Vec::new(), Compression::default());
     packer.write_all(&[0, 1, 2, 3, 4, 5])?;
     let packed = packer.finish()?;
     let sizes = [1, 6, 0, packed.len() as u32].map(u32::to_le_bytes).concat();
-    let packed_image = image.replace("byte_order", "compressor=\"vtkZLibDataCompressor\" byte_order");
+    let packed_image =
+        image.replace("byte_order", "compressor=\"vtkZLibDataCompressor\" byte_order");
     seeds.known(
         "vti",
         format!(
@@ -470,7 +493,9 @@ fn vtk(seeds: &mut Seeds) -> Result<()> {
         ),
     )?;
     let array = |kind: &str, name: &str, parts: u32, text: &str| {
-        format!("<DataArray type='{kind}' Name='{name}' NumberOfComponents='{parts}' format='ascii'>{text}</DataArray>")
+        format!(
+            "<DataArray type='{kind}' Name='{name}' NumberOfComponents='{parts}' format='ascii'>{text}</DataArray>"
+        )
     };
     let places = ["0 1 5", "-1 1", "7"].map(|text| array("Float64", "p", 1, text)).concat();
     seeds.known(
@@ -482,12 +507,14 @@ fn vtk(seeds: &mut Seeds) -> Result<()> {
         ),
     )?;
     let points = array("Float32", "points", 3, "0 0 0 2 0 0 0 2 0 0 0 2");
-    let cells = [("Int64", "connectivity", "0 1 2 3"), ("Int64", "offsets", "4"), ("UInt8", "types", "10")]
-        .map(|(kind, name, text)| array(kind, name, 1, text))
-        .concat();
-    for (point_data, cell_data) in
-        [(array("Float32", "value", 1, "1 2 3 4"), String::new()), (String::new(), array("Int32", "c", 1, "5"))]
-    {
+    let cells =
+        [("Int64", "connectivity", "0 1 2 3"), ("Int64", "offsets", "4"), ("UInt8", "types", "10")]
+            .map(|(kind, name, text)| array(kind, name, 1, text))
+            .concat();
+    for (point_data, cell_data) in [
+        (array("Float32", "value", 1, "1 2 3 4"), String::new()),
+        (String::new(), array("Int32", "c", 1, "5")),
+    ] {
         seeds.known(
             "vtu",
             format!(
@@ -509,7 +536,10 @@ fn vtk(seeds: &mut Seeds) -> Result<()> {
     let image = "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 1\nORIGIN 10 20 30\nSPACING 0.5 1 2\nPOINT_DATA 6\n\
          SCALARS density unsigned_char 1\nLOOKUP_TABLE default\n";
     seeds.known("vtk", format!("{}{image}0 1 2 30 4 255\n", head("ASCII")))?;
-    seeds.known("vtk", [head("BINARY").as_bytes(), image.as_bytes(), &[0, 1, 2, 3, 4, 5]].concat())?;
+    seeds.known(
+        "vtk",
+        [head("BINARY").as_bytes(), image.as_bytes(), &[0, 1, 2, 3, 4, 5]].concat(),
+    )?;
     for rest in [
         "DATASET RECTILINEAR_GRID\nDIMENSIONS 3 2 1\nX_COORDINATES 3 double\n0 1 5\nY_COORDINATES 2 float\n-1 1\n\
          Z_COORDINATES 1 float\n7\nPOINT_DATA 6\nFIELD FieldData 1\nf 1 6 float\n0 1 2 3 4 5.5\n",
@@ -524,15 +554,25 @@ fn vtk(seeds: &mut Seeds) -> Result<()> {
 }
 
 fn hierarchies(seeds: &mut Seeds) -> Result<()> {
-    let whole =
-        tetrahedron().surfels(&splatkit::surface::SurfelOptions { largest_spacing: 0.2, ..Default::default() })?;
+    let whole = tetrahedron().surfels(&splatkit::surface::SurfelOptions {
+        largest_spacing: 0.2,
+        ..Default::default()
+    })?;
     for (count, block_splats) in [(1, 64), (7, 64), (150, 64)] {
         let splats: Vec<_> = whole.splats.iter().copied().take(count).collect();
         let set = splatkit::splat::SplatSet { splats, ..whole.clone() };
-        let tree = Tree::build(&set, &BuildOptions { block_splats, ..BuildOptions::default() }, &|_, _| {})?;
+        let tree = Tree::build(
+            &set,
+            &BuildOptions { block_splats, ..BuildOptions::default() },
+            &|_, _| {},
+        )?;
         for lossless in [false, true] {
-            let options =
-                WriteOptions { lossless, unit: "m".into(), source: "a.ply".into(), ..WriteOptions::default() };
+            let options = WriteOptions {
+                lossless,
+                unit: "m".into(),
+                source: "a.ply".into(),
+                ..WriteOptions::default()
+            };
             let bytes = to_bytes(&tree, &options)?;
             seeds.put("splk", &bytes)?;
             seeds.known("splk_summed", bytes)?;

@@ -35,13 +35,25 @@ impl<T: Pod> Bins<T> {
         let most = (waiting / bins.max(1) / size_of::<T>()).clamp(64, 1 << 16);
         let file = Scratch::beside(wanted)?;
         let (waiting, runs) = (vec![Vec::new(); bins], vec![Vec::new(); bins]);
-        Ok(Self { file, wanted: wanted.to_owned(), end: 0, waiting, most, runs, counts: vec![0; bins] })
+        Ok(Self {
+            file,
+            wanted: wanted.to_owned(),
+            end: 0,
+            waiting,
+            most,
+            runs,
+            counts: vec![0; bins],
+        })
     }
 
     pub fn push(&mut self, bin: u32, record: T) -> Result<()> {
         self.waiting[bin as usize].push(record);
         self.counts[bin as usize] += 1;
-        if self.waiting[bin as usize].len() >= self.most { self.flush(bin as usize) } else { Ok(()) }
+        if self.waiting[bin as usize].len() >= self.most {
+            self.flush(bin as usize)
+        } else {
+            Ok(())
+        }
     }
 
     fn flush(&mut self, bin: usize) -> Result<()> {

@@ -77,7 +77,9 @@ impl Work<'_> {
             memory::room(WORK, OF_POINT.saturating_mul(input.points.count(region) as u64))?;
             let part = Part::read(&mut input, region)?;
             let splats = match &input.input.mesh {
-                Some(mesh) => part.of_mesh(mesh, Some(region) == input.input.long_region(), &surfels)?,
+                Some(mesh) => {
+                    part.of_mesh(mesh, Some(region) == input.input.long_region(), &surfels)?
+                }
                 None => part.of_cloud(&input, sides.as_mut(), region, &surfels)?,
             };
             let owned = part.owned.iter().filter(|owned| **owned).count() as u64;
@@ -99,7 +101,8 @@ impl Work<'_> {
             return Ok(());
         }
         self.splats += splats.len() as u64;
-        let mut set = SplatSet { origin, payload: Payload::Radiance, splats, extent: EXTENT, overlap: 1.0 };
+        let mut set =
+            SplatSet { origin, payload: Payload::Radiance, splats, extent: EXTENT, overlap: 1.0 };
         set.move_origin(self.origin)?;
         check_splats(&set)?;
         self.bounds = self.bounds.union(set.bounds());
@@ -151,7 +154,12 @@ impl Part {
         Ok(Self { mesh, indices, owned })
     }
 
-    fn of_mesh(&self, mesh: &Triangulated, is_long: bool, options: &SurfelOptions) -> Result<Vec<Splat>> {
+    fn of_mesh(
+        &self,
+        mesh: &Triangulated,
+        is_long: bool,
+        options: &SurfelOptions,
+    ) -> Result<Vec<Splat>> {
         if self.mesh.triangles.is_empty() {
             return Ok(Vec::new());
         }
@@ -172,7 +180,8 @@ impl Part {
             let splats = cloud_piece(&self.mesh, &self.owned, known, options)?;
             return Ok(splats.into_iter().map(|(_, splat)| splat).collect());
         };
-        known.normals = sides.read(region)?.into_iter().filter_map(|side| self.known(side)).collect();
+        known.normals =
+            sides.read(region)?.into_iter().filter_map(|side| self.known(side)).collect();
         let splats = cloud_piece(&self.mesh, &self.owned, known, options)?;
         let mut around = Vec::new();
         for (point, splat) in &splats {

@@ -37,7 +37,9 @@ impl Surveyed<'_> {
     /// The region that answers for a point at a place.
     pub fn owner(&self, place: Vec3) -> u32 {
         match &self.mesh {
-            Some(mesh) if !mesh.long.is_empty() && mesh.long.contains(&name(place)) => self.regions.count() as u32,
+            Some(mesh) if !mesh.long.is_empty() && mesh.long.contains(&name(place)) => {
+                self.regions.count() as u32
+            }
             _ => self.regions.of(place),
         }
     }
@@ -86,7 +88,9 @@ pub fn distribute<'a>(
             |((corners, foreign), seen)| {
                 done += seen;
                 watch(Stage::Distributing, done, total);
-                corners.into_iter().try_for_each(|(region, triangle)| bins.push(region, triangle))?;
+                corners
+                    .into_iter()
+                    .try_for_each(|(region, triangle)| bins.push(region, triangle))?;
                 foreign.into_iter().try_for_each(|(region, point)| points.push(region, point))
             },
         )?;
@@ -153,14 +157,25 @@ impl<'a> Crowd<'a> {
         // A region's neighbours may make it larger.
         let most = usize::try_from(most).unwrap_or(usize::MAX).saturating_mul(2);
         let places = vec![None; input.regions()];
-        Self { stream: &input.stream, most, is_cloud: input.mesh.is_none(), long: input.long_region(), places }
+        Self {
+            stream: &input.stream,
+            most,
+            is_cloud: input.mesh.is_none(),
+            long: input.long_region(),
+            places,
+        }
     }
 
     /// Whether a region keeps a point.
     ///
     /// # Errors
     /// [`Error::Input`](crate::Error::Input) where more points lie together than can be told apart from where the farthest ones are.
-    fn takes(&mut self, points: &mut Bins<StreamPoint>, region: u32, point: &StreamPoint) -> Result<bool> {
+    fn takes(
+        &mut self,
+        points: &mut Bins<StreamPoint>,
+        region: u32,
+        point: &StreamPoint,
+    ) -> Result<bool> {
         let held = points.count(region);
         // Triangles that are cut together are as many as memory suffices for, however many points of a region that is.
         if held >= self.most.saturating_mul(MOST_TIMES) && Some(region) != self.long {
@@ -175,6 +190,8 @@ impl<'a> Crowd<'a> {
         if !self.is_cloud || held < self.most {
             return Ok(true);
         }
-        Ok(self.places[region as usize].get_or_insert_default().insert(name(Vec3::from(point.position))))
+        Ok(self.places[region as usize]
+            .get_or_insert_default()
+            .insert(name(Vec3::from(point.position))))
     }
 }

@@ -18,7 +18,11 @@ const OF_CUT: u64 = 131;
 /// vertices, and splats in parts and as a whole; of a cloud its arrays, the tree that finds neighbours, what is found of them,
 /// and the edges along which sides are told; with splats, their order.
 fn of_counts(counts: Counts) -> u64 {
-    if counts.triangles > 0 { 140 * counts.points + 26 * counts.triangles } else { 330 * counts.points }
+    if counts.triangles > 0 {
+        140 * counts.points + 26 * counts.triangles
+    } else {
+        330 * counts.points
+    }
 }
 
 /// The counts once triangles are cut to so many: where none are neighbours, each is cut with corners of its own.
@@ -53,7 +57,8 @@ pub fn memory_of_splats(splats: usize) -> u64 {
 /// # Errors
 /// Those of [`Mesh::triangles_once_cut`].
 pub fn memory_of_mesh(mesh: &Mesh, options: &SurfelOptions, enough: u64) -> Result<u64> {
-    let counts = Counts { points: mesh.positions.len() as u64, triangles: mesh.triangles.len() as u64 };
+    let counts =
+        Counts { points: mesh.positions.len() as u64, triangles: mesh.triangles.len() as u64 };
     let [least, most] = memory_between(counts, options);
     if least > enough || most <= enough {
         return Ok(least);
@@ -86,7 +91,9 @@ pub(super) fn look_at_long(
 ) -> Result<(MeshPieces, Triangles)> {
     let most = options.memory.max(BLOCKS);
     let none = Counts { points: 0, triangles: 0 };
-    let room = usize::try_from(stream.counts().triangles).unwrap_or(usize::MAX).saturating_add(room(none, most));
+    let room = usize::try_from(stream.counts().triangles)
+        .unwrap_or(usize::MAX)
+        .saturating_add(room(none, most));
     let (pieces, seen) = look(stream, &options.surfels, room, watch)?;
     let need = |triangles: u64| of_counts(once_cut(none, triangles));
     if need(seen.cut as u64) <= most {
@@ -107,7 +114,12 @@ pub(super) fn look_at_long(
 /// # Errors
 /// Those of [`Stream::open`] and of reading on, and [`Error::Input`] for a mesh of so many long triangles, which are cut
 /// together, that the memory does not suffice.
-pub fn check(files: &[PathBuf], limits: &Limits, options: &ExternalOptions, watch: StageWatch<'_>) -> Result<()> {
+pub fn check(
+    files: &[PathBuf],
+    limits: &Limits,
+    options: &ExternalOptions,
+    watch: StageWatch<'_>,
+) -> Result<()> {
     for file in files {
         let Some(mut stream) = Stream::open(file, limits)? else { continue };
         let points = stream.counts().points;

@@ -26,7 +26,9 @@ use crate::{
 };
 use std::path::{Path, PathBuf};
 
-pub use memory::{BLOCKS, check, memory_between, memory_of_mesh, memory_of_splats, memory_of_stream};
+pub use memory::{
+    BLOCKS, check, memory_between, memory_of_mesh, memory_of_splats, memory_of_stream,
+};
 
 /// What is at work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,24 +98,32 @@ pub fn convert(
     let mut inputs = Vec::new();
     for file in files {
         let stream = Stream::open(file, limits)?.ok_or_else(|| {
-            Error::Argument(format!("{}: a file of this kind can only be read as a whole", file.display()))
+            Error::Argument(format!(
+                "{}: a file of this kind can only be read as a whole",
+                file.display()
+            ))
         })?;
         stream.warn();
         // Long triangles are cut once to be counted, and once to be drawn.
         let surfels = SurfelOptions { deadline: limits.deadline(), ..options.surfels.clone() };
         let options = &ExternalOptions { surfels, ..options.clone() };
-        let input = survey::survey(stream, most, options, watch).map_err(|error| error.in_file(file))?;
+        let input =
+            survey::survey(stream, most, options, watch).map_err(|error| error.in_file(file))?;
         tracing::info!(file = %file.display(), regions = input.regions(), "cut in regions");
         inputs.push(distribute::distribute(input, [most, options.memory], path, watch)?);
     }
-    let Some(first) = inputs.first() else { return Err(Error::NothingToDraw("there are no files".into())) };
+    let Some(first) = inputs.first() else {
+        return Err(Error::NothingToDraw("there are no files".into()));
+    };
     let origin = first.input.stream.origin();
     let spheres: Vec<Sphere> = inputs.iter().map(|input| input.around(origin, options)).collect();
     let outer = Sphere::around(&spheres, 1 << 10);
     let mut done = Converted {
         points: inputs.iter().map(|input| input.input.stream.point_count()).sum(),
         splats: 0,
-        closed: inputs.iter().all(|input| input.input.mesh.as_ref().is_some_and(|mesh| mesh.is_solid)),
+        closed: inputs
+            .iter()
+            .all(|input| input.input.mesh.as_ref().is_some_and(|mesh| mesh.is_solid)),
         regions: inputs.iter().map(|input| input.input.regions()).sum(),
     };
     let mut work = build::Work {

@@ -48,7 +48,11 @@ struct Cell {
 
 impl Regions {
     /// Cuts the cube in regions of at most `most` points. `pass` calls what it is given with the fine keys of all points.
-    pub fn cut(cube: Cube, most: u64, mut pass: impl FnMut(&mut dyn FnMut(&[u64])) -> Result<()>) -> Result<Self> {
+    pub fn cut(
+        cube: Cube,
+        most: u64,
+        mut pass: impl FnMut(&mut dyn FnMut(&[u64])) -> Result<()>,
+    ) -> Result<Self> {
         let mut coarse = vec![0u64; 1 << (3 * FINE_BITS - BELOW_COARSE)];
         pass(&mut |keys| keys.iter().for_each(|key| coarse[(key >> BELOW_COARSE) as usize] += 1))?;
         let mut cells = Vec::new();
@@ -64,8 +68,10 @@ impl Regions {
         // All that are open have the same number of bits below.
         while let Some(below) = open.first().map(|cell| cell.below) {
             let next = below.saturating_sub(CUT);
-            let mut inside: HashMap<u64, Vec<u64>> =
-                open.drain(..).map(|cell| (cell.start >> below, vec![0; 1 << (below - next)])).collect();
+            let mut inside: HashMap<u64, Vec<u64>> = open
+                .drain(..)
+                .map(|cell| (cell.start >> below, vec![0; 1 << (below - next)]))
+                .collect();
             pass(&mut |keys| {
                 for key in keys {
                     if let Some(counts) = inside.get_mut(&(key >> below)) {
@@ -75,7 +81,10 @@ impl Regions {
             })?;
             for (prefix, counts) in inside {
                 for (index, count) in (0u64..).zip(counts) {
-                    sort(Cell { start: prefix << below | index << next, below: next, count }, &mut open);
+                    sort(
+                        Cell { start: prefix << below | index << next, below: next, count },
+                        &mut open,
+                    );
                 }
             }
         }
@@ -98,10 +107,12 @@ impl Regions {
             held += cell.count;
             let (below, count) = larger.enough(cell);
             let edge = cube.edge() / (1u64 << (FINE_BITS - below / 3)) as f32;
-            let spacings = (REACH_ON_SURFACE / (count as f32).sqrt()).max(REACH_IN_SOLID / (count as f32).cbrt());
+            let spacings = (REACH_ON_SURFACE / (count as f32).sqrt())
+                .max(REACH_IN_SOLID / (count as f32).cbrt());
             let own = edge * spacings.min(1.0);
             // Points at one place count as one.
-            typical.push((edge / (count as f32).sqrt(), if cell.below > 0 { cell.count } else { 1 }));
+            typical
+                .push((edge / (count as f32).sqrt(), if cell.below > 0 { cell.count } else { 1 }));
             if cell.below == BELOW_COARSE {
                 reach[(cell.start >> BELOW_COARSE) as usize] = own;
             } else {
@@ -155,8 +166,11 @@ impl Regions {
         }
         // Where the cell of the point is no narrower than the reach, none of its size is missed between three places along
         // each axis. Where points are few, more are looked at.
-        let steps: &[f32] =
-            if reach <= self.cube.edge() / 128.0 { &[-1.0, 0.0, 1.0] } else { &[-1.0, -0.5, 0.0, 0.5, 1.0] };
+        let steps: &[f32] = if reach <= self.cube.edge() / 128.0 {
+            &[-1.0, 0.0, 1.0]
+        } else {
+            &[-1.0, -0.5, 0.0, 0.5, 1.0]
+        };
         for &x in steps {
             for &y in steps {
                 for &z in steps {
@@ -176,7 +190,8 @@ fn table(starts: &[u64], cells: usize) -> Vec<u32> {
     let mut table = vec![SEVERAL; cells];
     for (region, &start) in (0..).zip(starts) {
         let first = start.div_ceil(1 << BELOW_COARSE) as usize;
-        let end = starts.get(region as usize + 1).map_or(cells, |&next| (next >> BELOW_COARSE) as usize);
+        let end =
+            starts.get(region as usize + 1).map_or(cells, |&next| (next >> BELOW_COARSE) as usize);
         if first < end {
             table[first..end].fill(region);
         }
@@ -204,7 +219,9 @@ impl Larger {
         let levels = (3 * FINE_BITS - BELOW_COARSE) / 3;
         let count = |level: u32| {
             let mut counts = vec![0; 1 << (3 * level)];
-            cells.iter().for_each(|cell| counts[(cell.start >> (3 * (FINE_BITS - level))) as usize] += cell.count);
+            cells.iter().for_each(|cell| {
+                counts[(cell.start >> (3 * (FINE_BITS - level))) as usize] += cell.count
+            });
             counts
         };
         Self((0..levels).map(count).collect())
@@ -217,7 +234,8 @@ impl Larger {
             let below = 3 * (FINE_BITS - level as u32);
             (below, counts[(cell.start >> below) as usize])
         });
-        let mut sizes = std::iter::once((cell.below, cell.count)).chain(around.filter(|size| size.0 > cell.below));
+        let mut sizes = std::iter::once((cell.below, cell.count))
+            .chain(around.filter(|size| size.0 > cell.below));
         sizes.find(|size| size.1 >= ENOUGH).unwrap_or((3 * FINE_BITS, cell.count))
     }
 }
@@ -252,14 +270,18 @@ mod tests {
     fn none_holds_more_than_it_may() {
         let even: Vec<Vec3> = spread(1000).collect();
         // All but two in one coarse cell.
-        let crowded: Vec<Vec3> = even.iter().map(|p| p * 1e-4).chain([Vec3::ONE, -Vec3::ONE]).collect();
+        let crowded: Vec<Vec3> =
+            even.iter().map(|p| p * 1e-4).chain([Vec3::ONE, -Vec3::ONE]).collect();
         for places in [even, crowded] {
             let regions = regions(&places, 100);
             let counts = counts(&places, &regions);
-            assert!(counts.iter().all(|&count| (1..=100).contains(&count)) && counts.len() <= 25, "{counts:?}");
+            assert!(
+                counts.iter().all(|&count| (1..=100).contains(&count)) && counts.len() <= 25,
+                "{counts:?}"
+            );
             for (index, &region) in (0u64..).zip(&regions.coarse) {
-                let [first, last] =
-                    [index << BELOW_COARSE, ((index + 1) << BELOW_COARSE) - 1].map(|key| regions.search(key));
+                let [first, last] = [index << BELOW_COARSE, ((index + 1) << BELOW_COARSE) - 1]
+                    .map(|key| regions.search(key));
                 assert_eq!(region, if first == last { first } else { SEVERAL }, "cell {index}");
             }
         }
@@ -269,7 +291,10 @@ mod tests {
     fn points_at_one_place_stay_together() {
         let places: Vec<Vec3> = (0..1000).map(|_| Vec3::ONE).chain(spread(100)).collect();
         let found = counts(&places, &regions(&places, 10));
-        assert!(found.iter().filter(|&&count| count > 10).count() == 1 && found.iter().sum::<u64>() == 1100);
+        assert!(
+            found.iter().filter(|&&count| count > 10).count() == 1
+                && found.iter().sum::<u64>() == 1100
+        );
         let alone = vec![Vec3::ONE; 100];
         assert_eq!(counts(&alone, &regions(&alone, 10)), [100]);
     }

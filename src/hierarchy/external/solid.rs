@@ -17,13 +17,20 @@ const OF_PLACE: u64 = 24;
 /// As [`Mesh::is_solid`](crate::surface::Mesh::is_solid), of a mesh that is closed this way. Where half of `memory` does not
 /// hold what joins its triangles to parts, and what is known of each part, the answer is no: then nothing is left out of
 /// pictures.
-pub fn is_solid(stream: &Stream, closing: PiecesClosing, memory: u64, watch: StageWatch<'_>) -> Result<bool> {
+pub fn is_solid(
+    stream: &Stream,
+    closing: PiecesClosing,
+    memory: u64,
+    watch: StageWatch<'_>,
+) -> Result<bool> {
     let Counts { points, triangles } = stream.counts();
     let is_by_place = closing == PiecesClosing::Places;
     let of_places = if is_by_place { OF_PLACE * points } else { 0 };
     let fits = |more: u64| of_places + more <= (memory / 2).max(LEAST_MEMORY);
     let give_up = || {
-        tracing::info!("too little memory to tell whether all parts are turned outward: backs will be drawn");
+        tracing::info!(
+            "too little memory to tell whether all parts are turned outward: backs will be drawn"
+        );
         Ok(false)
     };
     if !fits(Joining::memory(triangles, 0)) || u32::try_from(triangles).is_err() {
@@ -59,8 +66,10 @@ pub fn is_solid(stream: &Stream, closing: PiecesClosing, memory: u64, watch: Sta
             for (number, triangle) in (first..).zip(triangles) {
                 let corners = triangle.map(|vertex| stream.vertex(vertex));
                 let is_opaque = corners.iter().all(|corner| corner.color[3] == 255);
-                let [places, normals] =
-                    [corners.map(|corner| corner.position.into()), corners.map(|corner| corner.normal.into())];
+                let [places, normals] = [
+                    corners.map(|corner| corner.position.into()),
+                    corners.map(|corner| corner.normal.into()),
+                ];
                 told.add(parts.of(number), places, normals, is_opaque);
             }
             (told, triangles.len())
@@ -108,14 +117,21 @@ mod tests {
 
     /// Tetrahedra side by side, none of which shares a vertex, as a binary PLY file.
     fn tetrahedra(count: u32) -> Vec<u8> {
-        let mut out = format!("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", 4 * count);
+        let mut out =
+            format!("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", 4 * count);
         ["x", "y", "z"].iter().for_each(|axis| out += &format!("property float {axis}\n"));
-        out += &format!("element face {}\nproperty list uchar int vertex_indices\nend_header\n", 4 * count);
+        out += &format!(
+            "element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+            4 * count
+        );
         let mut out = out.into_bytes();
         for i in 0..count {
             let place = Vec3::new((i % 500) as f32, (i / 500) as f32, 0.0);
             for corner in [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z] {
-                (place + corner * 0.5).to_array().iter().for_each(|value| out.extend(value.to_le_bytes()));
+                (place + corner * 0.5)
+                    .to_array()
+                    .iter()
+                    .for_each(|value| out.extend(value.to_le_bytes()));
             }
         }
         for first in (0..count).map(|i| 4 * i) {
@@ -136,7 +152,8 @@ mod tests {
         let limits = Limits::default();
         let mut stream = Stream::open(&path, &limits).unwrap().unwrap();
         stream.settle(&|_| ()).unwrap();
-        let solid = |memory| is_solid(&stream, PiecesClosing::Vertices, memory, &|_, _, _| ()).unwrap();
+        let solid =
+            |memory| is_solid(&stream, PiecesClosing::Vertices, memory, &|_, _, _| ()).unwrap();
         let triangles = Joining::memory(4 * count, 0);
         let need = triangles + Sides::memory(count as usize);
         assert!(2 * triangles < LEAST_MEMORY);

@@ -84,7 +84,8 @@ pub fn survey<'a>(
             },
         )
     })?;
-    let mesh = if counted.triangles > 0 { Some(triangulated(&stream, options, watch)?) } else { None };
+    let mesh =
+        if counted.triangles > 0 { Some(triangulated(&stream, options, watch)?) } else { None };
     let center = sum / stream.point_count().max(1) as f64;
     Ok(Surveyed { core: extremes.core(), stream, regions, center, mesh })
 }
@@ -128,7 +129,11 @@ pub fn look(
     )
 }
 
-fn triangulated(stream: &Stream, options: &ExternalOptions, watch: StageWatch<'_>) -> Result<Triangulated> {
+fn triangulated(
+    stream: &Stream,
+    options: &ExternalOptions,
+    watch: StageWatch<'_>,
+) -> Result<Triangulated> {
     let (pieces, seen) = look_at_long(stream, options, watch)?;
     let longest = seen.longest.min(pieces.longest());
     let long = seen.long.into_iter().flatten().map(name).collect();
@@ -170,7 +175,8 @@ impl Extremes {
 
     fn core(&self) -> Sphere {
         let places = self.0.iter().flatten().filter(|(along, _)| along.is_finite());
-        let points: Vec<Sphere> = places.map(|(_, p)| Sphere { center: p.as_dvec3(), radius: 0.0 }).collect();
+        let points: Vec<Sphere> =
+            places.map(|(_, p)| Sphere { center: p.as_dvec3(), radius: 0.0 }).collect();
         Sphere::around(&points, 1 << 12)
     }
 }

@@ -85,7 +85,13 @@ fn cones() -> &'static [f32; NO_CONE as usize + 1] {
 
 impl Code {
     /// Gives a node the bounds; `None` for codes of none.
-    pub fn decode(&self, node: &mut Node, shape: &Shape, extent: f32, fine: Option<f64>) -> Option<()> {
+    pub fn decode(
+        &self,
+        node: &mut Node,
+        shape: &Shape,
+        extent: f32,
+        fine: Option<f64>,
+    ) -> Option<()> {
         let largest = shape.largest();
         let own = f64::from(extent) * largest;
         let fits = (0..=MOST_POWER / SIZE).contains(&self.size)
@@ -104,12 +110,19 @@ impl Code {
             }
         };
         node.size = (FULL_WIDTH * largest * power(self.size * SIZE)) as f32;
-        (node.center.iter().chain([&node.radius, &node.size]).copied().all(f32::is_finite)).then_some(())
+        (node.center.iter().chain([&node.radius, &node.size]).copied().all(f32::is_finite))
+            .then_some(())
     }
 
     /// The tightest bounds around the children that the centre of the node, nearly, can have. `None` where no code tells
     /// them.
-    pub fn encode(node: &mut Node, children: &[Node], shape: &Shape, extent: f32, fine: Option<f64>) -> Option<Self> {
+    pub fn encode(
+        node: &mut Node,
+        children: &[Node],
+        shape: &Shape,
+        extent: f32,
+        fine: Option<f64>,
+    ) -> Option<Self> {
         let largest = shape.largest();
         let own = f64::from(extent) * largest;
         let around = |node: &Node| {
@@ -129,7 +142,8 @@ impl Code {
             radius = around(node);
         }
         let size = children.iter().map(|child| child.size).fold(0.0, f32::max);
-        let cosine = children.iter().map(|child| joint_cosine(node, child)).fold(1.0, f64::min) - 1e-12;
+        let cosine =
+            children.iter().map(|child| joint_cosine(node, child)).fold(1.0, f64::min) - 1e-12;
         let narrow = |cone: &f32| *cone == -1.0 || f64::from(*cone) <= cosine;
         code.cone = cones().iter().position(narrow)? as i32;
         // Estimates, then up to what really holds.
@@ -165,7 +179,11 @@ fn nearest_center(node: &Node, children: &[Node], shape: &Shape, step: f64) -> O
     }
     let near = (0..8).map(|corner| std::array::from_fn(|i| below[i] + f64::from(corner >> i & 1)));
     let radius = |steps: &[f64; 3]| {
-        let center = shape.axes.iter().zip(steps).fold(splat, |sum, (axis, steps)| sum + *axis * (steps * step));
+        let center = shape
+            .axes
+            .iter()
+            .zip(steps)
+            .fold(splat, |sum, (axis, steps)| sum + *axis * (steps * step));
         Sphere::reach(center, &spheres)
     };
     let best = near.min_by(|a, b| radius(a).total_cmp(&radius(b)))?;

@@ -147,7 +147,8 @@ fn check_entries(
             largest_size: entry.largest_parent_size,
         };
         if entry.nodes as usize != runs[index].nodes.len() || found != wanted {
-            let message = format!("the parents of its nodes are in {wanted:?}, and it tells of {found:?}");
+            let message =
+                format!("the parents of its nodes are in {wanted:?}, and it tells of {found:?}");
             findings.push(Finding::error("directory", format!("page {}", first + index), message));
         }
     }

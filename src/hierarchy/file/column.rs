@@ -162,7 +162,8 @@ impl<'a> Planes<'a> {
             return Ok(vec![self.constant().ok_or("a column's number is none")?; count]);
         }
         let length = usize::from(head & !DIFFERENCES);
-        let table = Table::read(length, &mut self.bits).ok_or("the frequencies of a column are none")?;
+        let table =
+            Table::read(length, &mut self.bits).ok_or("the frequencies of a column are none")?;
         let mut values = vec![0; count];
         let mut places = values.iter_mut();
         let bits = &mut self.bits;
@@ -209,7 +210,9 @@ mod tests {
 
     #[test]
     fn classes_hold_every_number() {
-        for value in (0..2000).chain((4..31).flat_map(|bit| [(1u32 << bit) - 1, 1 << bit, 1 << bit | 5])) {
+        for value in
+            (0..2000).chain((4..31).flat_map(|bit| [(1u32 << bit) - 1, 1 << bit, 1 << bit | 5]))
+        {
             let (class, bits) = class(value);
             let (least, same) = CLASSES[usize::from(class)];
             assert_eq!((bits, value - least < 1 << bits), (u32::from(same), true), "{value}");
@@ -222,7 +225,14 @@ mod tests {
         let mut noise = |size: f64, count: usize| -> Vec<i32> {
             (0..count).map(|_| ((random.next() + random.next() - 1.0) * size) as i32).collect()
         };
-        let mut columns = vec![vec![], vec![7], vec![-3; 4096], noise(3.0, 4096), noise(200.0, 4096), noise(2e8, 500)];
+        let mut columns = vec![
+            vec![],
+            vec![7],
+            vec![-3; 4096],
+            noise(3.0, 4096),
+            noise(200.0, 4096),
+            noise(2e8, 500),
+        ];
         columns.push((0..4096).map(|n| n * 1000).collect());
         columns.push(vec![-1 << 28, 1 << 28, 0, -1, 1]);
         columns.push(vec![i32::MIN; 3]);
@@ -248,7 +258,11 @@ mod tests {
             let mut bytes = Vec::new();
             columns.finish(&mut bytes);
             let entropy = 4096.0 / 8.0 * libm::log2(width * 4.1327);
-            assert!((bytes.len() as f64) < entropy * 1.03 + 50.0, "{width}: {} bytes for {entropy}", bytes.len());
+            assert!(
+                (bytes.len() as f64) < entropy * 1.03 + 50.0,
+                "{width}: {} bytes for {entropy}",
+                bytes.len()
+            );
         }
     }
 }

@@ -24,7 +24,11 @@ impl Directions {
     /// The unit direction behind the steps; `None` for those beyond the map.
     pub fn decode(self, from: DVec3, across: [DVec3; 2], [u, v]: [i32; 2]) -> Option<DVec3> {
         let is_behind = u.unsigned_abs() >= 2 * self.0 as u32;
-        let u = if is_behind { u.wrapping_add(if u < 0 { 4 * self.0 } else { -4 * self.0 }) } else { u };
+        let u = if is_behind {
+            u.wrapping_add(if u < 0 { 4 * self.0 } else { -4 * self.0 })
+        } else {
+            u
+        };
         let (x, y) = (f64::from(u) / f64::from(self.0), f64::from(v) / f64::from(self.0));
         let square = x * x + y * y;
         if square > 2.2 {
@@ -41,7 +45,10 @@ pub fn across(n: DVec3) -> [DVec3; 2] {
     let sign = if n.z < 0.0 { -1.0 } else { 1.0 };
     let a = -1.0 / (sign + n.z);
     let b = n.x * n.y * a;
-    [DVec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), DVec3::new(b, sign + n.y * n.y * a, -n.y)]
+    [
+        DVec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
+        DVec3::new(b, sign + n.y * n.y * a, -n.y),
+    ]
 }
 
 /// A unit direction as that of a [`Splat`](crate::splat::Splat): on an octahedron.

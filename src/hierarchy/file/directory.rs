@@ -74,14 +74,20 @@ impl Directory {
 
     /// Bytes that it takes in memory, with what is made of it.
     pub fn memory(&self) -> u64 {
-        (self.blocks.len() * 2 * size_of::<BlockEntry>() + self.pages.len() * 2 * size_of::<PageEntry>()) as u64
+        (self.blocks.len() * 2 * size_of::<BlockEntry>()
+            + self.pages.len() * 2 * size_of::<PageEntry>()) as u64
     }
 
     /// Adds a block, before it is known what portal it hangs below.
     pub fn push_block(&mut self, runs: &[Run], around: &[Around], places: &[Place]) {
         let (block, first_page) = (self.blocks.len() as u32, self.pages.len() as u32);
         let nodes = runs.last().map_or(0, |run| run.nodes.end as u32);
-        self.blocks.push(BlockEntry { first_page, pages: runs.len() as u32, nodes, portal: NO_PORTAL });
+        self.blocks.push(BlockEntry {
+            first_page,
+            pages: runs.len() as u32,
+            nodes,
+            portal: NO_PORTAL,
+        });
         for ((run, around), &place) in runs.iter().zip(around).zip(places) {
             self.pages.push(PageEntry {
                 block,
@@ -103,7 +109,8 @@ impl Directory {
         for (block, &portal) in self.blocks[1..].iter_mut().zip(portals) {
             block.portal = portal;
             let parent = parents[portal as usize].map(|parent| parent as usize);
-            let around = parent.map_or(Around::EVERYTHING, |parent| Around::parents(&top[parent..=parent]));
+            let around =
+                parent.map_or(Around::EVERYTHING, |parent| Around::parents(&top[parent..=parent]));
             let page = &mut self.pages[block.first_page as usize];
             page.parents_center = around.center;
             (page.parents_radius, page.largest_parent_size) = (around.radius, around.largest_size);
@@ -113,9 +120,12 @@ impl Directory {
     /// Adds the blocks of another directory.
     pub fn append(&mut self, other: Self) {
         let (blocks, pages) = (self.blocks.len() as u32, self.pages.len() as u32);
-        let shifted = |block: BlockEntry| BlockEntry { first_page: block.first_page + pages, ..block };
+        let shifted =
+            |block: BlockEntry| BlockEntry { first_page: block.first_page + pages, ..block };
         self.blocks.extend(other.blocks.into_iter().map(shifted));
-        self.pages.extend(other.pages.into_iter().map(|page| PageEntry { block: page.block + blocks, ..page }));
+        self.pages.extend(
+            other.pages.into_iter().map(|page| PageEntry { block: page.block + blocks, ..page }),
+        );
     }
 
     /// The numbers, in their block, of the nodes of a page.
@@ -162,7 +172,10 @@ impl Directory {
                     let parent = self.parent_page_of(0, portal);
                     parent..parent + 1
                 }
-                _ => self.parent_page_of(block, nodes.start)..page.min(self.parent_page_of(block, nodes.end - 1) + 1),
+                _ => {
+                    self.parent_page_of(block, nodes.start)
+                        ..page.min(self.parent_page_of(block, nodes.end - 1) + 1)
+                }
             };
         }
     }
@@ -182,11 +195,15 @@ impl Directory {
     pub fn encode(&self) -> Vec<u8> {
         let mut out = Vec::new();
         for block in &self.blocks {
-            [block.first_page, block.pages, block.nodes, block.portal].iter().for_each(|&value| out.u32(value));
+            [block.first_page, block.pages, block.nodes, block.portal]
+                .iter()
+                .for_each(|&value| out.u32(value));
         }
         for page in &self.pages {
             out.u64(page.place.offset);
-            [page.place.bytes, page.place.crc, page.nodes, page.first_child].iter().for_each(|&value| out.u32(value));
+            [page.place.bytes, page.place.crc, page.nodes, page.first_child]
+                .iter()
+                .for_each(|&value| out.u32(value));
             out.f32s(&page.parents_center);
             out.f32s(&[page.parents_radius, page.largest_parent_size]);
         }
@@ -200,7 +217,9 @@ impl Directory {
     pub fn decode(bytes: &[u8], stored: &Stored) -> Result<Self, Trouble> {
         let start = stored.length();
         let length = Self::length(stored.blocks as usize, stored.pages as usize);
-        let Some(all) = usize::try_from(length).ok().and_then(|length| bytes.get(start..start.checked_add(length)?))
+        let Some(all) = usize::try_from(length)
+            .ok()
+            .and_then(|length| bytes.get(start..start.checked_add(length)?))
         else {
             return Err(Trouble::Incomplete);
         };
@@ -218,13 +237,15 @@ impl Directory {
         let mut cursor = Cursor::new(content);
         let mut blocks = Vec::with_capacity(stored.blocks as usize);
         for _ in 0..stored.blocks {
-            let [first_page, pages, nodes, portal] = [cursor.u32()?, cursor.u32()?, cursor.u32()?, cursor.u32()?];
+            let [first_page, pages, nodes, portal] =
+                [cursor.u32()?, cursor.u32()?, cursor.u32()?, cursor.u32()?];
             blocks.push(BlockEntry { first_page, pages, nodes, portal });
         }
         let mut pages = Vec::with_capacity(stored.pages as usize);
         for _ in 0..stored.pages {
             let offset = cursor.u64()?;
-            let [bytes, crc, nodes, first_child] = [cursor.u32()?, cursor.u32()?, cursor.u32()?, cursor.u32()?];
+            let [bytes, crc, nodes, first_child] =
+                [cursor.u32()?, cursor.u32()?, cursor.u32()?, cursor.u32()?];
             pages.push(PageEntry {
                 block: 0,
                 first_node: 0,
@@ -247,11 +268,16 @@ impl Directory {
         let mut nodes = 0u64;
         let mut portals = Vec::new();
         for (number, block) in self.blocks.iter().enumerate() {
-            let pages = u64::from(block.first_page)..u64::from(block.first_page) + u64::from(block.pages);
+            let pages =
+                u64::from(block.first_page)..u64::from(block.first_page) + u64::from(block.pages);
             if pages.start != next_page || pages.is_empty() || pages.end > self.pages.len() as u64 {
                 return Err(format!("the pages of block {number} are {pages:?}"));
             }
-            let is_portal = if number == 0 { block.portal == NO_PORTAL } else { block.portal < self.blocks[0].nodes };
+            let is_portal = if number == 0 {
+                block.portal == NO_PORTAL
+            } else {
+                block.portal < self.blocks[0].nodes
+            };
             if !is_portal {
                 return Err(format!("block {number} hangs below node {} of block 0", block.portal));
             }
@@ -263,10 +289,16 @@ impl Directory {
             nodes += u64::from(block.nodes);
         }
         if next_page != self.pages.len() as u64 {
-            return Err(format!("{} pages belong to no block", self.pages.len() as u64 - next_page));
+            return Err(format!(
+                "{} pages belong to no block",
+                self.pages.len() as u64 - next_page
+            ));
         }
         if nodes != stored.header.nodes {
-            return Err(format!("its blocks hold {nodes} nodes and the header tells of {}", stored.header.nodes));
+            return Err(format!(
+                "its blocks hold {nodes} nodes and the header tells of {}",
+                stored.header.nodes
+            ));
         }
         portals.sort_unstable();
         if joined && portals.windows(2).any(|pair| pair[0] == pair[1]) {
@@ -304,7 +336,9 @@ fn number_nodes(block: u32, nodes: u32, pages: &mut [PageEntry]) -> Result<(), (
             return fail(format!("its children begin at node {}", page.first_child));
         }
         let around = [page.parents_center[0], page.parents_center[1], page.parents_center[2]];
-        let endless = first && page.parents_radius == f32::INFINITY && page.largest_parent_size == f32::INFINITY;
+        let endless = first
+            && page.parents_radius == f32::INFINITY
+            && page.largest_parent_size == f32::INFINITY;
         let sound = |value: f32| value >= 0.0 && value.is_finite();
         if !around.iter().all(|v| v.is_finite())
             || !(endless || sound(page.parents_radius) && sound(page.largest_parent_size))

@@ -90,7 +90,8 @@ impl Table {
             }
         }
         let largest = i32::from(frequencies[most]) + left;
-        frequencies[most] = u16::try_from(largest).ok().filter(|&largest| total > 0 && largest > 0)?;
+        frequencies[most] =
+            u16::try_from(largest).ok().filter(|&largest| total > 0 && largest > 0)?;
         Some(Self { length: codes.len(), frequencies })
     }
 
@@ -150,7 +151,9 @@ impl Encoder {
                 self.words.push(*state as u16);
                 *state >>= 16;
             }
-            *state = ((*state / frequency) << SCALE) + *state % frequency + u32::from(starts[usize::from(symbol)]);
+            *state = ((*state / frequency) << SCALE)
+                + *state % frequency
+                + u32::from(starts[usize::from(symbol)]);
         }
     }
 
@@ -190,7 +193,8 @@ impl<'a> Decoder<'a> {
     ) -> Option<()> {
         table.slots(slots);
         // The states in the order of their turns.
-        let mut states: [u32; STATES] = std::array::from_fn(|turn| self.states[(self.taken + turn) % STATES]);
+        let mut states: [u32; STATES] =
+            std::array::from_fn(|turn| self.states[(self.taken + turn) % STATES]);
         let mut step = |state: &mut u32| {
             let slot = slots.0[(*state & (WHOLE - 1)) as usize];
             *state = ((slot >> 20) + 1) * (*state >> SCALE) + (slot >> 8 & (WHOLE - 1));
@@ -304,7 +308,9 @@ mod tests {
         for round in 0..300 {
             let mut counts = [0; SYMBOLS];
             let last = 1 + random.below(SYMBOLS - 1);
-            counts[..=last].iter_mut().for_each(|count| *count = (random.next().powi(round % 12) * 4096.0) as u32);
+            counts[..=last]
+                .iter_mut()
+                .for_each(|count| *count = (random.next().powi(round % 12) * 4096.0) as u32);
             counts[last] = 1;
             let mut bits = Bits::default();
             let table = Table::write(&counts, last + 1, &mut bits);
@@ -314,7 +320,12 @@ mod tests {
             assert!(reader.is_at_end());
             assert_eq!(read.frequencies, table.frequencies);
             assert_eq!(read.frequencies.iter().map(|&f| u32::from(f)).sum::<u32>(), WHOLE);
-            assert!(counts.iter().zip(&table.frequencies).all(|(&count, &frequency)| count == 0 || frequency > 0));
+            assert!(
+                counts
+                    .iter()
+                    .zip(&table.frequencies)
+                    .all(|(&count, &frequency)| count == 0 || frequency > 0)
+            );
         }
     }
 
@@ -322,7 +333,10 @@ mod tests {
     fn weights_are_near_what_was_counted() {
         for count in 0..=4096 {
             let found = weight(nearest(count));
-            assert!(count < 4 && found == count || (0.81..1.23).contains(&(f64::from(found) / f64::from(count))));
+            assert!(
+                count < 4 && found == count
+                    || (0.81..1.23).contains(&(f64::from(found) / f64::from(count)))
+            );
         }
     }
 
@@ -330,7 +344,11 @@ mod tests {
     fn symbols_come_back() {
         let mut random = Random(4);
         let columns: Vec<Vec<u8>> = (1..30)
-            .map(|column| (0..column * 39).map(|_| (random.next().powi(3) * column as f64 * 4.0) as u8).collect())
+            .map(|column| {
+                (0..column * 39)
+                    .map(|_| (random.next().powi(3) * column as f64 * 4.0) as u8)
+                    .collect()
+            })
             .collect();
         let table = |column: &Vec<u8>| {
             let mut counts = [0; SYMBOLS];

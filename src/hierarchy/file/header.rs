@@ -137,7 +137,8 @@ impl Stored {
             3 => Some(UpAxis::Z),
             _ => return Some(Err(Refusal::Damaged("it names an axis that there is not"))),
         };
-        let (Ok(unit), Ok(source)) = (copy::text(&texts[..unit]), copy::text(&texts[unit..])) else {
+        let (Ok(unit), Ok(source)) = (copy::text(&texts[..unit]), copy::text(&texts[unit..]))
+        else {
             return Some(Err(Refusal::Damaged("its texts are not UTF-8")));
         };
         let sound = flags < 16

@@ -22,7 +22,8 @@ pub fn encode(nodes: &[Node]) -> Vec<u8> {
 /// The nodes of a page of `count`; what is wrong where there are none.
 pub fn decode(bytes: &[u8], count: usize) -> Result<Vec<Node>, String> {
     let length = count * NODE_BYTES;
-    let planes = zstd::bulk::decompress(bytes, length).map_err(|e| format!("it cannot be unpacked: {e}"))?;
+    let planes =
+        zstd::bulk::decompress(bytes, length).map_err(|e| format!("it cannot be unpacked: {e}"))?;
     if planes.len() != length {
         return Err(format!("it unpacks to {} bytes where {length} were expected", planes.len()));
     }
@@ -38,7 +39,9 @@ pub fn decode(bytes: &[u8], count: usize) -> Result<Vec<Node>, String> {
 
 fn to_bytes(node: &Node) -> [u8; NODE_BYTES] {
     let mut out = [0; NODE_BYTES];
-    out.chunks_exact_mut(4).zip(words(node)).for_each(|(out, word)| out.copy_from_slice(&word.to_le_bytes()));
+    out.chunks_exact_mut(4)
+        .zip(words(node))
+        .for_each(|(out, word)| out.copy_from_slice(&word.to_le_bytes()));
     out
 }
 
@@ -50,7 +53,28 @@ pub fn words(node: &Node) -> [u32; NODE_BYTES / 4] {
     let [cx, cy, cz] = center.map(f32::to_bits);
     let [strength, radius, size, cone] = [splat.strength, radius, size, cone].map(f32::to_bits);
     let Splat { color, normal, .. } = splat;
-    [x, y, z, strength, b0, b1, b2, b3, b4, b5, color, normal, cx, cy, cz, radius, size, cone, first_child, children]
+    [
+        x,
+        y,
+        z,
+        strength,
+        b0,
+        b1,
+        b2,
+        b3,
+        b4,
+        b5,
+        color,
+        normal,
+        cx,
+        cy,
+        cz,
+        radius,
+        size,
+        cone,
+        first_child,
+        children,
+    ]
 }
 
 fn from_bytes(bytes: &[u8; NODE_BYTES]) -> Option<Node> {

@@ -30,7 +30,11 @@ impl Codes {
 /// Replaces the splats of a page by those that will be read, and gives leaves their bounds. `None` where a splat has no
 /// code; the nodes may be changed then.
 pub fn quantise(nodes: &mut [Node], extent: f32) -> Option<Codes> {
-    let strength = nodes.iter().map(|node| node.splat.strength).find(|&strength| strength > 0.0).unwrap_or(1.0);
+    let strength = nodes
+        .iter()
+        .map(|node| node.splat.strength)
+        .find(|&strength| strength > 0.0)
+        .unwrap_or(1.0);
     let center = nodes[0].splat.center;
     let leaves = nodes.iter().filter(|node| node.is_leaf()).count();
     let mut out = Codes {
@@ -88,9 +92,29 @@ impl Group {
     }
 
     fn push(&mut self, code: &Code) {
-        let Code { axes, sigma, ratio, thickness, position: [x, y, z], color: [luma, orange, green, alpha], .. } =
-            *code;
-        let all = [axes as i32, sigma, ratio, thickness, x, y, z, luma, orange, green, alpha, code.strength];
+        let Code {
+            axes,
+            sigma,
+            ratio,
+            thickness,
+            position: [x, y, z],
+            color: [luma, orange, green, alpha],
+            ..
+        } = *code;
+        let all = [
+            axes as i32,
+            sigma,
+            ratio,
+            thickness,
+            x,
+            y,
+            z,
+            luma,
+            orange,
+            green,
+            alpha,
+            code.strength,
+        ];
         self.all.iter_mut().zip(all).for_each(|(column, value)| column.push(value));
         if axes == Axes::Normal {
             self.angle.push(code.angle);
@@ -144,7 +168,12 @@ impl Group {
         let of = |which: Axes| all[0].iter().filter(|&&axes| axes == which as i32).count();
         let (flat, bare) = (of(Axes::Normal), of(Axes::Bare));
         let [angle] = columns(planes, flat)?;
-        Ok(Self { all, angle, turn: columns(planes, count - flat)?, normal: columns(planes, count - bare)? })
+        Ok(Self {
+            all,
+            angle,
+            turn: columns(planes, count - flat)?,
+            normal: columns(planes, count - bare)?,
+        })
     }
 }
 
@@ -158,7 +187,13 @@ fn columns<const N: usize>(planes: &mut Planes, count: usize) -> Result<[Vec<i32
 
 /// The page's bytes; `bounds` are those of its inner nodes, those with a `fine` code of their largest standard deviation, or
 /// a larger one, fine.
-pub fn encode(nodes: &[Node], codes: &Codes, bounds: &[bounds::Code], fine: i32, out: &mut Vec<u8>) {
+pub fn encode(
+    nodes: &[Node],
+    codes: &Codes,
+    bounds: &[bounds::Code],
+    fine: i32,
+    out: &mut Vec<u8>,
+) {
     out.f32s(&[codes.strength]);
     out.f32s(&codes.center);
     out.u32(fine as u32);
@@ -193,7 +228,12 @@ fn children(stored: i32) -> Option<u8> {
 }
 
 /// The nodes of a page of `count`.
-pub fn decode(bytes: &[u8], count: usize, first_child: u32, extent: f32) -> Result<Vec<Node>, String> {
+pub fn decode(
+    bytes: &[u8],
+    count: usize,
+    first_child: u32,
+    extent: f32,
+) -> Result<Vec<Node>, String> {
     let mut cursor = Cursor::new(bytes);
     let mut begin = || Some((cursor.f32()?, cursor.f32s()?, cursor.u32()? as i32));
     let (strength, center, fine) = begin().ok_or("it ends within its beginning")?;
@@ -222,13 +262,21 @@ pub fn decode(bytes: &[u8], count: usize, first_child: u32, extent: f32) -> Resu
             bounds::leaf(&mut node, &shape, extent);
         } else {
             let step = bounds::fine_step(code.sigma, fine, extent);
-            let center = [0, 1, 2].map(|axis| if step.is_some() { centers[axis][centered] } else { 0 });
+            let center =
+                [0, 1, 2].map(|axis| if step.is_some() { centers[axis][centered] } else { 0 });
             centered += usize::from(step.is_some());
-            let code = bounds::Code { center, radius: radius[inner], cone: cone[inner], size: size[inner] };
+            let code = bounds::Code {
+                center,
+                radius: radius[inner],
+                cone: cone[inner],
+                size: size[inner],
+            };
             code.decode(&mut node, &shape, extent, step).ok_or_else(fail)?;
             inner += 1;
             (node.first_child, node.children) = (next, u32::from(children));
-            next = next.checked_add(u32::from(children)).ok_or("it has more children than can be numbered")?;
+            next = next
+                .checked_add(u32::from(children))
+                .ok_or("it has more children than can be numbered")?;
         }
         nodes.push(node);
     }
@@ -237,5 +285,13 @@ pub fn decode(bytes: &[u8], count: usize, first_child: u32, extent: f32) -> Resu
 
 /// A node of which only the splat is known.
 fn blank(splat: Splat) -> Node {
-    Node { splat, center: splat.center, radius: 0.0, size: 0.0, cone: 0.0, first_child: 0, children: 0 }
+    Node {
+        splat,
+        center: splat.center,
+        radius: 0.0,
+        size: 0.0,
+        cone: 0.0,
+        first_child: 0,
+        children: 0,
+    }
 }

@@ -47,7 +47,8 @@ pub fn encode(nodes: &[Node], extent: f32, is_lossless: bool) -> Coded {
     });
     let firsts: Vec<usize> = firsts.collect();
     let page = |((run, page), first): ((&Run, &PageCodes), &usize)| {
-        let own: Option<Vec<bounds::Code>> = bounds[*first..*first + page.inner].iter().copied().collect();
+        let own: Option<Vec<bounds::Code>> =
+            bounds[*first..*first + page.inner].iter().copied().collect();
         match (&page.codes, own) {
             (Some(codes), Some(own)) => {
                 let mut out = vec![LOSSY];
@@ -136,7 +137,8 @@ fn bound(
     codes: &[PageCodes],
     extent: f32,
 ) -> Vec<Option<bounds::Code>> {
-    let inner: Vec<u32> = (0..nodes.len() as u32).filter(|&node| !nodes[node as usize].is_leaf()).collect();
+    let inner: Vec<u32> =
+        (0..nodes.len() as u32).filter(|&node| !nodes[node as usize].is_leaf()).collect();
     let shapes = codes.iter().flat_map(|page| match &page.codes {
         Some(codes) => codes.shapes().map(Some).collect(),
         None => vec![None; page.inner],
@@ -152,8 +154,13 @@ fn bound(
             let children = &nodes[first..first + node.children as usize];
             let code = shapes[at].and_then(|(sigma, shape)| {
                 let mut coded = node;
-                let code =
-                    bounds::Code::encode(&mut coded, children, &shape, extent, bounds::fine_step(sigma, fine, extent))?;
+                let code = bounds::Code::encode(
+                    &mut coded,
+                    children,
+                    &shape,
+                    extent,
+                    bounds::fine_step(sigma, fine, extent),
+                )?;
                 node = coded;
                 Some(code)
             });
@@ -172,7 +179,12 @@ fn bound(
 }
 
 /// The nodes of a page of `count`, the children of the first of which stand at `first_child`; or what is wrong with it.
-pub fn decode(bytes: &[u8], count: usize, first_child: u32, extent: f32) -> Result<Vec<Node>, String> {
+pub fn decode(
+    bytes: &[u8],
+    count: usize,
+    first_child: u32,
+    extent: f32,
+) -> Result<Vec<Node>, String> {
     let (&code, rest) = bytes.split_first().ok_or("it is empty")?;
     let nodes = match code {
         LOSSLESS => lossless::decode(rest, count)?,
@@ -185,13 +197,20 @@ pub fn decode(bytes: &[u8], count: usize, first_child: u32, extent: f32) -> Resu
             return Err(format!("its node {index} has {fault}"));
         }
         if node.children as usize > MOST_CHILDREN {
-            return Err(format!("its node {index} has {} children; {MOST_CHILDREN} are the most", node.children));
+            return Err(format!(
+                "its node {index} has {} children; {MOST_CHILDREN} are the most",
+                node.children
+            ));
         }
         let wanted = if node.is_leaf() { 0 } else { next };
         if node.first_child != wanted {
-            return Err(format!("the children of its node {index} stand at {}, not at {wanted}", node.first_child));
+            return Err(format!(
+                "the children of its node {index} stand at {}, not at {wanted}",
+                node.first_child
+            ));
         }
-        next = next.checked_add(node.children).ok_or("it has more children than can be numbered")?;
+        next =
+            next.checked_add(node.children).ok_or("it has more children than can be numbered")?;
     }
     Ok(nodes)
 }
@@ -211,10 +230,14 @@ pub fn enclose(nodes: &mut [Node]) {
 
 fn enclose_children(node: &mut Node, children: &[Node]) {
     let center = node.center().as_dvec3();
-    node.radius = children.iter().map(|child| round_up(reach(center, child))).fold(node.radius, f32::max);
+    node.radius =
+        children.iter().map(|child| round_up(reach(center, child))).fold(node.radius, f32::max);
     let own = node.size.max(WIDTH * deviation(&node.splat));
     node.size = children.iter().map(|child| child.size).fold(own, f32::max);
-    node.cone = children.iter().map(|child| cosine_below(joint_angle(node, child))).fold(node.cone, f32::min);
+    node.cone = children
+        .iter()
+        .map(|child| cosine_below(joint_angle(node, child)))
+        .fold(node.cone, f32::min);
 }
 
 /// The cosine of [`joint_angle`].

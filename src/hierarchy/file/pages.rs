@@ -20,11 +20,17 @@ pub fn in_order(nodes: &[Node]) -> Result<(), String> {
             return Err(format!("node {index} is nobody's child"));
         }
         if node.children as usize > MOST_CHILDREN {
-            return Err(format!("node {index} has {} children; {MOST_CHILDREN} are the most", node.children));
+            return Err(format!(
+                "node {index} has {} children; {MOST_CHILDREN} are the most",
+                node.children
+            ));
         }
         let wanted = if node.is_leaf() { 0 } else { next as u32 };
         if node.first_child != wanted {
-            return Err(format!("the children of node {index} stand at {}, not at {wanted}", node.first_child));
+            return Err(format!(
+                "the children of node {index} stand at {}, not at {wanted}",
+                node.first_child
+            ));
         }
         next += node.children as usize;
     }
@@ -88,15 +94,17 @@ pub struct Around {
 
 impl Around {
     /// What is around everything: a page with a root that has no parent is always needed.
-    pub const EVERYTHING: Self = Self { center: [0.0; 3], radius: f32::INFINITY, largest_size: f32::INFINITY };
+    pub const EVERYTHING: Self =
+        Self { center: [0.0; 3], radius: f32::INFINITY, largest_size: f32::INFINITY };
 
     /// Around the nodes that have children.
     pub fn parents(nodes: &[Node]) -> Self {
         let nodes = nodes.iter().filter(|node| !node.is_leaf());
-        let (low, high) = nodes.clone().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), node| {
-            let (center, radius) = (node.center().as_dvec3(), f64::from(node.radius));
-            (low.min(center - radius), high.max(center + radius))
-        });
+        let (low, high) =
+            nodes.clone().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), node| {
+                let (center, radius) = (node.center().as_dvec3(), f64::from(node.radius));
+                (low.min(center - radius), high.max(center + radius))
+            });
         let center = ((low + high) * 0.5).as_vec3();
         let reach = nodes.clone().map(|node| reach(center.as_dvec3(), node)).fold(0.0, f64::max);
         let largest_size = nodes.map(|node| node.size).fold(0.0, f32::max);

@@ -89,7 +89,8 @@ pub fn logarithm(value: f64) -> f64 {
     let part = f64::from_bits(bits & ((1 << 52) - 1) | 1023 << 52);
     let t = (part - SQRT_2) / (part + SQRT_2);
     let square = t * t;
-    let sum = 1.0 + square * (1.0 / 3.0 + square * (1.0 / 5.0 + square * (1.0 / 7.0 + square * (1.0 / 9.0))));
+    let sum = 1.0
+        + square * (1.0 / 3.0 + square * (1.0 / 5.0 + square * (1.0 / 7.0 + square * (1.0 / 9.0))));
     exponent + 0.5 + t * sum * (2.0 / std::f64::consts::LN_2)
 }
 
@@ -191,8 +192,11 @@ impl Shape {
     fn factor(&self) -> [f32; 6] {
         let [first, second, third] = self.sigma;
         let [a, b, c] = [self.axes[0] * first, self.axes[1] * second, self.axes[2] * third];
-        let [d, e, f] =
-            [self.axes[0] * (second * third), self.axes[1] * (first * third), self.axes[2] * (first * second)];
+        let [d, e, f] = [
+            self.axes[0] * (second * third),
+            self.axes[1] * (first * third),
+            self.axes[2] * (first * second),
+        ];
         let b00 = (a.x * a.x + b.x * b.x + c.x * c.x).sqrt();
         let minor = (d.z * d.z + e.z * e.z + f.z * f.z).sqrt();
         let (one, two) = (1.0 / b00, 1.0 / minor);
@@ -245,11 +249,16 @@ fn axes_of_turn([largest, parts @ ..]: [i32; 4]) -> Option<[DVec3; 3]> {
 /// The quaternion of three unit axes, right-handed.
 fn turn([x, y, z]: [DVec3; 3]) -> [i32; 4] {
     let parts = DQuat::from_mat3(&DMat3::from_cols(x, y, z)).normalize().to_array();
-    let largest = (0..4).max_by(|&a, &b| parts[a].abs().total_cmp(&parts[b].abs())).expect("there are four");
+    let largest =
+        (0..4).max_by(|&a, &b| parts[a].abs().total_cmp(&parts[b].abs())).expect("there are four");
     let scale = f64::from(TURN_STEPS) * std::f64::consts::SQRT_2 * parts[largest].signum();
     let mut out = [largest as i32; 4];
-    let rest = (0..4).filter(|&part| part != largest).map(|part| (parts[part] * scale).round() as i32);
-    out[1..].iter_mut().zip(rest).for_each(|(out, part)| *out = part.clamp(-TURN_STEPS, TURN_STEPS));
+    let rest =
+        (0..4).filter(|&part| part != largest).map(|part| (parts[part] * scale).round() as i32);
+    out[1..]
+        .iter_mut()
+        .zip(rest)
+        .for_each(|(out, part)| *out = part.clamp(-TURN_STEPS, TURN_STEPS));
     out
 }
 
@@ -271,11 +280,15 @@ impl Course {
         }
         let along = before.way - normal * before.way.dot(normal);
         let length = along.length_squared().sqrt();
-        let (ahead, start) =
-            if length > 1e-100 { (along / length, AHEAD * fineness.position) } else { (before.across[0], 0.0) };
+        let (ahead, start) = if length > 1e-100 {
+            (along / length, AHEAD * fineness.position)
+        } else {
+            (before.across[0], 0.0)
+        };
         let left = normal.cross(ahead);
         let both = 1.0 + last.dot(normal);
-        let fall = if both > 0.5 { [ahead, left].map(|side| side.dot(last) / both) } else { [0.0; 2] };
+        let fall =
+            if both > 0.5 { [ahead, left].map(|side| side.dot(last) / both) } else { [0.0; 2] };
         Self { axes: [ahead, left, normal], start, fall }
     }
 
@@ -337,7 +350,8 @@ impl Code {
             return None;
         }
         if self.axes != Axes::Bare {
-            before.normal = fineness.directions.decode(before.normal, before.across, self.normal)?;
+            before.normal =
+                fineness.directions.decode(before.normal, before.across, self.normal)?;
             before.across = direction::across(before.normal);
         }
         let axes = match self.axes {
@@ -353,8 +367,15 @@ impl Code {
     }
 
     /// All that is left once the shape is known.
-    fn splat(&self, fineness: &Fineness, shape: &Shape, course: &Course, before: &mut Before) -> Option<Splat> {
-        let normal = if self.axes == Axes::Bare { NO_NORMAL } else { direction::packed(before.normal) };
+    fn splat(
+        &self,
+        fineness: &Fineness,
+        shape: &Shape,
+        course: &Course,
+        before: &mut Before,
+    ) -> Option<Splat> {
+        let normal =
+            if self.axes == Axes::Bare { NO_NORMAL } else { direction::packed(before.normal) };
         let way = course.place(self.position, shape.step(fineness));
         before.center = (before.center() + way).to_array().map(|value| value as f32);
         before.way = way;
@@ -366,18 +387,24 @@ impl Code {
             NO_STRENGTH => 0.0,
             0 => before.strength,
             steps => {
-                let parts = steps.saturating_mul(fineness.strength).clamp(-MOST_STRENGTH, MOST_STRENGTH);
+                let parts =
+                    steps.saturating_mul(fineness.strength).clamp(-MOST_STRENGTH, MOST_STRENGTH);
                 (f64::from(before.strength) * power(parts)) as f32
             }
         };
         let color = color(before.color)? | alpha << 24;
-        let splat = Splat { center: before.center, strength, factor: shape.factor(), color, normal };
+        let splat =
+            Splat { center: before.center, strength, factor: shape.factor(), color, normal };
         is_drawable(&splat).then_some(splat)
     }
 
     /// The code of a splat, and what comes back of it. `None` for splats beyond what codes can tell: without width, of
     /// negative strength, too far from the node before.
-    pub fn encode(splat: &Splat, is_leaf: bool, before: &mut Before) -> Option<(Self, Splat, Shape)> {
+    pub fn encode(
+        splat: &Splat,
+        is_leaf: bool,
+        before: &mut Before,
+    ) -> Option<(Self, Splat, Shape)> {
         let fineness = &FINENESS[usize::from(is_leaf)];
         let normal = direction::unpacked(splat.normal);
         let (axes, ellipsoid) = ellipsoid(splat, normal, is_leaf)?;
@@ -392,7 +419,10 @@ impl Code {
             strength if strength < 0.0 => return None,
             0.0 => NO_STRENGTH,
             strength if strength == before.strength => 0,
-            strength => round(logarithm(f64::from(strength) / f64::from(before.strength)), fineness.strength),
+            strength => round(
+                logarithm(f64::from(strength) / f64::from(before.strength)),
+                fineness.strength,
+            ),
         };
         let mut code = Self {
             axes,
@@ -401,7 +431,8 @@ impl Code {
             thickness: round(second - third, fineness.thickness).clamp(-most, most),
             angle: 0,
             turn: if axes == Axes::Normal { [0; 4] } else { turn(ellipsoid.axes) },
-            normal: normal.map_or([0; 2], |it| fineness.directions.encode(before.normal, before.across, it)),
+            normal: normal
+                .map_or([0; 2], |it| fineness.directions.encode(before.normal, before.across, it)),
             position: [0; 3],
             color: [
                 luma[0] - before.color[0],
@@ -443,20 +474,25 @@ fn ellipsoid(splat: &Splat, normal: Option<DVec3>, is_leaf: bool) -> Option<(Axe
         let [u, v] = direction::across(normal);
         let seen = |t: DVec3| DVec3::from(columns.map(|column| column.dot(t)));
         let (x, y, z) = (seen(u), seen(v), seen(normal));
-        let (xx, xy, yy, zz) = (x.length_squared(), x.dot(y), y.length_squared(), z.length_squared());
+        let (xx, xy, yy, zz) =
+            (x.length_squared(), x.dot(y), y.length_squared(), z.length_squared());
         let (mean, half) = ((xx + yy) * 0.5, (xx - yy) * 0.5);
         let root = (half * half + xy * xy).sqrt();
         let (large, small) = (mean + root, mean - root);
         // What is neither along the normal nor across: by the angle between the normal and the ellipsoid's own axis for
         // leaves, 1° at most; other nodes are drawn where their tilt cannot be seen.
         let tilt = DVec3::new(x.dot(z), y.dot(z), 0.0).length();
-        let most = if is_leaf { 0.0175 * (small - zz).max(0.0) + 1e-6 * large } else { 0.25 * large };
+        let most =
+            if is_leaf { 0.0175 * (small - zz).max(0.0) + 1e-6 * large } else { 0.25 * large };
         if large > 0.0 && tilt <= most {
             let (a, b) = if half >= 0.0 { (half + root, xy) } else { (xy, root - half) };
             let length = (a * a + b * b).sqrt();
             let first = if length > 0.0 { (u * a + v * b) / length } else { u };
             let sigma = sound([large, small, zz].map(|square| square.max(0.0).sqrt()))?;
-            return Some((Axes::Normal, Shape { axes: [first, normal.cross(first), normal], sigma }));
+            return Some((
+                Axes::Normal,
+                Shape { axes: [first, normal.cross(first), normal], sigma },
+            ));
         }
     }
     let b = DMat3::from_cols(columns[0], columns[1], columns[2]);
@@ -469,5 +505,9 @@ fn ellipsoid(splat: &Splat, normal: Option<DVec3>, is_leaf: bool) -> Option<(Axe
 /// Widths that codes can tell; none is flat without end.
 fn sound([first, second, third]: [f64; 3]) -> Option<[f64; 3]> {
     let second = second.max(first * 2f64.powi(-15));
-    (first > 0.0 && first.is_finite()).then_some([first, second, third.max(second * 2f64.powi(-19))])
+    (first > 0.0 && first.is_finite()).then_some([
+        first,
+        second,
+        third.max(second * 2f64.powi(-19)),
+    ])
 }

@@ -79,7 +79,10 @@ pub struct Hierarchy {
 
 impl std::fmt::Debug for Hierarchy {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Hierarchy").field("path", &self.path).field("header", &self.header).finish_non_exhaustive()
+        f.debug_struct("Hierarchy")
+            .field("path", &self.path)
+            .field("header", &self.header)
+            .finish_non_exhaustive()
     }
 }
 
@@ -119,7 +122,8 @@ impl Hierarchy {
     }
 
     fn new(path: &Path, store: Store, limits: &Limits, may_be_cut: bool) -> Result<Self> {
-        let begun = begin(path, store.bytes(), limits, may_be_cut).map_err(|error| store.why(path, error));
+        let begun =
+            begin(path, store.bytes(), limits, may_be_cut).map_err(|error| store.why(path, error));
         let (header, directory) = begun?;
         Ok(Self::assemble(path, store, header, directory, limits.clone()))
     }
@@ -140,13 +144,20 @@ impl Hierarchy {
             return Err(Error::Argument(format!("the hierarchy: {fault}")));
         }
         for (number, block) in tree.blocks.iter().enumerate() {
-            let refuse = |message| Error::Argument(format!("block {number} of the hierarchy: {message}"));
+            let refuse =
+                |message| Error::Argument(format!("block {number} of the hierarchy: {message}"));
             in_order(&block.nodes).and_then(|()| check_nodes(&block.nodes)).map_err(refuse)?;
             let runs = pages(&block.nodes);
-            directory.push_block(&runs, &arounds(&block.nodes, &runs), &vec![Place::default(); runs.len()]);
+            directory.push_block(
+                &runs,
+                &arounds(&block.nodes, &runs),
+                &vec![Place::default(); runs.len()],
+            );
             match (number, block.portal) {
                 (0, None) => {}
-                (1.., Some(portal)) if top.nodes.get(portal as usize).is_some_and(Node::is_leaf) => {
+                (1.., Some(portal))
+                    if top.nodes.get(portal as usize).is_some_and(Node::is_leaf) =>
+                {
                     portals.push(portal)
                 }
                 (_, portal) => return Err(refuse(format!("its portal is {portal:?}"))),
@@ -158,7 +169,10 @@ impl Hierarchy {
         sorted.sort_unstable();
         sorted.dedup();
         if tree.is_joined() && (sorted.len() != leaves || portals.len() != leaves) {
-            let message = format!("{} blocks hang below the {leaves} portals of the hierarchy", portals.len());
+            let message = format!(
+                "{} blocks hang below the {leaves} portals of the hierarchy",
+                portals.len()
+            );
             return Err(Error::Argument(message));
         }
         directory.link();
@@ -177,10 +191,22 @@ impl Hierarchy {
             unit: String::new(),
             source: String::new(),
         };
-        Ok(Self::assemble(Path::new("memory"), Store::Blocks(tree.blocks), header, directory, Limits::none()))
+        Ok(Self::assemble(
+            Path::new("memory"),
+            Store::Blocks(tree.blocks),
+            header,
+            directory,
+            Limits::none(),
+        ))
     }
 
-    fn assemble(path: &Path, store: Store, header: Header, directory: Directory, limits: Limits) -> Self {
+    fn assemble(
+        path: &Path,
+        store: Store,
+        header: Header,
+        directory: Directory,
+        limits: Limits,
+    ) -> Self {
         let below = directory.blocks.iter().enumerate().skip(1);
         Self {
             path: path.to_owned(),
@@ -244,8 +270,10 @@ impl Hierarchy {
                 NO_PORTAL | 0 => u32::MAX,
                 portal => {
                     let above = self.families(entry.parent_pages.start)?;
-                    let family = above.partition_point(|family| family.first_child <= portal).checked_sub(1);
-                    let family = family.map(|index| above[index]).filter(|family| family.has(portal));
+                    let family =
+                        above.partition_point(|family| family.first_child <= portal).checked_sub(1);
+                    let family =
+                        family.map(|index| above[index]).filter(|family| family.has(portal));
                     let family = family.ok_or_else(|| self.torn(page))?;
                     parents.push(family.parent);
                     0
@@ -255,7 +283,9 @@ impl Hierarchy {
         let mut add = |families: &[Family]| {
             let nodes = self.directory.nodes(page);
             let begin = families.partition_point(|family| family.first_child < nodes.start);
-            for family in families[begin..].iter().take_while(|family| family.first_child < nodes.end) {
+            for family in
+                families[begin..].iter().take_while(|family| family.first_child < nodes.end)
+            {
                 if family.first_child != nodes.start + parent.len() as u32 {
                     return Err(self.torn(page));
                 }
@@ -307,12 +337,21 @@ impl Hierarchy {
         let entry = self.directory.blocks[block as usize];
         // A page of equal nodes takes a few bytes of the file.
         let found = u64::from(entry.nodes) * 2 * size_of::<Node>() as u64;
-        self.limits.check(LimitKind::Bytes, &self.path, format!("the size of block {block} in bytes"), found)?;
+        self.limits.check(
+            LimitKind::Bytes,
+            &self.path,
+            format!("the size of block {block} in bytes"),
+            found,
+        )?;
         let pages = entry.first_page..entry.first_page + entry.pages;
         // Of several damaged pages the first is told, whichever thread finds one first.
-        let pages: Vec<Result<Vec<Node>>> = pages.into_par_iter().map(|page| self.read_nodes(page)).collect();
+        let pages: Vec<Result<Vec<Node>>> =
+            pages.into_par_iter().map(|page| self.read_nodes(page)).collect();
         let pages: Vec<Vec<Node>> = pages.into_iter().collect::<Result<_>>()?;
-        Ok(Block { nodes: pages.concat(), portal: Some(entry.portal).filter(|&portal| portal != NO_PORTAL) })
+        Ok(Block {
+            nodes: pages.concat(),
+            portal: Some(entry.portal).filter(|&portal| portal != NO_PORTAL),
+        })
     }
 
     pub(super) fn directory(&self) -> &Directory {
@@ -337,7 +376,9 @@ impl Hierarchy {
         let entry = self.entry(page)?;
         if let Store::Blocks(blocks) = &self.store {
             let nodes = self.directory.nodes(page);
-            return Ok(blocks[entry.block as usize].nodes[nodes.start as usize..nodes.end as usize].to_vec());
+            return Ok(blocks[entry.block as usize].nodes
+                [nodes.start as usize..nodes.end as usize]
+                .to_vec());
         }
         let Place { offset, bytes: length, crc } = entry.place;
         let place = || format!("page {page} (byte {offset})");
@@ -346,7 +387,8 @@ impl Hierarchy {
         if end < offset.saturating_add(u64::from(length)) {
             return Err(incomplete(&self.path, place()));
         }
-        let broken = |message: String| self.store.why(&self.path, damaged(&self.path, place(), message));
+        let broken =
+            |message: String| self.store.why(&self.path, damaged(&self.path, place(), message));
         // A copy: what is decoded is what has the checksum, whoever writes to the file.
         let bytes = all[offset as usize..end as usize].to_vec();
         if crc32fast::hash(&bytes) != crc {
@@ -354,10 +396,14 @@ impl Hierarchy {
         }
         let children = self.directory.children(page);
         let nodes =
-            page::decode(&bytes, entry.nodes as usize, entry.first_child, self.header.extent).map_err(broken)?;
+            page::decode(&bytes, entry.nodes as usize, entry.first_child, self.header.extent)
+                .map_err(broken)?;
         let counted: u64 = nodes.iter().map(|node| u64::from(node.children)).sum();
         if counted != u64::from(children.end - children.start) {
-            let message = format!("its nodes have {counted} children where the directory tells of {}", children.len());
+            let message = format!(
+                "its nodes have {counted} children where the directory tells of {}",
+                children.len()
+            );
             return Err(damaged(&self.path, place(), message));
         }
         Ok(nodes)
@@ -390,7 +436,11 @@ impl Hierarchy {
             }
             let number = entry.first_node + index as u32;
             let block = self.portals.get(&number).ok_or_else(|| {
-                damaged(&self.path, format!("page {page}"), format!("no block hangs below the portal at node {number}"))
+                damaged(
+                    &self.path,
+                    format!("page {page}"),
+                    format!("no block hangs below the portal at node {number}"),
+                )
             })?;
             Ok(self.directory.blocks[*block as usize].first_page)
         };
@@ -404,7 +454,12 @@ impl Hierarchy {
 }
 
 /// What stands at the beginning of a file, checked.
-fn begin(path: &Path, bytes: &[u8], limits: &Limits, may_be_cut: bool) -> Result<(Header, Directory)> {
+fn begin(
+    path: &Path,
+    bytes: &[u8],
+    limits: &Limits,
+    may_be_cut: bool,
+) -> Result<(Header, Directory)> {
     let stored = Stored::decode(bytes).map_err(|refusal| refused(path, refusal))?;
     let directory = Directory::decode(bytes, &stored).map_err(|trouble| match trouble {
         Trouble::Incomplete => incomplete(path, "directory"),
@@ -419,11 +474,18 @@ fn begin(path: &Path, bytes: &[u8], limits: &Limits, may_be_cut: bool) -> Result
     if present < file_bytes && !may_be_cut {
         return Err(incomplete(path, format!("byte {present} of {file_bytes}")));
     }
-    for (what, found) in [("the number of leaves", header.leaves), ("the number of points", header.source_points)] {
+    for (what, found) in
+        [("the number of leaves", header.leaves), ("the number of points", header.source_points)]
+    {
         limits.check(LimitKind::Points, path, what, found)?;
     }
     let bytes = present + directory.memory();
-    limits.check(LimitKind::Bytes, path, "the size of the file and its directory in bytes", bytes)?;
+    limits.check(
+        LimitKind::Bytes,
+        path,
+        "the size of the file and its directory in bytes",
+        bytes,
+    )?;
     Ok((header, directory))
 }
 
@@ -461,8 +523,11 @@ impl Family {
 
 fn families(nodes: &[Node]) -> Vec<Family> {
     let inner = nodes.iter().filter(|node| !node.is_leaf());
-    let family =
-        |node: &Node| Family { first_child: node.first_child, children: node.children, parent: CutSphere::of(node) };
+    let family = |node: &Node| Family {
+        first_child: node.first_child,
+        children: node.children,
+        parent: CutSphere::of(node),
+    };
     inner.map(family).collect()
 }
 
@@ -502,10 +567,12 @@ pub(super) fn refused(path: &Path, refusal: Refusal) -> Error {
         Refusal::Incomplete => incomplete(path, "header"),
         Refusal::Foreign => Error::input(path, "header", "is no hierarchy of splats")
             .hint("give a .splk file, or convert the source to one"),
-        Refusal::Version(version) => {
-            Error::input(path, "header", format!("is of version {version}; version {} can be read", super::VERSION))
-                .hint("convert the source again, or use the release that wrote the file")
-        }
+        Refusal::Version(version) => Error::input(
+            path,
+            "header",
+            format!("is of version {version}; version {} can be read", super::VERSION),
+        )
+        .hint("convert the source again, or use the release that wrote the file"),
         Refusal::Damaged(message) => damaged(path, "header", message),
     }
 }

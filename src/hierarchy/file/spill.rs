@@ -18,7 +18,10 @@ pub enum Spill {
 impl Spill {
     /// Beside a file that is to be.
     pub fn beside(wanted: &Path) -> Result<Self> {
-        Ok(Self::Disk { file: BufWriter::with_capacity(BUFFER, Scratch::beside(wanted)?), length: 0 })
+        Ok(Self::Disk {
+            file: BufWriter::with_capacity(BUFFER, Scratch::beside(wanted)?),
+            length: 0,
+        })
     }
 
     /// Appends bytes and tells where they stand.

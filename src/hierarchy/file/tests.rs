@@ -24,18 +24,25 @@ fn open(bytes: Vec<u8>) -> Hierarchy {
 
 fn same(a: &Tree, b: &Tree) {
     let blocks = |tree: &Tree| -> Vec<(Vec<Vec<u32>>, Option<u32>)> {
-        let words = |block: &Block| block.nodes.iter().map(lossless::words).map(|words| words.to_vec()).collect();
+        let words = |block: &Block| {
+            block.nodes.iter().map(lossless::words).map(|words| words.to_vec()).collect()
+        };
         tree.blocks.iter().map(|block| (words(block), block.portal)).collect()
     };
     assert!(blocks(a) == blocks(b));
-    let rest = |tree: &Tree| (tree.origin, tree.extent, tree.closed, tree.bounds, tree.source_points);
+    let rest =
+        |tree: &Tree| (tree.origin, tree.extent, tree.closed, tree.bounds, tree.source_points);
     assert_eq!(rest(a), rest(b));
 }
 
 fn trees() -> Vec<Tree> {
     let small = [1, 2, 9, 500].map(|count| tree(&surface(count, 1)));
-    let large =
-        [tree(&surface(20_000, 2)), joined(&surface(12_000, 3), 5), joined(&cloud(40, 4), 40), tree(&cloud(5_000, 5))];
+    let large = [
+        tree(&surface(20_000, 2)),
+        joined(&surface(12_000, 3), 5),
+        joined(&cloud(40, 4), 40),
+        tree(&cloud(5_000, 5)),
+    ];
     small.into_iter().chain(large).collect()
 }
 
@@ -52,7 +59,10 @@ fn lossless_keeps_every_bit() {
         let hierarchy = open(to_bytes(&tree, &options(true)).unwrap());
         same(&hierarchy.read_tree().unwrap(), &tree);
         let header = hierarchy.header();
-        assert_eq!((header.leaves, header.up, header.unit.as_str()), (tree.leaf_count(), Some(UpAxis::Z), "m"));
+        assert_eq!(
+            (header.leaves, header.up, header.unit.as_str()),
+            (tree.leaf_count(), Some(UpAxis::Z), "m")
+        );
         assert_eq!((header.lossless, header.source.as_str()), (true, "scan.ply"));
     }
 }
@@ -60,7 +70,8 @@ fn lossless_keeps_every_bit() {
 /// Every page against the tree that it came from.
 fn pages_tell_their_parents(hierarchy: &Hierarchy) {
     let tree = hierarchy.read_tree().unwrap();
-    let parents: Vec<Vec<Option<u32>>> = tree.blocks.iter().map(|block| write::parents(&block.nodes)).collect();
+    let parents: Vec<Vec<Option<u32>>> =
+        tree.blocks.iter().map(|block| write::parents(&block.nodes)).collect();
     for (number, entry) in hierarchy.pages().iter().enumerate() {
         let page = hierarchy.read_page(number as u32).unwrap();
         assert_eq!(page.nodes.len(), entry.nodes as usize);
@@ -70,27 +81,38 @@ fn pages_tell_their_parents(hierarchy: &Hierarchy) {
             assert_eq!(*node, block.nodes[own]);
             let parent = match (own, block.portal) {
                 (0, None) => None,
-                (0, Some(portal)) => parents[0][portal as usize].map(|parent| tree.blocks[0].nodes[parent as usize]),
+                (0, Some(portal)) => {
+                    parents[0][portal as usize].map(|parent| tree.blocks[0].nodes[parent as usize])
+                }
                 _ => parents[entry.block as usize][own].map(|parent| block.nodes[parent as usize]),
             };
             match (parent, page.parent[index]) {
                 (None, u32::MAX) => assert_eq!(entry.parents_radius, f32::INFINITY),
                 (Some(parent), told) => {
                     assert_eq!(page.parents[told as usize], CutSphere::of(&parent));
-                    let away = (parent.center() - glam::Vec3::from(entry.parents_center)).length() + parent.radius;
-                    assert!(away <= entry.parents_radius * 1.000_001 && parent.size <= entry.largest_parent_size);
+                    let away = (parent.center() - glam::Vec3::from(entry.parents_center)).length()
+                        + parent.radius;
+                    assert!(
+                        away <= entry.parents_radius * 1.000_001
+                            && parent.size <= entry.largest_parent_size
+                    );
                 }
                 other => panic!("{other:?}"),
             }
             let below = page.child_pages[index];
             if page.is_portal(index) {
                 let block = &hierarchy.pages()[below as usize];
-                assert_eq!((tree.blocks[block.block as usize].portal, block.first_node), (Some(own as u32), 0));
+                assert_eq!(
+                    (tree.blocks[block.block as usize].portal, block.first_node),
+                    (Some(own as u32), 0)
+                );
             } else if node.is_leaf() {
                 assert_eq!(below, NO_PAGE);
             } else {
                 let entry = &hierarchy.pages()[below as usize];
-                assert!((entry.first_node..entry.first_node + entry.nodes).contains(&node.first_child));
+                assert!(
+                    (entry.first_node..entry.first_node + entry.nodes).contains(&node.first_child)
+                );
                 assert!(below == number as u32 || entry.parent_pages.contains(&(number as u32)));
             }
         }
@@ -115,11 +137,19 @@ fn a_file_is_written_whole_and_is_sound() {
             write(&tree, &path, &options(lossless)).unwrap();
             assert_eq!(std::fs::read(&path).unwrap(), to_bytes(&tree, &options(lossless)).unwrap());
             assert_eq!(check(&path, &Limits::default()).findings, []);
-            assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing else is left");
+            assert_eq!(
+                std::fs::read_dir(folder.path()).unwrap().count(),
+                1,
+                "nothing else is left"
+            );
         }
     }
     drop(Writer::new(&folder.path().join("other.splk"), 3.0, &options(false)).unwrap());
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left of what was not finished");
+    assert_eq!(
+        std::fs::read_dir(folder.path()).unwrap().count(),
+        1,
+        "nothing is left of what was not finished"
+    );
 }
 
 /// What one file is read as: a tree, or the error of opening or of some page.
@@ -134,7 +164,10 @@ fn try_all(bytes: Vec<u8>) -> crate::Result<Tree> {
 fn input_error(result: crate::Result<impl Sized>, what: &str) {
     match result {
         Err(crate::Error::Input { place, message, hint, .. }) => {
-            assert!(!place.is_empty() && !message.is_empty() && hint.is_some(), "{what}: {place}: {message}");
+            assert!(
+                !place.is_empty() && !message.is_empty() && hint.is_some(),
+                "{what}: {place}: {message}"
+            );
         }
         Err(other) => panic!("{what}: {other}"),
         Ok(_) => panic!("{what} was not told"),
@@ -143,7 +176,10 @@ fn input_error(result: crate::Result<impl Sized>, what: &str) {
 
 fn small_files() -> Vec<Vec<u8>> {
     let trees = [joined(&surface(120, 8), 3), tree(&cloud(40, 9))];
-    trees.iter().flat_map(|tree| [true, false].map(|lossless| to_bytes(tree, &options(lossless)).unwrap())).collect()
+    trees
+        .iter()
+        .flat_map(|tree| [true, false].map(|lossless| to_bytes(tree, &options(lossless)).unwrap()))
+        .collect()
 }
 
 #[test]
@@ -193,9 +229,15 @@ fn the_beginning_of_a_file_is_a_coarse_model() {
         let mut present = 0;
         for page in 0..prefix.pages().len() as u32 {
             if prefix.is_present(page) {
-                assert_eq!(prefix.read_page(page).unwrap().nodes, whole.read_page(page).unwrap().nodes);
+                assert_eq!(
+                    prefix.read_page(page).unwrap().nodes,
+                    whole.read_page(page).unwrap().nodes
+                );
                 let above = prefix.pages()[page as usize].parent_pages.clone();
-                assert!(above.into_iter().all(|above| prefix.is_present(above)), "parents come first");
+                assert!(
+                    above.into_iter().all(|above| prefix.is_present(above)),
+                    "parents come first"
+                );
                 present += 1;
             } else {
                 input_error(prefix.read_page(page), "a page that is not there");
@@ -212,7 +254,8 @@ fn forged(bytes: &[u8], change: impl Fn(&mut [u8])) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let stored = header::Stored::decode(&bytes).unwrap();
     let start = stored.length();
-    let end = start + directory::Directory::length(stored.blocks as usize, stored.pages as usize) as usize;
+    let end = start
+        + directory::Directory::length(stored.blocks as usize, stored.pages as usize) as usize;
     change(&mut bytes);
     for range in [0..start, start..end] {
         let crc = crc32fast::hash(&bytes[range.start..range.end - 4]);
@@ -230,7 +273,8 @@ fn lies_are_told_though_checksums_fit() {
     assert!(try_all(forged(&bytes, |_| ())).is_ok());
     let start = header::Stored::decode(&bytes).unwrap().length();
     // Versions, counts of leaves, nodes, blocks and pages; then every word of the directory.
-    let directory_end = start + directory::Directory::length(3, open(bytes.clone()).pages().len()) as usize - 4;
+    let directory_end =
+        start + directory::Directory::length(3, open(bytes.clone()).pages().len()) as usize - 4;
     for at in [8, 16, 104, 112, 124, 128].into_iter().chain((start..directory_end).step_by(4)) {
         for change in [1u32, 0x0100_0000, u32::MAX] {
             let broken = forged(&bytes, |bytes| {
@@ -245,7 +289,9 @@ fn lies_are_told_though_checksums_fit() {
     }
     let future = forged(&bytes, |bytes| bytes[8] = 9);
     match try_all(future) {
-        Err(crate::Error::Input { message, .. }) => assert!(message.contains("version 9"), "{message}"),
+        Err(crate::Error::Input { message, .. }) => {
+            assert!(message.contains("version 9"), "{message}")
+        }
         other => panic!("{other:?}"),
     }
 }
@@ -270,7 +316,11 @@ fn pages_of_noise_are_survived() {
                     };
                     broken[at] = random.below(256) as u8;
                 }
-                broken.truncate(if random.next() < 0.3 { random.below(broken.len()) } else { broken.len() });
+                broken.truncate(if random.next() < 0.3 {
+                    random.below(broken.len())
+                } else {
+                    broken.len()
+                });
                 if let Ok(nodes) = page::decode(&broken, runs[0].nodes.len(), 1, tree.extent) {
                     assert_eq!(nodes.len(), runs[0].nodes.len());
                 }
@@ -288,7 +338,9 @@ fn bounds_hold_exactly_for_what_is_read() {
             for node in &block.nodes {
                 let first = node.first_child as usize;
                 for child in &block.nodes[first..first + node.children as usize] {
-                    assert!(pages::reach(node.center().as_dvec3(), child) <= f64::from(node.radius));
+                    assert!(
+                        pages::reach(node.center().as_dvec3(), child) <= f64::from(node.radius)
+                    );
                     assert!(child.size <= node.size);
                     let cone = libm::cos(page::joint_angle(node, child));
                     assert!(node.cone == -1.0 || f64::from(node.cone) <= cone);
@@ -300,7 +352,8 @@ fn bounds_hold_exactly_for_what_is_read() {
 
 /// Leaves in the order of their colours, as that among siblings may change.
 fn sorted_leaves(tree: &Tree) -> Vec<crate::hierarchy::Node> {
-    let mut leaves: Vec<_> = tree.blocks[0].nodes.iter().copied().filter(|node| node.is_leaf()).collect();
+    let mut leaves: Vec<_> =
+        tree.blocks[0].nodes.iter().copied().filter(|node| node.is_leaf()).collect();
     leaves.sort_by_key(|leaf| leaf.splat.color);
     leaves
 }
@@ -310,7 +363,10 @@ fn losses_keep_to_the_promises() {
     use crate::hierarchy::testing::ellipsoid;
     let mut splats = surface(30_000, 6);
     // A colour of its own tells each leaf.
-    splats.iter_mut().enumerate().for_each(|(index, splat)| splat.color = index as u32 | 0xff00_0000);
+    splats
+        .iter_mut()
+        .enumerate()
+        .for_each(|(index, splat)| splat.color = index as u32 | 0xff00_0000);
     let tree = tree(&splats);
     let bytes = to_bytes(&tree, &options(false)).unwrap();
     let read = open(bytes).read_tree().unwrap();
@@ -338,14 +394,21 @@ fn losses_keep_to_the_promises() {
     }
     let [root, wanted] = [&read, &tree].map(|tree| tree.blocks[0].nodes[0].radius);
     assert!(root <= 1.05 * wanted, "the root's sphere grows by {}", root / wanted);
-    assert!(sum / before.len() as f64 <= 0.67 && most <= 1.9, "normals: {} {most}", sum / before.len() as f64);
+    assert!(
+        sum / before.len() as f64 <= 0.67 && most <= 1.9,
+        "normals: {} {most}",
+        sum / before.len() as f64
+    );
 }
 
 #[test]
 fn what_was_read_loses_little_more() {
     for mut splats in [surface(9, 2), surface(4_000, 3)] {
         // A colour of its own tells each leaf.
-        splats.iter_mut().enumerate().for_each(|(index, splat)| splat.color = index as u32 | 0xff00_0000);
+        splats
+            .iter_mut()
+            .enumerate()
+            .for_each(|(index, splat)| splat.color = index as u32 | 0xff00_0000);
         let first = open(to_bytes(&tree(&splats), &options(false)).unwrap()).read_tree().unwrap();
         let again = open(to_bytes(&first, &options(false)).unwrap()).read_tree().unwrap();
         let (before, after) = (sorted_leaves(&first), sorted_leaves(&again));
@@ -397,7 +460,8 @@ fn disorder_is_refused() {
     refused(|tree| tree.extent = 0.0);
     refused(|tree| tree.blocks.push(tree.blocks[0].clone()));
     // Nor is it drawn.
-    let view = Camera::framing(&sound.bounds, DVec3::X, DVec3::Z, 1.0).view([9, 9]).expect("a view");
+    let view =
+        Camera::framing(&sound.bounds, DVec3::X, DVec3::Z, 1.0).view([9, 9]).expect("a view");
     assert!(!sound.cut(&view, Detail::Pixels(1.0), None).expect("a cut").splats.is_empty());
     let mut torn = sound.clone();
     torn.blocks[0].nodes[0].first_child = u32::MAX;
@@ -447,7 +511,11 @@ fn numbers_that_cannot_be_drawn_are_refused() {
     let refused = |change: &dyn Fn(&mut Tree), message: &str| {
         let mut tree = sound.clone();
         change(&mut tree);
-        assert!(validate(&tree).iter().any(|finding| finding.message.contains(message)), "{:?}", validate(&tree));
+        assert!(
+            validate(&tree).iter().any(|finding| finding.message.contains(message)),
+            "{:?}",
+            validate(&tree)
+        );
         for lossless in [true, false] {
             let error = to_bytes(&tree, &options(lossless)).unwrap_err().to_string();
             assert!(error.contains(message), "{error}");
@@ -459,7 +527,10 @@ fn numbers_that_cannot_be_drawn_are_refused() {
     let nodes: [(Change, &str); 7] = [
         (|node| node.splat.strength = 1.1e10, "an optical depth of 11000000000, but"),
         (|node| node.splat.strength = -1.0, "an optical depth of -1, but"),
-        (|node| node.splat.factor[3] = 1e19, "a coordinate or an element of its factor beyond 1e18"),
+        (
+            |node| node.splat.factor[3] = 1e19,
+            "a coordinate or an element of its factor beyond 1e18",
+        ),
         (|node| node.center[1] = -1e19, "a coordinate or an element of its factor beyond 1e18"),
         (|node| node.splat.center[2] = f32::NAN, "a value that is not finite"),
         (|node| node.radius = -1.0, "a radius of -1 and"),

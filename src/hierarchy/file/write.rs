@@ -117,7 +117,9 @@ impl Writer {
     pub fn blocks(&mut self, blocks: &[&[Node]]) -> Result<Vec<Node>> {
         let written = self.roots.len();
         for (number, nodes) in (written..).zip(blocks) {
-            let refuse = |message: String| Error::Argument(format!("block {number} of the hierarchy: {message}"));
+            let refuse = |message: String| {
+                Error::Argument(format!("block {number} of the hierarchy: {message}"))
+            };
             in_order(nodes).map_err(refuse)?;
             check_nodes(nodes).map_err(refuse)?;
         }
@@ -150,14 +152,23 @@ impl Writer {
         self.end(top, whole, target).map(|_| ())
     }
 
-    fn end(mut self, top: Option<Top>, whole: &Whole, target: impl FnOnce() -> Result<Target>) -> Result<Vec<u8>> {
+    fn end(
+        mut self,
+        top: Option<Top>,
+        whole: &Whole,
+        target: impl FnOnce() -> Result<Target>,
+    ) -> Result<Vec<u8>> {
         if let Some(fault) = fault_of_box(whole.origin, &whole.bounds) {
             return Err(Error::Argument(format!("the hierarchy: {fault}")));
         }
         let mut directory = match (top, self.roots.len()) {
             (_, 0) => return Err(Error::Argument("the hierarchy has no blocks".into())),
             (None, 1) => std::mem::take(&mut self.directory),
-            (None, count) => return Err(Error::Argument(format!("nothing joins the {count} blocks of the hierarchy"))),
+            (None, count) => {
+                return Err(Error::Argument(format!(
+                    "nothing joins the {count} blocks of the hierarchy"
+                )));
+            }
             (Some(top), _) => self.join(top)?,
         };
         directory.link();
@@ -169,7 +180,8 @@ impl Writer {
             blocks: directory.blocks.len() as u32,
             pages: directory.pages.len() as u32,
         };
-        let mut at = stored.length() as u64 + Directory::length(directory.blocks.len(), directory.pages.len());
+        let mut at = stored.length() as u64
+            + Directory::length(directory.blocks.len(), directory.pages.len());
         for &page in &order {
             let place = &mut directory.pages[page as usize].place;
             place.offset = at;
@@ -182,7 +194,8 @@ impl Writer {
             hash.update(bytes);
             out.write_all(bytes)
         };
-        let pieces = order.iter().map(|&page| (spilled[page as usize].offset, spilled[page as usize].bytes));
+        let pieces =
+            order.iter().map(|&page| (spilled[page as usize].offset, spilled[page as usize].bytes));
         let written = put(&stored.encode())
             .and_then(|()| put(&directory.encode()))
             .and_then(|()| self.spill.replay(pieces, &mut put))
@@ -194,18 +207,24 @@ impl Writer {
 
     /// The directory of all blocks, with the one on top written too.
     fn join(&mut self, top: Top) -> Result<Directory> {
-        let refuse = |message: String| Error::Argument(format!("the block that joins the others: {message}"));
+        let refuse = |message: String| {
+            Error::Argument(format!("the block that joins the others: {message}"))
+        };
         in_order(top.nodes).map_err(refuse)?;
         let mut nodes = top.nodes.to_vec();
         let leaves = nodes.iter().filter(|node| node.is_leaf()).count();
         if top.portals.len() != self.roots.len() || leaves != self.roots.len() {
             let [portals, blocks] = [top.portals.len(), self.roots.len()];
-            return Err(refuse(format!("it has {leaves} leaves and {portals} portals for {blocks} blocks")));
+            return Err(refuse(format!(
+                "it has {leaves} leaves and {portals} portals for {blocks} blocks"
+            )));
         }
         let mut is_taken = vec![false; nodes.len()];
         for (root, &portal) in self.roots.iter().zip(top.portals) {
             let portal = portal as usize;
-            if !nodes.get(portal).is_some_and(Node::is_leaf) || std::mem::replace(&mut is_taken[portal], true) {
+            if !nodes.get(portal).is_some_and(Node::is_leaf)
+                || std::mem::replace(&mut is_taken[portal], true)
+            {
                 return Err(refuse(format!("node {portal} is no portal, or that of two blocks")));
             }
             nodes[portal] = Node { first_child: 0, children: 0, ..*root };
@@ -252,7 +271,8 @@ impl Writer {
 
 /// Refuses nodes whose numbers cannot be drawn.
 pub(super) fn check_nodes(nodes: &[Node]) -> Result<(), String> {
-    let found = nodes.par_iter().enumerate().find_map_first(|(index, node)| Some((index, fault(node)?)));
+    let found =
+        nodes.par_iter().enumerate().find_map_first(|(index, node)| Some((index, fault(node)?)));
     found.map_or(Ok(()), |(index, fault)| Err(format!("node {index} has {fault}")))
 }
 
@@ -313,7 +333,11 @@ pub fn to_bytes(tree: &Tree, options: &WriteOptions) -> Result<Vec<u8>> {
     all(tree, writer, || Ok(Target::Memory(Vec::new())))
 }
 
-fn all(tree: &Tree, mut writer: Writer, target: impl FnOnce() -> Result<Target>) -> Result<Vec<u8>> {
+fn all(
+    tree: &Tree,
+    mut writer: Writer,
+    target: impl FnOnce() -> Result<Target>,
+) -> Result<Vec<u8>> {
     let Tree { origin, bounds, closed, source_points, .. } = *tree;
     let whole = Whole { origin, bounds, closed, source_points };
     let below = &tree.blocks[usize::from(tree.is_joined())..];
@@ -324,6 +348,7 @@ fn all(tree: &Tree, mut writer: Writer, target: impl FnOnce() -> Result<Target>)
         return writer.end(None, &whole, target);
     }
     let portals: Option<Vec<u32>> = below.iter().map(|block| block.portal).collect();
-    let portals = portals.ok_or_else(|| Error::Argument("a block of the hierarchy has no portal".into()))?;
+    let portals =
+        portals.ok_or_else(|| Error::Argument("a block of the hierarchy has no portal".into()))?;
     writer.end(Some(Top { nodes: &tree.blocks[0].nodes, portals: &portals }), &whole, target)
 }

@@ -25,7 +25,10 @@ pub fn check(source: &Source, xml: &[u8]) -> Result<()> {
             (b'=', None) if in_tag => {
                 attributes += 1;
                 if attributes > MOST_ATTRIBUTES {
-                    return Err(wrong(at, format!("an element has more than {MOST_ATTRIBUTES} attributes")));
+                    return Err(wrong(
+                        at,
+                        format!("an element has more than {MOST_ATTRIBUTES} attributes"),
+                    ));
                 }
             }
             _ => {}

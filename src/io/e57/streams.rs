@@ -27,13 +27,15 @@ pub fn check(source: &Source, scan: &PointCloud, number: usize, most: u64) -> Re
             Some(false) => continue,
             Some(true) => {}
         }
-        let items = || held.iter().zip(&sizes).filter_map(|(held, size)| (held * 8).checked_div(*size));
+        let items =
+            || held.iter().zip(&sizes).filter_map(|(held, size)| (held * 8).checked_div(*size));
         let before = complete;
         complete = items().min().unwrap_or(0);
         let ahead: u64 = items().map(|items| items - before).sum();
         let waiting = ahead.saturating_add((complete - before).saturating_mul(constants));
         if waiting > most {
-            let message = format!("{waiting} values wait for others of their points, more than {most}");
+            let message =
+                format!("{waiting} values wait for others of their points, more than {most}");
             return Err(source.error(format!("scan {number}"), message));
         }
     }
@@ -63,7 +65,8 @@ impl<'a> Packets<'a> {
     fn begin(bytes: &'a [u8], section: u64) -> Option<Self> {
         let page = u64::from_le_bytes(*bytes.get(40..)?.first_chunk()?);
         let logical = |place: u64| place.checked_sub(place.checked_div(page)? * CHECKSUM);
-        let mut packets = Self { bytes, page: (page > CHECKSUM).then_some(page)?, at: logical(section)? };
+        let mut packets =
+            Self { bytes, page: (page > CHECKSUM).then_some(page)?, at: logical(section)? };
         packets.skip(16)?;
         let data = u64::from_le_bytes(packets.take()?);
         packets.at = logical(data)?;
@@ -107,7 +110,8 @@ impl<'a> Packets<'a> {
         let mut out = [0; N];
         for byte in &mut out {
             let content = self.page - CHECKSUM;
-            let place = (self.at / content).checked_mul(self.page)?.checked_add(self.at % content)?;
+            let place =
+                (self.at / content).checked_mul(self.page)?.checked_add(self.at % content)?;
             *byte = *self.bytes.get(usize::try_from(place).ok()?)?;
             self.at += 1;
         }

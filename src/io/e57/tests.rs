@@ -22,8 +22,9 @@ fn file(scans: &[Scan], change: impl Fn(String) -> String) -> Vec<u8> {
     let mut out = Cursor::new(Vec::new());
     let mut writer = E57Writer::new(&mut out, "file").unwrap();
     for (records, points, pose) in scans {
-        let records =
-            records.iter().map(|(name, data_type)| Record { name: name.clone(), data_type: data_type.clone() });
+        let records = records
+            .iter()
+            .map(|(name, data_type)| Record { name: name.clone(), data_type: data_type.clone() });
         let mut scan = writer.add_pointcloud("scan", records.collect()).unwrap();
         scan.set_transform(pose.clone());
         points.iter().for_each(|point| scan.add_point(point.clone()).unwrap());
@@ -35,7 +36,9 @@ fn file(scans: &[Scan], change: impl Fn(String) -> String) -> Vec<u8> {
 }
 
 fn cartesian() -> Vec<(RecordName, RecordDataType)> {
-    [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ].map(|name| (name, DOUBLE)).to_vec()
+    [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ]
+        .map(|name| (name, DOUBLE))
+        .to_vec()
 }
 
 fn doubles(values: [f64; 3]) -> Vec<RecordValue> {
@@ -53,24 +56,37 @@ fn pose() -> Option<Transform> {
 
 /// Two coloured points and an invalid one by Cartesian coordinates, and a scan by spherical ones with intensities.
 fn scans() -> [Scan; 2] {
-    let colored =
-        [RecordName::ColorRed, RecordName::ColorGreen, RecordName::ColorBlue].map(|name| (name, integer(255)));
+    let colored = [RecordName::ColorRed, RecordName::ColorGreen, RecordName::ColorBlue]
+        .map(|name| (name, integer(255)));
     let invalid = (RecordName::CartesianInvalidState, integer(2));
     let point = |position, color: [i64; 3], state| {
-        [doubles(position), color.map(RecordValue::Integer).to_vec(), vec![RecordValue::Integer(state)]].concat()
+        [
+            doubles(position),
+            color.map(RecordValue::Integer).to_vec(),
+            vec![RecordValue::Integer(state)],
+        ]
+        .concat()
     };
     let points = vec![
         point([1.0, 0.0, 0.0], [255, 128, 0], 0),
         point([9.0, 9.0, 9.0], [1, 2, 3], 2),
         point([0.0, 0.002, 1.0], [0, 0, 51], 0),
     ];
-    let spherical = [RecordName::SphericalRange, RecordName::SphericalAzimuth, RecordName::SphericalElevation];
-    let spherical = [spherical.map(|name| (name, DOUBLE)).to_vec(), vec![(RecordName::Intensity, FLOAT)]].concat();
-    let measured = |position, intensity| [doubles(position), vec![RecordValue::Single(intensity)]].concat();
+    let spherical =
+        [RecordName::SphericalRange, RecordName::SphericalAzimuth, RecordName::SphericalElevation];
+    let spherical =
+        [spherical.map(|name| (name, DOUBLE)).to_vec(), vec![(RecordName::Intensity, FLOAT)]]
+            .concat();
+    let measured =
+        |position, intensity| [doubles(position), vec![RecordValue::Single(intensity)]].concat();
     let quarter = std::f64::consts::FRAC_PI_2;
     [
         ([cartesian(), colored.to_vec(), vec![invalid]].concat(), points, pose()),
-        (spherical, vec![measured([2.0, quarter, 0.0], -300.0), measured([3.0, 0.0, quarter], 900.0)], None),
+        (
+            spherical,
+            vec![measured([2.0, quarter, 0.0], -300.0), measured([3.0, 0.0, quarter], 900.0)],
+            None,
+        ),
     ]
 }
 
@@ -84,20 +100,30 @@ fn scans_with_poses_and_colors() {
     let mesh = load(&file(&scans()[..1], |xml| xml)).unwrap();
     let world = |i: usize| mesh.origin + mesh.positions[i].as_dvec3();
     assert!(world(0).distance(DVec3::new(4_500_000.0, 5_400_001.0, 100.0)) < 1e-5, "{}", world(0));
-    assert!(world(1).distance(DVec3::new(4_499_999.998, 5_400_000.0, 101.0)) < 1e-5, "{}", world(1));
+    assert!(
+        world(1).distance(DVec3::new(4_499_999.998, 5_400_000.0, 101.0)) < 1e-5,
+        "{}",
+        world(1)
+    );
     assert_eq!(mesh.colors, [[255, 128, 0, 255], [0, 0, 51, 255]]);
     assert_eq!(mesh.sensors.len(), 1);
     assert_eq!(mesh.sensors[0].points, 0..2);
     assert!(
-        (mesh.origin + mesh.sensors[0].position.as_dvec3()).distance(DVec3::new(4_500_000.0, 5_400_000.0, 100.0))
-            < 1e-5
+        (mesh.origin + mesh.sensors[0].position.as_dvec3()).distance(DVec3::new(
+            4_500_000.0,
+            5_400_000.0,
+            100.0
+        )) < 1e-5
     );
 }
 
 #[test]
 fn spherical_coordinates_and_intensities() {
     let mesh = load(&file(&scans()[1..], |xml| xml)).unwrap();
-    assert!(mesh.positions[0].distance(Vec3::Y * 2.0) < 1e-6 && mesh.positions[1].distance(Vec3::Z * 3.0) < 1e-6);
+    assert!(
+        mesh.positions[0].distance(Vec3::Y * 2.0) < 1e-6
+            && mesh.positions[1].distance(Vec3::Z * 3.0) < 1e-6
+    );
     assert_eq!(mesh.colors, [[0, 0, 0, 255], [255; 4]]);
     assert_eq!(mesh.sensors, [Sensor { position: Vec3::ZERO, points: 0..2 }]);
 }
@@ -107,9 +133,13 @@ fn all_scans_are_one_cloud() {
     let mesh = load(&file(&scans(), |xml| xml)).unwrap();
     assert_eq!((mesh.positions.len(), mesh.colors.len()), (4, 4));
     assert_eq!(mesh.colors[2], [255; 4], "no colour beside colours");
-    assert_eq!(mesh.sensors.iter().map(|sensor| sensor.points.clone()).collect::<Vec<_>>(), [0..2, 2..4]);
+    assert_eq!(
+        mesh.sensors.iter().map(|sensor| sensor.points.clone()).collect::<Vec<_>>(),
+        [0..2, 2..4]
+    );
     // Points in the world's coordinates tell nothing of a scanner.
-    let merged = load(&file(&[(cartesian(), vec![doubles([1.0, 2.0, 3.0])], None)], |xml| xml)).unwrap();
+    let merged =
+        load(&file(&[(cartesian(), vec![doubles([1.0, 2.0, 3.0])], None)], |xml| xml)).unwrap();
     assert!(merged.sensors.is_empty() && merged.colors.is_empty());
 }
 
@@ -143,9 +173,9 @@ fn cuts_and_lies_are_errors() {
 /// What takes no bits could be repeated for ever.
 #[test]
 fn scans_of_no_bits_are_refused() {
-    let records = cartesian()
-        .into_iter()
-        .map(|(name, _)| (name, RecordDataType::ScaledInteger { min: 3, max: 4, scale: 1.0, offset: 0.0 }));
+    let records = cartesian().into_iter().map(|(name, _)| {
+        (name, RecordDataType::ScaledInteger { min: 3, max: 4, scale: 1.0, offset: 0.0 })
+    });
     let scan = (records.collect(), vec![vec![RecordValue::ScaledInteger(3); 3]; 2], None);
     let content = file(&[scan], |xml| xml.replace("maximum=\"4\"", "maximum=\"3\""));
     let message = load(&content).unwrap_err().to_string();
@@ -168,7 +198,10 @@ fn no_changed_description_does_harm() {
                 crate::io::copy::lossy(&bytes)
             });
             if let Err(error) = load(&content) {
-                assert!(matches!(error, Error::Input { .. } | Error::Limit { .. }), "{at}: {error}");
+                assert!(
+                    matches!(error, Error::Input { .. } | Error::Limit { .. }),
+                    "{at}: {error}"
+                );
             }
         }
     }
@@ -179,7 +212,9 @@ fn no_changed_description_does_harm() {
 fn descriptions_of_many_names_are_refused() {
     let many = |what: fn(usize) -> String| {
         let names: String = (0..2000).map(what).collect();
-        load(&file(&scans(), |xml| xml.replacen("<e57Root", &format!("<e57Root{names}"), 1))).unwrap_err().to_string()
+        load(&file(&scans(), |xml| xml.replacen("<e57Root", &format!("<e57Root{names}"), 1)))
+            .unwrap_err()
+            .to_string()
     };
     let message = many(|i| format!(" xmlns:p{i}='u'"));
     assert!(message.contains("more than 256"), "{message}");
@@ -196,16 +231,21 @@ fn descriptions_of_many_names_are_refused() {
 /// Values of streams that are ahead of the others are kept until theirs come: that is counted by the packets' headers.
 #[test]
 fn values_that_wait_for_others_are_counted() {
-    let records =
-        [cartesian(), vec![(RecordName::RowIndex, integer(1)), (RecordName::ColumnIndex, integer(0))]].concat();
-    let point = [doubles([1.0, 2.0, 3.0]), vec![RecordValue::Integer(1), RecordValue::Integer(0)]].concat();
+    let records = [
+        cartesian(),
+        vec![(RecordName::RowIndex, integer(1)), (RecordName::ColumnIndex, integer(0))],
+    ]
+    .concat();
+    let point =
+        [doubles([1.0, 2.0, 3.0]), vec![RecordValue::Integer(1), RecordValue::Integer(0)]].concat();
     let content = file(&[(records, vec![point; 5000], None)], |xml| xml);
     let folder = Folder::new();
     let path = folder.write("a.e57", &content);
     let limits = Limits::default();
     let source = Source::open(&path, &limits).unwrap();
     let scans = E57Reader::new(Cursor::new(source.bytes())).unwrap().pointclouds();
-    let told = |most: u64| streams::check(&source, &scans[0], 0, most).map_err(|error| error.to_string());
+    let told =
+        |most: u64| streams::check(&source, &scans[0], 0, most).map_err(|error| error.to_string());
     told(streams::MOST_WAITING).unwrap();
     // A packet has some 2,500 points of 24 bytes and a bit, and of a record that takes none.
     let message = told(1000).unwrap_err();

@@ -30,7 +30,12 @@ impl Buffers<'_> {
 
     /// All elements of an accessor of `N` components; normalised integers (or, with `fractions`, all integers) are
     /// scaled to 0 … 1 or −1 … 1.
-    pub fn floats<const N: usize>(&self, index: usize, place: &str, fractions: bool) -> Result<Vec<[f32; N]>> {
+    pub fn floats<const N: usize>(
+        &self,
+        index: usize,
+        place: &str,
+        fractions: bool,
+    ) -> Result<Vec<[f32; N]>> {
         let layout = self.layout(index, place)?;
         if layout.multiplicity != N {
             let message = format!("has {} components where {N} are needed", layout.multiplicity);
@@ -45,7 +50,9 @@ impl Buffers<'_> {
             })
         };
         let mut out = match layout.data {
-            Some((data, stride)) => (0..layout.count).map(|i| element(&data[i * stride..])).collect(),
+            Some((data, stride)) => {
+                (0..layout.count).map(|i| element(&data[i * stride..])).collect()
+            }
             None => vec![[0.0; N]; layout.count],
         };
         if let Some(sparse) = &layout.sparse {
@@ -54,7 +61,8 @@ impl Buffers<'_> {
                 let at = number(at, sparse.component) as usize;
                 let count = layout.count;
                 let Some(slot) = out.get_mut(at) else {
-                    let message = format!("its sparse index {at} is not below its count of {count}");
+                    let message =
+                        format!("its sparse index {at} is not below its count of {count}");
                     return Err(self.source.error(format!("{place}, accessor {index}"), message));
                 };
                 *slot = element(value);
@@ -76,15 +84,19 @@ impl Buffers<'_> {
     pub fn indices(&self, index: usize, place: &str, vertices: usize) -> Result<Vec<u32>> {
         let layout = self.layout(index, place)?;
         let place = format!("{place}, accessor {index}");
-        let whole = matches!(layout.component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32);
-        let (Some((data, stride)), true, 1, None) = (layout.data, whole, layout.multiplicity, &layout.sparse) else {
+        let whole =
+            matches!(layout.component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32);
+        let (Some((data, stride)), true, 1, None) =
+            (layout.data, whole, layout.multiplicity, &layout.sparse)
+        else {
             return Err(self.source.error(place, "indices must be plain unsigned integers"));
         };
         (0..layout.count)
             .map(|i| {
                 let vertex = number(&data[i * stride..], layout.component) as u32;
                 if vertex as usize >= vertices {
-                    let message = format!("index {i} refers to vertex {vertex}, but there are {vertices}");
+                    let message =
+                        format!("index {i} refers to vertex {vertex}, but there are {vertices}");
                     return Err(self.source.error(place.as_str(), message));
                 }
                 Ok(vertex)
@@ -98,7 +110,9 @@ impl Buffers<'_> {
         let Some(accessor) = self.root.accessors.get(index) else {
             return Err(error(format!("there are {} accessors", self.root.accessors.len())));
         };
-        let (Checked::Valid(component), Checked::Valid(kind)) = (accessor.component_type, accessor.type_) else {
+        let (Checked::Valid(component), Checked::Valid(kind)) =
+            (accessor.component_type, accessor.type_)
+        else {
             return Err(error("has an unknown type".into()));
         };
         let (component, multiplicity) = (component.0, kind.multiplicity());
@@ -110,24 +124,31 @@ impl Buffers<'_> {
                 let (bytes, stride) = self.view(view.value(), &place)?;
                 let stride = stride.unwrap_or(size);
                 if stride < size {
-                    return Err(error(format!("the stride of {stride} bytes is less than an element's {size}")));
+                    return Err(error(format!(
+                        "the stride of {stride} bytes is less than an element's {size}"
+                    )));
                 }
                 let before = (count as u64).saturating_sub(1).checked_mul(stride as u64);
                 let own = if count == 0 { 0 } else { size as u64 };
                 let end = before.and_then(|before| before.checked_add(own)?.checked_add(offset));
                 if end.is_none_or(|end| end > bytes.len() as u64) {
-                    let message =
-                        format!("{count} elements from byte {offset} reach beyond the view's {}", bytes.len());
+                    let message = format!(
+                        "{count} elements from byte {offset} reach beyond the view's {}",
+                        bytes.len()
+                    );
                     return Err(error(message));
                 }
                 Some((&bytes[offset as usize..], stride))
             }
             // Zeros that the sparse part replaces: no bytes bound the count, so the size of the whole file does.
             None if accessor.sparse.is_none() => {
-                return Err(error("has no data".into()).hint("compressed (meshopt, Draco) meshes are not read"));
+                return Err(error("has no data".into())
+                    .hint("compressed (meshopt, Draco) meshes are not read"));
             }
             None if (count as u64).saturating_mul(size as u64) > self.total() => {
-                return Err(error(format!("claims {count} elements without a buffer view to hold them")));
+                return Err(error(format!(
+                    "claims {count} elements without a buffer view to hold them"
+                )));
             }
             None => None,
         };
@@ -138,19 +159,32 @@ impl Buffers<'_> {
         Ok(Layout { count, component, multiplicity, normalized: accessor.normalized, data, sparse })
     }
 
-    fn sparse(&self, sparse: &json::accessor::sparse::Sparse, size: usize, place: &str) -> Result<Sparse<'_>> {
+    fn sparse(
+        &self,
+        sparse: &json::accessor::sparse::Sparse,
+        size: usize,
+        place: &str,
+    ) -> Result<Sparse<'_>> {
         let Checked::Valid(component) = sparse.indices.component_type else {
             return Err(self.source.error(place, "has sparse indices of an unknown type"));
         };
         let component = component.0;
         let part = |view: usize, offset: u64, size: usize| -> Result<&[u8]> {
             let bytes = self.view(view, place)?.0;
-            let end = sparse.count.0.checked_mul(size as u64).and_then(|length| length.checked_add(offset));
+            let end = sparse
+                .count
+                .0
+                .checked_mul(size as u64)
+                .and_then(|length| length.checked_add(offset));
             match end.filter(|&end| end <= bytes.len() as u64) {
                 Some(end) => Ok(&bytes[offset as usize..end as usize]),
                 None => Err(self.source.error(
                     place,
-                    format!("{} sparse elements reach beyond their view of {} bytes", sparse.count.0, bytes.len()),
+                    format!(
+                        "{} sparse elements reach beyond their view of {} bytes",
+                        sparse.count.0,
+                        bytes.len()
+                    ),
                 )),
             }
         };
@@ -170,8 +204,12 @@ fn number(bytes: &[u8], component: ComponentType) -> f64 {
         ComponentType::U8 => f64::from(bytes[0]),
         ComponentType::I16 => f64::from(i16::from_le_bytes([bytes[0], bytes[1]])),
         ComponentType::U16 => f64::from(u16::from_le_bytes([bytes[0], bytes[1]])),
-        ComponentType::U32 => f64::from(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])),
-        ComponentType::F32 => f64::from(f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])),
+        ComponentType::U32 => {
+            f64::from(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
+        }
+        ComponentType::F32 => {
+            f64::from(f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
+        }
     }
 }
 

@@ -27,10 +27,14 @@ pub(super) fn split<'a>(source: &'a Source) -> Result<(&'a [u8], Option<&'a [u8]
         Some(u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) as usize)
     };
     let (Some(version), Some(length)) = (word(4), word(8)) else {
-        return Err(source.error(format!("byte {}", bytes.len()), "the file ends within the GLB header"));
+        return Err(
+            source.error(format!("byte {}", bytes.len()), "the file ends within the GLB header")
+        );
     };
     if version != 2 {
-        return Err(source.error("byte 4", format!("the GLB version is {version}; only version 2 is read")));
+        return Err(
+            source.error("byte 4", format!("the GLB version is {version}; only version 2 is read"))
+        );
     }
     if length > bytes.len() || length < 12 {
         let message = format!("the GLB header claims {length} bytes, the file has {}", bytes.len());
@@ -40,8 +44,11 @@ pub(super) fn split<'a>(source: &'a Source) -> Result<(&'a [u8], Option<&'a [u8]
     let (mut text, mut binary) = (None, None);
     while at < length {
         let place = format!("byte {at}");
-        let size = word(at).filter(|size| size.checked_add(at + 8).is_some_and(|end| end <= length));
-        let Some(size) = size else { return Err(source.error(place, "a GLB chunk reaches beyond the end")) };
+        let size =
+            word(at).filter(|size| size.checked_add(at + 8).is_some_and(|end| end <= length));
+        let Some(size) = size else {
+            return Err(source.error(place, "a GLB chunk reaches beyond the end"));
+        };
         let data = &bytes[at + 8..at + 8 + size];
         match &bytes[at + 4..at + 8] {
             b"JSON" => text = text.or(Some(data)),
@@ -61,7 +68,11 @@ pub(super) struct Buffers<'a> {
 }
 
 impl<'a> Buffers<'a> {
-    pub fn open(source: &'a Source<'a>, root: &'a json::Root, binary: Option<&'a [u8]>) -> Result<Self> {
+    pub fn open(
+        source: &'a Source<'a>,
+        root: &'a json::Root,
+        binary: Option<&'a [u8]>,
+    ) -> Result<Self> {
         let mut bytes: Vec<Cow<[u8]>> = Vec::with_capacity(root.buffers.len());
         for (index, buffer) in root.buffers.iter().enumerate() {
             let place = format!("buffer {index}");
@@ -73,7 +84,9 @@ impl<'a> Buffers<'a> {
             };
             let claimed = buffer.byte_length.0;
             if (data.len() as u64) < claimed && !(data.is_empty() && buffer.uri.is_none()) {
-                return Err(source.error(place, format!("claims {claimed} bytes but holds {}", data.len())));
+                return Err(
+                    source.error(place, format!("claims {claimed} bytes but holds {}", data.len()))
+                );
             }
             bytes.push(data);
         }
@@ -84,26 +97,36 @@ impl<'a> Buffers<'a> {
     pub fn view(&self, index: usize, place: &str) -> Result<(&[u8], Option<usize>)> {
         let Some(view) = self.root.buffer_views.get(index) else {
             let count = self.root.buffer_views.len();
-            return Err(self.source.error(place, format!("refers to buffer view {index}, but there are {count}")));
+            return Err(self
+                .source
+                .error(place, format!("refers to buffer view {index}, but there are {count}")));
         };
         let place = format!("buffer view {index}");
         let Some(bytes) = self.bytes.get(view.buffer.value()) else {
-            let message = format!("refers to buffer {}, but there are {}", view.buffer, self.bytes.len());
+            let message =
+                format!("refers to buffer {}, but there are {}", view.buffer, self.bytes.len());
             return Err(self.source.error(place, message));
         };
         let start = view.byte_offset.map_or(0, |offset| offset.0);
         let end = start.checked_add(view.byte_length.0).filter(|&end| end <= bytes.len() as u64);
         let Some(end) = end else {
-            let message =
-                format!("{} bytes from byte {start} reach beyond the buffer's {}", view.byte_length.0, bytes.len());
-            return Err(self.source.error(place, message).hint("compressed (meshopt, Draco) buffers are not read"));
+            let message = format!(
+                "{} bytes from byte {start} reach beyond the buffer's {}",
+                view.byte_length.0,
+                bytes.len()
+            );
+            return Err(self
+                .source
+                .error(place, message)
+                .hint("compressed (meshopt, Draco) buffers are not read"));
         };
         Ok((&bytes[start as usize..end as usize], view.byte_stride.as_ref().map(|stride| stride.0)))
     }
 
     /// All bytes that the file brought, the JSON among them.
     pub fn total(&self) -> u64 {
-        self.source.bytes().len() as u64 + self.bytes.iter().map(|bytes| bytes.len() as u64).sum::<u64>()
+        self.source.bytes().len() as u64
+            + self.bytes.iter().map(|bytes| bytes.len() as u64).sum::<u64>()
     }
 }
 
@@ -115,14 +138,21 @@ pub(super) fn resolve(source: &Source, place: &str, uri: &str) -> Result<Vec<u8>
             return Err(source.error(place, "has a data URI without a comma"));
         };
         if kind.ends_with(";base64") {
-            return BASE64.decode(data.trim()).map_err(|e| source.error(place, format!("is no base64: {e}")));
+            return BASE64
+                .decode(data.trim())
+                .map_err(|e| source.error(place, format!("is no base64: {e}")));
         }
-        return percent_decode(data).ok_or_else(|| source.error(place, "has a malformed % in its data URI"));
+        return percent_decode(data)
+            .ok_or_else(|| source.error(place, "has a malformed % in its data URI"));
     }
-    let path = percent_decode(uri).and_then(|bytes| String::from_utf8(bytes).ok()).filter(|path| !path.contains('\0'));
+    let path = percent_decode(uri)
+        .and_then(|bytes| String::from_utf8(bytes).ok())
+        .filter(|path| !path.contains('\0'));
     let Some(path) = path else {
         let uri: String = uri.chars().take(80).collect();
-        return Err(source.error(place, format!("refers to “{uri}”, whose % codes are no UTF-8 text")));
+        return Err(
+            source.error(place, format!("refers to “{uri}”, whose % codes are no UTF-8 text"))
+        );
     };
     let path = source.neighbour(place, &path)?;
     let file = source.open_beside(&path)?;

@@ -60,20 +60,28 @@ impl<'a> Builder<'a> {
     pub(super) fn base(&self, material: Option<usize>, place: &str) -> Result<Base<'a>> {
         let root = self.root;
         let Some(index) = material else {
-            return Ok(Base { name: "default", factor: [1.0; 4], texture: None, alpha: Alpha::OPAQUE });
+            return Ok(Base {
+                name: "default",
+                factor: [1.0; 4],
+                texture: None,
+                alpha: Alpha::OPAQUE,
+            });
         };
         let Some(material) = root.materials.get(index) else {
-            return Err(self.source.error(place, format!("refers to material {index}, which is not there")));
+            return Err(self
+                .source
+                .error(place, format!("refers to material {index}, which is not there")));
         };
         // Where a file has both, the extension goes before what stands for it in programs that do not know it.
         let extensions = material.extensions.as_ref();
-        let (factor, texture) = match extensions.and_then(|extensions| extensions.pbr_specular_glossiness.as_ref()) {
-            Some(glossy) => (glossy.diffuse_factor.0, &glossy.diffuse_texture),
-            None => {
-                let rough = &material.pbr_metallic_roughness;
-                (rough.base_color_factor.0, &rough.base_color_texture)
-            }
-        };
+        let (factor, texture) =
+            match extensions.and_then(|extensions| extensions.pbr_specular_glossiness.as_ref()) {
+                Some(glossy) => (glossy.diffuse_factor.0, &glossy.diffuse_texture),
+                None => {
+                    let rough = &material.pbr_metallic_roughness;
+                    (rough.base_color_factor.0, &rough.base_color_texture)
+                }
+            };
         let name = material.name.as_deref().unwrap_or_default();
         Ok(Base { name, factor, texture: texture.as_ref(), alpha: Alpha::of(material, factor[3]) })
     }
@@ -88,7 +96,8 @@ impl<'a> Builder<'a> {
             // Texels and vertices have the factor's alpha in them; without them, it is all that there is.
             color[3] = f32::from(base.alpha.apply(255)) / 255.0;
         }
-        let texture = base.texture.map(|info| self.texture(info.index.value(), base.alpha)).transpose()?;
+        let texture =
+            base.texture.map(|info| self.texture(info.index.value(), base.alpha)).transpose()?;
         let id = self.mesh.materials.len() as u32;
         self.mesh.materials.push(Material { name: base.name.into(), color, texture });
         self.material_of.insert(index, id);
@@ -98,7 +107,9 @@ impl<'a> Builder<'a> {
     fn texture(&mut self, index: usize, alpha: Alpha) -> Result<Arc<Texture>> {
         let Some(texture) = self.root.textures.get(index) else {
             let count = self.root.textures.len();
-            return Err(self.source.error(format!("texture {index}"), format!("there are {count} textures")));
+            return Err(self
+                .source
+                .error(format!("texture {index}"), format!("there are {count} textures")));
         };
         self.picture(texture.source.value(), alpha)
     }
@@ -125,11 +136,17 @@ impl<'a> Builder<'a> {
     fn decode(&self, image: usize) -> Result<Arc<Texture>> {
         let place = format!("image {image}");
         let Some(entry) = self.root.images.get(image) else {
-            return Err(self.source.error(place, format!("there are {} images", self.root.images.len())));
+            return Err(self
+                .source
+                .error(place, format!("there are {} images", self.root.images.len())));
         };
         match (&entry.uri, entry.buffer_view) {
-            (Some(uri), _) => texture::decode(self.source, &place, &buffers::resolve(self.source, &place, uri)?),
-            (None, Some(view)) => texture::decode(self.source, &place, self.buffers.view(view.value(), &place)?.0),
+            (Some(uri), _) => {
+                texture::decode(self.source, &place, &buffers::resolve(self.source, &place, uri)?)
+            }
+            (None, Some(view)) => {
+                texture::decode(self.source, &place, self.buffers.view(view.value(), &place)?.0)
+            }
             (None, None) => Err(self.source.error(place, "has neither a URI nor a buffer view")),
         }
     }

@@ -22,7 +22,10 @@ pub(super) fn meshes(source: &Source, root: &json::Root) -> Result<Vec<(DMat4, u
             stack.extend(scene.nodes.iter().rev().map(|node| (node.value(), DMat4::IDENTITY, 1)));
         }
         None if root.scene.is_some() => {
-            return Err(source.error("scene", format!("is {scene}, but there are {} scenes", root.scenes.len())));
+            return Err(source.error(
+                "scene",
+                format!("is {scene}, but there are {} scenes", root.scenes.len()),
+            ));
         }
         None => {
             let mut is_child = vec![false; count];
@@ -31,7 +34,12 @@ pub(super) fn meshes(source: &Source, root: &json::Root) -> Result<Vec<(DMat4, u
                     *flag = true;
                 }
             }
-            stack.extend((0..count).rev().filter(|&node| !is_child[node]).map(|node| (node, DMat4::IDENTITY, 1)));
+            stack.extend(
+                (0..count)
+                    .rev()
+                    .filter(|&node| !is_child[node])
+                    .map(|node| (node, DMat4::IDENTITY, 1)),
+            );
         }
     }
     let mut met = vec![false; count];
@@ -50,7 +58,10 @@ pub(super) fn meshes(source: &Source, root: &json::Root) -> Result<Vec<(DMat4, u
         if let Some(mesh) = node.mesh {
             meshes.push((transform, mesh.value()));
         }
-        source.room::<[Step; 2]>("the nodes below a node", node.children.as_ref().map_or(0, Vec::len))?;
+        source.room::<[Step; 2]>(
+            "the nodes below a node",
+            node.children.as_ref().map_or(0, Vec::len),
+        )?;
         let children = node.children.iter().flatten().rev();
         stack.extend(children.map(|child| (child.value(), transform, depth + 1)));
     }

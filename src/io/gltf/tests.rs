@@ -89,7 +89,10 @@ fn a_square_with_colours() {
     assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y]);
     assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
     // Linear light becomes display values: 55/255 is about half as displayed, 0.5 about 0.735.
-    assert_eq!(mesh.colors, [[255, 0, 0, 255], [128, 128, 128, 255], [0, 0, 0, 255], [255, 255, 255, 255]]);
+    assert_eq!(
+        mesh.colors,
+        [[255, 0, 0, 255], [128, 128, 128, 255], [0, 0, 0, 255], [255, 255, 255, 255]]
+    );
     let color = mesh.materials[0].color;
     assert!((color[1] - 0.735).abs() < 1e-3 && color[3] == 1.0, "{color:?}");
 }
@@ -119,7 +122,14 @@ fn picture_material(mode: &str, factor: f32) -> Value {
 }
 
 fn texel_alphas(mesh: &Mesh, material: usize) -> Vec<u8> {
-    mesh.materials[material].texture.as_ref().expect("a picture").texels.iter().map(|texel| texel[3]).collect()
+    mesh.materials[material]
+        .texture
+        .as_ref()
+        .expect("a picture")
+        .texels
+        .iter()
+        .map(|texel| texel[3])
+        .collect()
 }
 
 fn vertex_alphas(mesh: &Mesh) -> Vec<u8> {
@@ -135,7 +145,10 @@ fn opaque_materials_ignore_every_alpha() {
         assert_eq!(mesh.materials[0].color[3], 1.0);
         assert_eq!(texel_alphas(&mesh, 0), [255; 4]);
         assert_eq!(vertex_alphas(&mesh), [255; 4]);
-        assert_eq!(mesh.materials[0].texture.as_ref().expect("a picture").texels[0][..3], [9, 8, 7]);
+        assert_eq!(
+            mesh.materials[0].texture.as_ref().expect("a picture").texels[0][..3],
+            [9, 8, 7]
+        );
     }
     // Without a material, the default one counts, which is opaque.
     let mut value = square();
@@ -305,8 +318,10 @@ fn strips_fans_and_points() {
 
 #[test]
 fn quantised_positions() {
-    let values: Vec<u8> =
-        [0i16, 0, 0, 0, 32767, 0, -32768, 0, 0, 32767, 0, 0].iter().flat_map(|v| v.to_le_bytes()).collect();
+    let values: Vec<u8> = [0i16, 0, 0, 0, 32767, 0, -32768, 0, 0, 32767, 0, 0]
+        .iter()
+        .flat_map(|v| v.to_le_bytes())
+        .collect();
     for (normalized, scale) in [(true, 1.0), (false, 32767.0)] {
         let mesh = load_json(&json!({
             "asset": {"version": "2.0"}, "extensionsRequired": ["KHR_mesh_quantization"],
@@ -337,7 +352,10 @@ fn sparse_accessors() {
         let indices = data_uri(&[index as u8]);
         changed(&[
             ("/accessors/0", base),
-            ("/bufferViews", json!([{"buffer": 0, "byteLength": 108}, {"buffer": 1, "byteLength": 1}])),
+            (
+                "/bufferViews",
+                json!([{"buffer": 0, "byteLength": 108}, {"buffer": 1, "byteLength": 1}]),
+            ),
             (
                 "/buffers",
                 json!([{"byteLength": 108, "uri": data_uri(&square_bytes())}, {"byteLength": 1, "uri": indices}]),
@@ -361,8 +379,12 @@ fn sparse_accessors() {
 
 #[test]
 fn hostile_files_are_refused_with_a_reason() {
-    let deep: Vec<Value> = (0..200).map(|i| json!({"children": [i + 1]})).chain([json!({"mesh": 0})]).collect();
-    let nan = bytes(&[f32::NAN]).into_iter().chain(square_bytes().into_iter().skip(4)).collect::<Vec<u8>>();
+    let deep: Vec<Value> =
+        (0..200).map(|i| json!({"children": [i + 1]})).chain([json!({"mesh": 0})]).collect();
+    let nan = bytes(&[f32::NAN])
+        .into_iter()
+        .chain(square_bytes().into_iter().skip(4))
+        .collect::<Vec<u8>>();
     for (pointer, value, reason) in [
         ("/nodes/0", json!({"mesh": 0, "children": [0]}), "own ancestor"),
         ("/nodes", json!([{"children": [1]}, {"children": [0]}]), "own ancestor"),
@@ -402,12 +424,18 @@ fn hostile_files_are_refused_with_a_reason() {
         ("/extensionsRequired", json!(["KHR_draco_mesh_compression"]), "not supported"),
         ("/extensionsRequired", json!(["EXT_meshopt_compression"]), "not supported"),
     ] {
-        let error = load_json(&changed(&[(pointer, value.clone())])).expect_err(pointer).to_string();
+        let error =
+            load_json(&changed(&[(pointer, value.clone())])).expect_err(pointer).to_string();
         assert!(error.contains(reason), "{pointer} {value}: {error}");
     }
-    for file in
-        [&b"glTF"[..], b"glTF\x02\0\0\0\x04\0\0\0", b"glTF\x02\0\0\0\x0c\0\0\0", b"{}", b"[]", b"{\"asset\":{}}"]
-    {
+    for file in [
+        &b"glTF"[..],
+        b"glTF\x02\0\0\0\x04\0\0\0",
+        b"glTF\x02\0\0\0\x0c\0\0\0",
+        b"{}",
+        b"[]",
+        b"{\"asset\":{}}",
+    ] {
         load("a.glb", file).expect_err("broken");
     }
 }

@@ -9,7 +9,9 @@ use crate::{
 use laz::{
     DecompressionSelection, LazItem, LazItemType, LazVlr,
     laszip::ChunkTable,
-    record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor},
+    record::{
+        LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor,
+    },
 };
 use rayon::prelude::*;
 use std::{io::Cursor, ops::Range};
@@ -29,8 +31,10 @@ pub fn read(source: &Source, header: &Header) -> Result<Vec<Point>> {
     let chunks = chunks(source, header, &layout)?;
     // In chunks, and joined.
     source.room::<[Point; 2]>("the points", header.points)?;
-    let parts: Vec<Vec<Point>> =
-        chunks.par_iter().map(|chunk| unpack(source, header, &layout, chunk)).collect::<Result<_>>()?;
+    let parts: Vec<Vec<Point>> = chunks
+        .par_iter()
+        .map(|chunk| unpack(source, header, &layout, chunk))
+        .collect::<Result<_>>()?;
     Ok(parts.into_iter().flatten().collect())
 }
 
@@ -49,14 +53,18 @@ fn find_layout(source: &Source, header: &Header) -> Result<LazVlr> {
         let cut = |message: String| source.error("header", message);
         let id = u16::from_le_bytes(field.at(at + 18).map_err(cut)?);
         let length = usize::from(u16::from_le_bytes(field.at(at + 20).map_err(cut)?));
-        let is_wanted = id == LazVlr::RECORD_ID && bytes[at + 2..].starts_with(LazVlr::USER_ID.as_bytes());
+        let is_wanted =
+            id == LazVlr::RECORD_ID && bytes[at + 2..].starts_with(LazVlr::USER_ID.as_bytes());
         at += 54;
         let Some(data) = bytes[..header.start].get(at..at + length) else {
-            return Err(source.error("header", "a record before the points ends behind their beginning"));
+            return Err(
+                source.error("header", "a record before the points ends behind their beginning")
+            );
         };
         at += length;
         if is_wanted {
-            let layout = LazVlr::from_buffer(data).map_err(|error| source.error(place, error.to_string()))?;
+            let layout = LazVlr::from_buffer(data)
+                .map_err(|error| source.error(place, error.to_string()))?;
             check(header, layout.items()).map_err(|message| source.error(place, message))?;
             return Ok(layout);
         }
@@ -68,16 +76,24 @@ fn find_layout(source: &Source, header: &Header) -> Result<LazVlr> {
 fn check(header: &Header, items: &[LazItem]) -> Result<(), String> {
     let size: usize = items.iter().map(|item| usize::from(item.size())).sum();
     if size != header.size {
-        return Err(format!("packs points of {size} bytes, but the header has them of {}", header.size));
+        return Err(format!(
+            "packs points of {size} bytes, but the header has them of {}",
+            header.size
+        ));
     }
     let layered = header.format >= 6;
     let first = if layered { LazItemType::Point14 } else { LazItemType::Point10 };
     if items.first().map(LazItem::item_type) != Some(first) {
-        return Err(format!("does not begin with what a point of format {} begins with", header.format));
+        return Err(format!(
+            "does not begin with what a point of format {} begins with",
+            header.format
+        ));
     }
     let versions = if layered { 3..=4 } else { 1..=2 };
     match items.iter().find(|item| !versions.contains(&item.version())) {
-        Some(item) => Err(format!("packs by version {}, which is not known for this format", item.version())),
+        Some(item) => {
+            Err(format!("packs by version {}, which is not known for this format", item.version()))
+        }
         None => Ok(()),
     }
 }
@@ -96,8 +112,11 @@ fn find_chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<
     if table <= header.start as i64 {
         table = i64::from_le_bytes(field.at(bytes.len() - 8).map_err(wrong)?);
     }
-    let table = usize::try_from(table).ok().filter(|&table| table > header.start && table < bytes.len());
-    let Some(table) = table else { return Err(wrong("lies outside of the file: it is cut".into())) };
+    let table =
+        usize::try_from(table).ok().filter(|&table| table > header.start && table < bytes.len());
+    let Some(table) = table else {
+        return Err(wrong("lies outside of the file: it is cut".into()));
+    };
     // The crate makes room for all entries that the table claims.
     let claimed = u32::from_le_bytes(field.at(table + 4).map_err(wrong)?) as usize;
     if claimed > table - header.start {
@@ -106,7 +125,8 @@ fn find_chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<
     source.room::<[Chunk; 2]>("the table of chunks", claimed)?;
     let mut cursor = Cursor::new(bytes);
     cursor.set_position(header.start as u64);
-    let entries = ChunkTable::read_from(&mut cursor, layout).map_err(|error| wrong(error.to_string()))?;
+    let entries =
+        ChunkTable::read_from(&mut cursor, layout).map_err(|error| wrong(error.to_string()))?;
     let mut at = header.start + ChunkTable::OFFSET_SIZE;
     let mut left = header.points;
     let mut chunks = Vec::new();
@@ -121,18 +141,34 @@ fn find_chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<
         left -= points;
     }
     if left > 0 {
-        return Err(wrong(format!("has {} points, but the header counts {}", header.points - left, header.points)));
+        return Err(wrong(format!(
+            "has {} points, but the header counts {}",
+            header.points - left,
+            header.points
+        )));
     }
     chunks.retain(|chunk| chunk.points > 0);
     Ok(chunks)
 }
 
 /// Unpacks a chunk point by point, so that memory grows with what was really unpacked; behind a wall.
-pub(super) fn unpack(source: &Source, header: &Header, layout: &LazVlr, chunk: &Chunk) -> Result<Vec<Point>> {
-    isolated(source, &format!("chunk {}", chunk.number), || unpack_here(source, header, layout, chunk))
+pub(super) fn unpack(
+    source: &Source,
+    header: &Header,
+    layout: &LazVlr,
+    chunk: &Chunk,
+) -> Result<Vec<Point>> {
+    isolated(source, &format!("chunk {}", chunk.number), || {
+        unpack_here(source, header, layout, chunk)
+    })
 }
 
-fn unpack_here(source: &Source, header: &Header, layout: &LazVlr, chunk: &Chunk) -> Result<Vec<Point>> {
+fn unpack_here(
+    source: &Source,
+    header: &Header,
+    layout: &LazVlr,
+    chunk: &Chunk,
+) -> Result<Vec<Point>> {
     let wrong = |message: String| source.error(format!("chunk {}", chunk.number), message);
     let input = Cursor::new(&source.bytes()[chunk.bytes.clone()]);
     let mut decoder: Box<dyn RecordDecompressor<Cursor<&[u8]>>> = if header.format >= 6 {
@@ -147,7 +183,9 @@ fn unpack_here(source: &Source, header: &Header, layout: &LazVlr, chunk: &Chunk)
         for &item in layout.items() {
             match (item.item_type(), item.version()) {
                 (LazItemType::GpsTime, 2) => decoder.add_field_decompressor(Times::new()),
-                _ => decoder.set_fields_from(&vec![item]).map_err(|error| wrong(error.to_string()))?,
+                _ => decoder
+                    .set_fields_from(&vec![item])
+                    .map_err(|error| wrong(error.to_string()))?,
             }
         }
         Box::new(decoder)
@@ -159,14 +197,21 @@ fn unpack_here(source: &Source, header: &Header, layout: &LazVlr, chunk: &Chunk)
             source.check_time()?;
         }
         let unpacked = decoder.decompress_next(&mut record);
-        unpacked.map_err(|error| wrong(format!("ends after {number} of {} points: {error}", chunk.points)))?;
+        unpacked.map_err(|error| {
+            wrong(format!("ends after {number} of {} points: {error}", chunk.points))
+        })?;
         points.extend(header.point(&record));
     }
     Ok(points)
 }
 
 /// A chunk of layers begins with its first point, its count and the size of each layer, which the decoder makes room for.
-fn check_layers(source: &Source, header: &Header, layout: &LazVlr, chunk: &Chunk) -> Result<(), String> {
+fn check_layers(
+    source: &Source,
+    header: &Header,
+    layout: &LazVlr,
+    chunk: &Chunk,
+) -> Result<(), String> {
     let bytes = &source.bytes()[chunk.bytes.clone()];
     let layers = layout.items().iter().map(|item| match item.item_type() {
         LazItemType::Point14 => 9,
@@ -177,7 +222,9 @@ fn check_layers(source: &Source, header: &Header, layout: &LazVlr, chunk: &Chunk
     let first = header.size + 4;
     let sizes = bytes.get(first..first + 4 * layers.sum::<usize>());
     let Some(sizes) = sizes else { return Err("ends before its layers".into()) };
-    let size = |bytes: &[u8]| u64::from(bytes.iter().rev().fold(0u32, |size, &byte| size << 8 | u32::from(byte)));
+    let size = |bytes: &[u8]| {
+        u64::from(bytes.iter().rev().fold(0u32, |size, &byte| size << 8 | u32::from(byte)))
+    };
     let claimed: u64 = sizes.chunks_exact(4).map(size).sum();
     let present = bytes.len() - first - sizes.len();
     if claimed > present as u64 {

@@ -96,7 +96,8 @@ impl Pieces {
             Some((layout, chunks)) => packed::unpack(source, &self.header, layout, &chunks[piece])?,
             None => {
                 let size = self.header.size;
-                let range: Range<usize> = first * size..(first + POINTS).min(self.header.points) * size;
+                let range: Range<usize> =
+                    first * size..(first + POINTS).min(self.header.points) * size;
                 let records = source.bytes()[self.header.start..][range].chunks_exact(size);
                 records.filter_map(|record| self.header.point(record)).collect()
             }
@@ -129,7 +130,8 @@ impl Pieces {
         source.restart_time();
         for first in (0..self.pieces()).step_by(batch) {
             let pieces = (first..(first + batch).min(self.pieces())).into_par_iter();
-            let more: Vec<Seen> = pieces.map(|piece| self.look(source, piece)).collect::<Result<_>>()?;
+            let more: Vec<Seen> =
+                pieces.map(|piece| self.look(source, piece)).collect::<Result<_>>()?;
             more.into_iter().for_each(|more| seen.join(more));
             source.release();
             source.restart_time();

@@ -23,7 +23,8 @@ fn record(format: u8, number: i32, largest: u16, withheld: bool) -> Vec<u8> {
     if color_at > 0 {
         for channel in 0..3 {
             let value = (number % 2) as u16 * largest / (channel + 1);
-            record[color_at + 2 * usize::from(channel)..][..2].copy_from_slice(&value.to_le_bytes());
+            record[color_at + 2 * usize::from(channel)..][..2]
+                .copy_from_slice(&value.to_le_bytes());
         }
     }
     record
@@ -66,8 +67,12 @@ fn in_chunks_of(size: u32, format: u8, records: &[Vec<u8>], points: u64) -> Vec<
     let items = LazItemRecordBuilder::default_for_point_format_id(format, 0).unwrap();
     let builder = LazVlrBuilder::new(items);
     // As COPC has them, chunks of their own sizes.
-    let layout =
-        if format < 6 { builder.with_fixed_chunk_size(size) } else { builder.with_variable_chunk_size() }.build();
+    let layout = if format < 6 {
+        builder.with_fixed_chunk_size(size)
+    } else {
+        builder.with_variable_chunk_size()
+    }
+    .build();
     let mut described = Vec::new();
     layout.write_to(&mut described).unwrap();
     let mut before = vec![0; 54];
@@ -100,19 +105,33 @@ fn load(content: &[u8]) -> Result<Mesh> {
 fn every_format_plain_and_packed() {
     for format in [0, 1, 2, 3, 6, 7, 8] {
         for largest in [255, 0xffff] {
-            let records: Vec<Vec<u8>> = (0..50).map(|i| record(format, i, largest, i == 7)).collect();
+            let records: Vec<Vec<u8>> =
+                (0..50).map(|i| record(format, i, largest, i == 7)).collect();
             for content in [las(format, &records), laz(format, &records, 50)] {
                 let mesh = load(&content).unwrap_or_else(|error| panic!("{format}: {error}"));
                 assert_eq!(mesh.positions.len(), 49, "{format}");
-                let expected =
-                    |i: i32| DVec3::from_array([0, 1, 2].map(|a| OFFSET[a] + SCALE * f64::from(i * 7 + a as i32)));
+                let expected = |i: i32| {
+                    DVec3::from_array(
+                        [0, 1, 2].map(|a| OFFSET[a] + SCALE * f64::from(i * 7 + a as i32)),
+                    )
+                };
                 // To a hundredth of a millimetre, thousands of kilometres from the origin.
-                assert!((mesh.origin + mesh.positions[6].as_dvec3()).distance(expected(6)) < 1e-5, "{format}");
-                assert!((mesh.origin + mesh.positions[48].as_dvec3()).distance(expected(49)) < 1e-5, "{format}");
+                assert!(
+                    (mesh.origin + mesh.positions[6].as_dvec3()).distance(expected(6)) < 1e-5,
+                    "{format}"
+                );
+                assert!(
+                    (mesh.origin + mesh.positions[48].as_dvec3()).distance(expected(49)) < 1e-5,
+                    "{format}"
+                );
                 if matches!(format, 2 | 3 | 7 | 8) {
                     assert_eq!(mesh.colors[5], [255, 127, 85, 255], "{format}: {largest}");
                 } else {
-                    assert_eq!((mesh.colors[0], mesh.colors[48]), ([0, 0, 0, 255], [255; 4]), "{format}");
+                    assert_eq!(
+                        (mesh.colors[0], mesh.colors[48]),
+                        ([0, 0, 0, 255], [255; 4]),
+                        "{format}"
+                    );
                 }
             }
         }
@@ -184,7 +203,10 @@ fn lies_are_errors() {
     }
     for points in [1 << 32, u64::MAX] {
         for file in [&plain, &packed] {
-            assert!(matches!(load(&change(file, 247, &u64::to_le_bytes(points))), Err(Error::Limit { .. })));
+            assert!(matches!(
+                load(&change(file, 247, &u64::to_le_bytes(points))),
+                Err(Error::Limit { .. })
+            ));
         }
     }
     let folder = Folder::new();
@@ -204,7 +226,10 @@ fn no_changed_byte_does_harm() {
                 let mut changed = whole.clone();
                 changed[at] = value;
                 if let Err(error) = load(&changed) {
-                    assert!(matches!(error, Error::Input { .. } | Error::Limit { .. }), "{at}: {error}");
+                    assert!(
+                        matches!(error, Error::Input { .. } | Error::Limit { .. }),
+                        "{at}: {error}"
+                    );
                 }
             }
         }

@@ -56,7 +56,12 @@ impl Times {
     }
 
     /// Goes on by a difference that is expected to be near `near`.
-    fn step<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>, near: i32, context: u32) -> Result<i32> {
+    fn step<R: Read>(
+        &mut self,
+        decoder: &mut ArithmeticDecoder<R>,
+        near: i32,
+        context: u32,
+    ) -> Result<i32> {
         let difference = self.differences.decompress(decoder, near, context)?;
         let own = &mut self.sequences[self.current];
         own.time = own.time.wrapping_add(difference.into());
@@ -64,7 +69,12 @@ impl Times {
     }
 
     /// The same far off the expected: the fourth time in a row becomes what is expected.
-    fn jump<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>, near: i32, context: u32) -> Result<()> {
+    fn jump<R: Read>(
+        &mut self,
+        decoder: &mut ArithmeticDecoder<R>,
+        near: i32,
+        context: u32,
+    ) -> Result<()> {
         let difference = self.step(decoder, near, context)?;
         let own = &mut self.sequences[self.current];
         own.jumps += 1;
@@ -119,7 +129,9 @@ impl Times {
                     SAME => return Ok(()),
                     WHOLE => return self.begin(decoder),
                     code if code > WHOLE => onward = (code - WHOLE) as u32,
-                    code if MOST - code > LEAST => return self.step(decoder, times(MOST - code), 5).map(drop),
+                    code if MOST - code > LEAST => {
+                        return self.step(decoder, times(MOST - code), 5).map(drop);
+                    }
                     _ => return self.jump(decoder, times(LEAST), 6),
                 }
             }
@@ -141,7 +153,11 @@ impl<R: Read> FieldDecompressor<R> for Times {
         Ok(())
     }
 
-    fn decompress_with(&mut self, decoder: &mut ArithmeticDecoder<R>, out: &mut [u8]) -> Result<()> {
+    fn decompress_with(
+        &mut self,
+        decoder: &mut ArithmeticDecoder<R>,
+        out: &mut [u8],
+    ) -> Result<()> {
         self.next(decoder)?;
         out.copy_from_slice(&self.sequences[self.current].time.to_le_bytes());
         Ok(())
@@ -162,7 +178,9 @@ mod tests {
     fn all_times_come_back() {
         let mut random = 9u64;
         let mut next = |below: u64| {
-            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (random >> 33) % below
         };
         let mut bases = [1i64 << 60, 1 << 50, (1 << 40) + 5, 77];
@@ -207,7 +225,11 @@ mod tests {
         let mut record = [0; 28];
         for (index, &time) in times.iter().enumerate() {
             reader.decompress_next(&mut record).expect("bytes");
-            assert_eq!(i64::from_le_bytes(*record.last_chunk().expect("a time")), time, "time {index}");
+            assert_eq!(
+                i64::from_le_bytes(*record.last_chunk().expect("a time")),
+                time,
+                "time {index}"
+            );
             assert_eq!(record[..20], [7; 20], "point {index}");
         }
     }

@@ -117,7 +117,11 @@ fn install() {
 }
 
 #[expect(unsafe_code, reason = "a handler of a signal")]
-extern "C" fn on_fault(signal: libc::c_int, info: *mut libc::siginfo_t, context: *mut libc::c_void) {
+extern "C" fn on_fault(
+    signal: libc::c_int,
+    info: *mut libc::siginfo_t,
+    context: *mut libc::c_void,
+) {
     // SAFETY: the system calls this with a pointer to what it knows of the signal. A positive code tells that the signal is a
     // fault and has an address.
     let address = unsafe { ((*info).si_code > 0).then(|| (*info).si_addr() as usize) };
@@ -137,7 +141,9 @@ fn replace(address: usize) -> bool {
             let flags = libc::MAP_PRIVATE | libc::MAP_ANON | libc::MAP_FIXED;
             // SAFETY: the pages belong to a mapping that is ours, is being read, so is not dropped, and is read only; its last page
             // is its own to the end. Readers see the same bytes or zeros.
-            let mapped = unsafe { libc::mmap(start as *mut libc::c_void, end - start, libc::PROT_READ, flags, -1, 0) };
+            let mapped = unsafe {
+                libc::mmap(start as *mut libc::c_void, end - start, libc::PROT_READ, flags, -1, 0)
+            };
             return mapped != libc::MAP_FAILED;
         }
         slot = at.next.get().map(|next| &**next);
@@ -156,7 +162,9 @@ fn pass_on(signal: libc::c_int, info: *mut libc::siginfo_t, context: *mut libc::
         match PREVIOUS.get() {
             Some(previous) if ![libc::SIG_DFL, libc::SIG_IGN].contains(&previous.sa_sigaction) => {
                 if previous.sa_flags & libc::SA_SIGINFO != 0 {
-                    std::mem::transmute::<usize, Informed>(previous.sa_sigaction)(signal, info, context);
+                    std::mem::transmute::<usize, Informed>(previous.sa_sigaction)(
+                        signal, info, context,
+                    );
                 } else {
                     std::mem::transmute::<usize, Plain>(previous.sa_sigaction)(signal);
                 }

@@ -108,7 +108,8 @@ mod tests {
     fn what_is_gone_reads_as_zeros_and_is_told() {
         let folder = Folder::new();
         let path = folder.write("a", [7; 100_000]);
-        let [hit, other, away] = [mapping(&path), mapping(&folder.write("b", [7; 100_000])), mapping(&path)];
+        let [hit, other, away] =
+            [mapping(&path), mapping(&folder.write("b", [7; 100_000])), mapping(&path)];
         assert!(hit.change().is_none() && hit[99_999] == 7);
         shorten(&path, 5000);
         assert_eq!((hit[99_999], hit[4999], hit[5001], hit[70_000]), (0, 7, 0, 0));
@@ -127,7 +128,9 @@ mod tests {
             std::thread::scope(|scope| {
                 for part in 0..4 {
                     let mapping = &mapping;
-                    scope.spawn(move || assert!(mapping[part * 25_000..][..25_000].iter().all(|&byte| byte == 0)));
+                    scope.spawn(move || {
+                        assert!(mapping[part * 25_000..][..25_000].iter().all(|&byte| byte == 0))
+                    });
                 }
             });
             assert!(mapping.change().unwrap().contains("not there any more"));

@@ -32,7 +32,9 @@ impl Stamp {
 /// they read it again: then one of the two is the other, rounded.
 fn is_same(a: SystemTime, b: SystemTime) -> bool {
     const STEPS: [u128; 5] = [1_000_000_000, 1_000_000, 1_000, 100, 1];
-    let [a, b] = [a, b].map(|time| time.duration_since(SystemTime::UNIX_EPOCH).unwrap_or(Duration::ZERO).as_nanos());
+    let [a, b] = [a, b].map(|time| {
+        time.duration_since(SystemTime::UNIX_EPOCH).unwrap_or(Duration::ZERO).as_nanos()
+    });
     let step = STEPS.into_iter().find(|step| a % step == 0 || b % step == 0).unwrap_or(1);
     a.abs_diff(b) < step
 }
@@ -47,7 +49,10 @@ mod tests {
         let exact = 1_700_000_000_123_456_789;
         for step in [1_000_000_000, 1_000_000, 1_000, 100] {
             let rounded = exact / step * step;
-            assert!(is_same(at(exact), at(rounded)) && is_same(at(rounded + step), at(exact)), "{step}");
+            assert!(
+                is_same(at(exact), at(rounded)) && is_same(at(rounded + step), at(exact)),
+                "{step}"
+            );
             assert!(!is_same(at(exact), at(rounded - step)), "{step}");
         }
         assert!(is_same(at(exact), at(exact)) && !is_same(at(exact), at(exact + 1)));

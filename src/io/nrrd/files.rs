@@ -27,19 +27,30 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
             return Err(wrong(format!("“{}” is not “LIST” with the axes of a file", shown(field))));
         };
         if rest.len() > super::LONGEST {
-            return Err(wrong(format!("the list of files is longer than {} bytes", super::LONGEST)));
+            return Err(wrong(format!(
+                "the list of files is longer than {} bytes",
+                super::LONGEST
+            )));
         }
         source.spend("the size of the names of files in bytes", 5 * rest.len() as u64)?;
-        let text = copy::text(rest).map_err(|at| wrong(format!("byte {at} of the list of files is not text")))?;
+        let text = copy::text(rest)
+            .map_err(|at| wrong(format!("byte {at} of the list of files is not text")))?;
         let names = text.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned);
         (names.collect(), parts)
     } else if let Some(pattern) = Pattern::of(field) {
-        let count = pattern.count().ok_or_else(|| wrong(format!("“{}” counts no files", shown(field))))?;
+        let count =
+            pattern.count().ok_or_else(|| wrong(format!("“{}” counts no files", shown(field))))?;
         // Each file holds a sample at least.
         if count > dims.iter().product::<usize>() as u64 {
-            return Err(wrong(format!("“{}” counts {count} files, more than there are samples", shown(field))));
+            return Err(wrong(format!(
+                "“{}” counts {count} files, more than there are samples",
+                shown(field)
+            )));
         }
-        source.spend("the size of the names of files in bytes", count.saturating_mul(256 + field.len() as u64))?;
+        source.spend(
+            "the size of the names of files in bytes",
+            count.saturating_mul(256 + field.len() as u64),
+        )?;
         ((0..count).map(|index| pattern.name(index)).collect::<Vec<_>>(), pattern.parts)
     } else {
         return Ok(vec![field.to_owned()]);
@@ -47,13 +58,25 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
     let axes = match parts.map(str::parse::<usize>) {
         None => 2,
         Some(Ok(axes @ 1..=3)) => axes,
-        Some(_) => return Err(wrong(format!("“{}” does not tell 1, 2 or 3 axes of a file", shown(field)))),
+        Some(_) => {
+            return Err(wrong(format!(
+                "“{}” does not tell 1, 2 or 3 axes of a file",
+                shown(field)
+            )));
+        }
     };
     let wanted: usize = dims[axes..].iter().product();
-    let fits = if axes == 3 { !names.is_empty() && dims[2].is_multiple_of(names.len()) } else { names.len() == wanted };
+    let fits = if axes == 3 {
+        !names.is_empty() && dims[2].is_multiple_of(names.len())
+    } else {
+        names.len() == wanted
+    };
     if !fits {
         let wanted = if axes == 3 { format!("divide {}", dims[2]) } else { format!("be {wanted}") };
-        return Err(wrong(format!("there are {} files, but their number must {wanted}", names.len())));
+        return Err(wrong(format!(
+            "there are {} files, but their number must {wanted}",
+            names.len()
+        )));
     }
     Ok(names)
 }
@@ -75,7 +98,8 @@ impl<'a> Pattern<'a> {
     fn of(field: &'a str) -> Option<Self> {
         let mut words = field.split_ascii_whitespace();
         let (before, number) = words.next()?.split_once('%')?;
-        let [first, last, step] = [words.next()?, words.next()?, words.next()?].map(|word| word.parse().ok());
+        let [first, last, step] =
+            [words.next()?, words.next()?, words.next()?].map(|word| word.parse().ok());
         let parts = words.next();
         if words.next().is_some() {
             return None;
@@ -83,7 +107,11 @@ impl<'a> Pattern<'a> {
         let digits = number.bytes().take_while(u8::is_ascii_digit).count();
         let (width, behind) = number.split_at(digits);
         // Wider names are longer than file systems take.
-        let wide = if width.is_empty() { Some(0) } else { width.parse().ok().filter(|&wide: &usize| wide < 256) };
+        let wide = if width.is_empty() {
+            Some(0)
+        } else {
+            width.parse().ok().filter(|&wide: &usize| wide < 256)
+        };
         Some(Self {
             before,
             behind: behind.strip_prefix(['d', 'i', 'u']).filter(|rest| !rest.contains('%'))?,
@@ -125,13 +153,16 @@ mod tests {
 
     /// Reads a header of 2×1×4 bytes beside files of two and of four samples.
     fn volume(folder: &Folder, data_file: &str) -> Result<Volume> {
-        for (index, name) in ["slice01.raw", "slice02.raw", "slice03.raw", "slice04.raw"].iter().enumerate() {
+        for (index, name) in
+            ["slice01.raw", "slice02.raw", "slice03.raw", "slice04.raw"].iter().enumerate()
+        {
             folder.write(name, [2 * index as u8, 2 * index as u8 + 1]);
         }
         folder.write("slab 0.raw", [0, 1, 2, 3]);
         folder.write("slab 1.raw", [4, 5, 6, 7]);
-        let text =
-            format!("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 1 4\nencoding: raw\ndata file: {data_file}\n");
+        let text = format!(
+            "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 1 4\nencoding: raw\ndata file: {data_file}\n"
+        );
         read_with(&folder.write("volume.nhdr", text), read)
     }
 
@@ -156,7 +187,10 @@ mod tests {
             );
         }
         let read = volume(&folder, "slice%02d.raw 4 1 -1").unwrap();
-        assert_eq!((0..8).map(|i| read.value(i)).collect::<Vec<_>>(), [6., 7., 4., 5., 2., 3., 0., 1.]);
+        assert_eq!(
+            (0..8).map(|i| read.value(i)).collect::<Vec<_>>(),
+            [6., 7., 4., 5., 2., 3., 0., 1.]
+        );
     }
 
     #[test]

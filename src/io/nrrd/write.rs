@@ -27,7 +27,11 @@ pub fn write(volume: &Volume, path: &Path) -> Result<()> {
 /// # Errors
 /// [`Error::Argument`] for a lattice that is none ([`Lattice::validate`]), and where `slice` gives another number of samples than
 /// a slice has; [`Error::Output`] where the file cannot be written. No file is left of either.
-pub fn write_bytes(lattice: &Lattice, path: &Path, mut slice: impl FnMut(usize) -> Vec<u8>) -> Result<()> {
+pub fn write_bytes(
+    lattice: &Lattice,
+    path: &Path,
+    mut slice: impl FnMut(usize) -> Vec<u8>,
+) -> Result<()> {
     lattice.validate().map_err(Error::Argument)?;
     let [nx, ny, nz] = lattice.dims;
     let mut wrong = None;
@@ -47,7 +51,12 @@ pub fn write_bytes(lattice: &Lattice, path: &Path, mut slice: impl FnMut(usize) 
 }
 
 /// What stands before the samples: the fields that every file has, and the keys of lattices that are not Cartesian.
-fn write_header(lattice: &Lattice, scalar: Scalar, encoding: &str, out: &mut impl Write) -> std::io::Result<()> {
+fn write_header(
+    lattice: &Lattice,
+    scalar: Scalar,
+    encoding: &str,
+    out: &mut impl Write,
+) -> std::io::Result<()> {
     let [nx, ny, nz] = lattice.dims;
     let body_centred = lattice.arrangement == Arrangement::BodyCentred;
     let layer = if body_centred { 0.5 * lattice.axes.z_axis } else { lattice.axes.z_axis };
@@ -60,7 +69,10 @@ fn write_header(lattice: &Lattice, scalar: Scalar, encoding: &str, out: &mut imp
         Scalar::F32 => "float",
     };
     let endian = if cfg!(target_endian = "little") { "little" } else { "big" };
-    writeln!(out, "NRRD0004\ntype: {kind}\ndimension: 3\nspace dimension: 3\nsizes: {nx} {ny} {nz}")?;
+    writeln!(
+        out,
+        "NRRD0004\ntype: {kind}\ndimension: 3\nspace dimension: 3\nsizes: {nx} {ny} {nz}"
+    )?;
     writeln!(out, "space directions: {i} {j} {k}\nspace origin: {}", vector(lattice.origin))?;
     writeln!(out, "endian: {endian}\nencoding: {encoding}")?;
     if body_centred {
@@ -97,10 +109,12 @@ mod tests {
     #[test]
     fn what_is_written_reads_back() {
         let folder = Folder::new();
-        let axes = glam::DMat3::from_cols(DVec3::new(0.5, 0.1, 0.0), DVec3::new(0.0, 2.0, 0.0), DVec3::Z);
+        let axes =
+            glam::DMat3::from_cols(DVec3::new(0.5, 0.1, 0.0), DVec3::new(0.0, 2.0, 0.0), DVec3::Z);
         let lattice = Lattice::cartesian([2, 3, 1], DVec3::new(-1.5, 0.0, 1e9), axes);
         let places = [vec![-0.1, 1.0 / 3.0], vec![1e-300, 2.0, 1e9], vec![7.5]];
-        let rectilinear = Lattice { arrangement: Arrangement::Rectilinear(places.into()), ..lattice.clone() };
+        let rectilinear =
+            Lattice { arrangement: Arrangement::Rectilinear(places.into()), ..lattice.clone() };
         let samples = [
             Samples::U8(vec![0, 1, 2, 3, 4, 255]),
             Samples::U16(vec![0, 1, 2, 3, 4, 65535]),
@@ -123,11 +137,13 @@ mod tests {
         let folder = Folder::new();
         let cartesian = Lattice::with_spacing([2, 3, 3], DVec3::ONE);
         let places = [vec![0.0, 5.0], vec![1.0, 2.0, 7.5], vec![0.0, 1.0, 9.0]];
-        let rectilinear = Lattice { arrangement: Arrangement::Rectilinear(places.into()), ..cartesian.clone() };
+        let rectilinear =
+            Lattice { arrangement: Arrangement::Rectilinear(places.into()), ..cartesian.clone() };
         let body_centred = Lattice { arrangement: Arrangement::BodyCentred, ..cartesian.clone() };
         for lattice in [cartesian, rectilinear, body_centred] {
             let path = folder.write("bytes.nrrd", b"");
-            write_bytes(&lattice, &path, |k| (0..6).map(|at| (6 * k + at) as u8).collect()).unwrap();
+            write_bytes(&lattice, &path, |k| (0..6).map(|at| (6 * k + at) as u8).collect())
+                .unwrap();
             let read = read_with(&path, nrrd::read).unwrap();
             assert_eq!((read.samples, read.lattice), (Samples::U8((0..18).collect()), lattice));
         }
@@ -138,18 +154,29 @@ mod tests {
         let folder = Folder::new();
         let path = folder.write("before.nrrd", b"before");
         let refused = |result: Result<()>, word: &str| {
-            let Err(Error::Argument(message)) = result else { panic!("{result:?} where {word} was expected") };
+            let Err(Error::Argument(message)) = result else {
+                panic!("{result:?} where {word} was expected")
+            };
             assert!(message.contains(word), "{message}");
             assert_eq!(std::fs::read(&path).unwrap(), b"before");
         };
         let lattice = Lattice::with_spacing([2, 2, 2], DVec3::ONE);
         let good = Volume::new(lattice.clone(), Samples::F32(vec![1.0; 8])).unwrap();
-        refused(write(&Volume { samples: Samples::F32(vec![1.0; 3]), ..good.clone() }, &path), "3 samples");
-        refused(write(&Volume { samples: Samples::F32(vec![f32::NAN; 8]), ..good.clone() }, &path), "not finite");
+        refused(
+            write(&Volume { samples: Samples::F32(vec![1.0; 3]), ..good.clone() }, &path),
+            "3 samples",
+        );
+        refused(
+            write(&Volume { samples: Samples::F32(vec![f32::NAN; 8]), ..good.clone() }, &path),
+            "not finite",
+        );
         let places = Arrangement::Rectilinear([vec![0.0], vec![], vec![0.0, 1.0]].into());
         let uneven = Lattice { arrangement: places, ..lattice.clone() };
         refused(write(&Volume { lattice: uneven.clone(), ..good }, &path), "1 coordinates along x");
         refused(write_bytes(&uneven, &path, |_| vec![0; 4]), "1 coordinates along x");
-        refused(write_bytes(&lattice, &path, |k| vec![0; 4 - k]), "slice 1 has 3 samples, not 2 × 2");
+        refused(
+            write_bytes(&lattice, &path, |k| vec![0; 4 - k]),
+            "slice 1 has 3 samples, not 2 × 2",
+        );
     }
 }

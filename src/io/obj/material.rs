@@ -34,7 +34,9 @@ impl<'a, 'b> Library<'a, 'b> {
         if name.is_empty() || !self.names.insert(name.to_owned()) {
             return Ok((materials, index_of));
         }
-        let Some(path) = texture::find(self.source, "mtllib", name)? else { return Ok((materials, index_of)) };
+        let Some(path) = texture::find(self.source, "mtllib", name)? else {
+            return Ok((materials, index_of));
+        };
         let file = self.source.open_beside(&path)?;
         let text = copy::lossy(file.bytes());
         file.intact()?;
@@ -44,27 +46,43 @@ impl<'a, 'b> Library<'a, 'b> {
             let rest = rest.trim();
             let place = || format!("line {number}");
             if word == "newmtl" {
-                self.source.spend("the size of the materials in bytes", MATERIAL + 4 * rest.len() as u64)?;
+                self.source.spend(
+                    "the size of the materials in bytes",
+                    MATERIAL + 4 * rest.len() as u64,
+                )?;
                 index_of.insert(rest.to_owned(), materials.len());
                 materials.push(tobj::Material { name: rest.to_owned(), ..Default::default() });
                 continue;
             }
             let Some(material) = materials.last_mut() else { continue };
-            let numbers = || -> Option<Vec<f64>> { rest.split_whitespace().map(|word| word.parse().ok()).collect() };
+            let numbers = || -> Option<Vec<f64>> {
+                rest.split_whitespace().map(|word| word.parse().ok()).collect()
+            };
             match word {
                 "Kd" => match numbers().as_deref() {
                     Some([r, g, b, ..]) => material.diffuse = Some([*r, *g, *b]),
                     Some([grey]) => material.diffuse = Some([*grey; 3]),
-                    _ => return Err(file.error(place(), format!("“{line}” is not a colour of three numbers"))),
+                    _ => {
+                        return Err(file
+                            .error(place(), format!("“{line}” is not a colour of three numbers")));
+                    }
                 },
-                "d" => material.dissolve = rest.split_whitespace().last().and_then(|word| word.parse().ok()),
+                "d" => {
+                    material.dissolve =
+                        rest.split_whitespace().last().and_then(|word| word.parse().ok())
+                }
                 // Of the format itself is `d` alone. Some programs mean by `Tr` what others mean by `d`, and write 1 for what
                 // is opaque: nobody exports what cannot be seen.
                 "Tr" if material.dissolve.is_none() => {
-                    material.dissolve =
-                        rest.parse().ok().map(|clear: f64| 1.0 - clear).filter(|&opacity| opacity > 0.0);
+                    material.dissolve = rest
+                        .parse()
+                        .ok()
+                        .map(|clear: f64| 1.0 - clear)
+                        .filter(|&opacity| opacity > 0.0);
                 }
-                "map_Kd" => material.diffuse_texture = Some(file_name(rest)).filter(|name| !name.is_empty()),
+                "map_Kd" => {
+                    material.diffuse_texture = Some(file_name(rest)).filter(|name| !name.is_empty())
+                }
                 _ => {}
             }
         }
@@ -93,7 +111,8 @@ impl<'a, 'b> Library<'a, 'b> {
             None => default,
         };
         let opacity = material.dissolve.unwrap_or(1.0);
-        let color = [r, g, b, opacity].map(|part| if part.is_finite() { part.clamp(0.0, 1.0) as f32 } else { 1.0 });
+        let color = [r, g, b, opacity]
+            .map(|part| if part.is_finite() { part.clamp(0.0, 1.0) as f32 } else { 1.0 });
         Ok(Material { name: material.name.clone(), color, texture })
     }
 }
@@ -109,7 +128,9 @@ fn file_name(statement: &str) -> String {
             _ => 1,
         };
         for taken in 0..most {
-            let Some((value, after)) = tail.trim_start().split_once(char::is_whitespace) else { break };
+            let Some((value, after)) = tail.trim_start().split_once(char::is_whitespace) else {
+                break;
+            };
             // Options of numbers may have fewer than they could.
             if taken > 0 && value.parse::<f64>().is_err() {
                 break;

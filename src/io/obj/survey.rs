@@ -54,11 +54,17 @@ impl Survey {
                     let mut values = 0;
                     for word in words {
                         values += 1;
-                        let plain = |b: u8| b.is_ascii_digit() || matches!(b, b'.' | b'+' | b'-' | b'e' | b'E');
+                        let plain = |b: u8| {
+                            b.is_ascii_digit() || matches!(b, b'.' | b'+' | b'-' | b'e' | b'E')
+                        };
                         if values <= 3 && !word.bytes().all(plain) {
-                            let first = word.trim_start_matches(['-', '+']).bytes().next().unwrap_or(b'?');
+                            let first =
+                                word.trim_start_matches(['-', '+']).bytes().next().unwrap_or(b'?');
                             if matches!(first, b'n' | b'N' | b'i' | b'I') {
-                                return Err(source.error(place(), format!("the position “{word}” is not finite")));
+                                return Err(source.error(
+                                    place(),
+                                    format!("the position “{word}” is not finite"),
+                                ));
                             }
                             let shown: String = word.chars().take(40).collect();
                             return Err(source
@@ -78,7 +84,8 @@ impl Survey {
                         let mut has_normal = false;
                         for (kind, part) in word.split('/').enumerate() {
                             if kind > 2 || (part.is_empty() && kind == 0) {
-                                return Err(source.error(place(), format!("“{word}” is no corner of a face")));
+                                return Err(source
+                                    .error(place(), format!("“{word}” is no corner of a face")));
                             }
                             if part.is_empty() {
                                 continue;
@@ -86,7 +93,10 @@ impl Survey {
                             has_normal |= kind == 2;
                             let index: i64 = part
                                 .parse::<i32>()
-                                .map_err(|_| source.error(place(), format!("“{word}” is no corner of a face")))?
+                                .map_err(|_| {
+                                    source
+                                        .error(place(), format!("“{word}” is no corner of a face"))
+                                })?
                                 .into();
                             if index == 0 || -index > counts[kind] {
                                 return Err(source.error(place(), wrong(index, kind, counts[kind])));
@@ -130,7 +140,10 @@ impl Survey {
         survey.colors &= counts[0] > 0;
         source.check_points("the number of vertices", survey.vertices)?;
         source.check_points("the number of faces", survey.faces)?;
-        let bytes = VERTEX * survey.vertices + OTHER * survey.others + FACE * survey.faces + CORNER * survey.corners;
+        let bytes = VERTEX * survey.vertices
+            + OTHER * survey.others
+            + FACE * survey.faces
+            + CORNER * survey.corners;
         source.spend("the size of the mesh in bytes", bytes)?;
         Ok(survey)
     }
@@ -140,7 +153,15 @@ impl Survey {
         // tobj ends a part of the mesh at each `usemtl`, with what it has read so far.
         let (rest, again) = (text, self.ahead.then_some(text));
         let kinds = if self.ahead { Kinds::Values } else { Kinds::All };
-        Feed { rest, again, kinds, line: 0, current: &[], colors: self.colors, normals: self.normals }
+        Feed {
+            rest,
+            again,
+            kinds,
+            line: 0,
+            current: &[],
+            colors: self.colors,
+            normals: self.normals,
+        }
     }
 }
 
@@ -159,7 +180,9 @@ const WHAT: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
 fn wrong(index: i64, kind: usize, count: i64) -> String {
     let what = WHAT[kind];
-    format!("a face refers to {what} {index}, but there are {count} (1 … {count}, or −1 … −{count})")
+    format!(
+        "a face refers to {what} {index}, but there are {count} (1 … {count}, or −1 … −{count})"
+    )
 }
 
 /// What a feed serves: positions, texture coordinates and normals, or what refers to them.

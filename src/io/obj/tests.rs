@@ -24,12 +24,16 @@ fn polygons_negative_indices_and_line_ends() {
         assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y]);
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
     }
-    assert_eq!(load([b"# caf\xe9\n", SQUARE.as_bytes()].concat()).expect("Latin-1").triangles.len(), 2);
+    assert_eq!(
+        load([b"# caf\xe9\n", SQUARE.as_bytes()].concat()).expect("Latin-1").triangles.len(),
+        2
+    );
 }
 
 #[test]
 fn concave_polygons_cover_themselves_only() {
-    let l = ([[2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0], [0.0, 0.0]].as_slice(), 3.0);
+    let l =
+        ([[2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0], [0.0, 0.0]].as_slice(), 3.0);
     let dart = ([[0.0, 0.0], [2.0, 1.0], [0.0, 2.0], [0.5, 1.0]].as_slice(), 1.5);
     // With a normal, vertices are split; with a triangle beside it (of no area), a model has faces of many kinds.
     for ((outline, area), normal, beside, far) in [
@@ -44,7 +48,8 @@ fn concave_polygons_cover_themselves_only() {
         for turned in [false, true] {
             let mut text = String::from("vn 0 0 1\n");
             outline.iter().for_each(|[x, y]| text += &format!("v {} {} 7\n", x + far, y + far));
-            let mut face: Vec<String> = (1..=outline.len()).map(|vertex| format!("{vertex}{normal}")).collect();
+            let mut face: Vec<String> =
+                (1..=outline.len()).map(|vertex| format!("{vertex}{normal}")).collect();
             if turned {
                 face.reverse();
             }
@@ -70,9 +75,11 @@ fn every_triangle_of_a_polygon_has_its_material() {
     let head = "v 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\n";
     let folder = Folder::new();
     folder.write("m.mtl", "newmtl a\nnewmtl b\n");
-    let obj = format!("mtllib m.mtl\n{head}usemtl a\nf 1 2 3 4 5 6\nusemtl b\nf 1 2 3\nf 1 2 3 6\n");
+    let obj =
+        format!("mtllib m.mtl\n{head}usemtl a\nf 1 2 3 4 5 6\nusemtl b\nf 1 2 3\nf 1 2 3 6\n");
     let mesh = load_mesh(&folder.write("a.obj", obj), &Limits::default()).expect("loads");
-    let names: Vec<&str> = mesh.triangle_materials.iter().map(|&m| mesh.materials[m as usize].name.as_str()).collect();
+    let names: Vec<&str> =
+        mesh.triangle_materials.iter().map(|&m| mesh.materials[m as usize].name.as_str()).collect();
     assert_eq!(names, ["a", "a", "a", "a", "b", "b", "b"]);
 }
 
@@ -80,7 +87,8 @@ fn every_triangle_of_a_polygon_has_its_material() {
 fn colors_and_clouds() {
     let cloud = "v 0 0 0 1 0.5 0\nv 1 0 0 0 0 1\n";
     let mesh = load(cloud).expect("loads");
-    let cut = load(&cloud[..cloud.len() - 3]).expect_err("vertices that end within a line are a cut mesh");
+    let cut = load(&cloud[..cloud.len() - 3])
+        .expect_err("vertices that end within a line are a cut mesh");
     assert!(cut.to_string().contains("byte"), "{cut}");
     assert_eq!(mesh.colors, [[255, 128, 0, 255], [0, 0, 255, 255]]);
     assert!(mesh.triangles.is_empty());
@@ -111,7 +119,8 @@ fn faces_may_stand_before_what_they_refer_to() {
     let behind = load(format!("{positions}vn 0 0 1\nvn 1 0 0\n{}{}", faces[0], faces[1])).unwrap();
     assert_eq!((&ahead.positions, &ahead.normals), (&behind.positions, &behind.normals));
     assert_eq!((ahead.triangles, ahead.normals.len()), (behind.triangles, 6));
-    let error = load(format!("{}{positions}vn 0 0 1\nf -4 -3 -1\n", faces[0])).unwrap_err().to_string();
+    let error =
+        load(format!("{}{positions}vn 0 0 1\nf -4 -3 -1\n", faces[0])).unwrap_err().to_string();
     assert!(error.contains("line 1: a face refers to vertex 1, which stands behind it"), "{error}");
 }
 
@@ -124,15 +133,22 @@ fn materials_and_pictures() {
     let obj = "mtllib a b.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n\
         usemtl red\nf 1 2 3\nusemtl tex\nf 1/1 3/3 4/2\nusemtl unknown\nf 1 2 4\n";
     let mesh = load_mesh(&folder.write("a.obj", obj), &Limits::default()).expect("loads");
-    let names: Vec<&str> = mesh.triangle_materials.iter().map(|&m| mesh.materials[m as usize].name.as_str()).collect();
+    let names: Vec<&str> =
+        mesh.triangle_materials.iter().map(|&m| mesh.materials[m as usize].name.as_str()).collect();
     assert_eq!(names, ["red", "tex", "none"]);
     let material = &mesh.materials[mesh.triangle_materials[1] as usize];
-    assert_eq!(material.texture.as_ref().expect("a picture").texels, [[255, 0, 0, 255], [0, 255, 0, 255]]);
+    assert_eq!(
+        material.texture.as_ref().expect("a picture").texels,
+        [[255, 0, 0, 255], [0, 255, 0, 255]]
+    );
     assert_eq!(mesh.materials[mesh.triangle_materials[0] as usize].color, [1.0, 0.0, 0.0, 0.5]);
     assert_eq!(mesh.uvs[mesh.triangles[1][1] as usize], Vec2::new(1.0, 0.0));
     assert_eq!(mesh.uvs.len(), mesh.positions.len());
     let limits = Limits { texels: 1, ..Limits::default() };
-    assert!(matches!(load_mesh(&folder.path().join("a.obj"), &limits), Err(Error::Limit { found: 2, .. })));
+    assert!(matches!(
+        load_mesh(&folder.path().join("a.obj"), &limits),
+        Err(Error::Limit { found: 2, .. })
+    ));
 }
 
 /// `d` alone is of the format; `Tr` has two meanings.
@@ -153,14 +169,22 @@ fn opacities_of_materials() {
         folder.write("a.mtl", format!("newmtl m\nKd 1 1 1\n{statements}\n"));
         let obj = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
         let mesh = load_mesh(&folder.write("a.obj", obj), &Limits::default()).expect("loads");
-        assert_eq!(mesh.materials[mesh.triangle_materials[0] as usize].color[3], opacity, "{statements}");
+        assert_eq!(
+            mesh.materials[mesh.triangle_materials[0] as usize].color[3], opacity,
+            "{statements}"
+        );
     }
 }
 
 #[test]
 fn missing_files_are_warnings_and_traversal_is_refused() {
-    assert_eq!(load(format!("mtllib no.mtl\nusemtl a\n{SQUARE}")).expect("loads").triangles.len(), 2);
-    for path in ["../up.mtl", "/etc/hostname", "a/../../up.mtl", "..\\up.mtl", "file:///etc/hostname"] {
+    assert_eq!(
+        load(format!("mtllib no.mtl\nusemtl a\n{SQUARE}")).expect("loads").triangles.len(),
+        2
+    );
+    for path in
+        ["../up.mtl", "/etc/hostname", "a/../../up.mtl", "..\\up.mtl", "file:///etc/hostname"]
+    {
         let error = load(format!("mtllib {path}\n{SQUARE}")).expect_err(path).to_string();
         assert!(error.contains("refers to “") && error.contains("folder"), "{error}");
     }
@@ -173,10 +197,15 @@ fn missing_files_are_warnings_and_traversal_is_refused() {
         ("newmtl a\nKd nan 1 1\nmap_Kd\nmap_Kd no.png\nmap_Kd -s\n", ""),
     ] {
         folder.write("m.mtl", mtl);
-        let loaded = load_mesh(&folder.write("a.obj", format!("mtllib m.mtl\n{SQUARE}")), &Limits::default());
+        let loaded = load_mesh(
+            &folder.write("a.obj", format!("mtllib m.mtl\n{SQUARE}")),
+            &Limits::default(),
+        );
         match loaded {
             Ok(_) => assert!(reason.is_empty(), "{mtl}"),
-            Err(error) => assert!(!reason.is_empty() && error.to_string().contains(reason), "{mtl}: {error}"),
+            Err(error) => {
+                assert!(!reason.is_empty() && error.to_string().contains(reason), "{mtl}: {error}")
+            }
         }
     }
 }
@@ -207,7 +236,8 @@ fn broken_statements_are_errors_with_their_line() {
 
 #[test]
 fn a_cut_file_never_panics() {
-    let text = format!("mtllib no.mtl\no name\nvt 0 0\nvn 0 0 1\n{SQUARE}usemtl x\nf 1/1/1 2/1/1 3/1/1\n");
+    let text =
+        format!("mtllib no.mtl\no name\nvt 0 0\nvn 0 0 1\n{SQUARE}usemtl x\nf 1/1/1 2/1/1 3/1/1\n");
     for length in 0..text.len() {
         let _ = load(&text[..length]);
     }
@@ -215,9 +245,14 @@ fn a_cut_file_never_panics() {
 
 #[test]
 fn large_coordinates_keep_their_precision() {
-    let mesh = load("v 4500000.125 5600000.25 1\nv 4500001.125 5600000.25 1\nv 4500000.125 5600001.5 1\nf 1 2 3\n");
+    let mesh = load(
+        "v 4500000.125 5600000.25 1\nv 4500001.125 5600000.25 1\nv 4500000.125 5600001.5 1\nf 1 2 3\n",
+    );
     let mesh = mesh.expect("loads");
-    assert_eq!(mesh.origin + mesh.positions[2].as_dvec3(), DVec3::new(4_500_000.125, 5_600_001.5, 1.0));
+    assert_eq!(
+        mesh.origin + mesh.positions[2].as_dvec3(),
+        DVec3::new(4_500_000.125, 5_600_001.5, 1.0)
+    );
 }
 
 /// Coordinates in a picture that are none, or that 32 bits do not hold; elsewhere nobody asks for them.
@@ -234,7 +269,11 @@ fn texture_coordinates_are_finite() {
     };
     for uv in ["inf 0", "0 NaN", "-inf nan", "1e39 0", "0 -1e400"] {
         let error = obj(uv, "a").unwrap_err().to_string();
-        assert!(error.contains("a.obj: line 7: the texture coordinates [") && error.contains("not finite"), "{error}");
+        assert!(
+            error.contains("a.obj: line 7: the texture coordinates [")
+                && error.contains("not finite"),
+            "{error}"
+        );
         assert!(obj(uv, "b").is_ok());
     }
     assert!(obj("3e38 -1e38", "a").is_ok());

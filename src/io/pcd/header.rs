@@ -66,7 +66,9 @@ impl NumberKind {
         wide[..bytes.len()].copy_from_slice(bytes);
         let unused = 64 - 8 * bytes.len() as u32;
         match self {
-            Self::Float if bytes.len() == 4 => f64::from(f32::from_bits(u64::from_le_bytes(wide) as u32)),
+            Self::Float if bytes.len() == 4 => {
+                f64::from(f32::from_bits(u64::from_le_bytes(wide) as u32))
+            }
             Self::Float => f64::from_le_bytes(wide),
             Self::Signed => (i64::from_le_bytes(wide) << unused >> unused) as f64,
             Self::Unsigned => u64::from_le_bytes(wide) as f64,
@@ -92,7 +94,9 @@ pub fn read(source: &Source) -> Result<Header> {
         let window = &bytes[at..bytes.len().min(at + LONGEST)];
         let Some(length) = window.iter().position(|&b| b == b'\n') else {
             if at + window.len() < bytes.len() {
-                return Err(source.error(place(), format!("the line is longer than {LONGEST} bytes")));
+                return Err(
+                    source.error(place(), format!("the line is longer than {LONGEST} bytes"))
+                );
             }
             return Err(source.error(place(), "the header ends before its line “DATA”"));
         };
@@ -112,8 +116,18 @@ pub fn read(source: &Source) -> Result<Header> {
     unreachable!("a file has an end")
 }
 
-const ENTRIES: [&str; 10] =
-    ["VERSION", "FIELDS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA"];
+const ENTRIES: [&str; 10] = [
+    "VERSION",
+    "FIELDS",
+    "SIZE",
+    "TYPE",
+    "COUNT",
+    "WIDTH",
+    "HEIGHT",
+    "VIEWPOINT",
+    "POINTS",
+    "DATA",
+];
 const FIELDS: usize = 1;
 const SIZE: usize = 2;
 const TYPE: usize = 3;
@@ -124,7 +138,12 @@ const VIEWPOINT: usize = 7;
 const POINTS: usize = 8;
 const DATA: usize = 9;
 
-fn finish(source: &Source, words: &[Vec<String>; ENTRIES.len()], end: usize, lines: usize) -> Result<Header> {
+fn finish(
+    source: &Source,
+    words: &[Vec<String>; ENTRIES.len()],
+    end: usize,
+    lines: usize,
+) -> Result<Header> {
     let wrong = |entry: usize, message: &str| {
         source.error("header", format!("“{} {}” {message}", ENTRIES[entry], words[entry].join(" ")))
     };
@@ -143,7 +162,10 @@ fn finish(source: &Source, words: &[Vec<String>; ENTRIES.len()], end: usize, lin
     let product = width.map(|width| width.saturating_mul(height.unwrap_or(1)));
     let points = match (number(POINTS)?, product) {
         (Some(points), Some(product)) if points != product => {
-            return Err(source.error("header", format!("claims {points} points, but {product} in rows and columns")));
+            return Err(source.error(
+                "header",
+                format!("claims {points} points, but {product} in rows and columns"),
+            ));
         }
         (points, product) => points.or(product).ok_or_else(|| wrong(POINTS, "is missing"))?,
     };
@@ -170,7 +192,8 @@ fn finish(source: &Source, words: &[Vec<String>; ENTRIES.len()], end: usize, lin
             _ => return Err(wrong(SIZE, "has a size that its type cannot have")),
         };
         let count = words[COUNT].get(index).map_or(Some(1), |count| count.parse::<usize>().ok());
-        let fits = |count: &usize| word.checked_add(*count).is_some_and(|words| words <= MOST_FIELDS);
+        let fits =
+            |count: &usize| word.checked_add(*count).is_some_and(|words| words <= MOST_FIELDS);
         let count = count.filter(|count| fits(count) && index < MOST_FIELDS);
         let count = count.ok_or_else(|| wrong(COUNT, "has what is no count of numbers"))?;
         if count > 0 {
@@ -179,7 +202,8 @@ fn finish(source: &Source, words: &[Vec<String>; ENTRIES.len()], end: usize, lin
         offset += size * count;
         word += count;
     }
-    let viewpoint: Option<Vec<f64>> = words[VIEWPOINT].iter().map(|word| word.parse().ok()).collect();
+    let viewpoint: Option<Vec<f64>> =
+        words[VIEWPOINT].iter().map(|word| word.parse().ok()).collect();
     let viewpoint = match viewpoint.as_deref() {
         Some(&[x, y, z, ..]) => Some(DVec3::new(x, y, z)).filter(|place| place.is_finite()),
         _ => None,

@@ -9,7 +9,10 @@ pub fn unpack(packed: &[u8], size: usize) -> Result<Vec<u8>, (usize, String)> {
         let control = usize::from(packed[at]);
         let mut next = || {
             at += 1;
-            packed.get(at).map(|&byte| usize::from(byte)).ok_or((packed.len(), "end early".to_owned()))
+            packed
+                .get(at)
+                .map(|&byte| usize::from(byte))
+                .ok_or((packed.len(), "end early".to_owned()))
         };
         if control < 32 {
             let length = control + 1;
@@ -20,7 +23,10 @@ pub fn unpack(packed: &[u8], size: usize) -> Result<Vec<u8>, (usize, String)> {
             // Three bits of length, of which 7 says that a byte more follows, and 13 of distance.
             let length = 2 + if control >> 5 == 7 { 7 + next()? } else { control >> 5 };
             let distance = ((control & 31) << 8) + next()? + 1;
-            let from = out.len().checked_sub(distance).ok_or((start, "refer to before their start".to_owned()))?;
+            let from = out
+                .len()
+                .checked_sub(distance)
+                .ok_or((start, "refer to before their start".to_owned()))?;
             // A copy may reach into what it writes.
             (from..from + length).for_each(|index| out.push(out[index]));
         }
@@ -30,7 +36,10 @@ pub fn unpack(packed: &[u8], size: usize) -> Result<Vec<u8>, (usize, String)> {
         }
     }
     if out.len() < size {
-        return Err((packed.len(), format!("unpack to {} bytes where {size} were expected", out.len())));
+        return Err((
+            packed.len(),
+            format!("unpack to {} bytes where {size} were expected", out.len()),
+        ));
     }
     Ok(out)
 }

@@ -35,7 +35,8 @@ fn binary() -> Vec<u8> {
 /// All in runs of bytes, as a packer may do.
 fn packed() -> Vec<u8> {
     let bytes: Vec<u8> = columns().into_iter().flatten().flatten().collect();
-    let runs: Vec<u8> = bytes.chunks(32).flat_map(|run| [&[run.len() as u8 - 1], run].concat()).collect();
+    let runs: Vec<u8> =
+        bytes.chunks(32).flat_map(|run| [&[run.len() as u8 - 1], run].concat()).collect();
     let sizes = [runs.len(), bytes.len()].map(|size| (size as u32).to_le_bytes()).concat();
     [format!("{HEADER}DATA binary_compressed\n").into_bytes(), sizes, runs].concat()
 }
@@ -52,16 +53,19 @@ fn all_three_encodings_say_the_same() {
         assert_eq!(mesh.positions, [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]);
         assert_eq!(mesh.colors, [[255, 128, 1, 255], [0, 0, 51, 255]]);
         assert_eq!(mesh.normals, [Vec3::Z, Vec3::X]);
-        assert_eq!(mesh.sensors, [crate::surface::Sensor { position: Vec3::new(1.0, 2.0, 9.0), points: 0..2 }]);
+        assert_eq!(
+            mesh.sensors,
+            [crate::surface::Sensor { position: Vec3::new(1.0, 2.0, 9.0), points: 0..2 }]
+        );
     }
 }
 
 #[test]
 fn what_is_missing_and_what_is_unusual() {
-    let plain =
-        "FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\nWIDTH 2\nHEIGHT 2\nVIEWPOINT 0 0 0 1 0 0 0\nDATA ascii\n";
+    let plain = "FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\nWIDTH 2\nHEIGHT 2\nVIEWPOINT 0 0 0 1 0 0 0\nDATA ascii\n";
     let color = f32::from_bits(0x00ff_8001);
-    let mesh = load(format!("{plain}nan nan nan 0\n1 2 3 {color:e}\n4 5 6 0\nnan 1 2 0\n")).unwrap();
+    let mesh =
+        load(format!("{plain}nan nan nan 0\n1 2 3 {color:e}\n4 5 6 0\nnan 1 2 0\n")).unwrap();
     assert_eq!(mesh.positions, [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]);
     assert_eq!(mesh.colors[0], [255, 128, 1, 255]);
     assert_eq!(mesh.sensors[0].points, 0..2, "a camera at the origin");
@@ -88,7 +92,10 @@ fn cuts_and_lies_are_errors() {
         (header("SIZE 4 4", "SIZE 4"), "does not fit the 8 fields"),
         (header("TYPE F F", "TYPE F G"), "none of F, U and I"),
         (header("COUNT 1 1 1 3", "COUNT 1 1 1 99999999999"), "no count of numbers"),
-        (header("COUNT 1 1 1 3", "COUNT 1 1 1 4"), "line 12: has 10 numbers where the fields need 11"),
+        (
+            header("COUNT 1 1 1 3", "COUNT 1 1 1 4"),
+            "line 12: has 10 numbers where the fields need 11",
+        ),
         (header("DATA ascii", "DATA zipped"), "none of ascii"),
         (header("VERSION", "VERSIONS"), "line 2: “VERSIONS” is no entry"),
         (header("4.0 5", "4.0 five"), "line 14: “five” is not a number"),
@@ -98,7 +105,8 @@ fn cuts_and_lies_are_errors() {
         assert!(message.contains(word), "{word}: {message}");
     }
     for points in ["4294967296", "18446744073709551615"] {
-        let content = header("WIDTH 2\nHEIGHT 1\n", "").replace("POINTS 2", &format!("POINTS {points}"));
+        let content =
+            header("WIDTH 2\nHEIGHT 1\n", "").replace("POINTS 2", &format!("POINTS {points}"));
         assert!(matches!(load(content), Err(Error::Limit { .. })), "{points}");
     }
     let path = folder.write("b.pcd", binary());

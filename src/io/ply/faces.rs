@@ -54,7 +54,10 @@ pub(super) fn read(
         if element.count == 0 {
             return Ok(Faces::default());
         }
-        return Err(source.error("header", format!("the element “{}” has no list “vertex_indices”", element.name)));
+        return Err(source.error(
+            "header",
+            format!("the element “{}” has no list “vertex_indices”", element.name),
+        ));
     };
     // Once as they are found, once in their place.
     if let Rows::Fixed { .. } = rows {
@@ -122,7 +125,9 @@ fn read_rows(
         let wrong = |message: String| Err(source.error(rows.place(source, element, row), message));
         if let Some(index) = stray {
             let last = vertices.saturating_sub(1);
-            return wrong(format!("refers to vertex {index}, but there are {vertices} (0 … {last})"));
+            return wrong(format!(
+                "refers to vertex {index}, but there are {vertices} (0 … {last})"
+            ));
         }
         if are_strips {
             strips(&corners, &mut triangles)?;
@@ -135,10 +140,15 @@ fn read_rows(
         let has_uvs = columns.uvs.is_some() && !own_uvs.is_empty();
         if has_uvs && own_uvs.len() != 2 * corners.len() {
             let (found, corners) = (own_uvs.len(), corners.len());
-            return wrong(format!("has {found} texture coordinates for {corners} corners, which need {}", 2 * corners));
+            return wrong(format!(
+                "has {found} texture coordinates for {corners} corners, which need {}",
+                2 * corners
+            ));
         }
         let Some(picture) = vertex(picture, pictures.max(1)) else {
-            return wrong(format!("shows picture {picture}, but “comment TextureFile” names {pictures}"));
+            return wrong(format!(
+                "shows picture {picture}, but “comment TextureFile” names {pictures}"
+            ));
         };
         let place = |index: u32| positions[index as usize].as_dvec3();
         if columns.uvs.is_none() {
@@ -162,17 +172,30 @@ fn read_rows(
             },
         )?;
     }
-    Ok(Faces { triangles: triangles.into_inner(), uvs: uvs.into_inner(), pictures: shown.into_inner() })
+    Ok(Faces {
+        triangles: triangles.into_inner(),
+        uvs: uvs.into_inner(),
+        pictures: shown.into_inner(),
+    })
 }
 
 /// The common case: binary rows of one list of three 32-bit indices. `None` where it is another, or an index is wrong
 /// (the general way then finds the row).
-fn read_triangles(element: &Element, rows: &Rows, column: usize, vertices: usize) -> Option<Vec<[u32; 3]>> {
-    let (Rows::Fixed { data, stride, big }, PropertyType::List(count, item)) = (rows, &element.columns[column].kind)
+fn read_triangles(
+    element: &Element,
+    rows: &Rows,
+    column: usize,
+    vertices: usize,
+) -> Option<Vec<[u32; 3]>> {
+    let (Rows::Fixed { data, stride, big }, PropertyType::List(count, item)) =
+        (rows, &element.columns[column].kind)
     else {
         return None;
     };
-    if !matches!(item, ScalarType::Int | ScalarType::UInt) || element.name == "tristrips" || *stride == 0 {
+    if !matches!(item, ScalarType::Int | ScalarType::UInt)
+        || element.name == "tristrips"
+        || *stride == 0
+    {
         return None;
     }
     let offset: Option<usize> = element.columns[..column].iter().map(|before| before.width()).sum();
@@ -186,7 +209,10 @@ fn read_triangles(element: &Element, rows: &Rows, column: usize, vertices: usize
             })
         })
         .collect();
-    triangles.par_iter().all(|t| t.iter().all(|&index| (index as usize) < vertices)).then_some(triangles)
+    triangles
+        .par_iter()
+        .all(|t| t.iter().all(|&index| (index as usize) < vertices))
+        .then_some(triangles)
 }
 
 fn vertex(value: f64, vertices: usize) -> Option<u32> {
@@ -238,13 +264,20 @@ impl Faces {
                         source.spend("the vertices of seams in bytes", 128)?;
                         own.push(Some(uv));
                         copy(mesh, *index as usize);
-                        source.check_points("the number of vertices with those of seams", own.len() as u64)?;
+                        source.check_points(
+                            "the number of vertices with those of seams",
+                            own.len() as u64,
+                        )?;
                     }
                     *index = other;
                 }
             }
             // PLY counts v from the bottom of the picture.
-            mesh.uvs = own.iter().map(|uv| uv.unwrap_or_default()).map(|uv| Vec2::new(uv.x, 1.0 - uv.y)).collect();
+            mesh.uvs = own
+                .iter()
+                .map(|uv| uv.unwrap_or_default())
+                .map(|uv| Vec2::new(uv.x, 1.0 - uv.y))
+                .collect();
             mesh.triangle_materials = self.pictures;
         }
         mesh.triangles = self.triangles;

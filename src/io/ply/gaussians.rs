@@ -17,8 +17,8 @@ use std::{io::Write, path::Path};
 const HARMONIC: f64 = 0.282_094_791_773_878_14;
 
 const PROPERTIES: [&str; 17] = [
-    "x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2", "rot_0",
-    "rot_1", "rot_2", "rot_3",
+    "x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1",
+    "scale_2", "rot_0", "rot_1", "rot_2", "rot_3",
 ];
 
 /// Writes splats as 3D Gaussians, in world coordinates of 32 bits; beyond that, their shading and the extent of their
@@ -28,7 +28,9 @@ const PROPERTIES: [&str; 17] = [
 /// [`Error::Argument`] for scalar splats, which have no colours; [`Error::Output`] where the file cannot be written.
 pub fn write_gaussians(set: &SplatSet, path: &Path) -> Result<()> {
     if set.payload != Payload::Radiance {
-        return Err(Error::Argument("samples of a volume have no colours to write as Gaussians".into()));
+        return Err(Error::Argument(
+            "samples of a volume have no colours to write as Gaussians".into(),
+        ));
     }
     write_all(set.splats.len() as u64, set.splats.iter(), set.origin, path)
 }
@@ -42,7 +44,12 @@ pub fn write_gaussian_leaves(tree: &Tree, path: &Path) -> Result<()> {
     write_all(tree.leaf_count(), leaves, tree.origin, path)
 }
 
-fn write_all<'a>(count: u64, splats: impl Iterator<Item = &'a Splat>, origin: DVec3, path: &Path) -> Result<()> {
+fn write_all<'a>(
+    count: u64,
+    splats: impl Iterator<Item = &'a Splat>,
+    origin: DVec3,
+    path: &Path,
+) -> Result<()> {
     disk::write_with(path, |out| {
         writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {count}")?;
         PROPERTIES.iter().try_for_each(|name| writeln!(out, "property float {name}"))?;
@@ -72,18 +79,26 @@ pub(in super::super) fn warn(source: &Source) {
 fn gaussian(splat: &Splat, origin: DVec3) -> [f64; PROPERTIES.len()] {
     let center = origin + DVec3::from(splat.center.map(f64::from));
     let normal = decode_normal(splat.normal).unwrap_or_default().as_dvec3();
-    let color = [0, 8, 16].map(|shift| (f64::from(splat.color >> shift & 255) / 255.0 - 0.5) / HARMONIC);
+    let color =
+        [0, 8, 16].map(|shift| (f64::from(splat.color >> shift & 255) / 255.0 - 0.5) / HARMONIC);
     let depth = f64::from(splat.strength) * f64::from(splat.color >> 24) / 255.0;
     // The logit of 1 − e^−depth is the logarithm of e^depth − 1; where this is none, all but 0 or 1.
     let opacity = depth.exp_m1().ln().clamp(-16.0, 16.0);
     let [b00, b10, b11, b20, b21, b22] = splat.factor.map(f64::from);
-    let b = DMat3::from_cols(DVec3::new(b00, b10, b20), DVec3::new(0.0, b11, b21), DVec3::new(0.0, 0.0, b22));
+    let b = DMat3::from_cols(
+        DVec3::new(b00, b10, b20),
+        DVec3::new(0.0, b11, b21),
+        DVec3::new(0.0, 0.0, b22),
+    );
     let (squares, [first, second, _]) = eigen(b * b.transpose());
     let [s0, s1, s2] = squares.map(|square| 0.5 * square.max(f64::from(f32::MIN_POSITIVE)).ln());
     let turn = DQuat::from_mat3(&DMat3::from_cols(first, second, first.cross(second))).normalize();
     let [r, g, b] = color;
     let (place, n) = (center, normal);
-    [place.x, place.y, place.z, n.x, n.y, n.z, r, g, b, opacity, s0, s1, s2, turn.w, turn.x, turn.y, turn.z]
+    [
+        place.x, place.y, place.z, n.x, n.y, n.z, r, g, b, opacity, s0, s1, s2, turn.w, turn.x,
+        turn.y, turn.z,
+    ]
 }
 
 #[cfg(test)]
@@ -103,12 +118,18 @@ mod tests {
         assert!(header.contains(&format!("element vertex {}\n", set.splats.len())));
         let rows: Vec<[f32; 17]> = bytes[end..]
             .chunks_exact(68)
-            .map(|row| std::array::from_fn(|i| f32::from_le_bytes(row[4 * i..4 * i + 4].try_into().unwrap())))
+            .map(|row| {
+                std::array::from_fn(|i| {
+                    f32::from_le_bytes(row[4 * i..4 * i + 4].try_into().unwrap())
+                })
+            })
             .collect();
         assert_eq!((rows.len(), bytes[end..].len() % 68), (set.splats.len(), 0));
         for (row, splat) in rows.iter().zip(&set.splats) {
             let center = set.origin + DVec3::from(splat.center.map(f64::from));
-            assert!(center.distance(DVec3::new(row[0].into(), row[1].into(), row[2].into())) < 1e-6);
+            assert!(
+                center.distance(DVec3::new(row[0].into(), row[1].into(), row[2].into())) < 1e-6
+            );
             let depth = f64::from(splat.strength) * f64::from(splat.color >> 24) / 255.0;
             let opacity = 1.0 / (1.0 + (-f64::from(row[9])).exp());
             assert!((opacity - (1.0 - (-depth).exp())).abs() < 1e-6);
@@ -120,7 +141,11 @@ mod tests {
             let scale = DVec3::new(row[10].into(), row[11].into(), row[12].into()).exp();
             let found = turn * DMat3::from_diagonal(scale * scale) * turn.transpose();
             let [b00, b10, b11, b20, b21, b22] = splat.factor.map(f64::from);
-            let b = DMat3::from_cols(DVec3::new(b00, b10, b20), DVec3::new(0.0, b11, b21), DVec3::new(0.0, 0.0, b22));
+            let b = DMat3::from_cols(
+                DVec3::new(b00, b10, b20),
+                DVec3::new(0.0, b11, b21),
+                DVec3::new(0.0, 0.0, b22),
+            );
             let wanted = b * b.transpose();
             let miss = (found - wanted).to_cols_array().iter().map(|v| v.abs()).fold(0.0, f64::max);
             assert!(miss < 1e-5 * scale.x * scale.x, "{miss}");

@@ -88,10 +88,15 @@ pub(super) fn read(source: &Source) -> Result<Header> {
         let window = &rest[..rest.len().min(LONGEST.saturating_sub(at))];
         let Some(end) = window.iter().position(|b| matches!(b, b'\n' | b'\r')) else {
             if window.len() < rest.len() {
-                let message = format!("the header is longer than {LONGEST} bytes, with no line “end_header” in them");
+                let message = format!(
+                    "the header is longer than {LONGEST} bytes, with no line “end_header” in them"
+                );
                 return Err(source.error(place(), message));
             }
-            return Err(source.error(place(), "the header has no “end_header” line; the file is cut or is no PLY"));
+            return Err(source.error(
+                place(),
+                "the header has no “end_header” line; the file is cut or is no PLY",
+            ));
         };
         let line = copy::lossy(&rest[..end]);
         // A lone carriage return ends a line too (old Macintosh files).
@@ -100,7 +105,8 @@ pub(super) fn read(source: &Source) -> Result<Header> {
         match words.as_slice() {
             [] => clean.push_str("comment\n"),
             ["comment", "TextureFile", ..] => {
-                textures.extend(line.split_once("TextureFile").map(|(_, name)| name.trim().to_owned()));
+                textures
+                    .extend(line.split_once("TextureFile").map(|(_, name)| name.trim().to_owned()));
                 clean.push_str("comment\n");
             }
             ["comment" | "obj_info", ..] => clean.push_str("comment\n"),
@@ -115,7 +121,10 @@ pub(super) fn read(source: &Source) -> Result<Header> {
             }
             ["property", kind @ .., name] => {
                 let Some((_, properties)) = names.last_mut() else {
-                    return Err(source.error(place(), format!("the property “{name}” stands before any element")));
+                    return Err(source.error(
+                        place(),
+                        format!("the property “{name}” stands before any element"),
+                    ));
                 };
                 clean.push_str(&format!("property {} p{}\n", kind.join(" "), properties.len()));
                 properties.push((*name).to_owned());
@@ -127,16 +136,19 @@ pub(super) fn read(source: &Source) -> Result<Header> {
             }
         }
         if columns > MOST_COLUMNS {
-            return Err(source.error(place(), format!("more than {MOST_COLUMNS} elements and properties")));
+            return Err(
+                source.error(place(), format!("more than {MOST_COLUMNS} elements and properties"))
+            );
         }
         if words == ["end_header"] {
             break;
         }
     }
-    let parsed = Parser::<DefaultElement>::new().read_ply_header(&mut clean.as_bytes()).map_err(|e| {
-        let place = e.line().map_or("header".into(), |line| format!("header line {line}"));
-        source.error(place, e.to_string().replace(['\n', '\t'], " "))
-    })?;
+    let parsed =
+        Parser::<DefaultElement>::new().read_ply_header(&mut clean.as_bytes()).map_err(|e| {
+            let place = e.line().map_or("header".into(), |line| format!("header line {line}"));
+            source.error(place, e.to_string().replace(['\n', '\t'], " "))
+        })?;
     let mut elements = Vec::new();
     for ((name, properties), definition) in names.into_iter().zip(parsed.elements.into_values()) {
         let columns = properties

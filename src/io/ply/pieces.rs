@@ -63,11 +63,15 @@ impl Pieces {
         for element in &header.elements {
             let is_face = element.name == "face";
             let stride = if is_face { triangle_stride(element) } else { element.stride() };
-            let Some(stride) = stride.filter(|_| element.name != "tristrips") else { return Ok(None) };
+            let Some(stride) = stride.filter(|_| element.name != "tristrips") else {
+                return Ok(None);
+            };
             let left = source.bytes().len() - at;
             if is_face && element.count > 0 {
                 let rows = Rows { at, count: element.count.min(left / stride), stride, big };
-                let (None, Some(found)) = (&faces, Faces::find(element, rows)) else { return Ok(None) };
+                let (None, Some(found)) = (&faces, Faces::find(element, rows)) else {
+                    return Ok(None);
+                };
                 if !found.are_triangles(source) {
                     return Ok(None);
                 }
@@ -78,21 +82,29 @@ impl Pieces {
             let rows = Rows { at, count: element.count, stride, big };
             at += size;
             if is_face || element.name == "vertex" {
-                source.check_points(&format!("the count of element “{}”", element.name), element.count as u64)?;
+                source.check_points(
+                    &format!("the count of element “{}”", element.name),
+                    element.count as u64,
+                )?;
             }
             if element.name == "vertex" && vertices.is_none() {
                 vertices = Some((element, rows));
             }
         }
-        let Some((element, rows)) = vertices.filter(|(element, _)| element.count > 0) else { return Ok(None) };
-        let columns = ROLES.map(|names| element.column(names).filter(|&c| element.columns[c].width().is_some()));
-        let has = |from: usize, number: usize| columns[from..from + number].iter().all(Option::is_some);
+        let Some((element, rows)) = vertices.filter(|(element, _)| element.count > 0) else {
+            return Ok(None);
+        };
+        let columns = ROLES
+            .map(|names| element.column(names).filter(|&c| element.columns[c].width().is_some()));
+        let has =
+            |from: usize, number: usize| columns[from..from + number].iter().all(Option::is_some);
         let has_uvs = has(UV, 2);
         if !has(POSITION, 3) || (has_uvs && !header.textures.is_empty() && faces.is_some()) {
             return Ok(None);
         }
         let field = |column: usize| {
-            let offset: Option<usize> = element.columns[..column].iter().map(|before| before.width()).sum();
+            let offset: Option<usize> =
+                element.columns[..column].iter().map(|before| before.width()).sum();
             let PropertyType::Scalar(kind) = &element.columns[column].kind else { return None };
             Some((offset?, kind.clone()))
         };
@@ -157,9 +169,16 @@ impl Pieces {
     /// A vertex as the reader has it.
     pub fn vertex(&self, source: &Source, row: usize) -> Found {
         let value = |role: usize| self.value(source, row, role);
-        let mut found = Found { row, position: self.position(source, row), normal: Vec3::ZERO, color: [255; 4] };
+        let mut found = Found {
+            row,
+            position: self.position(source, row),
+            normal: Vec3::ZERO,
+            color: [255; 4],
+        };
         if self.has_normals {
-            found.normal = positions::unit(Vec3::from_array([0, 1, 2].map(|axis| value(NORMAL + axis) as f32)));
+            found.normal = positions::unit(Vec3::from_array(
+                [0, 1, 2].map(|axis| value(NORMAL + axis) as f32),
+            ));
         }
         if self.has_colors {
             found.color = color(self.vertices.color_scale, |channel| value(COLOR + channel));
@@ -183,7 +202,9 @@ impl Pieces {
             };
             let corners = number(&bytes[faces.length.0..], &faces.length.1, big);
             if corners != 3.0 {
-                return wrong(format!("has {corners} corners; in pieces only triangles can be read"));
+                return wrong(format!(
+                    "has {corners} corners; in pieces only triangles can be read"
+                ));
             }
             let corners = [0, 4, 8].map(|corner| {
                 let raw = [0, 1, 2, 3].map(|byte| bytes[faces.indices + corner + byte]);
@@ -203,7 +224,9 @@ impl Faces {
     /// Faces whose only list is one of indices of 32 bits.
     fn find(element: &Element, rows: Rows) -> Option<Self> {
         let column = element.column(&["vertex_indices", "vertex_index"])?;
-        let PropertyType::List(_, ScalarType::Int | ScalarType::UInt) = element.columns[column].kind else {
+        let PropertyType::List(_, ScalarType::Int | ScalarType::UInt) =
+            element.columns[column].kind
+        else {
             return None;
         };
         let (offset, kind) = list_place(element);
@@ -215,7 +238,9 @@ impl Faces {
         const LOOKS: usize = 1 << 10;
         let Rows { at, count, stride, big } = self.rows;
         let looks = LOOKS.min(count);
-        let row = |look: usize| look as u128 * (count - 1) as u128 / looks.saturating_sub(1).max(1) as u128;
+        let row = |look: usize| {
+            look as u128 * (count - 1) as u128 / looks.saturating_sub(1).max(1) as u128
+        };
         (0..looks).all(|look| {
             let start = at + row(look) as usize * stride + self.length.0;
             number(&source.bytes()[start..], &self.length.1, big) == 3.0

@@ -51,7 +51,12 @@ pub(super) type List = [f64];
 impl<'a> Rows<'a> {
     /// Finds the rows of the element at `at` and moves `at` behind them. What is allocated is bounded by the bytes
     /// present: a row of text is a line, a row with a list has a length of at least a byte.
-    pub fn find(source: &'a Source, element: &Element, encoding: Encoding, at: &mut usize) -> Result<Self> {
+    pub fn find(
+        source: &'a Source,
+        element: &Element,
+        encoding: Encoding,
+        at: &mut usize,
+    ) -> Result<Self> {
         let bytes = source.bytes();
         if element.columns.is_empty() {
             return Ok(Rows::Fixed { data: &[], stride: 0, big: false });
@@ -72,8 +77,9 @@ impl<'a> Rows<'a> {
             && let Some(size) = element.count.checked_mul(stride).filter(|&size| size <= rest.len())
         {
             let (offset, count_kind) = list_place(element);
-            let threes =
-                rest[..size].par_chunks_exact(stride).all(|row| number(&row[offset..], count_kind, big) == 3.0);
+            let threes = rest[..size]
+                .par_chunks_exact(stride)
+                .all(|row| number(&row[offset..], count_kind, big) == 3.0);
             if threes {
                 *at += size;
                 return Ok(Rows::Fixed { data: &rest[..size], stride, big });
@@ -152,13 +158,14 @@ impl<'a> Rows<'a> {
                 walk(&data[starts[row]..], element, *big, wanted, &mut list, &mut visit)
             }
             Rows::Text { lines } => {
-                let mut words = lines[row].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+                let mut words =
+                    lines[row].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
                 let mut next = |column: usize, parse: bool| -> Result<f64> {
                     let name = &element.columns[column].name;
                     let place = || text_place(source, element, row, lines[row]);
-                    let word = words
-                        .next()
-                        .ok_or_else(|| source.error(place(), format!("the line ends before the value of “{name}”")))?;
+                    let word = words.next().ok_or_else(|| {
+                        source.error(place(), format!("the line ends before the value of “{name}”"))
+                    })?;
                     if !parse {
                         return Ok(0.0);
                     }
@@ -179,7 +186,10 @@ impl<'a> Rows<'a> {
                             if !(length >= 0.0 && length.fract() == 0.0) {
                                 return Err(source.error(
                                     text_place(source, element, row, lines[row]),
-                                    format!("the list “{}” has the impossible length {length}", column.name),
+                                    format!(
+                                        "the list “{}” has the impossible length {length}",
+                                        column.name
+                                    ),
                                 ));
                             }
                             list.clear();
@@ -280,10 +290,14 @@ fn walk(
             PropertyType::List(count, item) => {
                 let Some(bytes) = take(width(count)) else { return };
                 let length = number(bytes, count, big);
-                let Some(bytes) = take((length as usize).saturating_mul(width(item))) else { return };
+                let Some(bytes) = take((length as usize).saturating_mul(width(item))) else {
+                    return;
+                };
                 if wanted[index] {
                     list.clear();
-                    list.extend(bytes.chunks_exact(width(item)).map(|bytes| number(bytes, item, big)));
+                    list.extend(
+                        bytes.chunks_exact(width(item)).map(|bytes| number(bytes, item, big)),
+                    );
                     visit(index, length, Some(list));
                 }
             }

@@ -22,7 +22,10 @@ const COVARIANCE: [&str; 6] = ["cov_xx", "cov_xy", "cov_xz", "cov_yy", "cov_yz",
 /// [`Error::Input`](crate::Error::Input) for a malformed header.
 pub fn has_faces(source: &Source) -> Result<bool> {
     let header = header::read(source)?;
-    Ok(header.elements.iter().any(|element| matches!(element.name.as_str(), "face" | "tristrips") && element.count > 0))
+    Ok(header
+        .elements
+        .iter()
+        .any(|element| matches!(element.name.as_str(), "face" | "tristrips") && element.count > 0))
 }
 
 /// Reads the vertices as scattered samples: the property that `scalar` names, else the only one that is no position, normal,
@@ -45,12 +48,20 @@ pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
     Err(source.error("header", "has no element “vertex”"))
 }
 
-fn of_vertices(source: &Source, element: &Element, rows: &Rows, scalar: Option<&str>) -> Result<Points> {
+fn of_vertices(
+    source: &Source,
+    element: &Element,
+    rows: &Rows,
+    scalar: Option<&str>,
+) -> Result<Points> {
     let place = "element “vertex”";
-    let column = |names: &[&str]| element.column(names).filter(|&column| element.columns[column].width().is_some());
+    let column = |names: &[&str]| {
+        element.column(names).filter(|&column| element.columns[column].width().is_some())
+    };
     let mut position = [0; 3];
     for (at, names) in position.iter_mut().zip(ROLES) {
-        *at = column(names).ok_or_else(|| source.error(place, format!("has no scalar property “{}”", names[0])))?;
+        *at = column(names)
+            .ok_or_else(|| source.error(place, format!("has no scalar property “{}”", names[0])))?;
     }
     // Of a whole group: a lone “t” or “v” is no texture coordinate.
     let groups = [POSITION..NORMAL, NORMAL..COLOR, COLOR..UV, UV..ROLES.len()];
@@ -61,7 +72,11 @@ fn of_vertices(source: &Source, element: &Element, rows: &Rows, scalar: Option<&
         });
         of_group || name == RADIUS || COVARIANCE.contains(&name)
     };
-    let scalars = element.columns.iter().filter(|column| column.width().is_some()).map(|column| column.name.as_str());
+    let scalars = element
+        .columns
+        .iter()
+        .filter(|column| column.width().is_some())
+        .map(|column| column.name.as_str());
     // Those that mean something else can be asked for too.
     let names: Vec<&str> = scalars.filter(|name| scalar == Some(*name) || !known(name)).collect();
     let value = element.column(&[names[choose(source, place, scalar, &names)?]]);
@@ -69,15 +84,22 @@ fn of_vertices(source: &Source, element: &Element, rows: &Rows, scalar: Option<&
     let covariance = COVARIANCE.map(|name| column(&[name]));
     let has_covariance = covariance.iter().all(Option::is_some);
     let [x, y, z] = position.map(Some);
-    let columns: Vec<Option<usize>> = [x, y, z, value, radius].into_iter().chain(covariance).collect();
+    let columns: Vec<Option<usize>> =
+        [x, y, z, value, radius].into_iter().chain(covariance).collect();
     let table = Table::read(source, element, rows, &columns)?;
     let count = element.count;
     source.spend("the size of the samples in bytes", Columns::ROW * count as u64)?;
     let columns = Columns {
         values: (0..count).map(|row| table.value(row, 3)).collect(),
-        radii: if radius.is_some() { (0..count).map(|row| table.value(row, 4) as f32).collect() } else { Vec::new() },
+        radii: if radius.is_some() {
+            (0..count).map(|row| table.value(row, 4) as f32).collect()
+        } else {
+            Vec::new()
+        },
         covariances: if has_covariance {
-            (0..count).map(|row| std::array::from_fn(|term| table.value(row, 5 + term) as f32)).collect()
+            (0..count)
+                .map(|row| std::array::from_fn(|term| table.value(row, 5 + term) as f32))
+                .collect()
         } else {
             Vec::new()
         },
@@ -140,8 +162,13 @@ mod tests {
             let short = file(format, "x y z p", &[&[1., 2., 3., 4.]]);
             for end in 0..short.len() {
                 // A text that ends within its last number reads as the shorter one.
-                let cut = read_with(&folder.write("a.ply", &short[..end]), |source| read_samples(source, None));
-                assert!(cut.is_err() || format == "ascii" && end + 3 > short.len(), "{format} cut at {end}");
+                let cut = read_with(&folder.write("a.ply", &short[..end]), |source| {
+                    read_samples(source, None)
+                });
+                assert!(
+                    cut.is_err() || format == "ascii" && end + 3 > short.len(),
+                    "{format} cut at {end}"
+                );
             }
         }
     }
@@ -160,7 +187,12 @@ mod tests {
             let message = load(&file("ascii", properties, &[row]), scalar).unwrap_err().to_string();
             assert!(message.contains(word), "{message}");
         }
-        assert!(load(&file("ascii", "x y z a", &[]), None).unwrap_err().to_string().contains("no samples"));
+        assert!(
+            load(&file("ascii", "x y z a", &[]), None)
+                .unwrap_err()
+                .to_string()
+                .contains("no samples")
+        );
         let hint = match load(&file("ascii", "x y z a b", &[&[1.0; 5]]), None) {
             Err(crate::Error::Input { hint, .. }) => hint,
             other => panic!("{other:?}"),

@@ -13,14 +13,24 @@ use rayon::prelude::*;
 /// Some scalar columns of an element, by their places in the list that was asked for.
 pub(super) enum Table<'a> {
     /// Rows of one stride: values are decoded when they are asked for, from their offset in the row.
-    Binary { data: &'a [u8], stride: usize, big: bool, fields: Vec<Option<(usize, &'a ScalarType)>> },
+    Binary {
+        data: &'a [u8],
+        stride: usize,
+        big: bool,
+        fields: Vec<Option<(usize, &'a ScalarType)>>,
+    },
     /// Text and rows with lists, decoded once: the values of all rows, and the place of each column in a row.
     Decoded { values: Vec<f64>, used: usize, slots: Vec<Option<usize>> },
 }
 
 impl<'a> Table<'a> {
     /// `columns` are indices of the element's columns, one at least; none for one that it lacks.
-    pub fn read(source: &Source, element: &'a Element, rows: &Rows<'a>, columns: &[Option<usize>]) -> Result<Self> {
+    pub fn read(
+        source: &Source,
+        element: &'a Element,
+        rows: &Rows<'a>,
+        columns: &[Option<usize>],
+    ) -> Result<Self> {
         if let Rows::Fixed { data, stride, big } = *rows {
             let field = |column: usize| {
                 let PropertyType::Scalar(kind) = &element.columns[column].kind else { return None };
@@ -58,10 +68,11 @@ impl<'a> Table<'a> {
     /// A value of a row; 0 for a column that is none.
     pub fn value(&self, row: usize, column: usize) -> f64 {
         match self {
-            Self::Binary { data, stride, big, fields } => {
-                fields[column].map_or(0.0, |(offset, kind)| number(&data[row * stride + offset..], kind, *big))
+            Self::Binary { data, stride, big, fields } => fields[column]
+                .map_or(0.0, |(offset, kind)| number(&data[row * stride + offset..], kind, *big)),
+            Self::Decoded { values, used, slots } => {
+                slots[column].map_or(0.0, |slot| values[row * used + slot])
             }
-            Self::Decoded { values, used, slots } => slots[column].map_or(0.0, |slot| values[row * used + slot]),
         }
     }
 }

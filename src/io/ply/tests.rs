@@ -15,7 +15,8 @@ fn load_within(bytes: impl AsRef<[u8]>, limits: &Limits) -> Result<Mesh> {
     read(&Source::open(&path, limits)?)
 }
 
-const POINTS: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.5], [1.0, 1.0, 0.25], [0.0, 1.0, -2.0]];
+const POINTS: [[f64; 3]; 4] =
+    [[0.0, 0.0, 0.0], [1.0, 0.0, 0.5], [1.0, 1.0, 0.25], [0.0, 1.0, -2.0]];
 
 fn check(mesh: &Mesh) {
     assert_eq!(mesh.positions, POINTS.map(|p| Vec3::new(p[0] as f32, p[1] as f32, p[2] as f32)));
@@ -53,7 +54,9 @@ fn square(format: &str, real: &str, count: &str, index: &str, quad: bool, extras
     if extras {
         head += "property short scalar.x\r\n";
     }
-    head += &format!("property {real} z\r\nproperty {real} x\r\nproperty {real} y\r\nproperty uchar red\r\n");
+    head += &format!(
+        "property {real} z\r\nproperty {real} x\r\nproperty {real} y\r\nproperty uchar red\r\n"
+    );
     head += "property uchar green\r\nproperty uchar blue\r\n";
     let faces: &[&[u32]] = if quad { &[&[0, 1, 2, 3]] } else { &[&[0, 1, 2], &[0, 2, 3]] };
     head += &format!("element face {}\r\n", faces.len());
@@ -110,8 +113,10 @@ fn every_format_and_type() {
             ("float", "short", "float"),
         ] {
             for (quad, extras) in [(false, false), (true, false), (false, true), (true, true)] {
-                let mesh = load(square(format, real, count, index, quad, extras))
-                    .unwrap_or_else(|e| panic!("{format} {real} {count} {index} {quad} {extras}: {e}"));
+                let mesh =
+                    load(square(format, real, count, index, quad, extras)).unwrap_or_else(|e| {
+                        panic!("{format} {real} {count} {index} {quad} {extras}: {e}")
+                    });
                 check(&mesh);
                 assert_eq!(mesh.colors[2], [20, 20, 255, 255]);
             }
@@ -127,7 +132,11 @@ fn a_cut_file_is_an_error_wherever_it_is_cut() {
             // Text may lose its line end, and the last number is of one digit.
             let least = if format == "ascii" { whole.trim_ascii_end().len() } else { whole.len() };
             for length in 0..least {
-                assert!(load(&whole[..length]).is_err(), "{format}: {length} of {} bytes", whole.len());
+                assert!(
+                    load(&whole[..length]).is_err(),
+                    "{format}: {length} of {} bytes",
+                    whole.len()
+                );
             }
             check(&load(&whole[..least]).expect("whole"));
         }
@@ -154,8 +163,13 @@ fn normals_colors_and_uvs() {
     assert_eq!(mesh.normals, [Vec3::Z, Vec3::ZERO, Vec3::ZERO]);
     assert_eq!(mesh.colors, [[255, 128, 0, 51], [255, 0, 0, 255], [0, 0, 0, 0]]);
     assert_eq!(mesh.uvs, [Vec2::new(0.25, 0.75), Vec2::new(0.0, 1.0), Vec2::new(1.0, 0.0)]);
-    let short = file.replace("float diffuse_", "ushort diffuse_").replace(" 1 0.5 0 0.2 ", " 65535 32896 0 1 ");
-    assert_eq!(load(short.replace("2 -1 nan", "0 0 0")).expect("loads").colors[0], [255, 128, 0, 255]);
+    let short = file
+        .replace("float diffuse_", "ushort diffuse_")
+        .replace(" 1 0.5 0 0.2 ", " 65535 32896 0 1 ");
+    assert_eq!(
+        load(short.replace("2 -1 nan", "0 0 0")).expect("loads").colors[0],
+        [255, 128, 0, 255]
+    );
 }
 
 /// A binary file of columns behind or before the position, and its rows.
@@ -177,8 +191,10 @@ fn columns_around_a_list_of_three_are_read() {
     let place = [("float", 1.0), ("float", 2.0), ("float", 3.0)];
     let colors = [("uchar", 255.0), ("uchar", 128.0), ("uchar", 64.0)];
     let row = [list.as_slice(), &place, &colors].concat();
-    let (lists, hues) =
-        ("property list uchar float q\n", "property uchar red\nproperty uchar green\nproperty uchar blue\n");
+    let (lists, hues) = (
+        "property list uchar float q\n",
+        "property uchar red\nproperty uchar green\nproperty uchar blue\n",
+    );
     let mesh = load(cloud(lists, hues, &[&row, &row])).expect("loads");
     assert_eq!((mesh.origin, mesh.colors[1]), (DVec3::new(1.0, 2.0, 3.0), [255, 128, 64, 255]));
     let row = [place.as_slice(), &list, &colors].concat();
@@ -215,7 +231,8 @@ fn colors_of_wider_types_may_be_bytes() {
         ("double", [65535.0, 257.0, 0.0], [255, 1, 0]),
         ("uchar", [200.0, 1.0, 0.0], [200, 1, 0]),
     ] {
-        let columns = ["red", "green", "blue"].map(|name| format!("property {kind} {name}\n")).concat();
+        let columns =
+            ["red", "green", "blue"].map(|name| format!("property {kind} {name}\n")).concat();
         let row = |scale: f64| {
             let place = [("float", scale), ("float", 0.0), ("float", 0.0)];
             [place, values.map(|value| (kind, value * scale))].concat()
@@ -247,13 +264,15 @@ fn texture_coordinates_of_corners() {
         let path = folder.write("a.ply", text);
         read(&Source::open(&path, &Limits::default())?)
     };
-    let mesh = file("3 0 1 2 6 0 0 1 0 1 1 0\n3 0 2 3 6 0 0 0.5 1 0 1 1\n3 0 1 3 0 0\n").expect("loads");
+    let mesh =
+        file("3 0 1 2 6 0 0 1 0 1 1 0\n3 0 2 3 6 0 0 0.5 1 0 1 1\n3 0 1 3 0 0\n").expect("loads");
     assert_eq!(mesh.triangles, [[0, 1, 2], [0, 4, 3], [0, 5, 6]]);
     assert_eq!((mesh.positions[4], mesh.colors[4]), (Vec3::new(1.0, 1.0, 0.0), [3, 0, 0, 255]));
     assert_eq!(mesh.uvs[2..5], [Vec2::new(1.0, 0.0), Vec2::new(0.0, 0.0), Vec2::new(0.5, 0.0)]);
     assert_eq!(mesh.uvs.len(), mesh.positions.len());
     assert_eq!(mesh.triangle_materials, [0, 1, 0]);
-    let colors: Vec<_> = mesh.materials.iter().map(|m| m.texture.as_ref().expect("a picture").texels[0]).collect();
+    let colors: Vec<_> =
+        mesh.materials.iter().map(|m| m.texture.as_ref().expect("a picture").texels[0]).collect();
     assert_eq!(colors, [[255, 0, 0, 255], [0, 255, 0, 255]]);
     let quad = file("4 0 1 2 3 8 0 0 1 0 1 1 0 1 1\n").expect("loads");
     assert_eq!((quad.triangles.len(), quad.positions.len()), (2, 4));
@@ -331,23 +350,46 @@ fn counts_that_lie_and_broken_numbers() {
     };
     let body = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
     load(file("ascii", "3", body)).expect("loads");
-    for count in ["0", "2", "4", "4294967296", "18446744073709551615", "18446744073709551616", "-1", "x"] {
+    for count in
+        ["0", "2", "4", "4294967296", "18446744073709551615", "18446744073709551616", "-1", "x"]
+    {
         for format in ["ascii", "binary_little_endian"] {
             load(file(format, count, body)).expect_err(count);
         }
     }
-    assert!(message(file("ascii", "3", &body.replace("1 0 0", "1 nan 0"))).contains("element “vertex”, row 1"));
-    assert!(message(file("ascii", "3", &body.replace("1 0 0", "1 0,5 0"))).contains("“0,5” is not a number"));
+    assert!(
+        message(file("ascii", "3", &body.replace("1 0 0", "1 nan 0")))
+            .contains("element “vertex”, row 1")
+    );
+    assert!(
+        message(file("ascii", "3", &body.replace("1 0 0", "1 0,5 0")))
+            .contains("“0,5” is not a number")
+    );
     assert!(message(file("ascii", "3", &body.replace("3 0 1 2", "3 0 1 3"))).contains("vertex 3"));
-    assert!(message(file("ascii", "3", &body.replace("3 0 1 2", "3 0 1 -1"))).contains("vertex -1"));
-    assert!(message(file("ascii", "3", &body.replace("3 0 1 2", "-1 0"))).contains("impossible length"));
-    assert!(message(file("ascii", "3", &body.replace("3 0 1 2", "1e300 0 1 2"))).contains("the line ends"));
-    assert!(message(file("ascii", "3", &body.replace("3 0 1 2", "3 0 1 2 7"))).contains("more values"));
-    assert!(message("ply\nformat ascii 1.0\nelement vertex 2000000000\nend_header\n").contains("no scalar property"));
+    assert!(
+        message(file("ascii", "3", &body.replace("3 0 1 2", "3 0 1 -1"))).contains("vertex -1")
+    );
+    assert!(
+        message(file("ascii", "3", &body.replace("3 0 1 2", "-1 0"))).contains("impossible length")
+    );
+    assert!(
+        message(file("ascii", "3", &body.replace("3 0 1 2", "1e300 0 1 2")))
+            .contains("the line ends")
+    );
+    assert!(
+        message(file("ascii", "3", &body.replace("3 0 1 2", "3 0 1 2 7"))).contains("more values")
+    );
+    assert!(
+        message("ply\nformat ascii 1.0\nelement vertex 2000000000\nend_header\n")
+            .contains("no scalar property")
+    );
     assert!(message("").contains("end_header"));
     assert!(message("ply\nproperty float x\nend_header\n").contains("before any element"));
     let limits = Limits { points: 2, ..Limits::default() };
-    assert!(matches!(load_within(file("ascii", "3", body), &limits), Err(Error::Limit { found: 3, .. })));
+    assert!(matches!(
+        load_within(file("ascii", "3", body), &limits),
+        Err(Error::Limit { found: 3, .. })
+    ));
 }
 
 #[test]

@@ -12,7 +12,9 @@ pub fn write(mesh: &Mesh, path: &Path) -> Result<()> {
     let count = mesh.positions.len();
     for (name, length) in [("normals", mesh.normals.len()), ("colors", mesh.colors.len())] {
         if length != 0 && length != count {
-            return Err(Error::Argument(format!("the mesh has {length} {name} where {count} are needed")));
+            return Err(Error::Argument(format!(
+                "the mesh has {length} {name} where {count} are needed"
+            )));
         }
     }
     disk::write_with(path, |out| write_to(mesh, out))
@@ -25,14 +27,23 @@ fn write_to(mesh: &Mesh, out: &mut impl Write) -> std::io::Result<()> {
         writeln!(out, "property float nx\nproperty float ny\nproperty float nz")?;
     }
     if !mesh.colors.is_empty() {
-        writeln!(out, "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha")?;
+        writeln!(
+            out,
+            "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha"
+        )?;
     }
     if !mesh.triangles.is_empty() {
-        writeln!(out, "element face {}\nproperty list uchar uint vertex_indices", mesh.triangles.len())?;
+        writeln!(
+            out,
+            "element face {}\nproperty list uchar uint vertex_indices",
+            mesh.triangles.len()
+        )?;
     }
     writeln!(out, "end_header")?;
     for (index, position) in mesh.positions.iter().enumerate() {
-        out.write_all(bytemuck::bytes_of(&(mesh.origin + position.as_dvec3()).as_vec3().to_array().map(little)))?;
+        out.write_all(bytemuck::bytes_of(
+            &(mesh.origin + position.as_dvec3()).as_vec3().to_array().map(little),
+        ))?;
         if let Some(normal) = mesh.normals.get(index) {
             out.write_all(bytemuck::bytes_of(&normal.to_array().map(little)))?;
         }
@@ -59,7 +70,9 @@ mod tests {
     #[test]
     fn what_is_written_reads_back() {
         let folder = Folder::new();
-        for mesh in [Mesh::knot(20, 5), Mesh::cube(2.0), Mesh { triangles: Vec::new(), ..Mesh::sphere(1) }] {
+        for mesh in
+            [Mesh::knot(20, 5), Mesh::cube(2.0), Mesh { triangles: Vec::new(), ..Mesh::sphere(1) }]
+        {
             let path = folder.write("mesh.ply", b"");
             write(&mesh, &path).unwrap();
             let read = read_with(&path, ply::read).unwrap();

@@ -19,7 +19,13 @@ struct Style {
     endian: Endian,
 }
 
-const PLAIN: Style = Style { format: "appended", appended: "raw", packed: false, wide: false, endian: Endian::Little };
+const PLAIN: Style = Style {
+    format: "appended",
+    appended: "raw",
+    packed: false,
+    wide: false,
+    endian: Endian::Little,
+};
 
 impl Style {
     fn count(&self, n: usize) -> Vec<u8> {
@@ -44,7 +50,8 @@ impl Style {
                 encoder.finish().unwrap()
             })
             .collect();
-        let head = [blocks.len(), 10, bytes.len() % 10].into_iter().chain(blocks.iter().map(Vec::len));
+        let head =
+            [blocks.len(), 10, bytes.len() % 10].into_iter().chain(blocks.iter().map(Vec::len));
         (head.flat_map(|n| self.count(n)).collect(), blocks.concat())
     }
 
@@ -71,7 +78,9 @@ impl Style {
     fn bytes(&self, values: &[i16]) -> Vec<u8> {
         values
             .iter()
-            .flat_map(|v| if self.endian == Endian::Little { v.to_le_bytes() } else { v.to_be_bytes() })
+            .flat_map(
+                |v| if self.endian == Endian::Little { v.to_le_bytes() } else { v.to_be_bytes() },
+            )
             .collect()
     }
 
@@ -93,8 +102,7 @@ impl Style {
             "binary" => format!("\n   {}\n  ", self.base64(&bytes)),
             _ => String::new(),
         };
-        let statistics =
-            "<InformationKey name=\"RANGE\" location=\"here\"><Value index=\"0\">77</Value></InformationKey>";
+        let statistics = "<InformationKey name=\"RANGE\" location=\"here\"><Value index=\"0\">77</Value></InformationKey>";
         let format = self.format;
         let mut file = format!(
             "{}<ImageData WholeExtent=\"1 3 0 1 0 1\" Origin=\"10 20 30\" Spacing=\"0.5 1 2\" \
@@ -119,10 +127,18 @@ impl Style {
 
 fn styles() -> Vec<Style> {
     let mut styles = Vec::new();
-    for (format, appended) in [("ascii", "raw"), ("binary", "raw"), ("appended", "raw"), ("appended", "base64")] {
+    for (format, appended) in
+        [("ascii", "raw"), ("binary", "raw"), ("appended", "raw"), ("appended", "base64")]
+    {
         for bits in 0..8 {
             let endian = if bits & 4 == 0 { Endian::Little } else { Endian::Big };
-            styles.push(Style { format, appended, packed: bits & 1 != 0, wide: bits & 2 != 0, endian });
+            styles.push(Style {
+                format,
+                appended,
+                packed: bits & 1 != 0,
+                wide: bits & 2 != 0,
+                endian,
+            });
         }
     }
     styles
@@ -132,8 +148,8 @@ fn styles() -> Vec<Style> {
 fn every_style() {
     let folder = Folder::new();
     for style in styles() {
-        let volume =
-            read_with(&folder.write("volume.vti", style.file()), read).unwrap_or_else(|e| panic!("{style:?}: {e}"));
+        let volume = read_with(&folder.write("volume.vti", style.file()), read)
+            .unwrap_or_else(|e| panic!("{style:?}: {e}"));
         assert_eq!(volume.samples, Samples::I16(VALUES.to_vec()), "{style:?}");
         assert_eq!(volume.lattice.dims, [3, 2, 2]);
         // The first axis points along y, the second one along −x; the first index along it is 1.
@@ -153,7 +169,9 @@ fn every_cut_is_an_error() {
 #[test]
 fn no_damage_panics_or_passes_for_long() {
     let folder = Folder::new();
-    for style in [PLAIN, Style { packed: true, ..PLAIN }, Style { packed: true, format: "binary", ..PLAIN }] {
+    for style in
+        [PLAIN, Style { packed: true, ..PLAIN }, Style { packed: true, format: "binary", ..PLAIN }]
+    {
         let file = style.file();
         for at in 0..file.len() {
             for value in [0, b'<', file[at] ^ 1] {
@@ -191,10 +209,13 @@ fn types_and_the_choice_of_the_array() {
         ("UInt64", Samples::I32(vec![1, 2, 3, 4])),
         ("Float64", Samples::F32(vec![1.0, 2.0, 3.0, 4.0])),
     ] {
-        let array = format!("<PointData><DataArray type='{name}' format='ascii'>1 2 3 4</DataArray></PointData>");
+        let array = format!(
+            "<PointData><DataArray type='{name}' format='ascii'>1 2 3 4</DataArray></PointData>"
+        );
         assert_eq!(load(&array).unwrap().samples, samples);
     }
-    let vector = "<DataArray type='UInt8' Name='v' NumberOfComponents='3' format='ascii'>0</DataArray>";
+    let vector =
+        "<DataArray type='UInt8' Name='v' NumberOfComponents='3' format='ascii'>0</DataArray>";
     let scalar = "<DataArray type='UInt8' Name='s' format='ascii'>1 2 3 4</DataArray>";
     let volume = load(&format!("<PointData>{vector}{scalar}</PointData>")).unwrap();
     assert_eq!((volume.range, volume.lattice.dims), ([1.0, 4.0], [2, 1, 2]));
@@ -206,10 +227,22 @@ fn types_and_the_choice_of_the_array() {
         (format!("<PointData>{}</PointData>", scalar.replace("UInt8", "String")), "String"),
         (format!("<PointData>{}</PointData>", scalar.replace("4<", "4 5<")), "more than the 4"),
         (format!("<PointData>{}</PointData>", scalar.replace("4<", "<")), "3 numbers"),
-        (format!("<PointData>{}</PointData>", scalar.replace("ascii", "binary").replace('4', "*")), "base64"),
-        (format!("<PointData>{}</PointData>", scalar.replace("ascii", "appended' offset='0")), "nothing is"),
         (
-            format!("<PointData>{}</PointData>", scalar.replace("UInt8", "Float32").replace(" 2 ", " nan ")),
+            format!(
+                "<PointData>{}</PointData>",
+                scalar.replace("ascii", "binary").replace('4', "*")
+            ),
+            "base64",
+        ),
+        (
+            format!("<PointData>{}</PointData>", scalar.replace("ascii", "appended' offset='0")),
+            "nothing is",
+        ),
+        (
+            format!(
+                "<PointData>{}</PointData>",
+                scalar.replace("UInt8", "Float32").replace(" 2 ", " nan ")
+            ),
             "not finite",
         ),
         (format!("<PointData>{scalar}</CellData>"), "is no XML"),
@@ -223,7 +256,8 @@ fn types_and_the_choice_of_the_array() {
 fn wrong_heads_are_told() {
     let folder = Folder::new();
     let error = |head: &str, image: &str| {
-        let points = "<PointData><DataArray type='UInt8' format='ascii'>1 2 3 4</DataArray></PointData>";
+        let points =
+            "<PointData><DataArray type='UInt8' format='ascii'>1 2 3 4</DataArray></PointData>";
         read_with(&folder.write("volume.vti", ascii(head, image, points)), read).unwrap_err()
     };
     let (head, image) = ("type='ImageData'", "WholeExtent='0 1 0 0 0 1'");
@@ -249,7 +283,10 @@ fn wrong_heads_are_told() {
         error(head, "WholeExtent='-9223372036854775808 9223372036854775807 0 0 0 1'"),
         Error::Input { .. }
     ));
-    assert!(matches!(error(head, "WholeExtent='0 4294967295 0 4294967295 0 4294967295'"), Error::Limit { .. }));
+    assert!(matches!(
+        error(head, "WholeExtent='0 4294967295 0 4294967295 0 4294967295'"),
+        Error::Limit { .. }
+    ));
 }
 
 #[test]
@@ -272,11 +309,17 @@ fn lying_counts_allocate_nothing() {
     let narrow = |counts: &[u32]| counts.iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<u8>>();
     for (message, word) in [
         (error("0 7 0 0 0 0", true, &wide(&[1 << 32, 1 << 32, 0])), "claims 4294967296 blocks"),
-        (error("0 7 0 0 0 0", true, &wide(&[u64::MAX, u64::MAX, u64::MAX])), "8 bytes were expected"),
+        (
+            error("0 7 0 0 0 0", true, &wide(&[u64::MAX, u64::MAX, u64::MAX])),
+            "8 bytes were expected",
+        ),
         (error("0 7 0 0 0 0", false, &narrow(&[8, 1, 0])), "sizes of its blocks"),
         (error("0 4294967295 0 0 0 0", false, &narrow(&[u32::MAX, 1, 1])), "expected"),
         (error("0 4294967294 0 0 0 0", false, &narrow(&[u32::MAX, 1, 0])), "sizes of its blocks"),
-        (error("0 4294967294 0 0 0 0", false, &narrow(&[1, u32::MAX, 0, 4, 0])), "packed ones cannot hold"),
+        (
+            error("0 4294967294 0 0 0 0", false, &narrow(&[1, u32::MAX, 0, 4, 0])),
+            "packed ones cannot hold",
+        ),
         (error("0 7 0 0 0 0", true, &wide(&[1, 8, 0, u64::MAX])), "block 0 claims"),
         (error("0 7 0 0 0 0", true, &wide(&[1, 0, 8, 9])), "last of 8"),
         (error("0 7 0 0 0 0", true, &wide(&[1, 8, 0, 8, 0])), "cannot be unpacked"),
@@ -304,8 +347,9 @@ fn pieces_are_put_together() {
                 )
             })
             .collect();
-        let file =
-            format!("<VTKFile type='ImageData'><ImageData WholeExtent='0 2 -1 0 5 6'>{pieces}</ImageData></VTKFile>");
+        let file = format!(
+            "<VTKFile type='ImageData'><ImageData WholeExtent='0 2 -1 0 5 6'>{pieces}</ImageData></VTKFile>"
+        );
         read_with(&folder.write("volume.vti", file.as_bytes()), read)
     };
     let left = ("0 1 -1 0 5 6", "0 1 3 4 6 7 9 10");

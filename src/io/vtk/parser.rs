@@ -32,7 +32,11 @@ impl<'a> Parser<'a> {
         parser.binary = match encoding.to_ascii_uppercase().as_str() {
             "ASCII" => false,
             "BINARY" => true,
-            _ => return Err(source.error(place, format!("“{encoding}” is neither ASCII nor BINARY"))),
+            _ => {
+                return Err(
+                    source.error(place, format!("“{encoding}” is neither ASCII nor BINARY"))
+                );
+            }
         };
         loop {
             let (place, line) = parser.line()?.ok_or_else(|| cut(&parser))?;
@@ -40,10 +44,17 @@ impl<'a> Parser<'a> {
             match words[..] {
                 [keyword, kind] if keyword.eq_ignore_ascii_case("DATASET") => {
                     let kind = kind.to_ascii_uppercase();
-                    let known =
-                        ["STRUCTURED_POINTS", "RECTILINEAR_GRID", "UNSTRUCTURED_GRID", "POLYDATA", "STRUCTURED_GRID"];
+                    let known = [
+                        "STRUCTURED_POINTS",
+                        "RECTILINEAR_GRID",
+                        "UNSTRUCTURED_GRID",
+                        "POLYDATA",
+                        "STRUCTURED_GRID",
+                    ];
                     if !known.contains(&kind.as_str()) {
-                        return Err(source.error(place, format!("the data set {kind} is not supported")));
+                        return Err(
+                            source.error(place, format!("the data set {kind} is not supported"))
+                        );
                     }
                     return Ok((parser, kind));
                 }
@@ -53,8 +64,14 @@ impl<'a> Parser<'a> {
                         parser.field()?;
                     }
                 }
-                [keyword, ..] if keyword.eq_ignore_ascii_case("METADATA") => parser.skip_to_blank()?,
-                _ => return Err(source.error(place, "is not the line “DATASET …” that was expected")),
+                [keyword, ..] if keyword.eq_ignore_ascii_case("METADATA") => {
+                    parser.skip_to_blank()?
+                }
+                _ => {
+                    return Err(
+                        source.error(place, "is not the line “DATASET …” that was expected")
+                    );
+                }
             }
         }
     }
@@ -74,7 +91,9 @@ impl<'a> Parser<'a> {
         let window = &rest[..rest.len().min(LONGEST)];
         let Some(line) = window.split_inclusive(|&b| b == b'\n').next() else { return Ok(None) };
         if line.len() == LONGEST && line.len() < rest.len() && !line.ends_with(b"\n") {
-            return Err(self.source.error(self.place(), format!("the line is longer than {LONGEST} bytes")));
+            return Err(self
+                .source
+                .error(self.place(), format!("the line is longer than {LONGEST} bytes")));
         }
         self.at += line.len();
         Ok(Some(line.trim_ascii()))
@@ -97,7 +116,9 @@ impl<'a> Parser<'a> {
     pub fn expect(&mut self, word: &str) -> Result<()> {
         match self.line()? {
             Some((_, line)) if line.split_ascii_whitespace().next() == Some(word) => Ok(()),
-            _ => Err(self.source.error(self.place(), format!("there is no line “{word}” where it was expected"))),
+            _ => Err(self
+                .source
+                .error(self.place(), format!("there is no line “{word}” where it was expected"))),
         }
     }
 
@@ -109,7 +130,8 @@ impl<'a> Parser<'a> {
 
     /// A count from a keyword's line, within the limits of points.
     pub fn count(&self, place: &str, word: &str) -> Result<usize> {
-        let count = word.parse().map_err(|_| self.source.error(place, format!("“{word}” is no count")))?;
+        let count =
+            word.parse().map_err(|_| self.source.error(place, format!("“{word}” is no count")))?;
         self.source.check_points("a count of points or cells", count)
     }
 
@@ -141,15 +163,21 @@ impl<'a> Parser<'a> {
         let (bytes, endian, length) = if self.binary {
             let size = count.saturating_mul(kind.bytes());
             let bytes = rest.get(..size).ok_or_else(|| {
-                wrong(format!("there are {} bytes where {size} were expected: the file ends", rest.len()))
+                wrong(format!(
+                    "there are {} bytes where {size} were expected: the file ends",
+                    rest.len()
+                ))
             })?;
             (bytes.into(), Endian::Big, size)
         } else {
             let length = length_of_words(rest, count).map_err(|found| {
-                wrong(format!("there are {found} numbers where {count} were expected: the file ends"))
+                wrong(format!(
+                    "there are {found} numbers where {count} were expected: the file ends"
+                ))
             })?;
             self.source.room::<u8>("the text", length)?;
-            let text = copy::text(&rest[..length]).map_err(|_| wrong("is followed by what is not text".into()))?;
+            let text = copy::text(&rest[..length])
+                .map_err(|_| wrong("is followed by what is not text".into()))?;
             self.source.spend("the size of the numbers in bytes", (count * kind.bytes()) as u64)?;
             (kind.parse(&text, count).map_err(wrong)?.into(), Endian::Little, length)
         };
@@ -159,18 +187,28 @@ impl<'a> Parser<'a> {
 
     /// The corners of `count` cells, and where each cell's end. Before version 5.1, `size` numbers: of each cell how many
     /// corners it has, and these. From then on, `count` offsets, the first of them 0, and `size` corners.
-    pub fn cells(&mut self, place: &str, count: usize, size: usize) -> Result<(Vec<f64>, Vec<f64>)> {
+    pub fn cells(
+        &mut self,
+        place: &str,
+        count: usize,
+        size: usize,
+    ) -> Result<(Vec<f64>, Vec<f64>)> {
         let before = self.at;
         if let Ok(Some((place, line))) = self.line()
             && let Some(kind) = line.strip_prefix("OFFSETS")
         {
             let mut ends = self.array(&place, count, kind.trim())?.doubles(self.source)?;
             let next = self.line()?;
-            let next = next.as_ref().and_then(|(place, line)| Some((place, line.strip_prefix("CONNECTIVITY")?.trim())));
-            let (place, kind) = next.ok_or_else(|| self.source.error(place, "offsets without their CONNECTIVITY"))?;
+            let next = next
+                .as_ref()
+                .and_then(|(place, line)| Some((place, line.strip_prefix("CONNECTIVITY")?.trim())));
+            let (place, kind) =
+                next.ok_or_else(|| self.source.error(place, "offsets without their CONNECTIVITY"))?;
             let corners = self.array(place, size, kind)?.doubles(self.source)?;
             if ends.first().is_some_and(|&first| first != 0.0) {
-                return Err(self.source.error(place, format!("the first offset is {}, not 0", ends[0])));
+                return Err(self
+                    .source
+                    .error(place, format!("the first offset is {}, not 0", ends[0])));
             }
             ends.drain(..ends.len().min(1));
             return Ok((corners, ends));
@@ -184,7 +222,9 @@ impl<'a> Parser<'a> {
             // Casts saturate: a negative number of corners is 0.
             let found = rest.split_first().and_then(|(&n, rest)| rest.split_at_checked(n as usize));
             let Some((own, after)) = found else {
-                return Err(self.source.error(place, format!("cell {cell} has more corners than are listed")));
+                return Err(self
+                    .source
+                    .error(place, format!("cell {cell} has more corners than are listed")));
             };
             corners.extend_from_slice(own);
             ends.push(corners.len() as f64);
@@ -201,7 +241,8 @@ impl<'a> Parser<'a> {
         if line.starts_with("METADATA") {
             self.skip_to_blank()?;
             let next = self.line()?;
-            (place, line) = next.ok_or_else(|| self.source.error(place, "the file ends inside a FIELD"))?;
+            (place, line) =
+                next.ok_or_else(|| self.source.error(place, "the file ends inside a FIELD"))?;
         }
         let words: Vec<&str> = line.split_ascii_whitespace().take(5).collect();
         let [name, components, tuples, kind] = words[..] else {
@@ -237,7 +278,10 @@ pub(super) fn unescaped(name: &str) -> String {
     let mut rest = name.as_bytes();
     while let [first, after @ ..] = rest {
         let digit = |at: usize| after.get(at).and_then(|&digit| char::from(digit).to_digit(16));
-        let code = digit(0).zip(digit(1)).filter(|_| *first == b'%').map(|(high, low)| (16 * high + low) as u8);
+        let code = digit(0)
+            .zip(digit(1))
+            .filter(|_| *first == b'%')
+            .map(|(high, low)| (16 * high + low) as u8);
         bytes.push(code.unwrap_or(*first));
         rest = if code.is_some() { &after[2..] } else { after };
     }

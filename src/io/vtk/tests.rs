@@ -7,7 +7,8 @@ use glam::Vec3;
 /// A file of text, or binary with the numbers of every line that begins with one turned into bytes of its type.
 fn file(binary: bool, body: &[(&str, &str, &str)]) -> Vec<u8> {
     let encoding = if binary { "BINARY" } else { "ASCII" };
-    let mut file = format!("# vtk DataFile Version 3.0\nmade for a test\n{encoding}\n").into_bytes();
+    let mut file =
+        format!("# vtk DataFile Version 3.0\nmade for a test\n{encoding}\n").into_bytes();
     for (line, kind, numbers) in body {
         file.extend(format!("{line}\n").bytes());
         if !binary {
@@ -41,7 +42,11 @@ fn samples(content: &[u8], scalar: Option<&str>) -> Result<Points> {
 }
 
 const IMAGE: &[(&str, &str, &str)] = &[
-    ("DATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 1\nORIGIN 10 20 30\nSPACING 0.5 1 2\nPOINT_DATA 6", "", ""),
+    (
+        "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 1\nORIGIN 10 20 30\nSPACING 0.5 1 2\nPOINT_DATA 6",
+        "",
+        "",
+    ),
     ("VECTORS v float", "float", "1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18"),
     ("SCALARS density unsigned_char 1\nLOOKUP_TABLE default", "uchar", "0 1 2 30 4 255"),
 ];
@@ -82,7 +87,8 @@ fn rectilinear_grids() {
 }
 
 /// A tetrahedron and a square.
-const POINTS: (&str, &str, &str) = ("POINTS 8 float", "float", "0 0 0 2 0 0 0 2 0 0 0 2  5 0 0 7 0 0 7 2 0 5 2 0");
+const POINTS: (&str, &str, &str) =
+    ("POINTS 8 float", "float", "0 0 0 2 0 0 0 2 0 0 0 2  5 0 0 7 0 0 7 2 0 5 2 0");
 const DATA: [(&str, &str, &str); 2] = [
     ("CELL_DATA 2\nSCALARS c int\nLOOKUP_TABLE default", "int", "10 -20"),
     ("POINT_DATA 8\nSCALARS p double 1\nLOOKUP_TABLE default", "double", "1 2 3 4 5 6 7 8"),
@@ -111,11 +117,22 @@ fn unstructured_grids_of_both_versions() {
         for binary in [false, true] {
             let content = file(binary, body);
             let points = samples(&content, None).unwrap();
-            assert_eq!((points.len(), points.positions[6], points.values[6]), (8, Vec3::new(7.0, 2.0, 0.0), 7.0));
+            assert_eq!(
+                (points.len(), points.positions[6], points.values[6]),
+                (8, Vec3::new(7.0, 2.0, 0.0), 7.0)
+            );
             let cells = samples(&content, Some("c")).unwrap();
             assert_eq!(cells.positions, [Vec3::splat(0.5), Vec3::new(6.0, 1.0, 0.0)]);
-            assert_eq!((cells.values, cells.radii), (vec![10.0, -20.0], vec![1.4 * 1.5, 1.4 * 2f32.sqrt()]));
-            assert!(samples(&content, Some("none")).unwrap_err().to_string().contains("no scalar “none”"));
+            assert_eq!(
+                (cells.values, cells.radii),
+                (vec![10.0, -20.0], vec![1.4 * 1.5, 1.4 * 2f32.sqrt()])
+            );
+            assert!(
+                samples(&content, Some("none"))
+                    .unwrap_err()
+                    .to_string()
+                    .contains("no scalar “none”")
+            );
             assert!(volume(&content).unwrap_err().to_string().contains("no volume"));
             for end in 0..content.len() {
                 // Whole parts may be missing at the end; nothing panics, and what is read is sound.
@@ -142,7 +159,8 @@ fn polygons_and_structured_grids() {
     let points = samples(&polygons, None).unwrap();
     assert_eq!((points.positions[0], points.values), (Vec3::ZERO, vec![10.0, -20.0]));
     assert!(points.radii.is_empty(), "a vertex has no size");
-    let grid = file(true, &[("DATASET STRUCTURED_GRID\nDIMENSIONS 2 2 2", "", ""), POINTS, DATA[1]]);
+    let grid =
+        file(true, &[("DATASET STRUCTURED_GRID\nDIMENSIONS 2 2 2", "", ""), POINTS, DATA[1]]);
     assert_eq!(samples(&grid, None).unwrap().values[7], 8.0);
 }
 
@@ -174,9 +192,15 @@ fn what_is_wrong_is_told() {
     assert!(matches!(image("POINT_DATA 6", "POINT_DATA 99999999999"), Error::Limit { .. }));
     assert!(image("POINT_DATA 6", "POINT_DATA 2000000000").to_string().contains("the file ends"));
     let cells = |cells: &'static str| {
-        samples(&file(true, &[("DATASET UNSTRUCTURED_GRID", "", ""), POINTS, ("CELLS 1 4", "int", cells)]), None)
-            .unwrap_err()
-            .to_string()
+        samples(
+            &file(
+                true,
+                &[("DATASET UNSTRUCTURED_GRID", "", ""), POINTS, ("CELLS 1 4", "int", cells)],
+            ),
+            None,
+        )
+        .unwrap_err()
+        .to_string()
     };
     assert!(cells("4 0 1 2").contains("more corners than are listed"));
     assert!(cells("3 0 1 8").contains("corner 8"));

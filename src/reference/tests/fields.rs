@@ -8,7 +8,11 @@ fn a_constant_field_lets_through_what_its_length_does() {
     let color = [0.3, 0.6, 0.9];
     for projection in PROJECTIONS {
         let lattice = centered([9, 8, 7], skewed_axes());
-        let scene = Scene::new().with_volume(volume(lattice.clone(), |_| 5.0), Shape::default(), uniform(color, 0.8));
+        let scene = Scene::new().with_volume(
+            volume(lattice.clone(), |_| 5.0),
+            Shape::default(),
+            uniform(color, 0.8),
+        );
         let camera = camera(projection);
         let settings = unshaded([24, 20]);
         let picture = render(&scene, &camera, &settings).unwrap();
@@ -16,7 +20,8 @@ fn a_constant_field_lets_through_what_its_length_does() {
         let mut crossed = 0;
         for (i, found) in picture.color.iter().enumerate() {
             // The length inside the box by asking many points.
-            let (origin, direction) = view.ray(DVec2::new((i % 24) as f64 + 0.5, (i / 24) as f64 + 0.5));
+            let (origin, direction) =
+                view.ray(DVec2::new((i % 24) as f64 + 0.5, (i / 24) as f64 + 0.5));
             let steps = 40_000;
             let inside = (0..steps).filter(|step| {
                 let s = 10.0 * (f64::from(*step) + 0.5) / f64::from(steps);
@@ -37,8 +42,13 @@ fn a_constant_field_lets_through_what_its_length_does() {
 #[test]
 fn a_flat_lattice_is_one_step_thick() {
     let lattice = centered([9, 8, 1], DMat3::from_diagonal(DVec3::new(0.3, 0.3, 0.5)));
-    let scene = Scene::new().with_volume(volume(lattice, |_| 5.0), Shape::default(), uniform([1.0; 3], 0.8));
-    let camera = Camera { position: DVec3::new(0.0, 0.0, 9.0), view_up: DVec3::Y, ..camera(PROJECTIONS[1]) };
+    let scene = Scene::new().with_volume(
+        volume(lattice, |_| 5.0),
+        Shape::default(),
+        uniform([1.0; 3], 0.8),
+    );
+    let camera =
+        Camera { position: DVec3::new(0.0, 0.0, 9.0), view_up: DVec3::Y, ..camera(PROJECTIONS[1]) };
     let picture = render(&scene, &camera, &unshaded([1, 1])).unwrap();
     close(picture.color[0][3], 1.0 - (-0.8_f64 * 0.5).exp(), 1e-6);
 }
@@ -66,7 +76,8 @@ fn scattered_samples_fill_at_most_their_sheets() {
     let planes = scene.sheets(&camera.view(settings.size).unwrap(), &settings).planes;
     let lengths = planes.windows(2).map(|plane| {
         let [from, to] = [0, 1].map(|i| (plane[i] - eye) / deviation);
-        (100.0 * weight * deviation * profile::Profile::Gaussian.moments(0.0, [from, to])[0]).min(plane[1] - plane[0])
+        (100.0 * weight * deviation * profile::Profile::Gaussian.moments(0.0, [from, to])[0])
+            .min(plane[1] - plane[0])
     });
     let found = render(&scene, &camera, &settings).unwrap().color[0][3];
     // Sheets filled to less than a ten-thousandth, the tails, have no value.
@@ -74,7 +85,14 @@ fn scattered_samples_fill_at_most_their_sheets() {
 }
 
 /// Asserts that a field is `value` with its `slope` at all faces of some pixels that lie within `reach` of the origin.
-fn assert_linear(scene: &Scene, projection: Projection, slope: DVec3, constant: f64, reach: f64, tolerance: f64) {
+fn assert_linear(
+    scene: &Scene,
+    projection: Projection,
+    slope: DVec3,
+    constant: f64,
+    reach: f64,
+    tolerance: f64,
+) {
     let settings = Settings { sheet_thickness: Some(0.2), ..Settings::new([32, 24]) };
     let view = camera(projection).view(settings.size).unwrap();
     let frame = Frame::new(scene, scene, view, &settings);
@@ -92,7 +110,10 @@ fn assert_linear(scene: &Scene, projection: Projection, slope: DVec3, constant: 
             close(face.value(1e-4).unwrap(), constant + slope.dot(world), tolerance);
             let to_world = |gradient: DVec3| frame.view.rotation.transpose() * gradient;
             let analytic = to_world(face.gradient(1e-4).unwrap());
-            assert!((analytic - slope).length() < 10.0 * tolerance * slope.length().max(1.0), "{analytic} for {slope}");
+            assert!(
+                (analytic - slope).length() < 10.0 * tolerance * slope.length().max(1.0),
+                "{analytic} for {slope}"
+            );
             let values = around.each_ref().map(|faces| faces[k].value(1e-4));
             let central = to_world(face.central_gradient(1e-4, &ray, plane, values).unwrap());
             assert!(
@@ -107,18 +128,28 @@ fn assert_linear(scene: &Scene, projection: Projection, slope: DVec3, constant: 
 
 #[test]
 fn a_linear_field_has_its_values_and_its_gradient() {
-    let sheared =
-        DMat3::from_cols(DVec3::new(0.25, 0.05, 0.0), DVec3::new(-0.05, 0.2, 0.08), DVec3::new(0.0, 0.1, 0.3));
+    let sheared = DMat3::from_cols(
+        DVec3::new(0.25, 0.05, 0.0),
+        DVec3::new(-0.05, 0.2, 0.08),
+        DVec3::new(0.0, 0.1, 0.3),
+    );
     let shapes = [DVec3::splat(0.25), DVec3::new(0.2, 0.2, 0.375)].map(DMat3::from_diagonal);
-    for (axes, projection) in shapes.into_iter().chain([sheared]).flat_map(|a| PROJECTIONS.map(|p| (a, p))) {
+    for (axes, projection) in
+        shapes.into_iter().chain([sheared]).flat_map(|a| PROJECTIONS.map(|p| (a, p)))
+    {
         for slope in [DVec3::X, DVec3::new(0.5, -1.0, 2.0), DVec3::ZERO] {
             // Wide kernels keep the ripple of the lattice out of the test.
             for (kernel, tolerance) in
                 [(Shape::gaussian(0.9, 5.5).unwrap(), 1e-5), (Shape::b_spline(4.0).unwrap(), 3e-4)]
             {
-                let transfer = TransferFunction { shade: Some(Shade::default()), ..uniform([1.0; 3], 0.8) };
+                let transfer =
+                    TransferFunction { shade: Some(Shade::default()), ..uniform([1.0; 3], 0.8) };
                 let lattice = centered([21, 21, 21], axes);
-                let scene = Scene::new().with_volume(volume(lattice, |p| 3.0 + slope.dot(p)), kernel, transfer.clone());
+                let scene = Scene::new().with_volume(
+                    volume(lattice, |p| 3.0 + slope.dot(p)),
+                    kernel,
+                    transfer.clone(),
+                );
                 assert_linear(&scene, projection, slope, 3.0, 0.5, tolerance);
             }
         }
@@ -130,11 +161,13 @@ fn a_linear_field_on_a_body_centred_lattice_is_linear() {
     for projection in PROJECTIONS {
         for slope in [DVec3::ZERO, DVec3::new(0.5, -1.0, 2.0)] {
             let axes = DMat3::from_diagonal(DVec3::splat(0.3));
-            let lattice = Lattice { arrangement: Arrangement::BodyCentred, ..centered([17, 17, 34], axes) };
+            let lattice =
+                Lattice { arrangement: Arrangement::BodyCentred, ..centered([17, 17, 34], axes) };
             let lattice = Lattice { origin: DVec3::splat(-2.4), ..lattice };
             let values = volume(lattice, |p| 3.0 + slope.dot(p));
             let transfer = uniform([1.0; 3], 0.8);
-            let scene = Scene::new().with_volume(values, Shape::gaussian(0.9, 5.5).unwrap(), transfer);
+            let scene =
+                Scene::new().with_volume(values, Shape::gaussian(0.9, 5.5).unwrap(), transfer);
             assert_linear(&scene, projection, slope, 3.0, 0.5, 1e-5);
         }
     }
@@ -157,7 +190,9 @@ fn a_linear_field_on_a_rectilinear_lattice_is_linear() {
         ..Lattice::cartesian([9; 3], DVec3::ZERO, DMat3::from_diagonal(DVec3::new(1.0, 0.8, 1.2)))
     };
     let slope = DVec3::new(0.5, -1.0, 2.0);
-    for (kernel, projection) in [(Shape::default(), PROJECTIONS[0]), (Shape::b_spline(2.0).unwrap(), PROJECTIONS[1])] {
+    for (kernel, projection) in
+        [(Shape::default(), PROJECTIONS[0]), (Shape::b_spline(2.0).unwrap(), PROJECTIONS[1])]
+    {
         let values = volume(lattice.clone(), |p| 3.0 + slope.dot(p));
         let scene = Scene::new().with_volume(values, kernel, uniform([1.0; 3], 0.8));
         // Samples of 32 bits are all that is not exact.
@@ -183,10 +218,19 @@ fn a_linear_field_of_scattered_samples_with_slopes_is_linear() {
         ];
         let [b00, b10, b11, b20, b21, b22] = factor.map(f64::from);
         // The place is c + B·x′, so the slope over x′ is Bᵀ times the gradient.
-        let in_kernel =
-            DVec3::new(b00 * slope.x + b10 * slope.y + b20 * slope.z, b11 * slope.y + b21 * slope.z, b22 * slope.z);
+        let in_kernel = DVec3::new(
+            b00 * slope.x + b10 * slope.y + b20 * slope.z,
+            b11 * slope.y + b21 * slope.z,
+            b22 * slope.z,
+        );
         let value = 3.0 + slope.dot(center.as_dvec3());
-        Splat::sample(center, value as f32, factor, 1.0 + 0.5 * random.next() as f32, in_kernel.as_vec3())
+        Splat::sample(
+            center,
+            value as f32,
+            factor,
+            1.0 + 0.5 * random.next() as f32,
+            in_kernel.as_vec3(),
+        )
     });
     let set = SplatSet { extent: 3.0, ..set(Payload::Scalar, samples.collect()) };
     let scene = Scene::new().with_samples(set, uniform([1.0; 3], 0.8));
@@ -199,10 +243,18 @@ fn a_linear_field_of_scattered_samples_with_slopes_is_linear() {
 #[test]
 fn heavier_samples_count_more() {
     let at = |x: f32, value: f32, weight: f32| {
-        Splat::sample(Vec3::new(x, 0.0, 0.0), value, [0.5, 0.0, 0.5, 0.0, 0.0, 0.5], weight, Vec3::ZERO)
+        Splat::sample(
+            Vec3::new(x, 0.0, 0.0),
+            value,
+            [0.5, 0.0, 0.5, 0.0, 0.0, 0.5],
+            weight,
+            Vec3::ZERO,
+        )
     };
-    let scene = Scene::new()
-        .with_samples(set(Payload::Scalar, vec![at(-0.2, 1.0, 3.0), at(0.2, 5.0, 1.0)]), uniform([1.0; 3], 0.8));
+    let scene = Scene::new().with_samples(
+        set(Payload::Scalar, vec![at(-0.2, 1.0, 3.0), at(0.2, 5.0, 1.0)]),
+        uniform([1.0; 3], 0.8),
+    );
     let settings = unshaded([1, 1]);
     let frame = Frame::new(&scene, &scene, from_above(5.0, 0.1).view([1, 1]).unwrap(), &settings);
     let everywhere: Vec<&Kernel> = frame.kernels.iter().collect();
@@ -255,8 +307,10 @@ fn what_makes_a_volume_sharp_is_drawn_in_its_own_box() {
         lattice: wide,
         kernel: Shape::default(),
     }));
-    let transfer =
-        TransferFunction { opacity: vec![(1.5, 0.0), (1.5, 1.0 - (-0.8_f64).exp())], ..uniform([1.0; 3], 1.0) };
+    let transfer = TransferFunction {
+        opacity: vec![(1.5, 0.0), (1.5, 1.0 - (-0.8_f64).exp())],
+        ..uniform([1.0; 3], 1.0)
+    };
     let scene = Scene::new().with_volume(sharp, Shape::default(), transfer);
     let picture = render(&scene, &from_above(5.0, 0.1), &unshaded([1, 1])).unwrap();
     close(picture.color[0][3], 1.0 - (-0.8_f64).exp(), 1e-6);

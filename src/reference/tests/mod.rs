@@ -23,7 +23,12 @@ const PROJECTIONS: [Projection; 2] =
 
 /// Looks at the world's origin from a slant.
 fn camera(projection: Projection) -> Camera {
-    Camera { position: DVec3::new(4.0, -3.0, 2.0), focal_point: DVec3::ZERO, view_up: DVec3::Z, projection }
+    Camera {
+        position: DVec3::new(4.0, -3.0, 2.0),
+        focal_point: DVec3::ZERO,
+        view_up: DVec3::Z,
+        projection,
+    }
 }
 
 fn unshaded(size: [u32; 2]) -> Settings {
@@ -53,7 +58,11 @@ fn centered(dims: [usize; 3], axes: DMat3) -> Lattice {
 }
 
 fn skewed_axes() -> DMat3 {
-    DMat3::from_cols(DVec3::new(0.2, 0.05, 0.0), DVec3::new(-0.04, 0.25, 0.06), DVec3::new(0.05, 0.0, 0.3))
+    DMat3::from_cols(
+        DVec3::new(0.2, 0.05, 0.0),
+        DVec3::new(-0.04, 0.25, 0.06),
+        DVec3::new(0.05, 0.0, 0.3),
+    )
 }
 
 fn round(center: Vec3, strength: f32, deviation: f32) -> Splat {

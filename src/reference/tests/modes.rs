@@ -18,21 +18,38 @@ fn classified_before_a_constant_field_is_as_dense_as_it_is() {
         origin: DVec3::new(-3.0, -3.0, -1.0),
         ..centered([24, 24, 16], DMat3::from_diagonal(DVec3::splat(0.25)))
     };
-    let evenly = |count: usize, step: f64| (0..count).map(|i| step * (i as f64 - 0.5 * (count as f64 - 1.0))).collect();
+    let evenly = |count: usize, step: f64| {
+        (0..count).map(|i| step * (i as f64 - 0.5 * (count as f64 - 1.0))).collect()
+    };
     let uneven = Lattice {
-        arrangement: Arrangement::Rectilinear(Arc::new([evenly(33, 0.2), evenly(33, 0.2), evenly(11, 0.2)])),
+        arrangement: Arrangement::Rectilinear(Arc::new([
+            evenly(33, 0.2),
+            evenly(33, 0.2),
+            evenly(11, 0.2),
+        ])),
         ..Lattice::with_spacing([33, 33, 11], DVec3::ONE)
     };
     for (lattice, length) in [(cubic, 2.0), (mixed, 2.0), (uneven, 2.2)] {
-        for (kernel, tolerance) in [(Shape::gaussian(0.8, 3.2).unwrap(), 1e-3), (Shape::b_spline(3.0).unwrap(), 3e-3)] {
-            let scene = Scene::new().with_volume(volume(lattice.clone(), |_| 5.0), kernel, uniform(color, 0.8));
-            for mode in
-                [Mode::Sheets, Mode::AxisSheets, Mode::Splats(Order::FrontToBack), Mode::Splats(Order::BackToFront)]
-            {
+        for (kernel, tolerance) in
+            [(Shape::gaussian(0.8, 3.2).unwrap(), 1e-3), (Shape::b_spline(3.0).unwrap(), 3e-3)]
+        {
+            let scene = Scene::new().with_volume(
+                volume(lattice.clone(), |_| 5.0),
+                kernel,
+                uniform(color, 0.8),
+            );
+            for mode in [
+                Mode::Sheets,
+                Mode::AxisSheets,
+                Mode::Splats(Order::FrontToBack),
+                Mode::Splats(Order::BackToFront),
+            ] {
                 let picture = render(&scene, &from_above(5.0, 0.01), &before(mode)).unwrap();
                 let opacity = 1.0 - (-0.8_f64 * length).exp();
                 close(picture.color[0][3], opacity, tolerance);
-                (0..3).for_each(|c| close(picture.color[0][c], f64::from(picture.color[0][3]) * color[c], 1e-6));
+                (0..3).for_each(|c| {
+                    close(picture.color[0][c], f64::from(picture.color[0][3]) * color[c], 1e-6)
+                });
                 assert!(picture.depth[0] > 4.0 - 0.5 && picture.depth[0] < 5.0);
             }
         }
@@ -77,7 +94,8 @@ fn single_splats_are_composited_by_distance() {
     // Red lies before blue, though they overlap; the green one is behind the eye.
     let splats = vec![at(-0.5, 0xffff_0000), at(0.5, 0xff00_00ff), at(9.0, 0xff00_ff00)];
     let scene = Scene::new().with_splats(set(Payload::Radiance, splats));
-    let camera = Camera { projection: Projection::Perspective { view_angle: 0.1 }, ..from_above(5.0, 1.0) };
+    let camera =
+        Camera { projection: Projection::Perspective { view_angle: 0.1 }, ..from_above(5.0, 1.0) };
     let alpha = 1.0 - (-0.7_f64).exp();
     for order in [Order::FrontToBack, Order::BackToFront] {
         let picture = render(&scene, &camera, &before(Mode::Splats(order))).unwrap();
@@ -99,7 +117,8 @@ fn samples_classified_before_are_lit_by_their_field() {
         let scene = Scene::new().with_volume(field, Shape::default(), transfer.clone());
         for mode in [Mode::Sheets, Mode::AxisSheets, Mode::Splats(Order::FrontToBack)] {
             let settings = Settings { volume_shade: None, ..before(mode) };
-            let [red, .., opacity] = render(&scene, &from_above(5.0, 0.01), &settings).unwrap().color[0];
+            let [red, .., opacity] =
+                render(&scene, &from_above(5.0, 0.01), &settings).unwrap().color[0];
             close(red / opacity, 0.1 + 0.4 * 0.5_f64.sqrt(), 1e-3);
         }
     }
@@ -118,9 +137,14 @@ fn the_near_side_of_a_wall_hides_its_far_side() {
         ..TransferFunction::default()
     };
     let scene = Scene::new().with_volume(field, Shape::default(), transfer);
-    let settings = Settings { volume_shade: None, sheet_thickness: Some(50.0), ..before(Mode::Sheets) };
-    let [red, _, blue, opacity] = render(&scene, &from_above(5.0, 0.01), &settings).unwrap().color[0];
-    assert!(opacity > 0.1 && red > 0.99 * opacity && blue < 0.01 * opacity, "{red} {blue} {opacity}");
+    let settings =
+        Settings { volume_shade: None, sheet_thickness: Some(50.0), ..before(Mode::Sheets) };
+    let [red, _, blue, opacity] =
+        render(&scene, &from_above(5.0, 0.01), &settings).unwrap().color[0];
+    assert!(
+        opacity > 0.1 && red > 0.99 * opacity && blue < 0.01 * opacity,
+        "{red} {blue} {opacity}"
+    );
 }
 
 #[test]
@@ -129,18 +153,28 @@ fn axis_sheets_follow_the_data() {
     // The camera looks most along −x.
     let axis = whole::sheet_axis(&view, None);
     assert!((axis + view.rotation * DVec3::X).length() < 1e-12 && axis.z > 0.0);
-    let axes = DMat3::from_cols(DVec3::new(0.0, 0.5, 0.0), DVec3::new(-0.2, 0.0, 0.0), DVec3::new(0.1, 0.0, 0.5));
+    let axes = DMat3::from_cols(
+        DVec3::new(0.0, 0.5, 0.0),
+        DVec3::new(-0.2, 0.0, 0.0),
+        DVec3::new(0.1, 0.0, 0.5),
+    );
     let lattice = Lattice::cartesian([2; 3], DVec3::ZERO, axes);
     let axis = whole::sheet_axis(&view, Some(&lattice));
     // Across the first and the third axis.
-    assert!((view.rotation.transpose() * axis).cross(DVec3::new(5.0, 0.0, -1.0).normalize()).length() < 1e-9, "{axis}");
+    assert!(
+        (view.rotation.transpose() * axis).cross(DVec3::new(5.0, 0.0, -1.0).normalize()).length()
+            < 1e-9,
+        "{axis}"
+    );
     // Two walls of unequal colour half a sheet apart lie in one sheet, or in two.
     let at = |z: f32, color: u32| Splat { color, ..round(Vec3::new(0.0, 0.0, z), 2.0, 1.0) };
     let splats = vec![at(0.0, 0xff00_00ff), at(1.0, 0xffff_0000)];
     let scene = Scene::new().with_splats(set(Payload::Radiance, splats));
     for (thickness, before, behind) in [(100.0, 0.5, 0.5), (0.1, (-2.0_f64).exp(), 1.0)] {
-        let settings = Settings { sheet_thickness: Some(thickness), sheet_pixels: 1e9, ..before_alone() };
-        let [red, _, blue, opacity] = render(&scene, &from_above(5.0, 0.01), &settings).unwrap().color[0];
+        let settings =
+            Settings { sheet_thickness: Some(thickness), sheet_pixels: 1e9, ..before_alone() };
+        let [red, _, blue, opacity] =
+            render(&scene, &from_above(5.0, 0.01), &settings).unwrap().color[0];
         close(opacity, 1.0 - (-4.0_f64).exp(), 1e-6);
         let whole = if thickness > 1.0 { f64::from(opacity) } else { 1.0 - (-2.0_f64).exp() };
         close(red, whole * before, 1e-6);

@@ -20,7 +20,10 @@ fn opacity(length: f64) -> f64 {
 fn clips_cut_where_they_are() {
     let scene = cube([0.5; 3]);
     let shape = |normal: DVec3, offset: f64| ClipShape::HalfSpace { normal, offset };
-    let hole = ClipShape::Box(Bounds { min: DVec3::new(-9.0, -9.0, -0.3), max: DVec3::new(9.0, 9.0, 0.13) });
+    let hole = ClipShape::Box(Bounds {
+        min: DVec3::new(-9.0, -9.0, -0.3),
+        max: DVec3::new(9.0, 9.0, 0.13),
+    });
     let slope = shape(DVec3::new(3.0, 0.0, 4.0), 1.0);
     let cases = [
         (vec![Clip { shape: shape(DVec3::Z, 0.37), inside: true }], 1.37),
@@ -28,7 +31,13 @@ fn clips_cut_where_they_are() {
         (vec![Clip { shape: hole, inside: true }], 0.43),
         // Two pieces are left.
         (vec![Clip { shape: hole, inside: false }], 1.57),
-        (vec![Clip { shape: hole, inside: false }, Clip { shape: shape(DVec3::Z, 0.37), inside: true }], 0.94),
+        (
+            vec![
+                Clip { shape: hole, inside: false },
+                Clip { shape: shape(DVec3::Z, 0.37), inside: true },
+            ],
+            0.94,
+        ),
         // On the axis 4z ≤ 1.
         (vec![Clip { shape: slope, inside: true }], 1.25),
         (vec![Clip { shape: slope, inside: true }, Clip { shape: slope, inside: false }], 0.0),
@@ -53,7 +62,8 @@ fn splats_are_clipped_by_their_closest_approach() {
     for mode in [Mode::Sheets, Mode::AxisSheets, Mode::Splats(scene::Order::FrontToBack)] {
         for (offset, expected) in [(0.51, 1.0 - (-3.0_f64).exp()), (0.49, 0.0)] {
             let shape = ClipShape::HalfSpace { normal: DVec3::Z, offset };
-            let settings = Settings { mode, clips: vec![Clip { shape, inside: true }], ..unshaded([1, 1]) };
+            let settings =
+                Settings { mode, clips: vec![Clip { shape, inside: true }], ..unshaded([1, 1]) };
             close(render(&scene, &camera, &settings).unwrap().color[0][3], expected, 2e-5);
         }
     }
@@ -62,7 +72,8 @@ fn splats_are_clipped_by_their_closest_approach() {
 #[test]
 fn an_x_ray_is_what_a_field_takes_from_white() {
     let lattice = centered([9; 3], DMat3::from_diagonal(DVec3::splat(0.25)));
-    let transfer = TransferFunction { shade: Some(Shade::default()), ..uniform([0.1, 0.5, 0.2], 0.8) };
+    let transfer =
+        TransferFunction { shade: Some(Shade::default()), ..uniform([0.1, 0.5, 0.2], 0.8) };
     let scene = Scene::new().with_volume(volume(lattice, |_| 5.0), Shape::default(), transfer);
     let splats = vec![round(Vec3::ZERO, 0.6, 0.3)];
     let both = scene.clone().with_splats(set(Payload::Radiance, splats));
@@ -103,7 +114,11 @@ fn the_maximum_is_the_largest_value_on_the_ray() {
     }
     // A clip leaves the slope alone.
     let shape = ClipShape::HalfSpace { normal: DVec3::Z, offset: -0.5 };
-    let settings = Settings { optics: Optics::Maximum, clips: vec![Clip { shape, inside: true }], ..unshaded([1, 1]) };
+    let settings = Settings {
+        optics: Optics::Maximum,
+        clips: vec![Clip { shape, inside: true }],
+        ..unshaded([1, 1])
+    };
     close(render(&scene, &from_above(5.0, 0.01), &settings).unwrap().color[0][3], 0.8 * 0.75, 0.02);
 }
 
@@ -111,7 +126,8 @@ fn the_maximum_is_the_largest_value_on_the_ray() {
 fn steep_places_hold_back_more() {
     let lattice = centered([13; 3], DMat3::from_diagonal(DVec3::splat(0.25)));
     for (slope, factor) in [(0.5, 0.0), (2.0, 0.5), (9.0, 1.0)] {
-        let transfer = TransferFunction { gradient: vec![(1.0, 0.0), (3.0, 1.0)], ..uniform([1.0; 3], 0.8) };
+        let transfer =
+            TransferFunction { gradient: vec![(1.0, 0.0), (3.0, 1.0)], ..uniform([1.0; 3], 0.8) };
         let field = volume(lattice.clone(), |p| slope * p.x);
         let scene = Scene::new().with_volume(field, Shape::gaussian(0.9, 4.0).unwrap(), transfer);
         for classification in [scene::Classification::PreIntegrated, scene::Classification::Post] {

@@ -8,8 +8,10 @@ fn one_round_splat_is_its_projection() {
     for projection in PROJECTIONS {
         let camera = camera(projection);
         let (center, deviation, strength) = (DVec3::new(0.1, 0.2, -0.1), 0.3, 2.0);
-        let scene =
-            Scene::new().with_splats(set(Payload::Radiance, vec![round(center.as_vec3(), strength, deviation)]));
+        let scene = Scene::new().with_splats(set(
+            Payload::Radiance,
+            vec![round(center.as_vec3(), strength, deviation)],
+        ));
         let settings = unshaded([24, 20]);
         let picture = render(&scene, &camera, &settings).unwrap();
         let view = camera.view(settings.size).unwrap();
@@ -22,7 +24,8 @@ fn one_round_splat_is_its_projection() {
             let (origin, direction) = view.ray(at);
             // The distance of the centre from the ray.
             let distance = (center - origin).cross(direction).length();
-            let opacity = 1.0 - (-f64::from(strength) * (-0.5 * distance * distance / variance).exp()).exp();
+            let opacity =
+                1.0 - (-f64::from(strength) * (-0.5 * distance * distance / variance).exp()).exp();
             // Sheets with an optical depth below 1e-5 are left out, up to three of them here.
             close(color[3], opacity, 3e-5);
             close(color[0], opacity * f64::from(0xc0) / 255.0, 3e-5);
@@ -39,7 +42,11 @@ fn opacity_scales_the_strength_and_normals_catch_the_light() {
     let toward = (camera.position - camera.focal_point).normalize();
     let across = toward.cross(DVec3::Z).normalize();
     let slant = (toward + across).normalize();
-    let splat = Splat { color: 0x80_ff_ff_ff, normal: encode_normal(slant.as_vec3()), ..round(Vec3::ZERO, 3.0, 5.0) };
+    let splat = Splat {
+        color: 0x80_ff_ff_ff,
+        normal: encode_normal(slant.as_vec3()),
+        ..round(Vec3::ZERO, 3.0, 5.0)
+    };
     let scene = Scene::new().with_splats(set(Payload::Radiance, vec![splat]));
     let shade = Shade { ambient: 0.1, diffuse: 0.4, specular: 0.2, power: 4.0 };
     // A pixel in the middle: an odd number of them.
@@ -54,22 +61,32 @@ fn opacity_scales_the_strength_and_normals_catch_the_light() {
 #[test]
 fn the_depth_of_an_opaque_wall_is_where_it_stands() {
     for projection in PROJECTIONS {
-        let camera = Camera { position: DVec3::new(0.0, 0.0, 5.0), view_up: DVec3::Y, ..camera(projection) };
+        let camera =
+            Camera { position: DVec3::new(0.0, 0.0, 5.0), view_up: DVec3::Y, ..camera(projection) };
         // A disc in the plane z = 0.25, thin against the sheets.
         let factor = [3.0, 0.0, 3.0, 0.0, 0.0, 1e-3];
         let wall = Splat { factor, ..round(Vec3::new(0.0, 0.0, 0.25), 80.0, 1.0) };
-        let scene = Scene::new().with_splats(SplatSet { extent: 3.0, ..set(Payload::Radiance, vec![wall]) });
+        let scene = Scene::new()
+            .with_splats(SplatSet { extent: 3.0, ..set(Payload::Radiance, vec![wall]) });
         let settings = Settings { sheet_thickness: Some(0.02), ..unshaded([24, 20]) };
         let picture = render(&scene, &camera, &settings).unwrap();
-        let pixel = if matches!(projection, Projection::Perspective { .. }) { 5.0 / 27.0 } else { 0.2 };
+        let pixel =
+            if matches!(projection, Projection::Perspective { .. }) { 5.0 / 27.0 } else { 0.2 };
         for (color, &z) in picture.color.iter().zip(&picture.depth) {
             assert!(color[3] > 0.9999);
             // The wall is widened by 0.35 pixels, and half of its light is taken in its near part.
             close(z, 4.75, pixel);
             assert!(z <= 4.75 + 0.02);
         }
-        let background = Scene::new().with_splats(set(Payload::Radiance, vec![round(Vec3::ZERO, 0.5, 0.1)]));
-        assert!(render(&background, &camera, &settings).unwrap().depth.iter().all(|z| *z == f32::INFINITY));
+        let background =
+            Scene::new().with_splats(set(Payload::Radiance, vec![round(Vec3::ZERO, 0.5, 0.1)]));
+        assert!(
+            render(&background, &camera, &settings)
+                .unwrap()
+                .depth
+                .iter()
+                .all(|z| *z == f32::INFINITY)
+        );
     }
 }
 
@@ -78,13 +95,20 @@ fn a_surface_in_a_translucent_volume_is_veiled_by_what_lies_before_it() {
     let (veil, extinction) = ([0.2, 0.9, 0.1], 0.6);
     let lattice = centered([7, 7, 9], DMat3::from_diagonal(DVec3::splat(0.5)));
     for projection in PROJECTIONS {
-        let camera = Camera { position: DVec3::new(0.0, 0.0, 6.0), view_up: DVec3::Y, ..camera(projection) };
+        let camera =
+            Camera { position: DVec3::new(0.0, 0.0, 6.0), view_up: DVec3::Y, ..camera(projection) };
         for height in [-1.0_f32, 0.0, 1.5] {
             // Fine pixels, so that the wall is widened but little: only the middle of a large picture is drawn.
-            let wall =
-                Splat { factor: [9.0, 0.0, 9.0, 0.0, 0.0, 1e-3], ..round(Vec3::new(0.0, 0.0, height), 5e3, 1.0) };
+            let wall = Splat {
+                factor: [9.0, 0.0, 9.0, 0.0, 0.0, 1e-3],
+                ..round(Vec3::new(0.0, 0.0, height), 5e3, 1.0)
+            };
             let scene = Scene::new()
-                .with_volume(volume(lattice.clone(), |_| 5.0), Shape::default(), uniform(veil, extinction))
+                .with_volume(
+                    volume(lattice.clone(), |_| 5.0),
+                    Shape::default(),
+                    uniform(veil, extinction),
+                )
                 .with_splats(SplatSet { extent: 3.0, ..set(Payload::Radiance, vec![wall]) });
             let settings = Settings { sheet_thickness: Some(0.01), ..unshaded([801, 801]) };
             let view = camera.view(settings.size).unwrap();

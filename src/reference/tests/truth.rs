@@ -20,7 +20,11 @@ fn steep() -> TransferFunction {
 /// Shells of the Marschner–Lobb signal.
 fn shells(lattice_size: usize, kernel: Shape, shade: Option<Shade>) -> Scene {
     let transfer = TransferFunction { shade, ..steep() };
-    Scene::new().with_volume(Phantom::MarschnerLobb.sample([lattice_size; 3]).unwrap(), kernel, transfer)
+    Scene::new().with_volume(
+        Phantom::MarschnerLobb.sample([lattice_size; 3]).unwrap(),
+        kernel,
+        transfer,
+    )
 }
 
 fn small(classification: Classification, thickness: Option<f64>) -> Settings {
@@ -32,31 +36,41 @@ fn a_step_on_a_ramp_is_as_long_as_it_is() {
     // Extinction 2 where the value is over 0.137, which it is for 0.863 of depth.
     let lattice = centered([17; 3], DMat3::from_diagonal(DVec3::splat(0.125)));
     let opaque = 1.0 - (-2.0_f64).exp();
-    let transfer = TransferFunction { opacity: vec![(0.137, 0.0), (0.137, opaque)], ..uniform([1.0; 3], 1.0) };
+    let transfer =
+        TransferFunction { opacity: vec![(0.137, 0.0), (0.137, opaque)], ..uniform([1.0; 3], 1.0) };
     let kernel = Shape::gaussian(0.9, 5.0).unwrap();
     let field = volume(lattice, |p| p.z);
     let scene = Scene::new().with_volume(field, kernel, transfer);
     let camera = from_above(5.0, 0.01);
     // Sheets inside, away from the border where fewer samples make the field lean.
     let error = |classification, thickness| {
-        let settings = Settings { classification, sheet_thickness: Some(thickness), ..unshaded([1, 1]) };
+        let settings =
+            Settings { classification, sheet_thickness: Some(thickness), ..unshaded([1, 1]) };
         let found = f64::from(render(&scene, &camera, &settings).unwrap().color[0][3]);
         (found - (1.0 - (-2.0_f64 * 0.863).exp())).abs()
     };
     for thickness in [0.4, 0.37, 0.3, 0.21] {
         assert!(error(Classification::PreIntegrated, thickness) < 1e-4);
     }
-    assert!([0.4, 0.37, 0.3, 0.21].iter().any(|thickness| error(Classification::Post, *thickness) > 0.01));
+    assert!(
+        [0.4, 0.37, 0.3, 0.21]
+            .iter()
+            .any(|thickness| error(Classification::Post, *thickness) > 0.01)
+    );
 }
 
 #[test]
 fn thinner_sheets_change_little() {
     let scene = shells(24, Shape::default(), None);
     let camera = camera(PROJECTIONS[0]);
-    let usual = scene.sheets(&camera.view([24, 20]).unwrap(), &small(Classification::Post, None)).step;
-    for (classification, least) in [(Classification::PreIntegrated, 50.0), (Classification::Post, 35.0)] {
-        let [thick, thin] = [usual, 0.5 * usual]
-            .map(|thickness| render(&scene, &camera, &small(classification, Some(thickness))).unwrap());
+    let usual =
+        scene.sheets(&camera.view([24, 20]).unwrap(), &small(Classification::Post, None)).step;
+    for (classification, least) in
+        [(Classification::PreIntegrated, 50.0), (Classification::Post, 35.0)]
+    {
+        let [thick, thin] = [usual, 0.5 * usual].map(|thickness| {
+            render(&scene, &camera, &small(classification, Some(thickness))).unwrap()
+        });
         let found = decibels(&thick, &thin);
         println!("{classification:?}: halving {found:.1} dB");
         assert!(found > least, "{classification:?}: {found} dB");
@@ -66,8 +80,10 @@ fn thinner_sheets_change_little() {
 /// Three balls that touch.
 fn blobs(kernel: Shape, shade: Option<Shade>) -> Scene {
     let lattice = centered([24; 3], DMat3::from_diagonal(DVec3::splat(2.0 / 23.0)));
-    let centers = [DVec3::new(0.4, 0.1, 0.0), DVec3::new(-0.4, 0.2, 0.3), DVec3::new(0.0, -0.4, -0.3)];
-    let field = volume(lattice, |p| centers.iter().map(|c| (-8.0 * (p - *c).length_squared()).exp()).sum());
+    let centers =
+        [DVec3::new(0.4, 0.1, 0.0), DVec3::new(-0.4, 0.2, 0.3), DVec3::new(0.0, -0.4, -0.3)];
+    let field =
+        volume(lattice, |p| centers.iter().map(|c| (-8.0 * (p - *c).length_squared()).exp()).sum());
     Scene::new().with_volume(field, kernel, TransferFunction { shade, ..steep() })
 }
 
@@ -85,15 +101,22 @@ fn sheets_converge_to_the_rays() {
     ] {
         for projection in PROJECTIONS {
             let camera = camera(projection);
-            let usual = scene.sheets(&camera.view([24, 20]).unwrap(), &small(Classification::Post, None)).step;
-            let truth = integrate(&scene, &camera, &small(Classification::Post, None), 0.0005).unwrap();
+            let usual = scene
+                .sheets(&camera.view([24, 20]).unwrap(), &small(Classification::Post, None))
+                .step;
+            let truth =
+                integrate(&scene, &camera, &small(Classification::Post, None), 0.0005).unwrap();
             let found = |classification, share: f64| {
-                let picture = render(&scene, &camera, &small(classification, Some(usual * share))).unwrap();
+                let picture =
+                    render(&scene, &camera, &small(classification, Some(usual * share))).unwrap();
                 decibels(&picture, &truth)
             };
             let [post, post_thin] = [1.0, 0.125].map(|share| found(Classification::Post, share));
-            let [inside, inside_thin] = [1.0, 0.125].map(|share| found(Classification::PreIntegrated, share));
-            println!("{name}: post {post:.1} → {post_thin:.1} dB, inside {inside:.1} → {inside_thin:.1} dB");
+            let [inside, inside_thin] =
+                [1.0, 0.125].map(|share| found(Classification::PreIntegrated, share));
+            println!(
+                "{name}: post {post:.1} → {post_thin:.1} dB, inside {inside:.1} → {inside_thin:.1} dB"
+            );
             assert!(post_thin > post + 15.0 && inside_thin > inside + 15.0);
             assert!(inside > post + better);
         }
@@ -107,8 +130,11 @@ fn sheets_of_tensor_products_converge_too() {
             let scene = blobs(Shape::tensor(tensor), shade);
             for projection in PROJECTIONS {
                 let camera = camera(projection);
-                let usual = scene.sheets(&camera.view([24, 20]).unwrap(), &small(Classification::Post, None)).step;
-                let truth = integrate(&scene, &camera, &small(Classification::Post, None), 0.0005).unwrap();
+                let usual = scene
+                    .sheets(&camera.view([24, 20]).unwrap(), &small(Classification::Post, None))
+                    .step;
+                let truth =
+                    integrate(&scene, &camera, &small(Classification::Post, None), 0.0005).unwrap();
                 let [usual, thin] = [1.0, 0.125].map(|share| {
                     let settings = small(Classification::PreIntegrated, Some(usual * share));
                     decibels(&render(&scene, &camera, &settings).unwrap(), &truth)
@@ -123,8 +149,11 @@ fn sheets_of_tensor_products_converge_too() {
 #[test]
 fn body_centred_samples_and_isosurfaces_converge_too() {
     let axes = DMat3::from_diagonal(DVec3::splat(0.12));
-    let lattice =
-        Lattice { arrangement: Arrangement::BodyCentred, origin: DVec3::splat(-1.0), ..centered([17, 17, 34], axes) };
+    let lattice = Lattice {
+        arrangement: Arrangement::BodyCentred,
+        origin: DVec3::splat(-1.0),
+        ..centered([17, 17, 34], axes)
+    };
     let field = volume(lattice, |p| Phantom::Ball.value(p - DVec3::new(0.1, 0.0, -0.1)));
     let surface = |value: f64, opacity: f64| Isosurface { value, color: [0.9, 0.5, 0.1], opacity };
     let transfer = TransferFunction {
@@ -140,7 +169,9 @@ fn body_centred_samples_and_isosurfaces_converge_too() {
         let camera = camera(projection);
         let truth = integrate(&scene, &camera, &small(Classification::Post, None), 0.002).unwrap();
         for (share, least) in [(0.1, 55.0), (0.02, 70.0)] {
-            let picture = render(&scene, &camera, &small(Classification::PreIntegrated, Some(share))).unwrap();
+            let picture =
+                render(&scene, &camera, &small(Classification::PreIntegrated, Some(share)))
+                    .unwrap();
             let found = decibels(&picture, &truth);
             println!("sheets of {share}: {found:.1} dB");
             assert!(found > least);
@@ -177,7 +208,8 @@ fn rays_through_a_large_volume() {
         ("thin, lit", vec![(0.0, 0.001)], Some(Shade::default())),
         ("dense, lit", vec![(100.0, 0.0), (140.0, 0.1)], Some(Shade::default())),
     ] {
-        let transfer = TransferFunction { opacity, unit: 0.01, shade, ..TransferFunction::default() };
+        let transfer =
+            TransferFunction { opacity, unit: 0.01, shade, ..TransferFunction::default() };
         let scene = Scene::new().with_volume(volume.clone(), Shape::default(), transfer);
         let start = std::time::Instant::now();
         integrate(&scene, &camera(PROJECTIONS[0]), &Settings::new([256, 256]), step).unwrap();

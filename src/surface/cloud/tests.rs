@@ -46,7 +46,11 @@ fn normals(mesh: &Mesh) -> Vec<Vec3> {
 
 /// The part of the points whose normal is on the same side as `outward`.
 fn agreement(mesh: &Mesh, outward: impl Fn(Vec3) -> Vec3) -> f64 {
-    let right = normals(mesh).iter().zip(&mesh.positions).filter(|(n, p)| n.dot(outward(**p)) > 0.0).count();
+    let right = normals(mesh)
+        .iter()
+        .zip(&mesh.positions)
+        .filter(|(n, p)| n.dot(outward(**p)) > 0.0)
+        .count();
     right as f64 / mesh.positions.len() as f64
 }
 
@@ -60,14 +64,19 @@ fn closed_surfaces_face_outward() {
     let far = Vec3::X * 5.0;
     let both = [sphere(2000, Vec3::ZERO), sphere(2000, far)].concat();
     assert!(agreement(&cloud(both), |p| if p.x < 2.5 { p } else { p - far }) >= 0.999);
-    let inner = sphere(3000, Vec3::ZERO).iter().map(|&p| p * 3.0).chain(sphere(3000, Vec3::ZERO)).collect();
+    let inner =
+        sphere(3000, Vec3::ZERO).iter().map(|&p| p * 3.0).chain(sphere(3000, Vec3::ZERO)).collect();
     assert!(agreement(&cloud(inner), |p| p) >= 0.999);
 }
 
 /// Points on the plane z = `height`, about 1 apart.
 fn sheet(height: f32) -> Vec<Vec3> {
     let mut random = random();
-    (0..2500).map(|i| Vec3::new((i % 50) as f32 + 0.6 * random(), (i / 50) as f32 + 0.6 * random(), height)).collect()
+    (0..2500)
+        .map(|i| {
+            Vec3::new((i % 50) as f32 + 0.6 * random(), (i / 50) as f32 + 0.6 * random(), height)
+        })
+        .collect()
 }
 
 #[test]
@@ -97,20 +106,32 @@ fn lone_points_are_small_and_change_no_others() {
     let before = all_surfels(&plain, &options);
     let mut mesh = plain.clone();
     // One just above the sheet, one far off, and a pair.
-    mesh.positions
-        .extend([[25.5, 25.5, 12.0], [1e5, 0.0, 0.0], [-300.0, 0.0, 7.0], [-300.0, 0.0, 8.0]].map(Vec3::from));
+    mesh.positions.extend(
+        [[25.5, 25.5, 12.0], [1e5, 0.0, 0.0], [-300.0, 0.0, 7.0], [-300.0, 0.0, 8.0]]
+            .map(Vec3::from),
+    );
     let after = all_surfels(&mesh, &options);
     assert_eq!(before, after[..2500]);
-    let widest = |splats: &[Splat]| splats.iter().flat_map(|s| s.factor).fold(0f32, |widest, b| widest.max(b.abs()));
-    assert!(widest(&after[2500..]) <= 1.5 * widest(&before), "{} {}", widest(&after[2500..]), widest(&before));
+    let widest = |splats: &[Splat]| {
+        splats.iter().flat_map(|s| s.factor).fold(0f32, |widest, b| widest.max(b.abs()))
+    };
+    assert!(
+        widest(&after[2500..]) <= 1.5 * widest(&before),
+        "{} {}",
+        widest(&after[2500..]),
+        widest(&before)
+    );
 }
 
 /// A part that was scanned from further away is sampled more coarsely, and covered all the same.
 #[test]
 fn coarse_parts_keep_their_width() {
     let coarse = sheet(0.0).iter().map(|&p| p * 10.0 + Vec3::X * 100.0).collect::<Vec<_>>();
-    let splats = all_surfels(&cloud([sheet(0.0), sheet(9.0), coarse].concat()), &SurfelOptions::default());
-    let mean = |splats: &[Splat]| splats.iter().map(|s| f64::from(s.factor[0])).sum::<f64>() / splats.len() as f64;
+    let splats =
+        all_surfels(&cloud([sheet(0.0), sheet(9.0), coarse].concat()), &SurfelOptions::default());
+    let mean = |splats: &[Splat]| {
+        splats.iter().map(|s| f64::from(s.factor[0])).sum::<f64>() / splats.len() as f64
+    };
     let ratio = mean(&splats[5000..]) / mean(&splats[..2500]);
     assert!((9.0..11.0).contains(&ratio), "{ratio}");
 }

@@ -20,7 +20,11 @@ fn depth(set: &SplatSet, point: DVec3, direction: DVec3) -> f64 {
             let offset = whiten(point - Vec3::from_array(splat.center).as_dvec3());
             let square = offset.reject_from(whiten(direction)).length_squared();
             let extent = f64::from(set.extent);
-            if square > extent * extent { 0.0 } else { f64::from(splat.strength) * (-square / 2.0).exp() }
+            if square > extent * extent {
+                0.0
+            } else {
+                f64::from(splat.strength) * (-square / 2.0).exp()
+            }
         })
         .sum()
 }
@@ -28,14 +32,18 @@ fn depth(set: &SplatSet, point: DVec3, direction: DVec3) -> f64 {
 /// The least optical depth seen along the triangles' normals, over points on up to 60 of the triangles.
 fn least_depth(mesh: &Mesh, set: &SplatSet) -> f64 {
     let step = (mesh.triangles.len() / 60).max(1);
-    let points =
-        |n: usize| (0..=n).flat_map(move |i| (0..=n - i).map(move |j| (i as f64 / n as f64, j as f64 / n as f64)));
+    let points = |n: usize| {
+        (0..=n)
+            .flat_map(move |i| (0..=n - i).map(move |j| (i as f64 / n as f64, j as f64 / n as f64)))
+    };
     (mesh.triangles.par_iter().step_by(step))
         .map(|&t| {
             let [a, b, c] = t.map(|index| mesh.positions[index as usize].as_dvec3());
             let normal = (b - a).cross(c - a).normalize();
             let n = if mesh.triangles.len() < 100 { 60 } else { 8 };
-            points(n).map(|(u, v)| depth(set, a + (b - a) * u + (c - a) * v, normal)).fold(f64::INFINITY, f64::min)
+            points(n)
+                .map(|(u, v)| depth(set, a + (b - a) * u + (c - a) * v, normal))
+                .fold(f64::INFINITY, f64::min)
         })
         .reduce(|| f64::INFINITY, f64::min)
 }
@@ -49,7 +57,10 @@ fn needles() -> Mesh {
     let mut mesh = Mesh { positions: vec![Vec3::ZERO], ..Mesh::default() };
     for i in 0..=40u32 {
         let angle = i as f32 * 0.02;
-        mesh.positions.push(Vec3::new(angle.cos(), angle.sin(), 0.02 * (i % 3) as f32) * (1.0 + 0.3 * (i % 5) as f32));
+        mesh.positions.push(
+            Vec3::new(angle.cos(), angle.sin(), 0.02 * (i % 3) as f32)
+                * (1.0 + 0.3 * (i % 5) as f32),
+        );
         if i > 0 {
             mesh.triangles.push([0, i, i + 1]);
         }
@@ -73,7 +84,9 @@ fn surfaces_have_no_holes() {
         let least = least_depth(&mesh, &mesh.surfels(&coarse).expect("surfels"));
         assert!(least >= bound(name), "{name}, not cut: {least}");
     }
-    for (name, mesh) in [("cube", Mesh::cube(2.0)), ("needles", needles()), ("sphere 0", Mesh::sphere(0))] {
+    for (name, mesh) in
+        [("cube", Mesh::cube(2.0)), ("needles", needles()), ("sphere 0", Mesh::sphere(0))]
+    {
         let fine = SurfelOptions { largest_spacing: 0.05, ..SurfelOptions::default() };
         let least = least_depth(&mesh, &mesh.surfels(&fine).expect("surfels"));
         assert!(least >= bound(name), "{name}: {least}");
@@ -96,7 +109,10 @@ fn normals_point_outward() {
     let own = knot.surfels(&options).expect("surfels");
     assert_eq!(own.splats.len(), knot.positions.len());
     for (a, b) in given.splats.iter().zip(&computed.splats) {
-        let (a, b) = (decode_normal(a.normal).expect("a normal"), decode_normal(b.normal).expect("a normal"));
+        let (a, b) = (
+            decode_normal(a.normal).expect("a normal"),
+            decode_normal(b.normal).expect("a normal"),
+        );
         assert!(a.dot(b) > 0.95, "{a} {b}");
     }
 }
@@ -141,7 +157,9 @@ fn ellipses_stay_close_to_the_surface() {
     let set = surfels(&mesh);
     let spacing = 2f64.sqrt() / 128.0;
     for along in 0..40 {
-        let at = |below: f64| depth(&set, DVec3::new(0.3 + 0.01 * f64::from(along), -spacing * below, 0.0), DVec3::Z);
+        let at = |below: f64| {
+            depth(&set, DVec3::new(0.3 + 0.01 * f64::from(along), -spacing * below, 0.0), DVec3::Z)
+        };
         assert!(at(0.3) < 0.6 && at(-0.1) > 0.8, "{} {}", at(0.3), at(-0.1));
     }
     assert!(depth(&set, DVec3::new(0.5, 0.5, spacing), DVec3::X) < 1e-3);
@@ -154,10 +172,16 @@ fn useless_parts_are_left_out() {
     mesh.positions.push(Vec3::ONE * 0.1);
     mesh.triangles.extend([[0, 0, 1], [3, 3, 3], [0, 1, 0]]);
     assert_eq!(surfels(&mesh).splats, whole);
-    let flat =
-        Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::X * 2.0], triangles: vec![[0, 1, 2]], ..Mesh::default() };
+    let flat = Mesh {
+        positions: vec![Vec3::ZERO, Vec3::X, Vec3::X * 2.0],
+        triangles: vec![[0, 1, 2]],
+        ..Mesh::default()
+    };
     assert!(matches!(flat.surfels(&SurfelOptions::default()), Err(Error::NothingToDraw(_))));
-    assert!(matches!(Mesh::default().surfels(&SurfelOptions::default()), Err(Error::NothingToDraw(_))));
+    assert!(matches!(
+        Mesh::default().surfels(&SurfelOptions::default()),
+        Err(Error::NothingToDraw(_))
+    ));
 }
 
 #[test]
@@ -177,8 +201,9 @@ fn a_mesh_that_contradicts_itself_is_an_argument_error() {
 
 #[test]
 fn textures_are_shown() {
-    let texels =
-        (0..64 * 64).map(|i| if (i / 8 + i / 512) % 2 == 0 { [255, 0, 0, 255] } else { [0, 0, 255, 255] }).collect();
+    let texels = (0..64 * 64)
+        .map(|i| if (i / 8 + i / 512) % 2 == 0 { [255, 0, 0, 255] } else { [0, 0, 255, 255] })
+        .collect();
     let texture = Some(Arc::new(Texture { width: 64, height: 64, texels }));
     let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
     let mesh = Mesh {
@@ -194,7 +219,12 @@ fn textures_are_shown() {
     let mut seen = [0, 0];
     for splat in set.splats.iter().filter(|s| inside(s.center[0]) && inside(s.center[1])) {
         let odd = ((splat.center[0] * 8.0) as u32 + (splat.center[1] * 8.0) as u32) % 2;
-        assert_eq!(splat.color, if odd == 0 { 0xff00_00ff } else { 0xff80_0000 }, "{:?}", splat.center);
+        assert_eq!(
+            splat.color,
+            if odd == 0 { 0xff00_00ff } else { 0xff80_0000 },
+            "{:?}",
+            splat.center
+        );
         seen[odd as usize] += 1;
     }
     assert!(seen.iter().all(|&count| count > 500), "{seen:?}");
@@ -219,10 +249,18 @@ fn clouds_of_all_sorts() {
     cloud.positions.push(Vec3::new(1e6, 0.0, 0.0));
     assert!(surfels(&cloud).splats.iter().all(|splat| splat.factor.iter().all(|b| b.abs() < 5.0)));
     cloud.normals = vec![Vec3::NEG_Z; cloud.positions.len()];
-    assert!(surfels(&cloud).splats.iter().all(|splat| decode_normal(splat.normal).expect("a normal").z < -0.99));
-    for positions in
-        [vec![Vec3::ONE; 5000], vec![Vec3::ZERO], vec![Vec3::X, Vec3::Y], (0..50).map(|i| Vec3::X * i as f32).collect()]
-    {
+    assert!(
+        surfels(&cloud)
+            .splats
+            .iter()
+            .all(|splat| decode_normal(splat.normal).expect("a normal").z < -0.99)
+    );
+    for positions in [
+        vec![Vec3::ONE; 5000],
+        vec![Vec3::ZERO],
+        vec![Vec3::X, Vec3::Y],
+        (0..50).map(|i| Vec3::X * i as f32).collect(),
+    ] {
         let set = surfels(&Mesh { positions, ..Mesh::default() });
         for splat in set.splats {
             let [xx, _, yy, _, _, zz] = splat.factor;
@@ -234,8 +272,10 @@ fn clouds_of_all_sorts() {
 #[test]
 fn a_split_mesh_is_as_a_whole_one() {
     let mesh = Mesh::sphere(3);
-    let positions = mesh.triangles.iter().flatten().map(|&index| mesh.positions[index as usize]).collect();
-    let triangles = (0..mesh.triangles.len() as u32).map(|i| [i * 3, i * 3 + 1, i * 3 + 2]).collect();
+    let positions =
+        mesh.triangles.iter().flatten().map(|&index| mesh.positions[index as usize]).collect();
+    let triangles =
+        (0..mesh.triangles.len() as u32).map(|i| [i * 3, i * 3 + 1, i * 3 + 2]).collect();
     let soup = Mesh { positions, triangles, ..Mesh::default() };
     let (whole, soup) = (surfels(&mesh), surfels(&soup));
     assert_eq!(whole.splats.len(), soup.splats.len());
@@ -248,14 +288,16 @@ fn a_split_mesh_is_as_a_whole_one() {
 
 #[test]
 fn a_fine_texture_on_coarse_triangles_is_averaged() {
-    let texels =
-        (0..1024 * 1024).map(|i: u32| if (i ^ (i / 1024)) & 1 == 0 { [255; 4] } else { [0, 0, 0, 255] }).collect();
+    let texels = (0..1024 * 1024)
+        .map(|i: u32| if (i ^ (i / 1024)) & 1 == 0 { [255; 4] } else { [0, 0, 0, 255] })
+        .collect();
     let texture = Some(Arc::new(Texture { width: 1024, height: 1024, texels }));
     let mut mesh = Mesh::sphere(2);
     mesh.uvs = mesh.positions.iter().map(|p| p.truncate() * 0.437).collect();
     mesh.triangle_materials = vec![0; mesh.triangles.len()];
     mesh.materials = vec![Material { name: String::new(), color: [1.0; 4], texture }];
-    let coarse = SurfelOptions { largest_spacing: 10.0, most_triangles: 300, ..SurfelOptions::default() };
+    let coarse =
+        SurfelOptions { largest_spacing: 10.0, most_triangles: 300, ..SurfelOptions::default() };
     for splat in mesh.surfels(&coarse).expect("surfels").splats {
         let red = splat.color & 255;
         assert!((70..186).contains(&red), "{red}");
@@ -265,21 +307,34 @@ fn a_fine_texture_on_coarse_triangles_is_averaged() {
 /// Whatever the coordinates of a texture are: the budget holds.
 #[test]
 fn textures_keep_to_the_budget() {
-    let texture = Some(Arc::new(Texture { width: 1024, height: 1024, texels: vec![[99; 4]; 1024 * 1024] }));
+    let texture =
+        Some(Arc::new(Texture { width: 1024, height: 1024, texels: vec![[99; 4]; 1024 * 1024] }));
     for far in [1.0, 5.0, 1e3, 1e5, 1e20, f32::MAX] {
         for across in [0.0, 0.01, far] {
             let mesh = Mesh {
                 positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
                 triangles: vec![[0, 1, 2], [0, 2, 3]],
-                uvs: [[0.0, 0.0], [far, 0.0], [far, across], [0.0, across]].map(glam::Vec2::from_array).to_vec(),
+                uvs: [[0.0, 0.0], [far, 0.0], [far, across], [0.0, across]]
+                    .map(glam::Vec2::from_array)
+                    .to_vec(),
                 triangle_materials: vec![0; 2],
-                materials: vec![Material { name: String::new(), color: [1.0; 4], texture: texture.clone() }],
+                materials: vec![Material {
+                    name: String::new(),
+                    color: [1.0; 4],
+                    texture: texture.clone(),
+                }],
                 ..Mesh::default()
             };
             let options = SurfelOptions { most_triangles: 30_000, ..SurfelOptions::default() };
-            let (told, made) = (mesh.triangles_once_cut(&options, usize::MAX).unwrap(), surfels_of(&mesh, &options));
+            let (told, made) = (
+                mesh.triangles_once_cut(&options, usize::MAX).unwrap(),
+                surfels_of(&mesh, &options),
+            );
             // The least that its size asks for is 35,000.
-            assert!(made < 100_000 && 2 * told > made, "{far} {across}: {made} surfels, {told} triangles told");
+            assert!(
+                made < 100_000 && 2 * told > made,
+                "{far} {across}: {made} surfels, {told} triangles told"
+            );
         }
     }
 }
@@ -319,7 +374,10 @@ fn a_far_origin_changes_nothing() {
         for origin in [DVec3::splat(1e16), DVec3::X * -1e300] {
             let far = Mesh { origin, ..mesh.clone() };
             let splats = surfels(&far).splats;
-            assert!(splats.len() == near.splats.len() && splats.iter().zip(&near.splats).all(|(a, b)| a == b));
+            assert!(
+                splats.len() == near.splats.len()
+                    && splats.iter().zip(&near.splats).all(|(a, b)| a == b)
+            );
             let options = SurfelOptions::default();
             assert_eq!(
                 far.triangles_once_cut(&options, usize::MAX).unwrap(),
@@ -327,7 +385,10 @@ fn a_far_origin_changes_nothing() {
             );
         }
         for origin in [DVec3::X * f64::NAN, DVec3::Y * f64::INFINITY] {
-            let error = Mesh { origin, ..mesh.clone() }.surfels(&SurfelOptions::default()).unwrap_err().to_string();
+            let error = Mesh { origin, ..mesh.clone() }
+                .surfels(&SurfelOptions::default())
+                .unwrap_err()
+                .to_string();
             assert!(error.contains("of the mesh is not finite"), "{error}");
         }
     }
@@ -356,11 +417,13 @@ fn options_are_numbers_that_surfels_can_be_made_of() {
     let mesh = Mesh::cube(2.0);
     let fine = |options: SurfelOptions| {
         let set = mesh.surfels(&SurfelOptions { most_triangles: 1000, ..options })?;
-        let is_sound = |splat: &Splat| splat.center.iter().chain(&splat.factor).all(|value| value.abs() < 9.0);
+        let is_sound =
+            |splat: &Splat| splat.center.iter().chain(&splat.factor).all(|value| value.abs() < 9.0);
         assert!(set.splats.iter().all(is_sound));
         Ok(set.splats.len())
     };
-    let spaced = |largest_spacing| fine(SurfelOptions { largest_spacing, ..SurfelOptions::default() });
+    let spaced =
+        |largest_spacing| fine(SurfelOptions { largest_spacing, ..SurfelOptions::default() });
     let deep = |optical_depth| fine(SurfelOptions { optical_depth, ..SurfelOptions::default() });
     let refused = |found: Result<usize>, message: &str| {
         let error = found.unwrap_err().to_string();
@@ -381,7 +444,8 @@ fn a_triangle_far_off_takes_nothing_away() {
     for (far, size) in [(1e8, 16.0), (-3e9, 512.0)] {
         let mut both = mesh.clone();
         let first = mesh.positions.len() as u32;
-        both.positions.extend([Vec3::ZERO, Vec3::X, Vec3::Y].map(|side| Vec3::X * far + side * size));
+        both.positions
+            .extend([Vec3::ZERO, Vec3::X, Vec3::Y].map(|side| Vec3::X * far + side * size));
         both.triangles.push([first, first + 1, first + 2]);
         let count = surfels(&both).splats.len();
         assert!(count >= mesh.positions.len() + 3, "{far:e}: {count} surfels");
@@ -392,12 +456,15 @@ fn a_triangle_far_off_takes_nothing_away() {
 fn textured(uv: glam::Vec2) -> Mesh {
     const SIDE: u32 = 12;
     let texture = Some(Arc::new(Texture { width: 8, height: 8, texels: vec![[99; 4]; 64] }));
-    let places = (0..(SIDE + 1).pow(2)).map(|vertex| [vertex % (SIDE + 1), vertex / (SIDE + 1)].map(|v| v as f32));
+    let places = (0..(SIDE + 1).pow(2))
+        .map(|vertex| [vertex % (SIDE + 1), vertex / (SIDE + 1)].map(|v| v as f32));
     let corners = (0..SIDE * SIDE).map(|square| square / SIDE * (SIDE + 1) + square % SIDE);
     let mut mesh = Mesh {
         positions: places.clone().map(|[x, y]| Vec3::new(x, y, (x + y).sin())).collect(),
         uvs: places.map(|place| glam::Vec2::from(place) / SIDE as f32).collect(),
-        triangles: corners.flat_map(|a| [[a, a + 1, a + SIDE + 2], [a, a + SIDE + 2, a + SIDE + 1]]).collect(),
+        triangles: corners
+            .flat_map(|a| [[a, a + 1, a + SIDE + 2], [a, a + SIDE + 2, a + SIDE + 1]])
+            .collect(),
         materials: vec![Material { name: String::new(), color: [1.0; 4], texture }],
         ..Mesh::default()
     };
@@ -418,7 +485,8 @@ fn a_far_texture_coordinate_is_soon_done() {
         }
     }
     for value in [f32::NAN, f32::INFINITY] {
-        let error = textured(glam::Vec2::new(0.5, value)).surfels(&options).unwrap_err().to_string();
+        let error =
+            textured(glam::Vec2::new(0.5, value)).surfels(&options).unwrap_err().to_string();
         assert!(error.contains("of vertex 7 are not finite"), "{error}");
     }
 }
@@ -438,8 +506,11 @@ fn a_far_vertex_is_named() {
         assert!(mesh.triangles_once_cut(&SurfelOptions::default(), usize::MAX).is_err());
         assert!(begin.elapsed().as_secs() < 10, "{x}: {:?}", begin.elapsed());
     }
-    let line =
-        Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::X * 2.0], triangles: vec![[0, 1, 2]], ..Mesh::default() };
+    let line = Mesh {
+        positions: vec![Vec3::ZERO, Vec3::X, Vec3::X * 2.0],
+        triangles: vec![[0, 1, 2]],
+        ..Mesh::default()
+    };
     let error = line.surfels(&SurfelOptions::default()).unwrap_err().to_string();
     assert!(error.contains("no triangle has an area"), "{error}");
 }

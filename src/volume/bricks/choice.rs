@@ -30,7 +30,14 @@ const STEPS: f64 = 16.0;
 /// pixels the longest step of level 0 covers at the point of the volume's box that is nearest to the eye. Between two levels
 /// both are drawn, with shares that follow λ, so that a zoom shows no pop. Where they have more than `most` bricks, λ is raised
 /// to the next sixteenth that has no more; the coarsest level, of one brick, is not refused.
-pub fn choice(bricks: &Bricks, view: &View, extent: f64, pixels: f64, shown: &[u16; 256], most: usize) -> Choice {
+pub fn choice(
+    bricks: &Bricks,
+    view: &View,
+    extent: f64,
+    pixels: f64,
+    shown: &[u16; 256],
+    most: usize,
+) -> Choice {
     let coarsest = (bricks.levels().len() - 1) as f64;
     // A level's bricks do not depend on λ: each is looked through once, when it is asked for.
     let mut known: Vec<Option<Vec<(f64, u32)>>> = vec![None; bricks.levels().len()];
@@ -39,7 +46,9 @@ pub fn choice(bricks: &Bricks, view: &View, extent: f64, pixels: f64, shown: &[u
         let levels = shares(lambda);
         let mut count = 0;
         for &(level, _) in &levels {
-            count += known[level].get_or_insert_with(|| visible(bricks, level, view, extent, shown)).len();
+            count += known[level]
+                .get_or_insert_with(|| visible(bricks, level, view, extent, shown))
+                .len();
         }
         if count <= most || lambda >= coarsest {
             break levels;
@@ -48,7 +57,9 @@ pub fn choice(bricks: &Bricks, view: &View, extent: f64, pixels: f64, shown: &[u
     };
     let mut found: Vec<(f64, usize, u32)> = Vec::new();
     for &(level, _) in &levels {
-        found.extend(known[level].iter().flatten().map(|&(distance, brick)| (distance, level, brick)));
+        found.extend(
+            known[level].iter().flatten().map(|&(distance, brick)| (distance, level, brick)),
+        );
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)).then(a.2.cmp(&b.2)));
     let bricks = found.into_iter().map(|(_, level, brick)| (level, brick)).collect();
@@ -70,7 +81,13 @@ fn shares(lambda: f64) -> Vec<(usize, f64)> {
 }
 
 /// The bricks of a level that meet the picture and show something, with their distances.
-fn visible(bricks: &Bricks, number: usize, view: &View, extent: f64, shown: &[u16; 256]) -> Vec<(f64, u32)> {
+fn visible(
+    bricks: &Bricks,
+    number: usize,
+    view: &View,
+    extent: f64,
+    shown: &[u16; 256],
+) -> Vec<(f64, u32)> {
     let level = bricks.level(number);
     let lattice = bricks.lattice(number);
     let sides = view.sides(1.0);
@@ -82,14 +99,19 @@ fn visible(bricks: &Bricks, number: usize, view: &View, extent: f64, shown: &[u1
         }
         let place = level.place(brick).map(|at| at * SIDE);
         let low = DVec3::from_array(place.map(|at| at as f64)) - extent;
-        let last: [usize; 3] = std::array::from_fn(|axis| (place[axis] + SIDE).min(level.dims[axis]) - 1);
+        let last: [usize; 3] =
+            std::array::from_fn(|axis| (place[axis] + SIDE).min(level.dims[axis]) - 1);
         let high = DVec3::from_array(last.map(|at| at as f64)) + extent;
         let corners: [DVec3; 8] = std::array::from_fn(|corner| {
             let at = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
             view.to_view(lattice.position(DVec3::new(at(0), at(1), at(2))))
         });
-        let outside = |(normal, reach): &(DVec3, f64)| corners.iter().all(|corner| normal.dot(*corner) + reach < 0.0);
-        if sides.iter().any(outside) || (view.perspective && corners.iter().all(|corner| corner.z <= 0.0)) {
+        let outside = |(normal, reach): &(DVec3, f64)| {
+            corners.iter().all(|corner| normal.dot(*corner) + reach < 0.0)
+        };
+        if sides.iter().any(outside)
+            || (view.perspective && corners.iter().all(|corner| corner.z <= 0.0))
+        {
             return None;
         }
         let center = view.to_view(lattice.position(0.5 * (low + high)));
@@ -113,7 +135,9 @@ mod tests {
     /// 100³ samples, two units apart, that grow from 0 to 198 along x.
     fn ramp() -> Bricks {
         let values = (0..1_000_000usize).map(|index| (2 * (index % 100)) as u8).collect();
-        let volume = Volume::new(Lattice::with_spacing([100; 3], DVec3::splat(2.0)), Samples::U8(values)).unwrap();
+        let volume =
+            Volume::new(Lattice::with_spacing([100; 3], DVec3::splat(2.0)), Samples::U8(values))
+                .unwrap();
         Bricks::from_volume(Arc::new(volume)).unwrap()
     }
 
@@ -154,23 +178,39 @@ mod tests {
         let bricks = ramp();
         let shows = over(-5.0);
         // A step of 2 covers one pixel where 800 units fill 400 pixels.
-        for (height, pixels, lambda) in
-            [(800.0, 1.0, 0.0), (400.0, 1.0, 0.0), (800.0, 2.0, 1.0), (1600.0, 1.0, 1.0), (1e9, 1.0, 2.0)]
-        {
+        for (height, pixels, lambda) in [
+            (800.0, 1.0, 0.0),
+            (400.0, 1.0, 0.0),
+            (800.0, 2.0, 1.0),
+            (1600.0, 1.0, 1.0),
+            (1e9, 1.0, 2.0),
+        ] {
             let choice = choice(&bricks, &flat(height), 2.0, pixels, &shows, MANY);
-            assert_eq!((choice.lambda, &choice.levels[..]), (lambda, &[(lambda as usize, 1.0)][..]), "{height}");
-            let count: usize = choice.levels.iter().map(|&(level, _)| bricks.level(level).bricks()).sum();
+            assert_eq!(
+                (choice.lambda, &choice.levels[..]),
+                (lambda, &[(lambda as usize, 1.0)][..]),
+                "{height}"
+            );
+            let count: usize =
+                choice.levels.iter().map(|&(level, _)| bricks.level(level).bricks()).sum();
             assert_eq!(choice.bricks.len(), count);
         }
         let between = choice(&bricks, &flat(800.0 * 2f64.sqrt()), 2.0, 1.0, &shows, MANY);
-        assert!((between.lambda - 0.5).abs() < 1e-12 && between.bricks.len() == 64 + 8, "{between:?}");
+        assert!(
+            (between.lambda - 0.5).abs() < 1e-12 && between.bricks.len() == 64 + 8,
+            "{between:?}"
+        );
         let [(0, fine), (1, coarse)] = between.levels[..] else { panic!("{between:?}") };
         assert!((fine - 0.5).abs() < 1e-12 && (fine + coarse - 1.0).abs() < 1e-12);
         // In perspective, at the nearest point of the box: twice as far, one level more.
         let scale = at(1.0).scale;
-        for (distance, lambda) in
-            [(-98.0, 0.0), (0.0, 0.0), (2.0 * scale, 0.0), (4.0 * scale, 1.0), (6.0 * scale, 3f64.log2())]
-        {
+        for (distance, lambda) in [
+            (-98.0, 0.0),
+            (0.0, 0.0),
+            (2.0 * scale, 0.0),
+            (4.0 * scale, 1.0),
+            (6.0 * scale, 3f64.log2()),
+        ] {
             let found = choice(&bricks, &at(distance), 2.0, 1.0, &shows, MANY).lambda;
             assert!((found - lambda).abs() < 1e-9, "{distance}: {found}");
         }
@@ -196,14 +236,18 @@ mod tests {
         let bricks = ramp();
         // Values over 150 are at x of 75 and more; kernels and ranges reach 3 further.
         let shown = choice(&bricks, &flat(400.0), 2.0, 1.0, &over(150.0), MANY);
-        let columns: Vec<usize> = shown.bricks.iter().map(|&(_, brick)| bricks.level(0).place(brick)[0]).collect();
+        let columns: Vec<usize> =
+            shown.bricks.iter().map(|&(_, brick)| bricks.level(0).place(brick)[0]).collect();
         assert!(columns.len() == 32 && columns.iter().all(|x| *x >= 2), "{columns:?}");
         assert_eq!(choice(&bricks, &flat(400.0), 2.0, 1.0, &EVERYTHING, MANY).bricks.len(), 64);
         assert!(choice(&bricks, &flat(400.0), 2.0, 1.0, &over(250.0), MANY).bricks.is_empty());
         // A picture of the middle alone: bricks 1 and 2 along x and y.
         let middle = choice(&bricks, &flat(10.0), 2.0, 1.0, &over(-5.0), MANY);
         let places = || middle.bricks.iter().map(|&(_, brick)| bricks.level(0).place(brick));
-        assert!(middle.bricks.len() == 4 && places().all(|[x, y, _]| x == 1 && y == 1), "{middle:?}");
+        assert!(
+            middle.bricks.len() == 4 && places().all(|[x, y, _]| x == 1 && y == 1),
+            "{middle:?}"
+        );
         // The sample at 99.5 steps is the last of brick 1; wider kernels of brick 2 reach it.
         let wider = choice(&bricks, &flat(10.0), 14.0, 1.0, &over(-5.0), MANY);
         assert_eq!(wider.bricks.len(), 16);
@@ -221,9 +265,14 @@ mod tests {
         let distance = |&(level, brick): &(usize, u32)| {
             let size = bricks.level(level);
             let place: [f64; 3] = size.place(brick).map(|at| (at * SIDE) as f64);
-            let last: [f64; 3] = std::array::from_fn(|axis| (place[axis] + 31.0).min(size.dims[axis] as f64 - 1.0));
+            let last: [f64; 3] =
+                std::array::from_fn(|axis| (place[axis] + 31.0).min(size.dims[axis] as f64 - 1.0));
             let middle = 0.5 * (DVec3::from_array(place) + DVec3::from_array(last));
-            bricks.lattice(level).position(middle).distance(DVec3::new(99.0, 99.0, -3.0 * at(1.0).scale))
+            bricks.lattice(level).position(middle).distance(DVec3::new(
+                99.0,
+                99.0,
+                -3.0 * at(1.0).scale,
+            ))
         };
         let distances: Vec<f64> = found.bricks.iter().map(distance).collect();
         assert!(distances.is_sorted_by(|a, b| *a <= b + 1e-9));
@@ -237,6 +286,9 @@ mod tests {
             assert!(found.bricks.len() <= most.max(1));
             found.lambda
         };
-        assert_eq!([72, 64, 63, 9, 8, 7, 1, 0].map(lambda), [0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0]);
+        assert_eq!(
+            [72, 64, 63, 9, 8, 7, 1, 0].map(lambda),
+            [0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0]
+        );
     }
 }

@@ -71,7 +71,10 @@ impl Slices<'_> {
         let size = self.scalar.bytes();
         let [x, y, z] = place.map(|at| (at * SIDE) as isize - REACH as isize);
         // What there is along x, and how often the first one counts before it.
-        let (from, to) = (inside(x, self.level.dims[0]), inside(x + AROUND as isize - 1, self.level.dims[0]) + 1);
+        let (from, to) = (
+            inside(x, self.level.dims[0]),
+            inside(x + AROUND as isize - 1, self.level.dims[0]) + 1,
+        );
         let before = (from as isize - x) as usize;
         let mut row = [[0u8; 2]; AROUND];
         let mut along_y = [[[255u8; 2]; BLOCKS]; AROUND];

@@ -43,7 +43,8 @@ fn means<T: Mean>(samples: &[u8], dims: [usize; 3]) -> Vec<u8> {
     let size = size_of::<T>();
     let [nx, ny, nz] = dims;
     let [cx, cy, cz] = dims.map(|n| n.div_ceil(2));
-    let at = |row: &[u8], i: usize| bytemuck::pod_read_unaligned::<T>(&row[i * size..(i + 1) * size]);
+    let at =
+        |row: &[u8], i: usize| bytemuck::pod_read_unaligned::<T>(&row[i * size..(i + 1) * size]);
     let mut out = vec![0; cx * cy * cz * size];
     out.par_chunks_mut(cx * size).enumerate().for_each(|(row, out)| {
         let (j, k) = (2 * (row % cy), 2 * (row / cy));
@@ -55,7 +56,9 @@ fn means<T: Mean>(samples: &[u8], dims: [usize; 3]) -> Vec<u8> {
         for (i, out) in out.chunks_exact_mut(size).enumerate() {
             let (left, right) = (2 * i, (2 * i + 1).min(nx - 1));
             let [a, b, c, d] = rows.map(|row| [at(row, left), at(row, right)]);
-            out.copy_from_slice(bytemuck::bytes_of(&T::mean([a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1]])));
+            out.copy_from_slice(bytemuck::bytes_of(&T::mean([
+                a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1],
+            ])));
         }
     });
     out

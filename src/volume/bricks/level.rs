@@ -37,17 +37,22 @@ impl Level {
 
 /// The levels of a volume, finest first: the last one fits in a brick.
 pub fn levels(dims: [usize; 3]) -> Vec<Level> {
-    let halved = |level: &Level| (level.bricks() > 1).then(|| Level::new(level.dims.map(|n| n.div_ceil(2))));
+    let halved =
+        |level: &Level| (level.bricks() > 1).then(|| Level::new(level.dims.map(|n| n.div_ceil(2))));
     std::iter::successors(Some(Level::new(dims)), halved).collect()
 }
 
 /// Says in words why a lattice has no bricks: only Cartesian ones do, of no more bricks than 32 bits can count.
 pub fn refusal(lattice: &Lattice) -> Result<(), String> {
     let name = match lattice.arrangement {
-        Arrangement::Cartesian if u32::try_from(Level::new(lattice.dims).bricks()).is_ok() => return Ok(()),
+        Arrangement::Cartesian if u32::try_from(Level::new(lattice.dims).bricks()).is_ok() => {
+            return Ok(());
+        }
         Arrangement::Cartesian => {
             let [nx, ny, nz] = lattice.dims;
-            return Err(format!("{nx} × {ny} × {nz} samples are more bricks than 32 bits can count"));
+            return Err(format!(
+                "{nx} × {ny} × {nz} samples are more bricks than 32 bits can count"
+            ));
         }
         Arrangement::BodyCentred => "body-centred",
         Arrangement::Rectilinear(_) => "rectilinear",
@@ -103,7 +108,11 @@ mod tests {
         let bcc = Lattice::body_centred([4; 3], DVec3::ZERO, DMat3::IDENTITY);
         assert!(refusal(&bcc).unwrap_err().contains("body-centred"));
         let places = Arrangement::Rectilinear([vec![0.0], vec![0.0], vec![0.0]].into());
-        assert!(refusal(&Lattice { arrangement: places, ..bcc.clone() }).unwrap_err().contains("rectilinear"));
+        assert!(
+            refusal(&Lattice { arrangement: places, ..bcc.clone() })
+                .unwrap_err()
+                .contains("rectilinear")
+        );
         let huge = Lattice::with_spacing([1 << 21; 3], DVec3::ONE);
         assert!(refusal(&huge).unwrap_err().contains("32 bits"));
         assert!(refusal(&Lattice::with_spacing([4; 3], DVec3::ONE)).is_ok());

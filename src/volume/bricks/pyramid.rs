@@ -24,7 +24,8 @@ struct Growing {
 
 impl Pyramid {
     pub fn new(scalar: Scalar, dims: [usize; 3]) -> Self {
-        let growing = |level| Growing { level, first: 0, samples: Vec::new(), halved: 0, layers: 0 };
+        let growing =
+            |level| Growing { level, first: 0, samples: Vec::new(), halved: 0, layers: 0 };
         Self { scalar, growing: levels(dims).into_iter().map(growing).collect() }
     }
 
@@ -36,7 +37,11 @@ impl Pyramid {
 
     /// Adds the next slices of level 0, as the bytes of their samples. `layer` is given each layer of bricks that can be cut
     /// now: its level, its number, and slices that hold what its bricks need. The layers of a level come in order.
-    pub fn push(&mut self, slices: &[u8], mut layer: impl FnMut(usize, usize, &Slices) -> Result<()>) -> Result<()> {
+    pub fn push(
+        &mut self,
+        slices: &[u8],
+        mut layer: impl FnMut(usize, usize, &Slices) -> Result<()>,
+    ) -> Result<()> {
         let mut coarse: Vec<u8>;
         let mut next = slices;
         for number in 0..self.growing.len() {
@@ -83,10 +88,17 @@ impl Growing {
         made
     }
 
-    fn cut(&mut self, scalar: Scalar, mut layer: impl FnMut(usize, &Slices) -> Result<()>) -> Result<()> {
+    fn cut(
+        &mut self,
+        scalar: Scalar,
+        mut layer: impl FnMut(usize, &Slices) -> Result<()>,
+    ) -> Result<()> {
         let (arrived, is_whole) = self.arrived(scalar);
-        let slices = Slices { level: self.level, scalar, first: self.first, samples: &self.samples };
-        while self.layers < self.level.brick_dims[2] && (is_whole || arrived >= (self.layers + 1) * SIDE + REACH) {
+        let slices =
+            Slices { level: self.level, scalar, first: self.first, samples: &self.samples };
+        while self.layers < self.level.brick_dims[2]
+            && (is_whole || arrived >= (self.layers + 1) * SIDE + REACH)
+        {
             layer(self.layers, &slices)?;
             self.layers += 1;
         }

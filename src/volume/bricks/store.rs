@@ -77,7 +77,10 @@ enum Bytes {
 
 impl std::fmt::Debug for Bricks {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Bricks").field("path", &self.path).field("header", &self.header).finish_non_exhaustive()
+        f.debug_struct("Bricks")
+            .field("path", &self.path)
+            .field("header", &self.header)
+            .finish_non_exhaustive()
     }
 }
 
@@ -139,7 +142,11 @@ impl Bricks {
         let (stored, directory) = begun?;
         let header = stored.header;
         let levels = level::levels(header.lattice.dims);
-        let ranges = directory.levels.iter().map(|level| level.iter().map(|entry| entry.range).collect()).collect();
+        let ranges = directory
+            .levels
+            .iter()
+            .map(|level| level.iter().map(|entry| entry.range).collect())
+            .collect();
         Ok(Self {
             path: path.to_owned(),
             header,
@@ -206,7 +213,10 @@ impl Bricks {
     pub fn read(&self, level: usize, brick: u32) -> Result<Brick> {
         let size = self.levels.get(level).filter(|size| (brick as usize) < size.bricks());
         let size = *size.ok_or_else(|| {
-            Error::Argument(format!("{}: there is no brick {brick} of level {level}", self.path.display()))
+            Error::Argument(format!(
+                "{}: there is no brick {brick} of level {level}",
+                self.path.display()
+            ))
         })?;
         match &self.origin {
             Origin::Memory { volume, coarse, steps } => {
@@ -231,7 +241,8 @@ impl Bricks {
     /// [`Error::Argument`] where there is no such level; [`Error::Input`] for damaged bricks; [`Error::Limit`] for a level
     /// larger than the limits allow.
     pub fn volume(&self, level: usize) -> Result<Volume> {
-        let missing = || Error::Argument(format!("{}: there is no level {level}", self.path.display()));
+        let missing =
+            || Error::Argument(format!("{}: there is no level {level}", self.path.display()));
         let size = *self.levels.get(level).ok_or_else(missing)?;
         let scalar = self.header.scalar;
         let [nx, ny, _] = size.dims;
@@ -241,35 +252,44 @@ impl Bricks {
         self.check_memory(&format!("the size of level {level} in bytes"), size.dims[2], size, 2)?;
         let mut bytes = vec![0; size.slice() * size.dims[2] * scalar.bytes()];
         // Each layer of bricks is a part of its own.
-        bytes.par_chunks_mut(super::SIDE * ny * row).enumerate().try_for_each(|(layer, slices)| {
-            for number in layer * bx * by..(layer + 1) * bx * by {
-                let brick = self.read(level, number as u32)?;
-                let [x, y, _] = size.place(number as u32).map(|at| at * super::SIDE);
-                let width = super::SIDE.min(nx - x) * scalar.bytes();
-                let rows = brick.samples.chunks(super::SIDE * scalar.bytes()).enumerate();
-                for (at, samples) in rows {
-                    let (j, k) = (y + at % super::SIDE, at / super::SIDE);
-                    let start = (k * ny + j) * row + x * scalar.bytes();
-                    if j < ny
-                        && let Some(place) = slices.get_mut(start..start + width)
-                    {
-                        place.copy_from_slice(&samples[..width]);
+        bytes.par_chunks_mut(super::SIDE * ny * row).enumerate().try_for_each(
+            |(layer, slices)| {
+                for number in layer * bx * by..(layer + 1) * bx * by {
+                    let brick = self.read(level, number as u32)?;
+                    let [x, y, _] = size.place(number as u32).map(|at| at * super::SIDE);
+                    let width = super::SIDE.min(nx - x) * scalar.bytes();
+                    let rows = brick.samples.chunks(super::SIDE * scalar.bytes()).enumerate();
+                    for (at, samples) in rows {
+                        let (j, k) = (y + at % super::SIDE, at / super::SIDE);
+                        let start = (k * ny + j) * row + x * scalar.bytes();
+                        if j < ny
+                            && let Some(place) = slices.get_mut(start..start + width)
+                        {
+                            place.copy_from_slice(&samples[..width]);
+                        }
                     }
                 }
-            }
-            Ok::<(), Error>(())
-        })?;
+                Ok::<(), Error>(())
+            },
+        )?;
         let samples = Samples::from_bytes(scalar, &bytes);
-        let mut volume =
-            Volume::new(self.lattice(level), samples).map_err(|message| damaged(&self.path, "samples", message))?;
+        let mut volume = Volume::new(self.lattice(level), samples)
+            .map_err(|message| damaged(&self.path, "samples", message))?;
         volume.range = self.header.range;
         Ok(volume)
     }
 
     /// Refuses so many slices of a level, `times` as large as their samples, where the limits allow less.
-    pub(super) fn check_memory(&self, what: &str, slices: usize, level: Level, times: u64) -> Result<()> {
+    pub(super) fn check_memory(
+        &self,
+        what: &str,
+        slices: usize,
+        level: Level,
+        times: u64,
+    ) -> Result<()> {
         let slice = (level.dims[0] as u64).saturating_mul(level.dims[1] as u64);
-        let bytes = slice.saturating_mul(slices as u64).saturating_mul(self.header.scalar.bytes() as u64);
+        let bytes =
+            slice.saturating_mul(slices as u64).saturating_mul(self.header.scalar.bytes() as u64);
         self.limits.check(LimitKind::Bytes, &self.path, what, bytes.saturating_mul(times))
     }
 
@@ -297,11 +317,21 @@ fn begin(path: &Path, all: &[u8], limits: &Limits) -> Result<(Stored, Directory)
         return Err(incomplete(path, format!("byte {present} of {end}")));
     }
     if present > end {
-        return Err(damaged(path, format!("byte {end}"), format!("{} bytes stand behind the end", present - end)));
+        return Err(damaged(
+            path,
+            format!("byte {end}"),
+            format!("{} bytes stand behind the end", present - end),
+        ));
     }
-    let directory = Directory::decode(all, &stored).map_err(|message| damaged(path, "directory", message))?;
+    let directory =
+        Directory::decode(all, &stored).map_err(|message| damaged(path, "directory", message))?;
     let memory = present + directory.memory();
-    limits.check(LimitKind::Bytes, path, "the size of the file and its directory in bytes", memory)?;
+    limits.check(
+        LimitKind::Bytes,
+        path,
+        "the size of the file and its directory in bytes",
+        memory,
+    )?;
     Ok((stored, directory))
 }
 
@@ -322,7 +352,12 @@ impl Bytes {
     }
 }
 
-fn in_memory<'a>(volume: &'a Volume, coarse: &'a [Vec<u8>], number: usize, level: Level) -> Slices<'a> {
+fn in_memory<'a>(
+    volume: &'a Volume,
+    coarse: &'a [Vec<u8>],
+    number: usize,
+    level: Level,
+) -> Slices<'a> {
     let samples = number.checked_sub(1).map_or(volume.samples.bytes(), |above| &coarse[above]);
     Slices { level, scalar: volume.samples.scalar(), first: 0, samples }
 }
@@ -332,16 +367,19 @@ fn refused(path: &Path, refusal: Refusal) -> Error {
         Refusal::Incomplete => incomplete(path, "header"),
         Refusal::Foreign => Error::input(path, "header", "is no volume in bricks")
             .hint("give a .splv file, or convert the source to one"),
-        Refusal::Version(version) => {
-            Error::input(path, "header", format!("is of version {version}; version {VERSION} can be read"))
-                .hint("convert the source again, or use the release that wrote the file")
-        }
+        Refusal::Version(version) => Error::input(
+            path,
+            "header",
+            format!("is of version {version}; version {VERSION} can be read"),
+        )
+        .hint("convert the source again, or use the release that wrote the file"),
         Refusal::Damaged(message) => damaged(path, "header", message),
     }
 }
 
 fn incomplete(path: &Path, place: impl Into<String>) -> Error {
-    Error::input(path, place, "the file is incomplete: it ends before its last brick").hint("copy or convert it again")
+    Error::input(path, place, "the file is incomplete: it ends before its last brick")
+        .hint("copy or convert it again")
 }
 
 fn damaged(path: &Path, place: impl Into<String>, message: impl Into<String>) -> Error {

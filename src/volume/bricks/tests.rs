@@ -17,10 +17,16 @@ fn samples(scalar: Scalar, dims: [usize; 3]) -> Samples {
     let mut state = 1u64;
     let count = dims.iter().product::<usize>();
     let values = (0..count).map(|index| {
-        let [x, y, z] = [index % dims[0], index / dims[0] % dims[1], index / dims[0] / dims[1]].map(|n| n as f64);
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let [x, y, z] = [index % dims[0], index / dims[0] % dims[1], index / dims[0] / dims[1]]
+            .map(|n| n as f64);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let noise = if index % 5 == 0 { (state >> 40) as f64 / (1u64 << 24) as f64 } else { 0.0 };
-        if x + y + z < 40.0 { 0.2 } else { 0.5 + 0.25 * (0.2 * x + 0.1 * y).sin() * (0.15 * z).cos() + 0.2 * noise }
+        if x + y + z < 40.0 {
+            0.2
+        } else {
+            0.5 + 0.25 * (0.2 * x + 0.1 * y).sin() * (0.15 * z).cos() + 0.2 * noise
+        }
     });
     match scalar {
         Scalar::U8 => Samples::U8(values.map(|v| (v * 255.0) as u8).collect()),
@@ -50,11 +56,15 @@ fn value(bricks: &[Brick], level: &Level, scalar: Scalar, at: [usize; 3]) -> f64
     let [nx, ny, _] = level.brick_dims;
     let [i, j, k] = at.map(|n| n / SIDE);
     let [x, y, z] = at.map(|n| n % SIDE);
-    scalar.value(&bricks[(k * ny + j) * nx + i].samples[((z * SIDE + y) * SIDE + x) * scalar.bytes()..])
+    scalar.value(
+        &bricks[(k * ny + j) * nx + i].samples[((z * SIDE + y) * SIDE + x) * scalar.bytes()..],
+    )
 }
 
 fn every(bricks: &Bricks, level: usize) -> Vec<Brick> {
-    (0..bricks.level(level).bricks() as u32).map(|brick| bricks.read(level, brick).unwrap()).collect()
+    (0..bricks.level(level).bricks() as u32)
+        .map(|brick| bricks.read(level, brick).unwrap())
+        .collect()
 }
 
 const ODD: [[usize; 3]; 5] = [[67, 35, 41], [1, 1, 1], [33, 1, 70], [32, 32, 32], [5, 90, 31]];
@@ -65,20 +75,32 @@ fn files_hold_what_memory_does() {
         for dims in ODD {
             let volume = volume(scalar, dims);
             let bytes = to_bytes(&volume, &options()).unwrap();
-            let (file, memory) = (open(&bytes).unwrap(), Bricks::from_volume(Arc::new(volume.clone())).unwrap());
+            let (file, memory) =
+                (open(&bytes).unwrap(), Bricks::from_volume(Arc::new(volume.clone())).unwrap());
             let header = file.header();
-            assert_eq!((&header.lattice, header.scalar, header.range), (&volume.lattice, scalar, volume.range));
+            assert_eq!(
+                (&header.lattice, header.scalar, header.range),
+                (&volume.lattice, scalar, volume.range)
+            );
             assert_eq!((header.unit.as_str(), header.source.as_str()), ("mm", "a.raw"));
             assert_eq!(file.levels(), memory.levels());
             for level in 0..file.levels().len() {
                 assert_eq!(file.ranges(level), memory.ranges(level));
                 assert_eq!(file.lattice(level), memory.lattice(level));
-                assert_eq!(every(&file, level), every(&memory, level), "{scalar:?} {dims:?} level {level}");
+                assert_eq!(
+                    every(&file, level),
+                    every(&memory, level),
+                    "{scalar:?} {dims:?} level {level}"
+                );
             }
             let bricks = every(&file, 0);
             for index in 0..volume.len() {
                 let at = volume.lattice.index(index);
-                assert_eq!(value(&bricks, file.level(0), scalar, at), volume.value(index), "{scalar:?} {at:?}");
+                assert_eq!(
+                    value(&bricks, file.level(0), scalar, at),
+                    volume.value(index),
+                    "{scalar:?} {at:?}"
+                );
             }
         }
     }
@@ -95,12 +117,19 @@ fn levels_are_means() {
                 for index in 0..size.dims.iter().product() {
                     let at = bricks.lattice(level).index(index);
                     let corner = |corner: usize| {
-                        let at = [0, 1, 2].map(|axis| (2 * at[axis] + (corner >> axis & 1)).min(below.dims[axis] - 1));
+                        let at = [0, 1, 2].map(|axis| {
+                            (2 * at[axis] + (corner >> axis & 1)).min(below.dims[axis] - 1)
+                        });
                         value(&fine, below, scalar, at)
                     };
                     let mean = (0..8).map(corner).sum::<f64>() / 8.0;
-                    let expected = if scalar == Scalar::F32 { f64::from(mean as f32) } else { mean.round() };
-                    assert_eq!(value(&coarse, size, scalar, at), expected, "{scalar:?} {dims:?} level {level} {at:?}");
+                    let expected =
+                        if scalar == Scalar::F32 { f64::from(mean as f32) } else { mean.round() };
+                    assert_eq!(
+                        value(&coarse, size, scalar, at),
+                        expected,
+                        "{scalar:?} {dims:?} level {level} {at:?}"
+                    );
                 }
             }
         }
@@ -109,7 +138,9 @@ fn levels_are_means() {
 
 #[test]
 fn ranges_are_those_of_brute_force() {
-    for (scalar, dims) in [(Scalar::U8, [67, 35, 41]), (Scalar::F32, [33, 1, 70]), (Scalar::I16, [5, 90, 31])] {
+    for (scalar, dims) in
+        [(Scalar::U8, [67, 35, 41]), (Scalar::F32, [33, 1, 70]), (Scalar::I16, [5, 90, 31])]
+    {
         let bricks = Bricks::from_volume(Arc::new(volume(scalar, dims))).unwrap();
         let [lowest, highest] = bricks.header().range;
         let scale = 255.0 / (highest - lowest);
@@ -119,14 +150,17 @@ fn ranges_are_those_of_brute_force() {
                 let place = level.place(brick as u32);
                 let mut whole = EMPTY;
                 for (index, &block) in found.blocks.iter().enumerate() {
-                    let block_at = [index % BLOCKS, index / BLOCKS % BLOCKS, index / BLOCKS / BLOCKS];
-                    let start: [usize; 3] = std::array::from_fn(|axis| place[axis] * SIDE + block_at[axis] * BLOCK);
+                    let block_at =
+                        [index % BLOCKS, index / BLOCKS % BLOCKS, index / BLOCKS / BLOCKS];
+                    let start: [usize; 3] =
+                        std::array::from_fn(|axis| place[axis] * SIDE + block_at[axis] * BLOCK);
                     if (0..3).any(|axis| start[axis] >= level.dims[axis]) {
                         assert_eq!(block, EMPTY);
                         continue;
                     }
                     let around = |axis: usize| {
-                        start[axis].saturating_sub(REACH)..(start[axis] + BLOCK + REACH).min(level.dims[axis])
+                        start[axis].saturating_sub(REACH)
+                            ..(start[axis] + BLOCK + REACH).min(level.dims[axis])
                     };
                     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
                     for (k, j) in around(2).flat_map(|k| around(1).map(move |j| (k, j))) {
@@ -135,8 +169,15 @@ fn ranges_are_those_of_brute_force() {
                             (low, high) = (low.min(value), high.max(value));
                         }
                     }
-                    let steps = [((low - lowest) * scale).floor(), ((high - lowest) * scale).ceil().min(255.0)];
-                    assert_eq!(block.map(f64::from), steps, "level {number}, brick {brick}, block {index}");
+                    let steps = [
+                        ((low - lowest) * scale).floor(),
+                        ((high - lowest) * scale).ceil().min(255.0),
+                    ];
+                    assert_eq!(
+                        block.map(f64::from),
+                        steps,
+                        "level {number}, brick {brick}, block {index}"
+                    );
                     whole = [whole[0].min(block[0]), whole[1].max(block[1])];
                 }
                 assert_eq!((bricks.ranges(number)[brick], found.range()), (whole, whole));
@@ -147,14 +188,20 @@ fn ranges_are_those_of_brute_force() {
 
 #[test]
 fn what_one_value_says_takes_no_room() {
-    let constant =
-        Volume::new(Lattice::with_spacing([64; 3], DVec3::ONE), Samples::U16(vec![7; 64 * 64 * 64])).unwrap();
+    let constant = Volume::new(
+        Lattice::with_spacing([64; 3], DVec3::ONE),
+        Samples::U16(vec![7; 64 * 64 * 64]),
+    )
+    .unwrap();
     let bytes = to_bytes(&constant, &WriteOptions::default()).unwrap();
     // Header, the entries of eight bricks and one, their checksum, and the hash.
     assert_eq!(bytes.len(), 196 + 9 * 16 + 4 + 32);
     let file = open(&bytes).unwrap();
     assert_eq!(file.ranges(0)[0], [0, 0]);
-    assert_eq!(file.read(0, 0).unwrap().samples, bytemuck::cast_slice::<u16, u8>(&[7; 32 * 32 * 32]));
+    assert_eq!(
+        file.read(0, 0).unwrap().samples,
+        bytemuck::cast_slice::<u16, u8>(&[7; 32 * 32 * 32])
+    );
     // Noise is kept as it is.
     let noise = samples(Scalar::F32, [32; 3]);
     let mut state = 1u32;
@@ -162,7 +209,9 @@ fn what_one_value_says_takes_no_room() {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         state.rotate_left(13) as u8
     });
-    let noise = Volume::new(Lattice::with_spacing([32; 3], DVec3::ONE), Samples::U8(noise.collect())).unwrap();
+    let noise =
+        Volume::new(Lattice::with_spacing([32; 3], DVec3::ONE), Samples::U8(noise.collect()))
+            .unwrap();
     let bytes = to_bytes(&noise, &WriteOptions::default()).unwrap();
     assert!(bytes.len() <= 196 + 20 + 32 + 32 * 32 * 32 + 1024);
     assert_eq!(open(&bytes).unwrap().read(0, 0).unwrap().samples, noise.samples.bytes());
@@ -171,7 +220,9 @@ fn what_one_value_says_takes_no_room() {
 #[test]
 fn streams_become_the_same_file() {
     let folder = Folder::new();
-    for (scalar, dims) in [(Scalar::U8, [67, 35, 141]), (Scalar::I16, [40, 40, 97]), (Scalar::F32, [33, 1, 70])] {
+    for (scalar, dims) in
+        [(Scalar::U8, [67, 35, 141]), (Scalar::I16, [40, 40, 97]), (Scalar::F32, [33, 1, 70])]
+    {
         let mut volume = volume(scalar, dims);
         volume.lattice = Lattice::with_spacing(dims, DVec3::new(1.0, 2.0, 3.0));
         let raw = folder.write("a.raw", volume.samples.bytes());
@@ -241,7 +292,8 @@ fn refusal(bytes: &[u8]) -> Option<String> {
         Err(error) => return Some(told(error)),
     };
     let all = bricks.levels().iter().enumerate();
-    let all = all.flat_map(|(number, level)| (0..level.bricks() as u32).map(move |brick| (number, brick)));
+    let all = all
+        .flat_map(|(number, level)| (0..level.bricks() as u32).map(move |brick| (number, brick)));
     all.filter_map(|(level, brick)| bricks.read(level, brick).err()).map(told).next()
 }
 
@@ -329,7 +381,11 @@ fn wrong_contents_are_found() {
     let right = volume(Scalar::I16, [70, 40, 33]);
     let codes = |bytes: Vec<u8>| {
         let report = check(&folder.write("a.splv", bytes), &Limits::default(), &|_, _| ());
-        report.findings.iter().map(|finding| (finding.code, finding.place.clone())).collect::<Vec<_>>()
+        report
+            .findings
+            .iter()
+            .map(|finding| (finding.code, finding.place.clone()))
+            .collect::<Vec<_>>()
     };
     // The range of a header that its samples do not fill.
     let wide = Volume { range: [right.range[0] - 1.0, right.range[1]], ..right.clone() };
@@ -348,5 +404,9 @@ fn wrong_contents_are_found() {
     assert_eq!(changed((1, 1), &|brick| brick.blocks[0][1] -= 1), [("blocks", place())]);
     // A sample of the finest level that the coarser ones and the blocks around do not know of.
     let lie = changed((0, 1), &|brick| brick.samples[40 * 2 * 32..40 * 2 * 32 + 64].fill(99));
-    assert!(lie.iter().any(|(code, _)| *code == "samples") && lie.iter().any(|(code, _)| *code == "blocks"), "{lie:?}");
+    assert!(
+        lie.iter().any(|(code, _)| *code == "samples")
+            && lie.iter().any(|(code, _)| *code == "blocks"),
+        "{lie:?}"
+    );
 }

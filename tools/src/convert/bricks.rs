@@ -36,7 +36,8 @@ impl Convert {
         match &source {
             Source::Whole(volume) => bricks::write(volume, &self.output, &options, &watch),
             Source::Stream(stream) => {
-                let range = stream.range(&|done, all| stages.set("Looking through the input", done, all))?;
+                let range = stream
+                    .range(&|done, all| stages.set("Looking through the input", done, all))?;
                 bricks::convert(stream, range, &self.output, &options, &watch)
             }
         }
@@ -57,7 +58,11 @@ impl Convert {
                 "total_ms": milliseconds(start),
             }));
         }
-        output::line(format_args!("samples         {} ({nx} × {ny} × {nz}, {})", lattice.len(), scalar.name()))?;
+        output::line(format_args!(
+            "samples         {} ({nx} × {ny} × {nz}, {})",
+            lattice.len(),
+            scalar.name()
+        ))?;
         output::line(format_args!("bytes           {bytes} ({per_sample:.3} a sample)"))?;
         output::line(format_args!("time            {:.2} s", milliseconds(start) / 1e3))
     }
@@ -81,8 +86,14 @@ impl Convert {
         }
         let [nx, ny, nz] = lattice.dims;
         let how = if slice_by_slice { "slice by slice" } else { "as a whole" };
-        output::line(format_args!("samples         {} ({nx} × {ny} × {nz}, {})", lattice.len(), scalar.name()))?;
-        output::line(format_args!("bytes           {unpacked} with all levels, less what packing takes away"))?;
+        output::line(format_args!(
+            "samples         {} ({nx} × {ny} × {nz}, {})",
+            lattice.len(),
+            scalar.name()
+        ))?;
+        output::line(format_args!(
+            "bytes           {unpacked} with all levels, less what packing takes away"
+        ))?;
         output::line(format_args!("memory          about {} MiB, {how}", need >> 20))
     }
 }

@@ -56,15 +56,19 @@ impl Convert {
             drop(stages);
             progress.clear();
             if self.json {
-                return output::line(json!({"expected_memory": need.bytes, "memory": taken, "in_regions": true}));
+                return output::line(
+                    json!({"expected_memory": need.bytes, "memory": taken, "in_regions": true}),
+                );
             }
             return output::line(format_args!(
                 "memory          about {wanted} MiB as a whole; region by region in {} MiB",
                 taken >> 20
             ));
         }
-        let first = self.files.first().map(|file| Stream::open(file, &limits)).transpose()?.flatten();
-        let frame = Frame { up: first.filter(Stream::z_is_up).map(|_| UpAxis::Z), ..Frame::default() };
+        let first =
+            self.files.first().map(|file| Stream::open(file, &limits)).transpose()?.flatten();
+        let frame =
+            Frame { up: first.filter(Stream::z_is_up).map(|_| UpAxis::Z), ..Frame::default() };
         let write = self.surface.write_options(&self.files, &frame);
         let done = convert(&self.files, &limits, &self.output, &options, &write, &watch)?;
         drop(stages);

@@ -34,14 +34,17 @@ pub fn need(files: &[PathBuf], limits: &Limits, options: &SurfelOptions, enough:
         match Stream::open(file, limits) {
             Ok(Some(stream)) => {
                 is_stream = true;
-                between.push(memory_between(stream.counts(), options).map(|bytes| bytes.saturating_add(own)));
+                between.push(
+                    memory_between(stream.counts(), options).map(|bytes| bytes.saturating_add(own)),
+                );
                 continue;
             }
             Ok(None) => in_pieces = in_pieces.map(|_| false),
             // Where the file fits, its reader tells what is wrong with it.
             Err(error) => in_pieces = in_pieces.and(Err(error)),
         }
-        let is_packed = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("splk"));
+        let is_packed =
+            file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("splk"));
         between.push([own.saturating_mul(if is_packed { OF_PACKED_BYTE } else { OF_BYTE }); 2]);
     }
     let blocks = if is_stream { BLOCKS } else { 0 };
@@ -71,7 +74,12 @@ fn sums(between: &[[u64; 2]], blocks: u64) -> [u64; 2] {
 }
 
 /// What a file takes that is read in pieces, where so much is `enough`.
-fn looked_through(file: &Path, limits: &Limits, options: &SurfelOptions, enough: u64) -> splatkit::Result<u64> {
+fn looked_through(
+    file: &Path,
+    limits: &Limits,
+    options: &SurfelOptions,
+    enough: u64,
+) -> splatkit::Result<u64> {
     let own = file_bytes(file);
     let Some(mut stream) = Stream::open(file, limits)? else { return Ok(own) };
     Ok(memory_of_stream(&mut stream, options, enough.saturating_sub(own))?.saturating_add(own))
@@ -83,7 +91,8 @@ pub fn check(file: &Path, need: u64, taken: u64, most: u64) -> Result<(), Failur
         return Ok(());
     }
     let [need, taken, most] = [need, taken, most].map(|bytes| bytes.div_ceil(1 << 20));
-    let before = if taken > 0 { format!(" beside {taken} MiB of the inputs before") } else { String::new() };
+    let before =
+        if taken > 0 { format!(" beside {taken} MiB of the inputs before") } else { String::new() };
     Err(Failure::Usage(format!(
         "{}: this takes about {need} MiB{before}, but only {most} MiB may be taken; --memory allows more",
         file.display()

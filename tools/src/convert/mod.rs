@@ -41,11 +41,16 @@ pub struct Convert {
 
 impl Convert {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
-        let extension = self.output.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+        let extension = self
+            .output
+            .extension()
+            .map(|extension| extension.to_string_lossy().to_ascii_lowercase());
         let extension = extension.unwrap_or_default();
         if !["splk", "ply", "nrrd", "splv"].contains(&extension.as_str()) {
             let file = self.output.display();
-            return Err(Failure::Usage(format!("{file}: only .splk, .ply, .nrrd and .splv files can be written")));
+            return Err(Failure::Usage(format!(
+                "{file}: only .splk, .ply, .nrrd and .splv files can be written"
+            )));
         }
         self.surface.check(&extension)?;
         if !self.dry_run {

@@ -76,5 +76,7 @@ impl Convert {
 
 fn none(file: &Path) -> Failure {
     let file = file.display();
-    Failure::Usage(format!("{file} holds no volume of which this can be made; write surfaces as .splk or .ply"))
+    Failure::Usage(format!(
+        "{file} holds no volume of which this can be made; write surfaces as .splk or .ply"
+    ))
 }

@@ -1,7 +1,10 @@
 //! Meshes, clouds and hierarchies: to a hierarchy, or to 3D Gaussians.
 
 use super::{Convert, memory};
-use crate::{failure::Failure, load::Input, output, parse, progress::Progress, render::milliseconds, scene::in_file};
+use crate::{
+    failure::Failure, load::Input, output, parse, progress::Progress, render::milliseconds,
+    scene::in_file,
+};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use splatkit::{
@@ -91,7 +94,12 @@ impl Convert {
         }
         let most = self.most_memory();
         let limits = self.load.limits();
-        let need = memory::need(&self.files, &limits, &self.surface.surfel_options(limits.deadline()), most);
+        let need = memory::need(
+            &self.files,
+            &limits,
+            &self.surface.surfel_options(limits.deadline()),
+            most,
+        );
         if need.bytes > most {
             return self.in_regions(extension, need, most, progress);
         }
@@ -133,7 +141,8 @@ impl Convert {
         output::line(format_args!("points          {}", gathered.points))?;
         output::line(format_args!("splats          {}", gathered.set.splats.len()))?;
         output::line(format_args!("bytes           {bytes} ({per_point:.2} a point)"))?;
-        let [read, splats, build] = [gathered.read_ms, gathered.splats_ms, build_ms].map(|ms| ms / 1e3);
+        let [read, splats, build] =
+            [gathered.read_ms, gathered.splats_ms, build_ms].map(|ms| ms / 1e3);
         output::line(format_args!(
             "time            {read:.2} s reading, {splats:.2} s splats, {build:.2} s tree and file"
         ))
@@ -183,7 +192,9 @@ impl Convert {
                 memory::check(path, memory_of_splats(header.leaves as usize), taken, most)?;
                 let mut set = hierarchy.leaves()?;
                 let scale = self.surface.radius_scale();
-                set.splats.iter_mut().for_each(|splat| splat.factor = splat.factor.map(|entry| entry * scale));
+                set.splats
+                    .iter_mut()
+                    .for_each(|splat| splat.factor = splat.factor.map(|entry| entry * scale));
                 let frame = Frame { up: header.up, unit: header.unit.clone() };
                 (set, header.closed, frame, header.source_points)
             }
@@ -206,10 +217,18 @@ impl Convert {
         let count = splats.len().min(SAMPLE);
         let first = (splats.len() - count) / 2;
         let SplatSet { origin, payload, extent, overlap, .. } = gathered.set;
-        let part = SplatSet { origin, payload, splats: splats[first..first + count].to_vec(), extent, overlap };
+        let part = SplatSet {
+            origin,
+            payload,
+            splats: splats[first..first + count].to_vec(),
+            extent,
+            overlap,
+        };
         let deadline = self.load.limits().deadline();
-        let (build, write) =
-            (self.surface.build_options(gathered, deadline), self.surface.write_options(&self.files, &gathered.frame));
+        let (build, write) = (
+            self.surface.build_options(gathered, deadline),
+            self.surface.write_options(&self.files, &gathered.frame),
+        );
         let start = Instant::now();
         let built = hierarchy::Tree::build(&part, &build, &|_, _| ());
         let tree = built.map_err(|error| error.in_file(&self.files[0]))?;
@@ -245,7 +264,12 @@ impl Gathered {
     /// Adds the splats of another input.
     fn join(&mut self, other: Self, path: &Path) -> Result<(), Failure> {
         if other.set.extent != self.set.extent {
-            return Err(Error::input(path, "splats", "their footprints end elsewhere than the first input's").into());
+            return Err(Error::input(
+                path,
+                "splats",
+                "their footprints end elsewhere than the first input's",
+            )
+            .into());
         }
         let mut set = other.set;
         set.move_origin(self.set.origin).map_err(|error| in_file(path, error))?;
@@ -270,8 +294,14 @@ impl SurfaceFlags {
         ];
         match flags.into_iter().find(|(_, is_given, of)| *is_given && !of.contains(&extension)) {
             Some((flag, _, of)) => {
-                let of = of.iter().map(|extension| format!(".{extension}")).collect::<Vec<_>>().join(" and ");
-                Err(Failure::Usage(format!("{flag} is for {of} files; it changes nothing in .{extension} ones")))
+                let of = of
+                    .iter()
+                    .map(|extension| format!(".{extension}"))
+                    .collect::<Vec<_>>()
+                    .join(" and ");
+                Err(Failure::Usage(format!(
+                    "{flag} is for {of} files; it changes nothing in .{extension} ones"
+                )))
             }
             None => Ok(()),
         }
@@ -307,7 +337,8 @@ impl SurfaceFlags {
 
     /// What the `frame` says counts where no flag says otherwise.
     pub(super) fn write_options(&self, files: &[PathBuf], frame: &Frame) -> WriteOptions {
-        let name = |path: &PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
+        let name =
+            |path: &PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
         WriteOptions {
             lossless: self.lossless,
             up: match self.up {

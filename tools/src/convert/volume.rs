@@ -24,7 +24,8 @@ impl Convert {
         };
         if self.dry_run {
             return Err(Failure::Usage(
-                "--dry-run is for .splk and .splv; the size of others is that of their samples".into(),
+                "--dry-run is for .splk and .splv; the size of others is that of their samples"
+                    .into(),
             ));
         }
         progress.stage(format!("Reading {}", file.display()));
@@ -54,7 +55,10 @@ impl Convert {
         }
         let [nx, ny, nz] = dims;
         output::line(format_args!("samples read      {count}"))?;
-        output::line(format_args!("samples written   {} ({nx} × {ny} × {nz}, {lattice})", volume.len()))
+        output::line(format_args!(
+            "samples written   {} ({nx} × {ny} × {nz}, {lattice})",
+            volume.len()
+        ))
     }
 }
 
@@ -75,8 +79,11 @@ fn on_lattice(volume: Volume, wanted: Option<Wanted>) -> Result<Volume, Error> {
         | (Arrangement::Cartesian, Some(Wanted::Cartesian))
         | (Arrangement::BodyCentred, Some(Wanted::Bcc)) => Ok(volume),
         (_, Some(wanted)) => {
-            let (from, to) = (name_of(&volume), if wanted == Wanted::Bcc { "bcc" } else { "cartesian" });
-            Err(Error::Argument(format!("a volume on a {from} lattice cannot be resampled on a {to} one")))
+            let (from, to) =
+                (name_of(&volume), if wanted == Wanted::Bcc { "bcc" } else { "cartesian" });
+            Err(Error::Argument(format!(
+                "a volume on a {from} lattice cannot be resampled on a {to} one"
+            )))
         }
     }
 }

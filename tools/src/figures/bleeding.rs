@@ -82,6 +82,7 @@ fn camera(degrees: f64) -> Camera {
 
 /// The mean share of red.
 fn red(picture: &Picture) -> f64 {
-    let shares = picture.color.iter().map(|[red, _, blue, _]| f64::from(red / (red + blue).max(1e-6)));
+    let shares =
+        picture.color.iter().map(|[red, _, blue, _]| f64::from(red / (red + blue).max(1e-6)));
     shares.sum::<f64>() / picture.color.len() as f64
 }

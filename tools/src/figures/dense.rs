@@ -68,7 +68,12 @@ pub fn generated() -> Result<Vec<Case>, Failure> {
     ])
 }
 
-pub fn table(stage: &mut Stage, cases: &[Case], size: [u32; 2], progress: &Progress) -> Result<Table, Failure> {
+pub fn table(
+    stage: &mut Stage,
+    cases: &[Case],
+    size: [u32; 2],
+    progress: &Progress,
+) -> Result<Table, Failure> {
     let mut table = Table::new(
         "Sheets against dense integration.",
         format!(
@@ -85,7 +90,12 @@ pub fn table(stage: &mut Stage, cases: &[Case], size: [u32; 2], progress: &Progr
         let mut settings = Settings::new(size);
         settings.volume_shade = Some(None);
         progress.stage(format!("Integrating {}", case.name));
-        let truth = reference::integrate(&scene, &camera, &settings, STEP * case.volume.lattice.kernel_spacing())?;
+        let truth = reference::integrate(
+            &scene,
+            &camera,
+            &settings,
+            STEP * case.volume.lattice.kernel_spacing(),
+        )?;
         let mut prepared = stage.prepare(&scene)?;
         let default = scene.sheets(&camera.view(size)?, &settings).step;
         let mut cells = Vec::new();
@@ -101,7 +111,8 @@ pub fn table(stage: &mut Stage, cases: &[Case], size: [u32; 2], progress: &Progr
 }
 
 fn camera(bounds: &Bounds, size: [u32; 2]) -> splatkit::Result<Camera> {
-    let mut camera = Camera::framing(bounds, DVec3::Y, DVec3::Z, f64::from(size[0]) / f64::from(size[1]));
+    let mut camera =
+        Camera::framing(bounds, DVec3::Y, DVec3::Z, f64::from(size[0]) / f64::from(size[1]));
     camera.azimuth(30.0);
     camera.elevation(20.0);
     camera.fit(bounds, size, 0.04)?;

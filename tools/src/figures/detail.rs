@@ -39,7 +39,8 @@ fn hierarchy(source: &Source, input: Input) -> Result<Arc<Hierarchy>, Failure> {
         Input::Hierarchy(hierarchy) => Ok(hierarchy),
         Input::Mesh(mesh) => {
             let options = BuildOptions { closed: mesh.is_solid(), ..BuildOptions::default() };
-            let tree = Tree::build(&mesh.surfels(&SurfelOptions::default())?, &options, &|_, _| ())?;
+            let tree =
+                Tree::build(&mesh.surfels(&SurfelOptions::default())?, &options, &|_, _| ())?;
             Ok(Arc::new(Hierarchy::from_tree(tree)?))
         }
         _ => Err(Error::input(&source.path, "file", OTHER).into()),
@@ -47,7 +48,12 @@ fn hierarchy(source: &Source, input: Input) -> Result<Arc<Hierarchy>, Failure> {
 }
 
 /// A camera that sees all, from so many times as far away.
-fn camera(hierarchy: &Hierarchy, source: &Source, size: [u32; 2], farther: f64) -> splatkit::Result<Camera> {
+fn camera(
+    hierarchy: &Hierarchy,
+    source: &Source,
+    size: [u32; 2],
+    farther: f64,
+) -> splatkit::Result<Camera> {
     let subject = Subject { bounds: hierarchy.bounds(), up: source.up };
     let mut camera = CameraFlags::default().camera(&subject, size)?;
     camera.position = camera.focal_point + (camera.position - camera.focal_point) * farther;
@@ -66,7 +72,17 @@ pub fn tables(
             "Pictures of {PIXELS}² pixels, all of the model in view, and from 4 and 16 times as far; a cut of {CUT} pixels. The \
              middle of {FRAMES} frames, after one that brought the pages."
         ),
-        &["model", "splats", "drawn", "ms", "drawn, ¼ as wide", "ms", "drawn, 1/16", "ms", "GPU MiB"],
+        &[
+            "model",
+            "splats",
+            "drawn",
+            "ms",
+            "drawn, ¼ as wide",
+            "ms",
+            "drawn, 1/16",
+            "ms",
+            "GPU MiB",
+        ],
     );
     let mut sweep = Table::new(
         "Zoom sweep.",
@@ -122,8 +138,10 @@ pub fn tables(
             changes.push(largest);
         }
         let ratio = changes[0] / changes[1];
-        sweep
-            .row(source.name(), [(changes[0], 3), (changes[1], 3), (ratio, 3)].map(|(v, n)| Cell::Number(v, n)).into());
+        sweep.row(
+            source.name(),
+            [(changes[0], 3), (changes[1], 3), (ratio, 3)].map(|(v, n)| Cell::Number(v, n)).into(),
+        );
     }
     Ok([cost, sweep])
 }

@@ -63,12 +63,17 @@ pub fn row(tree: &Tree) -> splatkit::Result<(Hierarchy, Vec<Cell>)> {
     };
     let mut errors: Vec<f64> = sample.iter().zip(&pairs).map(error).collect();
     errors.sort_by(f64::total_cmp);
-    let angle = |(a, b): &(&Node, &Node)| match (decode_normal(a.splat.normal), decode_normal(b.splat.normal)) {
+    let angle = |(a, b): &(&Node, &Node)| match (
+        decode_normal(a.splat.normal),
+        decode_normal(b.splat.normal),
+    ) {
         (Some(a), Some(b)) => 2.0 * f64::from(a.distance(b) * 0.5).asin().to_degrees(),
         _ => 0.0,
     };
     let radius = |(a, b): &(&Node, &Node)| f64::from(b.radius / a.radius);
-    let mean = |of: &dyn Fn(&(&Node, &Node)) -> f64| pairs.iter().map(of).sum::<f64>() / pairs.len() as f64;
+    let mean = |of: &dyn Fn(&(&Node, &Node)) -> f64| {
+        pairs.iter().map(of).sum::<f64>() / pairs.len() as f64
+    };
     let largest = |of: &dyn Fn(&(&Node, &Node)) -> f64| pairs.iter().map(of).fold(0.0, f64::max);
     let root = f64::from(read.blocks[0].nodes[0].radius) / smallest_sphere(&leaves);
     let cells = vec![
@@ -97,7 +102,8 @@ fn nearest<'a>(leaf: &Node, kept: &[&'a Node]) -> &'a Node {
     for other in kept {
         let apart = place.distance(other.splat.center.into());
         if apart < found.0 {
-            let turned = normal.zip(decode_normal(other.splat.normal)).map_or(0.0, |(a, b)| a.distance(b));
+            let turned =
+                normal.zip(decode_normal(other.splat.normal)).map_or(0.0, |(a, b)| a.distance(b));
             let distance = apart + 0.2 * (leaf.size * turned + (leaf.size - other.size).abs());
             if distance < found.0 {
                 found = (distance, other);
@@ -118,13 +124,16 @@ fn spacing(places: &[Vec3], index: usize) -> f64 {
             nearest[at] = distance;
         }
     }
-    nearest.iter().filter(|d| d.is_finite()).map(|d| f64::from(d.sqrt())).sum::<f64>() / NEIGHBOURS as f64
+    nearest.iter().filter(|d| d.is_finite()).map(|d| f64::from(d.sqrt())).sum::<f64>()
+        / NEIGHBOURS as f64
 }
 
 /// The radius of the smallest sphere around the leaves' as they were, nearly: by many small steps.
 fn smallest_sphere(leaves: &[&Node]) -> f64 {
-    let spheres: Vec<(DVec3, f64)> =
-        leaves.iter().map(|leaf| (Vec3::from(leaf.center).as_dvec3(), f64::from(leaf.radius))).collect();
+    let spheres: Vec<(DVec3, f64)> = leaves
+        .iter()
+        .map(|leaf| (Vec3::from(leaf.center).as_dvec3(), f64::from(leaf.radius)))
+        .collect();
     let mut center = spheres.iter().map(|sphere| sphere.0).sum::<DVec3>() / spheres.len() as f64;
     let mut best = f64::INFINITY;
     for round in 0..1000 {

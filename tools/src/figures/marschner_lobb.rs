@@ -45,9 +45,11 @@ pub fn table(stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {
     for side in sides {
         cartesian.push(SIGNAL.sample([side; 3]).map_err(splatkit::Error::Argument)?);
     }
-    for (name, interpolation) in [("trilinear", linear_weights as fn(f64) -> [f64; 4]), ("Catmull–Rom", cubic_weights)]
+    for (name, interpolation) in
+        [("trilinear", linear_weights as fn(f64) -> [f64; 4]), ("Catmull–Rom", cubic_weights)]
     {
-        let cells = cartesian.iter().map(|volume| error(|p| interpolated(volume, p, interpolation)));
+        let cells =
+            cartesian.iter().map(|volume| error(|p| interpolated(volume, p, interpolation)));
         table.row(name, cells.collect());
     }
     let smooth = Kernel::gaussian(0.6, 2.0)?;
@@ -63,7 +65,9 @@ pub fn table(stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {
         for (side, volume) in sides.into_iter().zip(&cartesian) {
             progress.stage(format!("Marschner–Lobb, {name}, {side}³"));
             let volume = match body_centred {
-                true => SIGNAL.sample_on(generate::body_centred(side)).map_err(splatkit::Error::Argument)?,
+                true => SIGNAL
+                    .sample_on(generate::body_centred(side))
+                    .map_err(splatkit::Error::Argument)?,
                 false => volume.clone(),
             };
             let volume = if sharp { volume.sharpened(shape)? } else { volume };
@@ -178,7 +182,12 @@ fn linear_weights(t: f64) -> [f64; 4] {
 /// Catmull and Rom 1974.
 fn cubic_weights(t: f64) -> [f64; 4] {
     let (t2, t3) = (t * t, t * t * t);
-    [-0.5 * t + t2 - 0.5 * t3, 1.0 - 2.5 * t2 + 1.5 * t3, 0.5 * t + 2.0 * t2 - 1.5 * t3, -0.5 * t2 + 0.5 * t3]
+    [
+        -0.5 * t + t2 - 0.5 * t3,
+        1.0 - 2.5 * t2 + 1.5 * t3,
+        0.5 * t + 2.0 * t2 - 1.5 * t3,
+        -0.5 * t2 + 0.5 * t3,
+    ]
 }
 
 #[cfg(test)]
@@ -188,8 +197,12 @@ mod tests {
     #[test]
     fn interpolation_has_its_known_errors() {
         let volume = SIGNAL.sample([40; 3]).unwrap();
-        for (weights, expected) in [(linear_weights as fn(f64) -> [f64; 4], 2.92), (cubic_weights, 1.93)] {
-            let Cell::Number(error, _) = error(|p| interpolated(&volume, p, weights)) else { panic!() };
+        for (weights, expected) in
+            [(linear_weights as fn(f64) -> [f64; 4], 2.92), (cubic_weights, 1.93)]
+        {
+            let Cell::Number(error, _) = error(|p| interpolated(&volume, p, weights)) else {
+                panic!()
+            };
             assert!((error - expected).abs() < 0.1, "{error} is not {expected}");
         }
     }

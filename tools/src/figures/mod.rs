@@ -90,20 +90,32 @@ impl Stage {
         self.renderer.prepare(scene)
     }
 
-    fn draw(&mut self, scene: &mut PreparedScene, camera: &Camera, settings: &Settings) -> splatkit::Result<Picture> {
+    fn draw(
+        &mut self,
+        scene: &mut PreparedScene,
+        camera: &Camera,
+        settings: &Settings,
+    ) -> splatkit::Result<Picture> {
         Ok(self.renderer.render(scene, camera, settings)?.0)
     }
 }
 
 impl Figures {
     pub fn run(self, progress: &Progress) -> Result<(), Failure> {
-        let block = self.write.as_deref().map(|path| Block::open(path, "figures", "figures")).transpose()?;
+        let block = self
+            .write
+            .as_deref()
+            .map(|path| Block::open(path, "figures", "figures"))
+            .transpose()?;
         self.look_at_inputs()?;
         let pictures = match &self.pictures {
             Some(folder) => surfaces::pictures(&self.surfaces, folder, self.overwrite)?,
             None => Vec::new(),
         };
-        let choice = self.gpu.as_deref().map_or(AdapterChoice::Automatic, |text| text.parse().unwrap_or_default());
+        let choice = self
+            .gpu
+            .as_deref()
+            .map_or(AdapterChoice::Automatic, |text| text.parse().unwrap_or_default());
         let gpu = Gpu::headless(&choice)?;
         let mut stage = Stage { renderer: Renderer::new(&gpu) };
         let mut report = Report { adapter: gpu.info.name.clone(), tables: Vec::new() };
@@ -124,7 +136,13 @@ impl Figures {
         }
         if !self.surfaces.is_empty() {
             let open = |path: &Path| self.load.open(path);
-            report.tables.extend(surfaces::tables(&mut stage, &self.surfaces, open, &pictures, progress)?);
+            report.tables.extend(surfaces::tables(
+                &mut stage,
+                &self.surfaces,
+                open,
+                &pictures,
+                progress,
+            )?);
         }
         if !self.detail.is_empty() {
             let open = |path: &Path| self.load.open(path);
@@ -144,20 +162,28 @@ impl Figures {
     }
 
     fn measures(&self, part: Part) -> bool {
-        self.surfaces.is_empty() && self.detail.is_empty() && (self.only.is_empty() || self.only.contains(&part))
+        self.surfaces.is_empty()
+            && self.detail.is_empty()
+            && (self.only.is_empty() || self.only.contains(&part))
     }
 
     /// Refuses files that nothing could be measured with, before the first of them is.
     fn look_at_inputs(&self) -> Result<(), Failure> {
         if !self.files.is_empty() && !self.measures(Part::Dense) {
-            return Err(Failure::Usage("volumes are for the part dense, which --only leaves out".into()));
+            return Err(Failure::Usage(
+                "volumes are for the part dense, which --only leaves out".into(),
+            ));
         }
-        let look = |path: &Path, kinds: &[Kind], message: &str| match kinds.contains(&self.load.kind(path)?) {
+        let look = |path: &Path, kinds: &[Kind], message: &str| match kinds
+            .contains(&self.load.kind(path)?)
+        {
             true => Ok(()),
             false => Err(Failure::from(Error::input(path, "file", message))),
         };
         self.files.iter().try_for_each(|file| look(file, &[Kind::Volume], dense::OTHER))?;
-        self.surfaces.iter().try_for_each(|source| look(&source.path, &[Kind::Mesh], surfaces::OTHER))?;
+        self.surfaces
+            .iter()
+            .try_for_each(|source| look(&source.path, &[Kind::Mesh], surfaces::OTHER))?;
         let kinds = [Kind::Mesh, Kind::Hierarchy];
         self.detail.iter().try_for_each(|source| look(&source.path, &kinds, detail::OTHER))
     }

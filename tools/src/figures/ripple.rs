@@ -47,7 +47,12 @@ fn ripple(kernel: &Kernel, body_centred: bool) -> f64 {
     for at in 0..PLACES.pow(3) {
         // Right at a sample others lie exactly at the extent, and rounding would decide on them; beside it, half are inside.
         let beside = DVec3::new(1e-7, 2e-7, 3e-7);
-        let p = beside + DVec3::new(place(at % PLACES), place(at / PLACES % PLACES), place(at / PLACES.pow(2)));
+        let p = beside
+            + DVec3::new(
+                place(at % PLACES),
+                place(at / PLACES % PLACES),
+                place(at / PLACES.pow(2)),
+            );
         let value: f64 = samples.iter().map(|sample| kernel.value((p - sample).length())).sum();
         (low, high, sum) = (low.min(value), high.max(value), sum + value);
     }

@@ -44,7 +44,8 @@ pub struct Source {
 impl Source {
     /// `FILE` or `FILE:AXIS`.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let named = text.rsplit_once(':').and_then(|(path, axis)| Some((path, parse::axis(axis).ok()?)));
+        let named =
+            text.rsplit_once(':').and_then(|(path, axis)| Some((path, parse::axis(axis).ok()?)));
         let (path, up) = named.unwrap_or((text, DVec3::Y));
         Ok(Self { path: path.into(), up })
     }
@@ -65,7 +66,8 @@ pub struct Truth {
 impl Truth {
     pub fn of(mesh: &Mesh, up: DVec3) -> splatkit::Result<Self> {
         let settings = Settings::new([PIXELS; 2]);
-        let [min, max] = mesh.bounds().ok_or_else(|| Error::NothingToDraw("there are no points".into()))?;
+        let [min, max] =
+            mesh.bounds().ok_or_else(|| Error::NothingToDraw("there are no points".into()))?;
         let subject = Subject { bounds: Bounds { min, max }, up };
         let camera = CameraFlags::default().camera(&subject, settings.size)?;
         let crease = SurfelOptions::default().crease_angle_degrees;
@@ -75,11 +77,17 @@ impl Truth {
 
     /// What a scene that stands for the mesh looks like, and how far that is from the truth. `scene` may hold all splats or
     /// a hierarchy, of which `detail` is drawn. Also gives how many splats were drawn.
-    pub fn measure(&self, stage: &mut Stage, scene: &Scene, detail: Detail) -> splatkit::Result<(Picture, Found, u64)> {
+    pub fn measure(
+        &self,
+        stage: &mut Stage,
+        scene: &Scene,
+        detail: Detail,
+    ) -> splatkit::Result<(Picture, Found, u64)> {
         let mut prepared = stage.prepare(scene)?;
         let settings = Settings { detail, ..self.settings.clone() };
         let (picture, stats) = stage.renderer.render(&mut prepared, &self.camera, &settings)?;
-        let found = Found::between(&picture, &self.picture, self.camera.view(self.settings.size)?.scale)?;
+        let found =
+            Found::between(&picture, &self.picture, self.camera.view(self.settings.size)?.scale)?;
         Ok((picture, found, stats.splats))
     }
 }
@@ -118,11 +126,13 @@ impl Found {
         for at in 0..truth.color.len() {
             let (own, wanted) = (picture.color[at], truth.color[at]);
             let around = || around(at, size, BESIDE);
-            let at_outline = around().any(|i| truth.color[i][3] > 0.0) && around().any(|i| truth.color[i][3] < 1.0);
+            let at_outline = around().any(|i| truth.color[i][3] > 0.0)
+                && around().any(|i| truth.color[i][3] < 1.0);
             let error: f64 = own.iter().zip(wanted).map(|(a, b)| f64::from(a - b).powi(2)).sum();
             let place = if at_outline {
                 0
-            } else if wanted[3] > 0.0 && around().any(|i| is_step(&truth.depth, i, size[0], scale)) {
+            } else if wanted[3] > 0.0 && around().any(|i| is_step(&truth.depth, i, size[0], scale))
+            {
                 1
             } else {
                 2
@@ -171,7 +181,9 @@ impl Found {
 fn around(at: usize, [width, height]: [usize; 2], reach: usize) -> impl Iterator<Item = usize> {
     let (x, y) = (at % width, at / width);
     let rows = y.saturating_sub(reach)..(y + reach + 1).min(height);
-    rows.flat_map(move |row| (x.saturating_sub(reach)..(x + reach + 1).min(width)).map(move |x| x + row * width))
+    rows.flat_map(move |row| {
+        (x.saturating_sub(reach)..(x + reach + 1).min(width)).map(move |x| x + row * width)
+    })
 }
 
 /// Whether depth jumps between a pixel and the next ones to the right and below.
@@ -188,8 +200,9 @@ fn nearest(at: usize, size: [usize; 2], covered: impl Fn(usize) -> bool) -> f64 
     let place = |at: usize| [(at % size[0]) as f64, (at / size[0]) as f64];
     let [x, y] = place(at);
     for reach in [2, 8, 64] {
-        let distances =
-            around(at, size, reach).filter(|&i| covered(i)).map(|i| (place(i)[0] - x).hypot(place(i)[1] - y));
+        let distances = around(at, size, reach)
+            .filter(|&i| covered(i))
+            .map(|i| (place(i)[0] - x).hypot(place(i)[1] - y));
         let least = distances.fold(f64::INFINITY, f64::min);
         if least <= reach as f64 {
             return least;
@@ -199,9 +212,14 @@ fn nearest(at: usize, size: [usize; 2], covered: impl Fn(usize) -> bool) -> f64 
 }
 
 /// The files of each source's truth and splats in a folder; none of them may be in the way, nor be one with another.
-pub fn pictures(sources: &[Source], folder: &Path, overwrite: bool) -> Result<Vec<[PathBuf; 2]>, Failure> {
-    let files_of =
-        |source: &Source| ["truth", "splats"].map(|what| folder.join(format!("{}_{what}.png", source.name())));
+pub fn pictures(
+    sources: &[Source],
+    folder: &Path,
+    overwrite: bool,
+) -> Result<Vec<[PathBuf; 2]>, Failure> {
+    let files_of = |source: &Source| {
+        ["truth", "splats"].map(|what| folder.join(format!("{}_{what}.png", source.name())))
+    };
     let files: Vec<_> = sources.iter().map(files_of).collect();
     for (at, own) in files.iter().enumerate() {
         if let Some(first) = files[..at].iter().position(|other| other == own) {
@@ -265,12 +283,15 @@ pub fn tables(
             ..BuildOptions::default()
         };
         let tree = Tree::build(&splats, &options, &|_, _| ())?;
-        let (picture, found, drawn) = truth.measure(stage, &Scene::new().with_splats(splats), Detail::default())?;
+        let (picture, found, drawn) =
+            truth.measure(stage, &Scene::new().with_splats(splats), Detail::default())?;
         table.row(source.name(), found.cells(drawn));
         let (hierarchy, cells) = files::row(&tree)?;
         sizes.row(source.name(), cells);
         let scene = Scene::new().with_hierarchy(hierarchy);
-        for (name, pixels) in [("file, leaves", 0.0), ("file, 1 pixel", 1.0), ("file, 2 pixels", 2.0)] {
+        for (name, pixels) in
+            [("file, leaves", 0.0), ("file, 1 pixel", 1.0), ("file, 2 pixels", 2.0)]
+        {
             let (_, found, drawn) = truth.measure(stage, &scene, Detail::Pixels(pixels))?;
             table.row(format!("{}, {name}", source.name()), found.cells(drawn));
         }
@@ -299,13 +320,18 @@ mod tests {
         let truth = bar(10, 30, |_| 1.0);
         let none = Found::between(&truth, &truth, 100.0).unwrap();
         assert_eq!((none.psnr, none.over.len(), none.under, none.holes), (None, 0, 0, [0, 0]));
-        let picture = bar(8, 29, |x| [1.0, 0.8, 0.4][usize::from(x == 20) + 2 * usize::from(x == 21)]);
+        let picture =
+            bar(8, 29, |x| [1.0, 0.8, 0.4][usize::from(x == 20) + 2 * usize::from(x == 21)]);
         let found = Found::between(&picture, &truth, 100.0).unwrap();
         assert_eq!((found.over.len(), found.under, found.covered), (14, 14, 140));
         assert_eq!((found.over[0], found.over[13]), (1.0, 2.0));
         assert_eq!(found.holes, [14, 7]);
         // Two columns of 1, and one, at the outline; 0.04 and 0.36 elsewhere.
-        assert!((found.shares[0] - 3.0 / 3.4).abs() < 1e-6 && found.shares[1] == 0.0, "{:?}", found.shares);
+        assert!(
+            (found.shares[0] - 3.0 / 3.4).abs() < 1e-6 && found.shares[1] == 0.0,
+            "{:?}",
+            found.shares
+        );
     }
 
     #[test]

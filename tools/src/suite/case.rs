@@ -16,7 +16,10 @@ pub struct Plan {
 }
 
 impl Plan {
-    pub fn new(name: impl Into<String>, make: impl FnOnce() -> splatkit::Result<Case> + 'static) -> Self {
+    pub fn new(
+        name: impl Into<String>,
+        make: impl FnOnce() -> splatkit::Result<Case> + 'static,
+    ) -> Self {
         Self { name: name.into(), make: Box::new(make) }
     }
 }
@@ -52,16 +55,32 @@ pub struct Series {
 }
 
 impl Case {
-    pub fn new(drawn: impl Into<String>, scene: Scene, subject: Subject, settings: Settings, effective: u64) -> Self {
+    pub fn new(
+        drawn: impl Into<String>,
+        scene: Scene,
+        subject: Subject,
+        settings: Settings,
+        effective: u64,
+    ) -> Self {
         // The tables count splats.
         let settings = Settings { evaluate: Evaluate::Scatter, ..settings };
-        Self { drawn: drawn.into(), scene, subject, settings, distance: 1.0, effective, seed: None, series: None }
+        Self {
+            drawn: drawn.into(),
+            scene,
+            subject,
+            settings,
+            distance: 1.0,
+            effective,
+            seed: None,
+            series: None,
+        }
     }
 
     /// The camera of `bench`, turned so many degrees about the up axis.
     pub fn camera(&self, turn: f64) -> Camera {
         let mut camera = CameraFlags::default().turned(&self.subject, self.settings.size, turn);
-        camera.position = camera.focal_point + self.distance * (camera.position - camera.focal_point);
+        camera.position =
+            camera.focal_point + self.distance * (camera.position - camera.focal_point);
         camera
     }
 }

@@ -90,7 +90,13 @@ fn volume(effort: Effort, opacity: f64) -> Result<Case> {
     };
     let (scene, effective) = case::volume(Arc::new(volume), transfer);
     let subject = Subject { bounds: splatkit::math::Bounds { min, max }, up: DVec3::Z };
-    Ok(Case::new("generated: specimen", scene, subject, Settings::new([effort.pixels(VOLUME_SIZE); 2]), effective))
+    Ok(Case::new(
+        "generated: specimen",
+        scene,
+        subject,
+        Settings::new([effort.pixels(VOLUME_SIZE); 2]),
+        effective,
+    ))
 }
 
 /// A knot inside a sphere of about as many points, which hides it.

@@ -32,12 +32,19 @@ pub fn plans(effort: Effort) -> Vec<Plan> {
         Plan::new(format!("specimen, {side}³"), move || volume(side, effort.pixels(VOLUME_SIZE)))
     };
     let part = |part: u32| {
-        let name = if part == 1 { "knot, whole width".into() } else { format!("knot, 1/{part} of the width") };
+        let name = if part == 1 {
+            "knot, whole width".into()
+        } else {
+            format!("knot, 1/{part} of the width")
+        };
         Plan::new(name, move || {
             let mut case = surfaces::model(effort.points(POINTS), effort.pixels(MODEL_SIZE))?;
             case.distance = f64::from(part);
-            let series =
-                Series { name: "frame time of a model", of: "the part of the width", value: 1.0 / f64::from(part) };
+            let series = Series {
+                name: "frame time of a model",
+                of: "the part of the width",
+                value: 1.0 / f64::from(part),
+            };
             case.series = Some(series);
             Ok(case)
         })
@@ -55,7 +62,13 @@ fn volume(side: usize, size: u32) -> Result<Case> {
     let samples = volume.len() as f64;
     let scene = Scene::new().with_bricks(Bricks::from_volume(Arc::new(volume))?, kernel, transfer);
     let subject = Subject { bounds: Bounds { min, max }, up: DVec3::Z };
-    let mut case = Case::new("generated: specimen, in bricks", scene, subject, Settings::new([size; 2]), effective);
+    let mut case = Case::new(
+        "generated: specimen, in bricks",
+        scene,
+        subject,
+        Settings::new([size; 2]),
+        effective,
+    );
     case.series = Some(Series { name: "frame time of a volume", of: "samples", value: samples });
     Ok(case)
 }

@@ -16,10 +16,16 @@ impl Machine {
     pub fn of(device: &Device) -> Self {
         let cores = available_parallelism().map_or(1, NonZero::get);
         match device {
-            Device::Cpu => Self { adapter: device.name().to_owned(), driver: String::new(), cores, has_clock: None },
+            Device::Cpu => Self {
+                adapter: device.name().to_owned(),
+                driver: String::new(),
+                cores,
+                has_clock: None,
+            },
             Device::Gpu(gpu, _) => {
                 let info = &gpu.info;
-                let driver = [info.backend.to_str(), &info.driver, &info.driver_info].map(str::trim);
+                let driver =
+                    [info.backend.to_str(), &info.driver, &info.driver_info].map(str::trim);
                 let driver: Vec<_> = driver.into_iter().filter(|part| !part.is_empty()).collect();
                 let has_clock = Some(gpu.has_clock());
                 Self { adapter: info.name.clone(), driver: driver.join(" "), cores, has_clock }

@@ -38,7 +38,12 @@ pub struct Counts {
 }
 
 /// Measures one plan after another.
-pub fn outcomes(plans: Vec<Plan>, device: &mut Device, counts: Counts, progress: &Progress) -> Vec<Outcome> {
+pub fn outcomes(
+    plans: Vec<Plan>,
+    device: &mut Device,
+    counts: Counts,
+    progress: &Progress,
+) -> Vec<Outcome> {
     let mut outcomes = Vec::new();
     for plan in plans {
         let outcome = outcome(plan, device, counts, progress);
@@ -97,7 +102,8 @@ fn measure(case: Case, device: &Device, counts: Counts) -> Result<Measured> {
     let steps = renderer.profile(&case.camera(0.0), settings)?.steps;
     let cpu_peak = memory::peak();
     drop(renderer);
-    let same_bytes = if counts.runs > 1 { Some(same_bytes(&case, device, counts.runs)?) } else { None };
+    let same_bytes =
+        if counts.runs > 1 { Some(same_bytes(&case, device, counts.runs)?) } else { None };
     Ok(Measured {
         drawn: case.drawn,
         size: case.settings.size,
@@ -153,8 +159,16 @@ mod tests {
 
     #[test]
     fn pictures_are_compared_bit_by_bit() {
-        let picture = |red: f32| Picture { width: 1, height: 1, color: vec![[red, 0.0, 0.0, 1.0]], depth: vec![1.0] };
+        let picture = |red: f32| Picture {
+            width: 1,
+            height: 1,
+            color: vec![[red, 0.0, 0.0, 1.0]],
+            depth: vec![1.0],
+        };
         assert!(same(&picture(f32::NAN), &picture(f32::NAN)));
-        assert!(!same(&picture(0.0), &picture(-0.0)) && !same(&picture(0.5), &picture(0.5 + f32::EPSILON)));
+        assert!(
+            !same(&picture(0.0), &picture(-0.0))
+                && !same(&picture(0.5), &picture(0.5 + f32::EPSILON))
+        );
     }
 }

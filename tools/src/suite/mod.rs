@@ -114,13 +114,19 @@ impl Part {
                 "Volumes of the sizes of 2005's table of splatting on a GPU, lit, whole in view; its numbers are at the right. \
                  Each is shown from the value on that leaves about as many splats.",
             ],
-            Self::Surfaces => ["surfaces", "Surfaces.", "Hierarchies of surfels, with a cut of one pixel."],
+            Self::Surfaces => {
+                ["surfaces", "Surfaces.", "Hierarchies of surfels, with a cut of one pixel."]
+            }
             Self::Growth => [
                 "growth",
                 "Growth.",
                 "One content in ever more samples, in bricks of levels; a model that fills ever less of the picture.",
             ],
-            Self::Culling => ["culling", "Culling.", "The same pictures with what cannot be seen left out, and drawn."],
+            Self::Culling => [
+                "culling",
+                "Culling.",
+                "The same pictures with what cannot be seen left out, and drawn.",
+            ],
         }
     }
 }
@@ -134,11 +140,15 @@ impl SuiteFlags {
         json: bool,
         progress: &Progress,
     ) -> Result<(), Failure> {
-        let block = write.as_deref().map(|path| Block::open(path, "suite", "bench --suite")).transpose()?;
+        let block =
+            write.as_deref().map(|path| Block::open(path, "suite", "bench --suite")).transpose()?;
         let mut device = engine.device(&splatkit::scene::Scene::new())?;
         let machine = Machine::of(&device);
         if let Some(block) = &block {
-            let left_out = Part::value_variants().iter().filter(|part| !self.measures(**part)).map(|part| part.told());
+            let left_out = Part::value_variants()
+                .iter()
+                .filter(|part| !self.measures(**part))
+                .map(|part| part.told());
             let parts = left_out.map(|[name, title, _]| (name.to_owned(), title));
             check_kept(&block.inside()?, &machine, parts, "--only")?;
         }
@@ -146,7 +156,12 @@ impl SuiteFlags {
         let mut chapters = Vec::new();
         for part in Part::value_variants().iter().filter(|part| self.measures(**part)) {
             let [name, title, note] = part.told();
-            let outcomes = measure::outcomes(part.plans(*effort, self.data.as_deref())?, &mut device, counts, progress);
+            let outcomes = measure::outcomes(
+                part.plans(*effort, self.data.as_deref())?,
+                &mut device,
+                counts,
+                progress,
+            );
             chapters.push(Chapter { name, title, note, outcomes });
         }
         progress.clear();
@@ -161,7 +176,10 @@ impl SuiteFlags {
         } else {
             output::line(text.trim_end())?;
         }
-        let failed = chapters.iter().flat_map(|chapter| &chapter.outcomes).filter(|outcome| outcome.result.is_err());
+        let failed = chapters
+            .iter()
+            .flat_map(|chapter| &chapter.outcomes)
+            .filter(|outcome| outcome.result.is_err());
         match (failed.count(), block) {
             (0, None) => Ok(()),
             (0, Some(block)) => block.replace(|old| with_section(old, &text)),
@@ -176,7 +194,8 @@ impl SuiteFlags {
     fn markdown(&self, machine: &Machine, chapters: &[Chapter], counts: Counts) -> String {
         let chapters: Vec<_> = chapters.iter().map(Chapter::markdown).collect();
         let Counts { frames, runs } = counts;
-        let repeated = if runs > 1 { format!(" *Same bytes*: in {runs} runs.") } else { String::new() };
+        let repeated =
+            if runs > 1 { format!(" *Same bytes*: in {runs} runs.") } else { String::new() };
         let timing = machine.timing();
         let note = format!("Medians of {frames} frames; passes timed {timing}.{repeated}");
         format!("{HEADING}{machine}\n\n{note}\n\n{}", chapters.join("\n"))

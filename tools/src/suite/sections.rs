@@ -27,7 +27,11 @@ fn sections(text: &str) -> Vec<&str> {
 /// The section of a machine, empty where there is none.
 fn section_of(text: &str, machine: impl fmt::Display) -> String {
     let wanted = format!("{HEADING}{machine}");
-    sections(text).into_iter().find(|section| heading(section) == wanted).unwrap_or_default().to_owned()
+    sections(text)
+        .into_iter()
+        .find(|section| heading(section) == wanted)
+        .unwrap_or_default()
+        .to_owned()
 }
 
 /// A text with sections of several machines, one of them put in or replaced.
@@ -68,7 +72,10 @@ mod tests {
         let both = with_section(&one, "### b\n\n2\n");
         assert_eq!(both, "### a\n\n1\n\n### b\n\n2\n");
         assert_eq!(with_section(&both, "### a\n\n3"), "### a\n\n3\n\n### b\n\n2\n");
-        assert_eq!((section_of(&both, "b").as_str(), section_of(&both, "c").as_str()), ("### b\n\n2", ""));
+        assert_eq!(
+            (section_of(&both, "b").as_str(), section_of(&both, "c").as_str()),
+            ("### b\n\n2", "")
+        );
         assert_eq!(with_section("– Words.\n", &one), "– Words.\n\n### a\n\n1\n");
     }
 }

@@ -12,7 +12,10 @@ use splatkit::{
     io::{self, Kind, Limits},
     math::{Bounds, Kernel},
     scene::{Mode, Settings},
-    volume::{Arrangement, Lattice, Samples, Shade, TransferFunction, Volume, body_centred, phantoms::Phantom},
+    volume::{
+        Arrangement, Lattice, Samples, Shade, TransferFunction, Volume, body_centred,
+        phantoms::Phantom,
+    },
 };
 use std::{
     path::{Path, PathBuf},
@@ -47,7 +50,14 @@ struct Row {
     reach: f64,
 }
 
-const fn row(name: &'static str, file: &'static str, dims: [usize; 3], look: Look, splats: u64, fps: f64) -> Row {
+const fn row(
+    name: &'static str,
+    file: &'static str,
+    dims: [usize; 3],
+    look: Look,
+    splats: u64,
+    fps: f64,
+) -> Row {
     let seed = Seed { splats, fps };
     Row { name, file, dims, centred: false, look, seed, phantom: Phantom::Specimen, reach: 1.0 }
 }
@@ -77,7 +87,9 @@ const ROWS: [Row; 16] = [
     row("Bonsai", "bonsai", [256; 3], Surface, 1_300_000, 4.9),
     row("Bonsai, BCC", "bonsai", [181, 181, 362], Surface, 955_000, 2.5).centred(),
     row("CT head, semi", "head", [128; 3], Semi, 526_000, 4.9).by(Phantom::Head, 0.85),
-    row("CT head, semi, BCC", "head", [91, 91, 182], Semi, 379_000, 3.1).by(Phantom::Head, 0.85).centred(),
+    row("CT head, semi, BCC", "head", [91, 91, 182], Semi, 379_000, 3.1)
+        .by(Phantom::Head, 0.85)
+        .centred(),
     row("Engine, semi", "engine", [256, 256, 128], Semi, 1_200_000, 2.1),
     row("Engine, isosurface", "engine", [256, 256, 128], Surface, 1_300_000, 5.1),
     row("Engine, BCC", "engine", [181, 181, 182], Surface, 963_000, 5.3).centred(),
@@ -100,7 +112,9 @@ fn volumes(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
-        if path.is_file() && matches!(Kind::of(&path, &Limits::default(), false), Ok(Some(Kind::Volume))) {
+        if path.is_file()
+            && matches!(Kind::of(&path, &Limits::default(), false), Ok(Some(Kind::Volume)))
+        {
             files.push(path);
         }
     }
@@ -153,24 +167,35 @@ impl Row {
             dims,
             origin: -0.5 * step * (cells - 1.0),
             axes: DMat3::from_diagonal(DVec3::splat(step)),
-            arrangement: if self.centred { Arrangement::BodyCentred } else { Arrangement::Cartesian },
+            arrangement: if self.centred {
+                Arrangement::BodyCentred
+            } else {
+                Arrangement::Cartesian
+            },
         })?;
         let [low, high] = volume.range;
         let scale = if high > low { 255.0 / (high - low) } else { 0.0 };
-        let bytes = (0..volume.len()).map(|i| ((volume.value(i) - low) * scale).round() as u8).collect();
+        let bytes =
+            (0..volume.len()).map(|i| ((volume.value(i) - low) * scale).round() as u8).collect();
         Volume::new(volume.lattice, Samples::U8(bytes))
     }
 }
 
 fn name_of(phantom: Phantom) -> &'static str {
-    Phantom::NAMES.into_iter().find(|name| Phantom::named(name) == Some(phantom)).unwrap_or("phantom")
+    Phantom::NAMES
+        .into_iter()
+        .find(|name| Phantom::named(name) == Some(phantom))
+        .unwrap_or("phantom")
 }
 
 impl Look {
     /// Shows the values above that with which the number of splats is nearest to `wanted`.
     fn transfer(self, volume: &Volume, wanted: u64) -> TransferFunction {
         let mut counts = [0u64; 256];
-        volume.drawn_ranges(&Kernel::default()).iter().for_each(|[_, high]| counts[usize::from(*high)] += 1);
+        volume
+            .drawn_ranges(&Kernel::default())
+            .iter()
+            .for_each(|[_, high]| counts[usize::from(*high)] += 1);
         let mut shown = 0;
         // From the largest value down: with step k clear, the samples show that reach a step above it.
         let start = (0..255usize).rev().map(|step| {
@@ -212,6 +237,9 @@ mod tests {
 
     #[test]
     fn files_are_known_by_their_first_name() {
-        assert_eq!((stem(Path::new("a/Bonsai.vti")), stem(Path::new("head.raw.gz"))), ("bonsai".into(), "head".into()));
+        assert_eq!(
+            (stem(Path::new("a/Bonsai.vti")), stem(Path::new("head.raw.gz"))),
+            ("bonsai".into(), "head".into())
+        );
     }
 }

@@ -15,19 +15,23 @@ pub struct Slope {
 /// The slope of each series of two cases at least, of the logarithm of the median time over that of the number.
 pub fn slopes<'a>(cases: impl Iterator<Item = &'a Measured>) -> impl Iterator<Item = Slope> {
     let mut all: Vec<(Slope, Vec<[f64; 2]>)> = Vec::new();
-    for (series, time) in cases.filter_map(|case| Some((case.series.as_ref()?, case.times.median))) {
+    for (series, time) in cases.filter_map(|case| Some((case.series.as_ref()?, case.times.median)))
+    {
         let point = [series.value.ln(), time.ln()];
         match all.iter_mut().find(|(slope, _)| slope.name == series.name) {
             Some((_, points)) => points.push(point),
             None => all.push((Slope { name: series.name, of: series.of, power: 0.0 }, vec![point])),
         }
     }
-    all.into_iter().filter(|(_, points)| points.len() > 1).map(|(slope, points)| Slope { power: fit(&points), ..slope })
+    all.into_iter()
+        .filter(|(_, points)| points.len() > 1)
+        .map(|(slope, points)| Slope { power: fit(&points), ..slope })
 }
 
 /// The slope of the line with the least squares.
 fn fit(points: &[[f64; 2]]) -> f64 {
-    let mean = |axis: usize| points.iter().map(|point| point[axis]).sum::<f64>() / points.len() as f64;
+    let mean =
+        |axis: usize| points.iter().map(|point| point[axis]).sum::<f64>() / points.len() as f64;
     let [x, y] = [mean(0), mean(1)];
     let sum = |of: &dyn Fn(&[f64; 2]) -> f64| points.iter().map(of).sum::<f64>();
     sum(&|point| (point[0] - x) * (point[1] - y)) / sum(&|point| (point[0] - x).powi(2))

@@ -28,7 +28,8 @@ pub fn plans(effort: Effort) -> Vec<Plan> {
         let points = effort.points(points);
         Plan::new(format!("knot, {points} points"), move || {
             let mut case = model(points, effort.pixels(SIZE))?;
-            let series = Series { name: "frame time of a surface", of: "points", value: f64::from(points) };
+            let series =
+                Series { name: "frame time of a surface", of: "points", value: f64::from(points) };
             case.series = Some(series);
             Ok(case)
         })
@@ -53,7 +54,8 @@ pub fn knot(points: u32) -> Mesh {
 
 /// The hierarchy of a closed mesh, and the box around it.
 pub fn hierarchy(mesh: &Mesh) -> Result<(Hierarchy, Bounds)> {
-    let [min, max] = mesh.bounds().ok_or_else(|| Error::NothingToDraw("there are no points".into()))?;
+    let [min, max] =
+        mesh.bounds().ok_or_else(|| Error::NothingToDraw("there are no points".into()))?;
     let options = BuildOptions { closed: true, ..BuildOptions::default() };
     let tree = Tree::build(&mesh.surfels(&SurfelOptions::default())?, &options, &|_, _| ())?;
     Ok((Hierarchy::from_tree(tree)?, Bounds { min, max }))

@@ -133,7 +133,17 @@ fn case_json(Outcome { name, result }: &Outcome) -> Value {
         Ok(found) => found,
         Err(error) => return json!({ "name": name, "error": error.to_string() }),
     };
-    let Measured { drawn, size: [width, height], effective, times, stats, cpu_peak, steps, same_bytes, .. } = found;
+    let Measured {
+        drawn,
+        size: [width, height],
+        effective,
+        times,
+        stats,
+        cpu_peak,
+        steps,
+        same_bytes,
+        ..
+    } = found;
     json!({
         "name": name,
         "drawn": drawn,

@@ -39,8 +39,11 @@ impl Asked {
     /// How many times as much this asks for as another does: of what grows most; at least 1.
     pub fn times(&self, other: &Self) -> f64 {
         let ratio = |own: f64, other: f64| if own > 0.0 && other > 0.0 { own / other } else { 1.0 };
-        let ratios =
-            [ratio(self.pixels, other.pixels), ratio(self.on_rays, other.on_rays), ratio(self.in_view, other.in_view)];
+        let ratios = [
+            ratio(self.pixels, other.pixels),
+            ratio(self.on_rays, other.on_rays),
+            ratio(self.in_view, other.in_view),
+        ];
         ratios.into_iter().fold(1.0, f64::max)
     }
 }
@@ -88,7 +91,9 @@ impl Content {
                     in_view: kernel * field.in_view(&view),
                 }
             }
-            Self::Surface(surface) => Asked { pixels, on_rays: 0.0, in_view: surface.in_view(&view, pixels) },
+            Self::Surface(surface) => {
+                Asked { pixels, on_rays: 0.0, in_view: surface.in_view(&view, pixels) }
+            }
         })
     }
 }
@@ -104,12 +109,15 @@ impl Field {
         let [width, height] = view.size.map(f64::from);
         let mut sum = 0.0;
         for at in 0..RAYS * RAYS {
-            let part = (DVec2::new(f64::from(at % RAYS), f64::from(at / RAYS)) + 0.5) / f64::from(RAYS);
+            let part =
+                (DVec2::new(f64::from(at % RAYS), f64::from(at / RAYS)) + 0.5) / f64::from(RAYS);
             let (start, direction) = view.ray(part * DVec2::new(width, height));
             let (start, direction) = (view.position + turn * start, turn * direction);
             let Some([near, far]) = within(&self.bounds, start, direction) else { continue };
             // Sheets that are thicker than samples ask for no fewer of them.
-            let density = (self.density * direction).length().max(thickness.map_or(0.0, |length| 1.0 / length));
+            let density = (self.density * direction)
+                .length()
+                .max(thickness.map_or(0.0, |length| 1.0 / length));
             let mut depth = 0.0;
             let mut distance = near + 0.5 * step;
             while distance < far && depth < OPAQUE {
@@ -130,7 +138,9 @@ impl Field {
             let index = [at % SAMPLES, at / SAMPLES % SAMPLES, at / SAMPLES.pow(2)].map(f64::from);
             min + (max - min) * (DVec3::from(index) + 0.5) / f64::from(SAMPLES)
         };
-        let seen = (0..SAMPLES.pow(3)).map(place).filter(|&place| is_in(view, place) && self.extinction(place) > 0.0);
+        let seen = (0..SAMPLES.pow(3))
+            .map(place)
+            .filter(|&place| is_in(view, place) && self.extinction(place) > 0.0);
         self.samples as f64 * seen.count() as f64 / f64::from(SAMPLES.pow(3))
     }
 }
@@ -195,14 +205,17 @@ mod tests {
 
     #[test]
     fn places_on_rays_are_counted() {
-        let near = |found: f64, wanted: f64| assert!((found / wanted - 1.0).abs() < 0.05, "{found} {wanted}");
+        let near = |found: f64, wanted: f64| {
+            assert!((found / wanted - 1.0).abs() < 0.05, "{found} {wanted}")
+        };
         // 40 × 40 pixels, each of 10 samples.
         near(field().on_rays(&view(), None), 16_000.0);
         near(field().on_rays(&view(), Some(1.0)), 16_000.0);
         near(field().on_rays(&view(), Some(0.1)), 32_000.0);
         near(field().in_view(&view()), 1000.0);
         // Opaque after half of the way.
-        let transfer = TransferFunction { opacity: vec![(0.0, 1.0 - (-OPAQUE).exp())], ..field().transfer };
+        let transfer =
+            TransferFunction { opacity: vec![(0.0, 1.0 - (-OPAQUE).exp())], ..field().transfer };
         near(Field { transfer, ..field() }.on_rays(&view(), None), 8_000.0);
         let transfer = TransferFunction { opacity: vec![(0.0, 0.0)], ..field().transfer };
         assert_eq!(Field { transfer, ..field() }.on_rays(&view(), None), 0.0);

@@ -24,7 +24,8 @@ pub struct Frames {
 
 impl Frames {
     fn take_more(self, times: &[f64]) -> bool {
-        times.len() < self.least || times.len() < self.most && times.iter().sum::<f64>() < self.enough
+        times.len() < self.least
+            || times.len() < self.most && times.iter().sum::<f64>() < self.enough
     }
 }
 
@@ -91,11 +92,14 @@ impl Measure<'_> {
                 && ratio.is_cliff()
                 && ratio.beyond() < HIGH
             {
-                sides.extend([other, at].iter().filter(|side| !sides.contains(side)).collect::<Vec<_>>());
+                sides.extend(
+                    [other, at].iter().filter(|side| !sides.contains(side)).collect::<Vec<_>>(),
+                );
             }
         }
         for side in sides {
-            if let (Ok(again), Ok(first)) = (self.result(axis, &plans[side]), &mut outcomes[side].result)
+            if let (Ok(again), Ok(first)) =
+                (self.result(axis, &plans[side]), &mut outcomes[side].result)
                 && again.times.min < first.times.min
             {
                 *first = again;

@@ -125,13 +125,15 @@ impl Axis {
                 "From far away into the volume; at 1 its sphere fills the picture, at 0.26 the camera is on that, at 0 in the middle.",
             ],
             Self::Angle => ["Angle.", "Azimuth and elevation; 0° and 90° look along axes."],
-            Self::SliceAngle => {
-                ["Angle to slices.", "The same, with slices five times as far apart as the samples in them."]
-            }
+            Self::SliceAngle => [
+                "Angle to slices.",
+                "The same, with slices five times as far apart as the samples in them.",
+            ],
             Self::Zoom => ["Zoom.", "The picture's middle enlarged; the camera stays."],
-            Self::Lens => {
-                ["Lens.", "The vertical view angle; the camera stands where the volume's sphere fills the picture."]
-            }
+            Self::Lens => [
+                "Lens.",
+                "The vertical view angle; the camera stands where the volume's sphere fills the picture.",
+            ],
             Self::Size => ["Picture.", "Its size."],
             Self::Samples => ["Samples.", "Of the same content."],
             Self::Lattice => ["Lattice.", "Of about as many samples, beside the Cartesian one."],
@@ -144,7 +146,9 @@ impl Axis {
             Self::Sharp => ["Sharp.", "Beside the same kernel as it is."],
             Self::Thickness => ["Thickness of sheets.", "In samples."],
             Self::Opacity => ["Opacity.", "Of a length of one sample."],
-            Self::SurfaceDistance => ["Distance of a surface.", "A knot of 650 thousand points; distances as above."],
+            Self::SurfaceDistance => {
+                ["Distance of a surface.", "A knot of 650 thousand points; distances as above."]
+            }
             Self::SurfaceSize => ["Picture of a surface.", "Its size."],
             Self::Cut => ["Cut of a hierarchy.", "In pixels; 0 is the finest level."],
         }
@@ -170,7 +174,8 @@ impl SweepFlags {
         progress: &Progress,
     ) -> Result<(), Failure> {
         engine.check()?;
-        let block = write.as_deref().map(|path| Block::open(path, "sweep", "bench --sweep")).transpose()?;
+        let block =
+            write.as_deref().map(|path| Block::open(path, "sweep", "bench --sweep")).transpose()?;
         let mut device = engine.device(&splatkit::scene::Scene::new())?;
         let machine = Machine::of(&device);
         if let Some(block) = &block {
@@ -182,7 +187,8 @@ impl SweepFlags {
             let count = frames as usize;
             Frames { least: count, most: count, enough: 0.0 }
         });
-        let mut measure = Measure { device: &mut device, evaluate: engine.evaluate(), frames, progress };
+        let mut measure =
+            Measure { device: &mut device, evaluate: engine.evaluate(), frames, progress };
         let mut chapters = Vec::new();
         for axis in Axis::value_variants().iter().filter(|axis| self.measures(**axis)) {
             let ([title, note], name) = (axis.told(), axis.name());

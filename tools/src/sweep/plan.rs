@@ -71,7 +71,8 @@ mod tests {
     use super::*;
 
     fn against(order: fn(Vec<Plan>) -> Vec<Plan>) -> Vec<Option<usize>> {
-        let plan = |name: &str| Plan::new(name, || Err(splatkit::Error::NothingToDraw(String::new())));
+        let plan =
+            |name: &str| Plan::new(name, || Err(splatkit::Error::NothingToDraw(String::new())));
         order(["a", "b", "c", "d"].map(plan).into()).iter().map(|plan| plan.against).collect()
     }
 

@@ -43,7 +43,10 @@ mod tests {
     #[test]
     fn time_that_is_explained_is_no_cliff() {
         let ratio = Ratio::of((40.0, &asked(100.0)), (10.0, &asked(25.0)));
-        assert_eq!((ratio.time, ratio.asked, ratio.beyond(), ratio.is_cliff()), (4.0, 4.0, 1.0, false));
+        assert_eq!(
+            (ratio.time, ratio.asked, ratio.beyond(), ratio.is_cliff()),
+            (4.0, 4.0, 1.0, false)
+        );
         // Less may cost as much: what every frame costs.
         assert!(!Ratio::of((10.0, &asked(1.0)), (10.0, &asked(25.0))).is_cliff());
     }

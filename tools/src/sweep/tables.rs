@@ -149,7 +149,12 @@ mod tests {
 
     fn outcome(name: &str, against: Option<usize>, ms: f64) -> Outcome {
         let asked = Asked { pixels: 100.0, on_rays: 1000.0, in_view: 10.0 };
-        let found = Measured { size: [9, 9], asked, times: Times::of(vec![ms]), stats: FrameStats::default() };
+        let found = Measured {
+            size: [9, 9],
+            asked,
+            times: Times::of(vec![ms]),
+            stats: FrameStats::default(),
+        };
         Outcome { name: name.into(), against, result: Ok(found) }
     }
 
@@ -171,16 +176,28 @@ mod tests {
         assert_eq!(chapter.json()["steps"][2]["cliff"], true);
         let text = cliffs(&[chapter]);
         let at = |words: &str| text.find(words).unwrap();
-        assert!(at("“b” costs 6.0 times as much as “c”") < at("“b” costs 3.0 times as much as “a”"), "{text}");
+        assert!(
+            at("“b” costs 6.0 times as much as “c”") < at("“b” costs 3.0 times as much as “a”"),
+            "{text}"
+        );
         assert_eq!(cliffs(&[]), "**Cliffs.** None.\n");
     }
 
     #[test]
     fn steps_beside_one_that_is_not_drawn_are_not_compared() {
-        let lost = Outcome { result: Err(splatkit::Error::Argument("no".into())), ..outcome("a", None, 1.0) };
+        let lost = Outcome {
+            result: Err(splatkit::Error::Argument("no".into())),
+            ..outcome("a", None, 1.0)
+        };
         assert!(!lost.has_failed());
-        let chapter =
-            Chapter { name: "a".into(), title: "A.", note: "", outcomes: vec![lost, outcome("b", Some(0), 9.0)] };
-        assert!(chapter.cliffs().next().is_none() && chapter.markdown().contains("a: not drawn: no"));
+        let chapter = Chapter {
+            name: "a".into(),
+            title: "A.",
+            note: "",
+            outcomes: vec![lost, outcome("b", Some(0), 9.0)],
+        };
+        assert!(
+            chapter.cliffs().next().is_none() && chapter.markdown().contains("a: not drawn: no")
+        );
     }
 }

@@ -5,7 +5,8 @@ use glam::DVec3;
 use splatkit::math::{Bounds, Camera};
 
 /// From far away to the middle, in distances at which the sphere around the scene fills the picture. Its surface lies at 0.26.
-pub const DISTANCES: [f64; 13] = [8.0, 4.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.12, 0.06, 0.0];
+pub const DISTANCES: [f64; 13] =
+    [8.0, 4.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.12, 0.06, 0.0];
 
 /// Azimuths and elevations, along axes, in planes of two and along the diagonal of all three.
 pub const ANGLES: [[f64; 2]; 14] = [
@@ -67,7 +68,8 @@ pub fn zoomed(factor: f64, bounds: &Bounds) -> Camera {
     let mut camera = usual(bounds, DVec3::Z);
     // A lens's picture follows the tangent of half its angle.
     let half = (0.5 * Camera::DEFAULT_VIEW_ANGLE).to_radians().tan() / factor;
-    camera.projection = splatkit::math::Projection::Perspective { view_angle: 2.0 * half.atan().to_degrees() };
+    camera.projection =
+        splatkit::math::Projection::Perspective { view_angle: 2.0 * half.atan().to_degrees() };
     camera
 }
 
@@ -92,7 +94,9 @@ mod tests {
         assert!((along([0.0, 0.0]) - DVec3::Y).length() < 1e-9);
         assert!((along([90.0, 0.0]).x.abs() - 1.0).abs() < 1e-9);
         assert!((along([45.0, 90.0]) - DVec3::NEG_Z).length() < 1e-9);
-        assert!((along([45.0, DIAGONAL]).abs() - DVec3::splat(3f64.sqrt().recip())).length() < 1e-9);
+        assert!(
+            (along([45.0, DIAGONAL]).abs() - DVec3::splat(3f64.sqrt().recip())).length() < 1e-9
+        );
     }
 
     #[test]

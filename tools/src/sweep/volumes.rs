@@ -11,7 +11,10 @@ use splatkit::{
     Error, Result,
     math::{Bounds, Camera, Kernel, Tensor},
     scene::{Scene, Settings},
-    volume::{Arrangement, Lattice, Samples, Shade, TransferFunction, Volume, bricks::Bricks, phantoms::Phantom},
+    volume::{
+        Arrangement, Lattice, Samples, Shade, TransferFunction, Volume, bricks::Bricks,
+        phantoms::Phantom,
+    },
 };
 use std::sync::Arc;
 
@@ -230,7 +233,9 @@ pub fn lattices(effort: Effort) -> Vec<Plan> {
     let on = |name: &str, lattice: fn(usize) -> Lattice| {
         Plan::new(name, move || Show::new(effort, volume(lattice(side))?).step())
     };
-    let bricks = Plan::new("bricks", move || Show { is_in_bricks: true, ..Show::new(effort, cube(side)?) }.step());
+    let bricks = Plan::new("bricks", move || {
+        Show { is_in_bricks: true, ..Show::new(effort, cube(side)?) }.step()
+    });
     with_first(vec![
         on("Cartesian", |side| box_lattice([side; 3], DVec3::ONE)),
         on("Cartesian, sheared", sheared),
@@ -285,9 +290,12 @@ pub fn steps(effort: Effort) -> Vec<Plan> {
     let plan = |ratio: f64| {
         let lattice = stretched(effort, ratio);
         let [x, y, z] = lattice.dims;
-        Plan::new(format!("1:{ratio} ({x}×{y}×{z})"), move || Show::new(effort, volume(lattice.clone())?).step())
+        Plan::new(format!("1:{ratio} ({x}×{y}×{z})"), move || {
+            Show::new(effort, volume(lattice.clone())?).step()
+        })
     };
-    let mut plans: Vec<_> = [1.0, 1.02, 1.114, 1.3, 1.5, 2.0, 2.2, 3.0, 5.0, 10.0, 30.0].map(plan).into();
+    let mut plans: Vec<_> =
+        [1.0, 1.02, 1.114, 1.3, 1.5, 2.0, 2.2, 3.0, 5.0, 10.0, 30.0].map(plan).into();
     // One flat stack, with slices ever nearer to each other.
     let stack = |ratio: f64| {
         let dims = [effort.side(300), effort.side(300), effort.side(9).max(5)];
@@ -316,7 +324,9 @@ fn kernel(name: &str) -> Result<Kernel> {
 
 pub fn kernels(effort: Effort) -> Vec<Plan> {
     let names = ["gaussian", "b-spline", "hann", "linear", "catmull-rom", "cubic-b-spline"];
-    with_first(each(effort, &names, str::to_owned, |show, name| Show { kernel: kernel(name)?, ..show }.step()))
+    with_first(each(effort, &names, str::to_owned, |show, name| {
+        Show { kernel: kernel(name)?, ..show }.step()
+    }))
 }
 
 pub fn extents(effort: Effort) -> Vec<Plan> {
@@ -324,13 +334,17 @@ pub fn extents(effort: Effort) -> Vec<Plan> {
         effort,
         &[1.5, 1.8, 2.0, 2.5, 3.0],
         |extent| extent.to_string(),
-        |show, extent| Show { kernel: Kernel::gaussian(Kernel::default().unit(), extent)?, ..show }.step(),
+        |show, extent| {
+            Show { kernel: Kernel::gaussian(Kernel::default().unit(), extent)?, ..show }.step()
+        },
     ))
 }
 
 pub fn sharp(effort: Effort) -> Vec<Plan> {
-    let steps = ["gaussian", "b-spline", "cubic-b-spline"].map(|name| [(name, false), (name, true)]);
-    let name = |(name, is_sharp): (&str, bool)| format!("{name}{}", if is_sharp { ", sharp" } else { "" });
+    let steps =
+        ["gaussian", "b-spline", "cubic-b-spline"].map(|name| [(name, false), (name, true)]);
+    let name =
+        |(name, is_sharp): (&str, bool)| format!("{name}{}", if is_sharp { ", sharp" } else { "" });
     in_pairs(each(effort, steps.as_flattened(), name, |show, (name, is_sharp)| {
         let kernel = kernel(name)?;
         let volume = match is_sharp {
@@ -375,16 +389,22 @@ mod tests {
     #[test]
     fn lattices_have_as_many_samples() {
         let cartesian = SIDE.pow(3) as f64;
-        let others = [body_centred(SIDE), stretched(Effort::Usual, 30.0), stretched(Effort::Usual, 1.114)];
+        let others =
+            [body_centred(SIDE), stretched(Effort::Usual, 30.0), stretched(Effort::Usual, 1.114)];
         for lattice in others.into_iter().chain([rectilinear(SIDE, 0.6), sheared(SIDE)]) {
             lattice.validate().unwrap();
-            assert!((0.95..1.05).contains(&(lattice.len() as f64 / cartesian)), "{:?}", lattice.dims);
+            assert!(
+                (0.95..1.05).contains(&(lattice.len() as f64 / cartesian)),
+                "{:?}",
+                lattice.dims
+            );
             let [min, max] = lattice.bounds();
             assert!(min.max_element() < -0.97 && max.min_element() > 0.97, "{min} {max}");
             let bounds = Bounds { min, max };
             let cube: f64 = density(&lattice, &bounds).to_array().iter().product();
             assert!(
-                (0.8..1.2).contains(&(cube / (0.5 * SIDE as f64).powi(3))) || lattice.axes.z_axis.x != 0.0,
+                (0.8..1.2).contains(&(cube / (0.5 * SIDE as f64).powi(3)))
+                    || lattice.axes.z_axis.x != 0.0,
                 "{cube}"
             );
         }
@@ -395,7 +415,8 @@ mod tests {
         let lattice = rectilinear(32, 0.6);
         let Arrangement::Rectilinear(places) = &lattice.arrangement else { panic!("{lattice:?}") };
         let steps: Vec<_> = places[0].windows(2).map(|two| two[1] - two[0]).collect();
-        let [least, most] = steps.iter().fold([f64::MAX, 0.0], |[a, b], &step| [step.min(a), step.max(b)]);
+        let [least, most] =
+            steps.iter().fold([f64::MAX, 0.0], |[a, b], &step| [step.min(a), step.max(b)]);
         assert!(least > 0.0 && (3.5..4.5).contains(&(most / least)), "{least} {most}");
     }
 }

@@ -13,7 +13,8 @@ pub struct Folder(pub PathBuf);
 
 impl Folder {
     pub fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("splatkit-command-{}-{name}", std::process::id()));
+        let path =
+            std::env::temp_dir().join(format!("splatkit-command-{}-{name}", std::process::id()));
         std::fs::create_dir_all(&path).unwrap();
         Self(path)
     }
@@ -35,8 +36,14 @@ impl Folder {
 
     pub fn run_with(&self, arguments: &[impl AsRef<OsStr>]) -> Run {
         let mut command = Command::new(env!("CARGO_BIN_EXE_splatkit"));
-        let output = command.args(arguments).current_dir(&self.0).env("NO_COLOR", "1").env_remove("RUST_LOG").output();
-        let told: Vec<_> = arguments.iter().map(|argument| argument.as_ref().to_string_lossy()).collect();
+        let output = command
+            .args(arguments)
+            .current_dir(&self.0)
+            .env("NO_COLOR", "1")
+            .env_remove("RUST_LOG")
+            .output();
+        let told: Vec<_> =
+            arguments.iter().map(|argument| argument.as_ref().to_string_lossy()).collect();
         Run(told.join(" "), output.unwrap())
     }
 
@@ -89,7 +96,11 @@ impl Run {
         for word in words {
             assert!(message.contains(word), "splatkit {}: no “{word}” in: {message}", self.0);
         }
-        assert!(self.1.stdout.is_empty() || code == 5, "splatkit {}: a failure writes nothing to stdout", self.0);
+        assert!(
+            self.1.stdout.is_empty() || code == 5,
+            "splatkit {}: a failure writes nothing to stdout",
+            self.0
+        );
     }
 }
 
@@ -114,8 +125,9 @@ pub fn ball() -> Vec<u8> {
 }
 
 pub fn nrrd(type_name: &str, samples: &[u8]) -> Vec<u8> {
-    let header =
-        format!("NRRD0004\ntype: {type_name}\ndimension: 3\nsizes: 16 16 16\nendian: little\nencoding: raw\n\n");
+    let header = format!(
+        "NRRD0004\ntype: {type_name}\ndimension: 3\nsizes: 16 16 16\nendian: little\nencoding: raw\n\n"
+    );
     [header.as_bytes(), samples].concat()
 }
 
@@ -134,14 +146,20 @@ pub fn vti() -> String {
 /// A square with a texture of four colours, all in one file.
 pub fn glb() -> Vec<u8> {
     let color = [[255u8, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]];
-    let pixels: Vec<[f32; 4]> = color.map(|c| [c[0], c[1], c[2], 255].map(|v| f32::from(v) / 255.0)).to_vec();
-    let texture = splatkit::picture::Picture { width: 2, height: 2, color: pixels, depth: Vec::new() };
+    let pixels: Vec<[f32; 4]> =
+        color.map(|c| [c[0], c[1], c[2], 255].map(|v| f32::from(v) / 255.0)).to_vec();
+    let texture =
+        splatkit::picture::Picture { width: 2, height: 2, color: pixels, depth: Vec::new() };
     let png = texture.encode(splatkit::picture::PictureFormat::Png, None).unwrap();
     let positions = [[0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
     let uvs = [[0f32, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]];
     let indices = [0u16, 1, 2, 0, 2, 3];
-    let mut binary: Vec<u8> =
-        positions.iter().flatten().chain(uvs.iter().flatten()).flat_map(|v| v.to_le_bytes()).collect();
+    let mut binary: Vec<u8> = positions
+        .iter()
+        .flatten()
+        .chain(uvs.iter().flatten())
+        .flat_map(|v| v.to_le_bytes())
+        .collect();
     binary.extend(indices.iter().flat_map(|v| v.to_le_bytes()));
     binary.extend(&png);
     let size = png.len();

@@ -8,7 +8,11 @@ use crate::volume::{
 use zstd::bulk::Compressor;
 
 /// The bytes of a brick, and what the directory tells of them.
-pub fn encode(brick: &Brick, scalar: Scalar, packer: &mut Compressor) -> std::io::Result<(Entry, Vec<u8>)> {
+pub fn encode(
+    brick: &Brick,
+    scalar: Scalar,
+    packer: &mut Compressor,
+) -> std::io::Result<(Entry, Vec<u8>)> {
     let mut entry = Entry { bytes: 0, crc: 0, value: [0; 4], range: brick.range(), flags: 0 };
     let mut samples = brick.samples.clone();
     turn(&mut samples, scalar);
@@ -43,12 +47,17 @@ pub fn decode(entry: &Entry, bytes: &[u8], scalar: Scalar) -> Result<Brick, Stri
     }
     let [samples, blocks] = entry.contents(scalar);
     let mut contents = if entry.has(PACKED) {
-        zstd::bulk::decompress(bytes, samples + blocks).map_err(|e| format!("it cannot be unpacked: {e}"))?
+        zstd::bulk::decompress(bytes, samples + blocks)
+            .map_err(|e| format!("it cannot be unpacked: {e}"))?
     } else {
         bytes.to_vec()
     };
     if contents.len() != samples + blocks {
-        return Err(format!("it has {} bytes where {} were expected", contents.len(), samples + blocks));
+        return Err(format!(
+            "it has {} bytes where {} were expected",
+            contents.len(),
+            samples + blocks
+        ));
     }
     let ranges = contents.split_off(samples);
     let mut samples = contents;
@@ -57,14 +66,19 @@ pub fn decode(entry: &Entry, bytes: &[u8], scalar: Scalar) -> Result<Brick, Stri
     }
     turn(&mut samples, scalar);
     if scalar == Scalar::F32
-        && let Some(odd) = samples.chunks_exact(4).position(|bytes| !scalar.value(bytes).is_finite())
+        && let Some(odd) =
+            samples.chunks_exact(4).position(|bytes| !scalar.value(bytes).is_finite())
     {
         return Err(format!("its sample {odd} is not finite"));
     }
     let mut blocks = Box::new([entry.range; BRICK_BLOCKS]);
     blocks.iter_mut().zip(ranges.as_chunks::<2>().0).for_each(|(block, range)| *block = *range);
     let brick = Brick { samples, blocks };
-    if brick.range() == entry.range { Ok(brick) } else { Err("its range is not that of its blocks".into()) }
+    if brick.range() == entry.range {
+        Ok(brick)
+    } else {
+        Err("its range is not that of its blocks".into())
+    }
 }
 
 /// From this machine's order of bytes to the file's, and back.

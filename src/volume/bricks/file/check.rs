@@ -59,7 +59,8 @@ fn sums(bricks: &Bricks, watch: &(dyn Fn(u64, u64) + Sync), findings: &mut Findi
         let layer = level.brick_dims[0] * level.brick_dims[1];
         for first in (0..level.bricks()).step_by(layer) {
             let layer = (first as u32..(first + layer) as u32).into_par_iter();
-            let errors: Vec<Error> = layer.clone().filter_map(|brick| bricks.read(number, brick).err()).collect();
+            let errors: Vec<Error> =
+                layer.clone().filter_map(|brick| bricks.read(number, brick).err()).collect();
             is_sound &= errors.is_empty();
             errors.iter().for_each(|error| findings.push(finding("brick", error)));
             done += layer.len() as u64;
@@ -70,7 +71,11 @@ fn sums(bricks: &Bricks, watch: &(dyn Fn(u64, u64) + Sync), findings: &mut Findi
 }
 
 /// Whether the file is what would be made of its level 0.
-fn contents(bricks: &Bricks, watch: &(dyn Fn(u64, u64) + Sync), findings: &mut Findings) -> Result<()> {
+fn contents(
+    bricks: &Bricks,
+    watch: &(dyn Fn(u64, u64) + Sync),
+    findings: &mut Findings,
+) -> Result<()> {
     let header = bricks.header();
     let steps = Steps::new(header.scalar, header.range);
     let mut pyramid = Pyramid::new(header.scalar, header.lattice.dims);
@@ -81,17 +86,21 @@ fn contents(bricks: &Bricks, watch: &(dyn Fn(u64, u64) + Sync), findings: &mut F
     bricks.check_memory("the size of a layer of bricks in bytes", 3 * SIDE, finest, 2)?;
     for layer in 0..finest.brick_dims[2] {
         let slices = slices(bricks, &finest, layer)?;
-        let values = slices.chunks_exact(header.scalar.bytes()).map(|sample| header.scalar.value(sample));
+        let values =
+            slices.chunks_exact(header.scalar.bytes()).map(|sample| header.scalar.value(sample));
         range = values.fold(range, |[low, high], value| [low.min(value), high.max(value)]);
         pyramid.push(&slices, |number, layer, slices| {
             let [nx, ny, _] = slices.level.brick_dims;
             let odd = |at: usize| {
                 let brick = (layer * nx * ny + at) as u32;
                 let wanted = slices.brick([at % nx, at / nx, layer], &steps);
-                let told = |what| Finding::error(what, format!("level {number}, brick {brick}"), meaning(what));
+                let told = |what| {
+                    Finding::error(what, format!("level {number}, brick {brick}"), meaning(what))
+                };
                 bricks.read(number, brick).map(|found| difference(&found, &wanted).map(told))
             };
-            let odd: Vec<Option<Finding>> = (0..nx * ny).into_par_iter().map(odd).collect::<Result<_>>()?;
+            let odd: Vec<Option<Finding>> =
+                (0..nx * ny).into_par_iter().map(odd).collect::<Result<_>>()?;
             odd.into_iter().flatten().for_each(|finding| findings.push(finding));
             done += (nx * ny) as u64;
             watch(done, 2 * count(bricks));
@@ -99,7 +108,8 @@ fn contents(bricks: &Bricks, watch: &(dyn Fn(u64, u64) + Sync), findings: &mut F
         })?;
     }
     if range != header.range {
-        let message = format!("it tells of values in {:?}, and they are in {range:?}", header.range);
+        let message =
+            format!("it tells of values in {:?}, and they are in {range:?}", header.range);
         findings.push(Finding::error("range", "header", message));
     }
     Ok(())
@@ -114,7 +124,9 @@ fn difference(found: &Brick, wanted: &Brick) -> Option<&'static str> {
 
 fn meaning(code: &str) -> &'static str {
     match code {
-        "samples" => "its samples are not the means of those below, or not continued behind the border",
+        "samples" => {
+            "its samples are not the means of those below, or not continued behind the border"
+        }
         _ => "the ranges of its blocks are not those of the samples around them",
     }
 }
@@ -125,7 +137,9 @@ fn slices(bricks: &Bricks, level: &Level, layer: usize) -> Result<Vec<u8>> {
     let ([nx, ny, nz], [across, down, _]) = (level.dims, level.brick_dims);
     let mut out = vec![0; nx * ny * SIDE.min(nz - layer * SIDE) * size];
     for j in 0..down {
-        let row = (0..across).into_par_iter().map(|i| bricks.read(0, ((layer * down + j) * across + i) as u32));
+        let row = (0..across)
+            .into_par_iter()
+            .map(|i| bricks.read(0, ((layer * down + j) * across + i) as u32));
         let row: Vec<Brick> = row.collect::<Result<_>>()?;
         out.par_chunks_mut(nx * ny * size).enumerate().for_each(|(z, slice)| {
             let lines = slice.chunks_mut(nx * size).skip(j * SIDE).take(SIDE);

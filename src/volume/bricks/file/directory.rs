@@ -47,7 +47,9 @@ impl Entry {
         let bytes = self.bytes as usize;
         let fits = if self.has(PACKED) { (1..whole).contains(&bytes) } else { bytes == whole };
         let used = if self.has(CONSTANT) { scalar.bytes() } else { 0 };
-        fits && self.flags < 8 && self.range[0] <= self.range[1] && self.value[used..].iter().all(|&byte| byte == 0)
+        fits && self.flags < 8
+            && self.range[0] <= self.range[1]
+            && self.value[used..].iter().all(|&byte| byte == 0)
     }
 }
 
@@ -69,7 +71,8 @@ impl Directory {
     pub fn new(levels: Vec<Vec<Entry>>, header: usize) -> Self {
         let bricks = levels.iter().map(|level| level.len() as u64).sum();
         let mut at = header as u64 + Self::length(bricks);
-        let mut offsets: Vec<Vec<u64>> = levels.iter().map(|level| Vec::with_capacity(level.len())).collect();
+        let mut offsets: Vec<Vec<u64>> =
+            levels.iter().map(|level| Vec::with_capacity(level.len())).collect();
         for (entries, offsets) in levels.iter().zip(&mut offsets).rev() {
             for entry in entries {
                 offsets.push(at);
@@ -87,8 +90,9 @@ impl Directory {
 
     /// Where the hash begins: behind the last brick of level 0.
     pub fn end(&self) -> u64 {
-        let last =
-            |(entries, offsets): (&Vec<Entry>, &Vec<u64>)| Some(offsets.last()? + u64::from(entries.last()?.bytes));
+        let last = |(entries, offsets): (&Vec<Entry>, &Vec<u64>)| {
+            Some(offsets.last()? + u64::from(entries.last()?.bytes))
+        };
         self.levels.iter().zip(&self.offsets).next().and_then(last).unwrap_or_default()
     }
 
@@ -125,19 +129,28 @@ impl Directory {
         }
         let directory = Self::new(entries, start);
         if directory.end() + HASH as u64 != stored.file_bytes {
-            let message = format!("its bricks end at byte {}, not {HASH} before the end", directory.end());
+            let message =
+                format!("its bricks end at byte {}, not {HASH} before the end", directory.end());
             return Err(message);
         }
         Ok(directory)
     }
 }
 
-fn read(cursor: &mut Cursor, level: &Level, number: usize, scalar: Scalar) -> Result<Vec<Entry>, String> {
+fn read(
+    cursor: &mut Cursor,
+    level: &Level,
+    number: usize,
+    scalar: Scalar,
+) -> Result<Vec<Entry>, String> {
     let mut entry = || {
         let [bytes, crc] = [cursor.u32()?, cursor.u32()?];
-        let (value, range, [flags, 0]) = (cursor.array()?, cursor.array()?, cursor.array()?) else { return None };
+        let (value, range, [flags, 0]) = (cursor.array()?, cursor.array()?, cursor.array()?) else {
+            return None;
+        };
         Some(Entry { bytes, crc, value, range, flags }).filter(|entry| entry.is_sound(scalar))
     };
-    let contradicts = |brick: usize| format!("the values of level {number}, brick {brick} contradict each other");
+    let contradicts =
+        |brick: usize| format!("the values of level {number}, brick {brick} contradict each other");
     (0..level.bricks()).map(|brick| entry().ok_or_else(|| contradicts(brick))).collect()
 }

@@ -49,7 +49,9 @@ impl Stored {
         out.u64(self.file_bytes);
         lattice.dims.iter().for_each(|&n| out.u64(n as u64));
         out.dvec3(lattice.origin);
-        [lattice.axes.x_axis, lattice.axes.y_axis, lattice.axes.z_axis].into_iter().for_each(|axis| out.dvec3(axis));
+        [lattice.axes.x_axis, lattice.axes.y_axis, lattice.axes.z_axis]
+            .into_iter()
+            .for_each(|axis| out.dvec3(axis));
         range.iter().for_each(|value| out.put(&value.to_le_bytes()));
         out.u32(level::levels(lattice.dims).len() as u32);
         out.u32(SIDE as u32);
@@ -67,7 +69,11 @@ impl Stored {
     /// Reads the header at the beginning of a file.
     pub fn decode(bytes: &[u8]) -> Result<Self, Refusal> {
         if bytes.len() < MAGIC.len() {
-            return Err(if MAGIC.starts_with(bytes) { Refusal::Incomplete } else { Refusal::Foreign });
+            return Err(if MAGIC.starts_with(bytes) {
+                Refusal::Incomplete
+            } else {
+                Refusal::Foreign
+            });
         }
         let mut cursor = Cursor::new(bytes);
         if cursor.array() != Some(MAGIC) {
@@ -79,13 +85,16 @@ impl Stored {
         }
         // The texts' lengths decide where the checksum stands, which decides whether they can be believed.
         let mut lengths = Cursor::new(bytes.get(172..FIXED).ok_or(Refusal::Incomplete)?);
-        let [unit, source] = [lengths.u32(), lengths.u32()].map(|length| length.unwrap_or_default() as usize);
+        let [unit, source] =
+            [lengths.u32(), lengths.u32()].map(|length| length.unwrap_or_default() as usize);
         let end = FIXED + unit + source;
         let text = bytes.get(..end).ok_or(Refusal::Incomplete)?;
         if Cursor::new(&bytes[end..]).u32().ok_or(Refusal::Incomplete)? != crc32fast::hash(text) {
             return Err(Refusal::Damaged("its checksum does not fit".into()));
         }
-        Self::fields(cursor, &text[FIXED..], unit).ok_or(Refusal::Incomplete)?.map_err(Refusal::Damaged)
+        Self::fields(cursor, &text[FIXED..], unit)
+            .ok_or(Refusal::Incomplete)?
+            .map_err(Refusal::Damaged)
     }
 
     fn fields(mut cursor: Cursor, texts: &[u8], unit: usize) -> Option<Result<Self, String>> {
@@ -94,18 +103,24 @@ impl Stored {
         let dims = [cursor.u64()?, cursor.u64()?, cursor.u64()?];
         let origin = cursor.dvec3()?;
         let axes = DMat3::from_cols(cursor.dvec3()?, cursor.dvec3()?, cursor.dvec3()?);
-        let range = [cursor.array().map(f64::from_le_bytes)?, cursor.array().map(f64::from_le_bytes)?];
+        let range =
+            [cursor.array().map(f64::from_le_bytes)?, cursor.array().map(f64::from_le_bytes)?];
         let [levels, side, reach] = [cursor.u32()?, cursor.u32()?, cursor.u32()?];
         let sound = || {
             let wrong = |what: &str| format!("its {what} is none that is known");
-            let scalar = *Scalar::ALL.get(scalar as usize).ok_or_else(|| wrong("type of samples"))?;
-            let [Ok(nx), Ok(ny), Ok(nz)] = dims.map(usize::try_from) else { return Err(wrong("size")) };
+            let scalar =
+                *Scalar::ALL.get(scalar as usize).ok_or_else(|| wrong("type of samples"))?;
+            let [Ok(nx), Ok(ny), Ok(nz)] = dims.map(usize::try_from) else {
+                return Err(wrong("size"));
+            };
             let lattice = Lattice::cartesian([nx, ny, nz], origin, axes);
             let text = |bytes| copy::text(bytes).map_err(|_| "its texts are not UTF-8");
             let (unit, source) = (text(&texts[..unit])?, text(&texts[unit..])?);
             let header = Header { lattice, scalar, range, unit, source };
             header.validate()?;
-            if [levels, side, reach].map(|n| n as usize) != [level::levels(header.lattice.dims).len(), SIDE, REACH] {
+            if [levels, side, reach].map(|n| n as usize)
+                != [level::levels(header.lattice.dims).len(), SIDE, REACH]
+            {
                 return Err(wrong("number of levels, or the size of its bricks,"));
             }
             Ok(Self { header, file_bytes })

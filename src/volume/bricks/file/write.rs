@@ -41,7 +41,8 @@ type Watch<'a> = &'a dyn Fn(u64, u64);
 /// About how many bytes of memory [`convert`] takes: of level 0 the slices of a layer of bricks, what reaches into them and
 /// what is being read; of each further level a quarter of the one before; and room for packing.
 pub fn memory_of(dims: [usize; 3], scalar: Scalar) -> u64 {
-    let slice = (dims[0] as u64).saturating_mul(dims[1] as u64).saturating_mul(scalar.bytes() as u64);
+    let slice =
+        (dims[0] as u64).saturating_mul(dims[1] as u64).saturating_mul(scalar.bytes() as u64);
     let slices = (SIDE + 2 * REACH + 4 * PIECE).min(2 * dims[2]) as u64;
     slice.saturating_mul(slices).saturating_mul(4) / 3 + (64 << 20)
 }
@@ -55,7 +56,15 @@ pub fn memory_of(dims: [usize; 3], scalar: Scalar) -> u64 {
 pub fn write(volume: &Volume, path: &Path, options: &WriteOptions, watch: Watch) -> Result<()> {
     volume.validate().map_err(Error::Argument)?;
     let spill = || Spill::beside(path);
-    all(&header(volume, options), path, spill, || Target::at(path), |z| Ok(slices(volume, z)), watch).map(|_| ())
+    all(
+        &header(volume, options),
+        path,
+        spill,
+        || Target::at(path),
+        |z| Ok(slices(volume, z)),
+        watch,
+    )
+    .map(|_| ())
 }
 
 /// As [`write`](write()), from a file that is read slice by slice: in [`memory_of`] bytes, whatever its size. The range of
@@ -71,7 +80,8 @@ pub fn convert(
     watch: Watch,
 ) -> Result<()> {
     let WriteOptions { unit, source } = options.clone();
-    let header = Header { lattice: stream.lattice().clone(), scalar: stream.scalar(), range, unit, source };
+    let header =
+        Header { lattice: stream.lattice().clone(), scalar: stream.scalar(), range, unit, source };
     let slices = |z| Ok(Cow::Owned(stream.slices(z)?.bytes().to_vec()));
     all(&header, path, || Spill::beside(path), || Target::at(path), slices, watch).map(|_| ())
 }
@@ -81,7 +91,14 @@ pub fn convert(
 pub fn to_bytes(volume: &Volume, options: &WriteOptions) -> Result<Vec<u8>> {
     let memory = || Ok(Spill::Memory(Vec::new()));
     let target = || Ok(Target::Memory(Vec::new()));
-    all(&header(volume, options), Path::new("memory"), memory, target, |z| Ok(slices(volume, z)), &|_, _| ())
+    all(
+        &header(volume, options),
+        Path::new("memory"),
+        memory,
+        target,
+        |z| Ok(slices(volume, z)),
+        &|_, _| (),
+    )
 }
 
 /// The bytes of a file with bricks that a function may change, so that they are not what was promised.
@@ -103,7 +120,13 @@ pub fn with_changes(bricks: &Bricks, change: impl Fn(usize, u32, &mut Brick)) ->
 
 fn header(volume: &Volume, options: &WriteOptions) -> Header {
     let WriteOptions { unit, source } = options.clone();
-    Header { lattice: volume.lattice.clone(), scalar: volume.samples.scalar(), range: volume.range, unit, source }
+    Header {
+        lattice: volume.lattice.clone(),
+        scalar: volume.samples.scalar(),
+        range: volume.range,
+        unit,
+        source,
+    }
 }
 
 /// The bytes of some slices.
@@ -129,7 +152,8 @@ fn all<'a>(
         let z = first..(first + PIECE).min(dims[2]);
         watch(first as u64, dims[2] as u64);
         let piece = slices(z)?;
-        pyramid.push(&piece, |level, layer, slices| coder.layer(level, layer, slices).map_err(fail))?;
+        pyramid
+            .push(&piece, |level, layer, slices| coder.layer(level, layer, slices).map_err(fail))?;
     }
     coder.kept.finish(header, target()?).map_err(fail)?.end(path)
 }
@@ -151,7 +175,8 @@ impl Coder {
         let [nx, ny, _] = slices.level.brick_dims;
         let Self { scalar, steps, kept } = self;
         let of_place = |packer: &mut std::io::Result<Compressor>, place: usize| {
-            let packer = packer.as_mut().map_err(|e| std::io::Error::new(e.kind(), e.to_string()))?;
+            let packer =
+                packer.as_mut().map_err(|e| std::io::Error::new(e.kind(), e.to_string()))?;
             encode(&slices.brick([place % nx, place / nx, layer], steps), *scalar, packer)
         };
         for first in (0..nx * ny).step_by(BATCH) {
@@ -198,7 +223,9 @@ impl Kept {
         put(&stored.encode())?;
         put(&directory.encode())?;
         let places = self.waiting.iter().zip(&directory.levels).rev();
-        let pieces = places.flat_map(|(waiting, entries)| waiting.iter().copied().zip(entries.iter().map(|e| e.bytes)));
+        let pieces = places.flat_map(|(waiting, entries)| {
+            waiting.iter().copied().zip(entries.iter().map(|e| e.bytes))
+        });
         self.spill.replay(pieces, &mut put)?;
         out.write_all(hash.finalize().as_bytes())?;
         Ok(out)
