@@ -5,7 +5,12 @@ use super::{
     memory,
 };
 use crate::{bench::STEP, progress::Progress, render::milliseconds, timing::Times};
-use splatkit::{Device, Error, Renderer, Result, engine::FrameStats, picture::Picture};
+use splatkit::{
+    Device, Error, Renderer, Result,
+    engine::FrameStats,
+    picture::Picture,
+    scene::{Evaluate, Settings},
+};
 use std::time::Instant;
 
 /// A case that was planned, and what it took, or why it was not drawn.
@@ -26,8 +31,19 @@ pub struct Measured {
     pub cpu_peak: Option<u64>,
     /// Milliseconds of each step of the first view.
     pub steps: Vec<(&'static str, f64)>,
+    /// The same scene gathered, if it can be.
+    pub gathered: Option<Gathered>,
     /// Whether every run drew the same bytes, where there was more than one.
     pub same_bytes: Option<bool>,
+}
+
+/// A scene whose lattice is gathered instead of scattered.
+pub struct Gathered {
+    pub times: Times,
+    /// Milliseconds of each step of the first view.
+    pub steps: Vec<(&'static str, f64)>,
+    /// Bytes of the scene's buffers and the frame's.
+    pub bytes: u64,
 }
 
 /// How often things are done.
@@ -87,21 +103,10 @@ fn outcome(plan: Plan, device: &Device, counts: Counts, progress: &Progress) -> 
 
 fn measure(case: Case, device: &Device, counts: Counts) -> Result<Measured> {
     memory::reset_peak();
-    // A renderer of its own: one that has drawn before keeps the largest buffers that it has needed.
-    let mut renderer = Renderer::new(device, &case.scene)?;
-    let settings = &case.settings;
-    let stats = renderer.draw(&case.camera(0.0), settings)?;
-    require_content(&stats)?;
-    let mut times = Vec::new();
-    for frame in 1..=counts.frames {
-        let camera = case.camera(STEP * f64::from(frame));
-        let start = Instant::now();
-        renderer.draw(&camera, settings)?;
-        times.push(milliseconds(start));
-    }
-    let steps = renderer.profile(&case.camera(0.0), settings)?.steps;
+    let scattered = frames(&case, &case.settings, device, counts)?;
+    require_content(&scattered.stats)?;
     let cpu_peak = memory::peak();
-    drop(renderer);
+    let gathered = gathered(&case, device, counts)?;
     let same_bytes =
         if counts.runs > 1 { Some(same_bytes(&case, device, counts.runs)?) } else { None };
     Ok(Measured {
@@ -110,12 +115,51 @@ fn measure(case: Case, device: &Device, counts: Counts) -> Result<Measured> {
         effective: case.effective,
         seed: case.seed,
         series: case.series,
-        times: Times::of(times),
-        stats,
+        times: scattered.times,
+        stats: scattered.stats,
         cpu_peak,
-        steps,
+        steps: scattered.steps,
+        gathered,
         same_bytes,
     })
+}
+
+/// Frames of one case with one set of settings.
+struct Frames {
+    times: Times,
+    /// Of the first view.
+    stats: FrameStats,
+    /// Milliseconds of each step of the first view.
+    steps: Vec<(&'static str, f64)>,
+}
+
+/// Draws and times the case's frames with `settings`. Uses a renderer of its own: a renderer keeps
+/// the largest buffers that it has ever needed.
+fn frames(case: &Case, settings: &Settings, device: &Device, counts: Counts) -> Result<Frames> {
+    let mut renderer = Renderer::new(device, &case.scene)?;
+    let stats = renderer.draw(&case.camera(0.0), settings)?;
+    let mut times = Vec::new();
+    for frame in 1..=counts.frames {
+        let camera = case.camera(STEP * f64::from(frame));
+        let start = Instant::now();
+        renderer.draw(&camera, settings)?;
+        times.push(milliseconds(start));
+    }
+    let steps = renderer.profile(&case.camera(0.0), settings)?.steps;
+    Ok(Frames { times: Times::of(times), stats, steps })
+}
+
+/// Measures the case once more as the engine draws it by itself. Returns `None` if it does not
+/// gather there.
+fn gathered(case: &Case, device: &Device, counts: Counts) -> Result<Option<Gathered>> {
+    let settings = Settings { evaluate: Evaluate::Auto, ..case.settings.clone() };
+    let mut renderer = Renderer::new(device, &case.scene)?;
+    if renderer.draw(&case.camera(0.0), &settings)?.gathered == 0 {
+        return Ok(None);
+    }
+    drop(renderer);
+    let Frames { times, steps, stats } = frames(case, &settings, device, counts)?;
+    Ok(Some(Gathered { times, steps, bytes: stats.gpu_bytes }))
 }
 
 /// Draws a case anew so many times and compares the pictures, bit by bit.

@@ -34,7 +34,8 @@ const COLUMNS: [&str; 13] = [
     "M splats/s",
     "M entries/s",
 ];
-const MEMORY: [&str; 2] = ["GPU MiB", "CPU peak MiB"];
+const MEMORY: [&str; 2] = ["engine MiB", "process peak MiB"];
+const GATHERED: [&str; 2] = ["gathered: median ms", "gathered: engine MiB"];
 
 impl Chapter {
     pub fn markdown(&self) -> String {
@@ -64,8 +65,12 @@ impl Chapter {
     fn cases(&self) -> Table {
         let seeded = self.measured().any(|found| found.seed.is_some());
         let repeated = self.measured().any(|found| found.same_bytes.is_some());
+        let gathered = self.measured().any(|found| found.gathered.is_some());
         let mut columns = COLUMNS.to_vec();
         columns.extend(MEMORY);
+        if gathered {
+            columns.extend(GATHERED);
+        }
         if seeded {
             columns.extend(["seed's splats", "seed's fps"]);
         }
@@ -76,6 +81,9 @@ impl Chapter {
         for Outcome { name, result } in &self.outcomes {
             let Ok(found) = result else { continue };
             let mut cells = cells(found);
+            if gathered {
+                cells.extend(gathered_cells(found));
+            }
             if let Some(seed) = found.seed {
                 cells.extend([Cell::Number(seed.splats as f64, 0), Cell::Number(seed.fps, 2)]);
             }
@@ -89,8 +97,12 @@ impl Chapter {
 
     fn passes(&self) -> Table {
         let mut names: Vec<&str> = Vec::new();
-        for (name, _) in self.measured().flat_map(|found| &found.steps) {
-            if !names.contains(name) {
+        let steps = |found: &'_ Measured| {
+            let gathered = found.gathered.iter().flat_map(|gathered| &gathered.steps);
+            found.steps.iter().chain(gathered).map(|step| step.0).collect::<Vec<_>>()
+        };
+        for name in self.measured().flat_map(steps) {
+            if !names.contains(&name) {
                 names.push(name);
             }
         }
@@ -98,12 +110,27 @@ impl Chapter {
         let mut table = Table::new("Passes.", "Milliseconds of each in a frame.", &columns);
         for Outcome { name, result } in &self.outcomes {
             let Ok(found) = result else { continue };
-            let time = |name: &&str| found.steps.iter().find(|step| step.0 == *name);
-            let cell = |name| time(name).map_or(Cell::None, |step| Cell::Number(step.1, 1));
-            table.row(name, names.iter().map(cell).collect());
+            table.row(name, step_cells(&names, &found.steps));
+            if let Some(gathered) = &found.gathered {
+                table.row(&format!("{name}, gathered"), step_cells(&names, &gathered.steps));
+            }
         }
         table
     }
+}
+
+/// The time of each named step in milliseconds.
+fn step_cells(names: &[&str], steps: &[(&'static str, f64)]) -> Vec<Cell> {
+    let cell = |name: &&str| {
+        let step = steps.iter().find(|step| step.0 == *name);
+        step.map_or(Cell::None, |step| Cell::Number(step.1, 1))
+    };
+    names.iter().map(cell).collect()
+}
+
+fn gathered_cells(found: &Measured) -> [Cell; 2] {
+    let Some(gathered) = &found.gathered else { return [Cell::None, Cell::None] };
+    [Cell::Number(gathered.times.median, 1), Cell::Number((gathered.bytes >> 20) as f64, 0)]
 }
 
 fn cells(found: &Measured) -> Vec<Cell> {
@@ -141,6 +168,7 @@ fn case_json(Outcome { name, result }: &Outcome) -> Value {
         stats,
         cpu_peak,
         steps,
+        gathered,
         same_bytes,
         ..
     } = found;
@@ -162,6 +190,11 @@ fn case_json(Outcome { name, result }: &Outcome) -> Value {
         "gpu_bytes": stats.gpu_bytes,
         "cpu_peak_bytes": cpu_peak,
         "passes": timing::steps(steps),
+        "gathered_case": gathered.as_ref().map(|gathered| json!({
+            "frame_ms": gathered.times.json(),
+            "gpu_bytes": gathered.bytes,
+            "passes": timing::steps(&gathered.steps),
+        })),
         "same_bytes": same_bytes,
         "seed": found.seed.map(|seed| json!({ "splats": seed.splats, "fps": seed.fps })),
     })
