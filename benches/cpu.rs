@@ -3,11 +3,12 @@
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use glam::DVec3;
 use splatkit::{
+    formats::{self, Endian, RawLayout, SampleType},
     hierarchy::{
         BuildOptions, Hierarchy, Tree,
         file::{WriteOptions, to_bytes},
     },
-    io::{self, Endian, Limits, RawLayout, SampleType},
+    input::Limits,
     math::Kernel,
     splat::SplatSet,
     surface::{Mesh, SurfelOptions},
@@ -51,9 +52,9 @@ impl Drop for File {
 fn reading(criterion: &mut Criterion) {
     let limits = Limits::default();
     let ply = File::new("knot.ply");
-    io::ply::write(&mesh(), &ply.0).expect("a mesh is written");
+    formats::ply::write(&mesh(), &ply.0).expect("a mesh is written");
     criterion.bench_function("read a binary PLY file", |bench| {
-        bench.iter(|| io::load_mesh(black_box(&ply.0), &limits).expect("a mesh"));
+        bench.iter(|| formats::load_mesh(black_box(&ply.0), &limits).expect("a mesh"));
     });
     let raw = File::new("specimen.raw");
     let values = volume();
@@ -67,8 +68,9 @@ fn reading(criterion: &mut Criterion) {
         header: 0,
     };
     criterion.bench_function("read a raw volume", |bench| {
-        bench
-            .iter(|| io::load_volume(black_box(&raw.0), &limits, Some(&layout)).expect("a volume"));
+        bench.iter(|| {
+            formats::load_volume(black_box(&raw.0), &limits, Some(&layout)).expect("a volume")
+        });
     });
 }
 

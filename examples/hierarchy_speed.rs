@@ -1,15 +1,16 @@
 //! Times how surfels and their hierarchy are made of a mesh: cargo run --release --example hierarchy_speed -- mesh.ply
 
 use splatkit::{
+    formats,
     hierarchy::{BuildOptions, Preset, Tree},
-    io,
+    input::Limits,
     surface::SurfelOptions,
 };
 use std::{error::Error, path::PathBuf, time::Instant};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = PathBuf::from(std::env::args().nth(1).ok_or("which mesh?")?);
-    let mesh = io::load_mesh(&path, &io::Limits::default())?;
+    let mesh = formats::load_mesh(&path, &Limits::default())?;
     let vertices = mesh.positions.len() as f64;
     let start = Instant::now();
     let set = mesh.surfels(&SurfelOptions::default())?;

@@ -1,9 +1,6 @@
 //! How fast a mesh becomes surfels: `cargo run --release --example surfels -- mesh.ply`.
 
-use splatkit::{
-    io::{Limits, load_mesh},
-    surface::SurfelOptions,
-};
+use splatkit::{formats::load_mesh, input::Limits, surface::SurfelOptions};
 use std::{path::Path, time::Instant};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

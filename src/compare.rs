@@ -5,7 +5,8 @@
 
 use crate::{
     Error, Result,
-    io::{Limits, Source, decode_picture},
+    formats::decode_picture,
+    input::{Limits, Source},
     picture::Picture,
     surface::Texture,
 };

@@ -1,7 +1,6 @@
 //! The one error type of the library. Every message names the file and the place in it, what was found and what
 //! was expected; the hint says what to do.
 
-use crate::io::LimitKind;
 use std::path::{Path, PathBuf};
 
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -12,7 +11,7 @@ pub enum Error {
     #[error("{}: {place}: {message}", file.display())]
     Input { file: PathBuf, place: String, message: String, hint: Option<String> },
 
-    /// A file (or a claim in it) larger than the [`Limits`](crate::io::Limits) allow.
+    /// A file (or a claim in it) larger than the [`Limits`](crate::input::Limits) allow.
     #[error("{}: {what} is {found}, over the limit of {limit}", file.display())]
     Limit { file: PathBuf, what: String, kind: LimitKind, found: u64, limit: u64 },
 
@@ -51,6 +50,16 @@ pub enum Error {
     /// The device is gone, with all that lay on it ([`Gpu::reopened`](crate::engine::Gpu::reopened)).
     #[error("GPU: {0}")]
     DeviceLost(String),
+}
+
+/// Which of the [`Limits`](crate::input::Limits) was met.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LimitKind {
+    Points,
+    Bytes,
+    Depth,
+    Texels,
+    Seconds,
 }
 
 impl Error {

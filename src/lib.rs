@@ -1,6 +1,6 @@
 //! splatkit draws volumes and surfaces as elliptic splats, on a GPU or on the processor.
 //!
-//! The way of the data: a file → [`io`] (what it says) → [`volume`] / [`scattered`] / [`surface`] (what it means) → splats
+//! The way of the data: a file → [`input`] (opened, guarded) → [`formats`] (what it says) → [`volume`] / [`scattered`] / [`surface`] (what it means) → splats
 //! ([`splat`]) in a [`Scene`](scene::Scene) → a [`Renderer`], which draws with the [`engine`] on wgpu (one pass, one Rust file, one
 //! shader) or with that for processors ([`cpu`]) → a [`Picture`](picture::Picture).
 
@@ -10,8 +10,9 @@ pub mod deadline;
 pub mod disk;
 pub mod engine;
 pub mod error;
+pub mod formats;
 pub mod hierarchy;
-pub mod io;
+pub mod input;
 pub mod math;
 pub mod memory;
 pub mod picture;

@@ -7,7 +7,7 @@ use inputs::*;
 use splatkit::{
     Error,
     hierarchy::{Hierarchy, file},
-    io::Limits,
+    input::Limits,
     volume::bricks,
 };
 use std::{
@@ -243,7 +243,7 @@ fn worst_inputs_stay_within_their_limits() {
 #[cfg(unix)]
 #[test]
 fn places_beyond_what_32_bits_count_are_found() {
-    use splatkit::io::{RawLayout, load_volume};
+    use splatkit::formats::{RawLayout, load_volume};
     use std::io::{Seek, SeekFrom, Write};
     let folder = Folder::new();
     let header = (4u64 << 30) + 36;

@@ -7,7 +7,7 @@ use splatkit::{
     cpu::CpuRenderer,
     engine::{AdapterChoice, FrameStats, Gpu, Renderer},
     hierarchy::Detail,
-    io::Limits,
+    input::Limits,
     math::{Bounds, Camera, Kernel, Projection},
     picture::Picture,
     reference,

@@ -2,13 +2,13 @@
 
 use glam::Vec3;
 use splatkit::{
-    Result,
+    Result, formats,
     hierarchy::{
         self, BuildOptions, Hierarchy,
         external::{Converted, ExternalOptions, convert},
         file::{WriteOptions, check},
     },
-    io::{self, Limits},
+    input::Limits,
     splat::{Splat, decode_normal},
     surface::{Mesh, SurfelOptions},
 };
@@ -79,7 +79,7 @@ fn sort(splats: &mut [Splat]) {
 /// The leaves of both ways, for a file of a mesh or cloud.
 fn both_ways(folder: &Folder, name: &str) -> (Vec<Splat>, Vec<Splat>, Converted) {
     let path = folder.path(name);
-    let mesh = io::load_mesh(&path, &Limits::default()).unwrap();
+    let mesh = formats::load_mesh(&path, &Limits::default()).unwrap();
     let set = mesh.surfels(&SurfelOptions::default()).unwrap();
     let whole = folder.path("whole.splk");
     let build = BuildOptions { preset: hierarchy::Preset::Fastest, ..BuildOptions::default() };

@@ -9,7 +9,7 @@ use splatkit::{
         file::{WriteOptions, to_bytes},
         validate,
     },
-    io::Limits,
+    input::Limits,
     math::{Bounds, Camera, Kernel, Projection, View},
     picture::Picture,
     reference,

@@ -7,8 +7,9 @@
 use glam::DVec3;
 use splatkit::{
     engine::{AdapterChoice, Gpu, Renderer},
+    formats,
     hierarchy::{self, BuildOptions, Detail, Hierarchy, Tree},
-    io::{self, Limits, Source},
+    input::{Limits, Source},
     math::{Camera, Kernel},
     scattered::SampleOptions,
     scene::{Mode, Optics, Order, Scene, Settings},
@@ -97,7 +98,7 @@ fn scenes(round: u32, folder: &Path) -> Vec<(&'static str, Scene)> {
     }
     let name = Path::new("a.csv");
     let points =
-        io::read_samples(&Source::from_bytes(name, table.as_bytes(), &limits).unwrap(), None)
+        formats::read_samples(&Source::from_bytes(name, table.as_bytes(), &limits).unwrap(), None)
             .unwrap();
     let scattered = points.to_splats(&SampleOptions::default()).unwrap();
     let range = points.range();

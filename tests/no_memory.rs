@@ -5,8 +5,9 @@
 
 use splatkit::{
     Error, Result,
+    formats::load_mesh,
     hierarchy::{BuildOptions, Hierarchy, Preset, Tree, build_file, file::WriteOptions},
-    io::{Limits, load_mesh},
+    input::Limits,
     surface::SurfelOptions,
 };
 use std::{

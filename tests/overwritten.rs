@@ -8,7 +8,7 @@
 mod inputs;
 
 use inputs::Folder;
-use splatkit::io::Limits;
+use splatkit::input::Limits;
 use std::{
     fs::File,
     os::unix::fs::FileExt,

@@ -8,13 +8,14 @@ use super::{
 };
 use crate::{
     Error, Result,
+    formats::{Endian, RawLayout, SampleType, VolumeStream, nrrd, ply},
     hierarchy::{
         self,
         external::{self, ExternalOptions},
         file,
         testing::{surface, tree},
     },
-    io::{Endian, Limits, RawLayout, SampleType, VolumeStream, nrrd, ply, testing::Folder},
+    input::{Limits, testing::Folder},
     picture::Picture,
     surface::{Mesh, SurfelOptions},
     volume::{Lattice, Volume, bricks, phantoms::Phantom},

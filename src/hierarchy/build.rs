@@ -275,7 +275,7 @@ pub fn check_splats(set: &SplatSet) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{hierarchy::testing::surface, io::testing::Folder};
+    use crate::{hierarchy::testing::surface, input::testing::Folder};
 
     #[test]
     fn building_keeps_to_the_deadline() {

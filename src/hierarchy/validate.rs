@@ -1,9 +1,9 @@
 //! What must hold in every hierarchy.
 
-use super::merge::{WIDTH, deviation};
 use super::{
     Node, Tree,
     file::{in_order, joint_angle, reach},
+    merge::{WIDTH, deviation},
 };
 use crate::{
     math::Bounds,

@@ -1,7 +1,9 @@
 //! What the kernels add up to in one sheet of one ray.
 
-use super::kernel::{Crossing, Radiance, Sample};
-use super::ray::Ray;
+use super::{
+    kernel::{Crossing, Radiance, Sample},
+    ray::Ray,
+};
 use glam::DVec3;
 
 /// The sums over all kernels in one sheet of one ray.

@@ -7,7 +7,8 @@ use super::{
 };
 use crate::{
     Error, Result,
-    io::{nrrd, testing::Folder},
+    formats::nrrd,
+    input::testing::Folder,
     math::{Kernel, Profile, Tensor},
     scene::Scene,
 };

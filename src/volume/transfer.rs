@@ -2,7 +2,7 @@
 
 use crate::{
     Error, Result,
-    io::{Limits, Source},
+    input::{Limits, Source},
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;

@@ -5,8 +5,9 @@ pub mod crafted;
 use glam::Vec3;
 use splatkit::{
     Error, Result,
+    formats::{self, Endian, Kind, RawLayout, SampleType},
     hierarchy::{BuildOptions, Hierarchy, Tree, file},
-    io::{self, Endian, Kind, Limits, RawLayout, SampleType},
+    input::Limits,
     surface::{Mesh, SurfelOptions},
     volume::{TransferFunction, Volume, bricks, phantoms::Phantom},
 };
@@ -81,13 +82,15 @@ pub fn load(path: &Path, limits: &Limits) -> Result<String> {
     Ok(match kind {
         None => return Err(Error::input(path, "file", "is of no kind")),
         Some(Kind::Mesh) => {
-            let mesh = io::load_mesh(path, limits)?;
+            let mesh = formats::load_mesh(path, limits)?;
             let pictures =
                 mesh.materials.iter().filter(|material| material.texture.is_some()).count();
             format!("mesh {} {} {pictures}", mesh.positions.len(), mesh.triangles.len())
         }
-        Some(Kind::Volume) => of_volume(&io::load_volume(path, limits, raw.as_ref())?),
-        Some(Kind::Samples) => format!("samples {}", io::load_samples(path, limits, None)?.len()),
+        Some(Kind::Volume) => of_volume(&formats::load_volume(path, limits, raw.as_ref())?),
+        Some(Kind::Samples) => {
+            format!("samples {}", formats::load_samples(path, limits, None)?.len())
+        }
         Some(Kind::Hierarchy) => {
             let tree = Hierarchy::open(path, limits)?.read_tree()?;
             format!("hierarchy {}", tree.leaf_count())

@@ -11,13 +11,14 @@ use checksums::{sum_bricks, sum_hierarchy};
 use glam::{DVec3, Vec3};
 use splatkit::{
     Error, Result,
+    formats::{self, Endian, Kind, RawLayout, SampleType, Stream, VolumeStream},
     hierarchy::{
         BuildOptions, Hierarchy, Preset, Tree,
         external::{self, ExternalOptions},
         file::{WriteOptions, to_bytes},
         validate,
     },
-    io::{self, Endian, Kind, Limits, RawLayout, SampleType, Source, Stream, VolumeStream},
+    input::{Limits, Source},
     math::{Camera, Projection},
     reference,
     scattered::Points,
@@ -177,20 +178,20 @@ fn stream(name: &str, bytes: &[u8], whole: Option<&Mesh>) {
 }
 
 pub fn ply(bytes: &[u8]) {
-    let whole = mesh("input.ply", bytes, io::ply::read);
+    let whole = mesh("input.ply", bytes, formats::ply::read);
     stream("input.ply", bytes, whole.as_ref());
-    samples("input.ply", bytes, io::read_samples);
+    samples("input.ply", bytes, formats::read_samples);
 }
 
 /// An OBJ file; behind a line `#mtl` its materials, `input.mtl`, and behind a line `#png` their picture, `input.png`.
 pub fn obj(bytes: &[u8]) {
     let Some((model, rest)) = cut(bytes, b"\n#mtl\n") else {
-        mesh("input.obj", bytes, io::obj::read);
+        mesh("input.obj", bytes, formats::obj::read);
         return;
     };
     let (materials, picture) = cut(rest, b"\n#png\n").unwrap_or((rest, &[]));
     let others = [("input.mtl", materials), ("input.png", picture)];
-    mesh_beside(("input.obj", model), &others, io::obj::read);
+    mesh_beside(("input.obj", model), &others, formats::obj::read);
 }
 
 /// Reads a mesh whose file refers to others beside it.
@@ -240,27 +241,27 @@ impl Drop for Folder {
 }
 
 pub fn stl(bytes: &[u8]) {
-    mesh("input.stl", bytes, io::stl::read);
+    mesh("input.stl", bytes, formats::stl::read);
 }
 
 /// A glTF file; behind a line `#bin` its buffer, `input.bin`, and behind a line `#png` its picture, `input.png`.
 pub fn gltf(bytes: &[u8]) {
     let Some((model, rest)) = cut(bytes, b"\n#bin\n") else {
-        mesh("input.glb", bytes, io::gltf::read);
+        mesh("input.glb", bytes, formats::gltf::read);
         return;
     };
     let (buffer, picture) = cut(rest, b"\n#png\n").unwrap_or((rest, &[]));
     let others = [("input.bin", buffer), ("input.png", picture)];
-    mesh_beside(("input.gltf", model), &others, io::gltf::read);
+    mesh_beside(("input.gltf", model), &others, formats::gltf::read);
 }
 
 pub fn las(bytes: &[u8]) {
-    let whole = mesh("input.laz", bytes, io::las::read);
+    let whole = mesh("input.laz", bytes, formats::las::read);
     stream("input.laz", bytes, whole.as_ref());
 }
 
 pub fn e57(bytes: &[u8]) {
-    mesh("input.e57", bytes, io::e57::read);
+    mesh("input.e57", bytes, formats::e57::read);
 }
 
 /// An E57 file with the checksums of its pages made right.
@@ -281,26 +282,26 @@ fn crc32c(bytes: &[u8]) -> u32 {
 }
 
 pub fn xyz(bytes: &[u8]) {
-    mesh("input.xyz", bytes, io::xyz::read);
+    mesh("input.xyz", bytes, formats::xyz::read);
 }
 
 pub fn pcd(bytes: &[u8]) {
-    mesh("input.pcd", bytes, io::pcd::read);
+    mesh("input.pcd", bytes, formats::pcd::read);
 }
 
 pub fn csv(bytes: &[u8]) {
-    samples("input.csv", bytes, io::csv::read);
+    samples("input.csv", bytes, formats::csv::read);
 }
 
 pub fn npy(bytes: &[u8]) {
-    read("input.npy", bytes, io::npy::read).iter().for_each(sound_samples);
+    read("input.npy", bytes, formats::npy::read).iter().for_each(sound_samples);
 }
 
 /// A NRRD file; behind lines `#data` the files that it may refer to: `0.raw`, `1.raw` and so on. With these it is also read
 /// slice by slice.
 pub fn nrrd(bytes: &[u8]) {
     let Some((header, mut rest)) = cut(bytes, DATA) else {
-        volume("input.nrrd", bytes, io::nrrd::read);
+        volume("input.nrrd", bytes, formats::nrrd::read);
         return;
     };
     const DATA: &[u8] = b"\n#data\n";
@@ -317,7 +318,7 @@ pub fn nrrd(bytes: &[u8]) {
         .for_each(|(number, data)| drop(folder.write(&format!("{number}.raw"), data)));
     let path = folder.write("input.nhdr", header);
     let limits = limits();
-    let whole = accepted(io::load_volume(&path, &limits, None));
+    let whole = accepted(formats::load_volume(&path, &limits, None));
     whole.iter().for_each(sound_volume);
     let stream = accepted(VolumeStream::open(&path, &limits, None)).flatten();
     if let (Some(whole), Some(stream)) = (whole, stream) {
@@ -328,20 +329,20 @@ pub fn nrrd(bytes: &[u8]) {
 }
 
 pub fn vti(bytes: &[u8]) {
-    volume("input.vti", bytes, io::vti::read);
+    volume("input.vti", bytes, formats::vti::read);
 }
 
 pub fn vtr(bytes: &[u8]) {
-    volume("input.vtr", bytes, io::vtr::read);
+    volume("input.vtr", bytes, formats::vtr::read);
 }
 
 pub fn vtu(bytes: &[u8]) {
-    samples("input.vtu", bytes, io::vtu::read);
+    samples("input.vtu", bytes, formats::vtu::read);
 }
 
 pub fn vtk(bytes: &[u8]) {
-    volume("input.vtk", bytes, io::vtk::read_volume);
-    samples("input.vtk", bytes, io::vtk::read_samples);
+    volume("input.vtk", bytes, formats::vtk::read_volume);
+    samples("input.vtk", bytes, formats::vtk::read_samples);
 }
 
 /// A raw volume: six numbers of 8 bits tell how it lies (three sizes, type, spacing, bytes to skip), then come its bytes.
@@ -366,7 +367,9 @@ pub fn raw(bytes: &[u8]) {
         endian: if kind & 1 == 1 { Endian::Big } else { Endian::Little },
         header: header.into(),
     };
-    read("input.raw", bytes, |source| io::raw::read(source, &layout)).iter().for_each(sound_volume);
+    read("input.raw", bytes, |source| formats::raw::read(source, &layout))
+        .iter()
+        .for_each(sound_volume);
 }
 
 /// A file whose name does not tell its format.
@@ -375,9 +378,13 @@ pub fn any(bytes: &[u8]) {
         |with_scalar| read("input", bytes, |source| Kind::of_source(source, with_scalar)).flatten();
     for kind in [kind(false), kind(true)] {
         match kind {
-            Some(Kind::Mesh) => read("input", bytes, io::read_mesh).iter().for_each(sound_mesh),
-            Some(Kind::Volume) => volume("input", bytes, |source| io::read_volume(source, None)),
-            Some(Kind::Samples) => samples("input", bytes, io::read_samples),
+            Some(Kind::Mesh) => {
+                read("input", bytes, formats::read_mesh).iter().for_each(sound_mesh)
+            }
+            Some(Kind::Volume) => {
+                volume("input", bytes, |source| formats::read_volume(source, None))
+            }
+            Some(Kind::Samples) => samples("input", bytes, formats::read_samples),
             Some(Kind::Hierarchy) => splk(bytes),
             Some(Kind::Bricks) => splv(bytes),
             None => {}
@@ -398,7 +405,7 @@ pub fn regions(bytes: &[u8]) {
         block_splats: 64,
         surfels: surfel_options(),
     };
-    let whole = accepted(io::load_mesh(&path, &limits));
+    let whole = accepted(formats::load_mesh(&path, &limits));
     let converted = accepted(external::convert(
         &[path],
         &limits,

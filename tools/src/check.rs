@@ -12,8 +12,8 @@ use clap::Args;
 use serde_json::json;
 use splatkit::{
     Deadline, Error,
+    formats::Kind,
     hierarchy::{Finding, Severity, file},
-    io::Kind,
     surface::{Mesh, SurfelOptions},
     volume::bricks,
 };

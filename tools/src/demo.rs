@@ -12,9 +12,8 @@ use crate::{
 };
 use clap::{Args, Parser};
 use splatkit::{
-    Error, disk,
+    Error, disk, formats,
     hierarchy::{BuildOptions, build_file, file::WriteOptions},
-    io,
     picture::PictureFormat,
     surface::{Mesh, SurfelOptions},
     volume::phantoms::Phantom,
@@ -116,7 +115,7 @@ impl Demo {
         // So large that the knot winds through the specimen.
         mesh.positions.iter_mut().for_each(|p| *p *= KNOT_SCALE);
         let specimen = Phantom::Specimen.sample([128; 3]).map_err(Error::Argument)?;
-        io::ply::write(&mesh, &self.folder.join(MESH))?;
+        formats::ply::write(&mesh, &self.folder.join(MESH))?;
         progress.stage("Building a hierarchy");
         let build = BuildOptions {
             closed: mesh.is_solid(),
@@ -126,7 +125,7 @@ impl Demo {
         let write = WriteOptions { source: MESH.into(), ..WriteOptions::default() };
         let splats = mesh.surfels(&SurfelOptions::default())?;
         build_file(&splats, &self.folder.join(TREE), &build, &write, &|_, _| ())?;
-        io::nrrd::write(&specimen, &self.folder.join(VOLUME))?;
+        formats::nrrd::write(&specimen, &self.folder.join(VOLUME))?;
         Ok(disk::write(&self.folder.join(TRANSFER), SHOWN.as_bytes())?)
     }
 

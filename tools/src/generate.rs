@@ -4,7 +4,9 @@ use crate::{failure::Failure, limits::LimitFlags, output, parse, progress::Progr
 use clap::{Args, ValueEnum};
 use glam::{DMat3, DVec3};
 use splatkit::{
-    Error, disk, io, memory,
+    Error, disk, formats,
+    input::{Limits, Source},
+    memory,
     volume::{Arrangement, Lattice, Volume, phantoms::Phantom},
 };
 use std::{io::Write, path::PathBuf};
@@ -87,8 +89,8 @@ impl Generate {
         match (self.what, &self.from, extension) {
             (What::Scan, Some(from), "ply") => {
                 let limits = LimitFlags::default().whole(memory::most());
-                let source = io::Source::open(from, &limits)?;
-                let mesh = io::read_mesh(&source)?;
+                let source = Source::open(from, &limits)?;
+                let mesh = formats::read_mesh(&source)?;
                 output::check_unneeded(&self.output, &source.files())?;
                 if mesh.triangles.is_empty() {
                     let message =
@@ -122,7 +124,7 @@ impl Generate {
                     AS_NUMBERS,
                 )?;
                 let volume = self.volume(phantom).map_err(Error::Argument)?;
-                io::nrrd::write(&volume, &self.output)?;
+                formats::nrrd::write(&volume, &self.output)?;
             }
         }
         Ok(())
@@ -139,7 +141,7 @@ impl Generate {
         check_dims([x, y, z.min(1)], AS_BYTES)?;
         let slices = phantom.byte_slices(self.dims).map_err(Error::Argument)?;
         let bar = progress.bar("Making slices", self.dims[2] as u64);
-        io::nrrd::write_bytes(slices.lattice(), &self.output, |k| {
+        formats::nrrd::write_bytes(slices.lattice(), &self.output, |k| {
             bar.set(k as u64);
             slices.slice(k)
         })?;
@@ -169,7 +171,7 @@ fn check_dims(dims: [usize; 3], bytes: u64) -> Result<(), Failure> {
         )));
     }
     let samples = dims.iter().try_fold(1u64, |all, &n| all.checked_mul(n as u64));
-    let most = memory::most().unwrap_or(u64::MAX).min(io::Limits::default().bytes) / bytes;
+    let most = memory::most().unwrap_or(u64::MAX).min(Limits::default().bytes) / bytes;
     match samples.filter(|&samples| samples <= most) {
         Some(_) => Ok(()),
         None => {

@@ -3,7 +3,7 @@
 use crate::{failure::Failure, parse, scene::in_file};
 use clap::Args;
 use splatkit::{
-    io::{Limits, Source},
+    input::{Limits, Source},
     math::{Kernel, Tensor},
 };
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! The flags of what reading an input may take.
 
 use clap::Args;
-use splatkit::io::{LimitKind, Limits};
+use splatkit::{error::LimitKind, input::Limits};
 use std::path::Path;
 
 /// How much any file may claim, occupy and take.

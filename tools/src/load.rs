@@ -5,8 +5,9 @@ use clap::Args;
 use glam::DVec3;
 use splatkit::{
     Deadline, Error,
+    formats::{self, Endian, Kind, RawLayout, SampleType, VolumeStream},
     hierarchy::Hierarchy,
-    io::{self, Endian, Kind, Limits, RawLayout, SampleType, Source, VolumeStream},
+    input::{Limits, Source},
     memory,
     scattered::{Points, SampleOptions},
     surface::Mesh,
@@ -92,15 +93,21 @@ impl LoadFlags {
             }
             Kind::Mesh => {
                 let source = Source::open(path, &whole)?;
-                (Input::Mesh(io::read_mesh(&source)?), source.files())
+                (Input::Mesh(formats::read_mesh(&source)?), source.files())
             }
             Kind::Volume => {
                 let source = Source::open(path, &whole)?;
-                (Input::Volume(io::read_volume(&source, self.layout().as_ref())?), source.files())
+                (
+                    Input::Volume(formats::read_volume(&source, self.layout().as_ref())?),
+                    source.files(),
+                )
             }
             Kind::Samples => {
                 let source = Source::open(path, &whole)?;
-                (Input::Samples(io::read_samples(&source, self.scalar.as_deref())?), source.files())
+                (
+                    Input::Samples(formats::read_samples(&source, self.scalar.as_deref())?),
+                    source.files(),
+                )
             }
         };
         read.extend(files);

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use splatkit::{
-    io::{Endian, SampleType},
+    formats::{Endian, SampleType},
     surface::SurfelOptions,
 };
 use std::str::FromStr;

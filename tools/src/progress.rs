@@ -1,7 +1,6 @@
 //! What the command is doing, on a terminal's stderr; nothing anywhere else.
 
-use crate::terminal::safe;
-use crate::threads;
+use crate::{terminal::safe, threads};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{io::IsTerminal, sync::Mutex, time::Duration};
 

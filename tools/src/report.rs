@@ -4,7 +4,7 @@ use crate::{failure::Failure, output};
 use serde_json::{Map, Value, json};
 use splatkit::{
     Error, disk,
-    io::{Limits, Source},
+    input::{Limits, Source},
 };
 use std::path::{Path, PathBuf};
 

@@ -4,7 +4,7 @@ use crate::{failure::Failure, kernel::KernelFlags, parse};
 use clap::Args;
 use splatkit::{
     Error,
-    io::Limits,
+    input::Limits,
     math::Kernel,
     volume::{Isosurface, TransferFunction},
 };

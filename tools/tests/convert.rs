@@ -4,13 +4,14 @@ mod common;
 
 use common::*;
 use splatkit::{
+    formats,
     hierarchy::Hierarchy,
-    io::{self, Limits},
+    input::Limits,
     volume::{Arrangement, Volume},
 };
 
 fn volume(folder: &Folder, name: &str) -> Volume {
-    io::load_volume(&folder.path(name), &Limits::default(), None).unwrap()
+    formats::load_volume(&folder.path(name), &Limits::default(), None).unwrap()
 }
 
 #[test]

@@ -3,15 +3,7 @@
 
 use flate2::{Compression, write::GzEncoder};
 use glam::{DVec3, Vec2, Vec3};
-use splatkit::{
-    hierarchy::{
-        BuildOptions, Tree,
-        file::{WriteOptions, to_bytes},
-    },
-    io,
-    surface::Mesh,
-    volume::{Lattice, Samples, Volume, bricks},
-};
+use splatkit::{hierarchy::{BuildOptions, Tree, file::{WriteOptions, to_bytes}}, formats, surface::Mesh, volume::{Lattice, Samples, Volume, bricks}};
 use std::{
     error::Error,
     fs,
@@ -101,14 +93,14 @@ fn floats(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
 }
 
 fn ply(seeds: &mut Seeds) -> Result<()> {
-    let plain = seeds.written(|path| io::ply::write(&tetrahedron(), path))?;
+    let plain = seeds.written(|path| formats::ply::write(&tetrahedron(), path))?;
     seeds.known("ply", plain)?;
     let cloud = Mesh { triangles: Vec::new(), uvs: Vec::new(), ..tetrahedron() };
-    let cloud = seeds.written(|path| io::ply::write(&cloud, path))?;
+    let cloud = seeds.written(|path| formats::ply::write(&cloud, path))?;
     seeds.known("ply", cloud)?;
     let set = tetrahedron().surfels(&Default::default())?;
     let few = splatkit::splat::SplatSet { splats: set.splats[..3].to_vec(), ..set };
-    let gaussians = seeds.written(|path| io::ply::write_gaussians(&few, path))?;
+    let gaussians = seeds.written(|path| formats::ply::write_gaussians(&few, path))?;
     seeds.known("ply", gaussians)?;
     seeds.known(
         "ply",
@@ -428,7 +420,7 @@ fn volumes(seeds: &mut Seeds) -> Result<()> {
     let lattice = Lattice::with_spacing([3, 2, 2], DVec3::new(1.0, 2.0, 0.5));
     let samples = Samples::U8((0..12).collect());
     let volume = Volume::new(lattice, samples)?;
-    let written = seeds.written(|path| io::nrrd::write(&volume, path))?;
+    let written = seeds.written(|path| formats::nrrd::write(&volume, path))?;
     seeds.known("nrrd", written)?;
     let head = "NRRD0005\n# text\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: 2 2 2\n\
          space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\nendian: big\n";

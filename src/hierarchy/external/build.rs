@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     Deadline, Error, Result,
-    io::StreamPoint,
+    formats::StreamPoint,
     math::Bounds,
     memory,
     splat::{Payload, Splat, SplatSet, decode_normal},

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     Result,
-    io::{Stream, StreamPoint},
+    formats::{Stream, StreamPoint},
 };
 use glam::Vec3;
 use std::{collections::HashSet, path::Path};

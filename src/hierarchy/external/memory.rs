@@ -3,7 +3,8 @@
 use super::{ExternalOptions, Stage, StageWatch, survey::look};
 use crate::{
     Error, Result,
-    io::{Counts, Limits, Stream},
+    formats::{Counts, Stream},
+    input::Limits,
     splat::Splat,
     surface::{Mesh, MeshPieces, SurfelOptions, Triangles},
 };

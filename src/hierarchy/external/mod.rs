@@ -19,8 +19,9 @@ mod survey;
 use super::{Preset, build::Builder, file::WriteOptions, sphere::Sphere};
 use crate::{
     Error, Result,
+    formats::Stream,
     hierarchy::file::Whole,
-    io::{Limits, Stream},
+    input::Limits,
     math::Bounds,
     surface::{EXTENT, SurfelOptions},
 };

@@ -3,7 +3,7 @@
 use super::{Stage, StageWatch};
 use crate::{
     Result,
-    io::{Counts, Stream},
+    formats::{Counts, Stream},
     math::weld::first_of_equals,
     surface::{Joining, PiecesClosing, Sides, Told},
 };
@@ -113,7 +113,7 @@ fn places(stream: &Stream) -> Result<Vec<Vec3>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::{Limits, testing::Folder};
+    use crate::input::{Limits, testing::Folder};
 
     /// Tetrahedra side by side, none of which shares a vertex, as a binary PLY file.
     fn tetrahedra(count: u32) -> Vec<u8> {

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     Result,
-    io::Stream,
+    formats::Stream,
     surface::{MeshPieces, SurfelOptions, Triangles},
 };
 use glam::{DVec3, Vec3};

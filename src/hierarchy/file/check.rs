@@ -12,7 +12,7 @@ use crate::{
         Finding, Node,
         validate::{Findings, Footprints, check_block, check_portals},
     },
-    io::Limits,
+    input::Limits,
     splat::NO_NORMAL,
 };
 use std::path::Path;

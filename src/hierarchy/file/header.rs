@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     hierarchy::validate::{fault_of_box, fault_of_extent},
-    io::copy,
+    input::copy,
     math::Bounds,
 };
 use glam::DVec3;

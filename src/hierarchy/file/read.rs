@@ -10,11 +10,12 @@ use super::{
 };
 use crate::{
     Error, Result,
+    error::LimitKind,
     hierarchy::{
         Block, Node, Tree,
         validate::{fault_of_box, fault_of_extent},
     },
-    io::{LimitKind, Limits, Mapping, Source, intact},
+    input::{Limits, Mapping, Source, intact},
     math::Bounds,
 };
 use rayon::prelude::*;

@@ -7,7 +7,7 @@ use crate::{
         testing::{cloud, joined, surface, tree},
         validate,
     },
-    io::{Limits, testing::Folder},
+    input::{Limits, testing::Folder},
     math::Camera,
     splat::Splat,
 };

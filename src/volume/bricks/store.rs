@@ -9,7 +9,8 @@ use super::{
 };
 use crate::{
     Error, Result,
-    io::{LimitKind, Limits, Mapping, Source, intact},
+    error::LimitKind,
+    input::{Limits, Mapping, Source, intact},
     math::Bounds,
     volume::{Lattice, Samples, Scalar, Volume, steps::Steps},
 };

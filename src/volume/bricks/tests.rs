@@ -6,7 +6,8 @@ use super::{
 };
 use crate::{
     Error,
-    io::{Endian, Limits, RawLayout, SampleType, VolumeStream, testing::Folder},
+    formats::{Endian, RawLayout, SampleType, VolumeStream},
+    input::{Limits, testing::Folder},
     volume::{Lattice, Samples, Scalar, Volume},
 };
 use glam::{DMat3, DVec3};

@@ -5,12 +5,12 @@ use crate::{failure::Failure, output, progress::Progress, render::milliseconds};
 use serde_json::json;
 use splatkit::{
     Deadline, Error,
+    formats::Stream,
     hierarchy::{
         BuildOptions,
         external::{BLOCKS, ExternalOptions, Stage, check, convert},
         file::UpAxis,
     },
-    io::Stream,
 };
 use std::time::Instant;
 

@@ -2,8 +2,9 @@
 
 use crate::failure::Failure;
 use splatkit::{
+    formats::Stream,
     hierarchy::external::{BLOCKS, memory_between, memory_of_stream},
-    io::{Limits, Stream},
+    input::Limits,
     surface::SurfelOptions,
 };
 use std::path::{Path, PathBuf};

@@ -4,7 +4,7 @@ use super::Convert;
 use crate::{failure::Failure, load::Input};
 use splatkit::{
     Error,
-    io::{Kind, VolumeStream},
+    formats::{Kind, VolumeStream},
     volume::{Lattice, Scalar, Volume},
 };
 use std::path::Path;

@@ -110,7 +110,7 @@ impl Convert {
         let start = Instant::now();
         if extension == "ply" {
             progress.stage(format!("Writing {}", self.output.display()));
-            splatkit::io::ply::write_gaussians(&gathered.set, &self.output)?;
+            splatkit::formats::ply::write_gaussians(&gathered.set, &self.output)?;
         } else {
             let bar = progress.bar("Building the hierarchy", gathered.set.splats.len() as u64);
             let watch = |done: u64, _: u64| bar.set(done);

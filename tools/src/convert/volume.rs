@@ -5,7 +5,7 @@ use crate::{failure::Failure, output, progress::Progress};
 use clap::ValueEnum;
 use serde_json::json;
 use splatkit::{
-    Error, io,
+    Error, formats,
     volume::{self, Arrangement, Volume},
 };
 
@@ -40,7 +40,7 @@ impl Convert {
         progress.stage("Resampling");
         let volume = on_lattice(volume, self.lattice)?;
         progress.stage(format!("Writing {}", self.output.display()));
-        io::nrrd::write(&volume, &self.output)?;
+        formats::nrrd::write(&volume, &self.output)?;
         progress.clear();
         let (lattice, dims) = (name_of(&volume), volume.lattice.dims);
         if self.json {

@@ -7,7 +7,7 @@ use splatkit::{
         Node, Tree,
         file::{Hierarchy, WriteOptions, to_bytes},
     },
-    io::Limits,
+    input::Limits,
     splat::decode_normal,
 };
 use std::path::Path;

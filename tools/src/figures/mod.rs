@@ -20,7 +20,7 @@ use clap::Args;
 use splatkit::{
     Error,
     engine::{AdapterChoice, Gpu, PreparedScene, Renderer},
-    io::Kind,
+    formats::Kind,
     math::Camera,
     picture::Picture,
     scene::{Scene, Settings},

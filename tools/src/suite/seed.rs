@@ -9,7 +9,8 @@ use crate::camera::Subject;
 use glam::{DMat3, DVec3};
 use splatkit::{
     Error, Result,
-    io::{self, Kind, Limits},
+    formats::{self, Kind},
+    input::Limits,
     math::{Bounds, Kernel},
     scene::{Mode, Settings},
     volume::{
@@ -133,7 +134,7 @@ impl Row {
         let wanted = effort.samples(self.seed.splats);
         let (volume, drawn) = match file {
             Some(file) => {
-                let volume = io::load_volume(file, &Limits::default(), None)?;
+                let volume = formats::load_volume(file, &Limits::default(), None)?;
                 let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
                 (if self.centred { body_centred(&volume)? } else { volume }, name)
             }

@@ -4,7 +4,7 @@ use super::HASH;
 use crate::{
     Error, Result,
     hierarchy::{Finding, Findings, file::Report},
-    io::Limits,
+    input::Limits,
     volume::{
         bricks::{Brick, Bricks, Level, SIDE, pyramid::Pyramid},
         steps::Steps,

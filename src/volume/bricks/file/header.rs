@@ -3,7 +3,7 @@
 use super::{MAGIC, VERSION};
 use crate::{
     hierarchy::file::{Cursor, Put},
-    io::copy,
+    input::copy,
     volume::{
         Lattice, Scalar,
         bricks::{Header, REACH, SIDE, level},

@@ -5,8 +5,8 @@ use super::{Directory, Entry, HASH, Stored, brick::encode};
 use crate::volume::bricks::{Brick, Bricks};
 use crate::{
     Error, Result,
+    formats::VolumeStream,
     hierarchy::file::{Spill, Target},
-    io::VolumeStream,
     volume::{
         Scalar, Volume,
         bricks::{Header, REACH, SIDE, cut::Slices, level, pyramid::Pyramid},

@@ -1,0 +1,192 @@
+//! Scattered samples as tables of text (`.csv`, `.txt`, `.xyzv`): a sample a line, with a line of names or without.
+
+use super::shared::gather::{Columns, choose, gather};
+use crate::{
+    Result,
+    input::{Source, text::Text},
+    scattered::Points,
+};
+use glam::DVec3;
+
+/// Columns of a covariance.
+const COVARIANCE: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
+
+/// Reads samples. With names: `x`, `y`, `z`, a value (the column `scalar` names, else `value` or `scalar`, else the only
+/// one left), and if there are some `radius` and `xx`, `xy`, `xz`, `yy`, `yz`, `zz` (or `cov_xx`, …). Without: x, y, z and
+/// value, and then nothing, a radius, or the six terms of a covariance.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) with the line, for columns that are not these, lines of another length, what is no
+/// number, and numbers that are not finite; [`Error::Limit`](crate::Error::Limit) for more lines than points are allowed.
+pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
+    let text = Text::of(source, |_, _| Ok(false))?;
+    let layout = match &text.names {
+        Some(names) => Layout::named(source, text.first, names, scalar)?,
+        None => Layout::plain(source, text.width)?,
+    };
+    let table = text.numbers(source, |column| layout.uses(column))?;
+    let (count, width) = (text.len(), text.width);
+    let value = |row: usize, column: usize| table[row * width + column];
+    let column = |column: usize| (0..count).map(move |row| value(row, column));
+    source.spend("the size of the samples in bytes", Columns::ROW * count as u64)?;
+    let columns = Columns {
+        values: column(layout.value).collect(),
+        radii: layout
+            .radius
+            .map_or(Vec::new(), |radius| column(radius).map(|radius| radius as f32).collect()),
+        covariances: layout.covariance.map_or(Vec::new(), |terms| {
+            (0..count).map(|row| terms.map(|term| value(row, term) as f32)).collect()
+        }),
+    };
+    let [x, y, z] = layout.position;
+    let position = |row| DVec3::new(value(row, x), value(row, y), value(row, z));
+    gather(source, count, position, |row| text.place(row), columns)
+}
+
+/// Which column means what.
+struct Layout {
+    position: [usize; 3],
+    value: usize,
+    radius: Option<usize>,
+    covariance: Option<[usize; 6]>,
+}
+
+impl Layout {
+    fn plain(source: &Source, count: usize) -> Result<Self> {
+        let plain = Self { position: [0, 1, 2], value: 3, radius: None, covariance: None };
+        match count {
+            4 => Ok(plain),
+            5 => Ok(Self { radius: Some(4), ..plain }),
+            10 => Ok(Self { covariance: Some([4, 5, 6, 7, 8, 9]), ..plain }),
+            _ => Err(source
+                .error("line 1", format!("has {count} columns without names"))
+                .hint("write x, y, z, value and then nothing, a radius, or xx, xy, xz, yy, yz, zz; or name the columns in the first line")),
+        }
+    }
+
+    fn named(source: &Source, line: usize, names: &[String], scalar: Option<&str>) -> Result<Self> {
+        let place = format!("line {line}");
+        let at = |name: &str| names.iter().position(|other| other.eq_ignore_ascii_case(name));
+        let need = |name: &str| {
+            at(name).ok_or_else(|| source.error(&place, format!("names no column “{name}”")))
+        };
+        let position = [need("x")?, need("y")?, need("z")?];
+        let radius = at("radius");
+        let terms = COVARIANCE.map(|term| at(term).or_else(|| at(&format!("cov_{term}"))));
+        let covariance =
+            terms.iter().all(Option::is_some).then(|| terms.map(Option::unwrap_or_default));
+        let taken = |column: &usize| {
+            position.contains(column) || radius == Some(*column) || terms.contains(&Some(*column))
+        };
+        let rest: Vec<usize> = (0..names.len()).filter(|column| !taken(column)).collect();
+        let of_rest: Vec<&str> = rest.iter().map(|&column| names[column].as_str()).collect();
+        let usual = || at("value").or_else(|| at("scalar")).filter(|_| scalar.is_none());
+        let value = match usual() {
+            Some(value) => value,
+            None => rest[choose(source, &place, scalar, &of_rest)?],
+        };
+        Ok(Self { position, value, radius, covariance })
+    }
+
+    fn uses(&self, column: usize) -> bool {
+        self.position.contains(&column)
+            || self.value == column
+            || self.radius == Some(column)
+            || self.covariance.is_some_and(|terms| terms.contains(&column))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        Error,
+        input::{Limits, testing::*},
+    };
+    use glam::Vec3;
+
+    fn load(text: &str, scalar: Option<&str>) -> Result<Points> {
+        let folder = Folder::new();
+        read_with(&folder.write("a.csv", text), |source| read(source, scalar))
+    }
+
+    #[test]
+    fn every_separator_and_every_set_of_columns() {
+        let plain = Points {
+            positions: vec![Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)],
+            values: vec![-0.5, 70.0],
+            ..Points::default()
+        };
+        for text in [
+            "1,2,3,-0.5\n4,5,6,7e1\n",
+            "x,y,z,p\r\n1,2,3,-0.5\r\n4,5,6,70",
+            "\u{feff}\"X\";\"Y\";\"Z\";\"pressure of air\"\n1;2;3;-0.5\n\n4;5;6;70\n",
+            "1\t2\t3\t-0.5\n4\t5\t6\t70",
+            "# made by hand\n  1   2 3 -0.5\n// more\n4 5  6 70 ",
+            "# x y z v\n1 2 3 -0.5\n4 5 6 70",
+            "value z y x\n-0.5 3 2 1\n70 6 5 4",
+            "x,y,z,value,name\n1,2,3,-0.5,first\n4,5,6,70,second",
+            "x,y,z,value,name\n1,2,3,-0.5,\"first, of two\"\n\"4\",5,6,\"70\",second",
+            "\"x\"\t\"y\"\t\"z\"\t\"pressure, of air\"\n1\t2\t3\t-0.5\n4\t5\t6\t70",
+        ] {
+            assert_eq!(load(text, None).unwrap(), plain, "{text}");
+        }
+        assert_eq!(load("x,y,z,a,b\n1,2,3,9,-0.5\n4,5,6,9,70", Some("b")).unwrap(), plain);
+        let round = Points { radii: vec![0.5, 2.0], ..plain.clone() };
+        assert_eq!(load("1 2 3 -0.5 0.5\n4 5 6 70 2", None).unwrap(), round);
+        assert_eq!(load("radius x y z v\n0.5 1 2 3 -0.5\n2 4 5 6 70", None).unwrap(), round);
+        let slanted = Points { covariances: vec![[4.0, 1.0, 0.0, 2.0, 0.0, 1.0]; 2], ..plain };
+        assert_eq!(load("1 2 3 -0.5 4 1 0 2 0 1\n4 5 6 70 4 1 0 2 0 1", None).unwrap(), slanted);
+        let names = "cov_xx cov_xy cov_xz cov_yy cov_yz cov_zz x y z v";
+        assert_eq!(
+            load(&format!("{names}\n4 1 0 2 0 1 1 2 3 -0.5\n4 1 0 2 0 1 4 5 6 70"), None).unwrap(),
+            slanted
+        );
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_its_line() {
+        for (text, scalar, word) in [
+            ("", None, "no lines"),
+            ("# nothing\n", None, "no lines"),
+            ("hello", None, "no column “x”"),
+            ("1 2 3", None, "3 columns without names"),
+            ("x,y,z\n1,2,3", None, "line 1: has no scalar"),
+            ("x,y,z,a,b\n1,2,3,4,5", None, "2 scalars to choose from"),
+            ("x,y,z,a,b\n1,2,3,4,5", Some("c"), "no scalar “c”"),
+            ("x,y,z,v\n", None, "no samples"),
+            ("1 2 3 4\n\n5 6 7 nan", None, "line 3: number 4 is NaN"),
+            ("1 2 3 4\n5 inf 7 8", None, "line 2: number 2 is inf"),
+            ("1 2 3 4\n5 6 7", None, "line 2: has 3 columns, but the first line has 4"),
+            ("1 2 3 4\n5 6 7 8 9", None, "line 2: has 5 columns"),
+            ("1 2 3 4\n5 6 seven 8", None, "line 2: “seven” is not a number"),
+            ("1;2;3;4\n5;6;7;8,5", None, "“8,5” is not a number"),
+            ("\"1,5\",\"2,5\",\"3,5\",\"4\"\n", None, "neither numbers nor names"),
+            ("1,2,3,4\n\"1,5\",\"2,5\",\"3,5\",\"4\"\n", None, "“1,5” is not a number"),
+            ("1 2 3 4 0", None, "radius of sample 0 is 0"),
+            ("1 2 3 1e39", None, "line 1: the value"),
+        ] {
+            let message = load(text, scalar).unwrap_err().to_string();
+            assert!(message.contains(word), "{text}: {message}");
+        }
+        let folder = Folder::new();
+        let path = folder.write("a.csv", "1 2 3 4\n5 6 7 8\n");
+        let limits = Limits { points: 1, ..Limits::default() };
+        assert!(matches!(
+            read(&Source::open(&path, &limits).unwrap(), None),
+            Err(Error::Limit { .. })
+        ));
+    }
+
+    /// A cut text is an error, or fewer lines, or one of its numbers shorter.
+    #[test]
+    fn every_cut_is_an_error_or_less() {
+        let whole = "x,y,z,v\n1,2,3,4\n5,6,7,85\n";
+        for end in 0..whole.len() {
+            match load(&whole[..end], None) {
+                Ok(points) => assert!(points.len() <= 2 && points.validate().is_ok()),
+                Err(error) => assert!(matches!(error, Error::Input { .. }), "{error}"),
+            }
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! E57, the format of terrestrial laser scanners (ASTM E2807): all scans of a file in one cloud, by the `e57` crate.
+
+mod description;
+mod streams;
+#[cfg(test)]
+mod tests;
+
+use super::shared::cloud::{Cloud, greys};
+use crate::{
+    Result,
+    input::{Source, growing::Growing, isolate::isolated},
+    surface::Mesh,
+};
+use ::e57::{CartesianCoordinate, E57Reader, PointCloud, RecordDataType, RecordName};
+use glam::DVec3;
+use std::io::Cursor;
+
+/// Points that are read between two looks at the clock.
+const POINTS: u64 = 1 << 16;
+
+/// Reads all scans, each moved by its pose: points by Cartesian or spherical coordinates, and colours, or where no scan has
+/// any the intensities as greys. Points without a valid position are left out. A scanner stood at the origin of its scan,
+/// unless the points lie in the world's coordinates already: that is taken from a scan without a pose of its own whose points
+/// are neither spherical nor in rows and columns.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) for a malformed file, a page whose checksum is wrong, and scans that end before
+/// their last point; [`Error::Limit`](crate::Error::Limit) for more points than the limits allow.
+pub fn read(source: &Source) -> Result<Mesh> {
+    // The crate asserts and clamps by numbers of the file, which may panic.
+    let cloud = isolated(source, "scans", || {
+        let unreadable = |error: ::e57::Error| {
+            source.error("file", format!("is no E57 file that can be read: {error}"))
+        };
+        let xml = E57Reader::raw_xml(Cursor::new(source.bytes())).map_err(unreadable)?;
+        description::check(source, &xml)?;
+        let mut file = E57Reader::new(Cursor::new(source.bytes())).map_err(unreadable)?;
+        let scans = file.pointclouds();
+        let claimed = scans.iter().fold(0u64, |sum, scan| sum.saturating_add(scan.records));
+        source.check_points("the number of points", claimed)?;
+        let mut positions = Growing::new(source, "the positions");
+        let mut colors = Growing::new(source, "the colours");
+        let mut intensities = Growing::new(source, "the intensities");
+        let mut sensors = Vec::new();
+        let mut has_colors = false;
+        for (number, scan) in scans.iter().enumerate() {
+            let wrong = |message: String| source.error(format!("scan {number}"), message);
+            check(scan).map_err(|message| wrong(message.into()))?;
+            streams::check(source, scan, number, streams::MOST_WAITING)?;
+            let start = positions.len();
+            let mut points =
+                file.pointcloud_simple(scan).map_err(|error| wrong(error.to_string()))?;
+            points.intensity_to_color(false);
+            points.normalize_intensity(false);
+            let mut index = 0u64;
+            for point in points {
+                let point = match point {
+                    Ok(point) => point,
+                    // What the crate says of a packet that completes no point, such as one of an index. The next call
+                    // reads on, and meets the end of the file if nothing else.
+                    Err(::e57::Error::Internal { .. }) => {
+                        source.check_time()?;
+                        continue;
+                    }
+                    Err(error) => return Err(wrong(format!("ends after {index} points: {error}"))),
+                };
+                index += 1;
+                // Points without a position are kept nowhere, but take their time.
+                if index.is_multiple_of(POINTS) {
+                    source.check_time()?;
+                }
+                let CartesianCoordinate::Valid { x, y, z } = point.cartesian else { continue };
+                let position = DVec3::new(x, y, z);
+                if !position.is_finite() {
+                    continue;
+                }
+                positions.push(position)?;
+                let color = point.color.as_ref().map(|color| [color.red, color.green, color.blue]);
+                has_colors |= color.is_some();
+                // What has no colour beside points that have one is white.
+                let [r, g, b] = color.unwrap_or([1.0; 3]).map(|part| (part * 255.0).round() as u8);
+                colors.push([r, g, b, 255])?;
+                intensities.push(point.intensity.unwrap_or(f32::NAN))?;
+            }
+            if let Some(sensor) = sensor(scan) {
+                sensors.push((sensor, start..positions.len()));
+            }
+        }
+        let left_out = claimed.saturating_sub(positions.len() as u64);
+        if left_out > 0 {
+            tracing::info!(points = left_out, "points without a valid position are left out");
+        }
+        // Once more sorted by size.
+        source.room::<f32>("the intensities", intensities.len())?;
+        let colors = if has_colors { colors.into_inner() } else { greys(&intensities) };
+        Ok(Cloud {
+            positions: positions.into_inner(),
+            colors,
+            sensors,
+            z_is_up: true,
+            ..Cloud::default()
+        })
+    })?;
+    cloud.into_mesh(source, |point| format!("point {point}"))
+}
+
+/// Refuses a scan whose values all take no bits: nothing would end what the crate makes of it.
+fn check(scan: &PointCloud) -> Result<(), &'static str> {
+    let takes_bits = scan.prototype.iter().any(|record| match record.data_type {
+        RecordDataType::Integer { min, max } | RecordDataType::ScaledInteger { min, max, .. } => {
+            min < max
+        }
+        _ => true,
+    });
+    if !takes_bits { Err("has points of no bits") } else { Ok(()) }
+}
+
+/// Where the scanner of a scan stood.
+fn sensor(scan: &PointCloud) -> Option<DVec3> {
+    let has = |name: RecordName| scan.prototype.iter().any(|record| record.name == name);
+    let as_scanned = has(RecordName::SphericalRange)
+        || has(RecordName::RowIndex) && has(RecordName::ColumnIndex);
+    let place = scan.transform.as_ref().map(|pose| &pose.translation);
+    let place = place.map_or(DVec3::ZERO, |place| DVec3::new(place.x, place.y, place.z));
+    (place.is_finite() && (place != DVec3::ZERO || as_scanned)).then_some(place)
+}

@@ -1,0 +1,303 @@
+//! glTF 2.0 and GLB: the meshes of the default scene, with base colours and pictures.
+//!
+//! The JSON is read into the types of the gltf crate, unvalidated: its validation panics on some broken files and lets
+//! others pass (cycles, counts without bytes). Every index is looked up and every range checked where it is used.
+
+mod accessor;
+mod buffers;
+mod materials;
+mod nodes;
+#[cfg(test)]
+mod tests;
+
+use crate::{
+    Result,
+    input::{Source, copy, positions},
+    surface::{Mesh, Texture},
+};
+use ::gltf::json::{self, mesh::Mode, mesh::Semantic, validation::Checked};
+use buffers::Buffers;
+use glam::{DMat3, DMat4, DVec3, Mat2, Vec2, Vec3};
+use materials::Alpha;
+use std::{collections::HashMap, sync::Arc};
+
+/// Extensions that a file may require: those that are read (`KHR_materials_pbrSpecularGlossiness` among them), and those
+/// that change only the looks of a material in ways that splats do not show.
+const KNOWN: [&str; 4] =
+    ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "KHR_materials_"];
+
+/// Reads a glTF or GLB file: the triangles of the default scene in its world frame (or its points, where it has no
+/// triangles), vertex colours, base colours and textures, with opacities as the alpha modes want them. Skins, morph targets
+/// and animations are not applied.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) for malformed JSON, indices and ranges outside their target, cyclic nodes,
+/// references outside the file's folder, positions that are not finite, and required extensions that are not read
+/// (Draco and meshopt compression among them); [`Error::Limit`](crate::Error::Limit) for counts over the limits.
+pub fn read(source: &Source) -> Result<Mesh> {
+    let (text, binary) = buffers::split(source)?;
+    // The copy of the text counts as well.
+    source.spend(
+        "the size of the scene's tree in bytes",
+        tree_bytes(text).saturating_add(text.len() as u64),
+    )?;
+    let text = copy::text(text)
+        .map_err(|at| source.error("JSON", format!("byte {at} is not UTF-8 text")))?;
+    let root: json::Root = json::deserialize::from_str(&text)
+        .map_err(|error| source.error("JSON", error.to_string()))?;
+    for extension in &root.extensions_required {
+        if !KNOWN.iter().any(|known| extension.starts_with(known)) {
+            return Err(source
+                .error("extensionsRequired", format!("the extension {extension} is not supported"))
+                .hint("convert the file without compression, for example with gltf-transform or gltfpack"));
+        }
+    }
+    let buffers = Buffers::open(source, &root, binary)?;
+    let mut builder = Builder {
+        source,
+        root: &root,
+        buffers: &buffers,
+        positions: Vec::new(),
+        mesh: Mesh::default(),
+        material_of: HashMap::new(),
+        pictures: HashMap::new(),
+    };
+    let meshes = nodes::meshes(source, &root)?;
+    builder.make_room(&meshes)?;
+    for (transform, mesh) in meshes {
+        builder.add_mesh(transform, mesh)?;
+    }
+    builder.finish()
+}
+
+/// Bytes that the tree of a JSON text may take: the largest of what objects become for each of them, and a number, with the
+/// room that lists keep in store, for each comma.
+fn tree_bytes(text: &[u8]) -> u64 {
+    let largest = [
+        size_of::<json::Node>(),
+        size_of::<json::Material>(),
+        size_of::<json::Accessor>(),
+        size_of::<json::mesh::Primitive>(),
+        size_of::<json::buffer::View>(),
+        size_of::<json::Image>(),
+        size_of::<json::animation::Channel>(),
+    ];
+    let object = largest.into_iter().max().unwrap_or_default() as u64;
+    let count = |letter: u8| text.iter().filter(|&&b| b == letter).count() as u64;
+    text.len() as u64 + 2 * object * count(b'{') + 16 * count(b',')
+}
+
+/// Bytes that a vertex may take in all lists while it is read, and the corner of a face.
+const VERTEX: u64 = 160;
+const CORNER: u64 = 40;
+
+/// The mesh as it grows.
+struct Builder<'a> {
+    source: &'a Source<'a>,
+    root: &'a json::Root,
+    buffers: &'a Buffers<'a>,
+    positions: Vec<DVec3>,
+    mesh: Mesh,
+    /// Index in the mesh's materials of a file's material (`None`: the default one).
+    material_of: HashMap<Option<usize>, u32>,
+    /// Decoded images, as each alpha mode shows them.
+    pictures: HashMap<(usize, Alpha), Arc<Texture>>,
+}
+
+impl Builder<'_> {
+    /// Takes what the scene will occupy from the budget. A mesh may stand at many nodes, and one accessor in many
+    /// primitives: then the scene is larger than the file by far, and its size should be known before it is built.
+    fn make_room(&self, meshes: &[(DMat4, usize)]) -> Result<()> {
+        let of_primitive = |primitive: &json::mesh::Primitive| {
+            let position = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+            let vertices = position.map_or(0, |accessor| self.buffers.claimed(accessor.value()));
+            let corners = primitive
+                .indices
+                .map_or(vertices, |accessor| self.buffers.claimed(accessor.value()));
+            // A corner of a strip or fan makes a triangle.
+            let triangles = if primitive.mode == Checked::Valid(Mode::Triangles) {
+                corners / 3
+            } else {
+                corners
+            };
+            [vertices, corners, triangles]
+        };
+        let add = |sum: [u64; 3], more: [u64; 3]| [0, 1, 2].map(|i| sum[i].saturating_add(more[i]));
+        let sizes: Vec<[u64; 3]> = self
+            .root
+            .meshes
+            .iter()
+            .map(|mesh| mesh.primitives.iter().map(of_primitive).fold([0; 3], add))
+            .collect();
+        let all = meshes.iter().filter_map(|(_, mesh)| sizes.get(*mesh)).copied().fold([0; 3], add);
+        let [vertices, corners, triangles] = all;
+        self.source.check_points("the number of vertices", vertices)?;
+        self.source.check_points("the number of triangles", triangles)?;
+        let bytes = vertices.saturating_mul(VERTEX).saturating_add(corners.saturating_mul(CORNER));
+        self.source.spend("the size of the scene in bytes", bytes)
+    }
+
+    fn add_mesh(&mut self, transform: DMat4, index: usize) -> Result<()> {
+        let root = self.root;
+        let Some(mesh) = root.meshes.get(index) else {
+            return Err(self.source.error(
+                format!("mesh {index}"),
+                format!("there are {} meshes", root.meshes.len()),
+            ));
+        };
+        for (number, primitive) in mesh.primitives.iter().enumerate() {
+            self.source.check_time()?;
+            self.add_primitive(transform, primitive, &format!("mesh {index}, primitive {number}"))?;
+        }
+        Ok(())
+    }
+
+    fn add_primitive(
+        &mut self,
+        transform: DMat4,
+        primitive: &json::mesh::Primitive,
+        place: &str,
+    ) -> Result<()> {
+        let Checked::Valid(mode) = primitive.mode else {
+            return Err(self.source.error(place, "has an unknown mode"));
+        };
+        if matches!(mode, Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
+            tracing::warn!("{}: {place}: lines are not drawn", self.source.path.display());
+            return Ok(());
+        }
+        let attribute = |semantic| {
+            primitive.attributes.get(&Checked::Valid(semantic)).map(|index| index.value())
+        };
+        let Some(position) = attribute(Semantic::Positions) else { return Ok(()) };
+        let points: Vec<[f32; 3]> = self.buffers.floats(position, place, false)?;
+        let base = self.positions.len();
+        let total =
+            self.source.check_points("the number of vertices", (base + points.len()) as u64)?;
+        if u32::try_from(total).is_err() {
+            return Err(self.source.error(place, "more vertices than 32-bit indices can name"));
+        }
+        self.positions.extend(
+            points.iter().map(|p| transform.transform_point3(Vec3::from_array(*p).as_dvec3())),
+        );
+        let count = points.len();
+        drop(points);
+        let material = primitive.material.map(|index| index.value());
+        let base_color = self.base(material, place)?;
+        let mirrors = transform.determinant() < 0.0;
+        let check = |what: &str, found: usize| {
+            if found == count {
+                return Ok(());
+            }
+            Err(self.source.error(place, format!("has {count} positions but {found} {what}")))
+        };
+
+        if let Some(accessor) = attribute(Semantic::Normals) {
+            let normals: Vec<[f32; 3]> = self.buffers.floats(accessor, place, false)?;
+            check("normals", normals.len())?;
+            // The cofactors turn normals as the inverse transpose does, and exist for a flat transform too. They have the
+            // determinant as a factor, and with it its sign.
+            let [x, y, z] = DMat3::from_mat4(transform).to_cols_array_2d().map(DVec3::from_array);
+            let sign = if mirrors { -1.0 } else { 1.0 };
+            let turn = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign;
+            let turned = normals
+                .iter()
+                .map(|n| positions::unit((turn * Vec3::from_array(*n).as_dvec3()).as_vec3()));
+            self.mesh.normals.resize(base, Vec3::ZERO);
+            self.mesh.normals.extend(turned);
+        }
+        if let Some(accessor) = attribute(Semantic::Colors(0)) {
+            let colors = self.buffers.colors(accessor, place)?;
+            check("colours", colors.len())?;
+            self.mesh.colors.resize(base, [255; 4]);
+            self.mesh.colors.extend(colors.iter().map(|&color| {
+                let [r, g, b, a] = displayed(color).map(|v| (v * 255.0).round() as u8);
+                [r, g, b, base_color.alpha.apply(a)]
+            }));
+        }
+        if let Some(info) = base_color.texture {
+            let shift = info
+                .extensions
+                .as_ref()
+                .and_then(|extensions| extensions.texture_transform.as_ref());
+            let set = shift.and_then(|shift| shift.tex_coord).unwrap_or(info.tex_coord);
+            if let Some(accessor) = attribute(Semantic::TexCoords(set)) {
+                let mut uvs: Vec<[f32; 2]> = self.buffers.floats(accessor, place, false)?;
+                check("texture coordinates", uvs.len())?;
+                if let Some(shift) = shift {
+                    let turn = Mat2::from_angle(-shift.rotation.0);
+                    for uv in &mut uvs {
+                        let scaled = Vec2::from_array(*uv) * Vec2::from_array(shift.scale.0);
+                        *uv = (turn * scaled + Vec2::from_array(shift.offset.0)).to_array();
+                    }
+                }
+                if let Some(vertex) = uvs.iter().position(|uv| !Vec2::from_array(*uv).is_finite()) {
+                    let place = format!("{place}: vertex {vertex}");
+                    return Err(super::uv_error(self.source, place, Vec2::from_array(uvs[vertex])));
+                }
+                self.mesh.uvs.resize(base, Vec2::ZERO);
+                self.mesh.uvs.extend(uvs.iter().map(|&uv| Vec2::from_array(uv)));
+            }
+        }
+        if mode != Mode::Points {
+            let corners = match primitive.indices {
+                Some(index) => self.buffers.indices(index.value(), place, count)?,
+                None => (0..count as u32).collect(),
+            };
+            let material = self.material(material, &base_color)?;
+            let mesh = &mut self.mesh;
+            triangles(mode, &corners, |[a, b, c]| {
+                let [a, b, c] = [a, b, c].map(|corner| corner + base as u32);
+                mesh.triangles.push(if mirrors { [a, c, b] } else { [a, b, c] });
+            });
+            self.source
+                .check_points("the number of triangles", self.mesh.triangles.len() as u64)?;
+            self.mesh.triangle_materials.resize(self.mesh.triangles.len(), material);
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<Mesh> {
+        let count = self.positions.len();
+        if count == 0 {
+            return Err(self.source.error("scene", "holds no meshes with positions"));
+        }
+        let positions = &self.positions;
+        (self.mesh.origin, self.mesh.positions) = positions::settle(
+            self.source,
+            count,
+            |i| positions[i],
+            |i| format!("vertex {i} of the scene"),
+        )?;
+        if !self.mesh.normals.is_empty() {
+            self.mesh.normals.resize(count, Vec3::ZERO);
+        }
+        if !self.mesh.colors.is_empty() {
+            self.mesh.colors.resize(count, [255; 4]);
+        }
+        if !self.mesh.uvs.is_empty() {
+            self.mesh.uvs.resize(count, Vec2::ZERO);
+        }
+        Ok(self.mesh)
+    }
+}
+
+/// A colour as displayed (sRGB) from linear light; the opacity is unchanged.
+fn displayed([r, g, b, a]: [f32; 4]) -> [f32; 4] {
+    let encode =
+        |v: f32| if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+    [encode(r), encode(g), encode(b), a].map(|v| if v.is_nan() { 1.0 } else { v.clamp(0.0, 1.0) })
+}
+
+/// Gives the triangles of a list, strip or fan of corners.
+fn triangles(mode: Mode, corners: &[u32], mut give: impl FnMut([u32; 3])) {
+    match mode {
+        Mode::Triangles => corners.chunks_exact(3).for_each(|t| give([t[0], t[1], t[2]])),
+        Mode::TriangleStrip => corners.windows(3).enumerate().for_each(|(i, t)| {
+            give(if i % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] });
+        }),
+        Mode::TriangleFan => {
+            corners.get(1..).unwrap_or(&[]).windows(2).for_each(|t| give([corners[0], t[0], t[1]]));
+        }
+        _ => {}
+    }
+}

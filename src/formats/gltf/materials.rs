@@ -1,0 +1,153 @@
+//! Materials: base colours, pictures, and what their alpha mode makes of opacities.
+
+use super::{super::shared::texture, Builder, buffers, displayed};
+use crate::{
+    Result,
+    surface::{Material, Texture},
+};
+use ::gltf::json::{self, material::AlphaMode, validation::Checked};
+use std::sync::Arc;
+
+/// What a material says of the base colour.
+pub(super) struct Base<'a> {
+    name: &'a str,
+    /// Linear light, and opacity.
+    factor: [f32; 4],
+    pub texture: Option<&'a json::texture::Info>,
+    pub alpha: Alpha,
+}
+
+/// What becomes of the alphas of texels and vertices (glTF 2.0, section 3.9.4).
+///
+/// MASK compares the product of factor, texel and vertex alpha with the cutoff. Texels and vertices are stored apart, so
+/// each is compared as if the other were opaque. That is exact where one of them is, and hides nothing that should show
+/// elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Alpha {
+    /// BLEND: they stay as they are.
+    Blend,
+    /// Opaque from this one on, and invisible below: 0 for OPAQUE, 256 where a mask hides everything.
+    From(u16),
+}
+
+impl Alpha {
+    const OPAQUE: Self = Self::From(0);
+
+    fn of(material: &json::Material, factor: f32) -> Self {
+        match material.alpha_mode {
+            Checked::Valid(AlphaMode::Blend) => Self::Blend,
+            Checked::Valid(AlphaMode::Mask) => {
+                let cutoff = material.alpha_cutoff.map_or(0.5, |cutoff| cutoff.0);
+                let shows = |alpha: &u16| factor * f32::from(*alpha) / 255.0 >= cutoff;
+                Self::From((0..=255).find(shows).unwrap_or(256))
+            }
+            // An unknown mode is taken for the default.
+            Checked::Valid(AlphaMode::Opaque) | Checked::Invalid => Self::OPAQUE,
+        }
+    }
+
+    pub fn apply(self, alpha: u8) -> u8 {
+        match self {
+            Self::Blend => alpha,
+            Self::From(least) if u16::from(alpha) >= least => 255,
+            Self::From(_) => 0,
+        }
+    }
+}
+
+impl<'a> Builder<'a> {
+    /// The base colour of a file's material (`None`: the default one). `place` names what refers to it.
+    pub(super) fn base(&self, material: Option<usize>, place: &str) -> Result<Base<'a>> {
+        let root = self.root;
+        let Some(index) = material else {
+            return Ok(Base {
+                name: "default",
+                factor: [1.0; 4],
+                texture: None,
+                alpha: Alpha::OPAQUE,
+            });
+        };
+        let Some(material) = root.materials.get(index) else {
+            return Err(self
+                .source
+                .error(place, format!("refers to material {index}, which is not there")));
+        };
+        // Where a file has both, the extension goes before what stands for it in programs that do not know it.
+        let extensions = material.extensions.as_ref();
+        let (factor, texture) =
+            match extensions.and_then(|extensions| extensions.pbr_specular_glossiness.as_ref()) {
+                Some(glossy) => (glossy.diffuse_factor.0, &glossy.diffuse_texture),
+                None => {
+                    let rough = &material.pbr_metallic_roughness;
+                    (rough.base_color_factor.0, &rough.base_color_texture)
+                }
+            };
+        let name = material.name.as_deref().unwrap_or_default();
+        Ok(Base { name, factor, texture: texture.as_ref(), alpha: Alpha::of(material, factor[3]) })
+    }
+
+    /// The index of a material in the mesh, which gets it at its first use.
+    pub(super) fn material(&mut self, index: Option<usize>, base: &Base) -> Result<u32> {
+        if let Some(&known) = self.material_of.get(&index) {
+            return Ok(known);
+        }
+        let mut color = displayed(base.factor);
+        if base.alpha != Alpha::Blend {
+            // Texels and vertices have the factor's alpha in them; without them, it is all that there is.
+            color[3] = f32::from(base.alpha.apply(255)) / 255.0;
+        }
+        let texture =
+            base.texture.map(|info| self.texture(info.index.value(), base.alpha)).transpose()?;
+        let id = self.mesh.materials.len() as u32;
+        self.mesh.materials.push(Material { name: base.name.into(), color, texture });
+        self.material_of.insert(index, id);
+        Ok(id)
+    }
+
+    fn texture(&mut self, index: usize, alpha: Alpha) -> Result<Arc<Texture>> {
+        let Some(texture) = self.root.textures.get(index) else {
+            let count = self.root.textures.len();
+            return Err(self
+                .source
+                .error(format!("texture {index}"), format!("there are {count} textures")));
+        };
+        self.picture(texture.source.value(), alpha)
+    }
+
+    /// A picture as an alpha mode shows it, made once for each mode. Modes that leave all alphas as they are share it.
+    fn picture(&mut self, image: usize, alpha: Alpha) -> Result<Arc<Texture>> {
+        if let Some(known) = self.pictures.get(&(image, alpha)) {
+            return Ok(known.clone());
+        }
+        let mut picture = match alpha {
+            Alpha::Blend => self.decode(image)?,
+            Alpha::From(_) => self.picture(image, Alpha::Blend)?,
+        };
+        if picture.texels.iter().any(|texel| alpha.apply(texel[3]) != texel[3]) {
+            self.source.room::<[u8; 4]>("a picture", picture.texels.len())?;
+            for texel in &mut Arc::make_mut(&mut picture).texels {
+                texel[3] = alpha.apply(texel[3]);
+            }
+        }
+        self.pictures.insert((image, alpha), picture.clone());
+        Ok(picture)
+    }
+
+    fn decode(&self, image: usize) -> Result<Arc<Texture>> {
+        let place = format!("image {image}");
+        let Some(entry) = self.root.images.get(image) else {
+            return Err(self
+                .source
+                .error(place, format!("there are {} images", self.root.images.len())));
+        };
+        match (&entry.uri, entry.buffer_view) {
+            (Some(uri), _) => {
+                texture::decode(self.source, &place, &buffers::resolve(self.source, &place, uri)?)
+            }
+            (None, Some(view)) => {
+                texture::decode(self.source, &place, self.buffers.view(view.value(), &place)?.0)
+            }
+            (None, None) => Err(self.source.error(place, "has neither a URI nor a buffer view")),
+        }
+    }
+}

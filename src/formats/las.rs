@@ -1,0 +1,197 @@
+//! LAS, and its packed form LAZ, of which COPC is a kind: point clouds from the air and from the ground. After the LAS
+//! specification 1.4 R15 of the American Society for Photogrammetry and Remote Sensing.
+//!
+//! The header and the points are read here, so that every count is checked against the bytes that there are; the `laz`
+//! crate unpacks the chunks of points (`packed`).
+
+mod packed;
+mod pieces;
+#[cfg(test)]
+mod tests;
+mod time;
+
+pub(super) use pieces::Pieces;
+
+use super::shared::cloud::{Cloud, colors_of_16_bits, greys};
+use crate::{Result, input::Source, surface::Mesh};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Reads a cloud: positions and colours, or intensities as greys where there are none. Points that are marked as withheld
+/// are left out.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) for a malformed header, fewer points than it counts, and what cannot be unpacked;
+/// [`Error::Limit`](crate::Error::Limit) for more points than the limits allow.
+pub fn read(source: &Source) -> Result<Mesh> {
+    let header = Header::read(source)?;
+    let points =
+        if header.packed { packed::read(source, &header)? } else { plain(source, &header)? };
+    let left_out = header.points - points.len();
+    if left_out > 0 {
+        tracing::info!(points = left_out, "withheld points are left out");
+    }
+    source.spend("the size of the points in bytes", POINT * points.len() as u64)?;
+    let positions = points.par_iter().map(|point| header.position(point)).collect();
+    let mut cloud = Cloud { positions, z_is_up: true, ..Cloud::default() };
+    if header.color_at.is_some() {
+        cloud.colors =
+            colors_of_16_bits(&points.par_iter().map(|p| p.color).collect::<Vec<[u16; 3]>>());
+    }
+    if cloud.colors.is_empty() {
+        cloud.colors =
+            greys(&points.par_iter().map(|p| f32::from(p.intensity)).collect::<Vec<f32>>());
+    }
+    cloud.into_mesh(source, |point| format!("point {point}"))
+}
+
+fn plain(source: &Source, header: &Header) -> Result<Vec<Point>> {
+    let data = plain_bytes(source, header)?;
+    source.room::<Point>("the points", header.points)?;
+    Ok(data.par_chunks_exact(header.size).filter_map(|record| header.point(record)).collect())
+}
+
+/// The bytes of points that are not packed.
+fn plain_bytes<'a>(source: &'a Source, header: &Header) -> Result<&'a [u8]> {
+    let data = &source.bytes()[header.start..];
+    let size = (header.points as u64).saturating_mul(header.size as u64);
+    if (data.len() as u64) < size {
+        let message = format!(
+            "counts {} points of {} bytes, {size} in all, but {} bytes follow",
+            header.points,
+            header.size,
+            data.len()
+        );
+        return Err(source.error("header", message).hint("the file is cut"));
+    }
+    Ok(&data[..size as usize])
+}
+
+/// Bytes that a point takes beside that: its place, its colour of 16 bits and of 8, its intensity.
+const POINT: u64 = 24 + 6 + 4 + 4;
+
+/// What matters here of a point.
+struct Point {
+    position: [i32; 3],
+    color: [u16; 3],
+    intensity: u16,
+}
+
+/// What the header says.
+struct Header {
+    /// Where the points begin, how many there are, and the bytes of each.
+    start: usize,
+    points: usize,
+    size: usize,
+    /// The format of the points, 0 to 10.
+    format: u8,
+    packed: bool,
+    scale: DVec3,
+    offset: DVec3,
+    /// Where the colour is in a point.
+    color_at: Option<usize>,
+    /// Where the first record of variable length is, and how many there are.
+    records: (usize, u32),
+}
+
+/// The least bytes of a point of each format.
+const SIZES: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
+
+impl Header {
+    fn read(source: &Source) -> Result<Self> {
+        let bytes = source.bytes();
+        let wrong = |message: String| source.error("header", message);
+        if !bytes.starts_with(b"LASF") {
+            return Err(wrong("does not begin with “LASF”".into()));
+        }
+        let field = Fields { bytes, place: "the header" };
+        let header_size = usize::from(u16::from_le_bytes(field.at(94).map_err(wrong)?));
+        let start = u32::from_le_bytes(field.at(96).map_err(wrong)?) as usize;
+        let record_count = u32::from_le_bytes(field.at(100).map_err(wrong)?);
+        let [format] = field.at(104).map_err(wrong)?;
+        let size = usize::from(u16::from_le_bytes(field.at(105).map_err(wrong)?));
+        let mut points = u64::from(u32::from_le_bytes(field.at(107).map_err(wrong)?));
+        let double = |at: usize| field.at(at).map(f64::from_le_bytes).map_err(wrong);
+        let three = |at: usize| Ok(DVec3::new(double(at)?, double(at + 8)?, double(at + 16)?));
+        let (scale, offset): (DVec3, DVec3) = (three(131)?, three(155)?);
+        let [major, minor] = field.at(24).map_err(wrong)?;
+        if major != 1 {
+            return Err(wrong(format!(
+                "is of version {major}.{minor}, but only 1.0 to 1.4 are known"
+            )));
+        }
+        // Version 1.4 has room for more points; what is older is still filled in where it suffices.
+        if minor >= 4 && header_size >= 255 {
+            let wide = u64::from_le_bytes(field.at(247).map_err(wrong)?);
+            points = if wide > 0 { wide } else { points };
+        }
+        let packed = format & 0xc0 != 0;
+        let format = format & 0x3f;
+        let Some(&least) = SIZES.get(usize::from(format)) else {
+            return Err(wrong(format!(
+                "has points of format {format}, but only 0 to 10 are known"
+            )));
+        };
+        if size < least {
+            return Err(wrong(format!(
+                "has points of {size} bytes, but those of format {format} need {least}"
+            )));
+        }
+        if !scale.is_finite() || !offset.is_finite() || scale.min_element() <= 0.0 {
+            return Err(wrong(format!("has the scale {scale} and the offset {offset}")));
+        }
+        if start < header_size || start > bytes.len() {
+            let message =
+                format!("puts the points at byte {start}, but the file has {}", bytes.len());
+            return Err(wrong(message));
+        }
+        Ok(Self {
+            start,
+            points: source.check_points("the number of points", points)?,
+            size,
+            format,
+            packed,
+            scale,
+            offset,
+            color_at: match format {
+                2 => Some(20),
+                3 | 5 => Some(28),
+                7 | 8 | 10 => Some(30),
+                _ => None,
+            },
+            records: (header_size, record_count),
+        })
+    }
+
+    /// A point from its bytes; none where it is withheld.
+    fn point(&self, record: &[u8]) -> Option<Point> {
+        let short = |at: usize| u16::from_le_bytes([record[at], record[at + 1]]);
+        let position =
+            [0, 4, 8].map(|at| i32::from_le_bytes([0, 1, 2, 3].map(|byte| record[at + byte])));
+        let withheld = if self.format < 6 { record[15] & 0x80 } else { record[15] & 0x04 };
+        (withheld == 0).then(|| Point {
+            position,
+            color: self.color_at.map_or([0; 3], |at| [0, 2, 4].map(|channel| short(at + channel))),
+            intensity: short(12),
+        })
+    }
+
+    fn position(&self, point: &Point) -> DVec3 {
+        DVec3::from_array(point.position.map(f64::from)) * self.scale + self.offset
+    }
+}
+
+/// Numbers at places that may lie beyond the end.
+struct Fields<'a> {
+    bytes: &'a [u8],
+    place: &'static str,
+}
+
+impl Fields<'_> {
+    fn at<const N: usize>(&self, at: usize) -> Result<[u8; N], String> {
+        let found = self.bytes.get(at..).and_then(|rest| rest.first_chunk()).copied();
+        found.ok_or_else(|| {
+            format!("{} reaches to byte {}, but there are {}", self.place, at + N, self.bytes.len())
+        })
+    }
+}

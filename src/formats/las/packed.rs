@@ -1,0 +1,234 @@
+//! The chunks of points of a LAZ file. The `laz` crate unpacks each; that the chunks lie within the file, and what they may
+//! ask memory for, is checked before.
+
+use super::{Fields, Header, Point, time::Times};
+use crate::{
+    Result,
+    input::{Source, isolate::isolated},
+};
+use laz::{
+    DecompressionSelection, LazItem, LazItemType, LazVlr,
+    laszip::ChunkTable,
+    record::{
+        LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor,
+    },
+};
+use rayon::prelude::*;
+use std::{io::Cursor, ops::Range};
+
+/// Points that are unpacked between two looks at the clock.
+const POINTS: usize = 1 << 16;
+
+/// A chunk: where its bytes are in the file, and its points.
+pub(super) struct Chunk {
+    pub number: usize,
+    pub bytes: Range<usize>,
+    pub points: usize,
+}
+
+pub fn read(source: &Source, header: &Header) -> Result<Vec<Point>> {
+    let layout = layout(source, header)?;
+    let chunks = chunks(source, header, &layout)?;
+    // In chunks, and joined.
+    source.room::<[Point; 2]>("the points", header.points)?;
+    let parts: Vec<Vec<Point>> = chunks
+        .par_iter()
+        .map(|chunk| unpack(source, header, &layout, chunk))
+        .collect::<Result<_>>()?;
+    Ok(parts.into_iter().flatten().collect())
+}
+
+/// How the points are packed, behind a wall. The decoder takes what it reads for true and panics at what it cannot be.
+pub(super) fn layout(source: &Source, header: &Header) -> Result<LazVlr> {
+    isolated(source, "record of LASzip", || find_layout(source, header))
+}
+
+/// How the points are packed: one of the file's records of variable length says it.
+fn find_layout(source: &Source, header: &Header) -> Result<LazVlr> {
+    let place = "record of LASzip";
+    let bytes = source.bytes();
+    let (mut at, count) = header.records;
+    for _ in 0..count {
+        let field = Fields { bytes: &bytes[..header.start], place: "a record before the points" };
+        let cut = |message: String| source.error("header", message);
+        let id = u16::from_le_bytes(field.at(at + 18).map_err(cut)?);
+        let length = usize::from(u16::from_le_bytes(field.at(at + 20).map_err(cut)?));
+        let is_wanted =
+            id == LazVlr::RECORD_ID && bytes[at + 2..].starts_with(LazVlr::USER_ID.as_bytes());
+        at += 54;
+        let Some(data) = bytes[..header.start].get(at..at + length) else {
+            return Err(
+                source.error("header", "a record before the points ends behind their beginning")
+            );
+        };
+        at += length;
+        if is_wanted {
+            let layout = LazVlr::from_buffer(data)
+                .map_err(|error| source.error(place, error.to_string()))?;
+            check(header, layout.items()).map_err(|message| source.error(place, message))?;
+            return Ok(layout);
+        }
+    }
+    Err(source.error("header", "says that the points are packed, but has no record that says how"))
+}
+
+/// The items that a point is packed as must be those of its format.
+fn check(header: &Header, items: &[LazItem]) -> Result<(), String> {
+    let size: usize = items.iter().map(|item| usize::from(item.size())).sum();
+    if size != header.size {
+        return Err(format!(
+            "packs points of {size} bytes, but the header has them of {}",
+            header.size
+        ));
+    }
+    let layered = header.format >= 6;
+    let first = if layered { LazItemType::Point14 } else { LazItemType::Point10 };
+    if items.first().map(LazItem::item_type) != Some(first) {
+        return Err(format!(
+            "does not begin with what a point of format {} begins with",
+            header.format
+        ));
+    }
+    let versions = if layered { 3..=4 } else { 1..=2 };
+    match items.iter().find(|item| !versions.contains(&item.version())) {
+        Some(item) => {
+            Err(format!("packs by version {}, which is not known for this format", item.version()))
+        }
+        None => Ok(()),
+    }
+}
+
+/// The chunks by the table that the file keeps of them, behind a wall.
+pub(super) fn chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<Chunk>> {
+    isolated(source, "table of chunks", || find_chunks(source, header, layout))
+}
+
+fn find_chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<Chunk>> {
+    let bytes = source.bytes();
+    let wrong = |message: String| source.error("table of chunks", message);
+    let field = Fields { bytes, place: "the table of chunks" };
+    // Writers that cannot go back leave no place at the beginning, but one at the end.
+    let mut table = i64::from_le_bytes(field.at(header.start).map_err(wrong)?);
+    if table <= header.start as i64 {
+        table = i64::from_le_bytes(field.at(bytes.len() - 8).map_err(wrong)?);
+    }
+    let table =
+        usize::try_from(table).ok().filter(|&table| table > header.start && table < bytes.len());
+    let Some(table) = table else {
+        return Err(wrong("lies outside of the file: it is cut".into()));
+    };
+    // The crate makes room for all entries that the table claims.
+    let claimed = u32::from_le_bytes(field.at(table + 4).map_err(wrong)?) as usize;
+    if claimed > table - header.start {
+        return Err(wrong(format!("claims {claimed} chunks in {} bytes", table - header.start)));
+    }
+    source.room::<[Chunk; 2]>("the table of chunks", claimed)?;
+    let mut cursor = Cursor::new(bytes);
+    cursor.set_position(header.start as u64);
+    let entries =
+        ChunkTable::read_from(&mut cursor, layout).map_err(|error| wrong(error.to_string()))?;
+    let mut at = header.start + ChunkTable::OFFSET_SIZE;
+    let mut left = header.points;
+    let mut chunks = Vec::new();
+    for (number, entry) in (&entries).into_iter().enumerate() {
+        let points = usize::try_from(entry.point_count).unwrap_or(usize::MAX).min(left);
+        let end = usize::try_from(entry.byte_count).ok().and_then(|size| at.checked_add(size));
+        let Some(end) = end.filter(|&end| end <= table) else {
+            return Err(wrong(format!("chunk {number} ends behind the packed points")));
+        };
+        chunks.push(Chunk { number, bytes: at..end, points });
+        at = end;
+        left -= points;
+    }
+    if left > 0 {
+        return Err(wrong(format!(
+            "has {} points, but the header counts {}",
+            header.points - left,
+            header.points
+        )));
+    }
+    chunks.retain(|chunk| chunk.points > 0);
+    Ok(chunks)
+}
+
+/// Unpacks a chunk point by point, so that memory grows with what was really unpacked; behind a wall.
+pub(super) fn unpack(
+    source: &Source,
+    header: &Header,
+    layout: &LazVlr,
+    chunk: &Chunk,
+) -> Result<Vec<Point>> {
+    isolated(source, &format!("chunk {}", chunk.number), || {
+        unpack_here(source, header, layout, chunk)
+    })
+}
+
+fn unpack_here(
+    source: &Source,
+    header: &Header,
+    layout: &LazVlr,
+    chunk: &Chunk,
+) -> Result<Vec<Point>> {
+    let wrong = |message: String| source.error(format!("chunk {}", chunk.number), message);
+    let input = Cursor::new(&source.bytes()[chunk.bytes.clone()]);
+    let mut decoder: Box<dyn RecordDecompressor<Cursor<&[u8]>>> = if header.format >= 6 {
+        check_layers(source, header, layout, chunk).map_err(wrong)?;
+        let mut decoder = LayeredPointRecordDecompressor::new(input);
+        decoder.set_fields_from(layout.items()).map_err(|error| wrong(error.to_string()))?;
+        // Times have a layer of their own, which is left out: see time.rs.
+        decoder.set_selection(DecompressionSelection::all().skip_gps_time());
+        Box::new(decoder)
+    } else {
+        let mut decoder = SequentialPointRecordDecompressor::new(input);
+        for &item in layout.items() {
+            match (item.item_type(), item.version()) {
+                (LazItemType::GpsTime, 2) => decoder.add_field_decompressor(Times::new()),
+                _ => decoder
+                    .set_fields_from(&vec![item])
+                    .map_err(|error| wrong(error.to_string()))?,
+            }
+        }
+        Box::new(decoder)
+    };
+    let mut record = vec![0; header.size];
+    let mut points = Vec::new();
+    for number in 0..chunk.points {
+        if number.is_multiple_of(POINTS) {
+            source.check_time()?;
+        }
+        let unpacked = decoder.decompress_next(&mut record);
+        unpacked.map_err(|error| {
+            wrong(format!("ends after {number} of {} points: {error}", chunk.points))
+        })?;
+        points.extend(header.point(&record));
+    }
+    Ok(points)
+}
+
+/// A chunk of layers begins with its first point, its count and the size of each layer, which the decoder makes room for.
+fn check_layers(
+    source: &Source,
+    header: &Header,
+    layout: &LazVlr,
+    chunk: &Chunk,
+) -> Result<(), String> {
+    let bytes = &source.bytes()[chunk.bytes.clone()];
+    let layers = layout.items().iter().map(|item| match item.item_type() {
+        LazItemType::Point14 => 9,
+        LazItemType::RGBNIR14 => 2,
+        LazItemType::Byte14(count) => usize::from(count),
+        _ => 1,
+    });
+    let first = header.size + 4;
+    let sizes = bytes.get(first..first + 4 * layers.sum::<usize>());
+    let Some(sizes) = sizes else { return Err("ends before its layers".into()) };
+    let size = |bytes: &[u8]| {
+        u64::from(bytes.iter().rev().fold(0u32, |size, &byte| size << 8 | u32::from(byte)))
+    };
+    let claimed: u64 = sizes.chunks_exact(4).map(size).sum();
+    let present = bytes.len() - first - sizes.len();
+    if claimed > present as u64 {
+        return Err(format!("claims {claimed} bytes of layers, but has {present}"));
+    }
+    Ok(())
+}

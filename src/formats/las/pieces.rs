@@ -1,0 +1,204 @@
+//! LAS and LAZ files in pieces.
+
+use super::{
+    super::{
+        shared::cloud::{color_of_16_bits, grey},
+        stream::Found,
+    },
+    Header, Point, packed, plain_bytes,
+};
+use crate::{
+    Error, Result,
+    input::{Source, positions},
+};
+use glam::{DVec3, Vec3};
+use laz::LazVlr;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Points of a piece that is not packed.
+const POINTS: usize = 1 << 16;
+/// Packed points of a piece: a chunk is unpacked as a whole. Writers make chunks of some 50,000.
+const MOST_POINTS: usize = 1 << 21;
+
+pub struct Pieces {
+    header: Header,
+    packed: Option<(LazVlr, Vec<packed::Chunk>)>,
+    /// The number of the first point of each piece.
+    firsts: Vec<usize>,
+    paint: Paint,
+}
+
+/// What a point's colour is made from.
+#[derive(Debug, Clone, Copy)]
+enum Paint {
+    None,
+    Color { largest: u16 },
+    Grey { low: f32, high: f32 },
+}
+
+/// What the first pass sees of some points.
+struct Seen {
+    low: DVec3,
+    high: DVec3,
+    largest: u16,
+    /// How many points have each intensity.
+    intensities: Vec<u64>,
+    bad: Option<(usize, DVec3)>,
+    points: u64,
+}
+
+impl Pieces {
+    /// `None` for chunks that are too large to be pieces.
+    pub fn find(source: &Source) -> Result<Option<Self>> {
+        let header = Header::read(source)?;
+        let packed = if header.packed {
+            let layout = packed::layout(source, &header)?;
+            let chunks = packed::chunks(source, &header, &layout)?;
+            if chunks.iter().any(|chunk| chunk.points > MOST_POINTS) {
+                return Ok(None);
+            }
+            Some((layout, chunks))
+        } else {
+            plain_bytes(source, &header)?;
+            None
+        };
+        let mut next = 0;
+        let firsts = match &packed {
+            Some((_, chunks)) => {
+                let first = |chunk: &packed::Chunk| {
+                    next += chunk.points;
+                    next - chunk.points
+                };
+                chunks.iter().map(first).collect()
+            }
+            None => (0..header.points).step_by(POINTS).collect(),
+        };
+        Ok(Some(Self { header, packed, firsts, paint: Paint::None }))
+    }
+
+    /// Points that the header counts, withheld ones too.
+    pub fn points(&self) -> usize {
+        self.header.points
+    }
+
+    pub fn pieces(&self) -> usize {
+        self.firsts.len()
+    }
+
+    pub fn has_colors(&self) -> bool {
+        !matches!(self.paint, Paint::None)
+    }
+
+    /// The points of a piece with their numbers in the file. Withheld ones keep theirs to themselves.
+    fn piece(&self, source: &Source, piece: usize) -> Result<impl Iterator<Item = (usize, Point)>> {
+        let first = self.firsts[piece];
+        let points: Vec<Point> = match &self.packed {
+            Some((layout, chunks)) => packed::unpack(source, &self.header, layout, &chunks[piece])?,
+            None => {
+                let size = self.header.size;
+                let range: Range<usize> =
+                    first * size..(first + POINTS).min(self.header.points) * size;
+                let records = source.bytes()[self.header.start..][range].chunks_exact(size);
+                records.filter_map(|record| self.header.point(record)).collect()
+            }
+        };
+        Ok((first..).zip(points))
+    }
+
+    /// The points of a piece, in their colours.
+    pub fn found(&self, source: &Source, piece: usize) -> Result<Vec<Found>> {
+        let found = |(row, point): (usize, Point)| Found {
+            row,
+            position: self.header.position(&point),
+            normal: Vec3::ZERO,
+            color: match self.paint {
+                Paint::None => [255; 4],
+                Paint::Color { largest } => color_of_16_bits(point.color, largest),
+                Paint::Grey { low, high } => grey(f32::from(point.intensity), low, high),
+            },
+        };
+        Ok(self.piece(source, piece)?.map(found).collect())
+    }
+
+    /// Goes through all points: gives their number and the corners of the box around them, and settles their colours.
+    ///
+    /// # Errors
+    /// As of the reader.
+    pub fn survey(&mut self, source: &Source, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])> {
+        let mut seen = Seen::nothing();
+        let batch = 2 * rayon::current_num_threads();
+        source.restart_time();
+        for first in (0..self.pieces()).step_by(batch) {
+            let pieces = (first..(first + batch).min(self.pieces())).into_par_iter();
+            let more: Vec<Seen> =
+                pieces.map(|piece| self.look(source, piece)).collect::<Result<_>>()?;
+            more.into_iter().for_each(|more| seen.join(more));
+            source.release();
+            source.restart_time();
+            watch(seen.points);
+        }
+        if let Some((point, position)) = seen.bad {
+            return Err(positions::not_finite(source, format!("point {point}"), position));
+        }
+        if seen.points == 0 {
+            return Err::<_, Error>(source.error("file", "holds no points"));
+        }
+        self.paint = seen.paint(&self.header);
+        Ok((seen.points, [seen.low, seen.high]))
+    }
+
+    fn look(&self, source: &Source, piece: usize) -> Result<Seen> {
+        let mut seen = Seen::nothing();
+        for (row, point) in self.piece(source, piece)? {
+            let position = self.header.position(&point);
+            if !position.is_finite() {
+                seen.bad.get_or_insert((row, position));
+            }
+            (seen.low, seen.high) = (seen.low.min(position), seen.high.max(position));
+            seen.largest = point.color.iter().fold(seen.largest, |a, &b| a.max(b));
+            seen.intensities[usize::from(point.intensity)] += 1;
+            seen.points += 1;
+        }
+        Ok(seen)
+    }
+}
+
+impl Seen {
+    fn nothing() -> Self {
+        Self {
+            low: DVec3::INFINITY,
+            high: DVec3::NEG_INFINITY,
+            largest: 0,
+            intensities: vec![0; 1 << 16],
+            bad: None,
+            points: 0,
+        }
+    }
+
+    fn join(&mut self, other: Self) {
+        (self.low, self.high) = (self.low.min(other.low), self.high.max(other.high));
+        self.largest = self.largest.max(other.largest);
+        self.intensities.iter_mut().zip(other.intensities).for_each(|(sum, more)| *sum += more);
+        self.bad = self.bad.or(other.bad);
+        self.points += other.points;
+    }
+
+    /// Colours, or where there are none greys from the darkest to the brightest hundredth.
+    fn paint(&self, header: &Header) -> Paint {
+        if header.color_at.is_some() && self.largest > 0 {
+            return Paint::Color { largest: self.largest };
+        }
+        let at = |rank: u64| {
+            let mut below = 0;
+            let place = self.intensities.iter().position(|&count| {
+                below += count;
+                below > rank
+            });
+            place.unwrap_or(0) as f32
+        };
+        let last = self.points - 1;
+        let (low, high) = (at(last / 100), at(last - last / 100));
+        if low < high { Paint::Grey { low, high } } else { Paint::None }
+    }
+}

@@ -1,0 +1,841 @@
+//! NRRD volumes (Teem's format, versions 1 to 5), attached and detached, after its definition at
+//! <https://teem.sourceforge.net/nrrd/format.html>.
+
+mod files;
+mod write;
+
+use super::{Endian, SampleType, volume_stream::Plain};
+use crate::{
+    Error, Result,
+    input::{Source, copy},
+    volume::{Arrangement, Lattice, Volume},
+};
+use flate2::read::MultiGzDecoder;
+use glam::{DMat3, DVec3};
+use std::{borrow::Cow, collections::HashMap, path::Path, sync::Arc};
+pub use write::{write, write_bytes};
+
+/// Reads a volume of three axes with one scalar each. Positions are in the file's own space (RAS, LPS, …: nothing is
+/// turned round); without `space directions` the axes are x, y, z at the `spacings`, 1 where those are missing or NaN.
+///
+/// A key and value of splatkit's own, `lattice:=bcc`, marks a body-centred cubic lattice: `sizes` counts its layers along the
+/// third axis, those of both Cartesian lattices in turn; the first two directions are the edges of the cubic cell, the third
+/// is the step from layer to layer, half an edge. Odd layers are displaced by half an edge along the first two. Readers that
+/// do not know the key see a stack of slices, each second one half a pixel off. All other keys are skipped.
+///
+/// A rectilinear lattice has the keys `axis positions 0`, `axis positions 1` and `axis positions 2`, a convention of our own
+/// (`axis positions 0:=0 1 2.5`): ascending positions of the samples along each axis, in lengths of its space direction, from
+/// the space origin.
+///
+/// Encodings: raw, gzip, ascii and hex. `data file` may name one file inside the header's folder, or several: as a list, or by
+/// a pattern with a number (`slice%03d.raw 1 90 1`).
+///
+/// # Errors
+/// [`Error::Input`] with the field that is missing or wrong, for data that are cut off and for
+/// samples that are not finite; [`Error::Limit`] for sizes over the limits.
+pub fn read(source: &Source) -> Result<Volume> {
+    let (header, body) = Header::read(source)?;
+    let dims = header.dims()?;
+    let lattice = header.lattice(dims)?;
+    let kind = header.sample_type()?;
+    let rest = &source.bytes()[body..];
+    let claimed = kind.bytes_of(dims).unwrap_or(u64::MAX);
+    // No limit helps where raw samples are missing, so that is told first.
+    if header.data_file().is_none()
+        && !header.has_skips()
+        && header.is_raw()?
+        && (rest.len() as u64) < claimed
+    {
+        return Err(source.error(
+            "data",
+            format!("there are {} bytes where {claimed} were expected", rest.len()),
+        ));
+    }
+    let size = source.check_bytes("the size of the samples in bytes", claimed)?;
+    source.spend("the size of the samples in bytes", kind.decoded_bytes(size))?;
+    let Some(field) = header.data_file() else {
+        let (bytes, endian) = header.bytes(source, rest, kind, size)?;
+        return Volume::new(lattice, kind.decode(bytes, endian))
+            .map_err(|message| source.error("samples", message));
+    };
+    let names = files::names(source, field, rest, dims)?;
+    let part = size / names.len();
+    if let [name] = &names[..] {
+        let path = source.neighbour("data file", name)?;
+        let data = source.open_beside(&path)?;
+        let volume = header.bytes(&data, data.bytes(), kind, size).and_then(|(bytes, endian)| {
+            Volume::new(lattice, kind.decode(bytes, endian))
+                .map_err(|message| data.error("samples", message))
+        });
+        return data.unless_changed(volume);
+    }
+    source.spend("the size of the joined samples in bytes", size as u64)?;
+    let (mut all, mut order) = (Vec::new(), Endian::Little);
+    for name in &names {
+        source.check_time()?;
+        let path = source.neighbour("data file", name)?;
+        let data = source.open_beside(&path)?;
+        let (bytes, endian) = header.bytes(&data, data.bytes(), kind, part)?;
+        all.extend_from_slice(&bytes);
+        order = endian;
+        data.intact()?;
+    }
+    Volume::new(lattice, kind.decode(all.into(), order))
+        .map_err(|message| source.error("samples", message))
+}
+
+/// Where the samples of a file of raw encoding stand; `None` for other encodings, and where something is to be skipped or
+/// several files are named.
+pub(super) fn plain(source: &Source) -> Result<Option<Plain>> {
+    let (header, body) = Header::read(source)?;
+    let lattice = header.lattice(header.dims()?)?;
+    let sample_type = header.sample_type()?;
+    if header.has_skips() || !header.is_raw()? {
+        return Ok(None);
+    }
+    let endian = header.endian(sample_type)?;
+    let (path, start) = match header.data_file() {
+        None => (source.path.to_owned(), body),
+        Some(field) if files::are_several(field) => return Ok(None),
+        Some(name) => {
+            let path = source.neighbour("data file", name)?;
+            let size = sample_type.bytes_of(lattice.dims).unwrap_or(u64::MAX);
+            // Fewer bytes are told where they are read.
+            if let Ok(found) = path.metadata() {
+                refuse_more(&path, found.len(), size)?;
+            }
+            (path, 0)
+        }
+    };
+    Ok(Some(Plain { path, start, sample_type, endian, lattice }))
+}
+
+/// Refuses raw samples in a file of their own that has more bytes than they take.
+fn refuse_more(path: &Path, there: u64, expected: u64) -> Result<()> {
+    if there <= expected {
+        return Ok(());
+    }
+    Err(Error::input(path, "data", format!("there are {there} bytes where {expected} were expected"))
+        .hint("“sizes” or “type” of the header are wrong, or “byte skip” is missing (-1 takes the last bytes)"))
+}
+
+/// No header of a real file comes near this many bytes.
+const LONGEST: usize = 64 << 20;
+
+/// Bytes that a line of the header takes beside its text.
+const ENTRY: u64 = 256;
+
+/// The fields of a header, names in lower case, and its keys with their values.
+struct Header<'a> {
+    source: &'a Source<'a>,
+    fields: HashMap<String, String>,
+    keys: HashMap<String, String>,
+}
+
+impl<'a> Header<'a> {
+    /// Reads up to the empty line or the end of the file; also gives where the data begin.
+    fn read(source: &'a Source<'a>) -> Result<(Self, usize)> {
+        let bytes = source.bytes();
+        if !(bytes.starts_with(b"NRRD000") && matches!(bytes.get(7), Some(b'1'..=b'5'))) {
+            return Err(source.error("line 1", "does not begin with NRRD0001 … NRRD0005"));
+        }
+        let mut fields = HashMap::new();
+        let mut keys = HashMap::new();
+        // The line of each field, by its name in the spelling without spaces.
+        let mut lines: HashMap<String, usize> = HashMap::new();
+        let mut at = 0;
+        // A byte more tells a line that is too long.
+        let window = &bytes[..bytes.len().min(LONGEST + 1)];
+        for (number, line) in window.split_inclusive(|&b| b == b'\n').enumerate() {
+            at += line.len();
+            if at > LONGEST {
+                return Err(source
+                    .error(
+                        format!("line {}", number + 1),
+                        format!("the header is longer than {LONGEST} bytes"),
+                    )
+                    .hint("an empty line must stand between the header and the data"));
+            }
+            // Comments may be in any encoding.
+            let text = copy::lossy(line);
+            let text = text.trim_end_matches(['\n', '\r']);
+            if text.is_empty() {
+                break;
+            }
+            source.spend("the size of the header in bytes", ENTRY + 2 * line.len() as u64)?;
+            match text.split_once(':') {
+                _ if number == 0 || text.starts_with('#') => {}
+                // “key:=value”
+                Some((key, value)) if value.starts_with('=') => {
+                    let key = key.trim();
+                    let is_read = key == "lattice" || key.starts_with("axis positions ");
+                    if keys.insert(key.to_owned(), value[1..].trim().to_owned()).is_some()
+                        && is_read
+                    {
+                        let message =
+                            format!("the key “{}” is given twice; it must stand once", shown(key));
+                        return Err(source.error(format!("line {}", number + 1), message));
+                    }
+                }
+                Some((name, value)) => {
+                    let (name, value) = (name.trim().to_ascii_lowercase(), value.trim());
+                    let spelling = match name.replace(' ', "").as_str() {
+                        "centerings" => "centers".to_owned(),
+                        other => other.to_owned(),
+                    };
+                    let is_list = spelling == "datafile" && files::is_list(value);
+                    if let Some(before) = lines.insert(spelling, number + 1) {
+                        let message = format!(
+                            "the field “{}” is given twice, in line {before} too; it must stand once",
+                            shown(&name)
+                        );
+                        return Err(source.error(format!("line {}", number + 1), message));
+                    }
+                    fields.insert(name, value.to_owned());
+                    // The names of files follow, up to the end.
+                    if is_list {
+                        break;
+                    }
+                }
+                None => {
+                    let message = "is neither a field, a key and value, a comment, nor the empty line before the data";
+                    return Err(source.error(format!("line {}", number + 1), message));
+                }
+            }
+        }
+        Ok((Self { source, fields, keys }, at))
+    }
+
+    /// A field by its spellings.
+    fn get(&self, names: &[&str]) -> Option<&str> {
+        names.iter().find_map(|&name| self.fields.get(name)).map(String::as_str)
+    }
+
+    /// What tells where the samples are; `None` where they are in this file.
+    fn data_file(&self) -> Option<&str> {
+        self.get(&["data file", "datafile"])
+    }
+
+    fn need(&self, name: &str) -> Result<&str> {
+        self.get(&[name])
+            .ok_or_else(|| self.source.error("header", format!("has no field “{name}”")))
+    }
+
+    /// Whether the samples stand as they are.
+    fn is_raw(&self) -> Result<bool> {
+        Ok(self.need("encoding")?.eq_ignore_ascii_case("raw"))
+    }
+
+    /// Whether something stands before the samples that is to be skipped.
+    fn has_skips(&self) -> bool {
+        self.get(&["line skip", "lineskip", "byte skip", "byteskip"]).is_some()
+    }
+
+    /// The numbers of a field, exactly `N`.
+    fn numbers<const N: usize, T: std::str::FromStr>(
+        &self,
+        name: &str,
+        text: &str,
+    ) -> Result<[T; N]> {
+        let words = text.split_ascii_whitespace().take(N + 1);
+        let numbers: Option<Vec<T>> = words.map(|word| word.parse().ok()).collect();
+        let wrong =
+            |_| self.source.error(name, format!("“{}” is not a list of {N} numbers", shown(text)));
+        numbers.unwrap_or_default().try_into().map_err(wrong)
+    }
+
+    fn dims(&self) -> Result<[usize; 3]> {
+        let [dimension]: [u32; 1] = self.numbers("dimension", self.need("dimension")?)?;
+        if dimension != 3 {
+            return Err(self.source.error(
+                "dimension",
+                format!("is {dimension}, but a volume has 3 axes with one scalar for each sample"),
+            ));
+        }
+        // An axis of colours or vectors is none of space.
+        let several =
+            ["color", "vector", "normal", "gradient", "matrix", "quaternion", "complex", "point"];
+        let kinds = self.get(&["kinds"]).unwrap_or_default().to_ascii_lowercase();
+        if let Some(kind) = kinds
+            .split_ascii_whitespace()
+            .find(|kind| several.iter().any(|name| kind.contains(name)))
+        {
+            let message = format!(
+                "one axis holds values of the kind “{kind}”, but a volume has one scalar for each sample"
+            );
+            return Err(self
+                .source
+                .error("kinds", message)
+                .hint("write one component, or a length, to a file of its own"));
+        }
+        self.numbers("sizes", self.need("sizes")?)
+    }
+
+    fn lattice(&self, dims: [usize; 3]) -> Result<Lattice> {
+        let along = match self.get(&["space directions"]) {
+            Some(_) => [[0.0, 1.0]; 3],
+            None => self.along_axes(dims)?,
+        };
+        let axes = match self.get(&["space directions"]) {
+            Some(text) => {
+                let [x, y, z] = self.vectors("space directions", text)?;
+                DMat3::from_cols(x, y, z)
+            }
+            None => DMat3::from_diagonal(along.map(|axis| axis[1]).into()),
+        };
+        let origin = match self.get(&["space origin"]) {
+            Some(text) => self.vectors::<1>("space origin", text)?[0],
+            None => DVec3::from(along.map(|axis| axis[0])),
+        };
+        let lattice = match self.keys.get("lattice").map(String::as_str) {
+            None => Lattice { dims, origin, axes, arrangement: self.arrangement()? },
+            // Two layers make an edge.
+            Some("bcc") => Lattice::body_centred(
+                dims,
+                origin,
+                DMat3::from_cols(axes.x_axis, axes.y_axis, 2.0 * axes.z_axis),
+            ),
+            Some(other) => {
+                let error = self
+                    .source
+                    .error("lattice", format!("“{other}” is not a lattice that is known"));
+                return Err(
+                    error.hint("lattice:=bcc marks body-centred cubic lattices; Cartesian ones have no such key")
+                );
+            }
+        };
+        lattice.validate().map_err(|message| self.source.error("header", message))?;
+        Ok(lattice)
+    }
+
+    /// Where the first sample is along each axis, and how far the next, by the fields of single axes.
+    fn along_axes(&self, dims: [usize; 3]) -> Result<[[f64; 2]; 3]> {
+        // NaN stands for what is not known of an axis.
+        let numbers = |names: &[&str]| match self.get(names) {
+            Some(text) => self.numbers::<3, f64>(names[0], text),
+            None => Ok([f64::NAN; 3]),
+        };
+        let spacings = numbers(&["spacings"])?;
+        let (mins, maxs) =
+            (numbers(&["axis mins", "axismins"])?, numbers(&["axis maxs", "axismaxs"])?);
+        // Samples stand in the middle of cells where nothing tells that they are nodes.
+        let centers = self.get(&["centers", "centerings"]).unwrap_or_default();
+        let is_node: Vec<bool> = centers
+            .split_ascii_whitespace()
+            .map(|word| word.eq_ignore_ascii_case("node"))
+            .collect();
+        Ok(std::array::from_fn(|axis| {
+            let is_node = is_node.get(axis).copied().unwrap_or(false);
+            let steps = dims[axis].saturating_sub(usize::from(is_node)).max(1) as f64;
+            let known = |spacing: &f64| !spacing.is_nan();
+            let of_ends = Some((maxs[axis] - mins[axis]) / steps).filter(known);
+            let spacing = Some(spacings[axis]).filter(known).or(of_ends).unwrap_or(1.0);
+            let first = Some(mins[axis] + if is_node { 0.0 } else { 0.5 * spacing }).filter(known);
+            [first.unwrap_or(0.0), spacing]
+        }))
+    }
+
+    fn arrangement(&self) -> Result<Arrangement> {
+        let keys = [0, 1, 2].map(|axis| format!("axis positions {axis}"));
+        if !keys.iter().any(|key| self.keys.contains_key(key)) {
+            return Ok(Arrangement::Cartesian);
+        }
+        let mut places = [const { Vec::new() }; 3];
+        for (places, key) in places.iter_mut().zip(&keys) {
+            let text = self
+                .keys
+                .get(key)
+                .ok_or_else(|| self.source.error("header", format!("has no key “{key}”")))?;
+            let wrong = || self.source.error(key, "is not a list of numbers");
+            self.source.room::<[f64; 2]>("the positions along an axis", text.len() / 2)?;
+            *places = text
+                .split_ascii_whitespace()
+                .map(|word| word.parse().map_err(|_| wrong()))
+                .collect::<Result<_>>()?;
+        }
+        Ok(Arrangement::Rectilinear(Arc::new(places)))
+    }
+
+    /// Vectors written as (x,y,z), exactly `N`.
+    fn vectors<const N: usize>(&self, name: &str, text: &str) -> Result<[DVec3; N]> {
+        let wrong = || self.source.error(name, format!("“{}” is not {N} × (x,y,z)", shown(text)));
+        let vector = |part: &str| {
+            let numbers: Option<Vec<f64>> = part
+                .trim()
+                .strip_prefix('(')?
+                .split(',')
+                .take(4)
+                .map(|word| word.trim().parse().ok())
+                .collect();
+            <[f64; 3]>::try_from(numbers?).ok().map(DVec3::from_array)
+        };
+        let (inside, rest) = text.rsplit_once(')').ok_or_else(wrong)?;
+        let vectors: Option<Vec<DVec3>> = inside.split(')').take(N + 1).map(vector).collect();
+        let vectors = vectors.filter(|_| rest.trim().is_empty()).ok_or_else(wrong)?;
+        vectors.try_into().map_err(|_| wrong())
+    }
+
+    fn sample_type(&self) -> Result<SampleType> {
+        let name = self.need("type")?.to_ascii_lowercase();
+        Ok(match name.as_str() {
+            "signed char" | "int8" | "int8_t" => SampleType::I8,
+            "uchar" | "unsigned char" | "uint8" | "uint8_t" => SampleType::U8,
+            "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => {
+                SampleType::I16
+            }
+            "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => {
+                SampleType::U16
+            }
+            "int" | "signed int" | "int32" | "int32_t" => SampleType::I32,
+            "uint" | "unsigned int" | "uint32" | "uint32_t" => SampleType::U32,
+            "longlong"
+            | "long long"
+            | "long long int"
+            | "signed long long"
+            | "signed long long int"
+            | "int64"
+            | "int64_t" => SampleType::I64,
+            "ulonglong"
+            | "unsigned long long"
+            | "unsigned long long int"
+            | "uint64"
+            | "uint64_t" => SampleType::U64,
+            "float" => SampleType::F32,
+            "double" => SampleType::F64,
+            _ => {
+                return Err(self
+                    .source
+                    .error("type", format!("“{}” is not a type of scalars", shown(&name))));
+            }
+        })
+    }
+
+    fn endian(&self, kind: SampleType) -> Result<Endian> {
+        match self.get(&["endian"]).map(str::to_ascii_lowercase).as_deref() {
+            Some("little") => Ok(Endian::Little),
+            Some("big") => Ok(Endian::Big),
+            None if kind.bytes() == 1 => Ok(Endian::Little),
+            None => Err(self
+                .source
+                .error("header", "has no field “endian”, which samples of several bytes need")),
+            Some(other) => {
+                Err(self.source.error("endian", format!("“{other}” is neither little nor big")))
+            }
+        }
+    }
+
+    /// Unpacks `size` bytes of samples from the data, which may be in a file of their own; and tells their order.
+    fn bytes<'d>(
+        &self,
+        file: &Source,
+        data: &'d [u8],
+        kind: SampleType,
+        size: usize,
+    ) -> Result<(Cow<'d, [u8]>, Endian)> {
+        let place = "data";
+        let skip = |names: &[&str]| match self.get(names) {
+            Some(text) => self.numbers::<1, i64>(names[0], text).map(|[n]| n),
+            None => Ok(0),
+        };
+        let lines = skip(&["line skip", "lineskip"])?;
+        let skipped: usize = data
+            .split_inclusive(|&b| b == b'\n')
+            .take(lines.max(0) as usize)
+            .map(<[u8]>::len)
+            .sum();
+        let data = &data[skipped..];
+        let skip = skip(&["byte skip", "byteskip"])?;
+        if lines < 0 || skip < -1 {
+            return Err(self.source.error("header", "skips a negative number of lines or bytes"));
+        }
+        let encoding = self.need("encoding")?.to_ascii_lowercase();
+        let from_end = skip == -1;
+        if from_end && encoding != "raw" {
+            return Err(self
+                .source
+                .error("byte skip", "-1 counts from the end, which only raw data can"));
+        }
+        let skip = skip.max(0) as usize;
+        let after_skip = || {
+            data.get(skip..)
+                .ok_or_else(|| file.error(place, format!("end before the {skip} bytes to skip do")))
+        };
+        let text = || {
+            let bytes = after_skip()?;
+            file.room::<u8>("the text", bytes.len())?;
+            copy::text(bytes).map_err(|at| file.error(place, format!("byte {at} is not text")))
+        };
+        Ok(match encoding.as_str() {
+            "raw" => {
+                let start = if from_end { data.len().checked_sub(size) } else { Some(skip) };
+                if !from_end && self.data_file().is_some() {
+                    refuse_more(file.path, data.len().saturating_sub(skip) as u64, size as u64)?;
+                }
+                let found =
+                    start.and_then(|start| data.get(start..)).and_then(|rest| rest.get(..size));
+                let found = found.ok_or_else(|| {
+                    let there = data.len().saturating_sub(skip);
+                    file.error(place, format!("there are {there} bytes where {size} were expected"))
+                })?;
+                (found.into(), self.endian(kind)?)
+            }
+            // Skipped lines stand before the packed stream, skipped bytes inside it.
+            "gzip" | "gz" => {
+                let mut unpacked =
+                    file.unpack(place, MultiGzDecoder::new(data), skip.saturating_add(size))?;
+                unpacked.drain(..skip);
+                (unpacked.into(), self.endian(kind)?)
+            }
+            "ascii" | "txt" | "text" => {
+                file.spend("the size of the numbers in bytes", size as u64)?;
+                let bytes = kind
+                    .parse(&text()?, size / kind.bytes())
+                    .map_err(|message| file.error(place, message))?;
+                (bytes.into(), Endian::Little)
+            }
+            "hex" => {
+                file.spend("the size of the digits in bytes", data.len() as u64)?;
+                let bytes =
+                    from_hex(&text()?, size).map_err(|message| file.error(place, message))?;
+                (bytes.into(), self.endian(kind)?)
+            }
+            _ => {
+                return Err(self
+                    .source
+                    .error("encoding", format!("“{encoding}” is not supported"))
+                    .hint("write the file with raw or gzip encoding"));
+            }
+        })
+    }
+}
+
+/// The beginning of a text, for an error.
+fn shown(text: &str) -> String {
+    if text.chars().nth(80).is_none() {
+        text.to_owned()
+    } else {
+        text.chars().take(80).chain(['…']).collect()
+    }
+}
+
+/// Bytes of two hexadecimal digits each; white space does not count.
+fn from_hex(text: &str, size: usize) -> Result<Vec<u8>, String> {
+    let mut digits = Vec::new();
+    for c in text.chars().filter(|c| !c.is_ascii_whitespace()) {
+        digits.push(c.to_digit(16).ok_or_else(|| format!("“{c}” is no hexadecimal digit"))? as u8);
+    }
+    if digits.len() % 2 != 0 || digits.len() / 2 != size {
+        return Err(format!(
+            "there are {} hexadecimal digits where {} were expected",
+            digits.len(),
+            2 * size as u64
+        ));
+    }
+    Ok(digits.chunks_exact(2).map(|pair| pair[0] << 4 | pair[1]).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Error, input::testing::*, volume::Samples};
+    use flate2::{Compression, write::GzEncoder};
+    use std::io::Write;
+
+    const VALUES: [i16; 12] = [0, 1, -2, 300, -4000, 5, 6, 7, 8, 9, 10, 32767];
+
+    fn gzip(bytes: &[u8]) -> Vec<u8> {
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
+        encoder.write_all(bytes).unwrap();
+        encoder.finish().unwrap()
+    }
+
+    fn file(fields: &str, data: &[u8]) -> Vec<u8> {
+        let mut bytes = format!("NRRD0005\n# a comment\ndimension: 3\n{fields}\n\n").into_bytes();
+        bytes.extend_from_slice(data);
+        bytes
+    }
+
+    fn bytes_of(endian: Endian) -> Vec<u8> {
+        VALUES
+            .iter()
+            .flat_map(|v| if endian == Endian::Little { v.to_le_bytes() } else { v.to_be_bytes() })
+            .collect()
+    }
+
+    #[test]
+    fn every_encoding_in_both_orders() {
+        let folder = Folder::new();
+        let ascii = VALUES.map(|v| v.to_string()).join("\n");
+        for (endian, name) in [(Endian::Little, "little"), (Endian::Big, "big")] {
+            let raw = bytes_of(endian);
+            let hex: String = raw.iter().map(|b| format!("{b:02x} ")).collect();
+            for (encoding, data) in [
+                ("raw", raw.clone()),
+                ("gzip", gzip(&raw)),
+                ("gz", gzip(&raw)),
+                ("ascii", ascii.clone().into_bytes()),
+                ("txt", ascii.clone().into_bytes()),
+                ("hex", hex.into_bytes()),
+            ] {
+                for (header, line_end) in [(0, "\n"), (1, "\r\n")] {
+                    let fields =
+                        format!("type: short\nsizes: 3 2 2\nencoding: {encoding}\nendian: {name}");
+                    let text =
+                        format!("NRRD000{}\nkey:=value\ndimension: 3\n{fields}\n\n", header + 4);
+                    let mut content = text.replace('\n', line_end).into_bytes();
+                    content.extend_from_slice(&data);
+                    let volume = read_with(&folder.write("volume.nrrd", &content), read).unwrap();
+                    assert_eq!(volume.samples, Samples::I16(VALUES.to_vec()), "{encoding} {name}");
+                    assert_eq!(volume.lattice, Lattice::with_spacing([3, 2, 2], DVec3::ONE));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lattices() {
+        let folder = Folder::new();
+        let lattice = |fields: &str| {
+            let content =
+                file(&format!("type: uint8\nsizes: 2 1 1\nencoding: raw\n{fields}"), &[1, 2]);
+            read_with(&folder.write("volume.nrrd", &content), read).map(|volume| volume.lattice)
+        };
+        let turned = lattice(
+            "space: RAS\nspace directions: (0, 0.5,0) (-2,0,0)(0,0,3)\nspace origin: (10,20,-30.5)",
+        )
+        .unwrap();
+        assert_eq!(turned.origin, DVec3::new(10.0, 20.0, -30.5));
+        assert_eq!(turned.position(DVec3::new(1.0, 1.0, 1.0)), DVec3::new(8.0, 20.5, -27.5));
+        assert_eq!(lattice("spacings: 1 2.5 NaN").unwrap().spacing(), DVec3::new(1.0, 2.5, 1.0));
+        for (fields, origin, spacing) in [
+            (
+                "axis mins: 0 1 2\naxis maxs: 4 4 20\ncenters: node node cell",
+                [0.0, 1.0, 11.0],
+                [4.0, 3.0, 18.0],
+            ),
+            ("axis mins: 0 NaN 2\naxis maxs: 4 4 nan", [1.0, 0.0, 2.5], [2.0, 1.0, 1.0]),
+            (
+                "axismins: 10 0 0\nspacings: 2 3 4\ncenterings: node node node",
+                [10.0, 0.0, 0.0],
+                [2.0, 3.0, 4.0],
+            ),
+            (
+                "kinds: domain space time\nspace origin: (1,2,3)\naxis mins: 9 9 9",
+                [1.0, 2.0, 3.0],
+                [1.0; 3],
+            ),
+        ] {
+            let found = lattice(fields).unwrap();
+            assert_eq!(
+                (found.origin, found.spacing()),
+                (origin.into(), spacing.into()),
+                "{fields}"
+            );
+        }
+        let body_centred = lattice("lattice:=bcc\nspacings: 2 2 1").unwrap();
+        assert_eq!(
+            body_centred,
+            Lattice::body_centred([2, 1, 1], DVec3::ZERO, DMat3::from_diagonal(DVec3::splat(2.0)))
+        );
+        assert_eq!(
+            lattice("units:=mm:=lattice:=bcc\ncontent: lattice:=bcc").unwrap(),
+            Lattice::with_spacing([2, 1, 1], DVec3::ONE)
+        );
+        for (fields, word) in [
+            ("space directions: none (1,0,0) (0,1,0)", "space directions"),
+            ("space directions: (1,0) (0,1)", "space directions"),
+            ("space directions: (1,0,0) (0,1,0) (1,1,0)", "one plane"),
+            ("space origin: (1,0,0", "space origin"),
+            ("kinds: RGB-color domain domain", "rgb-color"),
+            ("axis mins: 0 0", "axis mins"),
+            ("spacings: 1 0 1", "spacing"),
+            ("spacings: 1 1", "spacings"),
+            ("spacings: 1 1 inf", "finite"),
+            ("lattice:=fcc", "fcc"),
+            ("lattice:=", "lattice"),
+        ] {
+            let message = lattice(fields).unwrap_err().to_string();
+            assert!(message.contains(word), "{message}");
+        }
+    }
+
+    #[test]
+    fn skips_and_detached_files() {
+        let folder = Folder::new();
+        folder.write("plain.raw", [9, 9, 1, 2, 3, 4]);
+        folder.write("lines.raw", b"one\ntwo\n\x05\x01\x02\x03\x04");
+        folder.write("packed.raw.gz", [b"line\n".to_vec(), gzip(&[7, 1, 2, 3, 4])].concat());
+        let detached = |fields: &str| {
+            let text = format!("NRRD0001\ntype: uchar\ndimension: 3\nsizes: 2 2 1\n{fields}\n");
+            read_with(&folder.write("volume.nhdr", text.as_bytes()), read)
+        };
+        for fields in [
+            "encoding: raw\nbyte skip: 2\ndata file: plain.raw",
+            "encoding: raw\nbyte skip: -1\ndatafile: ./plain.raw",
+            "encoding: raw\nline skip: 2\nbyte skip: 1\ndata file: lines.raw",
+            "encoding: gzip\nlineskip: 1\nbyteskip: 1\ndata file: packed.raw.gz",
+        ] {
+            assert_eq!(
+                detached(fields).unwrap().samples,
+                Samples::U8(vec![1, 2, 3, 4]),
+                "{fields}"
+            );
+        }
+        for (fields, word) in [
+            ("encoding: raw\ndata file: missing.raw", "missing.raw"),
+            ("encoding: raw\ndata file: ../plain.raw", "own folder"),
+            ("encoding: raw\ndata file: LIST", "0 files"),
+            ("encoding: raw\ndata file: slice%03d.raw 1 9 1", "9 files"),
+            ("encoding: raw\nbyte skip: 99\ndata file: plain.raw", "0 bytes where 4"),
+            ("encoding: raw\nbyte skip: -2\ndata file: plain.raw", "negative"),
+            (
+                "encoding: raw\nbyte skip: 9223372036854775807\ndata file: plain.raw",
+                "0 bytes where 4",
+            ),
+            ("encoding: gzip\nbyte skip: 9223372036854775807\ndata file: packed.raw.gz", "limit"),
+            ("encoding: gzip\nbyte skip: -1\ndata file: packed.raw.gz", "-1"),
+            ("encoding: bzip2\ndata file: plain.raw", "bzip2"),
+            ("encoding: hex\ndata file: plain.raw", "hexadecimal"),
+            ("data file: plain.raw", "encoding"),
+        ] {
+            let message = detached(fields).unwrap_err().to_string();
+            assert!(message.contains(word), "{message}");
+        }
+    }
+
+    #[test]
+    fn every_type() {
+        let folder = Folder::new();
+        for (name, samples) in [
+            ("signed char", Samples::I16(vec![1, 2])),
+            ("unsigned char", Samples::U8(vec![1, 2])),
+            ("short int", Samples::I16(vec![1, 2])),
+            ("unsigned short int", Samples::U16(vec![1, 2])),
+            ("int", Samples::I32(vec![1, 2])),
+            ("uint32_t", Samples::I32(vec![1, 2])),
+            ("long long int", Samples::I32(vec![1, 2])),
+            ("unsigned long long", Samples::I32(vec![1, 2])),
+            ("float", Samples::F32(vec![1.0, 2.0])),
+            ("double", Samples::F32(vec![1.0, 2.0])),
+        ] {
+            let content = file(&format!("type: {name}\nsizes: 1 1 2\nencoding: ascii"), b"1 2");
+            let volume = read_with(&folder.write("volume.nrrd", &content), read).unwrap();
+            assert_eq!(volume.samples, samples, "{name}");
+        }
+    }
+
+    #[test]
+    fn positions_along_the_axes() {
+        let folder = Folder::new();
+        let load = |keys: &str| {
+            let fields = "space directions: (0,2,0) (1,0,0) (0,0,1)\nspace origin: (10,20,30)";
+            let content = file(
+                &format!("type: uint8\nsizes: 3 2 1\nencoding: raw\n{fields}\n{keys}"),
+                &[0, 1, 2, 3, 4, 5],
+            );
+            read_with(&folder.write("volume.nrrd", &content), read)
+        };
+        let keys = "axis positions 0:=0 1 2.5\naxis positions 1:=-1 3\naxis positions 2:=7";
+        let volume = load(keys).unwrap();
+        assert_eq!(volume.lattice.sample_position(5), DVec3::new(13.0, 25.0, 37.0));
+        for (from, to, word) in [
+            ("axis positions 1:=-1 3\n", "", "no key “axis positions 1”"),
+            ("2.5", "two", "axis positions 0: is not a list of numbers"),
+            ("2.5", "0.5", "must ascend"),
+            (" 2.5", "", "2 coordinates along x for 3 samples"),
+        ] {
+            let message = load(&keys.replace(from, to)).unwrap_err().to_string();
+            assert!(message.contains(word), "{message}");
+        }
+    }
+
+    #[test]
+    fn cuts_and_lies_are_errors() {
+        let folder = Folder::new();
+        let fields = "type: short\nsizes: 3 2 2\nencoding";
+        for (encoding, data) in
+            [("raw", bytes_of(Endian::Little)), ("gzip", gzip(&bytes_of(Endian::Little)))]
+        {
+            let content = file(&format!("{fields}: {encoding}\nendian: little"), &data);
+            every_cut(&folder, "volume.nrrd", &content, read);
+        }
+        let error = |fields: &str, data: &[u8]| {
+            read_with(&folder.write("volume.nrrd", file(fields, data)), read).unwrap_err()
+        };
+        let sizes = |sizes: &str| {
+            error(&format!("type: uint8\nsizes: {sizes}\nencoding: gzip"), &gzip(&vec![0; 1 << 20]))
+        };
+        assert!(matches!(sizes("1099511627776 1 1"), Error::Limit { .. }));
+        assert!(
+            matches!(sizes("4294967296 4294967296 2"), Error::Input { .. }),
+            "more than memory indexes"
+        );
+        assert!(sizes("99999999999999999999 1 1").to_string().contains("sizes"));
+        assert!(sizes("2147483648 4 1").to_string().contains("unpacks to 1048576 bytes"));
+        assert!(sizes("2 2 2").to_string().contains("more bytes"));
+        assert!(sizes("0 2 2").to_string().contains("holds none"));
+        assert!(sizes("2 2").to_string().contains("3 numbers"));
+        for (fields, data, word) in [
+            ("type: block\nsizes: 1 1 1\nencoding: raw", &[0][..], "block"),
+            ("type: short\nsizes: 1 1 1\nencoding: raw", &[0; 2], "endian"),
+            ("type: short\nsizes: 1 1 1\nencoding: raw\nendian: middle", &[0; 2], "middle"),
+            ("type: uchar\nsizes: 1 1 1\nencoding: ascii", b"256", "256"),
+            ("type: uchar\nsizes: 1 1 1\nencoding: ascii", b"\xff", "not text"),
+            ("type: float\nsizes: 1 1 2\nencoding: ascii", b"1 nan", "not finite"),
+            ("nonsense\ntype: float", b"", "line 4"),
+        ] {
+            let message = error(fields, data).to_string();
+            assert!(message.contains(word), "{message}");
+        }
+        let flat = "NRRD0004\ntype: uint8\ndimension: 2\nsizes: 2 2\nencoding: raw\n\n1234";
+        let message = read_with(&folder.write("volume.nrrd", flat), read).unwrap_err().to_string();
+        assert!(message.contains("3 axes"), "{message}");
+    }
+
+    #[test]
+    fn fields_stand_once() {
+        let folder = Folder::new();
+        let start = "type: uint8\nsizes: 2 1 1\nencoding: raw";
+        let load = |fields: &str| {
+            let content = file(&format!("{start}\n{fields}"), &[1, 2]);
+            read_with(&folder.write("volume.nrrd", &content), read)
+        };
+        assert!(load("content: a\nkey:=1\nkey:=2").is_ok());
+        for (fields, word) in [
+            ("sizes: 2 1 1", "“sizes” is given twice"),
+            ("Sizes: 1 2 1", "“sizes” is given twice"),
+            ("spacings: 1 1 1\nspacings: 1 1 2", "“spacings” is given twice"),
+            ("axis mins: 0 0 0\naxismins: 0 0 0", "“axismins” is given twice"),
+            ("centers: node node node\ncenterings: cell cell cell", "“centerings” is given twice"),
+            ("lattice:=bcc\nlattice:=bcc", "the key “lattice” is given twice"),
+        ] {
+            let message = load(fields).unwrap_err().to_string();
+            assert!(message.contains("line ") && message.contains(word), "{fields}: {message}");
+        }
+    }
+
+    #[test]
+    fn files_of_data_have_no_more_than_the_samples() {
+        let folder = Folder::new();
+        folder.write("a.raw", [9, 1, 2]);
+        let detached = |fields: &str| {
+            let text = format!(
+                "NRRD0001\ntype: uchar\ndimension: 3\nsizes: 2 1 1\nencoding: raw\n{fields}\n"
+            );
+            let path = folder.write("volume.nhdr", text);
+            (read_with(&path, read), read_with(&path, plain).map(|found| found.is_some()))
+        };
+        let (whole, plain) = detached("data file: a.raw");
+        for error in [whole.err(), plain.err()] {
+            let message = error.unwrap().to_string();
+            assert!(
+                message.ends_with("a.raw: data: there are 3 bytes where 2 were expected"),
+                "{message}"
+            );
+        }
+        for skip in ["byte skip: 1", "byte skip: -1"] {
+            let (whole, plain) = detached(&format!("{skip}\ndata file: a.raw"));
+            assert_eq!((whole.unwrap().samples, plain.unwrap()), (Samples::U8(vec![1, 2]), false));
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! The files of a detached header: one, a list, or a pattern with a number.
+
+use super::shown;
+use crate::{
+    Result,
+    input::{Source, copy},
+};
+
+/// Whether a field tells that the names of files follow in the lines below.
+pub fn is_list(field: &str) -> bool {
+    field.split_ascii_whitespace().next() == Some("LIST")
+}
+
+/// Whether a field tells of several files.
+pub fn are_several(field: &str) -> bool {
+    is_list(field) || Pattern::of(field).is_some()
+}
+
+/// The names that a field tells of; `rest` is what stands behind the header. Files hold equal parts of the samples, in the
+/// order of the last axis. So many samples are known to fit into memory.
+pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Result<Vec<String>> {
+    const PLACE: &str = "data file";
+    let wrong = |message: String| source.error(PLACE, message);
+    let (names, parts) = if is_list(field) {
+        let mut words = field.split_ascii_whitespace().skip(1);
+        let (parts, None) = (words.next(), words.next()) else {
+            return Err(wrong(format!("“{}” is not “LIST” with the axes of a file", shown(field))));
+        };
+        if rest.len() > super::LONGEST {
+            return Err(wrong(format!(
+                "the list of files is longer than {} bytes",
+                super::LONGEST
+            )));
+        }
+        source.spend("the size of the names of files in bytes", 5 * rest.len() as u64)?;
+        let text = copy::text(rest)
+            .map_err(|at| wrong(format!("byte {at} of the list of files is not text")))?;
+        let names = text.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned);
+        (names.collect(), parts)
+    } else if let Some(pattern) = Pattern::of(field) {
+        let count =
+            pattern.count().ok_or_else(|| wrong(format!("“{}” counts no files", shown(field))))?;
+        // Each file holds a sample at least.
+        if count > dims.iter().product::<usize>() as u64 {
+            return Err(wrong(format!(
+                "“{}” counts {count} files, more than there are samples",
+                shown(field)
+            )));
+        }
+        source.spend(
+            "the size of the names of files in bytes",
+            count.saturating_mul(256 + field.len() as u64),
+        )?;
+        ((0..count).map(|index| pattern.name(index)).collect::<Vec<_>>(), pattern.parts)
+    } else {
+        return Ok(vec![field.to_owned()]);
+    };
+    let axes = match parts.map(str::parse::<usize>) {
+        None => 2,
+        Some(Ok(axes @ 1..=3)) => axes,
+        Some(_) => {
+            return Err(wrong(format!(
+                "“{}” does not tell 1, 2 or 3 axes of a file",
+                shown(field)
+            )));
+        }
+    };
+    let wanted: usize = dims[axes..].iter().product();
+    let fits = if axes == 3 {
+        !names.is_empty() && dims[2].is_multiple_of(names.len())
+    } else {
+        names.len() == wanted
+    };
+    if !fits {
+        let wanted = if axes == 3 { format!("divide {}", dims[2]) } else { format!("be {wanted}") };
+        return Err(wrong(format!(
+            "there are {} files, but their number must {wanted}",
+            names.len()
+        )));
+    }
+    Ok(names)
+}
+
+/// Names with a number, as printf writes them: `slice%03d.raw`, the first number, the last, the step; the axes of a file.
+struct Pattern<'a> {
+    before: &'a str,
+    behind: &'a str,
+    width: usize,
+    zeros: bool,
+    first: i64,
+    last: i64,
+    step: i64,
+    parts: Option<&'a str>,
+}
+
+impl<'a> Pattern<'a> {
+    /// `None` for what is the name of one file.
+    fn of(field: &'a str) -> Option<Self> {
+        let mut words = field.split_ascii_whitespace();
+        let (before, number) = words.next()?.split_once('%')?;
+        let [first, last, step] =
+            [words.next()?, words.next()?, words.next()?].map(|word| word.parse().ok());
+        let parts = words.next();
+        if words.next().is_some() {
+            return None;
+        }
+        let digits = number.bytes().take_while(u8::is_ascii_digit).count();
+        let (width, behind) = number.split_at(digits);
+        // Wider names are longer than file systems take.
+        let wide = if width.is_empty() {
+            Some(0)
+        } else {
+            width.parse().ok().filter(|&wide: &usize| wide < 256)
+        };
+        Some(Self {
+            before,
+            behind: behind.strip_prefix(['d', 'i', 'u']).filter(|rest| !rest.contains('%'))?,
+            width: wide?,
+            zeros: width.starts_with('0'),
+            first: first?,
+            last: last?,
+            step: step?,
+            parts,
+        })
+    }
+
+    /// How many files; `None` where the step leads nowhere.
+    fn count(&self) -> Option<u64> {
+        let way = i128::from(self.last) - i128::from(self.first);
+        let steps = way.checked_div(self.step.into())?;
+        let leads_there = way == 0 || (way > 0) == (self.step > 0);
+        u64::try_from(steps + 1).ok().filter(|_| leads_there)
+    }
+
+    fn name(&self, index: u64) -> String {
+        let number = i128::from(self.first) + i128::from(self.step) * i128::from(index);
+        let Self { before, behind, width, .. } = *self;
+        if self.zeros {
+            format!("{before}{number:0width$}{behind}")
+        } else {
+            format!("{before}{number:width$}{behind}")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{formats::nrrd::read, input::testing::*, volume::Volume};
+
+    /// Reads a header of 2×1×4 bytes beside files of two and of four samples.
+    fn volume(folder: &Folder, data_file: &str) -> Result<Volume> {
+        for (index, name) in
+            ["slice01.raw", "slice02.raw", "slice03.raw", "slice04.raw"].iter().enumerate()
+        {
+            folder.write(name, [2 * index as u8, 2 * index as u8 + 1]);
+        }
+        folder.write("slab 0.raw", [0, 1, 2, 3]);
+        folder.write("slab 1.raw", [4, 5, 6, 7]);
+        let text = format!(
+            "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 1 4\nencoding: raw\ndata file: {data_file}\n"
+        );
+        read_with(&folder.write("volume.nhdr", text), read)
+    }
+
+    #[test]
+    fn several_files_are_joined() {
+        let folder = Folder::new();
+        let names = "slice01.raw\nslice02.raw\r\n\nslice03.raw\nslice04.raw";
+        for data_file in [
+            "slice%02d.raw 1 4 1",
+            "slice%02i.raw 1 4 1 2",
+            "slice0%u.raw 1 4 1 1",
+            "slab%2d.raw 0 1 1 3",
+            &format!("LIST\n{names}"),
+            &format!("LIST 2\n{names}"),
+            "LIST 3\nslab 0.raw\nslab 1.raw\n",
+        ] {
+            let read = volume(&folder, data_file).unwrap();
+            assert_eq!(
+                (0..8).map(|i| read.value(i)).collect::<Vec<_>>(),
+                [0., 1., 2., 3., 4., 5., 6., 7.],
+                "{data_file}"
+            );
+        }
+        let read = volume(&folder, "slice%02d.raw 4 1 -1").unwrap();
+        assert_eq!(
+            (0..8).map(|i| read.value(i)).collect::<Vec<_>>(),
+            [6., 7., 4., 5., 2., 3., 0., 1.]
+        );
+    }
+
+    #[test]
+    fn files_that_do_not_fit_are_told() {
+        let folder = Folder::new();
+        for (data_file, message) in [
+            ("slice%02d.raw 1 3 1", "there are 3 files, but their number must be 4"),
+            ("slab%2d.raw 0 2 1 3", "there are 3 files, but their number must divide 4"),
+            ("slice%02d.raw 1 4 0", "counts no files"),
+            ("slice%02d.raw 1 4 -1", "counts no files"),
+            ("slice%02d.raw 1 4 9", "there are 1 files"),
+            ("slice%02d.raw 0 9223372036854775807 1", "more than there are samples"),
+            ("slice%02d.raw -9223372036854775808 9223372036854775807 1", "counts no files"),
+            ("slice%02d.raw 1 4 1 4", "does not tell 1, 2 or 3 axes"),
+            ("LIST 2 2\n", "is not “LIST” with the axes"),
+            ("LIST", "there are 0 files"),
+            ("LIST 3", "there are 0 files"),
+            ("LIST\nslice01.raw", "there are 1 files"),
+            ("slice%02d.raw 2 5 1", "refers to “slice05.raw”"),
+            ("../slice%02d.raw 1 4 1", "leads out of the file's own folder"),
+            ("LIST 3\n/etc/hostname\nslab 1.raw", "an absolute path"),
+            ("LIST 3\nslab 0.raw\nslice01.raw", "there are 2 bytes where 4 were expected"),
+            // Names of one file.
+            ("slice%02x.raw 1 4 1", "refers to “slice%02x.raw 1 4 1”"),
+            ("slice%999999999d.raw 1 4 1", "refers to"),
+            ("slice%d%d.raw 1 4 1", "refers to"),
+            ("100%.raw", "refers to “100%.raw”"),
+        ] {
+            let error = volume(&folder, data_file).map(|_| ()).unwrap_err().to_string();
+            assert!(error.contains(message), "{data_file}: {error}");
+        }
+    }
+}

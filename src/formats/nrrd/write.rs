@@ -1,0 +1,179 @@
+//! Writing NRRD: samples in their own type, packed by gzip, in the header's own file.
+
+use crate::{
+    Error, Result, disk,
+    volume::{Arrangement, Lattice, Scalar, Volume},
+};
+use flate2::{Compression, write::GzEncoder};
+use glam::DVec3;
+use std::{
+    io::{ErrorKind, Write},
+    path::Path,
+};
+
+/// Writes a volume with its position in space; those that are not Cartesian with the keys that [`read`](super::read) knows.
+///
+/// # Errors
+/// [`Error::Argument`] for a volume that was put together by hand and contradicts itself; [`Error::Output`] where the file cannot
+/// be written.
+pub fn write(volume: &Volume, path: &Path) -> Result<()> {
+    volume.validate().map_err(Error::Argument)?;
+    disk::write_with(path, |out| write_to(volume, out))
+}
+
+/// Writes a volume of bytes that come slice by slice, not packed, so that it can be read slice by slice too
+/// ([`VolumeStream`](crate::formats::VolumeStream)). `slice` makes the samples of each slice across the last axis, in order.
+///
+/// # Errors
+/// [`Error::Argument`] for a lattice that is none ([`Lattice::validate`]), and where `slice` gives another number of samples than
+/// a slice has; [`Error::Output`] where the file cannot be written. No file is left of either.
+pub fn write_bytes(
+    lattice: &Lattice,
+    path: &Path,
+    mut slice: impl FnMut(usize) -> Vec<u8>,
+) -> Result<()> {
+    lattice.validate().map_err(Error::Argument)?;
+    let [nx, ny, nz] = lattice.dims;
+    let mut wrong = None;
+    let written = disk::write_with(path, |out| {
+        write_header(lattice, Scalar::U8, "raw", out)?;
+        for k in 0..nz {
+            let samples = slice(k);
+            if samples.len() != nx * ny {
+                wrong = Some(format!("slice {k} has {} samples, not {nx} × {ny}", samples.len()));
+                return Err(ErrorKind::InvalidInput.into());
+            }
+            out.write_all(&samples)?;
+        }
+        Ok(())
+    });
+    wrong.map_or(written, |message| Err(Error::Argument(message)))
+}
+
+/// What stands before the samples: the fields that every file has, and the keys of lattices that are not Cartesian.
+fn write_header(
+    lattice: &Lattice,
+    scalar: Scalar,
+    encoding: &str,
+    out: &mut impl Write,
+) -> std::io::Result<()> {
+    let [nx, ny, nz] = lattice.dims;
+    let body_centred = lattice.arrangement == Arrangement::BodyCentred;
+    let layer = if body_centred { 0.5 * lattice.axes.z_axis } else { lattice.axes.z_axis };
+    let [i, j, k] = [lattice.axes.x_axis, lattice.axes.y_axis, layer].map(vector);
+    let kind = match scalar {
+        Scalar::U8 => "uint8",
+        Scalar::U16 => "uint16",
+        Scalar::I16 => "int16",
+        Scalar::I32 => "int32",
+        Scalar::F32 => "float",
+    };
+    let endian = if cfg!(target_endian = "little") { "little" } else { "big" };
+    writeln!(
+        out,
+        "NRRD0004\ntype: {kind}\ndimension: 3\nspace dimension: 3\nsizes: {nx} {ny} {nz}"
+    )?;
+    writeln!(out, "space directions: {i} {j} {k}\nspace origin: {}", vector(lattice.origin))?;
+    writeln!(out, "endian: {endian}\nencoding: {encoding}")?;
+    if body_centred {
+        writeln!(out, "lattice:=bcc")?;
+    }
+    if let Arrangement::Rectilinear(places) = &lattice.arrangement {
+        for (axis, places) in places.iter().enumerate() {
+            let places: Vec<String> = places.iter().map(f64::to_string).collect();
+            writeln!(out, "axis positions {axis}:={}", places.join(" "))?;
+        }
+    }
+    writeln!(out)
+}
+
+fn write_to(volume: &Volume, out: &mut impl Write) -> std::io::Result<()> {
+    write_header(&volume.lattice, volume.samples.scalar(), "gzip", out)?;
+    let mut packed = GzEncoder::new(out, Compression::default());
+    packed.write_all(volume.samples.bytes())?;
+    packed.finish().map(drop)
+}
+
+fn vector(v: DVec3) -> String {
+    format!("({},{},{})", v.x, v.y, v.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{formats::nrrd, input::testing::*, volume::Samples};
+
+    #[test]
+    fn what_is_written_reads_back() {
+        let folder = Folder::new();
+        let axes =
+            glam::DMat3::from_cols(DVec3::new(0.5, 0.1, 0.0), DVec3::new(0.0, 2.0, 0.0), DVec3::Z);
+        let lattice = Lattice::cartesian([2, 3, 1], DVec3::new(-1.5, 0.0, 1e9), axes);
+        let places = [vec![-0.1, 1.0 / 3.0], vec![1e-300, 2.0, 1e9], vec![7.5]];
+        let rectilinear =
+            Lattice { arrangement: Arrangement::Rectilinear(places.into()), ..lattice.clone() };
+        let samples = [
+            Samples::U8(vec![0, 1, 2, 3, 4, 255]),
+            Samples::U16(vec![0, 1, 2, 3, 4, 65535]),
+            Samples::I16(vec![0, 1, 2, 3, 4, -32768]),
+            Samples::I32(vec![0, 1, 2, 3, 4, i32::MIN]),
+            Samples::F32(vec![0.0, 1e-30, -2.5, 3.0, 4.0, 1e30]),
+        ];
+        let body_centred = Lattice { arrangement: Arrangement::BodyCentred, ..lattice.clone() };
+        for samples in samples {
+            for lattice in [&lattice, &body_centred, &rectilinear] {
+                let path = folder.write("volume.nrrd", b"");
+                write(&Volume::new(lattice.clone(), samples.clone()).unwrap(), &path).unwrap();
+                let read = read_with(&path, nrrd::read).unwrap();
+                assert_eq!((&read.samples, &read.lattice), (&samples, lattice));
+            }
+        }
+    }
+    #[test]
+    fn slices_are_written_on_any_lattice() {
+        let folder = Folder::new();
+        let cartesian = Lattice::with_spacing([2, 3, 3], DVec3::ONE);
+        let places = [vec![0.0, 5.0], vec![1.0, 2.0, 7.5], vec![0.0, 1.0, 9.0]];
+        let rectilinear =
+            Lattice { arrangement: Arrangement::Rectilinear(places.into()), ..cartesian.clone() };
+        let body_centred = Lattice { arrangement: Arrangement::BodyCentred, ..cartesian.clone() };
+        for lattice in [cartesian, rectilinear, body_centred] {
+            let path = folder.write("bytes.nrrd", b"");
+            write_bytes(&lattice, &path, |k| (0..6).map(|at| (6 * k + at) as u8).collect())
+                .unwrap();
+            let read = read_with(&path, nrrd::read).unwrap();
+            assert_eq!((read.samples, read.lattice), (Samples::U8((0..18).collect()), lattice));
+        }
+    }
+
+    #[test]
+    fn contradictions_are_refused_and_leave_no_file() {
+        let folder = Folder::new();
+        let path = folder.write("before.nrrd", b"before");
+        let refused = |result: Result<()>, word: &str| {
+            let Err(Error::Argument(message)) = result else {
+                panic!("{result:?} where {word} was expected")
+            };
+            assert!(message.contains(word), "{message}");
+            assert_eq!(std::fs::read(&path).unwrap(), b"before");
+        };
+        let lattice = Lattice::with_spacing([2, 2, 2], DVec3::ONE);
+        let good = Volume::new(lattice.clone(), Samples::F32(vec![1.0; 8])).unwrap();
+        refused(
+            write(&Volume { samples: Samples::F32(vec![1.0; 3]), ..good.clone() }, &path),
+            "3 samples",
+        );
+        refused(
+            write(&Volume { samples: Samples::F32(vec![f32::NAN; 8]), ..good.clone() }, &path),
+            "not finite",
+        );
+        let places = Arrangement::Rectilinear([vec![0.0], vec![], vec![0.0, 1.0]].into());
+        let uneven = Lattice { arrangement: places, ..lattice.clone() };
+        refused(write(&Volume { lattice: uneven.clone(), ..good }, &path), "1 coordinates along x");
+        refused(write_bytes(&uneven, &path, |_| vec![0; 4]), "1 coordinates along x");
+        refused(
+            write_bytes(&lattice, &path, |k| vec![0; 4 - k]),
+            "slice 1 has 3 samples, not 2 × 2",
+        );
+    }
+}

@@ -1,0 +1,270 @@
+//! Wavefront OBJ with its MTL materials and pictures.
+//!
+//! tobj reads the statements. A survey of our own goes first (`survey`): it gives errors their line, and its feed
+//! keeps from tobj what tobj would read wrongly. OBJ has no counts and no end mark, so a file that is cut at the end of
+//! a line, or within its last number, reads as a smaller one.
+
+mod material;
+mod survey;
+#[cfg(test)]
+mod tests;
+
+use super::shared::polygon;
+use crate::{
+    Error, Result,
+    input::{Source, copy, isolate::isolated, positions},
+    surface::{Material, Mesh},
+};
+use glam::{DVec3, Vec2, Vec3};
+use std::{cell::RefCell, collections::HashMap, path::Path};
+use survey::Survey;
+
+/// Reads an OBJ file: polygons, concave ones too, cut into triangles, with vertex colours, normals and materials. Texture
+/// coordinates are kept where a material has a picture; a vertex is split where corners differ in normal or texture
+/// coordinates. A file of vertices only is a cloud. Lines and points are passed over.
+///
+/// # Errors
+/// [`Error::Input`] for malformed numbers, positions, and texture coordinates in pictures, that are not finite, indices without a vertex, and references to
+/// files outside the file's folder. Missing material files and pictures are warnings.
+pub fn read(source: &Source) -> Result<Mesh> {
+    source.room::<u8>("the text", source.bytes().len())?;
+    let text = join_lines(source, copy::lossy(source.bytes()))?;
+    let survey = Survey::of(source, &text)?;
+    if survey.faces == 0 {
+        return read_cloud(source, &text, &survey);
+    }
+    let library = RefCell::new(material::Library::new(source));
+    let failure: RefCell<Option<Error>> = RefCell::new(None);
+    let mut feed = survey.feed(&text);
+    // tobj's triangles are fans, which cover what is outside of a concave polygon.
+    let options =
+        tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
+    let load = |path: &Path| {
+        let loaded = library.borrow_mut().load(&path.to_string_lossy());
+        loaded.map(|(materials, index_of)| (materials, index_of.into_iter().collect())).map_err(
+            |error| {
+                failure.borrow_mut().get_or_insert(error);
+                tobj::LoadError::OpenFileFailed
+            },
+        )
+    };
+    // tobj does arithmetic on what it reads.
+    let loaded =
+        isolated(source, "statements", || Ok(tobj::load_obj_buf(&mut feed, &options, load)))?;
+    let line = feed.line();
+    if let Some(error) = failure.into_inner() {
+        return Err(error);
+    }
+    let (models, materials) =
+        loaded.map_err(|error| source.error(format!("line {line}"), error.to_string()))?;
+    let mut library = library.into_inner();
+    let materials = materials.unwrap_or_default();
+    let mut mesh = Mesh::default();
+    let mut corners = Corners::default();
+    let has_materials = !materials.is_empty();
+    for material in &materials {
+        mesh.materials.push(library.finish(material)?);
+    }
+    let textured: Vec<bool> =
+        mesh.materials.iter().map(|material| material.texture.is_some()).collect();
+    for model in models {
+        let id = model.mesh.material_id;
+        let with_uv = id.is_some_and(|id| textured.get(id) == Some(&true));
+        corners.add(source, &text, model.mesh, with_uv, textured.contains(&true))?;
+        if has_materials {
+            let id = id.unwrap_or(mesh.materials.len());
+            if id == mesh.materials.len() {
+                mesh.materials.push(neutral());
+            }
+            mesh.triangle_materials.resize(corners.triangles.len(), id as u32);
+        }
+    }
+    source.check_points("the number of vertices", corners.positions.len() as u64)?;
+    source.check_points("the number of triangles", corners.triangles.len() as u64)?;
+    if corners.triangles.is_empty() {
+        return Err(source.error("file", "has faces, but none of three corners or more"));
+    }
+    let positions = &corners.positions;
+    (mesh.origin, mesh.positions) = positions::settle(
+        source,
+        positions.len(),
+        |i| positions[i],
+        |i| format!("vertex {i} of the faces"),
+    )?;
+    mesh.normals = corners.normals;
+    mesh.uvs = corners.uvs;
+    mesh.colors = to_bytes(&corners.colors);
+    mesh.triangles = corners.triangles;
+    Ok(mesh)
+}
+
+/// What is drawn where a face names no material that exists.
+fn neutral() -> Material {
+    Material { name: "none".into(), color: [0.8, 0.8, 0.8, 1.0], texture: None }
+}
+
+/// Joins lines that end with a backslash.
+fn join_lines(source: &Source, text: String) -> Result<String> {
+    if text.contains("\\\n") || text.contains("\\\r\n") {
+        source.room::<u8>("the joined lines", 2 * text.len())?;
+        return Ok(text.replace("\\\r\n", " ").replace("\\\n", " "));
+    }
+    Ok(text)
+}
+
+/// The vertices of all models; a corner's index triple makes one.
+#[derive(Default)]
+struct Corners {
+    positions: Vec<DVec3>,
+    colors: Vec<[f64; 3]>,
+    normals: Vec<Vec3>,
+    uvs: Vec<Vec2>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Corners {
+    /// Adds a model. `with_uv`: its texture coordinates matter; `any_uv`: those of some model do.
+    fn add(
+        &mut self,
+        source: &Source,
+        text: &str,
+        mut mesh: tobj::Mesh,
+        with_uv: bool,
+        any_uv: bool,
+    ) -> Result<()> {
+        let mut corners = std::mem::take(&mut mesh.indices);
+        let split =
+            (with_uv && !mesh.texcoord_indices.is_empty()) || !mesh.normal_indices.is_empty();
+        if split {
+            let first = self.uvs.len();
+            self.add_split(&mesh, &mut corners, with_uv, any_uv);
+            if let Some(&uv) = self.uvs[first..].iter().find(|uv| !uv.is_finite()) {
+                return Err(super::uv_error(source, survey::place_of_wide_uv(text), uv));
+            }
+        } else {
+            let base = self.positions.len() as u32;
+            self.positions.extend(mesh.positions.chunks_exact(3).map(DVec3::from_slice));
+            self.colors.extend(mesh.vertex_color.chunks_exact(3).map(|c| [c[0], c[1], c[2]]));
+            self.uvs.extend(std::iter::repeat_n(
+                Vec2::ZERO,
+                if any_uv { mesh.positions.len() / 3 } else { 0 },
+            ));
+            corners.iter_mut().for_each(|corner| *corner += base);
+        }
+        self.cut(source, &corners, &mesh.face_arities)
+    }
+
+    /// Adds the vertices that a model's corners make, and puts them in the corners' place.
+    fn add_split(&mut self, mesh: &tobj::Mesh, corners: &mut [u32], with_uv: bool, any_uv: bool) {
+        let mut vertex_of: HashMap<(u32, u32, u32), u32> = HashMap::new();
+        for (corner, index) in corners.iter_mut().enumerate() {
+            let position = *index;
+            let uv = if with_uv { mesh.texcoord_indices.get(corner).copied() } else { None };
+            let normal = mesh.normal_indices.get(corner).copied();
+            let key = (position, uv.unwrap_or(u32::MAX), normal.unwrap_or(u32::MAX));
+            *index = *vertex_of.entry(key).or_insert_with(|| {
+                let at = position as usize * 3;
+                self.positions.push(DVec3::from_slice(&mesh.positions[at..at + 3]));
+                if let Some(color) = mesh.vertex_color.get(at..at + 3) {
+                    self.colors.push([color[0], color[1], color[2]]);
+                }
+                if let Some(normal) = normal {
+                    let normal = DVec3::from_slice(&mesh.normals[normal as usize * 3..]);
+                    self.normals.push(positions::unit(normal.as_vec3()));
+                }
+                if any_uv {
+                    // OBJ counts v from the bottom of the picture.
+                    let uv = uv.map_or([0.0, 0.0], |uv| {
+                        [mesh.texcoords[uv as usize * 2], 1.0 - mesh.texcoords[uv as usize * 2 + 1]]
+                    });
+                    self.uvs.push(Vec2::new(uv[0] as f32, uv[1] as f32));
+                }
+                self.positions.len() as u32 - 1
+            });
+        }
+    }
+
+    /// Cuts faces into triangles, given the corners of all and how many each has; without the latter, all are triangles.
+    fn cut(&mut self, source: &Source, corners: &[u32], arities: &[u32]) -> Result<()> {
+        if arities.is_empty() {
+            self.triangles.extend_from_slice(corners.as_chunks().0);
+            return Ok(());
+        }
+        let mut rest = corners;
+        for (face, &arity) in arities.iter().enumerate() {
+            // A face of many corners may take its time.
+            if arity > 64 || face.is_multiple_of(1 << 12) {
+                source.check_time()?;
+            }
+            let (face, others) = rest.split_at(arity as usize);
+            rest = others;
+            polygon::triangles(
+                face,
+                |vertex| self.positions[vertex as usize],
+                |triangle| {
+                    self.triangles.push(triangle);
+                    Ok(())
+                },
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Colours as bytes. They are fractions of 1 in most files, of 255 in some.
+fn to_bytes(colors: &[[f64; 3]]) -> Vec<[u8; 4]> {
+    let largest = colors.iter().flatten().fold(0.0, |a: f64, &b| a.max(b));
+    let scale = if largest > 1.0 { 1.0 } else { 255.0 };
+    colors
+        .iter()
+        .map(|c| {
+            let [r, g, b] = c.map(|v| (v * scale).round() as u8);
+            [r, g, b, 255]
+        })
+        .collect()
+}
+
+/// Vertices without faces, which tobj does not give.
+fn read_cloud(source: &Source, text: &str, survey: &Survey) -> Result<Mesh> {
+    let mut mesh = Mesh::default();
+    let mut points: Vec<(DVec3, usize)> = Vec::new();
+    let mut colors: Vec<[f64; 3]> = Vec::new();
+    for (number, line) in text.lines().enumerate() {
+        let mut words = line.split_whitespace();
+        if words.next() != Some("v") {
+            continue;
+        }
+        let values: Vec<f64> = words.take(6).map_while(|word| word.parse().ok()).collect();
+        if values.len() < 3 {
+            return Err(
+                source.error(format!("line {}", number + 1), "a vertex needs three numbers")
+            );
+        }
+        points.push((DVec3::from_slice(&values), number + 1));
+        if survey.colors && values.len() >= 6 {
+            colors.push([values[3], values[4], values[5]]);
+        }
+    }
+    if points.is_empty() {
+        return Err(source.error("file", "has no vertices (no line that begins with “v ”)"));
+    }
+    // Vertices come before faces: a mesh that is cut in its vertices looks like a cloud, but for its last line.
+    if !source.bytes().ends_with(b"\n") {
+        return Err(source
+            .error(
+                format!("byte {}", source.bytes().len()),
+                "the file ends within a line, before any face: it is cut",
+            )
+            .hint("if this is a whole point cloud, end its last line with a line break"));
+    }
+    (mesh.origin, mesh.positions) = positions::settle(
+        source,
+        points.len(),
+        |i| points[i].0,
+        |i| format!("line {}", points[i].1),
+    )?;
+    if colors.len() == points.len() {
+        mesh.colors = to_bytes(&colors);
+    }
+    Ok(mesh)
+}

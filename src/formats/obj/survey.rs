@@ -1,0 +1,296 @@
+//! The look over an OBJ file before tobj reads it.
+
+use crate::{Result, input::Source};
+use std::io::{BufRead, Read};
+
+/// Lines between two looks at the clock.
+const LINES: usize = 1 << 16;
+
+/// Bytes that a statement takes in all lists, those of tobj and those made of them: a vertex, a texture coordinate or
+/// normal, a face, and a corner of one, which may become a triangle and a vertex of its own, and is held while its face
+/// is cut.
+const VERTEX: u64 = 160;
+const OTHER: u64 = 48;
+const FACE: u64 = 168;
+const CORNER: u64 = 384;
+
+/// What holds for the whole file. tobj mistakes lines (`l`) for faces, shifts colours and normals where only some
+/// vertices have them, and does arithmetic on indices unchecked; the survey finds these cases.
+#[derive(Debug, Default)]
+pub(super) struct Survey {
+    vertices: u64,
+    pub faces: u64,
+    /// Corners of all faces.
+    corners: u64,
+    /// Texture coordinates and normals.
+    others: u64,
+    /// All vertices have a colour.
+    pub colors: bool,
+    /// All corners of all faces have a normal.
+    normals: bool,
+    /// Some face stands before what it refers to.
+    ahead: bool,
+}
+
+impl Survey {
+    pub fn of(source: &Source, text: &str) -> Result<Self> {
+        let mut survey = Self { colors: true, normals: true, ..Self::default() };
+        // Positions, texture coordinates and normals so far, and the largest index used of each with its line.
+        let mut counts = [0i64; 3];
+        let mut largest = [(0i64, 0usize); 3];
+        // The first line that refers to what stands behind it, and one that counts back from where it stands.
+        let mut ahead = None;
+        let mut back = None;
+        for (line, number) in text.lines().zip(1usize..) {
+            if number.is_multiple_of(LINES) {
+                source.check_time()?;
+            }
+            let place = || format!("line {number}");
+            let mut words = line.split_whitespace();
+            match words.next() {
+                Some("v") => {
+                    counts[0] += 1;
+                    let mut values = 0;
+                    for word in words {
+                        values += 1;
+                        let plain = |b: u8| {
+                            b.is_ascii_digit() || matches!(b, b'.' | b'+' | b'-' | b'e' | b'E')
+                        };
+                        if values <= 3 && !word.bytes().all(plain) {
+                            let first =
+                                word.trim_start_matches(['-', '+']).bytes().next().unwrap_or(b'?');
+                            if matches!(first, b'n' | b'N' | b'i' | b'I') {
+                                return Err(source.error(
+                                    place(),
+                                    format!("the position “{word}” is not finite"),
+                                ));
+                            }
+                            let shown: String = word.chars().take(40).collect();
+                            return Err(source
+                                .error(place(), format!("“{shown}” is not a number"))
+                                .hint("numbers have points, no decimal commas"));
+                        }
+                    }
+                    survey.colors &= values >= 6;
+                }
+                Some("vt") => counts[1] += 1,
+                Some("vn") => counts[2] += 1,
+                Some("f") => {
+                    survey.faces += 1;
+                    let corners = survey.corners;
+                    for word in words {
+                        survey.corners += 1;
+                        let mut has_normal = false;
+                        for (kind, part) in word.split('/').enumerate() {
+                            if kind > 2 || (part.is_empty() && kind == 0) {
+                                return Err(source
+                                    .error(place(), format!("“{word}” is no corner of a face")));
+                            }
+                            if part.is_empty() {
+                                continue;
+                            }
+                            has_normal |= kind == 2;
+                            let index: i64 = part
+                                .parse::<i32>()
+                                .map_err(|_| {
+                                    source
+                                        .error(place(), format!("“{word}” is no corner of a face"))
+                                })?
+                                .into();
+                            if index == 0 || -index > counts[kind] {
+                                return Err(source.error(place(), wrong(index, kind, counts[kind])));
+                            }
+                            if index > counts[kind] {
+                                ahead.get_or_insert((number, index, kind));
+                            } else if index < 0 {
+                                back = Some(number);
+                            }
+                            if index > largest[kind].0 {
+                                largest[kind] = (index, number);
+                            }
+                        }
+                        survey.normals &= has_normal;
+                    }
+                    if survey.corners == corners {
+                        return Err(source.error(place(), "a face has no corners"));
+                    }
+                }
+                _ => {}
+            }
+        }
+        for kind in 0..3 {
+            let (index, line) = largest[kind];
+            if index > counts[kind] {
+                return Err(source.error(format!("line {line}"), wrong(index, kind, counts[kind])));
+            }
+        }
+        if let (Some((line, index, kind)), Some(back)) = (ahead, back) {
+            let message = format!(
+                "a face refers to {} {index}, which stands behind it, while that of line {back} counts back from where it stands",
+                WHAT[kind]
+            );
+            return Err(source
+                .error(format!("line {line}"), message)
+                .hint("put the faces behind all that they refer to"));
+        }
+        survey.ahead = ahead.is_some();
+        survey.vertices = counts[0] as u64;
+        survey.others = (counts[1] + counts[2]) as u64;
+        survey.colors &= counts[0] > 0;
+        source.check_points("the number of vertices", survey.vertices)?;
+        source.check_points("the number of faces", survey.faces)?;
+        let bytes = VERTEX * survey.vertices
+            + OTHER * survey.others
+            + FACE * survey.faces
+            + CORNER * survey.corners;
+        source.spend("the size of the mesh in bytes", bytes)?;
+        Ok(survey)
+    }
+
+    /// The file's lines for tobj.
+    pub fn feed<'a>(&self, text: &'a str) -> Feed<'a> {
+        // tobj ends a part of the mesh at each `usemtl`, with what it has read so far.
+        let (rest, again) = (text, self.ahead.then_some(text));
+        let kinds = if self.ahead { Kinds::Values } else { Kinds::All };
+        Feed {
+            rest,
+            again,
+            kinds,
+            line: 0,
+            current: &[],
+            colors: self.colors,
+            normals: self.normals,
+        }
+    }
+}
+
+/// The place of the first texture coordinates that are not finite in 32 bits.
+pub(super) fn place_of_wide_uv(text: &str) -> String {
+    let is_wide = |word: &str| word.parse::<f64>().is_ok_and(|value| !(value as f32).is_finite());
+    let has_wide = |line: &str| {
+        let mut words = line.split_whitespace();
+        words.next() == Some("vt") && words.take(2).any(is_wide)
+    };
+    let line = text.lines().position(has_wide);
+    line.map_or_else(|| "texture coordinates".into(), |line| format!("line {}", line + 1))
+}
+
+const WHAT: [&str; 3] = ["vertex", "texture coordinate", "normal"];
+
+fn wrong(index: i64, kind: usize, count: i64) -> String {
+    let what = WHAT[kind];
+    format!(
+        "a face refers to {what} {index}, but there are {count} (1 … {count}, or −1 … −{count})"
+    )
+}
+
+/// What a feed serves: positions, texture coordinates and normals, or what refers to them.
+#[derive(PartialEq)]
+enum Kinds {
+    All,
+    Values,
+    References,
+}
+
+/// Serves the statements that matter, one at a time, and counts lines. Where faces stand before what they refer to, all of that
+/// comes first.
+pub(super) struct Feed<'a> {
+    rest: &'a str,
+    /// The text where it is served twice.
+    again: Option<&'a str>,
+    kinds: Kinds,
+    line: usize,
+    current: &'a [u8],
+    colors: bool,
+    normals: bool,
+}
+
+impl<'a> Feed<'a> {
+    /// The line that was served last, from 1.
+    pub fn line(&self) -> usize {
+        self.line
+    }
+
+    /// The part of a line that tobj is given: without values that not all vertices have. Groups (`g`, `o`) are left
+    /// out because tobj would split vertices between them.
+    fn useful(&self, line: &'a str) -> &'a str {
+        let keep = |words: usize| first_words(line, words + 1);
+        let word = line.split_whitespace().next();
+        let is_value = matches!(word, Some("v" | "vt" | "vn"));
+        if self.kinds == if is_value { Kinds::References } else { Kinds::Values } {
+            return "";
+        }
+        match word {
+            Some("v") if self.colors => keep(6),
+            Some("v") if line.split_whitespace().count() == 5 => keep(4),
+            Some("v") => keep(3),
+            Some("vt" | "f" | "usemtl" | "mtllib") => line,
+            Some("vn") if self.normals => line,
+            _ => "",
+        }
+    }
+}
+
+/// The start of a line, up to the end of its `count`-th word.
+fn first_words(line: &str, count: usize) -> &str {
+    let mut inside = false;
+    let mut seen = 0;
+    for (at, letter) in line.char_indices() {
+        match (inside, letter.is_whitespace()) {
+            (false, false) => {
+                inside = true;
+                seen += 1;
+            }
+            (true, true) => {
+                inside = false;
+                if seen == count {
+                    return &line[..at];
+                }
+            }
+            _ => {}
+        }
+    }
+    line
+}
+
+impl BufRead for Feed<'_> {
+    fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
+        while self.current.is_empty() {
+            if self.rest.is_empty() {
+                let Some(text) = self.again.take() else { return Ok(&[]) };
+                (self.rest, self.line, self.kinds) = (text, 0, Kinds::References);
+            }
+            let end = self.rest.find('\n').map_or(self.rest.len(), |end| end + 1);
+            let (line, rest) = self.rest.split_at(end);
+            (self.rest, self.line) = (rest, self.line + 1);
+            self.current = self.useful(line.trim()).as_bytes();
+            if !self.current.is_empty() {
+                break;
+            }
+        }
+        Ok(self.current)
+    }
+
+    fn consume(&mut self, amount: usize) {
+        self.current = self.current.get(amount..).unwrap_or(&[]);
+    }
+
+    // The served lines have lost their line ends, so each is one whole line here.
+    #[expect(clippy::disallowed_methods, reason = "the text is a copy of the file's")]
+    fn read_line(&mut self, out: &mut String) -> std::io::Result<usize> {
+        let line = std::str::from_utf8(self.fill_buf()?).unwrap_or("");
+        let length = line.len();
+        out.push_str(line);
+        self.consume(length);
+        Ok(length)
+    }
+}
+
+impl Read for Feed<'_> {
+    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+        let mut available = self.fill_buf()?;
+        let length = available.read(out)?;
+        self.consume(length);
+        Ok(length)
+    }
+}

@@ -1,0 +1,187 @@
+//! PCD, the format of the Point Cloud Library: text, binary, and packed by LZF.
+
+mod header;
+mod lzf;
+#[cfg(test)]
+mod tests;
+
+use super::shared::cloud::Cloud;
+use crate::{
+    Result,
+    input::{Source, copy, growing::Growing, text::lines_of},
+    surface::Mesh,
+};
+use glam::{DVec3, Vec3};
+use header::{Data, Field, Header};
+use rayon::prelude::*;
+use std::borrow::Cow;
+
+/// Bytes that a point takes with all that it may have, and its number.
+const POINT: u64 = 8 + 24 + 12 + 4;
+
+/// Reads a cloud: `x`, `y`, `z`, and if there are some `normal_x`, `normal_y`, `normal_z` (or `nx`, …) and `rgb` or `rgba`,
+/// whose opacity is passed over, since many writers leave it 0. Points that are not finite are how the format marks missing
+/// ones, and are left out. The viewpoint is where the scanner stood, but one at the origin only if the points are in rows
+/// and columns: it is also what is written where nothing is known.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) for a malformed header, another size than it claims, what cannot be unpacked, and a
+/// line of text that is not as the header says; [`Error::Limit`](crate::Error::Limit) for more points or bytes than the limits
+/// allow.
+pub fn read(source: &Source) -> Result<Mesh> {
+    let header = header::read(source)?;
+    let count = source.check_points("the number of points", header.points)?;
+    let find =
+        |names: &[&str]| header.fields.iter().find(|field| names.contains(&field.name.as_str()));
+    let triple = |names: [&[&str]; 3]| {
+        let [a, b, c] = names.map(find);
+        Some([a?, b?, c?])
+    };
+    let Some(position) = triple([&["x"], &["y"], &["z"]]) else {
+        return Err(source.error("header", "has no fields “x”, “y” and “z”"));
+    };
+    let normal = triple([&["normal_x", "nx"], &["normal_y", "ny"], &["normal_z", "nz"]]);
+    let color = find(&["rgb", "rgba"]);
+    let rows = Rows::find(source, &header, count)?;
+    source.spend("the size of the points in bytes", POINT * count as u64)?;
+    let three = |row: usize, fields: [&Field; 3]| {
+        DVec3::from_array(fields.map(|field| rows.number(row, field)))
+    };
+    let kept: Vec<usize> =
+        (0..count).into_par_iter().filter(|&row| three(row, position).is_finite()).collect();
+    if kept.len() < count {
+        tracing::info!(points = count - kept.len(), "points without a position are left out");
+    }
+    let each = || kept.par_iter().copied();
+    let normals =
+        normal.map(|fields| each().map(|row| three(row, fields).as_vec3()).collect::<Vec<Vec3>>());
+    let colors = color.map(|field| {
+        let bytes = |row| rows.bits(row, field).to_le_bytes();
+        each().map(bytes).map(|[b, g, r, _]| [r, g, b, 255]).collect::<Vec<_>>()
+    });
+    let sensor = header.viewpoint.filter(|place| *place != DVec3::ZERO || header.height > 1);
+    let cloud = Cloud {
+        positions: each().map(|row| three(row, position)).collect(),
+        normals: normals.unwrap_or_default(),
+        colors: colors.unwrap_or_default(),
+        sensors: sensor.map(|place| (place, 0..kept.len())).into_iter().collect(),
+        z_is_up: false,
+    };
+    cloud.into_mesh(source, |point| format!("point {}", kept[point]))
+}
+
+/// Where the numbers lie.
+enum Rows<'a> {
+    /// The numbers of each point of a text one after the other.
+    Text { numbers: Vec<f64>, width: usize },
+    /// Bytes of which each field's begin at `start` · offset, and of which each point takes `stride` or as many as the
+    /// field has.
+    Bytes { bytes: Cow<'a, [u8]>, start: usize, stride: Option<usize> },
+}
+
+impl<'a> Rows<'a> {
+    fn find(source: &'a Source, header: &Header, count: usize) -> Result<Self> {
+        let data = &source.bytes()[header.end..];
+        let stride = header.fields.iter().map(Field::bytes).sum::<usize>();
+        let size = source.check_bytes(
+            "the size of the points in bytes",
+            (count as u64).saturating_mul(stride as u64),
+        )?;
+        let sizes = |found: usize, wanted: usize| -> Result<()> {
+            if found >= wanted {
+                return Ok(());
+            }
+            Err(source.error(
+                "data",
+                format!("{found} bytes follow the header where {wanted} were expected"),
+            ))
+        };
+        match header.data {
+            Data::Text => Self::of_text(source, header, data, count),
+            Data::Binary => {
+                sizes(data.len(), size)?;
+                Ok(Self::Bytes { bytes: data[..size].into(), start: 1, stride: Some(stride) })
+            }
+            Data::Packed => {
+                sizes(data.len(), 8)?;
+                let [packed, unpacked] = [0, 4].map(|at| {
+                    u32::from_le_bytes([0, 1, 2, 3].map(|byte| data[at + byte])) as usize
+                });
+                sizes(data.len() - 8, packed)?;
+                if unpacked != size {
+                    return Err(source.error(
+                        "data",
+                        format!("unpacks to {unpacked} bytes where {size} were expected"),
+                    ));
+                }
+                source.room::<u8>("the unpacked points", size)?;
+                let bytes = lzf::unpack(&data[8..][..packed], size);
+                let bytes = bytes.map_err(|(at, message)| {
+                    source.error(
+                        format!("byte {}", header.end + 8 + at),
+                        format!("the packed data {message}"),
+                    )
+                })?;
+                Ok(Self::Bytes { bytes: bytes.into(), start: count, stride: None })
+            }
+        }
+    }
+
+    fn of_text(source: &Source, header: &Header, data: &[u8], count: usize) -> Result<Self> {
+        let width = header.fields.iter().map(|field| field.count).sum::<usize>();
+        let mut numbers = Growing::new(source, "the numbers");
+        let mut found = 0;
+        for (number, line) in (header.lines + 1..).zip(lines_of(data)) {
+            let before = numbers.len();
+            for word in line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()) {
+                let value: f64 = copy::number(word).ok_or_else(|| {
+                    let shown = copy::excerpt(word);
+                    source.error(format!("line {number}"), format!("“{shown}” is not a number"))
+                })?;
+                numbers.push(value)?;
+            }
+            match numbers.len() - before {
+                0 => continue,
+                words if words == width => found += 1,
+                words => {
+                    let message = format!("has {words} numbers where the fields need {width}");
+                    return Err(source.error(format!("line {number}"), message));
+                }
+            }
+            if found == count {
+                break;
+            }
+        }
+        if found < count {
+            return Err(source
+                .error("data", format!("holds {found} points where the header claims {count}")));
+        }
+        Ok(Self::Text { numbers: numbers.into_inner(), width })
+    }
+
+    fn number(&self, row: usize, field: &Field) -> f64 {
+        match self {
+            Self::Text { numbers, width } => numbers[row * width + field.word],
+            Self::Bytes { .. } => field.kind.number(self.bytes(row, field)),
+        }
+    }
+
+    /// The bits of a colour: an unsigned number, or a float of the same bits.
+    fn bits(&self, row: usize, field: &Field) -> u32 {
+        match self {
+            Self::Text { numbers, width } => {
+                let number = numbers[row * width + field.word];
+                if field.kind.is_float() { (number as f32).to_bits() } else { number as i64 as u32 }
+            }
+            Self::Bytes { .. } => {
+                self.bytes(row, field).first_chunk().map_or(0, |&bytes| u32::from_le_bytes(bytes))
+            }
+        }
+    }
+
+    /// The bytes of a field's first number.
+    fn bytes(&self, row: usize, field: &Field) -> &[u8] {
+        let Self::Bytes { bytes, start, stride } = self else { return &[] };
+        &bytes[start * field.offset + row * stride.unwrap_or(field.bytes())..][..field.size]
+    }
+}

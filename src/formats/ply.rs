@@ -1,0 +1,245 @@
+//! PLY, in text and binary of either byte order: meshes and clouds, with normals, colours and texture coordinates.
+//!
+//! The header gives every element's columns (`header`); the rows are found without decoding (`rows`); then the
+//! columns that mean something here are decoded in parallel. Other elements and columns are passed over. A text file
+//! that ends within its very last number cannot be told from a whole one and reads as that shorter number.
+
+mod faces;
+mod gaussians;
+mod header;
+mod pieces;
+mod rows;
+mod samples;
+mod table;
+#[cfg(test)]
+mod tests;
+mod write;
+
+use super::shared::texture;
+use crate::{
+    Result,
+    input::{Source, positions},
+    surface::{Material, Mesh},
+};
+use faces::Faces;
+pub(super) use gaussians::warn as warn_of_gaussians;
+pub use gaussians::{write_gaussian_leaves, write_gaussians};
+use glam::{DVec3, Vec2, Vec3};
+use header::Element;
+pub(super) use pieces::Pieces;
+use ply_rs::ply::{PropertyType, ScalarType};
+use rayon::prelude::*;
+use rows::Rows;
+pub use samples::{has_faces, read_samples};
+use table::Table;
+pub use write::write;
+
+/// Rows of one parallel task.
+const CHUNK: usize = 1 << 14;
+
+/// Reads a PLY file.
+///
+/// Faces of more than three corners are cut into triangles, and `tristrips` too. Texture coordinates are those of vertices, or
+/// else those that faces have for their corners (`texcoord`, with a `texnumber`). Colours are bytes, 16-bit numbers or
+/// fractions of 1; as wider types they are bytes where the largest of all tells so.
+///
+/// # Errors
+/// A malformed header, a file that ends before its last row, positions that are not finite, and face indices without a
+/// vertex are [`Error::Input`](crate::Error::Input); more vertices or faces than the limits allow are
+/// [`Error::Limit`](crate::Error::Limit).
+pub fn read(source: &Source) -> Result<Mesh> {
+    let header = header::read(source)?;
+    let vertices = header.elements.iter().find(|element| element.name == "vertex");
+    let mut mesh = Mesh::default();
+    let mut faces = Vec::new();
+    let mut at = header.payload;
+    for element in &header.elements {
+        let is_face = matches!(element.name.as_str(), "face" | "tristrips");
+        if is_face || element.name == "vertex" {
+            source.check_points(
+                &format!("the count of element “{}”", element.name),
+                element.count as u64,
+            )?;
+        }
+        let rows = Rows::find(source, element, header.encoding, &mut at)?;
+        if vertices.is_some_and(|vertices| std::ptr::eq(vertices, element)) {
+            if gaussians::are_gaussians(element) {
+                gaussians::warn(source);
+            }
+            read_vertices(source, element, &rows, &mut mesh)?;
+        } else if is_face {
+            // Their vertices may stand behind them.
+            faces.push((element, rows));
+        }
+    }
+    let mut all = Faces::default();
+    for (element, rows) in faces {
+        let pictures = if mesh.uvs.is_empty() { header.textures.len() } else { 0 };
+        all.append(faces::read(source, element, &rows, &mesh.positions, pictures)?);
+    }
+    source.check_points("the number of triangles", all.triangles.len() as u64)?;
+    if mesh.positions.is_empty() {
+        return Err(source.error("header", "has no element “vertex” with at least one row"));
+    }
+    let of_corners = all.have_uvs();
+    all.give(source, &mut mesh)?;
+    if header.textures.is_empty() || mesh.triangles.is_empty() {
+        return Ok(mesh);
+    }
+    if mesh.uvs.is_empty() {
+        let file = source.path.display();
+        tracing::warn!(
+            "{file}: names a picture, but neither vertices nor faces have coordinates in it; drawn without it"
+        );
+        return Ok(mesh);
+    }
+    // Those of vertices that were split stand behind those of the file's rows.
+    if let Some(vertex) = mesh.uvs.par_iter().position_first(|uv| !uv.is_finite()) {
+        return Err(super::uv_error(source, format!("vertex {vertex}"), mesh.uvs[vertex]));
+    }
+    // Coordinates of vertices are those in the first picture.
+    let shown = if of_corners { header.textures.len() } else { 1 };
+    for name in header.textures.into_iter().take(shown) {
+        let texture = texture::read_reference(source, "comment TextureFile", &name)?;
+        mesh.materials.push(Material { name, color: [1.0; 4], texture });
+    }
+    if !of_corners {
+        source.room::<u32>("the materials of the triangles", mesh.triangles.len())?;
+        mesh.triangle_materials = vec![0; mesh.triangles.len()];
+    }
+    Ok(mesh)
+}
+
+/// The columns of a vertex that mean something here, in the order of [`Role`].
+const ROLES: [&[&str]; 12] = [
+    &["x"],
+    &["y"],
+    &["z"],
+    &["nx", "normal_x"],
+    &["ny", "normal_y"],
+    &["nz", "normal_z"],
+    &["red", "diffuse_red", "r"],
+    &["green", "diffuse_green", "g"],
+    &["blue", "diffuse_blue", "b"],
+    &["alpha", "diffuse_alpha", "a"],
+    &["s", "u", "texture_u"],
+    &["t", "v", "texture_v"],
+];
+const POSITION: usize = 0;
+const NORMAL: usize = 3;
+const COLOR: usize = 6;
+const ALPHA: usize = 9;
+const UV: usize = 10;
+
+fn read_vertices(source: &Source, element: &Element, rows: &Rows, mesh: &mut Mesh) -> Result<()> {
+    let columns =
+        ROLES.map(|names| element.column(names).filter(|&c| element.columns[c].width().is_some()));
+    if let Some(missing) = (POSITION..POSITION + 3).find(|&role| columns[role].is_none()) {
+        let name = ROLES[missing][0];
+        return Err(
+            source.error("header", format!("the element “vertex” has no scalar property “{name}”"))
+        );
+    }
+    let table = Table::read(source, element, rows, &columns)?;
+    fill(source, element, rows, &columns, |row, role| table.value(row, role), mesh)
+}
+
+/// Fills the mesh from the value of a row and a role.
+fn fill(
+    source: &Source,
+    element: &Element,
+    rows: &Rows,
+    columns: &[Option<usize>; ROLES.len()],
+    value: impl Fn(usize, usize) -> f64 + Sync,
+    mesh: &mut Mesh,
+) -> Result<()> {
+    let count = element.count;
+    let position =
+        |row| DVec3::new(value(row, POSITION), value(row, POSITION + 1), value(row, POSITION + 2));
+    (mesh.origin, mesh.positions) =
+        positions::settle(source, count, position, |row| rows.place(source, element, row))?;
+    let has = |from: usize, number: usize| columns[from..from + number].iter().all(Option::is_some);
+    if has(NORMAL, 3) {
+        source.room::<Vec3>("the normals", count)?;
+        let normal = |row| Vec3::from_array([0, 1, 2].map(|axis| value(row, NORMAL + axis) as f32));
+        mesh.normals = (0..count).into_par_iter().map(|row| positions::unit(normal(row))).collect();
+    }
+    if has(COLOR, 3) {
+        source.room::<[u8; 4]>("the colours", count)?;
+        let kinds = color_kind(element, columns);
+        let channel = |row, channel: usize| {
+            if kinds[channel].is_some() { value(row, COLOR + channel) } else { 0.0 }
+        };
+        let mut largest = [0.0; 4];
+        if kinds.iter().flatten().any(ColorKind::is_wide) {
+            let of_row = |row| [0, 1, 2, 3].map(|c| channel(row, c));
+            largest = (0..count).into_par_iter().map(of_row).reduce(|| [0.0; 4], larger);
+        }
+        let scale = color_scale(&kinds, largest);
+        mesh.colors =
+            (0..count).into_par_iter().map(|row| color(scale, |c| channel(row, c))).collect();
+    }
+    if has(UV, 2) {
+        source.room::<Vec2>("the texture coordinates", count)?;
+        // PLY counts v from the bottom of the picture.
+        let uv = |row| Vec2::new(value(row, UV) as f32, 1.0 - value(row, UV + 1) as f32);
+        mesh.uvs = (0..count).into_par_iter().map(uv).collect();
+    }
+    Ok(())
+}
+
+/// The type of a channel of colour.
+#[derive(Clone, Copy, PartialEq)]
+enum ColorKind {
+    Byte,
+    Short,
+    Fraction,
+}
+
+impl ColorKind {
+    /// Whether its type alone does not tell what the largest value means.
+    fn is_wide(&self) -> bool {
+        *self != Self::Byte
+    }
+}
+
+/// The types of a vertex's channels of colour; none for one that there is not.
+fn color_kind(element: &Element, columns: &[Option<usize>; ROLES.len()]) -> [Option<ColorKind>; 4] {
+    debug_assert_eq!(COLOR + 3, ALPHA);
+    [0, 1, 2, 3].map(|channel| {
+        columns[COLOR + channel].map(|column| match &element.columns[column].kind {
+            PropertyType::Scalar(ScalarType::Float | ScalarType::Double) => ColorKind::Fraction,
+            PropertyType::Scalar(ScalarType::UShort | ScalarType::Short) => ColorKind::Short,
+            _ => ColorKind::Byte,
+        })
+    })
+}
+
+/// What makes a byte of each channel, by the largest values of all colours: some programs write bytes as 16-bit numbers, and
+/// some as floating point ones.
+fn color_scale(kinds: &[Option<ColorKind>; 4], largest: [f64; 4]) -> [Option<f64>; 4] {
+    // Fractions may shine a little brighter than 1.
+    const BRIGHTEST: f64 = 16.0;
+    let hue = largest[..3].iter().copied().fold(0.0, f64::max);
+    std::array::from_fn(|channel| {
+        let largest = if channel < 3 { hue } else { largest[3] };
+        kinds[channel].map(|kind| match kind {
+            ColorKind::Short if largest > 255.0 => 255.0 / 65535.0,
+            ColorKind::Fraction if largest <= BRIGHTEST => 255.0,
+            ColorKind::Fraction if largest > 255.0 => 255.0 / 65535.0,
+            _ => 1.0,
+        })
+    })
+}
+
+/// A colour of scaled channels; what there is not is full.
+fn color(scale: [Option<f64>; 4], value: impl Fn(usize) -> f64) -> [u8; 4] {
+    std::array::from_fn(|channel| {
+        scale[channel].map_or(255, |scale| (value(channel) * scale).round() as u8)
+    })
+}
+
+/// The larger values of each channel.
+pub(super) fn larger(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+    std::array::from_fn(|channel| a[channel].max(b[channel]))
+}

@@ -1,0 +1,298 @@
+//! The triangles of an element “face” or “tristrips”, and the texture coordinates that faces have for their corners.
+
+use super::{
+    CHUNK,
+    header::{Element, width},
+    rows::Rows,
+};
+use crate::{
+    Result,
+    formats::shared::polygon,
+    input::{Source, growing::Growing},
+    surface::Mesh,
+};
+use glam::{Vec2, Vec3};
+use ply_rs::ply::{PropertyType, ScalarType};
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// Stands for −1, which separates strips.
+const MARK: u32 = u32::MAX;
+
+/// Bytes that a corner takes while a polygon of more corners than few is cut.
+const OF_CORNER: u64 = 128;
+const FEW: usize = 1024;
+
+/// What the faces of a file are.
+#[derive(Default)]
+pub(super) struct Faces {
+    pub triangles: Vec<[u32; 3]>,
+    /// Texture coordinates of the triangles' corners, as the file has them; none where it has none.
+    uvs: Vec<[Vec2; 3]>,
+    /// Which picture each triangle with such coordinates shows.
+    pictures: Vec<u32>,
+}
+
+/// The columns of a face that mean something here.
+struct Columns {
+    indices: usize,
+    /// A list with u and v of each corner, and the number of the picture, as MeshLab writes them.
+    uvs: Option<usize>,
+    picture: Option<usize>,
+}
+
+/// Reads an element's faces; `positions` are those of the vertices, `pictures` how many pictures corners may have coordinates
+/// in.
+pub(super) fn read(
+    source: &Source,
+    element: &Element,
+    rows: &Rows,
+    positions: &[Vec3],
+    pictures: usize,
+) -> Result<Faces> {
+    let is_list = |&column: &usize| element.columns[column].width().is_none();
+    let Some(indices) = element.column(&["vertex_indices", "vertex_index"]).filter(is_list) else {
+        if element.count == 0 {
+            return Ok(Faces::default());
+        }
+        return Err(source.error(
+            "header",
+            format!("the element “{}” has no list “vertex_indices”", element.name),
+        ));
+    };
+    // Once as they are found, once in their place.
+    if let Rows::Fixed { .. } = rows {
+        source.room::<[[u32; 3]; 2]>("the triangles", element.count)?;
+    }
+    if let Some(triangles) = read_triangles(element, rows, indices, positions.len()) {
+        return Ok(Faces { triangles, ..Faces::default() });
+    }
+    let uvs = element.column(&["texcoord"]).filter(|column| pictures > 0 && is_list(column));
+    let picture = element.column(&["texnumber"]).filter(|column| uvs.is_some() && !is_list(column));
+    let columns = Columns { indices, uvs, picture };
+    let chunks = element.count.div_ceil(CHUNK);
+    let parts: Vec<Faces> = (0..chunks)
+        .into_par_iter()
+        .map(|chunk| {
+            let rows_of_chunk = chunk * CHUNK..((chunk + 1) * CHUNK).min(element.count);
+            read_rows(source, element, rows, &columns, rows_of_chunk, (positions, pictures))
+        })
+        .collect::<Result<_>>()?;
+    let count = parts.iter().map(|part| part.triangles.len()).sum();
+    source.room::<[[u32; 3]; 2]>("the triangles", count)?;
+    let mut all = Faces { triangles: Vec::with_capacity(count), ..Faces::default() };
+    parts.into_iter().for_each(|part| all.append(part));
+    Ok(all)
+}
+
+fn read_rows(
+    source: &Source,
+    element: &Element,
+    rows: &Rows,
+    columns: &Columns,
+    range: std::ops::Range<usize>,
+    (positions, pictures): (&[Vec3], usize),
+) -> Result<Faces> {
+    let vertices = positions.len();
+    let mut wanted = vec![false; element.columns.len()];
+    [Some(columns.indices), columns.uvs, columns.picture]
+        .into_iter()
+        .flatten()
+        .for_each(|column| wanted[column] = true);
+    let are_strips = element.name == "tristrips";
+    let mut triangles = Growing::new(source, "the triangles");
+    let mut uvs = Growing::new(source, "the texture coordinates");
+    let mut shown = Growing::new(source, "the pictures of the triangles");
+    let (mut corners, mut own_uvs, mut picture) = (Vec::<u32>::new(), Vec::<f64>::new(), 0.0);
+    // The corners of a face by their places in its list.
+    let mut order = Vec::new();
+    for row in range {
+        let mut stray = None;
+        rows.visit(source, element, row, &wanted, |at, value, list| {
+            if let Some(list) = list.filter(|_| at == columns.indices) {
+                corners.clear();
+                corners.extend(list.iter().map(|&value| match vertex(value, vertices) {
+                    None if are_strips && value == -1.0 => MARK,
+                    None => *stray.get_or_insert(value) as u32,
+                    Some(index) => index,
+                }));
+            } else if let Some(list) = list.filter(|_| Some(at) == columns.uvs) {
+                own_uvs.clear();
+                own_uvs.extend_from_slice(list);
+            } else if Some(at) == columns.picture {
+                picture = value;
+            }
+        })?;
+        let wrong = |message: String| Err(source.error(rows.place(source, element, row), message));
+        if let Some(index) = stray {
+            let last = vertices.saturating_sub(1);
+            return wrong(format!(
+                "refers to vertex {index}, but there are {vertices} (0 … {last})"
+            ));
+        }
+        if are_strips {
+            strips(&corners, &mut triangles)?;
+            continue;
+        }
+        if corners.len() > FEW {
+            source.spend("the size of a polygon in bytes", OF_CORNER * corners.len() as u64)?;
+        }
+        // Faces without coordinates stand among those that have some.
+        let has_uvs = columns.uvs.is_some() && !own_uvs.is_empty();
+        if has_uvs && own_uvs.len() != 2 * corners.len() {
+            let (found, corners) = (own_uvs.len(), corners.len());
+            return wrong(format!(
+                "has {found} texture coordinates for {corners} corners, which need {}",
+                2 * corners
+            ));
+        }
+        let Some(picture) = vertex(picture, pictures.max(1)) else {
+            return wrong(format!(
+                "shows picture {picture}, but “comment TextureFile” names {pictures}"
+            ));
+        };
+        let place = |index: u32| positions[index as usize].as_dvec3();
+        if columns.uvs.is_none() {
+            polygon::triangles(&corners, place, |triangle| triangles.push(triangle))?;
+            continue;
+        }
+        order.clear();
+        order.extend(0..corners.len() as u32);
+        let index = |corner: u32| corners[corner as usize];
+        polygon::triangles(
+            &order,
+            |corner| place(index(corner)),
+            |cut| {
+                let uv = |corner: u32| {
+                    let at = 2 * corner as usize;
+                    Vec2::new(own_uvs[at] as f32, own_uvs[at + 1] as f32)
+                };
+                triangles.push(cut.map(index))?;
+                uvs.push(if has_uvs { cut.map(uv) } else { [Vec2::ZERO; 3] })?;
+                shown.push(picture)
+            },
+        )?;
+    }
+    Ok(Faces {
+        triangles: triangles.into_inner(),
+        uvs: uvs.into_inner(),
+        pictures: shown.into_inner(),
+    })
+}
+
+/// The common case: binary rows of one list of three 32-bit indices. `None` where it is another, or an index is wrong
+/// (the general way then finds the row).
+fn read_triangles(
+    element: &Element,
+    rows: &Rows,
+    column: usize,
+    vertices: usize,
+) -> Option<Vec<[u32; 3]>> {
+    let (Rows::Fixed { data, stride, big }, PropertyType::List(count, item)) =
+        (rows, &element.columns[column].kind)
+    else {
+        return None;
+    };
+    if !matches!(item, ScalarType::Int | ScalarType::UInt)
+        || element.name == "tristrips"
+        || *stride == 0
+    {
+        return None;
+    }
+    let offset: Option<usize> = element.columns[..column].iter().map(|before| before.width()).sum();
+    let offset = offset? + width(count);
+    let triangles: Vec<[u32; 3]> = data
+        .par_chunks_exact(*stride)
+        .map(|row| {
+            [0, 4, 8].map(|at| {
+                let bytes = [0, 1, 2, 3].map(|byte| row[offset + at + byte]);
+                if *big { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) }
+            })
+        })
+        .collect();
+    triangles
+        .par_iter()
+        .all(|t| t.iter().all(|&index| (index as usize) < vertices))
+        .then_some(triangles)
+}
+
+fn vertex(value: f64, vertices: usize) -> Option<u32> {
+    (value >= 0.0 && value < vertices as f64 && value.fract() == 0.0).then_some(value as u32)
+}
+
+/// Cuts strips, separated by marks, into triangles.
+fn strips(list: &[u32], triangles: &mut Growing<[u32; 3]>) -> Result<()> {
+    for run in list.split(|&index| index == MARK) {
+        for i in 2..run.len() {
+            let (a, b) = if i % 2 == 0 { (i - 2, i - 1) } else { (i - 1, i - 2) };
+            triangles.push([run[a], run[b], run[i]])?;
+        }
+    }
+    Ok(())
+}
+
+impl Faces {
+    /// Adds those of another element.
+    pub fn append(&mut self, mut other: Self) {
+        self.triangles.append(&mut other.triangles);
+        self.uvs.append(&mut other.uvs);
+        self.pictures.append(&mut other.pictures);
+    }
+
+    /// Whether all triangles have texture coordinates of their corners.
+    pub fn have_uvs(&self) -> bool {
+        !self.uvs.is_empty() && self.uvs.len() == self.triangles.len()
+    }
+
+    /// Gives the triangles to a mesh of vertices. Where corners of one vertex have several texture coordinates, it becomes
+    /// several vertices.
+    pub fn give(mut self, source: &Source, mesh: &mut Mesh) -> Result<()> {
+        if self.have_uvs() {
+            let mut own: Vec<Option<Vec2>> = Vec::new();
+            source.room::<(Option<Vec2>, Vec2)>("the texture coordinates", mesh.positions.len())?;
+            own.resize(mesh.positions.len(), None);
+            let mut others: HashMap<(u32, [u32; 2]), u32> = HashMap::new();
+            for (triangle, uvs) in self.triangles.iter_mut().zip(&self.uvs) {
+                for (index, &uv) in triangle.iter_mut().zip(uvs) {
+                    let known = *own[*index as usize].get_or_insert(uv);
+                    let bits = uv.to_array().map(f32::to_bits);
+                    if known.to_array().map(f32::to_bits) == bits {
+                        continue;
+                    }
+                    let count = own.len() as u32;
+                    let other = *others.entry((*index, bits)).or_insert(count);
+                    if other == count {
+                        source.spend("the vertices of seams in bytes", 128)?;
+                        own.push(Some(uv));
+                        copy(mesh, *index as usize);
+                        source.check_points(
+                            "the number of vertices with those of seams",
+                            own.len() as u64,
+                        )?;
+                    }
+                    *index = other;
+                }
+            }
+            // PLY counts v from the bottom of the picture.
+            mesh.uvs = own
+                .iter()
+                .map(|uv| uv.unwrap_or_default())
+                .map(|uv| Vec2::new(uv.x, 1.0 - uv.y))
+                .collect();
+            mesh.triangle_materials = self.pictures;
+        }
+        mesh.triangles = self.triangles;
+        Ok(())
+    }
+}
+
+/// Adds a vertex once more.
+fn copy(mesh: &mut Mesh, vertex: usize) {
+    mesh.positions.push(mesh.positions[vertex]);
+    if let Some(&normal) = mesh.normals.get(vertex) {
+        mesh.normals.push(normal);
+    }
+    if let Some(&color) = mesh.colors.get(vertex) {
+        mesh.colors.push(color);
+    }
+}

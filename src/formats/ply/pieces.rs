@@ -1,0 +1,252 @@
+//! Binary PLY files in pieces: vertices of a fixed stride, and faces of three corners each.
+
+use super::{
+    super::stream::Found,
+    COLOR, ColorKind, NORMAL, POSITION, ROLES, UV, color, color_kind, color_scale, gaussians,
+    header::{self, Element, width},
+    rows::{cut, list_place, number, triangle_stride},
+};
+use crate::{
+    Error, Result,
+    input::{Source, positions},
+};
+use glam::{DVec3, Vec3};
+use ply_rs::ply::{Encoding, PropertyType, ScalarType};
+use std::ops::Range;
+
+/// Rows of a piece.
+const ROWS: usize = 1 << 16;
+
+/// Where everything is in a file.
+pub struct Pieces {
+    vertices: Vertices,
+    faces: Option<Faces>,
+    pub has_normals: bool,
+    pub has_colors: bool,
+    pub has_uvs: bool,
+    /// Whether the points are the centres of trained 3D Gaussians.
+    pub are_gaussians: bool,
+}
+
+/// Rows that are all of one length.
+struct Rows {
+    at: usize,
+    count: usize,
+    stride: usize,
+    big: bool,
+}
+
+struct Vertices {
+    rows: Rows,
+    fields: [Option<(usize, ScalarType)>; ROLES.len()],
+    color_kind: [Option<ColorKind>; 4],
+    color_scale: [Option<f64>; 4],
+}
+
+struct Faces {
+    rows: Rows,
+    /// Where the number of corners is in a row.
+    length: (usize, ScalarType),
+    /// Where the first of the three indices is.
+    indices: usize,
+}
+
+impl Pieces {
+    /// Finds the rows by the header and by some faces. None for text, polygons and strips, textures, and what the reader
+    /// refuses.
+    pub fn find(source: &Source) -> Result<Option<Self>> {
+        let header = header::read(source)?;
+        let big = match header.encoding {
+            Encoding::Ascii => return Ok(None),
+            Encoding::BinaryBigEndian => true,
+            Encoding::BinaryLittleEndian => false,
+        };
+        let (mut vertices, mut faces) = (None, None);
+        let mut at = header.payload;
+        for element in &header.elements {
+            let is_face = element.name == "face";
+            let stride = if is_face { triangle_stride(element) } else { element.stride() };
+            let Some(stride) = stride.filter(|_| element.name != "tristrips") else {
+                return Ok(None);
+            };
+            let left = source.bytes().len() - at;
+            if is_face && element.count > 0 {
+                let rows = Rows { at, count: element.count.min(left / stride), stride, big };
+                let (None, Some(found)) = (&faces, Faces::find(element, rows)) else {
+                    return Ok(None);
+                };
+                if !found.are_triangles(source) {
+                    return Ok(None);
+                }
+                faces = Some(found);
+            }
+            let size = element.count.checked_mul(stride).filter(|&size| size <= left);
+            let Some(size) = size else { return Err(cut(source, element, left / stride)) };
+            let rows = Rows { at, count: element.count, stride, big };
+            at += size;
+            if is_face || element.name == "vertex" {
+                source.check_points(
+                    &format!("the count of element “{}”", element.name),
+                    element.count as u64,
+                )?;
+            }
+            if element.name == "vertex" && vertices.is_none() {
+                vertices = Some((element, rows));
+            }
+        }
+        let Some((element, rows)) = vertices.filter(|(element, _)| element.count > 0) else {
+            return Ok(None);
+        };
+        let columns = ROLES
+            .map(|names| element.column(names).filter(|&c| element.columns[c].width().is_some()));
+        let has =
+            |from: usize, number: usize| columns[from..from + number].iter().all(Option::is_some);
+        let has_uvs = has(UV, 2);
+        if !has(POSITION, 3) || (has_uvs && !header.textures.is_empty() && faces.is_some()) {
+            return Ok(None);
+        }
+        let field = |column: usize| {
+            let offset: Option<usize> =
+                element.columns[..column].iter().map(|before| before.width()).sum();
+            let PropertyType::Scalar(kind) = &element.columns[column].kind else { return None };
+            Some((offset?, kind.clone()))
+        };
+        let (has_normals, has_colors) = (has(NORMAL, 3), has(COLOR, 3));
+        let are_gaussians = gaussians::are_gaussians(element);
+        let color_kind = color_kind(element, &columns);
+        let fields = columns.map(|column| column.and_then(field));
+        let vertices = Vertices { rows, fields, color_kind, color_scale: [None; 4] };
+        Ok(Some(Self { vertices, faces, has_normals, has_colors, has_uvs, are_gaussians }))
+    }
+
+    /// Whether all colours have to be known before any of them is.
+    pub fn asks_for_colors(&self) -> bool {
+        self.has_colors && self.vertices.color_kind.iter().flatten().any(ColorKind::is_wide)
+    }
+
+    /// The values of a vertex's channels of colour; 0 for one that there is not.
+    pub fn channels(&self, source: &Source, row: usize) -> [f64; 4] {
+        std::array::from_fn(|channel| self.value(source, row, COLOR + channel))
+    }
+
+    /// Tells the largest values of all channels, without which there are no colours.
+    pub fn settle_colors(&mut self, largest: [f64; 4]) {
+        self.vertices.color_scale = color_scale(&self.vertices.color_kind, largest);
+    }
+
+    pub fn points(&self) -> usize {
+        self.vertices.rows.count
+    }
+
+    pub fn triangles(&self) -> usize {
+        self.faces.as_ref().map_or(0, |faces| faces.rows.count)
+    }
+
+    /// How many pieces there are of the points, and of the triangles.
+    pub fn pieces(&self) -> [usize; 2] {
+        [self.points(), self.triangles()].map(|count| count.div_ceil(ROWS))
+    }
+
+    /// The rows of a piece of the points.
+    pub fn rows(&self, piece: usize) -> Range<usize> {
+        piece * ROWS..((piece + 1) * ROWS).min(self.points())
+    }
+
+    fn value(&self, source: &Source, row: usize, role: usize) -> f64 {
+        let Vertices { rows, fields, .. } = &self.vertices;
+        let row = &source.bytes()[rows.at + row * rows.stride..];
+        fields[role].as_ref().map_or(0.0, |(offset, kind)| number(&row[*offset..], kind, rows.big))
+    }
+
+    pub fn position(&self, source: &Source, row: usize) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|axis| self.value(source, row, POSITION + axis)))
+    }
+
+    /// The error of a vertex whose position is not finite.
+    pub fn not_finite(&self, source: &Source, row: usize) -> Error {
+        let byte = self.vertices.rows.at + row * self.vertices.rows.stride;
+        let place = format!("element “vertex”, row {row}, byte {byte}");
+        positions::not_finite(source, place, self.position(source, row))
+    }
+
+    /// A vertex as the reader has it.
+    pub fn vertex(&self, source: &Source, row: usize) -> Found {
+        let value = |role: usize| self.value(source, row, role);
+        let mut found = Found {
+            row,
+            position: self.position(source, row),
+            normal: Vec3::ZERO,
+            color: [255; 4],
+        };
+        if self.has_normals {
+            found.normal = positions::unit(Vec3::from_array(
+                [0, 1, 2].map(|axis| value(NORMAL + axis) as f32),
+            ));
+        }
+        if self.has_colors {
+            found.color = color(self.vertices.color_scale, |channel| value(COLOR + channel));
+        }
+        found
+    }
+
+    /// The triangles of a piece, and the number of the first one.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a polygon, and for an index without a vertex.
+    pub fn triangle_piece(&self, source: &Source, piece: usize) -> Result<(usize, Vec<[u32; 3]>)> {
+        let Some(faces) = &self.faces else { return Ok((0, Vec::new())) };
+        let Rows { at, count, stride, big } = faces.rows;
+        let vertices = self.points();
+        let triangle = |row: usize| {
+            let bytes = &source.bytes()[at + row * stride..at + (row + 1) * stride];
+            let wrong = |message: String| {
+                let place = format!("element “face”, row {row}, byte {}", at + row * stride);
+                Err(source.error(place, message))
+            };
+            let corners = number(&bytes[faces.length.0..], &faces.length.1, big);
+            if corners != 3.0 {
+                return wrong(format!(
+                    "has {corners} corners; in pieces only triangles can be read"
+                ));
+            }
+            let corners = [0, 4, 8].map(|corner| {
+                let raw = [0, 1, 2, 3].map(|byte| bytes[faces.indices + corner + byte]);
+                if big { u32::from_be_bytes(raw) } else { u32::from_le_bytes(raw) }
+            });
+            match corners.iter().find(|&&index| index as usize >= vertices) {
+                Some(index) => wrong(format!("refers to vertex {index}, but there are {vertices}")),
+                None => Ok(corners),
+            }
+        };
+        let rows = piece * ROWS..((piece + 1) * ROWS).min(count);
+        Ok((rows.start, rows.map(triangle).collect::<Result<_>>()?))
+    }
+}
+
+impl Faces {
+    /// Faces whose only list is one of indices of 32 bits.
+    fn find(element: &Element, rows: Rows) -> Option<Self> {
+        let column = element.column(&["vertex_indices", "vertex_index"])?;
+        let PropertyType::List(_, ScalarType::Int | ScalarType::UInt) =
+            element.columns[column].kind
+        else {
+            return None;
+        };
+        let (offset, kind) = list_place(element);
+        Some(Self { rows, length: (offset, kind.clone()), indices: offset + width(kind) })
+    }
+
+    /// Whether faces all over the rows have three corners: behind one that has not, no row is where it is looked for.
+    fn are_triangles(&self, source: &Source) -> bool {
+        const LOOKS: usize = 1 << 10;
+        let Rows { at, count, stride, big } = self.rows;
+        let looks = LOOKS.min(count);
+        let row = |look: usize| {
+            look as u128 * (count - 1) as u128 / looks.saturating_sub(1).max(1) as u128
+        };
+        (0..looks).all(|look| {
+            let start = at + row(look) as usize * stride + self.length.0;
+            number(&source.bytes()[start..], &self.length.1, big) == 3.0
+        })
+    }
+}

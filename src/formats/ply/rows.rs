@@ -1,0 +1,333 @@
+//! The rows of one element, in text or binary, behind one way of asking for their values.
+//!
+//! ply-rs's own payload readers are not used: they hang on elements without properties, refuse `nan` and blank lines
+//! in text, and build a map per row, many times slower than the plain strides read here.
+
+use super::header::{Element, width};
+use crate::{
+    Error, Result,
+    input::{Source, copy},
+};
+use ply_rs::ply::{Encoding, PropertyType, ScalarType};
+use rayon::prelude::*;
+
+/// A number as the file's type holds it. `bytes` has at least the width of the type.
+pub(super) fn number(bytes: &[u8], kind: &ScalarType, big: bool) -> f64 {
+    macro_rules! take {
+        ($t:ty) => {{
+            let mut raw = [0; size_of::<$t>()];
+            raw.copy_from_slice(&bytes[..size_of::<$t>()]);
+            if big { <$t>::from_be_bytes(raw) as f64 } else { <$t>::from_le_bytes(raw) as f64 }
+        }};
+    }
+    match kind {
+        ScalarType::Char => take!(i8),
+        ScalarType::UChar => take!(u8),
+        ScalarType::Short => take!(i16),
+        ScalarType::UShort => take!(u16),
+        ScalarType::Int => take!(i32),
+        ScalarType::UInt => take!(u32),
+        ScalarType::Float => take!(f32),
+        ScalarType::Double => take!(f64),
+    }
+}
+
+/// The rows of an element, found in the file but not yet decoded.
+pub(super) enum Rows<'a> {
+    /// Every row has the same number of bytes.
+    Fixed { data: &'a [u8], stride: usize, big: bool },
+    /// Rows with lists: where each begins.
+    Loose { data: &'a [u8], starts: Vec<usize>, big: bool },
+    /// One line a row.
+    Text { lines: Vec<&'a [u8]> },
+}
+
+/// Rows that are found between two looks at the clock.
+const ROWS: usize = 1 << 16;
+
+/// One value list of a row.
+pub(super) type List = [f64];
+
+impl<'a> Rows<'a> {
+    /// Finds the rows of the element at `at` and moves `at` behind them. What is allocated is bounded by the bytes
+    /// present: a row of text is a line, a row with a list has a length of at least a byte.
+    pub fn find(
+        source: &'a Source,
+        element: &Element,
+        encoding: Encoding,
+        at: &mut usize,
+    ) -> Result<Self> {
+        let bytes = source.bytes();
+        if element.columns.is_empty() {
+            return Ok(Rows::Fixed { data: &[], stride: 0, big: false });
+        }
+        let big = match encoding {
+            Encoding::Ascii => return Self::find_lines(source, element, at),
+            Encoding::BinaryBigEndian => true,
+            Encoding::BinaryLittleEndian => false,
+        };
+        let rest = &bytes[*at..];
+        if let Some(stride) = element.stride() {
+            let size = element.count.checked_mul(stride).filter(|&size| size <= rest.len());
+            let Some(size) = size else { return Err(cut(source, element, rest.len() / stride)) };
+            *at += size;
+            return Ok(Rows::Fixed { data: &rest[..size], stride, big });
+        }
+        if let Some(stride) = triangle_stride(element)
+            && let Some(size) = element.count.checked_mul(stride).filter(|&size| size <= rest.len())
+        {
+            let (offset, count_kind) = list_place(element);
+            let threes = rest[..size]
+                .par_chunks_exact(stride)
+                .all(|row| number(&row[offset..], count_kind, big) == 3.0);
+            if threes {
+                *at += size;
+                return Ok(Rows::Fixed { data: &rest[..size], stride, big });
+            }
+        }
+        let most = element.count.min(rest.len() / element.least_bytes());
+        source.room::<usize>("the places of the rows", most)?;
+        let mut starts = Vec::with_capacity(most);
+        let mut next = 0;
+        for row in 0..element.count {
+            if row.is_multiple_of(ROWS) {
+                source.check_time()?;
+            }
+            starts.push(next);
+            for column in &element.columns {
+                next = end_of(rest, next, &column.kind, big).map_err(|problem| match problem {
+                    Problem::Cut => cut(source, element, row),
+                    Problem::Length(found) => source.error(
+                        format!("element “{}”, row {row}, byte {}", element.name, *at + next),
+                        format!("the list “{}” has the impossible length {found}", column.name),
+                    ),
+                })?;
+            }
+        }
+        *at += next;
+        Ok(Rows::Loose { data: &rest[..next], starts, big })
+    }
+
+    fn find_lines(source: &'a Source, element: &Element, at: &mut usize) -> Result<Self> {
+        let bytes = source.bytes();
+        // The last line may end with the file.
+        let most = element.count.min((bytes.len() - *at) / (2 * element.columns.len()) + 1);
+        source.room::<&[u8]>("the places of the lines", most)?;
+        let mut lines = Vec::with_capacity(most);
+        let mut longest = 0;
+        while lines.len() < element.count {
+            if lines.len().is_multiple_of(ROWS) {
+                source.check_time()?;
+            }
+            if *at >= bytes.len() {
+                return Err(cut(source, element, lines.len()));
+            }
+            let rest = &bytes[*at..];
+            let end = rest.iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(rest.len());
+            *at = (*at + end + 1).min(bytes.len());
+            let line = rest[..end].trim_ascii();
+            if !line.is_empty() {
+                longest = longest.max(line.len());
+                lines.push(line);
+                // A list of a line may be as long as it, and be read by every thread.
+                if lines.len() == lines.capacity() && lines.len() < element.count {
+                    source.room::<&[u8]>("the places of the lines", lines.len())?;
+                }
+            }
+        }
+        source.room::<f64>("the values of a line", longest / 2)?;
+        Ok(Rows::Text { lines })
+    }
+
+    /// Calls `visit` for every value of a row in column order: its column, and a number or a list.
+    pub fn visit(
+        &self,
+        source: &Source,
+        element: &Element,
+        row: usize,
+        wanted: &[bool],
+        mut visit: impl FnMut(usize, f64, Option<&List>),
+    ) -> Result<()> {
+        let mut list = Vec::new();
+        match self {
+            Rows::Fixed { data, stride, big } => {
+                let row = &data[row * stride..][..*stride];
+                walk(row, element, *big, wanted, &mut list, &mut visit);
+            }
+            Rows::Loose { data, starts, big } => {
+                walk(&data[starts[row]..], element, *big, wanted, &mut list, &mut visit)
+            }
+            Rows::Text { lines } => {
+                let mut words =
+                    lines[row].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+                let mut next = |column: usize, parse: bool| -> Result<f64> {
+                    let name = &element.columns[column].name;
+                    let place = || text_place(source, element, row, lines[row]);
+                    let word = words.next().ok_or_else(|| {
+                        source.error(place(), format!("the line ends before the value of “{name}”"))
+                    })?;
+                    if !parse {
+                        return Ok(0.0);
+                    }
+                    copy::number(word).ok_or_else(|| {
+                        let word = copy::excerpt(word);
+                        source.error(place(), format!("“{word}” is not a number (for “{name}”)"))
+                    })
+                };
+                for (index, column) in element.columns.iter().enumerate() {
+                    match column.kind {
+                        PropertyType::Scalar(_) => {
+                            let value = next(index, wanted[index])?;
+                            visit(index, value, None);
+                        }
+                        PropertyType::List(..) => {
+                            let length = next(index, true)?;
+                            // A line cannot hold more values than bytes, so a longer list ends in the error above.
+                            if !(length >= 0.0 && length.fract() == 0.0) {
+                                return Err(source.error(
+                                    text_place(source, element, row, lines[row]),
+                                    format!(
+                                        "the list “{}” has the impossible length {length}",
+                                        column.name
+                                    ),
+                                ));
+                            }
+                            list.clear();
+                            let mut left = length;
+                            while left > 0.0 {
+                                list.push(next(index, wanted[index])?);
+                                left -= 1.0;
+                            }
+                            visit(index, length, Some(&list));
+                        }
+                    }
+                }
+                if words.next().is_some() {
+                    return Err(source.error(
+                        text_place(source, element, row, lines[row]),
+                        "the line has more values than the header names",
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Where a row stands, for an error.
+    pub fn place(&self, source: &Source, element: &Element, row: usize) -> String {
+        let start = source.bytes().as_ptr() as usize;
+        let byte = match self {
+            Rows::Fixed { data, stride, .. } => data.as_ptr() as usize + row * stride,
+            Rows::Loose { data, starts, .. } => data.as_ptr() as usize + starts[row],
+            Rows::Text { lines } => lines[row].as_ptr() as usize,
+        };
+        format!("element “{}”, row {row}, byte {}", element.name, byte.wrapping_sub(start))
+    }
+}
+
+fn text_place(source: &Source, element: &Element, row: usize, line: &[u8]) -> String {
+    let byte = (line.as_ptr() as usize).wrapping_sub(source.bytes().as_ptr() as usize);
+    format!("element “{}”, row {row}, byte {byte}", element.name)
+}
+
+pub(super) fn cut(source: &Source, element: &Element, rows: usize) -> Error {
+    source
+        .error(
+            format!("element “{}”, row {rows}, byte {}", element.name, source.bytes().len()),
+            format!("the file ends, though the header claims {} rows", element.count),
+        )
+        .hint("the file is cut, or its header does not belong to it")
+}
+
+enum Problem {
+    Cut,
+    Length(f64),
+}
+
+/// The offset behind a value that begins at `at`.
+fn end_of(data: &[u8], at: usize, kind: &PropertyType, big: bool) -> Result<usize, Problem> {
+    let inside = |end: usize| if end <= data.len() { Ok(end) } else { Err(Problem::Cut) };
+    match kind {
+        PropertyType::Scalar(scalar) => inside(at + width(scalar)),
+        PropertyType::List(count, item) => {
+            let first = inside(at + width(count))?;
+            let length = number(&data[at..], count, big);
+            if !(length >= 0.0 && length.fract() == 0.0) {
+                return Err(Problem::Length(length));
+            }
+            if length > (data.len() - first) as f64 {
+                return Err(Problem::Cut);
+            }
+            inside(first + length as usize * width(item))
+        }
+    }
+}
+
+/// Visits a binary row. Its bytes were present when rows were counted: where a file changes under the reader and they are not
+/// any more, the row ends, and the reader tells of the change.
+fn walk(
+    row: &[u8],
+    element: &Element,
+    big: bool,
+    wanted: &[bool],
+    list: &mut Vec<f64>,
+    visit: &mut impl FnMut(usize, f64, Option<&List>),
+) {
+    let mut rest = row;
+    let mut take = |size: usize| {
+        let (part, behind) = rest.split_at_checked(size)?;
+        rest = behind;
+        Some(part)
+    };
+    for (index, column) in element.columns.iter().enumerate() {
+        match &column.kind {
+            PropertyType::Scalar(kind) => {
+                let Some(bytes) = take(width(kind)) else { return };
+                if wanted[index] {
+                    visit(index, number(bytes, kind, big), None);
+                }
+            }
+            PropertyType::List(count, item) => {
+                let Some(bytes) = take(width(count)) else { return };
+                let length = number(bytes, count, big);
+                let Some(bytes) = take((length as usize).saturating_mul(width(item))) else {
+                    return;
+                };
+                if wanted[index] {
+                    list.clear();
+                    list.extend(
+                        bytes.chunks_exact(width(item)).map(|bytes| number(bytes, item, big)),
+                    );
+                    visit(index, length, Some(list));
+                }
+            }
+        }
+    }
+}
+
+/// Bytes of a row whose only list holds three values.
+pub(super) fn triangle_stride(element: &Element) -> Option<usize> {
+    let lists = element.columns.iter().filter(|column| column.width().is_none()).count();
+    (lists == 1).then(|| place_in_row(element, element.columns.len()))
+}
+
+/// Where a column begins in rows of one length, in which a list holds three values.
+pub(super) fn place_in_row(element: &Element, column: usize) -> usize {
+    let bytes = |kind: &PropertyType| match kind {
+        PropertyType::Scalar(kind) => width(kind),
+        PropertyType::List(count, item) => width(count) + 3 * width(item),
+    };
+    element.columns[..column].iter().map(|before| bytes(&before.kind)).sum()
+}
+
+/// Offset in the row, and type of the length, of an element's first list.
+pub(super) fn list_place(element: &Element) -> (usize, &ScalarType) {
+    let mut offset = 0;
+    for column in &element.columns {
+        match &column.kind {
+            PropertyType::Scalar(kind) => offset += width(kind),
+            PropertyType::List(count, _) => return (offset, count),
+        }
+    }
+    (0, &ScalarType::UChar)
+}

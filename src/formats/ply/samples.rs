@@ -1,0 +1,199 @@
+//! Scattered samples in PLY: vertices with a scalar property.
+
+use super::{
+    super::shared::gather::{Columns, choose, gather},
+    ALPHA, COLOR, NORMAL, POSITION, ROLES, Table, UV,
+    header::{self, Element},
+    rows::Rows,
+};
+use crate::{Result, input::Source, scattered::Points};
+use glam::DVec3;
+
+/// Properties that shape a kernel.
+const RADIUS: &str = "radius";
+const COVARIANCE: [&str; 6] = ["cov_xx", "cov_xy", "cov_xz", "cov_yy", "cov_yz", "cov_zz"];
+
+/// Whether a PLY file's header tells of faces.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) for a malformed header.
+pub fn has_faces(source: &Source) -> Result<bool> {
+    let header = header::read(source)?;
+    Ok(header
+        .elements
+        .iter()
+        .any(|element| matches!(element.name.as_str(), "face" | "tristrips") && element.count > 0))
+}
+
+/// Reads the vertices as scattered samples: the property that `scalar` names, else the only one that is no position, normal,
+/// colour, texture coordinate or part of a kernel. Kernels: a property `radius`, or `cov_xx`, `cov_xy`, `cov_xz`, `cov_yy`,
+/// `cov_yz` and `cov_zz`.
+///
+/// # Errors
+/// As [`read`](super::read); [`Error::Input`](crate::Error::Input) also where the scalar cannot be told, with the names of
+/// those that there are, and for values that are not finite.
+pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
+    let header = header::read(source)?;
+    let mut at = header.payload;
+    for element in &header.elements {
+        let rows = Rows::find(source, element, header.encoding, &mut at)?;
+        if element.name == "vertex" {
+            source.check_points("the count of element “vertex”", element.count as u64)?;
+            return of_vertices(source, element, &rows, scalar);
+        }
+    }
+    Err(source.error("header", "has no element “vertex”"))
+}
+
+fn of_vertices(
+    source: &Source,
+    element: &Element,
+    rows: &Rows,
+    scalar: Option<&str>,
+) -> Result<Points> {
+    let place = "element “vertex”";
+    let column = |names: &[&str]| {
+        element.column(names).filter(|&column| element.columns[column].width().is_some())
+    };
+    let mut position = [0; 3];
+    for (at, names) in position.iter_mut().zip(ROLES) {
+        *at = column(names)
+            .ok_or_else(|| source.error(place, format!("has no scalar property “{}”", names[0])))?;
+    }
+    // Of a whole group: a lone “t” or “v” is no texture coordinate.
+    let groups = [POSITION..NORMAL, NORMAL..COLOR, COLOR..UV, UV..ROLES.len()];
+    let known = |name: &str| {
+        let of_group = groups.iter().cloned().any(|group| {
+            let has = |role: usize| role == ALPHA || element.column(ROLES[role]).is_some();
+            group.clone().all(has) && ROLES[group].iter().any(|names| names.contains(&name))
+        });
+        of_group || name == RADIUS || COVARIANCE.contains(&name)
+    };
+    let scalars = element
+        .columns
+        .iter()
+        .filter(|column| column.width().is_some())
+        .map(|column| column.name.as_str());
+    // Those that mean something else can be asked for too.
+    let names: Vec<&str> = scalars.filter(|name| scalar == Some(*name) || !known(name)).collect();
+    let value = element.column(&[names[choose(source, place, scalar, &names)?]]);
+    let radius = column(&[RADIUS]);
+    let covariance = COVARIANCE.map(|name| column(&[name]));
+    let has_covariance = covariance.iter().all(Option::is_some);
+    let [x, y, z] = position.map(Some);
+    let columns: Vec<Option<usize>> =
+        [x, y, z, value, radius].into_iter().chain(covariance).collect();
+    let table = Table::read(source, element, rows, &columns)?;
+    let count = element.count;
+    source.spend("the size of the samples in bytes", Columns::ROW * count as u64)?;
+    let columns = Columns {
+        values: (0..count).map(|row| table.value(row, 3)).collect(),
+        radii: if radius.is_some() {
+            (0..count).map(|row| table.value(row, 4) as f32).collect()
+        } else {
+            Vec::new()
+        },
+        covariances: if has_covariance {
+            (0..count)
+                .map(|row| std::array::from_fn(|term| table.value(row, 5 + term) as f32))
+                .collect()
+        } else {
+            Vec::new()
+        },
+    };
+    let position = |row| DVec3::new(table.value(row, 0), table.value(row, 1), table.value(row, 2));
+    gather(source, count, position, |row| rows.place(source, element, row), columns)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::testing::*;
+    use glam::Vec3;
+
+    fn file(format: &str, properties: &str, rows: &[&[f64]]) -> Vec<u8> {
+        let mut file = format!("ply\nformat {format} 1.0\nelement vertex {}\n", rows.len());
+        properties.split_whitespace().for_each(|name| file += &format!("property double {name}\n"));
+        file += "end_header\n";
+        let mut file = file.into_bytes();
+        for row in rows {
+            match format {
+                "ascii" => {
+                    file.extend(row.iter().flat_map(|v| format!("{v} ").into_bytes()));
+                    file.push(b'\n');
+                }
+                "binary_big_endian" => file.extend(row.iter().flat_map(|v| v.to_be_bytes())),
+                _ => file.extend(row.iter().flat_map(|v| v.to_le_bytes())),
+            }
+        }
+        file
+    }
+
+    fn load(content: &[u8], scalar: Option<&str>) -> Result<Points> {
+        let folder = Folder::new();
+        read_with(&folder.write("a.ply", content), |source| read_samples(source, scalar))
+    }
+
+    #[test]
+    fn scalars_by_name_and_alone_in_every_encoding() {
+        let folder = Folder::new();
+        for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
+            let one = file(
+                format,
+                "x temperature y z nx ny nz",
+                &[&[1., 7., 2., 3., 0., 0., 1.], &[4., 8., 5., 6., 0., 0., 1.]],
+            );
+            let points = load(&one, None).unwrap();
+            assert_eq!(points.positions, [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)]);
+            assert_eq!((points.values, points.radii), (vec![7.0, 8.0], vec![]));
+            assert_eq!(load(&one, Some("nz")).unwrap().values, [1.0, 1.0]);
+            assert_eq!(load(&one, Some("x")).unwrap().values, [1.0, 4.0]);
+            let painted = "x y z red green blue v alpha";
+            let painted = file(format, painted, &[&[1., 2., 3., 4., 5., 6., 7., 8.]]);
+            assert_eq!(load(&painted, None).unwrap().values, [7.0]);
+            let two = file(format, "x y z p radius", &[&[1., 2., 3., 4., 0.5]]);
+            assert_eq!(load(&two, None).unwrap().radii, [0.5]);
+            let terms = "x y z p cov_zz cov_xx cov_xy cov_xz cov_yy cov_yz";
+            let slanted = file(format, terms, &[&[1., 2., 3., 4., 6., 1., 0., 0.5, 4., 0.]]);
+            assert_eq!(load(&slanted, None).unwrap().covariances, [[1.0, 0.0, 0.5, 4.0, 0.0, 6.0]]);
+            let short = file(format, "x y z p", &[&[1., 2., 3., 4.]]);
+            for end in 0..short.len() {
+                // A text that ends within its last number reads as the shorter one.
+                let cut = read_with(&folder.write("a.ply", &short[..end]), |source| {
+                    read_samples(source, None)
+                });
+                assert!(
+                    cut.is_err() || format == "ascii" && end + 3 > short.len(),
+                    "{format} cut at {end}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_told() {
+        for (properties, row, scalar, word) in [
+            ("x y z", &[1.0, 2.0, 3.0][..], None, "has no scalar"),
+            ("x y z a b", &[1.0; 5], None, "2 scalars to choose from"),
+            ("x y z a b", &[1.0; 5], Some("c"), "no scalar “c”"),
+            ("x y a", &[1.0; 3], None, "no scalar property “z”"),
+            ("x y z a", &[1.0, 2.0, 3.0, f64::NAN], None, "row 0, byte"),
+            ("x y z a", &[1.0, f64::NAN, 3.0, 4.0], None, "not finite"),
+            ("x y z a radius", &[1.0, 2.0, 3.0, 4.0, -1.0], None, "radius of sample 0"),
+        ] {
+            let message = load(&file("ascii", properties, &[row]), scalar).unwrap_err().to_string();
+            assert!(message.contains(word), "{message}");
+        }
+        assert!(
+            load(&file("ascii", "x y z a", &[]), None)
+                .unwrap_err()
+                .to_string()
+                .contains("no samples")
+        );
+        let hint = match load(&file("ascii", "x y z a b", &[&[1.0; 5]]), None) {
+            Err(crate::Error::Input { hint, .. }) => hint,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(hint.as_deref(), Some("name one of them: a, b"));
+    }
+}

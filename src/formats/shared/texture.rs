@@ -1,0 +1,88 @@
+//! Pictures that a mesh refers to, decoded under the limits.
+
+use crate::{
+    Result,
+    error::LimitKind,
+    input::{Source, isolate::isolated, neighbour::is_inside},
+    surface::Texture,
+};
+use std::{io::Cursor, path::PathBuf, sync::Arc};
+
+/// Texels that a byte can stand for at most: deflate makes 1032 bytes of one, and a byte may hold 8 grey texels.
+const MOST_TEXELS: u64 = 8 * 1032;
+/// Bytes that a texel takes on the way: 16 bits a channel as the decoder gives it, 8 as a picture and as a texture.
+const TEXEL: u64 = 8 + 4 + 4;
+
+/// Decodes a PNG or JPEG picture. `place` names what refers to it.
+pub(crate) fn decode(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture>> {
+    isolated(source, place, || decode_here(source, place, bytes))
+}
+
+fn decode_here(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture>> {
+    let broken =
+        |e: image::ImageError| source.error(place, format!("the picture cannot be decoded: {e}"));
+    let reader = image::ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|e| broken(e.into()))?;
+    let mut decoder = reader.into_decoder().map_err(broken)?;
+    let (width, height) = image::ImageDecoder::dimensions(&decoder);
+    let texels = u64::from(width) * u64::from(height);
+    source.limits.check(
+        LimitKind::Texels,
+        source.path,
+        format!("{place}: the number of texels"),
+        texels,
+    )?;
+    if texels > (bytes.len() as u64).saturating_mul(MOST_TEXELS) {
+        let message = format!(
+            "the picture claims {width} × {height} texels, more than {} bytes can hold",
+            bytes.len()
+        );
+        return Err(source.error(place, message));
+    }
+    source.spend("the size of a picture in bytes", texels * TEXEL)?;
+    let mut limits = image::Limits::default();
+    // Room for 16 bits a channel and the decoder's own copy.
+    limits.max_alloc = Some((texels * 16).saturating_add(1 << 20));
+    image::ImageDecoder::set_limits(&mut decoder, limits).map_err(broken)?;
+    let picture = image::DynamicImage::from_decoder(decoder).map_err(broken)?.into_rgba8();
+    let texels: Vec<[u8; 4]> = picture.pixels().map(|pixel| pixel.0).collect();
+    if texels.is_empty() {
+        return Err(source.error(place, "the picture has no texels"));
+    }
+    Ok(Arc::new(Texture { width, height, texels }))
+}
+
+/// Reads the picture that a file refers to. `None`, with a warning, where there is no such file.
+pub(crate) fn read_reference(
+    source: &Source,
+    place: &str,
+    reference: &str,
+) -> Result<Option<Arc<Texture>>> {
+    let Some(path) = find(source, place, reference)? else { return Ok(None) };
+    let file = source.open_beside(&path)?;
+    file.unless_changed(decode(&file, place, file.bytes())).map(Some)
+}
+
+/// The path of a file that may be missing: `None`, with a warning, where a proper reference leads to no file.
+pub(crate) fn find(source: &Source, place: &str, reference: &str) -> Result<Option<PathBuf>> {
+    let reference = reference.replace('\\', "/");
+    match source.neighbour(place, &reference) {
+        Ok(path) => Ok(Some(path)),
+        Err(_)
+            if is_inside(&reference)
+                && (source.is_in_memory()
+                    || source
+                        .path
+                        .parent()
+                        .is_some_and(|folder| !folder.join(&reference).exists())) =>
+        {
+            tracing::warn!(
+                "{}: {place}: “{reference}” does not exist; drawn without it",
+                source.path.display()
+            );
+            Ok(None)
+        }
+        Err(error) => Err(error),
+    }
+}

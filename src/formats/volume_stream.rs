@@ -1,0 +1,241 @@
+//! The slices of a volume one after another, for those who cannot hold all of them.
+
+use super::{Endian, RawLayout, SampleType, nrrd, raw};
+use crate::{
+    Error, Result,
+    input::{Limits, Mapping, Source, intact},
+    volume::{Lattice, Samples, Scalar},
+};
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+};
+
+/// Where the samples of a file stand, one behind the other and not packed.
+pub(super) struct Plain {
+    /// The file that holds them.
+    pub path: PathBuf,
+    /// The byte of the first one.
+    pub start: usize,
+    pub sample_type: SampleType,
+    pub endian: Endian,
+    pub lattice: Lattice,
+}
+
+/// A volume whose samples stand in a file as they are: a raw file, or a NRRD file of raw encoding. What it gives is what
+/// [`load_volume`](super::load_volume) gives of the file. The pages of the file that were read go back to the system again
+/// and again.
+pub struct VolumeStream {
+    plain: Plain,
+    scalar: Scalar,
+    map: Mapping,
+}
+
+/// Slices that are looked at together.
+const PIECE: usize = 8;
+
+impl VolumeStream {
+    /// Looks at a file's header, or at its size where `raw` gives its layout. `None` for what can only be read as a whole:
+    /// other formats, packed samples, types that become others by their values (u32, u64, i64), and files in which
+    /// [`load_volume`](super::load_volume) will find something wrong.
+    ///
+    /// # Errors
+    /// Those of opening the file, [`Error::Input`] for a malformed header, and [`Error::Limit`] for sizes over the limits.
+    pub fn open(path: &Path, limits: &Limits, raw: Option<&RawLayout>) -> Result<Option<Self>> {
+        let source = Source::open(path, limits)?;
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        let plain = match (extension.as_deref(), raw) {
+            (Some("vti" | "vtr" | "vtk"), _) => None,
+            (Some("nrrd" | "nhdr"), _) => nrrd::plain(&source)?,
+            (_, Some(layout)) => raw::plain(&source, layout)?,
+            _ if source.bytes().starts_with(b"NRRD") => nrrd::plain(&source)?,
+            _ => None,
+        };
+        let Some(plain) = plain else { return Ok(None) };
+        let scalar = match plain.sample_type {
+            SampleType::U8 => Scalar::U8,
+            SampleType::U16 => Scalar::U16,
+            SampleType::I8 | SampleType::I16 => Scalar::I16,
+            SampleType::I32 => Scalar::I32,
+            SampleType::F32 | SampleType::F64 => Scalar::F32,
+            SampleType::U32 | SampleType::U64 | SampleType::I64 => return Ok(None),
+        };
+        source.intact()?;
+        let file = if plain.path == path { source } else { source.open_beside(&plain.path)? };
+        let Some(map) = file.into_mapping() else { return Ok(None) };
+        let bytes = plain
+            .sample_type
+            .bytes_of(plain.lattice.dims)
+            .and_then(|bytes| bytes.checked_add(plain.start as u64));
+        let is_whole = bytes.is_some_and(|bytes| bytes <= map.len() as u64) && !map.is_empty();
+        Ok(is_whole.then_some(Self { plain, scalar, map }))
+    }
+
+    /// The file that holds the samples: a detached header's is another one.
+    pub fn path(&self) -> &Path {
+        &self.plain.path
+    }
+
+    /// Where the samples lie.
+    pub fn lattice(&self) -> &Lattice {
+        &self.plain.lattice
+    }
+
+    /// The type of the samples that [`slices`](Self::slices) gives.
+    pub fn scalar(&self) -> Scalar {
+        self.scalar
+    }
+
+    /// The samples of some slices across the last axis.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where the file is not the one that was opened any more.
+    ///
+    /// # Panics
+    /// Where the volume does not have them.
+    pub fn slices(&self, z: Range<usize>) -> Result<Samples> {
+        let Plain { start, sample_type, endian, ref lattice, .. } = self.plain;
+        let slice = lattice.dims[0] * lattice.dims[1] * sample_type.bytes();
+        let samples = sample_type
+            .decode(self.map[start + z.start * slice..start + z.end * slice].into(), endian);
+        self.map.release();
+        intact(&self.map, &self.plain.path).map(|()| samples)
+    }
+
+    /// The smallest and the largest value of all samples: goes through the file once. `watch` is told how many slices have
+    /// been seen, of how many.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for samples that are not finite.
+    pub fn range(&self, watch: &dyn Fn(u64, u64)) -> Result<[f64; 2]> {
+        let count = self.plain.lattice.dims[2];
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        for first in (0..count).step_by(PIECE) {
+            watch(first as u64, count as u64);
+            let z = first..(first + PIECE).min(count);
+            let [low, high] = self.slices(z.clone())?.range().map_err(|message| {
+                let place = format!("samples of the slices {} to {}", z.start, z.end - 1);
+                Error::input(&self.plain.path, place, message)
+            })?;
+            range = [range[0].min(low), range[1].max(high)];
+        }
+        Ok(range)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{formats::load_volume, input::testing::Folder};
+    use glam::DVec3;
+
+    /// Numbers that every type can hold, as bytes.
+    fn bytes(sample_type: SampleType, endian: Endian) -> Vec<u8> {
+        let text: Vec<String> = (0..3 * 4 * 19).map(|i| (i / 2).to_string()).collect();
+        let little = sample_type.parse(&text.join(" "), text.len()).unwrap();
+        match endian {
+            Endian::Little => little,
+            Endian::Big => {
+                little.chunks(sample_type.bytes()).flat_map(|n| n.iter().rev().copied()).collect()
+            }
+        }
+    }
+
+    fn compare(path: &Path, layout: Option<&RawLayout>) {
+        let limits = Limits::default();
+        let whole = load_volume(path, &limits, layout).unwrap();
+        let stream = VolumeStream::open(path, &limits, layout).unwrap().unwrap();
+        assert_eq!((stream.lattice(), stream.scalar()), (&whole.lattice, whole.samples.scalar()));
+        assert_eq!(stream.range(&|_, _| ()).unwrap(), whole.range);
+        let slice = whole.lattice.dims[0] * whole.lattice.dims[1] * whole.samples.sample_bytes();
+        assert_eq!(
+            stream.slices(3..7).unwrap().bytes(),
+            &whole.samples.bytes()[3 * slice..7 * slice]
+        );
+        assert_eq!(stream.slices(0..19).unwrap(), whole.samples);
+    }
+
+    #[test]
+    fn slices_are_those_of_the_whole() {
+        let folder = Folder::new();
+        for sample_type in ["u8", "i8", "u16", "i16", "i32", "f32", "f64"]
+            .map(|name| SampleType::from_name(name).unwrap())
+        {
+            for endian in [Endian::Little, Endian::Big] {
+                let samples = bytes(sample_type, endian);
+                let layout = RawLayout {
+                    dims: [3, 4, 19],
+                    sample_type,
+                    spacing: DVec3::ONE,
+                    endian,
+                    header: 7,
+                };
+                let path = folder.write("a.raw", [&[0; 7], &samples[..]].concat());
+                compare(&path, Some(&layout));
+                let order = if endian == Endian::Big { "big" } else { "little" };
+                let name = match sample_type.name() {
+                    "f32" => "float".into(),
+                    "f64" => "double".into(),
+                    name => name.replace('u', "uint").replacen(
+                        'i',
+                        "int",
+                        usize::from(name.starts_with('i')),
+                    ),
+                };
+                let fields = format!(
+                    "type: {name}\ndimension: 3\nsizes: 3 4 19\nendian: {order}\nencoding: raw"
+                );
+                let path = folder.write(
+                    "a.nrrd",
+                    [format!("NRRD0004\n{fields}\n\n").as_bytes(), &samples].concat(),
+                );
+                compare(&path, None);
+                folder.write("b.bin", &samples);
+                compare(
+                    &folder.write("b.nhdr", format!("NRRD0004\n{fields}\ndata file: b.bin\n")),
+                    None,
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_packed_wrong_or_not_finite_is_told() {
+        let folder = Folder::new();
+        let limits = Limits::default();
+        let layout = |sample_type| RawLayout {
+            dims: [2, 1, 2],
+            sample_type,
+            spacing: DVec3::ONE,
+            endian: Endian::Little,
+            header: 0,
+        };
+        let path = folder.write("a.raw", [0; 16]);
+        for (sample_type, is_plain) in
+            [(SampleType::F32, true), (SampleType::U32, false), (SampleType::U8, false)]
+        {
+            let stream = VolumeStream::open(&path, &limits, Some(&layout(sample_type))).unwrap();
+            assert_eq!(stream.is_some(), is_plain, "{sample_type:?}");
+        }
+        for encoding in ["gzip", "raw\nbyte skip: 1", "raw\nline skip: 1", "ascii"] {
+            let text = format!(
+                "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1 1 1\nencoding: {encoding}\n\n 1"
+            );
+            let path = folder.write("a.nrrd", text);
+            assert!(VolumeStream::open(&path, &limits, None).unwrap().is_none(), "{encoding}");
+        }
+        let cut = folder.write(
+            "a.nrrd",
+            "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 9 9 9\nencoding: raw\n\n12",
+        );
+        assert!(VolumeStream::open(&cut, &limits, None).unwrap().is_none());
+        let path = folder.write("a.raw", [1f32, 2.0, f32::NAN, 3.0].map(f32::to_le_bytes).concat());
+        let stream =
+            VolumeStream::open(&path, &limits, Some(&layout(SampleType::F32))).unwrap().unwrap();
+        let message = stream.range(&|_, _| ()).unwrap_err().to_string();
+        assert!(
+            message.contains("a.raw: samples of the slices 0 to 1: 1 of 4 samples are not finite"),
+            "{message}"
+        );
+    }
+}

@@ -1,0 +1,264 @@
+//! VTK's legacy files (`.vtk`), in text and binary: structured points and rectilinear grids as volumes; unstructured grids,
+//! polygons and structured grids as scattered samples. After the format's description in the VTK User's Guide, with the
+//! cells of version 5.1.
+
+mod parser;
+#[cfg(test)]
+mod tests;
+
+use super::{shared::gather::which_scalar, vtk_cells::Cells, vtk_xml::Part, vtr};
+use crate::{
+    Error, Result,
+    input::Source,
+    scattered::Points,
+    volume::{Lattice, Volume},
+};
+use glam::{DMat3, DVec3};
+use parser::Parser;
+
+/// Words of a line that are looked at.
+const MOST_WORDS: usize = 16;
+
+/// A data set as the file has it.
+#[derive(Default)]
+struct DataSet<'a> {
+    /// `STRUCTURED_POINTS`, …
+    kind: String,
+    dims: [u64; 3],
+    origin: DVec3,
+    spacing: DVec3,
+    /// Along x, y and z, of rectilinear grids.
+    places: [Vec<f64>; 3],
+    cells: Cells,
+    points: Attributes<'a>,
+    of_cells: Attributes<'a>,
+}
+
+/// The data of the points or the cells: how many there are, and arrays of one component by their names.
+#[derive(Default)]
+struct Attributes<'a> {
+    count: usize,
+    arrays: Vec<(String, Part<'a>)>,
+}
+
+/// Whether a file holds a volume: structured points or a rectilinear grid.
+///
+/// # Errors
+/// [`Error::Input`] for a malformed header.
+pub fn holds_volume(source: &Source) -> Result<bool> {
+    let kind = Parser::open(source)?.1;
+    Ok(is_volume(&kind))
+}
+
+fn is_volume(kind: &str) -> bool {
+    matches!(kind, "STRUCTURED_POINTS" | "RECTILINEAR_GRID")
+}
+
+/// Reads structured points or a rectilinear grid: the first scalars of the points.
+///
+/// # Errors
+/// [`Error::Input`] for another data set, without scalars, cut off, or with numbers that are not finite; [`Error::Limit`] for
+/// counts over the limits.
+pub fn read_volume(source: &Source) -> Result<Volume> {
+    let mut data = DataSet::read(source)?;
+    if !is_volume(&data.kind) {
+        return Err(source.error("DATASET", format!("is {}, which is no volume", data.kind)));
+    }
+    if data.points.arrays.is_empty() {
+        return Err(source
+            .error("POINT_DATA", "holds no scalars")
+            .hint("values of cells are not read; turn them into values of points"));
+    }
+    let (_, part) = data.points.arrays.swap_remove(0);
+    source.spend("the size of the samples in bytes", part.kind.decoded_bytes(part.bytes.len()))?;
+    let samples = part.kind.decode(part.bytes, part.endian);
+    let volume = if data.kind == "RECTILINEAR_GRID" {
+        let found = data.places.each_ref().map(|places| places.len() as u64);
+        if found != data.dims {
+            let message = format!("there are {found:?} coordinates for {:?} points", data.dims);
+            return Err(source.error("DIMENSIONS", message));
+        }
+        vtr::volume(data.places, samples)
+    } else {
+        let dims = data.dims.map(|count| count as usize);
+        Volume::new(
+            Lattice::cartesian(dims, data.origin, DMat3::from_diagonal(data.spacing)),
+            samples,
+        )
+    };
+    volume.map_err(|message| source.error("samples", message))
+}
+
+/// Reads an unstructured grid, polygons or a structured grid, as [`vtu::read`](super::vtu::read) does.
+///
+/// # Errors
+/// Those of [`read_volume`]; [`Error::Input`] also where there is no array of the name `scalar`.
+pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
+    let data = DataSet::read(source)?;
+    if is_volume(&data.kind) {
+        return Err(
+            source.error("DATASET", format!("is {}, a volume and no scattered samples", data.kind))
+        );
+    }
+    let wanted = |attributes: &Attributes| {
+        let is = |name: &String| scalar.is_none_or(|scalar| scalar == name);
+        attributes.arrays.iter().position(|(name, _)| is(name))
+    };
+    let count = |place: &str, there: usize, attributes: &Attributes| -> Result<(), Error> {
+        let claim = attributes.count;
+        if there == claim {
+            Ok(())
+        } else {
+            Err(source.error(place, format!("claims {claim} of {there}")))
+        }
+    };
+    if let Some(index) = wanted(&data.points) {
+        count("POINT_DATA", data.cells.points.len(), &data.points)?;
+        return data.cells.samples_at_points(source, data.points.arrays[index].1.doubles(source)?);
+    }
+    if let Some(index) = wanted(&data.of_cells) {
+        count("CELL_DATA", data.cells.ends.len(), &data.of_cells)?;
+        return data
+            .cells
+            .samples_at_centres(source, data.of_cells.arrays[index].1.doubles(source)?);
+    }
+    let arrays = data.points.arrays.iter().chain(&data.of_cells.arrays);
+    let names: Vec<&str> = arrays.map(|(name, _)| name.as_str()).collect();
+    Err(which_scalar(source, "POINT_DATA and CELL_DATA", scalar, &names))
+}
+
+impl<'a> DataSet<'a> {
+    fn read(source: &'a Source) -> Result<Self> {
+        let (mut parser, kind) = Parser::open(source)?;
+        let mut data = Self { kind, spacing: DVec3::ONE, ..Self::default() };
+        // The data that attributes belong to: none, points or cells.
+        let mut attributes: Option<bool> = None;
+        while let Some((place, line)) = parser.line()? {
+            // No keyword has more words behind it.
+            let words: Vec<&str> = line.split_ascii_whitespace().take(MOST_WORDS).collect();
+            let wrong = |message: String| source.error(place.clone(), message);
+            source.check_time()?;
+            let keyword = words[0].to_ascii_uppercase();
+            match (keyword.as_str(), &words[1..]) {
+                ("DIMENSIONS", sizes) => data.dims = parser.three(&place, sizes)?,
+                ("ORIGIN", numbers) => {
+                    data.origin = DVec3::from_array(parser.three(&place, numbers)?)
+                }
+                ("SPACING" | "ASPECT_RATIO", numbers) => {
+                    data.spacing = DVec3::from_array(parser.three(&place, numbers)?);
+                }
+                ("X_COORDINATES" | "Y_COORDINATES" | "Z_COORDINATES", [count, kind]) => {
+                    let axis = usize::from(keyword.as_bytes()[0] - b'X');
+                    data.places[axis] = parser
+                        .array(&place, parser.count(&place, count)?, kind)?
+                        .doubles(source)?;
+                }
+                // Cells that were read refer to points that were there.
+                ("POINTS", _)
+                    if !(data.cells.points.is_empty() && data.cells.corners.is_empty()) =>
+                {
+                    return Err(wrong("POINTS are given twice, or behind the cells".into()));
+                }
+                ("POINTS", [count, kind]) => {
+                    let count = parser.count(&place, count)?;
+                    let numbers =
+                        parser.array(&place, count.saturating_mul(3), kind)?.doubles(source)?;
+                    source.room::<DVec3>("the points", count)?;
+                    data.cells.points = numbers.chunks_exact(3).map(DVec3::from_slice).collect();
+                }
+                (
+                    "CELLS" | "VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS",
+                    [count, size],
+                ) => {
+                    let (count, size) = (parser.count(&place, count)?, parser.count(&place, size)?);
+                    let (corners, ends) = parser.cells(&place, count, size)?;
+                    data.cells.room(source, corners.len(), ends.len())?;
+                    data.cells.add(&corners, &ends, 0).map_err(wrong)?;
+                }
+                ("CELL_TYPES", [count]) => {
+                    drop(parser.array(&place, parser.count(&place, count)?, "int")?)
+                }
+                ("POINT_DATA", [count]) => {
+                    data.points.count = parser.count(&place, count)?;
+                    attributes = Some(false);
+                }
+                ("CELL_DATA", [count]) => {
+                    data.of_cells.count = parser.count(&place, count)?;
+                    attributes = Some(true);
+                }
+                ("METADATA", _) => parser.skip_to_blank()?,
+                ("LOOKUP_TABLE", [_, count]) => {
+                    parser.skip_colors(&place, parser.count(&place, count)?, 4)?
+                }
+                ("FIELD", [_, arrays]) => {
+                    for _ in 0..parser.count(&place, arrays)? {
+                        let (name, components, part) = parser.field()?;
+                        if let Some(attributes) = data.attributes(attributes)
+                            && components == 1
+                            && part.len() == attributes.count
+                        {
+                            attributes.arrays.push((name, part));
+                        }
+                    }
+                }
+                (_, [name, rest @ ..]) => {
+                    let Some(attributes) = data.attributes(attributes) else {
+                        return Err(wrong(format!(
+                            "“{keyword}” is not known before POINT_DATA or CELL_DATA"
+                        )));
+                    };
+                    let count = attributes.count;
+                    let (components, kind) = match (keyword.as_str(), rest) {
+                        ("SCALARS", [kind]) => (1, *kind),
+                        ("SCALARS", [kind, components]) => {
+                            (parser.count(&place, components)?, *kind)
+                        }
+                        ("VECTORS" | "NORMALS", [kind]) => (3, *kind),
+                        ("TENSORS", [kind]) => (9, *kind),
+                        ("TENSORS6", [kind]) => (6, *kind),
+                        ("TEXTURE_COORDINATES", [components, kind]) => {
+                            (parser.count(&place, components)?, *kind)
+                        }
+                        ("GLOBAL_IDS" | "PEDIGREE_IDS" | "EDGE_FLAGS", [kind]) => (1, *kind),
+                        ("COLOR_SCALARS", [components]) => {
+                            parser.skip_colors(&place, count, parser.count(&place, components)?)?;
+                            continue;
+                        }
+                        _ => return Err(wrong(format!("“{keyword}” is not known"))),
+                    };
+                    if keyword == "SCALARS" {
+                        parser.expect("LOOKUP_TABLE")?;
+                    }
+                    let part = parser.array(&place, count.saturating_mul(components), kind)?;
+                    if components == 1 && keyword == "SCALARS" {
+                        attributes.arrays.push((parser::unescaped(name), part));
+                    }
+                }
+                _ => {
+                    return Err(wrong(format!(
+                        "“{}” is not known",
+                        line.chars().take(40).collect::<String>()
+                    )));
+                }
+            }
+        }
+        let points = if data.cells.points.is_empty() {
+            data.dims
+                .iter()
+                .try_fold(1u64, |product, &n| product.checked_mul(n))
+                .unwrap_or(u64::MAX)
+        } else {
+            data.cells.points.len() as u64
+        };
+        if !data.points.arrays.is_empty() && points != data.points.count as u64 {
+            let message =
+                format!("claims {} points, but the data set has {points}", data.points.count);
+            return Err(source.error("POINT_DATA", message));
+        }
+        Ok(data)
+    }
+
+    fn attributes(&mut self, of_cells: Option<bool>) -> Option<&mut Attributes<'a>> {
+        of_cells.map(|of_cells| if of_cells { &mut self.of_cells } else { &mut self.points })
+    }
+}

@@ -1,0 +1,292 @@
+//! The lines and the arrays of legacy VTK files.
+
+use super::super::{Endian, SampleType, vtk_xml::Part};
+use crate::{
+    Error, Result,
+    input::{Source, copy},
+};
+
+/// Bytes that an array of a field takes beside its name and its numbers.
+const FIELD: u64 = 256;
+
+/// No line of a real file comes near this many bytes. Arrays are no lines.
+const LONGEST: usize = 1 << 20;
+
+/// A place in a file.
+pub(super) struct Parser<'a> {
+    source: &'a Source<'a>,
+    at: usize,
+    binary: bool,
+}
+
+impl<'a> Parser<'a> {
+    /// Reads the header; also gives the kind of the data set.
+    pub fn open(source: &'a Source) -> Result<(Self, String)> {
+        let mut parser = Self { source, at: 0, binary: false };
+        let cut = |parser: &Self| source.error(parser.place(), "the file ends inside its header");
+        if !source.bytes().starts_with(b"# vtk DataFile Version") {
+            return Err(source.error("line 1", "does not begin with “# vtk DataFile Version”"));
+        }
+        // The title may be empty, and in any encoding.
+        for _ in 0..2 {
+            parser.raw_line()?.ok_or_else(|| cut(&parser))?;
+        }
+        let (place, encoding) = parser.line()?.ok_or_else(|| cut(&parser))?;
+        parser.binary = match encoding.to_ascii_uppercase().as_str() {
+            "ASCII" => false,
+            "BINARY" => true,
+            _ => {
+                return Err(
+                    source.error(place, format!("“{encoding}” is neither ASCII nor BINARY"))
+                );
+            }
+        };
+        loop {
+            let (place, line) = parser.line()?.ok_or_else(|| cut(&parser))?;
+            let words: Vec<&str> = line.split_ascii_whitespace().take(4).collect();
+            match words[..] {
+                [keyword, kind] if keyword.eq_ignore_ascii_case("DATASET") => {
+                    let kind = kind.to_ascii_uppercase();
+                    let known = [
+                        "STRUCTURED_POINTS",
+                        "RECTILINEAR_GRID",
+                        "UNSTRUCTURED_GRID",
+                        "POLYDATA",
+                        "STRUCTURED_GRID",
+                    ];
+                    if !known.contains(&kind.as_str()) {
+                        return Err(
+                            source.error(place, format!("the data set {kind} is not supported"))
+                        );
+                    }
+                    return Ok((parser, kind));
+                }
+                // Data of the whole may stand before.
+                [keyword, _, count] if keyword.eq_ignore_ascii_case("FIELD") => {
+                    for _ in 0..parser.count(&place, count)? {
+                        parser.field()?;
+                    }
+                }
+                [keyword, ..] if keyword.eq_ignore_ascii_case("METADATA") => {
+                    parser.skip_to_blank()?
+                }
+                _ => {
+                    return Err(
+                        source.error(place, "is not the line “DATASET …” that was expected")
+                    );
+                }
+            }
+        }
+    }
+
+    fn place(&self) -> String {
+        format!("byte {}", self.at)
+    }
+
+    fn rest(&self) -> &'a [u8] {
+        let source: &'a Source = self.source;
+        &source.bytes()[self.at..]
+    }
+
+    /// The next line as it stands; none at the end of the file.
+    fn raw_line(&mut self) -> Result<Option<&'a [u8]>> {
+        let rest = self.rest();
+        let window = &rest[..rest.len().min(LONGEST)];
+        let Some(line) = window.split_inclusive(|&b| b == b'\n').next() else { return Ok(None) };
+        if line.len() == LONGEST && line.len() < rest.len() && !line.ends_with(b"\n") {
+            return Err(self
+                .source
+                .error(self.place(), format!("the line is longer than {LONGEST} bytes")));
+        }
+        self.at += line.len();
+        Ok(Some(line.trim_ascii()))
+    }
+
+    /// The next line that is not empty, and its place.
+    pub fn line(&mut self) -> Result<Option<(String, String)>> {
+        loop {
+            let place = self.place();
+            let Some(line) = self.raw_line()? else { return Ok(None) };
+            let text = copy::text(line).map_err(|_| self.source.error(&place, "is not text"))?;
+            // The copy is asked: what is mapped may have become blank since the line was found.
+            if text.split_ascii_whitespace().next().is_some() {
+                return Ok(Some((place, text)));
+            }
+        }
+    }
+
+    /// Passes over the line that must come next, by its first word.
+    pub fn expect(&mut self, word: &str) -> Result<()> {
+        match self.line()? {
+            Some((_, line)) if line.split_ascii_whitespace().next() == Some(word) => Ok(()),
+            _ => Err(self
+                .source
+                .error(self.place(), format!("there is no line “{word}” where it was expected"))),
+        }
+    }
+
+    /// Passes over lines up to an empty one.
+    pub fn skip_to_blank(&mut self) -> Result<()> {
+        while self.raw_line()?.is_some_and(|line| !line.is_empty()) {}
+        Ok(())
+    }
+
+    /// A count from a keyword's line, within the limits of points.
+    pub fn count(&self, place: &str, word: &str) -> Result<usize> {
+        let count =
+            word.parse().map_err(|_| self.source.error(place, format!("“{word}” is no count")))?;
+        self.source.check_points("a count of points or cells", count)
+    }
+
+    /// Three numbers of a keyword's line.
+    pub fn three<T: std::str::FromStr>(&self, place: &str, words: &[&str]) -> Result<[T; 3]> {
+        let numbers: Option<Vec<T>> = words.iter().map(|word| word.parse().ok()).collect();
+        let wrong = |_| self.source.error(place, "needs three numbers");
+        numbers.unwrap_or_default().try_into().map_err(wrong)
+    }
+
+    /// The array that begins here.
+    pub fn array(&mut self, place: &str, count: usize, kind: &str) -> Result<Part<'a>> {
+        let wrong = |message: String| -> Error { self.source.error(place, message) };
+        // Of the machines that write these files, long is 8 bytes wide; indices are written as int.
+        let kind = match kind.to_ascii_lowercase().as_str() {
+            "unsigned_char" | "vtktypeuint8" => SampleType::U8,
+            "char" | "signed_char" | "vtktypeint8" => SampleType::I8,
+            "unsigned_short" | "vtktypeuint16" => SampleType::U16,
+            "short" | "vtktypeint16" => SampleType::I16,
+            "unsigned_int" | "vtktypeuint32" => SampleType::U32,
+            "int" | "vtkidtype" | "vtktypeint32" => SampleType::I32,
+            "unsigned_long" | "vtktypeuint64" => SampleType::U64,
+            "long" | "vtktypeint64" => SampleType::I64,
+            "float" => SampleType::F32,
+            "double" => SampleType::F64,
+            other => return Err(wrong(format!("has the type {other}, which is not supported"))),
+        };
+        let rest = self.rest();
+        let (bytes, endian, length) = if self.binary {
+            let size = count.saturating_mul(kind.bytes());
+            let bytes = rest.get(..size).ok_or_else(|| {
+                wrong(format!(
+                    "there are {} bytes where {size} were expected: the file ends",
+                    rest.len()
+                ))
+            })?;
+            (bytes.into(), Endian::Big, size)
+        } else {
+            let length = length_of_words(rest, count).map_err(|found| {
+                wrong(format!(
+                    "there are {found} numbers where {count} were expected: the file ends"
+                ))
+            })?;
+            self.source.room::<u8>("the text", length)?;
+            let text = copy::text(&rest[..length])
+                .map_err(|_| wrong("is followed by what is not text".into()))?;
+            self.source.spend("the size of the numbers in bytes", (count * kind.bytes()) as u64)?;
+            (kind.parse(&text, count).map_err(wrong)?.into(), Endian::Little, length)
+        };
+        self.at += length;
+        Ok(Part { kind, endian, bytes })
+    }
+
+    /// The corners of `count` cells, and where each cell's end. Before version 5.1, `size` numbers: of each cell how many
+    /// corners it has, and these. From then on, `count` offsets, the first of them 0, and `size` corners.
+    pub fn cells(
+        &mut self,
+        place: &str,
+        count: usize,
+        size: usize,
+    ) -> Result<(Vec<f64>, Vec<f64>)> {
+        let before = self.at;
+        if let Ok(Some((place, line))) = self.line()
+            && let Some(kind) = line.strip_prefix("OFFSETS")
+        {
+            let mut ends = self.array(&place, count, kind.trim())?.doubles(self.source)?;
+            let next = self.line()?;
+            let next = next
+                .as_ref()
+                .and_then(|(place, line)| Some((place, line.strip_prefix("CONNECTIVITY")?.trim())));
+            let (place, kind) =
+                next.ok_or_else(|| self.source.error(place, "offsets without their CONNECTIVITY"))?;
+            let corners = self.array(place, size, kind)?.doubles(self.source)?;
+            if ends.first().is_some_and(|&first| first != 0.0) {
+                return Err(self
+                    .source
+                    .error(place, format!("the first offset is {}, not 0", ends[0])));
+            }
+            ends.drain(..ends.len().min(1));
+            return Ok((corners, ends));
+        }
+        self.at = before;
+        let numbers = self.array(place, size, "int")?.doubles(self.source)?;
+        self.source.room::<[f64; 2]>("the corners of the cells", numbers.len())?;
+        let (mut corners, mut ends) = (Vec::new(), Vec::new());
+        let mut rest = &numbers[..];
+        for cell in 0..count {
+            // Casts saturate: a negative number of corners is 0.
+            let found = rest.split_first().and_then(|(&n, rest)| rest.split_at_checked(n as usize));
+            let Some((own, after)) = found else {
+                return Err(self
+                    .source
+                    .error(place, format!("cell {cell} has more corners than are listed")));
+            };
+            corners.extend_from_slice(own);
+            ends.push(corners.len() as f64);
+            rest = after;
+        }
+        Ok((corners, ends))
+    }
+
+    /// An array of a field: its name, components and numbers.
+    pub fn field(&mut self) -> Result<(String, usize, Part<'a>)> {
+        let Some((mut place, mut line)) = self.line()? else {
+            return Err(self.source.error(self.place(), "the file ends inside a FIELD"));
+        };
+        if line.starts_with("METADATA") {
+            self.skip_to_blank()?;
+            let next = self.line()?;
+            (place, line) =
+                next.ok_or_else(|| self.source.error(place, "the file ends inside a FIELD"))?;
+        }
+        let words: Vec<&str> = line.split_ascii_whitespace().take(5).collect();
+        let [name, components, tuples, kind] = words[..] else {
+            return Err(self.source.error(place, "needs a name, components, tuples and a type"));
+        };
+        self.source.spend("the size of the names in bytes", FIELD + 2 * name.len() as u64)?;
+        let (components, tuples) = (self.count(&place, components)?, self.count(&place, tuples)?);
+        let part = self.array(&place, components.saturating_mul(tuples), kind)?;
+        Ok((unescaped(name), components, part))
+    }
+
+    /// Passes over colours, which are bytes in binary and fractions in text.
+    pub fn skip_colors(&mut self, place: &str, count: usize, components: usize) -> Result<()> {
+        let kind = if self.binary { "unsigned_char" } else { "float" };
+        self.array(place, count.saturating_mul(components), kind).map(drop)
+    }
+}
+
+/// Bytes up to the end of the `count`-th word, or how many words there are.
+fn length_of_words(bytes: &[u8], count: usize) -> Result<usize, usize> {
+    let (mut found, mut at) = (0, 0);
+    while found < count {
+        at += bytes[at..].iter().position(|b| !b.is_ascii_whitespace()).ok_or(found)?;
+        at += bytes[at..].iter().position(u8::is_ascii_whitespace).unwrap_or(bytes.len() - at);
+        found += 1;
+    }
+    Ok(at)
+}
+
+/// A name as it was before characters were written as % and two hexadecimal digits.
+pub(super) fn unescaped(name: &str) -> String {
+    let mut bytes = Vec::new();
+    let mut rest = name.as_bytes();
+    while let [first, after @ ..] = rest {
+        let digit = |at: usize| after.get(at).and_then(|&digit| char::from(digit).to_digit(16));
+        let code = digit(0)
+            .zip(digit(1))
+            .filter(|_| *first == b'%')
+            .map(|(high, low)| (16 * high + low) as u8);
+        bytes.push(code.unwrap_or(*first));
+        rest = if code.is_some() { &after[2..] } else { after };
+    }
+    copy::lossy(&bytes)
+}

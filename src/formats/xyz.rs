@@ -1,0 +1,311 @@
+//! Point clouds as tables of text (`.xyz`, `.pts`, `.asc`, `.csv`, `.txt`): a point a line, with a line of names or without.
+//! `.pts` files begin each scan with its count of points in a line of its own.
+
+use super::shared::cloud::{Cloud, greys};
+use crate::{
+    Result,
+    input::{
+        Source, copy,
+        growing::Growing,
+        text::{Text, first_words},
+    },
+    surface::Mesh,
+};
+use glam::{DVec3, Vec3};
+
+/// Bytes that a point takes with all that it may have.
+const POINT: u64 = 24 + 12 + 8;
+
+/// The names of what a point has; names are compared without regard to case.
+const POSITION: [&[&str]; 3] = [&["x"], &["y"], &["z"]];
+const COLOR: [&[&str]; 3] = [&["r", "red"], &["g", "green"], &["b", "blue"]];
+const NORMAL: [&[&str]; 3] = [
+    &["nx", "normal_x", "normalx"],
+    &["ny", "normal_y", "normaly"],
+    &["nz", "normal_z", "normalz"],
+];
+const INTENSITY: &[&str] = &["intensity", "i", "grey", "gray", "reflectance"];
+
+/// Reads a cloud. With names: `x`, `y`, `z` and if there are some `r`, `g`, `b` (or `red`, …), `nx`, `ny`, `nz` (or
+/// `normal_x`, …) and `intensity`; other columns are passed over. Without: 3 columns of a position, and then an intensity,
+/// or a colour or normal, or both of them in either order, or an intensity and a colour, or these and a normal. Three numbers
+/// are a normal where all lie between −1 and 1 and some are below 0 or all lengths are 1. Intensities are drawn as greys where
+/// there are no colours. Colours are bytes, or of 16 bits where some are larger, or fractions where none is above 1.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) with the line, for columns that are not these, lines of another length, what is no
+/// number, numbers that are not finite, and fewer points than the file counts; [`Error::Limit`](crate::Error::Limit) for more
+/// lines than points are allowed.
+pub fn read(source: &Source) -> Result<Mesh> {
+    let mut counts = Growing::new(source, "the counts");
+    let text = Text::of(source, |number, line| match copy::number::<u64>(line) {
+        Some(count) => counts.push((number, count)).map(|()| true),
+        None => Ok(false),
+    })?;
+    let counted = counts.iter().fold(0u64, |sum, &(_, count)| sum.saturating_add(count));
+    if let Some(&(line, _)) = counts.first().filter(|_| counted != text.len() as u64) {
+        return Err(source
+            .error(
+                format!("line {line}"),
+                format!("counts {counted} points, but there are {}", text.len()),
+            )
+            .hint("the file is cut, or a line has a single number"));
+    }
+    let mut layout = match &text.names {
+        Some(names) => Layout::named(source, text.first, names)?,
+        None => Layout::plain(source, text.first, text.width)?,
+    };
+    let table = text.numbers(source, |column| layout.uses(column))?;
+    let value = |row: usize, column: usize| table[row * text.width + column];
+    let rows = || 0..text.len();
+    let three = |row: usize, columns: [usize; 3]| {
+        DVec3::from_array(columns.map(|column| value(row, column)))
+    };
+    // Without names the numbers tell what they are.
+    let is_normal = |columns: [usize; 3]| {
+        let mut all = rows().map(|row| three(row, columns));
+        let unit = rows().all(|row| (three(row, columns).length() - 1.0).abs() < 0.02);
+        let signed = rows().any(|row| three(row, columns).min_element() < 0.0);
+        all.all(|v| v.abs().max_element() <= 1.0) && (unit || signed)
+    };
+    for columns in layout.untold.clone() {
+        let slot = if is_normal(columns) { &mut layout.normal } else { &mut layout.color };
+        if slot.replace(columns).is_some() {
+            return Err(source
+                .error(
+                    format!("line {}", text.first),
+                    "has two colours or two normals behind the position",
+                )
+                .hint("name the columns in the first line"));
+        }
+    }
+    source.spend("the size of the points in bytes", POINT * text.len() as u64)?;
+    let positions = rows().map(|row| three(row, layout.position)).collect();
+    let mut cloud = Cloud { positions, z_is_up: true, ..Cloud::default() };
+    if let Some(columns) = layout.normal {
+        cloud.normals = rows().map(|row| three(row, columns).as_vec3()).collect::<Vec<Vec3>>();
+    }
+    if let Some(columns) = layout.color {
+        let largest = rows().map(|row| three(row, columns).max_element()).fold(0.0, f64::max);
+        let scale = if largest > 255.0 {
+            255.0 / 65535.0
+        } else if largest > 1.0 {
+            1.0
+        } else {
+            255.0
+        };
+        let color = |row| (three(row, columns) * scale).to_array().map(|part| part.round() as u8);
+        cloud.colors = rows().map(color).map(|[r, g, b]| [r, g, b, 255]).collect();
+    } else if let Some(column) = layout.intensity {
+        cloud.colors = greys(&rows().map(|row| value(row, column) as f32).collect::<Vec<f32>>());
+    }
+    cloud.into_mesh(source, |row| text.place(row))
+}
+
+/// Whether a table is a cloud and not samples: its first line names colours or normals but no `value` or `scalar`, or names
+/// nothing but a position, or has as many numbers without names as a cloud has and samples have not.
+pub(super) fn is_cloud(source: &Source) -> bool {
+    let Some((words, named)) = first_words(source.bytes()) else { return false };
+    if !named {
+        return matches!(words.len(), 1 | 3 | 6 | 7 | 9);
+    }
+    let has = |names: &[&str]| find(&words, names).is_some();
+    let is_sample = has(&["value", "scalar"]);
+    !is_sample
+        && (triple(&words, COLOR).is_some() || triple(&words, NORMAL).is_some() || words.len() == 3)
+}
+
+/// Which column means what.
+#[derive(Default)]
+struct Layout {
+    position: [usize; 3],
+    color: Option<[usize; 3]>,
+    normal: Option<[usize; 3]>,
+    intensity: Option<usize>,
+    /// Columns that are a colour or a normal.
+    untold: Vec<[usize; 3]>,
+}
+
+impl Layout {
+    fn named(source: &Source, line: usize, names: &[String]) -> Result<Self> {
+        let Some(position) = triple(names, POSITION) else {
+            let missing =
+                POSITION.iter().find(|name| find(names, name).is_none()).map_or("", |name| name[0]);
+            return Err(
+                source.error(format!("line {line}"), format!("names no column “{missing}”"))
+            );
+        };
+        Ok(Self {
+            position,
+            color: triple(names, COLOR),
+            normal: triple(names, NORMAL),
+            intensity: find(names, INTENSITY),
+            untold: Vec::new(),
+        })
+    }
+
+    fn plain(source: &Source, line: usize, width: usize) -> Result<Self> {
+        let plain = Self { position: [0, 1, 2], ..Self::default() };
+        match width {
+            3 => Ok(plain),
+            4 => Ok(Self { intensity: Some(3), ..plain }),
+            6 => Ok(Self { untold: vec![[3, 4, 5]], ..plain }),
+            7 => Ok(Self { intensity: Some(3), color: Some([4, 5, 6]), ..plain }),
+            9 => Ok(Self { untold: vec![[3, 4, 5], [6, 7, 8]], ..plain }),
+            10 => Ok(Self { intensity: Some(3), color: Some([4, 5, 6]), normal: Some([7, 8, 9]), ..plain }),
+            _ => Err(source.error(format!("line {line}"), format!("has {width} columns without names")).hint(
+                "a point is x, y, z and then a colour, a normal, both, or an intensity and a colour; or name the columns in the \
+                 first line",
+            )),
+        }
+    }
+
+    fn uses(&self, column: usize) -> bool {
+        let triples = [Some(self.position), self.color, self.normal];
+        self.intensity == Some(column)
+            || triples.iter().flatten().chain(&self.untold).any(|columns| columns.contains(&column))
+    }
+}
+
+fn find(names: &[String], wanted: &[&str]) -> Option<usize> {
+    names.iter().position(|name| wanted.iter().any(|wanted| name.eq_ignore_ascii_case(wanted)))
+}
+
+fn triple(names: &[String], wanted: [&[&str]; 3]) -> Option<[usize; 3]> {
+    let [a, b, c] = wanted.map(|wanted| find(names, wanted));
+    Some([a?, b?, c?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        Error,
+        formats::{Kind, load_mesh},
+        input::{Limits, testing::*},
+    };
+
+    fn load(text: &str) -> Result<Mesh> {
+        let folder = Folder::new();
+        read_with(&folder.write("a.xyz", text), read)
+    }
+
+    #[test]
+    fn every_set_of_columns() {
+        let colors = [[255, 128, 0, 255], [0, 0, 51, 255]];
+        for (text, colored, normal) in [
+            ("1 2 3\n4 5 6\n", false, false),
+            ("1,2,3,255,128,0\r\n4,5,6,0,0,51", true, false),
+            ("1,2,3,255,128,0\r4,5,6,0,0,51\r", true, false),
+            ("1 2 3 65535 32896 0\n4 5 6 0 0 13107", true, false),
+            ("1 2 3 1.0 0.502 0\n4 5 6 0 0 0.2", true, false),
+            ("1 2 3 0 0.6 0.8\n4 5 6 -1 0 0", false, true),
+            ("1 2 3 0 0.6 0.8 255 128 0\n4 5 6 1 0 0 0 0 51", true, true),
+            ("1 2 3 255 128 0 0 0.6 0.8\n4 5 6 0 0 51 1 0 0", true, true),
+            ("2\n1 2 3 -1200 255 128 0\n4 5 6 7 0 0 51", true, false),
+            ("1\n1 2 3 -1200 255 128 0\n1\n4 5 6 7 0 0 51\n", true, false),
+            ("# made by hand\n1 2 3 9 255 128 0 0 0.6 0.8\n4 5 6 8 0 0 51 1 0 0", true, true),
+            ("//X Y Z R G B Nx Ny Nz\n1 2 3 255 128 0 0 0.6 0.8\n4 5 6 0 0 51 1 0 0", true, true),
+            ("name;blue;green;red;z;y;x\nfirst;0;128;255;3;2;1\n;51;0;0;6;5;4", true, false),
+        ] {
+            let mesh = load(text).unwrap_or_else(|error| panic!("{text}: {error}"));
+            assert_eq!(
+                mesh.positions,
+                [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)],
+                "{text}"
+            );
+            assert_eq!(mesh.colors, if colored { &colors[..] } else { &[] }, "{text}");
+            assert_eq!(mesh.normals.len(), if normal { 2 } else { 0 }, "{text}");
+            assert!(!normal || mesh.normals[0].distance(Vec3::new(0.0, 0.6, 0.8)) < 1e-6, "{text}");
+        }
+        for text in ["1 2 3 100\n4 5 6 300", "x y z intensity\n1 2 3 -1\n4 5 6 0"] {
+            assert_eq!(load(text).unwrap().colors, [[0, 0, 0, 255], [255; 4]], "{text}");
+        }
+    }
+
+    #[test]
+    fn positions_on_the_globe_keep_millimetres() {
+        let mesh = load("4500000.001 5400000.002 100.003\n4500000.004 5400000.009 100\n").unwrap();
+        let world = |i: usize| mesh.origin + mesh.positions[i].as_dvec3();
+        assert!(world(0).distance(DVec3::new(4500000.001, 5400000.002, 100.003)) < 1e-5);
+        assert!(world(1).distance(DVec3::new(4500000.004, 5400000.009, 100.0)) < 1e-5);
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_its_line() {
+        for (text, word) in [
+            ("", "no lines"),
+            ("hello", "no column “x”"),
+            ("x y\n1 2", "no column “z”"),
+            ("1 2\n", "line 1: has 2 columns without names"),
+            ("1 2 3 4 5", "5 columns without names"),
+            ("x y z\n", "no points"),
+            ("1 2 3\n4 5", "line 2: has 2 columns, but the first line has 3"),
+            ("1 2 3\n4 nan 6", "line 2: number 2 is NaN"),
+            ("1 2 3\r\n4 nan 6\r\n", "line 2: number 2 is NaN"),
+            ("1 2 3\r4 nan 6\r", "line 2: number 2 is NaN"),
+            ("1 2 3\n4 five 6", "line 2: “five” is not a number"),
+            ("3\n1 2 3\n4 5 6\n", "line 1: counts 3 points, but there are 2"),
+            (
+                "18446744073709551615\n1 2 3\n18446744073709551615\n4 5 6\n",
+                "line 1: counts 18446744073709551615",
+            ),
+            ("0\n1 2 3\n", "counts 0 points"),
+            ("1 2 3 1 0 0 0 1 0", "two colours or two normals"),
+        ] {
+            let message = load(text).unwrap_err().to_string();
+            assert!(message.contains(word), "{text}: {message}");
+        }
+        let folder = Folder::new();
+        let path = folder.write("a.xyz", "1 2 3\n4 5 6\n");
+        let limits = Limits { points: 1, ..Limits::default() };
+        assert!(matches!(read(&Source::open(&path, &limits).unwrap()), Err(Error::Limit { .. })));
+    }
+
+    /// A file that counts its points notices each cut but that of its last number.
+    #[test]
+    fn every_cut_is_an_error_or_less() {
+        let whole = "2\n1 2 3 9 255 128 0\n4 5 6 8 0 0 51";
+        for end in 0..whole.len() - 1 {
+            assert!(matches!(load(&whole[..end]), Err(Error::Input { .. })), "{end}");
+        }
+        let named = "x,y,z,r,g,b\n1,2,3,4,5,6\n";
+        for end in 0..named.len() {
+            match load(&named[..end]) {
+                Ok(mesh) => assert_eq!(mesh.positions.len(), 1),
+                Err(error) => assert!(matches!(error, Error::Input { .. }), "{error}"),
+            }
+        }
+    }
+
+    #[test]
+    fn tables_are_clouds_or_samples() {
+        let folder = Folder::new();
+        for (name, text, cloud) in [
+            ("a.xyz", "1 2 3 4\n", true),
+            ("a.pts", "1\n1 2 3\n", true),
+            ("a.ASC", "1 2 3\n", true),
+            ("a.xyzv", "1 2 3 4\n", false),
+            ("a.csv", "1,2,3\n", true),
+            ("a.csv", "1,2,3,4\n", false),
+            ("a.csv", "1,2,3,4,5\n", false),
+            ("a.txt", "1 2 3 4 5 6\n", true),
+            ("a.txt", "1 2 3 4 5 6 7 8 9 10\n", false),
+            ("a.csv", "x,y,z\n1,2,3\n", true),
+            ("a.csv", "x,y,z,p\n1,2,3,4\n", false),
+            ("a.csv", "x,y,z,red,green,blue\n1,2,3,4,5,6\n", true),
+            ("a.csv", "x,y,z,nx,ny,nz,curvature\n1,2,3,1,0,0,9\n", true),
+            ("a.csv", "x,y,z,r,g,b,value\n1,2,3,4,5,6,7\n", false),
+        ] {
+            let path = folder.write(name, text);
+            let kind = |scalar| Kind::of(&path, &Limits::default(), scalar).unwrap();
+            assert_eq!(
+                kind(false),
+                Some(if cloud { Kind::Mesh } else { Kind::Samples }),
+                "{name}: {text}"
+            );
+            assert_eq!(kind(true), Some(Kind::Samples), "{name}: {text}");
+            assert!(!cloud || load_mesh(&path, &Limits::default()).is_ok(), "{name}: {text}");
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! Files mapped to memory, which others may shorten or write to meanwhile.
+//!
+//! A mapping is read like memory, at any place and by any thread, which is what the readers of large files live on. Its price:
+//! where a file is shortened, or its disk fails, reading the mapping raises a signal (SIGBUS) that ends the process. Here the
+//! signal is answered instead (`fault`): the rest of the mapping becomes zeros and is marked. Whoever is done with reading asks
+//! [`Mapping::change`], and drops what was made of zeros, or of bytes old and new.
+//!
+//! The bytes behind `&[u8]` may thus change, which Rust's rules do not foresee. What is relied on: the readers take every
+//! byte for untrusted when they use it, so that other bytes lead to other results, or to an error, and those are dropped.
+
+#[cfg(any(target_os = "linux", target_os = "macos"))]
+mod fault;
+#[cfg(not(any(target_os = "linux", target_os = "macos")))]
+mod fault {
+    //! Windows does not let mapped files be shortened. Elsewhere the signal keeps its usual effect.
+
+    pub struct Guard;
+
+    impl Guard {
+        pub fn new(_: &[u8]) -> Self {
+            Self
+        }
+
+        pub fn is_hit(&self) -> bool {
+            false
+        }
+    }
+}
+mod stamp;
+
+use memmap2::Mmap;
+use stamp::Stamp;
+use std::{fs::File, io, ops::Deref};
+
+/// The bytes of a file.
+pub(crate) struct Mapping {
+    /// None of an empty file. The guard goes before what it guards.
+    bytes: Option<(fault::Guard, Mmap)>,
+    file: File,
+    /// Of the file when it was opened.
+    opened: Stamp,
+}
+
+impl Mapping {
+    pub fn new(file: File) -> io::Result<Self> {
+        let opened = Stamp::of(&file)?;
+        let bytes = match opened.length {
+            0 => None,
+            _ => Some(map(&file)?),
+        };
+        Ok(Self { bytes, file, opened })
+    }
+
+    /// What has become of the file since it was opened, in words; `None` where nothing has.
+    pub fn change(&self) -> Option<String> {
+        if self.bytes.as_ref().is_some_and(|(guard, _)| guard.is_hit()) {
+            return Some("a part of it is not there any more, or its disk failed".into());
+        }
+        // A file that cannot be asked any more may still have given what was in it.
+        self.opened.change(&Stamp::of(&self.file).ok()?)
+    }
+
+    /// Gives the pages that were read back to the system: those who go through a file larger than memory do so now and
+    /// then. They are read again where they are asked for again.
+    pub fn release(&self) {
+        #[cfg(unix)]
+        #[expect(unsafe_code, reason = "advice that may drop what was written to a mapping")]
+        if let Some((_, map)) = &self.bytes {
+            // SAFETY: the mapping is of a file and read only, or of zeros where `fault` put them: what is dropped reads again as
+            // it was. Where the advice is not taken, nothing is lost.
+            unsafe { map.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) }.ok();
+        }
+    }
+}
+
+#[expect(unsafe_code, reason = "mapping a file, which others may change")]
+fn map(file: &File) -> io::Result<(fault::Guard, Mmap)> {
+    // SAFETY: the mapping is read only. That others may change the file, and what comes of it, is told above.
+    let map = unsafe { Mmap::map(file) }?;
+    Ok((fault::Guard::new(&map), map))
+}
+
+impl Deref for Mapping {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        self.bytes.as_ref().map_or(&[], |(_, map)| map)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::testing::Folder;
+    use std::{io::Write, path::Path};
+
+    fn mapping(path: &Path) -> Mapping {
+        Mapping::new(File::open(path).unwrap()).unwrap()
+    }
+
+    #[cfg(any(target_os = "linux", target_os = "macos"))]
+    fn shorten(path: &Path, length: u64) {
+        File::options().write(true).open(path).unwrap().set_len(length).unwrap();
+    }
+
+    #[test]
+    #[cfg(any(target_os = "linux", target_os = "macos"))]
+    fn what_is_gone_reads_as_zeros_and_is_told() {
+        let folder = Folder::new();
+        let path = folder.write("a", [7; 100_000]);
+        let [hit, other, away] =
+            [mapping(&path), mapping(&folder.write("b", [7; 100_000])), mapping(&path)];
+        assert!(hit.change().is_none() && hit[99_999] == 7);
+        shorten(&path, 5000);
+        assert_eq!((hit[99_999], hit[4999], hit[5001], hit[70_000]), (0, 7, 0, 0));
+        hit.release();
+        assert_eq!((hit[99_999], hit[4999]), (0, 7));
+        assert!(hit.change().unwrap().contains("not there any more"));
+        // Others have not been read, and are told by their length alone.
+        assert_eq!((other.change(), other[99_999]), (None, 7));
+        assert!(away.change().unwrap().contains("5000 bytes"));
+        // Each mapping answers for itself, by many threads at once, and guards are used again.
+        drop(hit);
+        for _ in 0..100 {
+            let path = folder.write("c", [7; 100_000]);
+            let mapping = mapping(&path);
+            shorten(&path, 0);
+            std::thread::scope(|scope| {
+                for part in 0..4 {
+                    let mapping = &mapping;
+                    scope.spawn(move || {
+                        assert!(mapping[part * 25_000..][..25_000].iter().all(|&byte| byte == 0))
+                    });
+                }
+            });
+            assert!(mapping.change().unwrap().contains("not there any more"));
+        }
+        assert_eq!((other.change(), other[50_000]), (None, 7));
+    }
+
+    #[test]
+    fn files_that_grow_or_are_written_to_are_told() {
+        let folder = Folder::new();
+        let path = folder.write("a", [7; 5000]);
+        let [grown, empty] = [mapping(&path), mapping(&folder.write("b", []))];
+        assert!(grown.change().is_none() && empty.change().is_none() && empty.is_empty());
+        File::options().append(true).open(&path).unwrap().write_all(&[7]).unwrap();
+        assert!(grown.change().unwrap().contains("5001 bytes"));
+        let written = mapping(&path);
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        File::options().write(true).open(&path).unwrap().write_all(&[8]).unwrap();
+        assert!(written.change().unwrap().contains("written to"));
+        // A new file of the same name is another one.
+        let replaced = mapping(&path);
+        folder.write("a", [9; 10]);
+        assert!(replaced.change().is_none() && replaced.len() == 5001);
+    }
+}

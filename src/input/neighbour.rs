@@ -1,0 +1,175 @@
+//! References from one file to another: relative, and inside the folder of the file that has them.
+
+use super::Source;
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+
+impl Source<'_> {
+    /// The path of a file that this file refers to: relative, and inside this file's folder after links are resolved.
+    ///
+    /// What is a path elsewhere, on any system, is refused on all of them: a model that one machine takes is taken by
+    /// every other.
+    pub fn neighbour(&self, place: &str, reference: &str) -> Result<PathBuf> {
+        let refuse = |reason: &str| {
+            let shown: String = reference.chars().take(80).collect();
+            self.error(place, format!("refers to “{shown}”, {reason}")).hint(
+                "put the file beside the one that names it and refer to it by a relative path",
+            )
+        };
+        if let Some(reason) = refusal(reference) {
+            return Err(refuse(reason));
+        }
+        if self.is_in_memory() {
+            let message = format!(
+                "refers to “{reference}”, but was read from memory, where there are no other files"
+            );
+            return Err(self
+                .error(place, message)
+                .hint("open the file by its path, beside those that it refers to"));
+        }
+        let folder =
+            self.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let target = folder.join(reference);
+        let real = target
+            .canonicalize()
+            .map_err(|e| self.error(place, format!("refers to “{reference}”: {e}")))?;
+        let home = folder.canonicalize().map_err(|e| Error::file(folder, "resolve", e))?;
+        if !real.starts_with(&home) {
+            return Err(refuse("a link that leaves the file's own folder"));
+        }
+        if self.path.canonicalize().is_ok_and(|own| own == real) {
+            return Err(refuse("the file itself"));
+        }
+        if !real.is_file() {
+            return Err(refuse("which is not a regular file"));
+        }
+        Ok(target)
+    }
+}
+
+/// Whether a reference is a path inside a folder, by its text alone.
+pub(crate) fn is_inside(reference: &str) -> bool {
+    refusal(reference).is_none()
+}
+
+/// Why a reference is none to a file inside the folder, by its text alone.
+fn refusal(reference: &str) -> Option<&'static str> {
+    let parts = || reference.split(['/', '\\']);
+    if reference.trim().is_empty() {
+        return Some("which names no file");
+    }
+    if reference.contains('\0') {
+        return Some("which is no path");
+    }
+    // “C:” is a drive, “file:” and “http:” are schemes; no portable name has a colon.
+    if reference.contains(':') {
+        return Some("an address or a drive; only files in the same folder or below it are read");
+    }
+    if reference.starts_with(['/', '\\']) {
+        return Some("an absolute path; only files in the same folder or below it are read");
+    }
+    if parts().any(|part| part == "..") {
+        return Some("which leads out of the file's own folder");
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::{Limits, testing::Folder};
+
+    #[test]
+    fn references_stay_in_their_folder() {
+        let folder = Folder::new();
+        let inside = folder.path().join("model");
+        std::fs::create_dir_all(inside.join("below")).unwrap();
+        let path = inside.join("a.gltf");
+        for file in ["a.gltf", "b.bin", "below/c.bin", "two words.bin", "x..y.bin"] {
+            std::fs::write(inside.join(file), "bytes").unwrap();
+        }
+        folder.write("outside.bin", "bytes");
+        let limits = Limits::default();
+        let source = Source::open(&path, &limits).unwrap();
+        for name in
+            ["b.bin", "./b.bin", "below/c.bin", "below/./c.bin", "two words.bin", "x..y.bin"]
+        {
+            assert!(source.neighbour("buffer 0", name).is_ok(), "{name}");
+        }
+        let outside = folder.path().join("outside.bin");
+        for (reference, reason) in [
+            ("../outside.bin", "leads out of the file's own folder"),
+            ("below/../../outside.bin", "leads out of the file's own folder"),
+            ("..", "leads out of the file's own folder"),
+            ("..\\outside.bin", "leads out of the file's own folder"),
+            ("below\\..\\..\\outside.bin", "leads out of the file's own folder"),
+            (outside.to_str().unwrap(), "an absolute path"),
+            ("/etc/hostname", "an absolute path"),
+            ("\\\\server\\share\\b.bin", "an absolute path"),
+            ("\\b.bin", "an absolute path"),
+            ("C:\\b.bin", "an address or a drive"),
+            ("C:b.bin", "an address or a drive"),
+            ("file:///etc/hostname", "an address or a drive"),
+            ("file:b.bin", "an address or a drive"),
+            ("http://example.org/b.bin", "an address or a drive"),
+            ("b.bin:stream", "an address or a drive"),
+            ("", "names no file"),
+            ("  ", "names no file"),
+            ("b\0.bin", "is no path"),
+            ("below", "not a regular file"),
+            (".", "not a regular file"),
+            ("a.gltf", "the file itself"),
+            ("below/../a.gltf", "leads out"),
+            ("none.bin", "No such file"),
+        ] {
+            let message = source.neighbour("buffer 0", reference).unwrap_err().to_string();
+            assert!(message.contains(reason), "{reference}: {message}");
+            assert!(message.contains("a.gltf: buffer 0: refers to"), "{message}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_pipes_are_looked_through() {
+        use std::os::unix::fs::symlink;
+        let folder = Folder::new();
+        let inside = folder.path().join("model");
+        std::fs::create_dir(&inside).unwrap();
+        let path = inside.join("a.gltf");
+        std::fs::write(&path, "{}").unwrap();
+        std::fs::write(inside.join("b.bin"), "bytes").unwrap();
+        let outside = folder.write("outside.bin", "bytes");
+        symlink(&outside, inside.join("out.bin")).unwrap();
+        symlink(folder.path(), inside.join("up")).unwrap();
+        symlink("b.bin", inside.join("in.bin")).unwrap();
+        symlink("a.gltf", inside.join("self.bin")).unwrap();
+        symlink("/dev/zero", inside.join("zero.bin")).unwrap();
+        symlink("loop.bin", inside.join("loop.bin")).unwrap();
+        let limits = Limits::default();
+        let source = Source::open(&path, &limits).unwrap();
+        assert!(source.neighbour("buffer 0", "in.bin").is_ok());
+        for (reference, reason) in [
+            ("out.bin", "a link that leaves the file's own folder"),
+            ("up/outside.bin", "a link that leaves the file's own folder"),
+            ("zero.bin", "a link that leaves the file's own folder"),
+            ("self.bin", "the file itself"),
+            ("loop.bin", "symbolic links"),
+        ] {
+            let message = source.neighbour("buffer 0", reference).unwrap_err().to_string();
+            assert!(message.contains(reason), "{reference}: {message}");
+        }
+        // What waits for another process, or has no end, is not opened.
+        let pipe = inside.join("pipe.bin");
+        if std::process::Command::new("mkfifo")
+            .arg(&pipe)
+            .status()
+            .is_ok_and(|status| status.success())
+        {
+            let message = source.neighbour("buffer 0", "pipe.bin").unwrap_err().to_string();
+            assert!(message.contains("not a regular file"), "{message}");
+            assert!(Source::open(&pipe, &limits).is_err());
+        }
+        assert!(Source::open(Path::new("/dev/zero"), &limits).is_err());
+        assert!(Source::open(folder.path(), &limits).is_err());
+    }
+}

@@ -1,0 +1,272 @@
+//! The guarded opening: every format reads its bytes through a [`Source`], which maps the file, holds the limits
+//! and gives errors that name the file.
+
+use super::{Limits, budget::Budget, copy, mapping::Mapping};
+use crate::{Error, Result, error::LimitKind, memory};
+use std::{
+    fs::File,
+    io::Read,
+    path::{Path, PathBuf},
+    sync::{Arc, OnceLock},
+};
+
+/// Bytes that are unpacked between two looks at the clock.
+const PORTION: u64 = 16 << 20;
+
+/// The system is not asked for less than this many bytes.
+const SMALL: u64 = 64 << 10;
+
+/// Where the bytes of an input are.
+enum Content<'a> {
+    Mapped(Mapping),
+    /// In place of a file.
+    Held(&'a [u8]),
+}
+
+/// An opened input: its path, its bytes (mapped) and the limits that hold for it.
+pub struct Source<'a> {
+    pub path: &'a Path,
+    pub limits: &'a Limits,
+    content: Content<'a>,
+    /// Text of the file that the reader refers to, as a copy.
+    text: OnceLock<String>,
+    /// Shared by all files of a model.
+    budget: Arc<Budget>,
+}
+
+impl<'a> Source<'a> {
+    /// Opens and maps a regular file. Directories, devices, missing files and files over the byte limit are errors.
+    pub fn open(path: &'a Path, limits: &'a Limits) -> Result<Self> {
+        Self::open_within(path, limits, Arc::new(Budget::new()))
+    }
+
+    /// Opens a file that this one refers to, at a path from [`neighbour`](Self::neighbour), or that is read together with it:
+    /// both count as one.
+    pub(crate) fn open_beside<'b>(&self, path: &'b Path) -> Result<Source<'b>>
+    where
+        'a: 'b,
+    {
+        Source::open_within(path, self.limits, self.budget.clone())
+    }
+
+    fn open_within(path: &'a Path, limits: &'a Limits, budget: Arc<Budget>) -> Result<Self> {
+        let content = Content::Mapped(map_within(path, limits, &budget)?);
+        Ok(Self { path, limits, content, text: OnceLock::new(), budget })
+    }
+
+    /// Maps a file as [`open`](Self::open) does, for those who read from it later.
+    pub(crate) fn map(path: &Path, limits: &Limits) -> Result<Mapping> {
+        map_within(path, limits, &Budget::new())
+    }
+
+    /// The files that were opened so far: this one, and those that it refers to where a reader has asked for them.
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.budget.files()
+    }
+
+    /// Takes bytes in place of a file: of a program that has them from elsewhere. `name` is what errors call them, and its
+    /// extension tells their format where that is asked for. There is no folder around them, so what they refer to is not
+    /// read: missing materials and pictures are left out with a warning, missing data are an error.
+    ///
+    /// # Errors
+    /// [`Error::Limit`] for more bytes than the limits allow.
+    pub fn from_bytes(name: &'a Path, bytes: &'a [u8], limits: &'a Limits) -> Result<Self> {
+        let budget = Arc::new(Budget::new());
+        budget.spend(limits, name, "the file's size in bytes", bytes.len() as u64)?;
+        Ok(Self {
+            path: name,
+            limits,
+            content: Content::Held(bytes),
+            text: OnceLock::new(),
+            budget,
+        })
+    }
+
+    /// Whether this is no file but bytes from elsewhere, which have no neighbours.
+    pub(crate) fn is_in_memory(&self) -> bool {
+        matches!(self.content, Content::Held(_))
+    }
+
+    /// The whole file.
+    pub fn bytes(&self) -> &[u8] {
+        match &self.content {
+            Content::Mapped(mapping) => mapping,
+            Content::Held(bytes) => bytes,
+        }
+    }
+
+    /// An error if the file is not the one that was opened any more, so that what was read may be neither the old nor the
+    /// new. The readers of whole files ask when they are done.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with what has become of the file.
+    pub fn intact(&self) -> Result<()> {
+        match &self.content {
+            Content::Mapped(mapping) => intact(mapping, self.path),
+            Content::Held(_) => Ok(()),
+        }
+    }
+
+    /// The text of a file that people write, as a copy: what was checked stays what it is. `what` names it in errors (“a
+    /// transfer function”).
+    ///
+    /// # Errors
+    /// [`Error::Input`] for more than `most` bytes, for what is not UTF-8, and for a file that changed.
+    pub fn small_text(&self, what: &str, most: usize) -> Result<String> {
+        let size = self.bytes().len();
+        if size > most {
+            return Err(
+                self.error("file", format!("has {size} bytes, but {what} has {most} at most"))
+            );
+        }
+        let text = copy::text(self.bytes());
+        self.intact()?;
+        text.map_err(|at| self.error(format!("byte {at}"), "is not UTF-8 text"))
+    }
+
+    /// A part of the file as text, copied and kept as long as this source. Only one part can be kept: a second call returns
+    /// the first text. `what` names it in errors.
+    pub(crate) fn keep_text(&self, bytes: &[u8], what: &str) -> Result<&str> {
+        self.room::<u8>("the text", bytes.len())?;
+        let text = copy::text(bytes)
+            .map_err(|at| self.error(format!("byte {at}"), format!("{what} is not UTF-8 text")))?;
+        Ok(self.text.get_or_init(|| text))
+    }
+
+    /// What was made of the file, or why it was not; and where the file was changed meanwhile, that alone.
+    pub(crate) fn unless_changed<T>(&self, found: Result<T>) -> Result<T> {
+        self.intact().and(found)
+    }
+
+    /// See [`Mapping::release`].
+    pub(crate) fn release(&self) {
+        if let Content::Mapped(mapping) = &self.content {
+            mapping.release();
+        }
+    }
+
+    /// The mapping itself, for those who read from it later; bytes that are held have none.
+    pub(crate) fn into_mapping(self) -> Option<Mapping> {
+        match self.content {
+            Content::Mapped(mapping) => Some(mapping),
+            Content::Held(_) => None,
+        }
+    }
+
+    /// An input error at a place of this file (`"line 12"`, `"byte 407"`, `"header"`).
+    pub fn error(&self, place: impl Into<String>, message: impl Into<String>) -> Error {
+        Error::input(self.path, place, message)
+    }
+
+    /// Checks a claimed count against [`Limits::points`].
+    pub fn check_points(&self, what: &str, count: u64) -> Result<usize> {
+        self.check(LimitKind::Points, what, count)
+    }
+
+    /// Checks a claimed number of bytes against [`Limits::bytes`], without taking them.
+    pub fn check_bytes(&self, what: &str, bytes: u64) -> Result<usize> {
+        self.check(LimitKind::Bytes, what, bytes)
+    }
+
+    /// Checks a depth of nesting against [`Limits::depth`].
+    pub(crate) fn check_depth(&self, place: &str, depth: usize) -> Result<()> {
+        self.limits.check(
+            LimitKind::Depth,
+            self.path,
+            format!("{place}: the depth of nesting"),
+            depth as u64,
+        )
+    }
+
+    /// Checks that there is still time ([`Limits::seconds`]).
+    pub(crate) fn check_time(&self) -> Result<()> {
+        self.budget.check_time(self.limits, self.path)
+    }
+
+    /// Lets the time begin again, for the next pieces of a file that is read in pieces.
+    pub(crate) fn restart_time(&self) {
+        self.budget.restart();
+    }
+
+    /// Takes so many bytes from what this input may occupy ([`Limits::bytes`]), and asks the system whether they are there.
+    pub(crate) fn spend(&self, what: &str, bytes: u64) -> Result<()> {
+        self.budget.spend(self.limits, self.path, what, bytes)?;
+        // Readers take small amounts for each item.
+        if bytes < SMALL {
+            return Ok(());
+        }
+        let what = what
+            .strip_prefix("the size of ")
+            .and_then(|what| what.strip_suffix(" in bytes"))
+            .unwrap_or(what);
+        memory::room(&format!("reading {what}"), bytes).map_err(|error| error.in_file(self.path))
+    }
+
+    /// As [`spend`](Self::spend), for an array: `what` names what it holds.
+    pub(crate) fn room<T>(&self, what: &str, count: usize) -> Result<()> {
+        self.spend(
+            &format!("the size of {what} in bytes"),
+            (count as u64).saturating_mul(size_of::<T>() as u64),
+        )
+    }
+
+    fn check(&self, kind: LimitKind, what: &str, found: u64) -> Result<usize> {
+        self.limits.check(kind, self.path, what, found)?;
+        // A 32-bit machine counts less than a limit may allow.
+        usize::try_from(found)
+            .map_err(|_| self.error(what, format!("is {found}, more than this machine can count")))
+    }
+
+    /// Unpacks a stream whose unpacked size is known. A stream that ends early or holds more than `expected` is an
+    /// error; memory grows with what was really unpacked, so a lying size allocates nothing.
+    pub fn unpack(&self, place: &str, mut stream: impl Read, expected: usize) -> Result<Vec<u8>> {
+        // The list grows with what is unpacked, and reading to its end gives an error where there is no memory.
+        self.budget.spend(self.limits, self.path, "the unpacked size in bytes", expected as u64)?;
+        let mut out = Vec::new();
+        loop {
+            self.check_time()?;
+            let before = out.len();
+            let most = PORTION.min(expected as u64 + 1 - before as u64);
+            let read = stream.by_ref().take(most).read_to_end(&mut out);
+            read.map_err(|e| {
+                self.error(place, format!("cannot be unpacked after {} bytes: {e}", out.len()))
+            })?;
+            if out.len() == before || out.len() > expected {
+                break;
+            }
+        }
+        if out.len() != expected {
+            let found =
+                if out.len() > expected { "more".to_owned() } else { out.len().to_string() };
+            return Err(self
+                .error(place, format!("unpacks to {found} bytes where {expected} were expected")));
+        }
+        Ok(out)
+    }
+}
+
+fn map_within(path: &Path, limits: &Limits, budget: &Budget) -> Result<Mapping> {
+    // Opening a pipe would wait for its other end, and opening a device may start it: so look first.
+    let look = std::fs::metadata(path).map_err(|e| Error::file(path, "open", e))?;
+    let regular = |meta: &std::fs::Metadata| {
+        if meta.is_file() {
+            Ok(())
+        } else {
+            Err(Error::input(path, "path", "is not a regular file"))
+        }
+    };
+    regular(&look)?;
+    let file = File::open(path).map_err(|e| Error::file(path, "open", e))?;
+    let meta = file.metadata().map_err(|e| Error::file(path, "read", e))?;
+    regular(&meta)?;
+    budget.spend(limits, path, "the file's size in bytes", meta.len())?;
+    budget.opened(path);
+    Mapping::new(file).map_err(|e| Error::file(path, "map", e))
+}
+
+/// An error if a file is not the one that was mapped any more.
+pub(crate) fn intact(mapping: &Mapping, path: &Path) -> Result<()> {
+    let Some(change) = mapping.change() else { return Ok(()) };
+    Err(Error::input(path, "file", format!("changed while it was read: {change}"))
+        .hint("try again when nothing writes to it; programs that write a new file and rename it do no harm"))
+}

@@ -1,0 +1,205 @@
+//! Tables of numbers as text: their lines, the names of their columns and their numbers.
+//!
+//! Columns are parted by the first of these that the first line has: semicolons, commas, tabs, and else any white space.
+//! (The csv crate takes single bytes only, not runs of spaces.) Lines that are empty or begin with `#` or `//` are passed
+//! over, but for a first one that names the columns. Numbers have points, no decimal commas.
+
+use super::{Source, copy, growing::Growing};
+use crate::{Error, Result};
+use rayon::prelude::*;
+
+/// No table has more columns.
+const MOST_COLUMNS: usize = 4096;
+/// Rows that are read between two looks at the clock.
+const ROWS: usize = 1 << 12;
+
+/// A table whose lines are found but whose numbers are not read yet.
+pub(crate) struct Text<'a> {
+    /// The names of the columns, where the first line gives some.
+    pub names: Option<Vec<String>>,
+    /// Columns of the first line.
+    pub width: usize,
+    /// The number of the first line in the file.
+    pub first: usize,
+    /// The rows with the numbers of their lines.
+    rows: Vec<(usize, &'a [u8])>,
+    separator: Option<u8>,
+}
+
+impl<'a> Text<'a> {
+    /// Finds the lines of a file. Those that `skip` tells are passed over.
+    pub fn of(
+        source: &'a Source,
+        mut skip: impl FnMut(usize, &[u8]) -> Result<bool>,
+    ) -> Result<Self> {
+        let mut lines: Growing<(usize, &[u8])> = Growing::new(source, "the places of the lines");
+        for (number, line) in (1..).zip(lines_of(without_mark(source.bytes()))) {
+            let line = line.trim_ascii();
+            if is_row(line, lines.is_empty()) && !skip(number, line)? {
+                lines.push((number, line))?;
+            }
+        }
+        source.check_points("the number of lines", lines.len() as u64)?;
+        let Some(&(first, line)) = lines.first() else {
+            return Err(source.error("file", "holds no lines of numbers"));
+        };
+        let mut lines = lines.into_inner();
+        let (separator, words) = split(line);
+        if words.len() > MOST_COLUMNS {
+            return Err(source
+                .error(format!("line {first}"), format!("has more than {MOST_COLUMNS} columns")));
+        }
+        let names = has_names(&words).then(|| words.clone());
+        if names.is_some() && !line.iter().any(|b| b.is_ascii_alphabetic() || !b.is_ascii()) {
+            return Err(source
+                .error(
+                    format!("line {first}"),
+                    format!("{:?} is neither numbers nor names of columns", copy::excerpt(line)),
+                )
+                .hint("numbers have points, no decimal commas"));
+        }
+        if names.is_some() {
+            lines.remove(0);
+        }
+        Ok(Self { names, width: words.len(), first, rows: lines, separator })
+    }
+
+    /// The number of rows.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Where a row is, for an error.
+    pub fn place(&self, row: usize) -> String {
+        format!("line {}", self.rows[row].0)
+    }
+
+    /// The numbers of all rows, one row after the other; zero in the columns that are not asked for, which may hold
+    /// anything.
+    pub fn numbers(
+        &self,
+        source: &Source,
+        asked: impl Fn(usize) -> bool + Sync,
+    ) -> Result<Vec<f64>> {
+        let width = self.width;
+        // Each number takes a byte at least. Where they cannot all be there, some line is too short.
+        let numbers = self.rows.len().saturating_mul(width);
+        if numbers > source.bytes().len() {
+            self.check_widths(source)?;
+        }
+        source.room::<f64>("the numbers", numbers)?;
+        let mut table = vec![0.0f64; numbers];
+        table.par_chunks_mut(width).zip(&self.rows).enumerate().try_for_each(
+            |(index, (row, &(number, line)))| {
+                if index.is_multiple_of(ROWS) {
+                    source.check_time()?;
+                }
+                let place = || format!("line {number}");
+                let mut count = 0;
+                for word in words(line, self.separator) {
+                    if let Some(slot) = row.get_mut(count).filter(|_| asked(count)) {
+                        let word = without_quotes(word);
+                        *slot = copy::number(word).ok_or_else(|| {
+                            let shown = copy::excerpt(word);
+                            let error = source.error(place(), format!("“{shown}” is not a number"));
+                            if shown.contains(',') {
+                                error.hint("numbers have points, no decimal commas")
+                            } else {
+                                error
+                            }
+                        })?;
+                        if !slot.is_finite() {
+                            return Err(
+                                source.error(place(), format!("number {} is {slot}", count + 1))
+                            );
+                        }
+                    }
+                    count += 1;
+                }
+                if count != width { Err(self.wrong_width(source, number, count)) } else { Ok(()) }
+            },
+        )?;
+        Ok(table)
+    }
+
+    fn check_widths(&self, source: &Source) -> Result<()> {
+        self.rows.iter().try_for_each(|&(number, line)| {
+            let count = words(line, self.separator).count();
+            if count != self.width { Err(self.wrong_width(source, number, count)) } else { Ok(()) }
+        })
+    }
+
+    fn wrong_width(&self, source: &Source, line: usize, count: usize) -> Error {
+        let message = format!("has {count} columns, but the first line has {}", self.width);
+        source.error(format!("line {line}"), message)
+    }
+}
+
+/// The words of the first line that counts, and whether they are names; none in a file without such a line.
+pub(crate) fn first_words(bytes: &[u8]) -> Option<(Vec<String>, bool)> {
+    let line =
+        lines_of(without_mark(bytes)).map(<[u8]>::trim_ascii).find(|line| is_row(line, true))?;
+    let words = split(line).1;
+    let named = has_names(&words);
+    Some((words, named))
+}
+
+/// The lines of a text, which end as on any system: by a line feed, a carriage return, or both.
+pub(crate) fn lines_of(text: &[u8]) -> impl Iterator<Item = &[u8]> {
+    text.split(|&b| b == b'\n')
+        .flat_map(|line| line.strip_suffix(b"\r").unwrap_or(line).split(|&b| b == b'\r'))
+}
+
+/// Without quotation marks around it.
+fn without_quotes(mut word: &[u8]) -> &[u8] {
+    while let [b'"', rest @ ..] | [rest @ .., b'"'] = word {
+        word = rest;
+    }
+    word
+}
+
+/// Without the byte order mark that some writers of UTF-8 begin with.
+fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
+
+/// Whether a line is one of the table. A comment may name the columns, if it comes first.
+fn is_row(line: &[u8], first: bool) -> bool {
+    let comment = line.starts_with(b"#") || line.starts_with(b"//");
+    !line.is_empty() && (!comment || first && names_columns(line))
+}
+
+/// Whether a comment is a line of names.
+fn names_columns(line: &[u8]) -> bool {
+    let separators = |b: &u8| b.is_ascii_whitespace() || matches!(b, b',' | b';' | b'#' | b'/');
+    let has = |name: &[u8]| line.split(separators).any(|word| word.eq_ignore_ascii_case(name));
+    has(b"x") && has(b"y") && has(b"z")
+}
+
+fn has_names(words: &[String]) -> bool {
+    !words.iter().all(|word| word.parse::<f64>().is_ok())
+}
+
+/// The separator that a first line tells, and its words, out of their quotes.
+fn split(line: &[u8]) -> (Option<u8>, Vec<String>) {
+    let outside: Vec<&[u8]> = line.split(|&b| b == b'"').step_by(2).collect();
+    let has = |separator: &u8| outside.iter().any(|part| part.contains(separator));
+    let separator = [b';', b',', b'\t'].into_iter().find(has);
+    let name = |word: &[u8]| copy::lossy(word).trim_matches('"').trim().to_owned();
+    // One more than there may be tells that there are too many.
+    (separator, words(line, separator).take(MOST_COLUMNS + 1).map(name).collect())
+}
+
+/// The words of a line; a comment's sign is none, and what stands between quotes is one (RFC 4180).
+fn words(line: &[u8], separator: Option<u8>) -> impl Iterator<Item = &[u8]> {
+    let sign = line.iter().take_while(|&&b| matches!(b, b'#' | b'/')).count();
+    let mut quoted = false;
+    line[sign..]
+        .trim_ascii()
+        .split(move |&b| {
+            quoted ^= b == b'"';
+            !quoted && separator.map_or(b.is_ascii_whitespace(), |separator| b == separator)
+        })
+        .map(<[u8]>::trim_ascii)
+        .filter(move |word| separator.is_some() || !word.is_empty())
+}
