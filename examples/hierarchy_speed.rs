@@ -24,7 +24,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             let rate = vertices / (surfels + built) / 1e6;
             let nodes = tree.nodes().count() as f64 / set.splats.len() as f64;
             println!(
-                "{preset:?} {block_splats}: {:.0} ms, {nodes:.3} nodes a leaf; {rate:.2} M vertices/s in all",
+                "{preset:?} {block_splats}: {:.0} ms, {nodes:.3} nodes a leaf; {rate:.2} M \
+                 vertices/s in all",
                 built * 1e3
             );
         }

@@ -226,7 +226,8 @@ fn worst_inputs_stay_within_their_limits() {
                 words.next().unwrap_or_default().replace(&format!("{}/", folder.0.display()), "");
             let (size, taken_mib) = (bytes.len() as f64 / 1048576.0, taken as f64 / 1048576.0);
             println!(
-                "{name}: {size:.2} MiB, limit {} MiB: {milliseconds} ms, {taken_mib:.1} MiB: {outcome}",
+                "{name}: {size:.2} MiB, limit {} MiB: {milliseconds} ms, {taken_mib:.1} MiB: \
+                 {outcome}",
                 limit >> 20
             );
             assert!(
@@ -266,7 +267,8 @@ fn places_beyond_what_32_bits_count_are_found() {
     assert_eq!(read("far.raw", &Limits::default()), "[0.0, 63.0] 63");
     assert_eq!(
         read("far_cut.raw", &Limits::default()),
-        "far_cut.raw: size: holds 63 bytes after the header, but 4 × 4 × 4 samples of type u8 need 64"
+        "far_cut.raw: size: holds 63 bytes after the header, but 4 × 4 × 4 samples of type u8 need \
+         64"
     );
     let little = Limits { bytes: 1 << 30, ..Limits::default() };
     assert_eq!(
@@ -294,11 +296,12 @@ fn peak() -> u64 {
 fn shared_pieces(count: usize, bytes: usize) -> Vec<u8> {
     let extent = format!("0 {} 0 0 0 0", bytes - 1);
     let piece = format!(
-        "<Piece Extent='{extent}'><PointData><DataArray type='UInt8' Name='v' format='appended' offset='0'/></PointData></Piece>"
+        "<Piece Extent='{extent}'><PointData><DataArray type='UInt8' Name='v' format='appended' \
+         offset='0'/></PointData></Piece>"
     );
     let head = format!(
-        "<VTKFile type='ImageData' byte_order='LittleEndian'><ImageData WholeExtent='{extent}'>{}</ImageData>\
-         <AppendedData encoding='raw'>_",
+        "<VTKFile type='ImageData' byte_order='LittleEndian'><ImageData WholeExtent='{extent}'>\
+         {}</ImageData><AppendedData encoding='raw'>_",
         piece.repeat(count)
     );
     let mut file = head.into_bytes();
@@ -338,9 +341,11 @@ fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
     let block = zlib(&vec![0; 200 * mib]);
     let counts: Vec<u8> =
         [1, 200 * mib as u32, 0, block.len() as u32].iter().flat_map(|n| n.to_le_bytes()).collect();
-    let vti = "<VTKFile type='ImageData' byte_order='LittleEndian' compressor='vtkZLibDataCompressor'><ImageData WholeExtent='0 1023 0 1023 0 199'>\
-         <Piece Extent='0 1023 0 1023 0 199'><PointData><DataArray type='UInt8' Name='v' format='appended' offset='0'/></PointData></Piece>\
-         </ImageData><AppendedData encoding='raw'>_";
+    let vti = "<VTKFile type='ImageData' byte_order='LittleEndian' \
+         compressor='vtkZLibDataCompressor'><ImageData WholeExtent='0 1023 0 1023 0 199'><Piece \
+         Extent='0 1023 0 1023 0 199'><PointData><DataArray type='UInt8' Name='v' \
+         format='appended' offset='0'/></PointData></Piece></ImageData><AppendedData \
+         encoding='raw'>_";
     let vti = [vti.as_bytes(), &counts, &block, b"</AppendedData></VTKFile>"].concat();
     let wide = format!("{}\n{}", vec!["1"; 4096].join(" "), "1\n".repeat(mib));
     let polygon = format!("{}\n", vec!["0"; 2 * mib].join(" "));

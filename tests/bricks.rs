@@ -121,7 +121,8 @@ fn the_finest_level_is_the_volume() {
                     assert_eq!(stats.lambda, 0.0);
                     let agreement = decibels(&found, &expected);
                     println!(
-                        "{name}, bytes: {bytes}, {origin}, occlusion: {occlusion}: {agreement:.1} dB"
+                        "{name}, bytes: {bytes}, {origin}, occlusion: {occlusion}: {agreement:.1} \
+                         dB"
                     );
                     assert!(
                         agreement > 100.0,

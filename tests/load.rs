@@ -201,7 +201,8 @@ fn nothing_grows() {
     let early = held[..held.len().div_ceil(3)].iter().max().unwrap();
     let last = held[held.len() - held.len().div_ceil(3)..].iter().max().unwrap();
     println!(
-        "{pictures} pictures in {} rounds, {:.0} s; at most {} MiB in the first third, {} MiB in the last; {} buffers on the GPU",
+        "{pictures} pictures in {} rounds, {:.0} s; at most {} MiB in the first third, {} MiB in \
+         the last; {} buffers on the GPU",
         held.len(),
         start.elapsed().as_secs_f64(),
         early >> 20,

@@ -38,17 +38,18 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
         "element vertex 1500\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
     let pcd =
         "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1500\nHEIGHT 1\nPOINTS 1500\nDATA ascii\n";
-    let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+    let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n\
+         endloop\nendfacet\n";
     let vti = format!(
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"0.1\" byte_order=\"LittleEndian\">\n\
-         <ImageData WholeExtent=\"0 15 0 15 0 15\" Origin=\"0 0 0\" Spacing=\"1 1 1\">\n\
-         <Piece Extent=\"0 15 0 15 0 15\"><PointData Scalars=\"v\">\n\
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"0.1\" \
+         byte_order=\"LittleEndian\">\n<ImageData WholeExtent=\"0 15 0 15 0 15\" Origin=\"0 0 0\" \
+         Spacing=\"1 1 1\">\n<Piece Extent=\"0 15 0 15 0 15\"><PointData Scalars=\"v\">\n\
          <DataArray type=\"UInt8\" Name=\"v\" format=\"ascii\">{values}@</DataArray>\n\
          </PointData></Piece></ImageData></VTKFile>\n"
     );
     let vtk = format!(
-        "# vtk DataFile Version 3.0\n@\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 16 16 16\nPOINT_DATA 4096\n\
-         SCALARS s int\nLOOKUP_TABLE d\n{values}"
+        "# vtk DataFile Version 3.0\n@\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 16 16 16\n\
+         POINT_DATA 4096\nSCALARS s int\nLOOKUP_TABLE d\n{values}"
     );
     let nrrd = format!(
         "NRRD0004\n# @\ntype: uint8\ndimension: 3\nsizes: 16 16 16\nencoding: ascii\n\n{values}"

@@ -359,7 +359,8 @@ fn table() -> String {
     text
 }
 
-const START: &str = "<!-- drawn: written by `SPLATKIT_WRITE=1 cargo test --release --test what_engines_draw` -->\n\n";
+const START: &str = "<!-- drawn: written by `SPLATKIT_WRITE=1 cargo test --release --test \
+     what_engines_draw` -->\n\n";
 const END: &str = "\n<!-- end of drawn -->";
 
 #[test]

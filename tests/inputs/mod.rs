@@ -107,8 +107,8 @@ pub fn ply(elements: &str, rows: &str) -> Vec<u8> {
 fn binary_ply(big: bool) -> Vec<u8> {
     let order = if big { "big" } else { "little" };
     let header = format!(
-        "ply\nformat binary_{order}_endian 1.0\nelement vertex 3\n{FLOATS}element face 1\nproperty list uchar int \
-         vertex_indices\nend_header\n"
+        "ply\nformat binary_{order}_endian 1.0\nelement vertex 3\n{FLOATS}element face 1\n\
+         property list uchar int vertex_indices\nend_header\n"
     );
     let corners = [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let number = |n: f32| if big { n.to_be_bytes() } else { n.to_le_bytes() };
@@ -166,7 +166,13 @@ pub fn triangle_bytes() -> Vec<u8> {
 /// The same with a buffer elsewhere and other nodes, of which node 0 is the scene's.
 pub fn gltf_with(uri: &str, nodes: &str) -> String {
     format!(
-        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{nodes}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}},{{"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}}],"bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":6}}],"buffers":[{{"uri":"{uri}","byteLength":42}}]}}"#
+        "{{\"asset\":{{\"version\":\"2.0\"}},\"scene\":0,\"scenes\":[{{\"nodes\":[0]}}],\
+         \"nodes\":[{nodes}],\"meshes\":[{{\"primitives\":[{{\"attributes\":{{\"POSITION\":0}},\
+         \"indices\":1}}]}}],\"accessors\":[{{\"bufferView\":0,\"componentType\":5126,\"count\":3,\
+         \"type\":\"VEC3\"}},{{\"bufferView\":1,\"componentType\":5123,\"count\":3,\
+         \"type\":\"SCALAR\"}}],\"bufferViews\":[{{\"buffer\":0,\"byteLength\":36}},{{\"buffer\":0,\
+         \"byteOffset\":36,\"byteLength\":6}}],\"buffers\":[{{\"uri\":\"{uri}\",\
+         \"byteLength\":42}}]}}"
     )
 }
 
@@ -197,8 +203,8 @@ pub fn stl() -> Vec<u8> {
     bytes
 }
 
-pub const STL_TEXT: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n\
-    endfacet\nendsolid a\n";
+pub const STL_TEXT: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n\
+     vertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
 
 fn las_header(format: u8, start: usize, records: u32, points: u32) -> Vec<u8> {
     let mut header = vec![0; 227];
@@ -290,8 +296,8 @@ pub fn nrrd(sizes: &str, fields: &str, data: &[u8]) -> Vec<u8> {
 /// A VTK file of XML: `kind` around `pieces`.
 pub fn vtk_xml(kind: &str, attributes: &str, pieces: &str) -> String {
     format!(
-        "<?xml version='1.0'?><VTKFile type='{kind}' byte_order='LittleEndian'{attributes}><{kind} WholeExtent='0 1 0 1 0 0'>\
-         {pieces}</{kind}></VTKFile>"
+        "<?xml version='1.0'?><VTKFile type='{kind}' byte_order='LittleEndian'{attributes}><{kind} \
+         WholeExtent='0 1 0 1 0 0'>{pieces}</{kind}></VTKFile>"
     )
 }
 
@@ -319,22 +325,25 @@ fn appended(xml: &str, encoding: &str, data: &[u8]) -> Vec<u8> {
 }
 
 pub fn vtk() -> String {
-    "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 1\nORIGIN 0 0 0\nSPACING 1 1 1\n\
-     POINT_DATA 4\nSCALARS v unsigned_char 1\nLOOKUP_TABLE default\n1 2 3 4\n"
+    "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 1\n\
+     ORIGIN 0 0 0\nSPACING 1 1 1\nPOINT_DATA 4\nSCALARS v unsigned_char 1\nLOOKUP_TABLE default\n\
+     1 2 3 4\n"
         .into()
 }
 
 pub fn vtu(corners: &str) -> String {
     let numbers = |name: &str, kind: &str, text: &str, components: u32| {
         format!(
-            "<DataArray type='{kind}' Name='{name}' NumberOfComponents='{components}' format='ascii'>{text}</DataArray>"
+            "<DataArray type='{kind}' Name='{name}' NumberOfComponents='{components}' \
+             format='ascii'>{text}</DataArray>"
         )
     };
     vtk_xml(
         "UnstructuredGrid",
         "",
         &format!(
-            "<Piece NumberOfPoints='3' NumberOfCells='1'><CellData>{}</CellData><Points>{}</Points><Cells>{}{}{}</Cells></Piece>",
+            "<Piece NumberOfPoints='3' NumberOfCells='1'><CellData>{}</CellData><Points>{}</Points>\
+             <Cells>{}{}{}</Cells></Piece>",
             numbers("v", "Float32", "7", 1),
             numbers("p", "Float32", "0 0 0 1 0 0 0 1 0", 3),
             numbers("connectivity", "Int32", corners, 1),
@@ -412,7 +421,8 @@ pub fn every_format(folder: &Folder) -> Vec<Format> {
         format!("<DataArray type='Float32' Name='x' format='ascii'>{axis}</DataArray>")
     };
     let vtr_piece = format!(
-        "<Piece Extent='0 1 0 1 0 0'><PointData Scalars='v'>{}</PointData><Coordinates>{}{}{}</Coordinates></Piece>",
+        "<Piece Extent='0 1 0 1 0 0'><PointData Scalars='v'>{}</PointData><Coordinates>\
+         {}{}{}</Coordinates></Piece>",
         array("format='ascii'", "1 2 3 4"),
         places("0 1"),
         places("0 2"),
