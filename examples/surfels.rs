@@ -1,4 +1,4 @@
-//! How fast a mesh becomes surfels: `cargo run --release --example surfels -- mesh.ply`.
+//! Times the conversion of a mesh to surfels: `cargo run --release --example surfels -- mesh.ply`.
 
 use splatkit::{
     io::{Limits, load_mesh},

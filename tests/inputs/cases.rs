@@ -43,7 +43,7 @@
             .replace(r#"{"mesh":0}"#, &format!(r#"{},{{"mesh":0}}"#, nodes.join(",")))
             .into_bytes()
     };
-    // A PNG that claims a size: only its header is true.
+    // A PNG that claims a size. Only its header is valid.
     let claim = {
         let mut png = png(2, 2);
         png[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
@@ -83,7 +83,7 @@
     let lists = |count: usize| "[".repeat(count);
     let bricks = || splv(&Folder::new());
     vec![
-        // PLY: counts that lie.
+        // PLY: wrong counts.
         (
             "count0.ply",
             vertices("0", ""),
@@ -175,7 +175,7 @@
             "endless.ply: header line 131072: the header is longer than 1048576 bytes, with no \
              line “end_header” in them",
         ),
-        // PLY: numbers that are none.
+        // PLY: numbers that are not finite, or not numbers.
         (
             "nan.ply",
             vertices("2", "1 2 3\n1 nan 3\n"),
@@ -219,7 +219,7 @@
             vertices("1", "1 2\n"),
             "fewer.ply: element “vertex”, row 0, byte 100: the line ends before the value of “z”",
         ),
-        // PLY: what strict parsers refuse, and real files have.
+        // PLY: files that strict parsers refuse, but that exist in practice.
         (
             "crlf.ply",
             String::from_utf8_lossy(&vertices("2", "1 2 3\n4 5 6\n")).replace('\n', "\r\n").into(),
@@ -298,7 +298,7 @@
             "zeros.ply: header line 1: the header has no “end_header” line; the file is cut or is \
              no PLY",
         ),
-        // OBJ and what it refers to.
+        // OBJ and the files that it refers to.
         (
             "zero.obj",
             "v 0 0 0\nf 0 1 1\n".into(),
@@ -746,7 +746,7 @@
             e57(|xml| xml.replace("recordCount=\"2\"", "recordCount=\"0\"")),
             "none.e57: file: holds no points",
         ),
-        // Tables of text.
+        // Text tables.
         (
             "comma.xyz",
             "1,5 2,5 3,5\n".into(),
@@ -1142,7 +1142,7 @@
             "spacing.vtk: samples: the spacing is 0 × 1 × 1, but every step needs a length",
         ),
         ("crlf.vtk", vtk().replace('\n', "\r\n").into(), "volume [2, 2, 1] [1.0, 4.0]"),
-        // Raw volumes, of 4 × 4 × 4 bytes.
+        // Raw volumes of 4 × 4 × 4 bytes.
         (
             "short.raw",
             vec![1; 63],
@@ -1182,7 +1182,7 @@
             [bricks(), vec![0]].concat(),
             "tail.splv: byte 477: 1 bytes stand behind the end",
         ),
-        // Hierarchies and bricks whose checksums are right.
+        // Hierarchies and bricks with correct checksums.
         (
             "bomb.splk",
             crafted::page_of_zeros(64 << 20),
@@ -1315,7 +1315,7 @@
             vec![b' '; 2 << 20],
             "long.json: file: has 2097152 bytes, but a transfer function has 1048576 at most",
         ),
-        // Nothing.
+        // Files of no format.
         ("nothing.bin", Vec::new(), "nothing.bin: file: is of no kind"),
         ("zeros.bin", vec![0; 4096], "zeros.bin: file: is of no kind"),
         ("text.bin", b"hello".to_vec(), "text.bin: file: is of no kind"),

@@ -1,5 +1,6 @@
-//! Writes the first inputs of every fuzz target to the folder that is given: small files of each format, from the library's
-//! own writers, from the writers of the formats' crates, and as text. A fuzzer that begins with these need not guess headers.
+//! Writes the seed inputs of every fuzz target to the given folder. They are small files of each
+//! format, made by the library's own writers, by the writers of the formats' crates, or as text.
+//! With them a fuzzer need not guess headers.
 
 use flate2::{Compression, write::GzEncoder};
 use glam::{DVec3, Vec2, Vec3};
@@ -23,7 +24,7 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 fn main() -> Result<()> {
     let Some(folder) = std::env::args_os().nth(1).map(PathBuf::from) else {
-        return Err("give the folder that the inputs are written to".into());
+        return Err("name the folder to write the inputs to".into());
     };
     let mut seeds = Seeds { folder, count: 0 };
     ply(&mut seeds)?;
@@ -45,7 +46,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The folder with a folder for each target.
+/// The output folder, with a subfolder for each target.
 struct Seeds {
     folder: PathBuf,
     count: usize,
@@ -60,7 +61,9 @@ impl Seeds {
         Ok(())
     }
 
-    /// As [`put`](Self::put), also for the target of files without a name.
+    /// Like [`put`](Self::put), and also adds the input to `any`, the target of files without a
+    /// name.
+    /// PLY and LAS files go to `regions` as well.
     fn known(&mut self, target: &str, bytes: impl AsRef<[u8]>) -> Result<()> {
         self.put("any", &bytes)?;
         if matches!(target, "ply" | "las") {
@@ -69,7 +72,7 @@ impl Seeds {
         self.put(target, bytes)
     }
 
-    /// What a writer writes to a path.
+    /// Returns the bytes that `write` writes to a temporary path.
     fn written<E: Error + 'static>(
         &self,
         write: impl FnOnce(&Path) -> std::result::Result<(), E>,
@@ -83,7 +86,7 @@ impl Seeds {
     }
 }
 
-/// A tetrahedron with all attributes that a mesh has.
+/// A tetrahedron with every attribute that a mesh can have.
 fn tetrahedron() -> Mesh {
     let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
     Mesh {
@@ -177,7 +180,7 @@ fn stl(seeds: &mut Seeds) -> Result<()> {
 }
 
 fn gltf(seeds: &mut Seeds) -> Result<()> {
-    // Positions, indices, a normal each, and texture coordinates of a triangle.
+    // The positions, indices, normals and texture coordinates of one triangle.
     let mut data = floats([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
     [0u16, 1, 2, 0].iter().for_each(|v| data.extend(v.to_le_bytes()));
     data.extend(floats([0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]));
@@ -250,7 +253,7 @@ fn base64(bytes: &[u8]) -> String {
     bytes.chunks(3).map(group).collect()
 }
 
-/// Bytes of a point of each format.
+/// Size of a point record in each LAS point format, in bytes.
 const RECORD: [usize; 9] = [20, 28, 26, 34, 57, 63, 30, 36, 38];
 
 fn las_header(format: u8, start: usize, records: u32, points: u32) -> Vec<u8> {
@@ -417,7 +420,7 @@ fn pcd(seeds: &mut Seeds) -> Result<()> {
         rows.chunks(32).flat_map(|run| [&[run.len() as u8 - 1], run].concat()).collect();
     let sizes = [runs.len(), rows.len()].map(|size| (size as u32).to_le_bytes()).concat();
     seeds.known("pcd", [header("binary_compressed"), sizes, runs].concat())?;
-    // A copy of what came before, which overlaps itself.
+    // A copy of earlier output that overlaps itself.
     let packed = [&[0, 0, 0xe0, 45, 0][..], &[0, 1]].concat();
     let sizes = [packed.len() as u32, 56].map(u32::to_le_bytes).concat();
     seeds.known("pcd", [header("binary_compressed"), sizes, packed].concat())
@@ -648,7 +651,7 @@ fn transfer(seeds: &mut Seeds) -> Result<()> {
     Ok(())
 }
 
-/// Bytes that are taken for models whatever they are: the fuzzer finds the rest.
+/// Random bytes, which the target decodes as a model. The fuzzer finds the rest.
 fn models(seeds: &mut Seeds) -> Result<()> {
     let mut state = 1u32;
     for length in [40, 200, 600] {
