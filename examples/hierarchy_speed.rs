@@ -1,6 +1,5 @@
-//! Times the conversion of a mesh to surfels and to a hierarchy, for every preset and several block
-//! sizes:
-//! `cargo run --release --example hierarchy_speed -- mesh.ply`.
+//! Times the conversion of a mesh to surfels and a hierarchy, by preset and block size:
+//! `cargo run --release --example hierarchy_speed -- mesh.ply`
 
 use splatkit::{
     hierarchy::{BuildOptions, Preset, Tree},

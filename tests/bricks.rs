@@ -307,7 +307,7 @@ fn what_bricks_cannot_do_is_told() {
 }
 
 /// The CPU engine gathers bricks. At the finest level the picture is that of the whole volume.
-/// Between levels it is the picture of scattering.
+/// Between levels it matches the picture that scattering draws.
 #[test]
 fn processors_gather_bricks() {
     let cases = [
@@ -327,7 +327,10 @@ fn processors_gather_bricks() {
             };
             let finest = Settings { evaluate: Evaluate::Gather, ..settings(0.0) };
             let ((whole, _), (found, stats)) = (drawn(&plain, &finest), drawn(&bricks, &finest));
-            assert!(whole.color.iter().any(|color| color[3] > 0.1), "{name}, {dims:?}: nothing");
+            assert!(
+                whole.color.iter().any(|color| color[3] > 0.1),
+                "{name}, {dims:?}: an empty picture"
+            );
             assert!(stats.gathered > 0 && stats.lambda == 0.0, "{stats:?}");
             let agreement = decibels(&found, &whole);
             println!("{name}, {dims:?}: {agreement:.1} dB to the whole volume");

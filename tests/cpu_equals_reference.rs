@@ -1,6 +1,6 @@
 //! Scenes of every kind, drawn by the CPU engine and compared to the reference in double precision.
 
-#[allow(dead_code, reason = "scenes of other tests")]
+#[allow(dead_code, reason = "other tests use the rest")]
 mod scenes;
 
 use glam::DVec3;
@@ -41,8 +41,8 @@ fn assert_matches(case: &Case, least: f64) {
             .expect("a folder to write to");
     }
     assert!(psnr >= least, "{}: {psnr:.1} dB, expected {least} dB", case.name);
-    // The engines place the depths of whole kernels at their centres, and spread those of thick
-    // sheets evenly within a sheet.
+    // Depths of whole kernels and thick sheets are not compared: the engines place them at the
+    // centres of kernels, and spread them evenly within a sheet.
     if case.settings.mode != Mode::Sheets || case.settings.sheet_thickness.is_some() {
         return;
     }

@@ -258,7 +258,7 @@ fn clouds_have_nearly_the_same_leaves() {
     let most = whole.len() as u32 / 100;
     assert!(
         other_shapes <= most && other_sides <= most,
-        "{other_shapes} shapes and {other_sides} sides of {most}"
+        "{other_shapes} shapes and {other_sides} sides differ; {most} may"
     );
 }
 

@@ -1,7 +1,7 @@
 //! Volumes that the CPU engine gathers by sums over samples: those with radial kernels, sharp
 //! volumes, and body-centred and rectilinear lattices.
 
-#[allow(dead_code, reason = "scenes of other tests")]
+#[allow(dead_code, reason = "other tests use the rest")]
 mod scenes;
 
 use glam::{DMat3, DVec3};

@@ -324,8 +324,8 @@ fn the_engine_matches_the_reference() {
     }
 }
 
-/// Counts the holes of a cut: pixels that it does not cover, although the leaves cover them and all
-/// their neighbours.
+/// Counts the holes of a cut: pixels that it does not cover, although the leaves cover all 5 × 5
+/// pixels around them.
 fn holes(leaves: &Picture, cut: &Picture) -> usize {
     let [width, height] = [leaves.width as i32, leaves.height as i32];
     let covered = |x: i32, y: i32| {

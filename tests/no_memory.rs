@@ -130,7 +130,7 @@ fn ply(side: u32, has_triangles: bool) -> Vec<u8> {
     out
 }
 
-/// The same sheet as text.
+/// A sheet of `side`² vertices in quads, as OBJ text.
 fn obj(side: u32) -> Vec<u8> {
     let mut out = String::new();
     for vertex in 0..side * side {

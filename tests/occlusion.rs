@@ -1,7 +1,7 @@
 //! Leaving out hidden splats does not show. Over many views and transfer functions, pictures with
 //! and without culling differ by no more than the light that an opaque pixel still lets through.
 
-#[allow(dead_code, reason = "scenes of other tests")]
+#[allow(dead_code, reason = "other tests use the rest")]
 mod scenes;
 
 use glam::{DQuat, DVec3};

@@ -1,7 +1,7 @@
 //! Kernels that are products along the axes of a lattice, drawn by the CPU engine and compared to
 //! the reference in double precision.
 
-#[allow(dead_code, reason = "scenes of other tests")]
+#[allow(dead_code, reason = "other tests use the rest")]
 mod scenes;
 
 use glam::{DMat3, DVec3};

@@ -349,11 +349,11 @@ fn table() -> String {
             .collect();
         check_likeness(&row, &pictures);
         let cells = answers.each_ref().map(|(_, answer)| reasons.cell(answer));
-        writeln!(text, "| {} | {} |", row.name, cells.join(" | ")).expect("text takes text");
+        writeln!(text, "| {} | {} |", row.name, cells.join(" | ")).expect("writing to a string");
     }
     text.push('\n');
     for (at, reason) in reasons.0.iter().enumerate() {
-        writeln!(text, "{}. {reason}", at + 1).expect("text takes text");
+        writeln!(text, "{}. {reason}", at + 1).expect("writing to a string");
     }
     text
 }

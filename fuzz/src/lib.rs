@@ -26,7 +26,7 @@ macro_rules! target {
 /// Message and location of the last panic.
 static LAST: Mutex<String> = Mutex::new(String::new());
 
-/// Lets panics reach their `catch_unwind`, and runs all work on this thread.
+/// Lets panics reach `catch_unwind`, and runs all work on this thread.
 ///
 /// libFuzzer's own hook ends the process at every panic, including the panics of decoders that the
 /// library catches on purpose.

@@ -62,8 +62,7 @@ impl Seeds {
     }
 
     /// Like [`put`](Self::put), and also adds the input to `any`, the target of files without a
-    /// name.
-    /// PLY and LAS files go to `regions` as well.
+    /// name. PLY and LAS files go to `regions` as well.
     fn known(&mut self, target: &str, bytes: impl AsRef<[u8]>) -> Result<()> {
         self.put("any", &bytes)?;
         if matches!(target, "ply" | "las") {
