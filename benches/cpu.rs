@@ -1,4 +1,5 @@
-//! The parts that run on the CPU: `cargo bench`. Inputs are generated, and so small that each part takes milliseconds.
+//! Benchmarks of the parts that run on the CPU: `cargo bench`. Inputs are generated, and small
+//! enough that each benchmark takes milliseconds.
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use glam::DVec3;
@@ -34,7 +35,7 @@ fn volume() -> Volume {
     Phantom::Specimen.sample_bytes([SIDE; 3]).expect("a volume")
 }
 
-/// A file that is gone with its owner.
+/// A temporary file, removed when the value is dropped.
 struct File(PathBuf);
 
 impl File {

@@ -1,4 +1,5 @@
-//! Times how surfels and their hierarchy are made of a mesh: cargo run --release --example hierarchy_speed -- mesh.ply
+//! Times the conversion of a mesh to surfels and a hierarchy, by preset and block size:
+//! `cargo run --release --example hierarchy_speed -- mesh.ply`
 
 use splatkit::{
     formats,
@@ -9,7 +10,7 @@ use splatkit::{
 use std::{error::Error, path::PathBuf, time::Instant};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = PathBuf::from(std::env::args().nth(1).ok_or("which mesh?")?);
+    let path = PathBuf::from(std::env::args().nth(1).ok_or("name a mesh file")?);
     let mesh = formats::load_mesh(&path, &Limits::default())?;
     let vertices = mesh.positions.len() as f64;
     let start = Instant::now();
@@ -25,7 +26,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             let rate = vertices / (surfels + built) / 1e6;
             let nodes = tree.nodes().count() as f64 / set.splats.len() as f64;
             println!(
-                "{preset:?} {block_splats}: {:.0} ms, {nodes:.3} nodes a leaf; {rate:.2} M vertices/s in all",
+                "{preset:?} {block_splats}: {:.0} ms, {nodes:.3} nodes per leaf; {rate:.2} M \
+                 vertices/s in total",
                 built * 1e3
             );
         }

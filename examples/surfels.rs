@@ -1,4 +1,4 @@
-//! How fast a mesh becomes surfels: `cargo run --release --example surfels -- mesh.ply`.
+//! Times the conversion of a mesh to surfels: `cargo run --release --example surfels -- mesh.ply`.
 
 use splatkit::{formats::load_mesh, input::Limits, surface::SurfelOptions};
 use std::{path::Path, time::Instant};

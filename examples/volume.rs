@@ -1,4 +1,4 @@
-//! Draws a volume that the library makes itself: cargo run --release --example volume
+//! Draws a volume that the library generates: `cargo run --release --example volume`.
 
 use glam::DVec3;
 use splatkit::{

@@ -1,4 +1,5 @@
-//! A process that is about to end does away with what is on its way: alone in its file, for it does so for all its threads.
+//! `abandon` removes unfinished files before the process ends. The test has a file of its own
+//! because `abandon` acts on all threads of the process.
 
 use splatkit::disk::{AtomicFile, abandon, write};
 use std::{io::Write, time::Duration};
@@ -17,7 +18,7 @@ fn what_is_abandoned_is_gone() {
     std::thread::scope(|scope| {
         let others = scope.spawn(|| (file.commit().is_err(), write(&path, b"newer").is_ok()));
         std::thread::sleep(Duration::from_millis(50));
-        // As long as it is held nothing comes up.
+        // No new file appears while `abandoned` is held.
         assert_eq!((names(), std::fs::read(&path).unwrap()), (1, b"old".to_vec()));
         drop(abandoned);
         assert_eq!(others.join().unwrap(), (true, true));

@@ -1,5 +1,5 @@
-//! Bad files of every format: each is refused with a message that tells what is wrong and where, none panics, none hangs, and
-//! none takes more than it may.
+//! Bad files of every format. Each is refused with a message that says what is wrong and where.
+//! None causes a panic, hangs or exceeds its memory limit.
 
 mod inputs;
 
@@ -19,10 +19,11 @@ use std::{
     time::Instant,
 };
 
-/// What a bad input may take, in seconds.
+/// Time limit for reading a bad input, in seconds.
 const MOST_SECONDS: f64 = 2.0;
 
-/// Panics that were printed, those of decoders behind walls among them where the walls leak.
+/// Number of panics that were printed, without those of the tests themselves. The library hides the
+/// panics of decoders that it isolates, so none should be printed.
 static PANICS: AtomicUsize = AtomicUsize::new(0);
 
 fn count_panics() {
@@ -30,7 +31,7 @@ fn count_panics() {
     ONCE.call_once(|| {
         let before = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |info| {
-            // What fails here is told anyway.
+            // A failed test is reported anyway.
             let of_tests = info.location().is_some_and(|place| place.file().starts_with("tests"));
             PANICS.fetch_add(usize::from(!of_tests), Ordering::Relaxed);
             before(info);
@@ -38,7 +39,7 @@ fn count_panics() {
     });
 }
 
-/// Asserts that a file is refused in words, with its name and a place in it.
+/// Asserts that the error has a message, and names a file of the folder and a place in it.
 fn refused(path: &Path, error: &Error, context: &str) {
     match error {
         Error::Input { file, place, message, .. } => {
@@ -68,7 +69,8 @@ fn every_cut_of_every_format_is_told() {
         }
         folder.write(name, &bytes);
     }
-    // What a model refers to may be cut as well: buffers and samples must be whole, pictures too; of materials there are less.
+    // Files that a model refers to may be cut as well. Buffers, samples and pictures must be whole.
+    // A cut material file yields fewer materials.
     for (name, referring, may_load) in [
         ("beside.bin", "beside.gltf", false),
         ("beside.raw", "detached.nhdr", false),
@@ -81,7 +83,7 @@ fn every_cut_of_every_format_is_told() {
             let context = format!("{referring} with {name} cut at {at} of {}", bytes.len());
             match load(&folder.0.join(referring), &limits) {
                 Err(error) => refused(&folder.0.join(referring), &error, &context),
-                // The end of a PNG says nothing that a picture needs.
+                // The last bytes of a PNG hold nothing that decoding needs.
                 Ok(told) => {
                     assert!(
                         may_load || name == "a.png" && at + 16 >= bytes.len(),
@@ -115,15 +117,15 @@ fn every_flipped_byte_of_a_hierarchy_and_of_bricks_is_found() {
         assert_eq!(check(&path).findings, [], "{name}");
         for at in 0..bytes.len() {
             let mut flipped = bytes.clone();
-            // All bits, or one that turns.
+            // Flip all bits, or a single bit at a varying position.
             flipped[at] ^= if at % 2 == 0 { 0xff } else { 1 << (at / 2 % 8) };
             let path = folder.write(name, &flipped);
             assert!(
                 !check(&path).is_sound(),
-                "{name}: byte {at} of {} is flipped and nothing is found",
+                "{name}: byte {at} of {} is flipped, but check finds nothing",
                 bytes.len()
             );
-            // Reading finds it too, or reads what stands in other bytes.
+            // Reading finds the flip too, unless it does not use that byte.
             if let Err(error) = load(&path, &limits) {
                 refused(&path, &error, name);
             }
@@ -132,7 +134,7 @@ fn every_flipped_byte_of_a_hierarchy_and_of_bricks_is_found() {
     assert_eq!(PANICS.load(Ordering::Relaxed), 0);
 }
 
-/// What is wrong, or unusual: the name of a file, its bytes, and what reading it gives.
+/// Bad or unusual files: the name, the bytes, and the expected outcome of reading the file.
 fn cases() -> Vec<(&'static str, Vec<u8>, &'static str)> {
     include!("inputs/cases.rs")
 }
@@ -153,7 +155,7 @@ fn each_bad_input_has_its_message() {
         folder.write(name, &bytes);
         let mut found = String::new();
         let mut seconds = f64::INFINITY;
-        // A machine that is busy with something else may make one attempt slow, not all.
+        // On a busy machine one attempt may be slow, but not all three.
         for _ in 0..3 {
             let begun = Instant::now();
             found = folder.outcome(name, &limits);
@@ -176,7 +178,8 @@ fn each_bad_input_has_its_message() {
     assert_eq!(PANICS.load(Ordering::Relaxed), 0);
 }
 
-/// What a reading takes, measured in a process of its own: this test again, told so by its environment.
+/// Measures the time and memory of reading an input in a process of its own. The process runs this
+/// same test; an environment variable names the input.
 #[test]
 fn worst_inputs_stay_within_their_limits() {
     const NAME: &str = "SPLATKIT_WORST_INPUT";
@@ -226,12 +229,13 @@ fn worst_inputs_stay_within_their_limits() {
                 words.next().unwrap_or_default().replace(&format!("{}/", folder.0.display()), "");
             let (size, taken_mib) = (bytes.len() as f64 / 1048576.0, taken as f64 / 1048576.0);
             println!(
-                "{name}: {size:.2} MiB, limit {} MiB: {milliseconds} ms, {taken_mib:.1} MiB: {outcome}",
+                "{name}: {size:.2} MiB, limit {} MiB: {milliseconds} ms, {taken_mib:.1} MiB: \
+                 {outcome}",
                 limit >> 20
             );
             assert!(
                 taken <= limit + PROGRAM,
-                "{name}: takes {taken} bytes, over the limit of {limit}: {outcome}"
+                "{name}: takes {taken} bytes; the limit is {limit}: {outcome}"
             );
             worst = (worst.0.max(milliseconds), worst.1.max(taken));
         }
@@ -239,7 +243,8 @@ fn worst_inputs_stay_within_their_limits() {
     println!("longest {} ms, most {:.1} MiB", worst.0, worst.1 as f64 / 1048576.0);
 }
 
-/// Files with holes, which take no room: those that are not of Unix are filled when they are written behind their end.
+/// Sparse files, which take no disk space. This test is for Unix only: other systems fill the gap
+/// when a file is written beyond its end.
 #[cfg(unix)]
 #[test]
 fn places_beyond_what_32_bits_count_are_found() {
@@ -266,39 +271,41 @@ fn places_beyond_what_32_bits_count_are_found() {
     assert_eq!(read("far.raw", &Limits::default()), "[0.0, 63.0] 63");
     assert_eq!(
         read("far_cut.raw", &Limits::default()),
-        "far_cut.raw: size: holds 63 bytes after the header, but 4 × 4 × 4 samples of type u8 need 64"
+        "far_cut.raw: size: holds 63 bytes after the header, but 4 × 4 × 4 samples of type u8 need \
+         64"
     );
     let little = Limits { bytes: 1 << 30, ..Limits::default() };
     assert_eq!(
         read("far.raw", &little),
         "far.raw: the file's size in bytes is 4294967396, over the limit of 1073741824"
     );
-    // A header that sends its reader as far.
+    // A header that refers to data beyond 4 GiB.
     let text = String::from_utf8(nrrd("4 4 4", "encoding: raw", b"")).expect("text");
     let skip = format!("byte skip: {header}\ndata file: far.raw");
     folder.write("far.nhdr", text.replacen("encoding: raw", &format!("encoding: raw\n{skip}"), 1));
     assert_eq!(folder.outcome("far.nhdr", &Limits::default()), "volume [4, 4, 4] [0.0, 63.0]");
 }
 
-/// Bytes of the program itself, its threads among it, that come into memory as it runs.
+/// Memory that the program itself takes while it runs, in bytes, including its threads.
 const PROGRAM: u64 = 8 << 20;
 
-/// The most memory that this process has held, in bytes; 0 where the system does not tell.
+/// Peak resident memory of this process, in bytes; 0 if the system does not report it.
 fn peak() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap_or_default();
     line.trim().trim_end_matches(" kB").parse::<u64>().unwrap_or_default() * 1024
 }
 
-/// Pieces of the same bytes, each the whole.
+/// A VTI file whose pieces all refer to the same bytes. Each piece spans the whole extent.
 fn shared_pieces(count: usize, bytes: usize) -> Vec<u8> {
     let extent = format!("0 {} 0 0 0 0", bytes - 1);
     let piece = format!(
-        "<Piece Extent='{extent}'><PointData><DataArray type='UInt8' Name='v' format='appended' offset='0'/></PointData></Piece>"
+        "<Piece Extent='{extent}'><PointData><DataArray type='UInt8' Name='v' format='appended' \
+         offset='0'/></PointData></Piece>"
     );
     let head = format!(
-        "<VTKFile type='ImageData' byte_order='LittleEndian'><ImageData WholeExtent='{extent}'>{}</ImageData>\
-         <AppendedData encoding='raw'>_",
+        "<VTKFile type='ImageData' byte_order='LittleEndian'><ImageData WholeExtent='{extent}'>\
+         {}</ImageData><AppendedData encoding='raw'>_",
         piece.repeat(count)
     );
     let mut file = head.into_bytes();
@@ -308,7 +315,7 @@ fn shared_pieces(count: usize, bytes: usize) -> Vec<u8> {
     file
 }
 
-/// A hierarchy of few bytes and many nodes is under the limit in whatever way it is read.
+/// A hierarchy file of few bytes and many nodes stays within the limit, however it is read.
 #[test]
 fn equal_pages_are_read_within_limits() {
     let limits = Limits { bytes: 256 << 20, ..Limits::default() };
@@ -323,7 +330,7 @@ fn equal_pages_are_read_within_limits() {
     assert_eq!(hierarchy.read_page(0).expect("a page").nodes.len(), 4089);
 }
 
-/// Files that become much larger than they are.
+/// Small files that expand to many times their size.
 fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
     let mib = 1usize << 20;
     let nodes = vec![r#"{"mesh":0}"#; 100_000].join(",");
@@ -338,9 +345,11 @@ fn worst_inputs() -> Vec<(&'static str, Vec<u8>)> {
     let block = zlib(&vec![0; 200 * mib]);
     let counts: Vec<u8> =
         [1, 200 * mib as u32, 0, block.len() as u32].iter().flat_map(|n| n.to_le_bytes()).collect();
-    let vti = "<VTKFile type='ImageData' byte_order='LittleEndian' compressor='vtkZLibDataCompressor'><ImageData WholeExtent='0 1023 0 1023 0 199'>\
-         <Piece Extent='0 1023 0 1023 0 199'><PointData><DataArray type='UInt8' Name='v' format='appended' offset='0'/></PointData></Piece>\
-         </ImageData><AppendedData encoding='raw'>_";
+    let vti = "<VTKFile type='ImageData' byte_order='LittleEndian' \
+         compressor='vtkZLibDataCompressor'><ImageData WholeExtent='0 1023 0 1023 0 199'><Piece \
+         Extent='0 1023 0 1023 0 199'><PointData><DataArray type='UInt8' Name='v' \
+         format='appended' offset='0'/></PointData></Piece></ImageData><AppendedData \
+         encoding='raw'>_";
     let vti = [vti.as_bytes(), &counts, &block, b"</AppendedData></VTKFile>"].concat();
     let wide = format!("{}\n{}", vec!["1"; 4096].join(" "), "1\n".repeat(mib));
     let polygon = format!("{}\n", vec!["0"; 2 * mib].join(" "));

@@ -1,5 +1,5 @@
-//! Volumes in bricks: their pictures are those of the volume, coarser ones where the view or the budget asks for them, and
-//! no brick is read twice.
+//! Volumes in bricks. Their pictures match those of the volume, or are coarser if the view or the
+//! memory budget asks for it. No brick is read twice.
 
 use glam::DVec3;
 use splatkit::{
@@ -20,7 +20,7 @@ use splatkit::{
 };
 use std::sync::Arc;
 
-/// Round waves that reach the borders, of odd sizes: values 0 … 200.
+/// Spherical waves that reach the borders of a lattice of any size. Values are 0 … 200.
 fn value(dims: [usize; 3], index: usize) -> f64 {
     let at = [index % dims[0], index / dims[0] % dims[1], index / dims[0] / dims[1]];
     let p =
@@ -56,7 +56,8 @@ fn bricks_of(volume: &Arc<Volume>) -> Arc<Bricks> {
     Arc::new(Bricks::from_volume(volume.clone()).expect("bricks"))
 }
 
-/// From a corner: near enough for records of their own shape, so far that samples are alike for all pixels, and flat.
+/// Cameras that look from a corner. Near: each record has a shape of its own. Far: sections are the
+/// same for all pixels of a footprint. Flat: orthographic.
 fn cameras(scene: &Scene) -> [(&'static str, Camera); 3] {
     let bounds = scene.bounds();
     let near = Camera::framing(&bounds, DVec3::new(1.0, -2.0, 0.7), DVec3::Z, 1.0);
@@ -73,9 +74,10 @@ fn renderer() -> Renderer {
     Renderer::new(&Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver"))
 }
 
-/// With steps between samples of so many pixels at most.
+/// Settings that let the steps between samples cover `pixels` pixels at most.
 fn settings(pixels: f64) -> Settings {
-    // Bricks are scattered, and pictures of whole volumes agree with theirs closest if these are too.
+    // The GPU engine scatters bricks. Whole volumes match them most closely if they are scattered
+    // too.
     let (detail, evaluate) = (Detail::Pixels(2.0 * pixels), Evaluate::Scatter);
     Settings { detail, evaluate, ..Settings::new([96, 96]) }
 }
@@ -121,7 +123,8 @@ fn the_finest_level_is_the_volume() {
                     assert_eq!(stats.lambda, 0.0);
                     let agreement = decibels(&found, &expected);
                     println!(
-                        "{name}, bytes: {bytes}, {origin}, occlusion: {occlusion}: {agreement:.1} dB"
+                        "{name}, bytes: {bytes}, {origin}, occlusion: {occlusion}: {agreement:.1} \
+                         dB"
                     );
                     assert!(
                         agreement > 100.0,
@@ -135,11 +138,12 @@ fn the_finest_level_is_the_volume() {
     }
 }
 
-/// Sheets thicker than kernels reach mix samples of whose neighbourhood, and bricks of which, nothing shows.
+/// Sheets thicker than the kernels' reach also mix in samples whose neighbourhood is invisible, and
+/// bricks in which nothing is visible.
 #[test]
 fn thick_sheets_take_all_bricks() {
     let volume = volume([75, 60, 49], DVec3::ONE, true);
-    // What shows lies in one corner.
+    // Only one corner is visible.
     let corner = TransferFunction { opacity: vec![(175.0, 0.0), (190.0, 0.5)], ..transfer() };
     let plain = Scene::new().with_volume(volume.clone(), Kernel::default(), corner.clone());
     let bricks = Scene::new().with_bricks(bricks_of(&volume), Kernel::default(), corner);
@@ -190,7 +194,8 @@ fn budgets_are_kept_by_coarser_levels() {
         println!("{count} bricks: {agreement:.1} dB");
         assert!(agreement > 20.0, "{count}: {agreement:.1} dB");
     }
-    // Two views that need different bricks share the slots, and the first comes out as before.
+    // Two views that need different bricks share the slots. The first view looks the same
+    // afterwards.
     let mut prepared = renderer.prepare(&scene).expect("a scene");
     let room = Settings { page_memory: 16 * slot, ..settings(0.0) };
     let mut corner = camera.clone();
@@ -205,7 +210,7 @@ fn budgets_are_kept_by_coarser_levels() {
     let (_, between) = renderer.render(&mut prepared, &corner, &room).expect("a picture");
     assert!(between.read_bricks > 0 && between.brick_bytes <= 16 * slot, "{between:?}");
     let (again, _) = renderer.render(&mut prepared, camera, &room).expect("a picture");
-    // Bricks lie in other slots now: sums come in another order.
+    // Bricks now lie in other slots, so sums are added in another order.
     assert!(decibels(&again, &first) > 80.0);
 }
 
@@ -217,7 +222,7 @@ fn a_zoom_shows_no_pop() {
     let mut renderer = renderer();
     let mut prepared = renderer.prepare(&scene).expect("a scene");
     for (name, camera) in &cameras(&scene) {
-        // λ is 1 at twice the pixels that a step covers.
+        // λ is 1 if steps may cover twice the pixels that they cover at the finest level.
         let view = camera.view([96, 96]).expect("a view");
         let lambda =
             |pixels| bricks::choice(&bricks, &view, 2.0, pixels, &EVERYTHING, usize::MAX).lambda;
@@ -301,7 +306,8 @@ fn what_bricks_cannot_do_is_told() {
     assert!(two.validate().unwrap_err().to_string().contains("2"));
 }
 
-/// The engine for processors gathers bricks: the same picture as of the whole volume, and between levels that of scattering.
+/// The CPU engine gathers bricks. At the finest level the picture is that of the whole volume.
+/// Between levels it matches the picture that scattering draws.
 #[test]
 fn processors_gather_bricks() {
     let cases = [
@@ -321,7 +327,10 @@ fn processors_gather_bricks() {
             };
             let finest = Settings { evaluate: Evaluate::Gather, ..settings(0.0) };
             let ((whole, _), (found, stats)) = (drawn(&plain, &finest), drawn(&bricks, &finest));
-            assert!(whole.color.iter().any(|color| color[3] > 0.1), "{name}, {dims:?}: nothing");
+            assert!(
+                whole.color.iter().any(|color| color[3] > 0.1),
+                "{name}, {dims:?}: an empty picture"
+            );
             assert!(stats.gathered > 0 && stats.lambda == 0.0, "{stats:?}");
             let agreement = decibels(&found, &whole);
             println!("{name}, {dims:?}: {agreement:.1} dB to the whole volume");
@@ -359,7 +368,8 @@ fn processors_gather_bricks() {
     }
 }
 
-/// Slots are used again, and what lies beside bricks comes and goes with their neighbours.
+/// Slots are reused. The samples stored beside a brick follow the bricks that are its neighbours at
+/// the time.
 #[test]
 fn processors_hold_few_bricks() {
     let volume = volume([130, 120, 110], DVec3::ONE, true);
@@ -381,7 +391,8 @@ fn processors_hold_few_bricks() {
     let (again, _) = draw(&mut renderer, &near);
     assert_shows_something(&first);
     assert_eq!(first.color, again.color);
-    // From one end to the other in one renderer, and each alone.
+    // Clip boxes from one end to the other, drawn by one renderer and each by a renderer of its
+    // own.
     let part = |from: f64, to: f64| {
         let mut own = settings.clone();
         own.page_memory = 1 << 30;

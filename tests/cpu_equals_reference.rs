@@ -1,6 +1,6 @@
-//! Every kind of scene, drawn by the CPU engine and by the reference in double precision.
+//! Scenes of every kind, drawn by the CPU engine and compared to the reference in double precision.
 
-#[allow(dead_code, reason = "scenes of other tests")]
+#[allow(dead_code, reason = "other tests use the rest")]
 mod scenes;
 
 use glam::DVec3;
@@ -24,7 +24,8 @@ fn agreement(a: &Picture, b: &Picture) -> f64 {
     compare_pictures(a, b).expect("pictures of one size").psnr.unwrap_or(f64::INFINITY)
 }
 
-/// Draws a case both ways. Depths are compared where both pictures are clearly opaque.
+/// Asserts that both pictures of a case agree to `least` dB or better. Depths are compared where
+/// the reference is clearly opaque; one in 50 may be off by more than 5 % of the scene.
 fn assert_matches(case: &Case, least: f64) {
     let found = drawn(case);
     let truth = reference::render(&case.scene, &case.camera, &case.settings).expect(case.name);
@@ -40,7 +41,8 @@ fn assert_matches(case: &Case, least: f64) {
             .expect("a folder to write to");
     }
     assert!(psnr >= least, "{}: {psnr:.1} dB, expected {least} dB", case.name);
-    // Whole kernels and thick sheets have their depths where the engines put them: at centres, and evenly in a sheet.
+    // Depths of whole kernels and thick sheets are not compared: the engines place them at the
+    // centres of kernels, and spread them evenly within a sheet.
     if case.settings.mode != Mode::Sheets || case.settings.sheet_thickness.is_some() {
         return;
     }
@@ -55,9 +57,10 @@ fn assert_matches(case: &Case, least: f64) {
     assert!(far * 50 <= opaque().count(), "{}: {far} of {} depths", case.name, opaque().count());
 }
 
-/// What a gathered case must agree to, in dB. Gathering cuts kernels to a cube of four samples a side, the reference to the ball
-/// in it. What lies between is up to a hundredth of the weight, which steep functions and sharp surfaces on a lattice as coarse as
-/// this one show, and a broken sample a hundred thousand times as large as the others most of all.
+/// Minimum agreement of a gathered case, in dB. Gathering cuts kernels off at a cube of four
+/// samples a side, the reference at the ball inside that cube. Up to 1 % of the weight lies between
+/// the two. Steep functions and sharp surfaces on so coarse a lattice show this difference. A
+/// broken sample, a hundred thousand times as large as the others, shows it most of all.
 fn least(name: &str) -> f64 {
     match name {
         "post_classified" | "isosurfaces_in_fog" => 48.0,
@@ -181,7 +184,7 @@ fn whole_kernels() {
     }
 }
 
-/// Sheets thicker than kernels reach mix samples of whose neighbourhood nothing shows.
+/// Sheets thicker than the kernels' reach also mix in samples whose neighbourhood is invisible.
 #[test]
 fn thick_sheets() {
     for case in
@@ -198,7 +201,7 @@ fn thick_sheets() {
             assert_matches(&case, 50.0);
         }
     }
-    // Seen along short steps beside long ones.
+    // Seen along the short steps of a lattice whose steps along another axis are long.
     let mut flat = scenes::blobs_analytic();
     let Item::Volume(volume, kernel, transfer) = &flat.scene.items[0] else {
         panic!("{}", flat.name)
@@ -212,7 +215,7 @@ fn thick_sheets() {
     assert_matches(&flat, 50.0);
 }
 
-/// The same bytes however many threads draw.
+/// Any number of threads draws the same bytes.
 #[test]
 fn threads_change_nothing() {
     for make in [

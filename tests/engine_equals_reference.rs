@@ -1,8 +1,10 @@
-//! Every kind of scene, drawn by the engine on the GPU and by the reference in plain double precision.
+//! Scenes of every kind, drawn by the GPU engine and compared to the reference in plain double
+//! precision.
 //!
-//! Where nothing physical differs the two agree to 50 dB or better over premultiplied colour: a root mean square
-//! difference of 0.8 levels of 255, below what a person sees. What is left is 32-bit arithmetic, the polynomial of the
-//! normal distribution (1e-4), sheets thinner than a splat's tails (1e-3 of its mass), and the early end of a ray (5e-4).
+//! Unless they differ physically, the two agree to 50 dB or better over premultiplied colour. That
+//! is a root mean square difference of 0.8 of 255 levels, below what a person sees. The rest of the
+//! difference comes from 32-bit arithmetic, the polynomial for the normal distribution (1e-4),
+//! sheets thinner than a splat's tails (1e-3 of its mass), and rays that end early (5e-4).
 
 mod scenes;
 
@@ -17,7 +19,7 @@ use splatkit::{
     volume::{Lattice, Samples, Volume},
 };
 
-/// As the engine decides by itself.
+/// Draws the case with its own settings, by which the engine usually chooses how to fill sheets.
 fn drawn(case: &Case, budget: Budget) -> Picture {
     drawn_by(case.settings.evaluate, case, budget).expect(case.name)
 }
@@ -30,14 +32,15 @@ fn drawn_by(evaluate: Evaluate, case: &Case, budget: Budget) -> splatkit::Result
     Ok(renderer.render(&mut prepared, &case.camera, &settings)?.0)
 }
 
-/// The case with one way to fill its sheets.
+/// The case with a given way to fill sheets.
 fn by(evaluate: Evaluate, case: Case) -> Case {
     Case { settings: Settings { evaluate, ..case.settings.clone() }, ..case }
 }
 
-/// What a gathered picture must agree to, in dB. It cuts kernels to a cube of four samples a side, the reference to the ball in
-/// it. What lies between is up to a hundredth of the weight, which steep functions and sharp surfaces on a lattice as coarse as
-/// these show, and a broken sample a hundred thousand times as large as the others most of all.
+/// Minimum agreement of a gathered picture, in dB. Gathering cuts kernels off at a cube of four
+/// samples a side, the reference at the ball inside that cube. Up to 1 % of the weight lies between
+/// the two. Steep functions and sharp surfaces on such coarse lattices show this difference. A
+/// broken sample, a hundred thousand times as large as the others, shows it most of all.
 fn least_of_gathered(name: &str) -> f64 {
     match name {
         "post_classified" | "isosurfaces_in_fog" => 48.0,
@@ -46,8 +49,8 @@ fn least_of_gathered(name: &str) -> f64 {
     }
 }
 
-/// The same lattice from so far away that its samples take the isotropic path, in which sections are the same for all
-/// pixels of a footprint.
+/// The blobs from far away. Their samples take the isotropic path, in which sections are the same
+/// for all pixels of a footprint.
 #[test]
 fn blobs_from_afar() {
     let mut case = scenes::blobs_analytic();
@@ -68,8 +71,8 @@ fn psnr(a: &Picture, b: &Picture) -> f64 {
     -10.0 * (squares.sum::<f64>() / (4 * a.color.len()) as f64).log10()
 }
 
-/// Draws a case by the reference, and by the engine in all ways that it has for it. Depths are compared where both pictures are clearly opaque: near one half, a difference of
-/// one ten-thousandth in opacity moves them by any amount.
+/// Draws a case by the reference, and by every method that the GPU engine has for it. Asserts that
+/// each picture agrees with the reference to `least` dB or better.
 fn assert_matches(case: Case, least: f64) {
     let expected = reference::render(&case.scene, &case.camera, &case.settings).expect(case.name);
     assert_shows_something(&case, &expected);
@@ -84,6 +87,8 @@ fn assert_matches(case: Case, least: f64) {
     }
 }
 
+/// Depths of gathered pictures are compared where the reference is clearly opaque. Near an opacity
+/// of one half, a difference of 1e-4 in opacity moves the depth by any amount.
 fn assert_agrees(case: &Case, way: &str, found: &Picture, expected: &Picture, least: f64) {
     let agreement = psnr(found, expected);
     println!("{} {way}: {agreement:.1} dB", case.name);
@@ -109,8 +114,8 @@ fn assert_agrees(case: &Case, way: &str, found: &Picture, expected: &Picture, le
     }
 }
 
-/// Volumes on Cartesian lattices are gathered, also among surfaces; of what is not the error names what it is. Else no picture
-/// would tell whether it was.
+/// Volumes on Cartesian lattices are gathered, also among surfaces. For other scenes, the error
+/// names the reason. Pictures alone would not show whether a scene was gathered.
 #[test]
 fn what_is_gathered_and_what_is_not() {
     for case in [
@@ -133,7 +138,7 @@ fn what_is_gathered_and_what_is_not() {
             let settings = Settings { evaluate, ..case.settings.clone() };
             renderer.draw(&mut prepared, &case.camera, &settings).expect(case.name)
         };
-        // Each way also after the other, in one scene.
+        // Draw by both methods twice, so that each also follows the other in one prepared scene.
         for _ in 0..2 {
             let [auto, scattered] = [draw(Evaluate::Auto), draw(Evaluate::Scatter)];
             assert!(auto.gathered > 0 && scattered.gathered == 0, "{}: {auto:?}", case.name);
@@ -162,7 +167,7 @@ fn what_is_gathered_and_what_is_not() {
     }
 }
 
-/// Sheets of so many samples.
+/// The blobs in sheets that are `samples` samples thick.
 fn thick(samples: f64) -> Case {
     let mut case = scenes::blobs_analytic();
     let Item::Volume(volume, ..) = &case.scene.items[0] else { panic!("{}", case.name) };
@@ -170,7 +175,8 @@ fn thick(samples: f64) -> Case {
     case
 }
 
-/// Samples of every type, more than fill whole words, and fewer along an axis than a kernel reaches.
+/// Samples of every type, counts that don't fill whole words, and fewer samples along an axis than
+/// a kernel reaches.
 #[test]
 fn samples_of_all_types_and_few() {
     let case = scenes::blobs_analytic();
@@ -217,8 +223,8 @@ fn samples_of_all_types_and_few() {
     }
 }
 
-/// Fails unless the picture is one of numbers that are neither all the same nor nearly all empty, with depths that fit
-/// its opacities.
+/// Asserts that a picture shows something. Its colours must be numbers, neither all alike nor
+/// nearly all empty, and its depths must fit its opacities.
 fn assert_shows_something(Case { name, settings, .. }: &Case, picture: &Picture) {
     let [width, height] = settings.size;
     assert_eq!(
@@ -228,7 +234,7 @@ fn assert_shows_something(Case { name, settings, .. }: &Case, picture: &Picture)
     let range = f32::EPSILON..=1.0 + 4.0 * f32::EPSILON;
     let mut covered = 0;
     let mut deep = 0;
-    // The largest value of a ray is at no depth.
+    // The maximum along a ray has no depth.
     let has_depths = settings.optics != Optics::Maximum;
     for (color, &depth) in picture.color.iter().zip(&picture.depth) {
         assert!(
@@ -249,7 +255,7 @@ fn assert_shows_something(Case { name, settings, .. }: &Case, picture: &Picture)
     greens.sort_unstable();
     greens.dedup();
     let share = covered as f64 / picture.color.len() as f64;
-    assert!(share > 0.2, "{name}: only {share:.2} of the picture shows something");
+    assert!(share > 0.2, "{name}: only {share:.2} of the picture is covered");
     assert!(!has_depths || deep > 0, "{name}: nothing is opaque");
     assert!(greens.len() > 30, "{name}: only {} shades", greens.len());
 }
@@ -429,8 +435,9 @@ fn single_ellipsoids() {
     assert_matches(methods::single_ellipsoids(), 50.0);
 }
 
-/// Sheets thicker than kernels reach mix samples of whose neighbourhood nothing shows. A single one is not lit: where it begins
-/// and ends are only the tails of kernels, which have no slope to speak of.
+/// Sheets thicker than the kernels' reach also mix in samples whose neighbourhood is invisible. A
+/// single sheet is not lit: it begins and ends in the tails of kernels, which have hardly any
+/// slope.
 #[test]
 fn thick_sheets() {
     for case in
@@ -447,7 +454,7 @@ fn thick_sheets() {
             assert_matches(case, 60.0);
         }
     }
-    // Seen along short steps beside long ones.
+    // Seen along the short steps of a lattice whose steps along another axis are long.
     let mut flat = scenes::blobs_analytic();
     let Item::Volume(volume, kernel, transfer) = &flat.scene.items[0] else {
         panic!("{}", flat.name)
@@ -520,7 +527,7 @@ fn single_splats_in_both_orders() {
     });
     // Rays that end early leave up to 5e-4 of the light.
     let agreement = psnr(&front, &back);
-    println!("one order and the other: {agreement:.1} dB");
+    println!("front to back and back to front: {agreement:.1} dB");
     assert!(agreement > 60.0, "{agreement:.1} dB");
 }
 
@@ -531,7 +538,7 @@ fn samples_with_slopes_and_weights() {
     }
 }
 
-/// Slopes, and gradients of what is not round, are vectors across the ray.
+/// Slopes, and gradients of kernels that are not round, are vectors across the ray.
 #[test]
 fn slopes_and_gradients_orthographic() {
     let samples = methods::samples_with_slopes(Classification::PreIntegrated);
@@ -540,7 +547,7 @@ fn slopes_and_gradients_orthographic() {
     }
 }
 
-/// Whole kernels count where their middle is before the eye.
+/// A whole kernel counts if its centre is in front of the eye.
 #[test]
 fn whole_kernels_from_inside() {
     let mut in_sheets = methods::single_ellipsoids();
@@ -551,18 +558,18 @@ fn whole_kernels_from_inside() {
     }
 }
 
-/// Westover's table with one more axis against the closed form.
+/// Compares Westover's table, with one more axis, to the closed form.
 #[test]
 fn the_section_table_agrees_with_the_closed_form() {
     let [table, closed] = [methods::table_of_a_gaussian(), methods::closed_form_of_that_gaussian()]
         .map(|case| drawn(&case, Budget::default()));
     let agreement = psnr(&table, &closed);
-    println!("table and closed form: {agreement:.1} dB");
+    println!("table to closed form: {agreement:.1} dB");
     assert!(agreement > 60.0, "{agreement:.1} dB");
 }
 
-/// A frame that does not fit in one pass is drawn in several, and is the same picture: only the sums at the seams of
-/// passes are rounded otherwise.
+/// A frame that does not fit in one pass is drawn in several. The picture is the same, except that
+/// sums are rounded differently at the seams between passes.
 #[test]
 fn small_budgets_draw_the_same_picture() {
     let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
@@ -595,8 +602,8 @@ fn small_budgets_draw_the_same_picture() {
     }
 }
 
-/// On a GPU an invocation draws one pixel, and a workgroup of 64 a tile; on a processor one of eight. Shown the software driver as
-/// a GPU, the engine takes the GPU's way.
+/// On a GPU an invocation draws one pixel of a tile, on a processor a column of eight. If the
+/// software driver is presented as a GPU, the engine draws as on a GPU.
 #[test]
 fn the_gpus_way_is_the_same() {
     let cases = [
@@ -633,12 +640,12 @@ fn the_gpus_way_is_the_same() {
         let expected =
             reference::render(&case.scene, &case.camera, &case.settings).expect(case.name);
         let agreement = psnr(&found, &expected);
-        println!("{} the GPU's way: {agreement:.1} dB", case.name);
+        println!("{} as on a GPU: {agreement:.1} dB", case.name);
         assert!(agreement >= least_of_gathered(case.name), "{}: {agreement:.1} dB", case.name);
     }
 }
 
-/// A tile that stops after some hundred entries and goes on in another dispatch draws the same picture.
+/// A tile that stops after 300 entries and continues in another dispatch draws the same picture.
 #[test]
 fn tiles_that_stop_go_on() {
     let cases = [
@@ -659,7 +666,8 @@ fn tiles_that_stop_go_on() {
     }
 }
 
-/// More splats in one sheet of one band than the budget holds: an error that says so, not a picture without them.
+/// If one sheet of one band has more splats than the budget holds, the result is an error that says
+/// so. It is not a picture without those splats.
 #[test]
 fn a_budget_too_small_for_a_single_sheet_is_an_error() {
     let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
@@ -692,7 +700,7 @@ fn bits(picture: &Picture) -> Vec<u32> {
     picture.color.iter().flatten().chain(&picture.depth).map(|v| v.to_bits()).collect()
 }
 
-/// Bins too long for one invocation go through the bitonic network.
+/// Bins too long for one invocation are sorted by a bitonic network.
 #[test]
 fn thousands_of_splats_in_one_bin() {
     let case = scenes::ellipsoids_orthographic();
@@ -711,7 +719,7 @@ fn thousands_of_splats_in_one_bin() {
     assert!(agreement > 50.0, "{agreement:.1} dB");
 }
 
-/// Tensor products are for the CPU engine.
+/// Only the CPU engine draws tensor-product kernels.
 #[test]
 fn kernels_that_are_not_drawn_are_named() {
     let case = scenes::blobs_analytic();
@@ -722,7 +730,10 @@ fn kernels_that_are_not_drawn_are_named() {
     for tensor in Tensor::ALL {
         let scene =
             Scene::new().with_volume(volume.clone(), Kernel::tensor(tensor), transfer.clone());
-        let error = Renderer::new(&gpu).prepare(&scene).expect_err("no such kernels").to_string();
+        let error = Renderer::new(&gpu)
+            .prepare(&scene)
+            .expect_err("tensor products are refused")
+            .to_string();
         assert!(error.contains(tensor.name()) && error.contains("the CPU engine does"), "{error}");
     }
 }

@@ -1,4 +1,4 @@
-//! Hierarchies made region by region have the leaves of those made as a whole.
+//! Hierarchies converted in regions have the same leaves as hierarchies built as a whole.
 
 use glam::Vec3;
 use splatkit::{
@@ -44,7 +44,7 @@ impl Drop for Folder {
     }
 }
 
-/// So little memory that regions are as small as they get.
+/// Options with so little memory that regions are as small as possible.
 fn options() -> ExternalOptions {
     ExternalOptions {
         memory: 1,
@@ -62,7 +62,7 @@ fn in_regions(files: &[PathBuf], out: &Path) -> Result<Converted> {
     convert(files, &Limits::default(), out, &options(), &lossless(), &|_, _, _| ())
 }
 
-/// The splats of the finest level, in an order of their own.
+/// Checks a file and returns the splats of its finest level, sorted.
 fn leaves(path: &Path) -> Vec<Splat> {
     let report = check(path, &Limits::default());
     assert!(report.findings.is_empty(), "{:?}", report.findings);
@@ -76,7 +76,7 @@ fn sort(splats: &mut [Splat]) {
     splats.sort_by_key(key);
 }
 
-/// The leaves of both ways, for a file of a mesh or cloud.
+/// Converts a mesh or point cloud as a whole and in regions, and returns the leaves of both.
 fn both_ways(folder: &Folder, name: &str) -> (Vec<Splat>, Vec<Splat>, Converted) {
     let path = folder.path(name);
     let mesh = formats::load_mesh(&path, &Limits::default()).unwrap();
@@ -95,7 +95,7 @@ fn both_ways(folder: &Folder, name: &str) -> (Vec<Splat>, Vec<Splat>, Converted)
     (leaves(&whole), leaves(&parts), converted)
 }
 
-/// A binary PLY file, of floats or doubles of either order.
+/// A binary PLY file of floats or doubles, in either byte order.
 fn ply(mesh: &Mesh, big: bool, double: bool) -> Vec<u8> {
     let order = if big { "big" } else { "little" };
     let kind = if double { "double" } else { "float" };
@@ -138,7 +138,8 @@ fn ply(mesh: &Mesh, big: bool, double: bool) -> Vec<u8> {
     out
 }
 
-/// A bumpy torus of a grid of vertices, in colours; `skew` moves one in ten out of the order.
+/// A knotted tube over a grid of vertices, with colours and without normals. Small displacements
+/// make it bumpy.
 fn torus(along: u32, around: u32) -> Mesh {
     let mut mesh = Mesh::knot(along, around);
     mesh.normals.clear();
@@ -162,9 +163,9 @@ fn nearly_the_same(a: &Splat, b: &Splat) -> bool {
 #[test]
 fn meshes_have_the_same_leaves() {
     let folder = Folder::new("meshes");
-    // Fine enough that no edge is cut.
+    // Fine enough that no edge is subdivided.
     let shared = torus(1000, 50);
-    // Long edges in one place: a lid, and a needle.
+    // Long edges: a lid, and a needle.
     let mut long = shared.clone();
     let last = long.positions.len() as u32;
     long.positions.extend([
@@ -174,14 +175,15 @@ fn meshes_have_the_same_leaves() {
     ]);
     long.colors.extend([[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255]]);
     long.triangles.extend([[last, last + 1, last + 2], [last, 100, last + 1], [0, 1, last]]);
-    // Every triangle has vertices of its own.
+    // Every triangle has its own vertices.
     let corners: Vec<u32> = shared.triangles.iter().flatten().copied().collect();
     let split = Mesh {
         positions: corners.iter().map(|&corner| shared.positions[corner as usize]).collect(),
         triangles: (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
         ..Mesh::default()
     };
-    // A vertex that no triangle has does not count for the size of the whole, a part that is inside out is told.
+    // A vertex that no triangle uses does not count for the size of the mesh. A part that is inside
+    // out is detected.
     let mut stray = shared.clone();
     stray.positions.push(Vec3::splat(2000.0));
     stray.colors.push([1, 2, 3, 255]);
@@ -219,7 +221,8 @@ fn meshes_have_the_same_leaves() {
         );
         assert_eq!(whole.len(), parts.len(), "{name}");
         if name == "long.ply" {
-            // Normals over what was cut are interpolated; the shares of the corners are rounded.
+            // Normals on subdivided triangles are interpolated; the weights of the corners are
+            // rounded.
             assert!(whole.iter().zip(&parts).all(|(a, b)| nearly_the_same(a, b)), "{name}");
         } else {
             assert!(whole == parts, "{name}");
@@ -233,7 +236,7 @@ fn clouds_have_nearly_the_same_leaves() {
     let folder = Folder::new("clouds");
     let mut cloud = torus(600, 60);
     cloud.triangles.clear();
-    // Some at one place, some far from all others.
+    // Add points at one place, and points far from all others.
     cloud.positions.extend([Vec3::new(9.0, 9.0, 9.0), Vec3::new(-9.0, 4.0, 0.0)]);
     cloud.positions.extend([cloud.positions[77]; 3]);
     cloud.colors.resize(cloud.positions.len(), [9, 8, 7, 255]);
@@ -255,11 +258,12 @@ fn clouds_have_nearly_the_same_leaves() {
     let most = whole.len() as u32 / 100;
     assert!(
         other_shapes <= most && other_sides <= most,
-        "{other_shapes} shapes and {other_sides} sides of {most}"
+        "{other_shapes} shapes and {other_sides} sides differ; {most} may"
     );
 }
 
-/// Points of far coarser parts are drawn so many times as wide as the median one, which regions know about.
+/// The width of points in sparse parts is limited to a multiple of the median width. Regions know
+/// the median of the whole, so their points are as wide.
 #[test]
 fn uneven_clouds_are_as_wide() {
     let folder = Folder::new("uneven");
@@ -281,7 +285,7 @@ fn uneven_clouds_are_as_wide() {
         widths.sum::<f64>()
     };
     let ratio = coarse(&parts) / coarse(&whole);
-    assert!((0.9..1.1).contains(&ratio), "{ratio} times as wide in regions");
+    assert!((0.9..1.1).contains(&ratio), "{ratio} times as wide if converted in regions");
 }
 
 #[test]
@@ -299,7 +303,8 @@ fn crowded_clouds_are_cut_too() {
     assert!(whole.iter().zip(&parts).all(|(a, b)| a.center == b.center));
 }
 
-/// Where the whole is so large that its parts cannot be told apart, the file is told, and what helps.
+/// If the bounds are so large that the points cannot be separated, the error names the file and the
+/// cause.
 #[test]
 fn points_far_off_are_told() {
     let folder = Folder::new("far_off");
@@ -329,15 +334,16 @@ fn several_files_become_one() {
     assert!(bounds.max.z > 29.0 && bounds.min.z < 0.0, "{bounds:?}");
 }
 
-/// Whether parts are turned outward is told in regions as of the whole: also of those that share a vertex alone. Where there
-/// are too many to be told apart in the memory that there is, the answer is that nothing is solid.
+/// Conversion in regions finds whether all parts face outward, like conversion as a whole. That
+/// includes parts that share only a vertex. If memory does not suffice to separate the parts, the
+/// mesh counts as not solid.
 #[test]
 fn solid_parts_are_those_of_the_whole() {
     let folder = Folder::new("solid");
     let tetrahedra = |count: u32, turned: u32| {
         let mut mesh = Mesh::default();
         for i in 0..count {
-            // In rows, each with the last corner of the one before as its first.
+            // In rows: the first corner of each tetrahedron is the last corner of the one before.
             let place = Vec3::new((i % 400) as f32, (i / 400) as f32 * 2.0, 0.0);
             let first = mesh.positions.len() as u32;
             let [a, b, c, d] = if i % 400 == 0 {
@@ -376,7 +382,7 @@ fn what_is_damaged_leaves_nothing() {
     };
     let last_face = whole.len() - 13;
     let first_vertex = whole.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
-    // One of those that are not looked at before.
+    // A face that is not checked in advance.
     let polygon = at(last_face - 5 * 13, &[4]);
     let lost = at(last_face + 1, &u32::MAX.to_le_bytes());
     let endless = at(first_vertex + 15 * 4000, &f32::NAN.to_le_bytes());
@@ -406,7 +412,7 @@ fn points_of_surveys_keep_their_millimetres_and_colours() {
             record[4 * axis..4 * axis + 4].copy_from_slice(&value.to_le_bytes());
         }
         record[12..14].copy_from_slice(&(i as u16).to_le_bytes());
-        // One is withheld.
+        // One point is withheld.
         record[15] = if i == 1234 { 0x80 } else { 0 };
         record[20..22].copy_from_slice(&((i * 20) as u16).to_le_bytes());
         record

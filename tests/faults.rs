@@ -1,5 +1,5 @@
-//! What goes wrong with a device: it is lost, does not answer, has little room. Either the picture is the same as ever, or there
-//! is an error; a part of a picture is never given out.
+//! Faults of a device: it is lost, does not answer, or has little memory. The result is the usual
+//! picture or an error, never a part of a picture.
 
 use glam::DVec3;
 use splatkit::{
@@ -19,7 +19,7 @@ fn gpu() -> Gpu {
     Gpu::headless(&AdapterChoice::Automatic).expect("an adapter")
 }
 
-/// A volume of 48³ samples, whole or in bricks, beside a knot.
+/// A volume of 48³ samples, whole or in bricks, with a knot in its middle.
 fn scene(in_bricks: bool) -> Scene {
     let volume = Arc::new(Phantom::Specimen.sample_bytes([48; 3]).unwrap());
     let transfer = TransferFunction::automatic(&volume);
@@ -46,7 +46,8 @@ fn drawn(gpu: &Gpu, scene: &Scene) -> splatkit::Result<Picture> {
     drawn_by(Evaluate::Auto, gpu, scene)
 }
 
-/// A device may be too small to gather a volume that another gathers; scattered, the picture is the same.
+/// Draws by scattering. A device may be too small to gather a volume that another device gathers;
+/// scattered, the picture is the same on both.
 fn scattered(gpu: &Gpu, scene: &Scene) -> splatkit::Result<Picture> {
     drawn_by(Evaluate::Scatter, gpu, scene)
 }
@@ -74,7 +75,7 @@ fn a_lost_device_is_an_error_and_another_draws_the_same() {
     let mut lost = (Renderer::new(&gpu), renderer.prepare(&scene).unwrap());
     gpu.device.destroy();
     let (camera, settings) = view(&scene);
-    // Whatever is asked of it from now on, and however often.
+    // Every call fails from now on, however often it is made.
     for _ in 0..2 {
         let error = lost.0.render(&mut lost.1, &camera, &settings).unwrap_err();
         assert!(matches!(error, Error::DeviceLost(_)), "{error}");
@@ -97,13 +98,13 @@ fn a_device_lost_at_any_moment_gives_no_part_of_a_picture() {
             let gpu = gpu();
             let device = gpu.device.clone();
             let killer = std::thread::spawn(move || {
-                // A picture takes some tenths of a second, the shaders' compilation among them.
+                // A picture takes a few tenths of a second, including the compilation of shaders.
                 std::thread::sleep(Duration::from_millis(35 * moment));
                 device.destroy();
             });
             match drawn(&gpu, scene) {
                 Ok(picture) => {
-                    assert!(same(&picture, truth), "moment {moment}: another picture");
+                    assert!(same(&picture, truth), "moment {moment}: a different picture");
                     outcomes[0] += 1;
                 }
                 Err(Error::DeviceLost(_)) => outcomes[1] += 1,
@@ -112,11 +113,11 @@ fn a_device_lost_at_any_moment_gives_no_part_of_a_picture() {
             killer.join().unwrap();
         }
     }
-    assert!(outcomes[1] > 0, "never lost: {outcomes:?}");
+    assert!(outcomes[1] > 0, "the device was never lost: {outcomes:?}");
 }
 
-/// Keeps the device busy: for a second or more in software, for some hundredths of one on a fast GPU. No invocation takes
-/// more steps than Mesa's software driver allows.
+/// Keeps the device busy: for a second or more in software, for a few hundredths of a second on a
+/// fast GPU. No invocation takes more steps than Mesa's software driver allows.
 fn hang(gpu: &Gpu) {
     let source = "@group(0) @binding(0) var<storage, read_write> state: u32;
         @compute @workgroup_size(8) fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -126,7 +127,7 @@ fn hang(gpu: &Gpu) {
                 x ^= x >> 17u;
                 x ^= x << 5u;
             }
-            // Never, which compilers do not know.
+            // Never true, but compilers do not know that.
             if x == 0u {
                 state = x;
             }
@@ -165,17 +166,17 @@ fn a_device_that_does_not_answer_in_time_is_an_error() {
     let (gpu, scene) = (gpu(), scene(false));
     let truth = drawn(&gpu, &scene).expect("draws");
     let impatient = gpu.clone().with_patience(Duration::from_millis(1));
-    // A fast one may be done while this thread rests.
+    // A fast device may finish while this thread is suspended.
     let mut waits = (0..5).map(|_| {
         hang(&gpu);
         impatient.wait()
     });
-    let error = waits.find_map(Result::err).expect("busy for longer");
+    let error = waits.find_map(Result::err).expect("the device is busy for longer");
     assert!(error.to_string().contains("did not answer within"), "{error}");
-    // What is asked of it afterwards does not wait again, by whomever.
+    // Later calls do not wait again, also those through other clones.
     assert!(matches!(impatient.wait(), Err(Error::DeviceLost(_))));
     assert!(matches!(drawn(&gpu, &scene), Err(Error::DeviceLost(_))));
-    // A picture that is done before it is waited for is a picture; there is none of which a part is done.
+    // A picture that is finished before the wait begins is returned. A part of a picture never is.
     let pictures = (0..20).map(|_| {
         let impatient = gpu.reopened().expect("opens again").with_patience(Duration::from_nanos(1));
         drawn(&impatient, &scene).map(|picture| assert!(same(&picture, &truth)))
@@ -190,7 +191,8 @@ fn a_device_that_does_not_answer_in_time_is_an_error() {
     );
 }
 
-/// What a pixel may differ by where smaller buffers cut the scene into other parts: as of tests/occlusion.rs.
+/// Largest difference of a channel if smaller buffers split the scene into other parts; the same as
+/// in tests/occlusion.rs.
 const MOST_DIFFERENCE: f32 = 0.004;
 
 fn difference(a: &Picture, b: &Picture) -> f32 {
@@ -198,7 +200,7 @@ fn difference(a: &Picture, b: &Picture) -> f32 {
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 
-/// A host's device of some limits.
+/// A device of a host application, with the given limits.
 fn host_device(required_limits: wgpu::Limits) -> Gpu {
     let open = async {
         let instance =
@@ -206,14 +208,15 @@ fn host_device(required_limits: wgpu::Limits) -> Gpu {
         let adapter = instance.enumerate_adapters(wgpu::Backends::all()).await.swap_remove(0);
         let descriptor = wgpu::DeviceDescriptor { required_limits, ..Default::default() };
         let (device, queue) = adapter.request_device(&descriptor).await.expect("a device");
-        // A host that ends where it hears of an error: the engine's are not its.
+        // The host panics if it hears of an error. It must not hear of errors that the engine
+        // causes.
         device.on_uncaptured_error(Arc::new(|error| panic!("the host heard of {error}")));
         Gpu::from_wgpu(device, queue, adapter.get_info())
     };
     pollster::block_on(open)
 }
 
-/// One with room for so many bytes a buffer.
+/// A device of a host application whose buffers have at most `bytes`.
 fn small_device(bytes: u64) -> Gpu {
     host_device(wgpu::Limits {
         max_buffer_size: bytes,
@@ -233,14 +236,14 @@ fn a_small_device_draws_the_same_or_says_why_not() {
                 let found = difference(&picture, &truth);
                 assert!(
                     found <= MOST_DIFFERENCE,
-                    "2^{shift} bytes a buffer: another picture, by {found}"
+                    "2^{shift} bytes per buffer: the picture differs by {found}"
                 );
             }
             Err(Error::Gpu(message)) => {
-                assert!(message.contains("buffer"), "2^{shift} bytes a buffer: {message}");
+                assert!(message.contains("buffer"), "2^{shift} bytes per buffer: {message}");
                 errors += 1;
             }
-            Err(other) => panic!("2^{shift} bytes a buffer: {other}"),
+            Err(other) => panic!("2^{shift} bytes per buffer: {other}"),
         }
     }
     assert!((1..11).contains(&errors), "{errors}");
@@ -254,7 +257,7 @@ fn what_did_not_fit_leaves_the_device_usable() {
     let mut prepared = renderer.prepare(&scene).expect("fits");
     let (camera, settings) = view(&scene);
     let first = renderer.render(&mut prepared, &camera, &settings).expect("draws").0;
-    // A row of this picture alone is larger than a buffer may be.
+    // One row of this picture is larger than the largest buffer.
     let huge = Settings::new([1 << 23, 2]);
     let error = renderer.render(&mut prepared, &camera, &huge).unwrap_err();
     assert!(matches!(error, Error::Gpu(_) | Error::Argument(_)), "{error}");
@@ -262,8 +265,9 @@ fn what_did_not_fit_leaves_the_device_usable() {
     assert!(same(&first, &again));
 }
 
-/// Scenes of 67 million candidates, and pictures of 65,536 tiles, need more workgroups than a row of a dispatch takes; where a
-/// row takes 16 or 24, so do these. Rows of 24 end behind the last tile.
+/// Scenes of 67 million candidates and pictures of 65,536 tiles need more workgroups than one row
+/// of a dispatch holds. If a row holds 16 or 24 workgroups, the small scenes here need several rows
+/// too. Rows of 24 end beyond the last tile.
 #[test]
 fn dispatches_of_many_rows_draw_the_same() {
     let usual = host_device(wgpu::Limits::default());
@@ -280,13 +284,14 @@ fn dispatches_of_many_rows_draw_the_same() {
         for gpu in &narrow {
             assert!(
                 same(&drawn(gpu, &scene).expect("draws"), &expected),
-                "{name}: another picture"
+                "{name}: a different picture"
             );
         }
     }
 }
 
-/// Slices so wide that a binding holds few: chunks of two slices with their neighbours. Wider ones are refused.
+/// If slices are so wide that a binding holds few, a chunk has two slices and their neighbours.
+/// Wider slices are refused.
 #[test]
 fn wide_slices_are_drawn_in_thin_chunks() {
     let gpu = host_device(wgpu::Limits {
@@ -309,7 +314,7 @@ fn wide_slices_are_drawn_in_thin_chunks() {
     let covered = expected.color.iter().filter(|color| color[3] > 0.5).count();
     assert!(covered > 1000, "{covered} pixels");
     let difference = difference(&scattered(&gpu, &wide).expect("draws"), &expected);
-    assert!(difference < MOST_DIFFERENCE, "another picture, by {difference}");
+    assert!(difference < MOST_DIFFERENCE, "the picture differs by {difference}");
     let refused = scattered(&gpu, &scene(600)).unwrap_err();
     assert!(
         matches!(&refused, Error::Argument(what) if what.contains("convert the volume to bricks")),
@@ -317,7 +322,8 @@ fn wide_slices_are_drawn_in_thin_chunks() {
     );
 }
 
-/// A picture with more tiles than there are bins for all its sheets is drawn in strips.
+/// A picture with so many tiles that there are not enough bins for all its sheets is drawn in
+/// strips.
 #[test]
 fn many_sheets_of_many_tiles_are_drawn_in_strips() {
     let gpu = gpu();
@@ -327,12 +333,13 @@ fn many_sheets_of_many_tiles_are_drawn_in_strips() {
     let camera = Camera::framing(&scene.bounds(), DVec3::new(0.4, -0.3, -1.0), DVec3::Y, 1.2);
     let mut renderer = Renderer::new(&gpu);
     let mut prepared = renderer.prepare(&scene).expect("fits");
-    // 90,000 tiles of 8 × 8 pixels and some 30 groups of 128 sheets are more than 2,097,152 bins.
+    // 90,000 tiles of 8 × 8 pixels, with about 30 groups of 128 sheets, need more than the
+    // 2,097,152 bins.
     let settings = Settings { size: [2400, 2400], sheet_pixels: 0.35, ..Settings::new([1, 1]) };
     let sheets = scene.sheets(&camera.view(settings.size).unwrap(), &settings).count();
     assert!(sheets > 3500, "{sheets} sheets");
     let thin = renderer.render(&mut prepared, &camera, &settings).expect("draws").0;
-    // The same number of sheets in a picture of one piece.
+    // The same number of sheets in a picture that needs no strips.
     let small = Settings { size: [600, 600], sheet_pixels: 0.35 / 4.0, ..settings };
     let whole = renderer.render(&mut prepared, &camera, &small).expect("draws").0;
     let coverage = |picture: &Picture| {
@@ -343,12 +350,12 @@ fn many_sheets_of_many_tiles_are_drawn_in_strips() {
     assert!(small > 0.05 && (large / small - 1.0).abs() < 0.01, "{large} and {small}");
 }
 
-/// A picture takes as many candidates as one binding holds the runs of: here two million. Of bricks that show more, coarser ones
-/// are drawn.
+/// One binding holds the batches of candidates of a picture, so it limits their number: here to two
+/// million. If bricks show more, coarser bricks are drawn.
 #[test]
 fn bricks_that_show_too_much_are_drawn_coarser() {
     let volume = Arc::new(Phantom::Specimen.sample_bytes([128; 3]).unwrap());
-    // All of it shows, the air a little.
+    // Everything is visible, the air faintly.
     let transfer = TransferFunction {
         opacity: vec![(0.0, 0.001), (255.0, 0.9)],
         ..TransferFunction::automatic(&volume)
@@ -367,8 +374,8 @@ fn bricks_that_show_too_much_are_drawn_coarser() {
         let first = renderer.render(&mut prepared, &camera, &settings).expect("draws").0;
         let (again, stats) =
             renderer.render(&mut prepared, &camera, &settings).expect("draws again");
-        assert!(same(&first, &again), "another picture");
-        assert_eq!(stats.read_bricks, 0, "a view that rests reads nothing");
+        assert!(same(&first, &again), "a different picture");
+        assert_eq!(stats.read_bricks, 0, "a resting view reads no bricks");
         (again, stats)
     });
     assert_eq!((all.lambda, all.bricks), (0.0, 64));
@@ -380,7 +387,8 @@ fn bricks_that_show_too_much_are_drawn_coarser() {
     assert!(agreement > 25.0, "{agreement:.1} dB");
 }
 
-/// A picture too large for a binding is drawn in strips; its budget is that of the whole, or the strips would differ.
+/// A picture too large for a binding is drawn in strips. Its splat budget applies to the whole
+/// picture; otherwise the strips would differ.
 #[test]
 fn a_budget_counts_for_the_whole_picture() {
     let splats = Mesh::knot(600, 50).surfels(&SurfelOptions::default()).unwrap();
@@ -388,7 +396,7 @@ fn a_budget_counts_for_the_whole_picture() {
     let scene = Scene::new().with_hierarchy(Hierarchy::from_tree(tree).expect("a hierarchy"));
     let (camera, settings) = view(&scene);
     let settings = Settings { size: [400, 300], detail: Detail::Splats(3000), ..settings };
-    // 16 bytes a pixel: the second draws 163 rows at a time.
+    // At 16 bytes per pixel, the second device draws 163 rows at a time.
     let pictures = [1 << 27, 1 << 20].map(|bytes| {
         let gpu = host_device(wgpu::Limits {
             max_storage_buffer_binding_size: bytes,
@@ -405,10 +413,11 @@ fn a_budget_counts_for_the_whole_picture() {
     );
     assert!((own.cut_pixels / others.cut_pixels - 1.0).abs() < 1e-9, "{own:?}\n{others:?}");
     let difference = difference(whole, strips);
-    assert!(difference < MOST_DIFFERENCE, "another picture, by {difference}");
+    assert!(difference < MOST_DIFFERENCE, "the picture differs by {difference}");
 }
 
-/// Hierarchies and bricks that share too little memory show the same whatever was seen before, and no less where there is more.
+/// Hierarchies and bricks that share too little memory look the same whatever was drawn before.
+/// More memory never shows less.
 #[test]
 fn memory_is_shared_evenly() {
     let splats = Mesh::knot(600, 50).surfels(&SurfelOptions::default()).unwrap();
@@ -431,7 +440,10 @@ fn memory_is_shared_evenly() {
         kinds.push(match (alone, later) {
             (Ok(alone), Ok(later)) => {
                 let ((alone, own), (later, _)) = (&alone[0], &later[1]);
-                assert!(same(alone, later), "{mebibytes} MiB: another picture after another view");
+                assert!(
+                    same(alone, later),
+                    "{mebibytes} MiB: the picture depends on the view before"
+                );
                 Some((own.lambda, own.missing_pages))
             }
             (Err(_), Err(_)) => None,
@@ -448,8 +460,8 @@ fn memory_is_shared_evenly() {
     assert!(drawn[0].is_some_and(|(lambda, missing)| lambda > 0.0 && missing > 0), "{kinds:?}");
 }
 
-/// A scene that takes more than it may is refused before it is there: its samples, and the lists of those that show. Of bricks
-/// coarser ones are drawn where they fit.
+/// A scene that exceeds the memory limit is refused before its samples, or the lists of visible
+/// samples, are uploaded. If coarser bricks fit, these are drawn instead.
 #[test]
 fn memory_is_kept_to() {
     for in_bricks in [false, true] {
@@ -465,7 +477,7 @@ fn memory_is_kept_to() {
                 Err(error) => Err(("prepared", error)),
                 Ok(mut prepared) => {
                     let mut draw = || renderer.render(&mut prepared, &camera, &settings);
-                    // What is refused once is refused again.
+                    // A refused picture is refused again.
                     let first =
                         draw().map_err(|error| error.to_string()).map(|(picture, _)| picture);
                     match draw() {
@@ -490,7 +502,7 @@ fn memory_is_kept_to() {
             };
             outcomes.push(match outcome {
                 Ok(picture) if same(&picture, &expected) => "done",
-                // Bricks of a coarser level.
+                // Coarser bricks were drawn.
                 Ok(picture) if in_bricks => {
                     let like = compare_pictures(&picture, &expected).expect("of one size").psnr;
                     assert!(
@@ -499,7 +511,7 @@ fn memory_is_kept_to() {
                     );
                     "coarser"
                 }
-                Ok(_) => panic!("2^{shift} bytes: another picture"),
+                Ok(_) => panic!("2^{shift} bytes: a different picture"),
                 Err((when, Error::Gpu(message))) => {
                     assert!(message.ends_with(" MiB may be taken"), "2^{shift} bytes: {message}");
                     when

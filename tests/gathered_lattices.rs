@@ -1,6 +1,7 @@
-//! What the CPU engine gathers by sums over samples: radial kernels, sharp volumes, body-centred and rectilinear lattices.
+//! Volumes that the CPU engine gathers by sums over samples: those with radial kernels, sharp
+//! volumes, and body-centred and rectilinear lattices.
 
-#[allow(dead_code, reason = "scenes of other tests")]
+#[allow(dead_code, reason = "other tests use the rest")]
 mod scenes;
 
 use glam::{DMat3, DVec3};
@@ -33,7 +34,7 @@ fn agreement(a: &Picture, b: &Picture) -> f64 {
     compare_pictures(a, b).expect("pictures of one size").psnr.unwrap_or(f64::INFINITY)
 }
 
-/// The case with another kernel, and its volume sharp or not.
+/// The case with another kernel. Its volume is sharpened if `is_sharp`.
 fn with_kernel(case: &Case, kernel: &Kernel, is_sharp: bool) -> Case {
     let items = case.scene.items.iter().map(|item| match item {
         Item::Volume(volume, _, transfer) => {
@@ -50,7 +51,7 @@ fn with_kernel(case: &Case, kernel: &Kernel, is_sharp: bool) -> Case {
     Case { name: case.name, scene, camera: case.camera.clone(), settings: case.settings.clone() }
 }
 
-/// The case with random bytes on another lattice, whose border shows.
+/// The unlit blobs with random bytes on another lattice, whose border is visible.
 fn random(lattice: Lattice) -> Case {
     let case = scenes::blobs_unshaded();
     let mut random = 7u64;
@@ -95,7 +96,7 @@ fn rectilinear(dims: [usize; 3], steps: &[f64]) -> Lattice {
     Lattice { arrangement, ..cartesian(dims) }
 }
 
-/// Draws cases by gathering, which must come as near to the reference as told.
+/// Asserts that each gathered picture agrees with the reference to `least(name)` dB or better.
 fn agree(cases: impl IntoIterator<Item = (String, Case)>, least: impl Fn(&str) -> f64) {
     let mut failed = Vec::new();
     for (name, case) in cases {
@@ -129,7 +130,8 @@ fn kernels() -> Vec<(&'static str, Kernel)> {
     kernels.into_iter().map(|(name, kernel)| (name, kernel.expect(name))).collect()
 }
 
-/// Kernels of both signs have no field where too few of them reach: its border in a single layer of samples lies within sheets.
+/// Minimum agreement at borders, in dB. Kernels of both signs define no field where too few of them
+/// reach. In a single layer of samples, the border of the field then lies inside sheets.
 fn least_of_borders(name: &str) -> f64 {
     if name.starts_with("hann") && (name.contains(" 1,") || name.contains(" 1]")) {
         28.0
@@ -197,7 +199,8 @@ fn rectilinear_lattices_agree_with_the_reference() {
             cases.push((format!("{steps:?}, {dims:?}"), random(rectilinear(dims, steps))));
         }
     }
-    // Steps three times as long as those before: scattering comes no nearer in a single layer.
+    // Each long step is three times the one before it. In a single layer, scattering is no closer
+    // to the reference.
     agree(cases, |name| if name.contains("3.0], [1,") { 41.0 } else { 50.0 });
 }
 

@@ -1,4 +1,5 @@
-//! Trees of splats: what every one promises, and that pictures of their cuts are those of the splats.
+//! Trees of splats. Every tree keeps its promises, and pictures of its cuts match pictures of the
+//! splats.
 
 use glam::{DVec3, Vec3};
 use splatkit::{
@@ -20,7 +21,7 @@ use splatkit::{
 };
 use std::{path::Path, sync::Arc};
 
-/// A knotted tube of about so many vertices, coloured by place.
+/// A knotted tube of about `count` vertices, coloured by position.
 fn knot(count: u32) -> SplatSet {
     let around = f64::from(count / 12).sqrt() as u32;
     let mut mesh = Mesh::knot(12 * around, around);
@@ -38,7 +39,7 @@ fn build(set: &SplatSet, block_splats: usize) -> Tree {
         .expect("a tree")
 }
 
-/// Looks at a set from where it fills this part of the picture.
+/// A camera for which the bounds fill `part` of the picture.
 fn camera(bounds: &Bounds, part: f64) -> Camera {
     let mut camera = Camera::framing(bounds, DVec3::new(1.0, -2.0, 0.7), DVec3::Z, 1.0);
     camera.position = camera.focal_point + (camera.position - camera.focal_point) / part;
@@ -80,7 +81,7 @@ fn trees_of_every_preset_keep_their_promises_and_all_splats() {
     }
 }
 
-/// Lengths may be in any unit: coarse nodes keep their opacity.
+/// Lengths may have any unit: coarse nodes keep their opacity.
 #[test]
 fn trees_of_any_size_are_alike() {
     let set = knot(5000);
@@ -103,7 +104,8 @@ fn trees_of_any_size_are_alike() {
     }
 }
 
-/// Nodes and samples in one picture, from the first frame on: what is chosen of the one moves the runs of the other.
+/// Nodes and samples in one picture, from the first frame on. The nodes that are chosen move the
+/// batches of the samples, and vice versa.
 #[test]
 fn a_hierarchy_in_a_volume() {
     let volume = Arc::new(Phantom::Ball.sample_bytes([32; 3]).expect("a ball"));
@@ -133,7 +135,7 @@ fn a_hierarchy_in_a_volume() {
         let camera = camera(&scene.bounds(), 0.8);
         let mut renderer = renderer();
         let mut prepared = renderer.prepare(&scene).expect("fits");
-        // Nearer, so that bricks and pages are read anew.
+        // From far and then nearer, so that other bricks and pages are read.
         for part in [0.3, 1.0] {
             let camera = Camera {
                 position: camera.focal_point + (camera.position - camera.focal_point) / part,
@@ -148,7 +150,7 @@ fn a_hierarchy_in_a_volume() {
     }
 }
 
-/// What was at hand before a page that cannot be read is drawn as ever afterwards.
+/// Pages that were loaded before a page that cannot be read are drawn as usual afterwards.
 #[test]
 fn a_page_that_cannot_be_read_takes_nothing_with_it() {
     let mut file =
@@ -181,7 +183,7 @@ fn bytes(splat: &splatkit::splat::Splat) -> [u8; 48] {
     bytemuck::cast(*splat)
 }
 
-/// The smallest sphere around the leaves' spheres, nearly: by many small steps.
+/// Approximate radius of the smallest sphere around the leaves' spheres, found by many small steps.
 fn smallest_sphere(tree: &Tree) -> f64 {
     let leaves: Vec<(DVec3, f64)> = tree
         .nodes()
@@ -214,7 +216,7 @@ fn root_spheres_are_nearly_the_smallest() {
     }
 }
 
-/// Along every way from the root to a leaf the shares of a cut add up to the whole.
+/// On every path from the root to a leaf, the shares of a cut add up to the whole.
 #[test]
 fn shares_add_up_on_every_way_down() {
     let set = knot(5_000);
@@ -222,7 +224,7 @@ fn shares_add_up_on_every_way_down() {
         let tree = build(&set, block_splats);
         for (part, pixels) in [(1.0, 4.0), (0.5, 2.0), (0.1, 1.0), (3.0, 30.0)] {
             let view = camera(&set.bounds(), part).view([4000, 4000]).expect("a view");
-            // The picture is so wide that nothing is beside it.
+            // The picture is so wide that nothing lies beside it.
             let view = View { center: view.center + 1e6, size: [2_000_000; 2], ..view };
             let cut = Cut::new(&view, tree.origin, pixels, false);
             let selected: std::collections::HashMap<*const _, u32> = tree
@@ -258,7 +260,8 @@ fn shares_add_up_on_every_way_down() {
     }
 }
 
-/// The engine selects on the GPU what the CPU finds, in one block and in many, in memory and from a file.
+/// The GPU engine selects the same nodes as the CPU: in one block and in many, in memory and from a
+/// file.
 #[test]
 fn the_engine_draws_the_cut_that_the_oracle_finds() {
     let set = knot(8_000);
@@ -291,7 +294,8 @@ fn the_engine_draws_the_cut_that_the_oracle_finds() {
                     }
                     let mut flat =
                         renderer.prepare(&Scene::new().with_splats(cut)).expect("prepared");
-                    // The same sheets need the same bounds, which a cut's splats have but nearly.
+                    // Equal sheets need equal bounds, which the splats of a cut have only
+                    // approximately.
                     let (expected, _) =
                         renderer.render(&mut flat, &camera, &settings).expect("a picture");
                     let agreement = decibels(&found, &expected);
@@ -320,7 +324,8 @@ fn the_engine_matches_the_reference() {
     }
 }
 
-/// Pixels that all of the leaves' picture's neighbourhood covers, but the cut's does not.
+/// Counts the holes of a cut: pixels that it does not cover, although the leaves cover all 5 × 5
+/// pixels around them.
 fn holes(leaves: &Picture, cut: &Picture) -> usize {
     let [width, height] = [leaves.width as i32, leaves.height as i32];
     let covered = |x: i32, y: i32| {
@@ -356,7 +361,7 @@ fn coarse_cuts_have_no_holes_and_look_like_the_leaves() {
             );
             assert_eq!(holes(&leaves, &cut), 0, "{part} {pixels}");
             assert!(agreement > least, "{part} {pixels}: {agreement:.1} dB");
-            assert!(agreement <= last + 3.0, "coarser cuts are no better");
+            assert!(agreement <= last + 3.0, "a coarser cut agrees better");
             last = agreement;
         }
     }
@@ -381,7 +386,8 @@ fn a_budget_of_splats_is_kept_and_used() {
     }
 }
 
-/// With room for few pages the coarse ones are drawn: less sharp, but whole. With more room the picture is that of all.
+/// If the cache holds few pages, coarse ones are drawn: the picture is less sharp, but whole. With
+/// more capacity the picture comes closer to the one of all pages.
 #[test]
 fn a_page_cache_of_any_size_draws_a_whole_picture() {
     let set = knot(120_000);
@@ -410,7 +416,7 @@ fn a_page_cache_of_any_size_draws_a_whole_picture() {
         assert!(agreement > last, "{agreement}");
         last = agreement;
     }
-    // What a device may take bounds them, too, all hierarchies together.
+    // The memory limit of the device bounds the pages too, for all hierarchies together.
     let hierarchy = || Hierarchy::from_tree(tree.clone()).expect("a hierarchy");
     let scene = Scene::new().with_hierarchy(hierarchy()).with_hierarchy(hierarchy());
     let gpu =
@@ -422,7 +428,8 @@ fn a_page_cache_of_any_size_draws_a_whole_picture() {
     assert_eq!(holes(&all, &both), 0);
 }
 
-/// Pages come and go while the view moves; what is drawn does not depend on what was at hand before.
+/// Pages come and go while the view moves. The picture does not depend on which pages were loaded
+/// before.
 #[test]
 fn a_view_looks_the_same_however_it_was_reached() {
     let set = knot(60_000);
@@ -467,7 +474,8 @@ fn a_closed_surface_looks_the_same_without_what_faces_away() {
     }
 }
 
-/// What faces away is left out only where the surface hides it: not where a clip opens it, nor from within.
+/// Back faces are left out only if the surface hides them: not if a clip opens it, and not from
+/// within.
 #[test]
 fn an_opened_surface_shows_its_back() {
     let set = knot(30_000);
@@ -511,7 +519,7 @@ fn an_opened_surface_shows_its_back() {
     }
 }
 
-/// As of a set of splats, so of a tree: no optical depth is so large that a picture of it is none.
+/// Trees refuse optical depths so large that a picture would hold no numbers, as sets of splats do.
 #[test]
 fn optical_depths_beyond_what_can_be_drawn_are_refused() {
     let mut set = knot(500);
@@ -532,7 +540,8 @@ fn optical_depths_beyond_what_can_be_drawn_are_refused() {
     );
 }
 
-/// Normals that are smooth over edges are not those of the faces, and it is the faces that face away.
+/// Normals that are smooth over edges are not the normals of the faces. Faces, not normals, decide
+/// what faces away.
 #[test]
 fn smooth_normals_over_edges_lose_nothing() {
     let mut cube = Mesh::cube(2.0);

@@ -1,7 +1,7 @@
-//! Many varied scenes, one after the other in one process: converted, drawn and let go again. What the process and the GPU hold
-//! stays the same.
+//! Converts, draws and drops many varied scenes, one after the other in one process. The memory
+//! that the process and the GPU hold stays the same.
 //!
-//! The ordinary run is short. For a long one:
+//! The default run is short. For a long one:
 //! `SPLATKIT_LOAD_SECONDS=3600 cargo test --release --test load -- --nocapture`
 
 use glam::DVec3;
@@ -26,16 +26,17 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Rounds of the ordinary run, and how many of them differ; a round draws one scene of each kind. Each kind of scene and
-/// settings has shaders that a driver keeps, so what is held settles after all that differ were drawn.
+/// Rounds of the default run, and how many rounds differ. A round draws one scene of each kind.
+/// Each kind of scene and settings has shaders that a driver keeps. So memory settles only after
+/// every differing round was drawn once.
 const ROUNDS: u32 = 9;
 const CYCLE: u32 = 3;
 const LONG_CYCLE: u32 = 20;
-/// What the process may hold more in the last third of all rounds than in the first, beside a part of it: allocators keep what
-/// was freed.
+/// How much memory the last third of all rounds may hold beyond the first third, in bytes. A
+/// twentieth of the first third is allowed in addition. Allocators keep freed memory.
 const SLACK: u64 = 24 << 20;
 
-/// A folder that goes when it is let go.
+/// A temporary folder, removed when it is dropped.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -56,7 +57,7 @@ impl Drop for Folder {
     }
 }
 
-/// A number that differs from round to round, below `below`.
+/// A number below `below` that varies from round to round.
 fn varied(round: u32, salt: u32, below: u32) -> u32 {
     // Knuth's multiplier (1973) spreads neighbours far apart.
     ((round + 1).wrapping_mul(salt + 17).wrapping_mul(2_654_435_761) >> 8) % below
@@ -70,7 +71,8 @@ fn knot(round: u32) -> Mesh {
     Mesh::knot(200 + varied(round, 1, 400), 12 + varied(round, 2, 12))
 }
 
-/// Each kind of scene, of another size each round; files come and go in the folder.
+/// Scenes of each kind, whose sizes vary from round to round. Their files are written to `folder`
+/// and replaced in every round.
 fn scenes(round: u32, folder: &Path) -> Vec<(&'static str, Scene)> {
     let limits = Limits::default();
     let side = 24 + varied(round, 3, 40) as usize;
@@ -89,7 +91,7 @@ fn scenes(round: u32, folder: &Path) -> Vec<(&'static str, Scene)> {
     bricks::write(&volume, &splv, &bricks::WriteOptions::default(), &|_, _| ()).unwrap();
     let cut = Bricks::open(&splv, &limits).unwrap();
 
-    // A table as programs write it.
+    // A table like those that other programs write.
     let mut table = String::from("x,y,z,value\n");
     for index in 0..600 + varied(round, 4, 600) {
         let [x, y, z] =
@@ -121,7 +123,7 @@ fn scenes(round: u32, folder: &Path) -> Vec<(&'static str, Scene)> {
     ]
 }
 
-/// Settings that differ from round to round; bricks are drawn in sheets alone.
+/// Settings that vary from round to round. Bricks are drawn in sheets only.
 fn settings(round: u32, name: &str) -> Settings {
     let mut settings = Settings::new([64 + varied(round, 8, 200), 64 + varied(round, 9, 200)]);
     settings.detail = Detail::Pixels(f64::from(varied(round, 10, 3)));
@@ -134,7 +136,7 @@ fn settings(round: u32, name: &str) -> Settings {
     settings
 }
 
-/// Bytes that the process holds; nothing where the system does not tell.
+/// Resident memory of the process in bytes; 0 if the system does not report it.
 fn resident() -> u64 {
     let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let kib = text.lines().find_map(|line| {
@@ -143,7 +145,7 @@ fn resident() -> u64 {
     1024 * kib.unwrap_or(0)
 }
 
-/// Buffers and bytes that live on the GPU; nothing where the backend does not tell.
+/// Number of buffers on the GPU and their bytes; 0 if the backend does not report them.
 fn on_the_gpu(gpu: &Gpu) -> (usize, u64) {
     gpu.wait().unwrap();
     let report = gpu.device.generate_allocator_report();
@@ -186,7 +188,7 @@ fn nothing_grows() {
             }
         }
         let own = on_the_gpu(&gpu);
-        // All that a round has made is gone.
+        // Everything that the round created is freed.
         assert_eq!(*buffers.get_or_insert(own), own, "round {round}: buffers and bytes on the GPU");
         assert_eq!(folder.files(), 2, "files are replaced, and nothing else is left");
         held.push(resident());
@@ -202,7 +204,8 @@ fn nothing_grows() {
     let early = held[..held.len().div_ceil(3)].iter().max().unwrap();
     let last = held[held.len() - held.len().div_ceil(3)..].iter().max().unwrap();
     println!(
-        "{pictures} pictures in {} rounds, {:.0} s; at most {} MiB in the first third, {} MiB in the last; {} buffers on the GPU",
+        "{pictures} pictures in {} rounds, {:.0} s; at most {} MiB in the first third, {} MiB in \
+         the last; {} buffers on the GPU",
         held.len(),
         start.elapsed().as_secs_f64(),
         early >> 20,

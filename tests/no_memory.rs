@@ -1,7 +1,8 @@
-//! Every step from a file to a hierarchy, where large allocations fail: each ends with an error that names the file, and none
-//! ends the process.
+//! Runs every step from a file to a hierarchy while large allocations fail. Each failure is an
+//! error that names the file, and none ends the process.
 //!
-//! The allocator of this test refuses whatever is larger than a bound, and, in the second test, more than so much together.
+//! The allocator of this test refuses single allocations above a bound. In the second test it
+//! refuses allocations whose sum would exceed a bound.
 
 use splatkit::{
     Error, Result,
@@ -19,7 +20,7 @@ use std::{
     },
 };
 
-/// The most bytes that one allocation may have, and that all may have together.
+/// The most bytes of one allocation, the most bytes of all together, and the bytes allocated now.
 static LARGEST: AtomicUsize = AtomicUsize::new(usize::MAX);
 static MOST: AtomicUsize = AtomicUsize::new(usize::MAX);
 static HELD: AtomicUsize = AtomicUsize::new(0);
@@ -29,7 +30,8 @@ static BOUNDS: Mutex<()> = Mutex::new(());
 
 struct Bounded;
 
-/// Smaller allocations are not refused: lists of one task, which memory is asked for together.
+/// Allocations up to this size are never refused. They are lists of single tasks, whose memory the
+/// library reserves together.
 const SMALL: usize = 1 << 20;
 
 fn refuses(more: usize) -> bool {
@@ -43,16 +45,16 @@ static ALLOCATOR: Bounded = Bounded;
 
 #[expect(
     unsafe_code,
-    reason = "an allocator that fails is what this tests; it hands on to the system's"
+    reason = "this test needs an allocator that fails; it forwards to the system's"
 )]
-// SAFETY: memory comes from the system's allocator alone, and null where there is none is allowed.
+// SAFETY: all memory comes from the system's allocator, and an allocator may return null.
 unsafe impl GlobalAlloc for Bounded {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         if refuses(layout.size()) {
             return std::ptr::null_mut();
         }
         HELD.fetch_add(layout.size(), Relaxed);
-        // SAFETY: the caller's promises are those that the system's asks for.
+        // SAFETY: the caller keeps the promises that the system's allocator asks for.
         unsafe { System.alloc(layout) }
     }
 
@@ -72,7 +74,7 @@ unsafe impl GlobalAlloc for Bounded {
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        // Both are held while one is moved.
+        // Both blocks are held while the content moves.
         if size > layout.size() && refuses(size) {
             return std::ptr::null_mut();
         }
@@ -129,7 +131,7 @@ fn ply(side: u32, has_triangles: bool) -> Vec<u8> {
     out
 }
 
-/// The same sheet as text.
+/// A sheet of `side`² vertices in quads, as OBJ text.
 fn obj(side: u32) -> Vec<u8> {
     let mut out = String::new();
     for vertex in 0..side * side {
@@ -143,7 +145,7 @@ fn obj(side: u32) -> Vec<u8> {
     out.into_bytes()
 }
 
-/// From a file to a hierarchy and back to its splats.
+/// Converts a file to a hierarchy, reads the hierarchy back and returns its number of splats.
 fn convert(input: &Path, output: &Path) -> Result<usize> {
     let mesh = load_mesh(input, &Limits::default())?;
     mesh.is_solid();
@@ -158,7 +160,8 @@ fn convert(input: &Path, output: &Path) -> Result<usize> {
     Ok(Hierarchy::open(output, &Limits::default())?.leaves()?.splats.len())
 }
 
-/// Converts under ever larger bounds until all works, and gives how many of them were too small.
+/// Converts under ever larger bounds until a conversion succeeds. Returns how many bounds were too
+/// small.
 fn walk(name: &str, content: Vec<u8>, mut bound: impl FnMut(usize), first: usize) -> usize {
     let _held = BOUNDS.lock().unwrap_or_else(PoisonError::into_inner);
     let folder = Folder::new(name);
@@ -189,7 +192,7 @@ fn walk(name: &str, content: Vec<u8>, mut bound: impl FnMut(usize), first: usize
     }
 }
 
-/// A sheet, a cloud, a text, and few triangles that are cut into many.
+/// A sheet, a point cloud, a text file, and few triangles that are subdivided into many.
 fn inputs() -> [(&'static str, Vec<u8>); 4] {
     [
         ("sheet.ply", ply(600, true)),

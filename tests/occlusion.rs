@@ -1,7 +1,7 @@
-//! What is hidden and left out does not show: pictures with culling and without are the same within the light that a pixel
-//! counts as opaque with, over many views and transfer functions.
+//! Leaving out hidden splats does not show. Over many views and transfer functions, pictures with
+//! and without culling differ by no more than the light that an opaque pixel still lets through.
 
-#[allow(dead_code, reason = "scenes of other tests")]
+#[allow(dead_code, reason = "other tests use the rest")]
 mod scenes;
 
 use glam::{DQuat, DVec3};
@@ -16,17 +16,19 @@ use splatkit::{
 };
 use std::sync::Arc;
 
-/// What a pixel may differ by: the light that is left where nothing more is added (0.0005), and what a field differs by where
-/// another pass begins. There, samples that end just before the seam no longer reach across it with the last 0.4 % of their
-/// kernels; where the transfer function is steep and lit, that is up to 0.0026 (measured with nothing hidden).
+/// The most that a channel of a pixel may differ by. One part is the light that is left when a
+/// pixel counts as opaque (0.0005). The other is a difference of the field where another pass
+/// begins: samples that end just before the seam no longer reach across it with the last 0.4 % of
+/// their kernels. If the transfer function is steep and lit, that makes up to 0.0026 (measured with
+/// nothing hidden).
 const MOST_DIFFERENCE: f32 = 0.004;
 
-/// Passes as thin as they come, so that small scenes have many.
+/// A renderer with passes as thin as possible, so that small scenes have many.
 fn renderer(gpu: &Gpu) -> Renderer {
     Renderer::with_budget(gpu, Budget { least_share: Some(1), ..Budget::default() })
 }
 
-/// The camera turned around what it looks at, in steps that are no part of a turn.
+/// The camera turned around its focal point, in steps that do not divide a full turn.
 fn turned(camera: &Camera, step: u32) -> Camera {
     let angle = 0.9 * f64::from(step);
     let away = camera.position - camera.focal_point;
@@ -37,12 +39,12 @@ fn turned(camera: &Camera, step: u32) -> Camera {
 
 fn case(name: &'static str, scene: Scene) -> Case {
     let camera = Camera::framing(&scene.bounds(), DVec3::new(0.4, -0.3, -1.0), DVec3::Y, 1.2);
-    // What is gathered has no splats that could be hidden.
+    // Gathered volumes have no splats that could be hidden.
     let settings = Settings { evaluate: Evaluate::Scatter, ..Settings::new([96, 80]) };
     Case { name, scene, camera, settings }
 }
 
-/// A solid of rind, flesh and stones, of which an opacity shows all.
+/// A solid of rind, flesh and stones, all drawn with one opacity.
 fn specimen(opacity: f64) -> Case {
     let volume = Phantom::Specimen.sample_bytes([40; 3]).unwrap();
     let transfer = TransferFunction {
@@ -80,7 +82,8 @@ fn largest_difference(a: &Picture, b: &Picture) -> f32 {
     channels.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 
-/// Draws a case from all around with culling and without; gives the splats hidden in all views together.
+/// Asserts that a case looks the same with culling and without, from all around. Returns the number
+/// of hidden splats over all views.
 fn hidden_in(case: &Case, views: u32) -> u64 {
     let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
     let mut renderer = renderer(&gpu);
@@ -143,7 +146,7 @@ fn scenes_of_all_kinds_are_the_same() {
     }
 }
 
-/// Where it would be wrong to leave anything out, nothing is.
+/// Nothing is left out of scenes in which every splat counts.
 #[test]
 fn nothing_hides_where_all_counts() {
     let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");
@@ -153,7 +156,7 @@ fn nothing_hides_where_all_counts() {
     }
 }
 
-/// The same scene draws the same bytes, however its tiles and runs come up.
+/// A scene draws the same bytes each time, in whatever order its tiles and batches are processed.
 #[test]
 fn the_same_bytes_each_time() {
     let gpu = Gpu::headless(&AdapterChoice::Automatic).expect("a GPU, or a software driver");

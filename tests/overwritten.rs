@@ -1,6 +1,8 @@
-//! Files that another program writes to while they are read. The outcome is a result or an error, never a panic or a signal.
+//! Files that another program writes to while they are read. The outcome is a result or an error,
+//! never a panic or a signal.
 //!
-//! Every file ends where a page of memory ends: who reads a character beyond the end of the text reads what is not mapped.
+//! Every file ends at the end of a memory page, so reading a character beyond the end of the text
+//! accesses unmapped memory.
 
 #![cfg(any(target_os = "linux", target_os = "macos"))]
 
@@ -16,7 +18,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How long each file is read.
+/// How long each file is read, over and over.
 const TIME: Duration = Duration::from_millis(150);
 const PAGE: usize = 1 << 14;
 
@@ -24,7 +26,7 @@ fn lines(count: usize, line: impl Fn(usize) -> String) -> String {
     (0..count).map(line).collect()
 }
 
-/// The text with as many of the letters at the mark `@` that it ends with a page.
+/// Replaces the mark `@` by copies of `letter`, so that the text ends at the end of a page.
 fn padded(text: &str, letter: &str) -> Vec<u8> {
     let missing = (PAGE - (text.len() - 1) % PAGE) % PAGE;
     text.replacen('@', &letter.repeat(missing), 1).into_bytes()
@@ -38,17 +40,18 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
         "element vertex 1500\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
     let pcd =
         "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1500\nHEIGHT 1\nPOINTS 1500\nDATA ascii\n";
-    let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+    let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n\
+         endloop\nendfacet\n";
     let vti = format!(
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"0.1\" byte_order=\"LittleEndian\">\n\
-         <ImageData WholeExtent=\"0 15 0 15 0 15\" Origin=\"0 0 0\" Spacing=\"1 1 1\">\n\
-         <Piece Extent=\"0 15 0 15 0 15\"><PointData Scalars=\"v\">\n\
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"0.1\" \
+         byte_order=\"LittleEndian\">\n<ImageData WholeExtent=\"0 15 0 15 0 15\" Origin=\"0 0 0\" \
+         Spacing=\"1 1 1\">\n<Piece Extent=\"0 15 0 15 0 15\"><PointData Scalars=\"v\">\n\
          <DataArray type=\"UInt8\" Name=\"v\" format=\"ascii\">{values}@</DataArray>\n\
          </PointData></Piece></ImageData></VTKFile>\n"
     );
     let vtk = format!(
-        "# vtk DataFile Version 3.0\n@\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 16 16 16\nPOINT_DATA 4096\n\
-         SCALARS s int\nLOOKUP_TABLE d\n{values}"
+        "# vtk DataFile Version 3.0\n@\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 16 16 16\n\
+         POINT_DATA 4096\nSCALARS s int\nLOOKUP_TABLE d\n{values}"
     );
     let nrrd = format!(
         "NRRD0004\n# @\ntype: uint8\ndimension: 3\nsizes: 16 16 16\nencoding: ascii\n\n{values}"
@@ -81,7 +84,8 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// Writes leading bytes of long characters, and other bytes, over a file and puts back what was there, again and again.
+/// Overwrites bytes of a file with lead bytes of long UTF-8 characters and other bytes, and
+/// restores them, again and again.
 fn overwrite(file: &File, sound: &[u8], stop: &AtomicBool) {
     let mut state = 1u64;
     while !stop.load(Relaxed) {
@@ -98,7 +102,8 @@ fn overwrite(file: &File, sound: &[u8], stop: &AtomicBool) {
     }
 }
 
-/// Ends the thread that writes, also where a reader panics: the scope would wait for the thread for ever.
+/// Stops the writing thread, also if a reader panics. Otherwise the scope would wait for the thread
+/// forever.
 struct StopAtEnd<'a>(&'a AtomicBool);
 
 impl Drop for StopAtEnd<'_> {
@@ -124,6 +129,6 @@ fn files_that_are_written_to_while_they_are_read() {
                 refused += usize::from(inputs::load(&path, &limits).is_err());
             }
         });
-        assert!(refused > 0, "{name}: what changed was never refused");
+        assert!(refused > 0, "{name}: no changed file was ever refused");
     }
 }

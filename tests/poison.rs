@@ -1,5 +1,6 @@
-//! Numbers that make no picture (not finite, negative, tiny, huge) in every part of a scene. Each is refused by an error that
-//! names what is wrong, or is drawn as by the reference in double precision; never is a picture spoilt in silence.
+//! Numbers that make no picture (not finite, negative, tiny, huge) in every part of a scene. Each
+//! is refused by an error that names the problem, or drawn as the reference in double precision
+//! draws it. No picture is spoilt silently.
 
 use glam::{DMat3, DVec3, Vec3};
 use splatkit::{
@@ -18,10 +19,10 @@ use splatkit::{
 use std::sync::{Arc, OnceLock};
 
 const NOT_FINITE: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
-/// Of either end of what 32 bits hold, the last ones denormal.
+/// Numbers near both ends of the range of 32-bit floats; the last two are denormal.
 const ODD: [f32; 10] = [3e38, -3e38, 1e30, 1e18, 1e10, -1e10, 0.0, 1e-18, 1e-40, -1e-44];
 
-/// The splat that is poisoned.
+/// Index of the splat or sample that is poisoned.
 const POISONED: usize = 17;
 
 fn gpu() -> &'static Gpu {
@@ -100,7 +101,7 @@ fn with_volume(volume: Volume) -> Scene {
     Scene::new().with_volume(volume, Kernel::default(), transfer())
 }
 
-/// Both renderers refuse, in the same words, which hold all of these.
+/// Asserts that both renderers refuse with the same message, which contains all `words`.
 fn assert_refused(scene: &Scene, camera: &Camera, settings: &Settings, words: &[&str]) {
     let found = drawn(scene, camera, settings).expect_err(&format!("{words:?}")).to_string();
     let expected =
@@ -109,12 +110,12 @@ fn assert_refused(scene: &Scene, camera: &Camera, settings: &Settings, words: &[
     words.iter().for_each(|word| assert!(found.contains(word), "“{found}” does not say “{word}”"));
 }
 
-/// What was drawn wrongly, all of which a test tells of at its end.
+/// What was drawn wrongly; a test reports all of it at its end.
 #[derive(Default)]
 struct Faults(Vec<String>);
 
 impl Faults {
-    /// The engine refuses in words, or draws what the reference draws.
+    /// Records a fault unless both refuse, or the engine draws what the reference draws.
     fn look(&mut self, what: &str, scene: &Scene, camera: &Camera, settings: &Settings) {
         let fault =
             match (drawn(scene, camera, settings), reference::render(scene, camera, settings)) {
@@ -139,7 +140,7 @@ fn difference(found: &Picture, expected: &Picture) -> Option<String> {
             return Some(format!("the {name} draws the colour {odd:?}"));
         }
         if picture.depth.iter().any(|depth| depth.is_nan()) {
-            return Some(format!("a depth of the {name} is no number"));
+            return Some(format!("a depth of the {name} is not a number"));
         }
     }
     let pairs = found.color.iter().flatten().zip(expected.color.iter().flatten());
@@ -154,7 +155,7 @@ fn difference(found: &Picture, expected: &Picture) -> Option<String> {
     })
 }
 
-/// The numbers of a splat one by one.
+/// The numbers of a splat one by one, each with its name in errors.
 fn numbers_of(splat: &mut Splat) -> [(&'static str, &mut f32); 10] {
     let Splat { center: [x, y, z], strength, factor: [a, b, c, d, e, f], .. } = splat;
     let (center, factor) = ("the centre", "the factor");
@@ -173,7 +174,7 @@ fn scene_of(set: SplatSet) -> Scene {
     }
 }
 
-/// So far from the origin, an edge has no middle that is not one of its ends.
+/// So far from the origin, the midpoint of an edge rounds to one of its ends.
 #[test]
 fn triangles_far_from_the_origin_come_to_an_end() {
     let mesh = Mesh {
@@ -187,7 +188,7 @@ fn triangles_far_from_the_origin_come_to_an_end() {
     assert!((1..1000).contains(&set.splats.len()), "{}", set.splats.len());
 }
 
-/// Samples of which there are none have no range of values.
+/// An empty set of samples has no range of values.
 #[test]
 fn no_samples_beside_a_surface_are_nothing() {
     let none = SplatSet { splats: Vec::new(), ..samples() };
@@ -208,7 +209,7 @@ fn splats_that_are_not_finite_are_named() {
                     .nth(number)
                     .expect("a number");
                 *value = poison;
-                // The first item is sound: the second one is told of.
+                // The first item is sound, so the error names the second.
                 let scene = match set.payload {
                     Payload::Radiance => Scene::new().with_splats(ball()).with_splats(set),
                     Payload::Scalar => {

@@ -1,7 +1,8 @@
-//! Every input that once broke something, small and of our own making, through the entry points of the fuzz targets.
+//! Runs every input that once broke something through the entry points of the fuzz targets. All
+//! inputs are small and of our own making.
 //!
-//! `tests/regressions/<format>/` holds them; `tools/fuzz` finds them. To add one: minimise it (`cargo fuzz tmin`), give it a
-//! name that says what was wrong, and put it there.
+//! `tests/regressions/<format>/` holds the inputs; `tools/fuzz` finds them. To add one, minimise it
+//! (`cargo fuzz tmin`), give it a name that says what was wrong, and put it there.
 
 #[path = "regressions/oracle.rs"]
 mod oracle;
@@ -12,7 +13,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Far more than any of them takes, where one that hangs takes for ever.
+/// Time limit: far more than any input takes, to catch an input that hangs.
 const MOST_TIME: Duration = Duration::from_secs(20);
 
 fn inputs(format: &str) -> Vec<PathBuf> {
@@ -37,7 +38,7 @@ fn what_broke_once_holds() {
     }
 }
 
-/// No format refuses to be cut anywhere, or to be nothing.
+/// Empty inputs and inputs of one byte break no format.
 #[test]
 fn nothing_and_little() {
     for (_, look) in oracle::FORMATS {
@@ -54,7 +55,7 @@ fn every_folder_has_its_format() {
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
         assert!(
             path.is_file() || oracle::FORMATS.iter().any(|(format, _)| *format == name),
-            "{name} is no format"
+            "the folder {name} has no format of its name"
         );
     }
 }

@@ -1,4 +1,5 @@
-//! Sharp volumes pass through their samples, hold what Marschner and Lobb's signal has, and keep inside their ranges.
+//! Sharp volumes pass through their samples, reproduce Marschner and Lobb's signal, and stay within
+//! their ranges.
 
 use glam::{DMat3, DVec3};
 use splatkit::{
@@ -31,7 +32,8 @@ fn kernels() -> Vec<Kernel> {
     ]
 }
 
-/// Cartesian and body-centred, of unequal and sheared axes, thin and long.
+/// Cartesian and body-centred lattices with unequal and sheared axes, thin and long ones among
+/// them.
 fn lattices() -> Vec<Lattice> {
     let sheared = DMat3::from_cols(
         DVec3::new(0.3, 0.1, 0.0),
@@ -76,7 +78,7 @@ fn sharp_volumes_pass_through_their_samples() {
     }
 }
 
-/// Weak detail far from single outliers, which give the volume a range that the detail does not fill.
+/// Weak detail between two outliers, which make the range of the volume much wider than the detail.
 fn with_outliers(lattice: Lattice, mut detail: impl FnMut(DVec3) -> f64) -> Volume {
     let count = lattice.len();
     let mut values: Vec<f32> =
@@ -85,11 +87,11 @@ fn with_outliers(lattice: Lattice, mut detail: impl FnMut(DVec3) -> f64) -> Volu
     Volume::new(lattice, Samples::F32(values)).unwrap()
 }
 
-/// The reconstruction at places all around each sample lies in the range that stands for it.
+/// The reconstruction around each sample lies within the range that is stored for the sample.
 #[test]
 fn ranges_hold_what_is_reconstructed() {
     let mut random = Random(11);
-    // Samples on either side of a cell's middle alternate as the cardinal function there does.
+    // Samples on either side of a cell's centre alternate in sign like the cardinal function there.
     let worst = |steps: DVec3| {
         let sign = (steps - 7.5)
             .abs()
@@ -122,7 +124,8 @@ fn ranges_hold_what_is_reconstructed() {
     assert!(tightest < 12.0);
 }
 
-/// Looks at places around each drawn sample; the least that is left between a value and its range's upper end.
+/// Checks positions around each drawn sample. Returns the smallest gap between a value and the
+/// upper end of its range, in 255ths of the range of the volume.
 fn slack(volume: &Volume, kernel: &Kernel, random: &mut Random) -> f64 {
     let field = Reconstruction::new(volume, kernel).unwrap();
     let coefficients = volume.coefficients.clone().unwrap();
@@ -133,14 +136,14 @@ fn slack(volume: &Volume, kernel: &Kernel, random: &mut Random) -> f64 {
     let mut tightest = f64::INFINITY;
     for (sample, range) in coefficients.ranges.iter().enumerate() {
         for place in 0..4 {
-            // One of them the middle of a cell.
+            // The first position is the centre of a cell.
             let offset = if place == 0 {
                 DVec3::splat(0.5)
             } else {
                 kernel.extent * (2.0 * random.place() - 1.0)
             };
             let position = coefficients.lattice.sample_position(sample) + unit * offset;
-            // Beyond the volume sums are not whole.
+            // Beyond the volume sums are incomplete.
             let steps = inverse * (position - volume.lattice.origin);
             if offset.length() > kernel.extent || steps.clamp(first, last) != steps {
                 continue;
@@ -161,11 +164,11 @@ fn slack(volume: &Volume, kernel: &Kernel, random: &mut Random) -> f64 {
     tightest
 }
 
-/// How far from the middle of the cube the signal is compared: there trilinear interpolation has the errors of 2.92 and 1.28
-/// (×100) at 40³ and 64³ that others are held against.
+/// Half the edge of the cube in which the signal is compared. There trilinear interpolation has
+/// errors (×100) of 2.92 at 40³ and 1.28 at 64³, the values that other methods are compared to.
 const INSIDE: f64 = 0.71;
 
-/// Root mean square error ×100 of a field against the signal, at random places.
+/// Root mean square error (×100) of a field against the signal, at random positions.
 fn error(inside: impl Fn(DVec3) -> bool, field: impl Fn(DVec3) -> f64) -> f64 {
     let mut random = Random(3);
     let places =
@@ -181,7 +184,7 @@ fn in_cube(place: DVec3) -> bool {
     place.abs().max_element() < INSIDE
 }
 
-/// A cylinder, in which no direction of the signal's rings counts more than others.
+/// A cylinder, in which all directions of the signal's rings count equally.
 fn in_cylinder(place: DVec3) -> bool {
     place.truncate().length() < 0.9 && place.z.abs() < 0.9
 }
@@ -199,7 +202,8 @@ fn signal(samples: usize) -> Volume {
     Phantom::MarschnerLobb.sample([samples; 3]).unwrap()
 }
 
-/// The signal on a body-centred lattice of the unit of `samples` Cartesian ones, reaching beyond the cube.
+/// The signal on a body-centred lattice with the unit of `samples` Cartesian samples. The lattice
+/// reaches beyond the cube.
 fn on_body_centred(samples: usize) -> Volume {
     let edge = std::f64::consts::SQRT_2 * 2.0 / (samples - 1) as f64;
     let across = (2.0 / edge).ceil() as usize + 1;
@@ -251,7 +255,8 @@ fn marschner_and_lobb() {
     }
 }
 
-/// With 29.3 % fewer samples a body-centred lattice of the same unit holds the same.
+/// With 29.3 % fewer samples, a body-centred lattice of the same unit represents the signal equally
+/// well.
 #[test]
 fn body_centred_lattices_hold_as_much() {
     for samples in [40, 64] {
@@ -274,7 +279,7 @@ fn body_centred_lattices_hold_as_much() {
 }
 
 #[test]
-#[ignore = "takes a scan, and tells times"]
+#[ignore = "needs a scan, and prints times"]
 fn a_scan_is_made_sharp_in_seconds() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/bonsai.vti");
     let volume =

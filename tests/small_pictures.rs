@@ -1,5 +1,5 @@
-//! Dense scenes in small pictures: thousands of splats in every pixel. They are drawn, at any size, and a picture that takes too
-//! long is an error in time.
+//! Dense scenes in small pictures, with thousands of splats in every pixel. They are drawn at any
+//! size. A picture that takes too long ends with an error at the time limit.
 
 use glam::{DVec3, Vec3};
 use splatkit::{
@@ -67,7 +67,8 @@ fn psnr(a: &Picture, b: &Picture) -> f64 {
     compare_pictures(a, b).expect("pictures of one size").psnr.unwrap_or(f64::INFINITY)
 }
 
-/// More splats in a tile of one sheet than a driver adds up in one dispatch, of every kind.
+/// A tile of one sheet holds more splats than a driver adds up in one dispatch; for every kind of
+/// splat.
 #[test]
 fn thousands_of_splats_in_a_pixel_agree_with_the_reference() {
     let volume = Phantom::Specimen.sample_bytes([48; 3]).expect("samples");
@@ -92,13 +93,14 @@ fn thousands_of_splats_in_a_pixel_agree_with_the_reference() {
             let agreement = psnr(&whole, &truth);
             println!("{name} {size:?}: {agreement:.1} dB, with more stops {stopped:.1} dB");
             assert!(stopped > 80.0, "{name} {size:?}: {stopped:.1} dB with more stops");
-            // Footprints as large as the scene and half the way to it are beyond what bounds of them hold.
+            // Footprints as large as the scene, or as half the distance to it, are beyond what
+            // their bounds hold. Only the largest picture must agree to 50 dB.
             assert!(agreement > 50.0 || size[1] < 24, "{name} {size:?}: {agreement:.1} dB");
         }
     }
 }
 
-/// Of sets far too fine for the picture fewer splats are drawn, and the picture stays.
+/// Sets far too fine for the picture are drawn with fewer splats, and the picture stays the same.
 #[test]
 fn fewer_splats_stand_for_what_is_too_fine() {
     let surface = Scene::new().with_splats(hills(500));
@@ -114,7 +116,7 @@ fn fewer_splats_stand_for_what_is_too_fine() {
         };
         let (small, few) = draw(Detail::default());
         let (whole, all) = draw(Detail::Pixels(0.0));
-        // What was drawn before changes nothing.
+        // The picture does not depend on what was drawn before.
         let (again, _) = draw(Detail::default());
         let reduced =
             |picture: &Picture| picture.clone().reduced(factor).expect("a smaller picture");
@@ -186,8 +188,8 @@ fn any_scenes() -> Vec<(&'static str, Scene)> {
     ]
 }
 
-/// Sizes, cuts and cameras of all kinds: every picture is done in time, and has colours. For as many seconds as
-/// SPLATKIT_SIZES_SECONDS says.
+/// Draws pictures of random sizes, cuts and cameras for SPLATKIT_SIZES_SECONDS (5 if unset). Every
+/// picture is finished in time and has valid colours.
 #[test]
 fn any_scene_draws_at_any_size() {
     let seconds = std::env::var("SPLATKIT_SIZES_SECONDS")
@@ -230,10 +232,10 @@ fn any_scene_draws_at_any_size() {
         assert!(picture.color.as_flattened().iter().all(inside), "{what}: colours beyond 0 … 1");
         assert!(
             !picture.depth.iter().any(|depth| depth.is_nan()),
-            "{what}: depths that are no numbers"
+            "{what}: depths that are not numbers"
         );
         pictures += 1;
         longest = longest.max(took);
     }
-    println!("{pictures} pictures, {longest:?} the longest");
+    println!("{pictures} pictures; the longest took {longest:?}");
 }

@@ -1,6 +1,7 @@
-//! Kernels that are products along the axes of a lattice: drawn by the CPU engine and by the reference in double precision.
+//! Kernels that are products along the axes of a lattice, drawn by the CPU engine and compared to
+//! the reference in double precision.
 
-#[allow(dead_code, reason = "scenes of other tests")]
+#[allow(dead_code, reason = "other tests use the rest")]
 mod scenes;
 
 use glam::{DMat3, DVec3};
@@ -15,7 +16,7 @@ use splatkit::{
     volume::{Lattice, Reconstruction, Samples, Volume},
 };
 
-/// The kernels, and whether the volume is made sharp.
+/// The kernels, and whether the volume is sharpened.
 const KERNELS: [(Tensor, bool); 4] = [
     (Tensor::Linear, false),
     (Tensor::CatmullRom, false),
@@ -23,7 +24,7 @@ const KERNELS: [(Tensor, bool); 4] = [
     (Tensor::CubicBSpline, true),
 ];
 
-/// A case with another kernel.
+/// The case with another kernel. Its volume is sharpened if `is_sharp`.
 fn with_kernel(case: &Case, tensor: Tensor, is_sharp: bool) -> Case {
     let kernel = Kernel::tensor(tensor);
     let items = case.scene.items.iter().map(|item| match item {
@@ -41,7 +42,7 @@ fn with_kernel(case: &Case, tensor: Tensor, is_sharp: bool) -> Case {
     Case { name: case.name, scene, camera: case.camera.clone(), settings: case.settings.clone() }
 }
 
-/// A case with a volume of random bytes of some size, whose border shows.
+/// A case with random bytes on a lattice of `dims` samples, whose border is visible.
 fn border(dims: [usize; 3]) -> Case {
     let case = scenes::blobs_analytic();
     let edge = 2.0 / dims.into_iter().max().expect("three axes") as f64;
@@ -68,7 +69,7 @@ fn drawn(case: &Case) -> splatkit::Result<Picture> {
     Ok(CpuRenderer::new(&case.scene)?.render(&case.camera, &case.settings)?.0)
 }
 
-/// How near the CPU engine comes to the reference, in dB.
+/// Agreement of the CPU engine with the reference, in dB.
 fn agreement(case: &Case) -> f64 {
     let found = drawn(case).expect(case.name);
     let truth = reference::render(&case.scene, &case.camera, &case.settings).expect(case.name);
@@ -150,7 +151,7 @@ fn fields_pass_through_the_samples() {
     }
 }
 
-/// What no tensor product is drawn with is an error that names it.
+/// If a setting or lattice cannot be drawn with tensor products, the error names it.
 #[test]
 fn what_does_not_go_with_them_is_told() {
     let refused = |case: &Case, what: &str| {

@@ -1,4 +1,5 @@
-//! A scene shows the same picture in any units: of lengths, of values, and wherever the values' zero is.
+//! A scene shows the same picture in any unit of length or value, and wherever the zero of its
+//! values lies.
 
 use glam::DVec3;
 use splatkit::{
@@ -19,7 +20,8 @@ fn gpu() -> &'static Gpu {
     })
 }
 
-/// World lengths per length, values per value and the value of what was 0.
+/// World length of one usual unit of length, value of one usual unit of values, and the value that
+/// stands for the usual 0.
 #[derive(Debug, Clone, Copy)]
 struct Units {
     length: f64,
@@ -34,7 +36,7 @@ impl Units {
         self.zero + self.value * value
     }
 
-    /// Seen from outside, or from within.
+    /// A camera outside the scene, or inside.
     fn camera(self, projection: Projection, is_inside: bool) -> Camera {
         let position =
             if is_inside { DVec3::new(0.3, -0.2, 0.1) } else { DVec3::new(2.0, -3.0, 1.5) }
@@ -80,7 +82,7 @@ impl Units {
         }
     }
 
-    /// Whole values from 0 to 255 in their own units.
+    /// Whole values from 0 to 255 of the usual unit, in this unit.
     fn samples(self) -> Vec<f64> {
         let lattice = USUAL.lattice();
         let value = |sample: usize| {
@@ -133,7 +135,7 @@ fn drawn(scene: &Scene, camera: &Camera, settings: &Settings) -> Picture {
     renderer.render(&mut prepared, camera, settings).expect("a picture").0
 }
 
-/// Peak signal-to-noise ratio of colour and opacity, in dB; of pictures that show something.
+/// Peak signal-to-noise ratio of colour and opacity, in dB. Panics if picture `a` is nearly empty.
 fn psnr(a: &Picture, b: &Picture) -> f64 {
     assert!(
         a.color.iter().filter(|color| color[3] > 0.1).count() > a.color.len() / 8,
@@ -162,7 +164,7 @@ fn values_of_any_unit_and_zero() {
         println!("values times {value:e}, from {zero:e} on: {agreement:.1} dB");
         assert!(agreement > 70.0, "{units:?}: {agreement:.1} dB");
     }
-    // More bits than a float has.
+    // Values with more bits than a float holds.
     let units = Units { zero: 2e9 - 77.0, ..USUAL };
     let samples = Samples::I32(units.samples().iter().map(|v| *v as i32).collect());
     let agreement = psnr(&expected, &drawn(&units.volume(samples), &camera, &settings()));
@@ -170,7 +172,7 @@ fn values_of_any_unit_and_zero() {
     assert!(agreement > 70.0, "{agreement:.1} dB");
 }
 
-/// Where nothing changes there is no slope that rounding could leave and light fall on.
+/// Constant surroundings have no slope that rounding could leave and light could show.
 #[test]
 fn flat_surroundings_are_flat() {
     let inside = |sample: usize| USUAL.lattice().sample_position(sample).length() < 0.6;
@@ -188,8 +190,8 @@ fn flat_surroundings_are_flat() {
     let scene = Scene::new().with_volume(volume, Kernel::default(), transfer);
     let camera = USUAL.camera(PERSPECTIVE, false);
     let expected = reference::render(&scene, &camera, &settings()).expect("a picture");
-    // Gathered, kernels are cut to a cube of four samples a side, not to the ball in it: at the edge of the ball of samples, which is
-    // as hard as can be, that costs two decibels.
+    // Gathering cuts kernels off at a cube of four samples a side, not at the ball inside it. The
+    // edge of this ball of samples is as hard as can be, so that costs 2 dB.
     for (evaluate, least) in [(Evaluate::Scatter, 40.0), (Evaluate::Gather, 38.0)] {
         let agreement =
             psnr(&expected, &drawn(&scene, &camera, &Settings { evaluate, ..settings() }));
@@ -224,7 +226,8 @@ fn lengths_of_any_unit() {
     }
 }
 
-/// From within a scene, everything from the eye on is drawn in order, and sheets may be as thick as they like.
+/// From within a scene, everything in front of the eye is drawn in order, whatever `near` is.
+/// Sheets may have any thickness.
 #[test]
 fn from_the_eye_on() {
     let camera = USUAL.camera(WIDE, true);

@@ -1,6 +1,7 @@
-//! What each engine draws, and in which way, asked of the engines themselves: the table of docs/engine.md.
+//! What each engine draws, and by which method: tests the table of docs/engine.md by asking the
+//! engines.
 //!
-//! Where it has changed, `SPLATKIT_WRITE=1 cargo test --release --test what_engines_draw` writes it anew.
+//! To update the table, run `SPLATKIT_WRITE=1 cargo test --release --test what_engines_draw`.
 
 use glam::{DMat3, DVec3};
 use splatkit::{
@@ -28,7 +29,7 @@ use std::{fmt::Write, fs, path::Path, sync::Arc};
 const SIDE: usize = 12;
 const SIZE: [u32; 2] = [16, 16];
 
-/// How near a picture comes to the reference, in dB, where it shows the scene at all.
+/// Minimum agreement with the reference, in dB, of a picture that shows the scene at all.
 const LIKENESS: f64 = 25.0;
 
 /// A feature, and a scene that needs it.
@@ -65,7 +66,7 @@ fn bytes_on(lattice: Lattice) -> Result<Volume> {
     Volume::new(volume.lattice, Samples::U8(bytes)).map_err(Error::Argument)
 }
 
-/// A lattice of some samples along z in the cube from −1 to 1.
+/// A lattice in the cube from −1 to 1, with `layers` samples along z.
 fn cartesian(layers: usize) -> Lattice {
     let step = |count: usize| 2.0 / (count - 1) as f64;
     let steps = DVec3::new(step(SIDE), step(SIDE), step(layers));
@@ -169,7 +170,7 @@ fn hierarchy() -> Result<Hierarchy> {
     Hierarchy::from_tree(tree)
 }
 
-/// What a picture may need.
+/// The features that a picture may need, one per row of the table.
 fn rows() -> Vec<Row> {
     let gaussian = || Ok(Kernel::default());
     let tensor = |tensor| Ok(Kernel::tensor(tensor));
@@ -269,7 +270,7 @@ fn rows() -> Vec<Row> {
     ]
 }
 
-/// What is asked for each column.
+/// Titles of the columns, and the method that each asks for.
 const COLUMNS: [(&str, Evaluate); 4] = [
     ("CPU: scatter", Evaluate::Scatter),
     ("CPU: gather", Evaluate::Gather),
@@ -277,7 +278,7 @@ const COLUMNS: [(&str, Evaluate); 4] = [
     ("GPU: gather", Evaluate::Gather),
 ];
 
-/// Reasons, each told once.
+/// The reasons of refusals, each listed once.
 #[derive(Default)]
 struct Reasons(Vec<String>);
 
@@ -292,14 +293,12 @@ impl Reasons {
                 });
                 format!("no ({})", at + 1)
             }
-            Err(error) => panic!(
-                "an engine that does not draw something says so by an argument error: {error}"
-            ),
+            Err(error) => panic!("an engine refuses by an argument error alone, not: {error}"),
         }
     }
 }
 
-/// The engines. That for GPUs keeps its pipelines from scene to scene.
+/// The engines. The GPU engine keeps its pipelines from scene to scene.
 struct Engines {
     gpu: Renderer,
 }
@@ -321,7 +320,7 @@ impl Engines {
     }
 }
 
-/// Pictures that show something else than the scene do not count as drawn.
+/// Asserts that the pictures show the scene; other pictures do not count as drawn.
 fn check_likeness(row: &Row, pictures: &[(&str, &Picture)]) {
     let (Ok(scene), false) = (&row.scene, pictures.is_empty()) else { return };
     let truth = reference::render(scene, &row.camera, &row.settings).expect(row.name);
@@ -350,16 +349,17 @@ fn table() -> String {
             .collect();
         check_likeness(&row, &pictures);
         let cells = answers.each_ref().map(|(_, answer)| reasons.cell(answer));
-        writeln!(text, "| {} | {} |", row.name, cells.join(" | ")).expect("text takes text");
+        writeln!(text, "| {} | {} |", row.name, cells.join(" | ")).expect("writing to a string");
     }
     text.push('\n');
     for (at, reason) in reasons.0.iter().enumerate() {
-        writeln!(text, "{}. {reason}", at + 1).expect("text takes text");
+        writeln!(text, "{}. {reason}", at + 1).expect("writing to a string");
     }
     text
 }
 
-const START: &str = "<!-- drawn: written by `SPLATKIT_WRITE=1 cargo test --release --test what_engines_draw` -->\n\n";
+const START: &str = "<!-- drawn: written by `SPLATKIT_WRITE=1 cargo test --release --test \
+     what_engines_draw` -->\n\n";
 const END: &str = "\n<!-- end of drawn -->";
 
 #[test]
@@ -374,7 +374,7 @@ fn the_table_of_what_each_engine_draws_is_true() {
         return;
     }
     for (old, new) in inside.lines().zip(found.lines()) {
-        assert_eq!(old, new, "docs/engine.md is out of date; SPLATKIT_WRITE=1 writes it anew");
+        assert_eq!(old, new, "docs/engine.md is out of date; SPLATKIT_WRITE=1 updates it");
     }
-    assert_eq!(inside, found, "docs/engine.md is out of date; SPLATKIT_WRITE=1 writes it anew");
+    assert_eq!(inside, found, "docs/engine.md is out of date; SPLATKIT_WRITE=1 updates it");
 }

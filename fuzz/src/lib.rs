@@ -1,4 +1,5 @@
-//! What the fuzz targets share: each runs one entry point of the oracle that the regression tests of the library use too.
+//! Shared code of the fuzz targets. Each target runs one entry point of the oracle, which the
+//! regression tests of the library use too.
 
 #[path = "../../tests/regressions/oracle.rs"]
 pub mod oracle;
@@ -10,7 +11,7 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-/// A target: an entry point of the oracle by its name.
+/// Defines a fuzz target from the name of an entry point of the oracle.
 #[macro_export]
 macro_rules! target {
     ($name:ident) => {
@@ -22,21 +23,23 @@ macro_rules! target {
     };
 }
 
-/// What the last panic said, and where.
+/// Message and location of the last panic.
 static LAST: Mutex<String> = Mutex::new(String::new());
 
-/// Makes panics reach those who catch them, and everything run on this thread.
+/// Lets panics reach `catch_unwind`, and runs all work on this thread.
 ///
-/// libFuzzer's own hook ends the process at every panic, those of decoders among them that the library catches on purpose.
+/// libFuzzer's own hook ends the process at every panic, including the panics of decoders that the
+/// library catches on purpose.
 pub fn prepare() {
     std::panic::set_hook(Box::new(|panic| {
         *LAST.lock().unwrap_or_else(PoisonError::into_inner) = panic.to_string();
     }));
-    // One thread makes runs repeatable, and small inputs fast.
+    // With one thread runs are repeatable, and small inputs fast.
     rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global().ok();
 }
 
-/// Runs a target; what it does not catch ends the process, so that libFuzzer keeps the input.
+/// Runs a target. A panic that the target does not catch aborts the process, so that libFuzzer
+/// keeps the input.
 pub fn run(look: oracle::Look, bytes: &[u8]) {
     if catch_unwind(AssertUnwindSafe(|| look(bytes))).is_err() {
         eprintln!("{}", LAST.lock().unwrap_or_else(PoisonError::into_inner));

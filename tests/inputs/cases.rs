@@ -1,29 +1,49 @@
 {
-    let vertices = |count: &str, rows: &str| ply(&format!("element vertex {count}\n{FLOATS}"), rows);
+    let vertices =
+        |count: &str, rows: &str| ply(&format!("element vertex {count}\n{FLOATS}"), rows);
     let faces = |list: &str, rows: &str| {
-        let head = format!("element vertex 3\n{FLOATS}element face 1\nproperty list {list} vertex_indices\n");
+        let head = format!(
+            "element vertex 3\n{FLOATS}element face 1\nproperty list {list} \
+             vertex_indices\n"
+        );
         ply(&head, &format!("0 0 0\n1 0 0\n0 1 0\n{rows}"))
     };
     let after_header = |text: &str, insert: &str| -> Vec<u8> {
         String::from_utf8_lossy(&vertices("1", "1 2 3\n")).replacen(text, insert, 1).into_bytes()
     };
-    let obj = |text: &str| -> Vec<u8> { format!("{text}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").into_bytes() };
+    let obj = |text: &str| -> Vec<u8> {
+        format!("{text}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").into_bytes()
+    };
     let buffer = |uri: &str| -> Vec<u8> { gltf_with(uri, r#"{"mesh":0}"#).into_bytes() };
-    let scene = |nodes: &str| -> Vec<u8> { gltf().replace(r#""nodes":[{"mesh":0}]"#, &format!(r#""nodes":[{nodes}]"#)).into_bytes() };
-    let changed = |from: &str, to: &str| -> Vec<u8> { assert!(gltf().contains(from)); gltf().replacen(from, to, 1).into_bytes() };
-    let at = |mut bytes: Vec<u8>, place: usize, new: &[u8]| -> Vec<u8> { bytes[place..place + new.len()].copy_from_slice(new); bytes };
-    let vti = |content: &str| -> Vec<u8> { vtk_xml("ImageData", "", &vti_piece(&array("format='ascii'", content))).into_bytes() };
+    let scene = |nodes: &str| -> Vec<u8> {
+        gltf().replace(r#""nodes":[{"mesh":0}]"#, &format!(r#""nodes":[{nodes}]"#)).into_bytes()
+    };
+    let changed = |from: &str, to: &str| -> Vec<u8> {
+        assert!(gltf().contains(from));
+        gltf().replacen(from, to, 1).into_bytes()
+    };
+    let at = |mut bytes: Vec<u8>, place: usize, new: &[u8]| -> Vec<u8> {
+        bytes[place..place + new.len()].copy_from_slice(new);
+        bytes
+    };
+    let vti = |content: &str| -> Vec<u8> {
+        vtk_xml("ImageData", "", &vti_piece(&array("format='ascii'", content))).into_bytes()
+    };
     let binary = |attributes: &str, bytes: &[u8]| -> Vec<u8> {
         use ::base64::Engine;
         let text = ::base64::engine::general_purpose::STANDARD.encode(bytes);
         vtk_xml("ImageData", attributes, &vti_piece(&array("format='binary'", &text))).into_bytes()
     };
-    let counts = |numbers: &[u32]| -> Vec<u8> { numbers.iter().flat_map(|n| n.to_le_bytes()).collect() };
+    let counts =
+        |numbers: &[u32]| -> Vec<u8> { numbers.iter().flat_map(|n| n.to_le_bytes()).collect() };
     let chain = |count: usize| -> Vec<u8> {
-        let nodes: Vec<String> = (1..count).map(|child| format!(r#"{{"children":[{child}]}}"#)).collect();
-        gltf().replace(r#"{"mesh":0}"#, &format!(r#"{},{{"mesh":0}}"#, nodes.join(","))).into_bytes()
+        let nodes: Vec<String> =
+            (1..count).map(|child| format!(r#"{{"children":[{child}]}}"#)).collect();
+        gltf()
+            .replace(r#"{"mesh":0}"#, &format!(r#"{},{{"mesh":0}}"#, nodes.join(",")))
+            .into_bytes()
     };
-    // A PNG that claims a size: only its header is true.
+    // A PNG that claims a size. Only its header is valid.
     let claim = {
         let mut png = png(2, 2);
         png[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
@@ -42,286 +62,1260 @@
         use ::base64::Engine;
         let text = ::base64::engine::general_purpose::STANDARD.encode(bytes);
         let material = format!(
-            r#""materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}],"textures":[{{"source":0}}],"images":[{{"uri":"data:image/png;base64,{text}"}}],"meshes""#
+            "\"materials\":[{{\"pbrMetallicRoughness\":{{\"baseColorTexture\":{{\"index\":0}}}}}}],\
+             \"textures\":[{{\"source\":0}}],\"images\":[{{\"uri\":\"data:image/png;base64,\
+             {text}\"}}],\"meshes\""
         );
-        gltf().replacen(r#""meshes""#, &material, 1).replacen(r#""indices":1"#, r#""indices":1,"material":0"#, 1).into_bytes()
+        gltf()
+            .replacen(r#""meshes""#, &material, 1)
+            .replacen(r#""indices":1"#, r#""indices":1,"material":0"#, 1)
+            .into_bytes()
     };
     let mut laughs = String::from("<!DOCTYPE a [<!ENTITY l0 \"ha\">");
     for level in 1..30 {
-        laughs += &format!("<!ENTITY l{level} \"&l{0};&l{0};&l{0};&l{0};&l{0};&l{0};&l{0};&l{0};&l{0};&l{0};\">", level - 1);
+        laughs += &format!(
+            "<!ENTITY l{level} \"&l{0};&l{0};&l{0};&l{0};&l{0};&l{0};&l{0};&l{0};\
+             &l{0};&l{0};\">",
+            level - 1
+        );
     }
     laughs += "]>";
     let lists = |count: usize| "[".repeat(count);
     let bricks = || splv(&Folder::new());
     vec![
-        // PLY: counts that lie.
-        ("count0.ply", vertices("0", ""), "count0.ply: header: has no element “vertex” with at least one row"),
-        ("count32.ply", vertices("4294967296", "1 2 3\n"), "count32.ply: the count of element “vertex” is 4294967296, over the limit of 2147483648"),
-        ("count31.ply", vertices("2147483647", "1 2 3\n"), "count31.ply: element “vertex”, row 1, byte 115: the file ends, though the header claims 2147483647 rows"),
-        ("count63.ply", vertices("18446744073709551615", "1 2 3\n"), "count63.ply: the count of element “vertex” is 18446744073709551615, over the limit of 2147483648"),
-        ("count64.ply", vertices("18446744073709551616", "1 2 3\n"), "count64.ply: header line 3: “18446744073709551616” is no count of rows"),
-        ("countminus.ply", vertices("-1", "1 2 3\n"), "countminus.ply: header line 3: “-1” is no count of rows"),
-        ("bare.ply", ply(&format!("element nothing 40000000000\nelement vertex 1\n{FLOATS}"), "1 2 3\n"), "mesh 1 0 0"),
-        ("barevertex.ply", ply("element vertex 40000000000\n", ""), "barevertex.ply: the count of element “vertex” is 40000000000, over the limit of 2147483648"),
-        ("bareface.ply", ply(&format!("element vertex 1\n{FLOATS}element face 40000000000\n"), "1 2 3\n"), "bareface.ply: the count of element “face” is 40000000000, over the limit of 2147483648"),
-        ("list32.ply", faces("uint int", "4294967295 0 1 2\n"), "list32.ply: element “face”, row 0, byte 171: the line ends before the value of “vertex_indices”"),
-        ("listminus.ply", faces("int int", "-1\n"), "listminus.ply: element “face”, row 0, byte 170: the list “vertex_indices” has the impossible length -1"),
-        ("listhalf.ply", faces("float int", "2.5 0 1 2\n"), "listhalf.ply: element “face”, row 0, byte 172: the list “vertex_indices” has the impossible length 2.5"),
-        ("index.ply", faces("uchar int", "3 0 1 3\n"), "index.ply: element “face”, row 0, byte 172: refers to vertex 3, but there are 3 (0 … 2)"),
-        ("indexminus.ply", faces("uchar int", "3 0 1 -1\n"), "indexminus.ply: element “face”, row 0, byte 172: refers to vertex -1, but there are 3 (0 … 2)"),
-        ("columns.ply", ply(&format!("element vertex 1\n{}", "property float x\n".repeat(5000)), ""), "columns.ply: header line 4099: more than 4096 elements and properties"),
-        ("endless.ply", format!("ply\nformat ascii 1.0\n{}", "comment\n".repeat(200_000)).into(), "endless.ply: header line 131072: the header is longer than 1048576 bytes, with no line “end_header” in them"),
-        // PLY: numbers that are none.
-        ("nan.ply", vertices("2", "1 2 3\n1 nan 3\n"), "nan.ply: element “vertex”, row 1, byte 106: the position [1, NaN, 3] is not finite"),
-        ("inf.ply", vertices("1", "1 2 inf\n"), "inf.ply: element “vertex”, row 0, byte 100: the position [1, 2, inf] is not finite"),
-        ("minusinf.ply", vertices("1", "-Infinity 2 3\n"), "minusinf.ply: element “vertex”, row 0, byte 100: the position [-inf, 2, 3] is not finite"),
-        ("far.ply", vertices("2", "0 0 0\n1e30 0 0\n"), "far.ply: positions: spread from [0.0, 0.0, 0.0] to [1e30, 0.0, 0.0], more than 32 bits can hold"),
-        ("comma.ply", vertices("1", "1,5 2,5 3,5\n"), "comma.ply: element “vertex”, row 0, byte 100: “1,5” is not a number (for “x”)"),
-        ("words.ply", vertices("1", "one two three\n"), "words.ply: element “vertex”, row 0, byte 100: “one” is not a number (for “x”)"),
-        ("more.ply", vertices("1", "1 2 3 4\n"), "more.ply: element “vertex”, row 0, byte 100: the line has more values than the header names"),
-        ("fewer.ply", vertices("1", "1 2\n"), "fewer.ply: element “vertex”, row 0, byte 100: the line ends before the value of “z”"),
-        // PLY: what strict parsers refuse, and real files have.
-        ("crlf.ply", String::from_utf8_lossy(&vertices("2", "1 2 3\n4 5 6\n")).replace('\n', "\r\n").into(), "mesh 2 0 0"),
-        ("mac.ply", String::from_utf8_lossy(&vertices("2", "1 2 3\n4 5 6\n")).replace('\n', "\r").into(), "mesh 2 0 0"),
+        // PLY: wrong counts.
+        (
+            "count0.ply",
+            vertices("0", ""),
+            "count0.ply: header: has no element “vertex” with at least one row",
+        ),
+        (
+            "count32.ply",
+            vertices("4294967296", "1 2 3\n"),
+            "count32.ply: the count of element “vertex” is 4294967296, over the limit of \
+             2147483648",
+        ),
+        (
+            "count31.ply",
+            vertices("2147483647", "1 2 3\n"),
+            "count31.ply: element “vertex”, row 1, byte 115: the file ends, though the header \
+             claims 2147483647 rows",
+        ),
+        (
+            "count63.ply",
+            vertices("18446744073709551615", "1 2 3\n"),
+            "count63.ply: the count of element “vertex” is 18446744073709551615, over the limit of \
+             2147483648",
+        ),
+        (
+            "count64.ply",
+            vertices("18446744073709551616", "1 2 3\n"),
+            "count64.ply: header line 3: “18446744073709551616” is no count of rows",
+        ),
+        (
+            "countminus.ply",
+            vertices("-1", "1 2 3\n"),
+            "countminus.ply: header line 3: “-1” is no count of rows",
+        ),
+        (
+            "bare.ply",
+            ply(&format!("element nothing 40000000000\nelement vertex 1\n{FLOATS}"), "1 2 3\n"),
+            "mesh 1 0 0",
+        ),
+        (
+            "barevertex.ply",
+            ply("element vertex 40000000000\n", ""),
+            "barevertex.ply: the count of element “vertex” is 40000000000, over the limit of \
+             2147483648",
+        ),
+        (
+            "bareface.ply",
+            ply(&format!("element vertex 1\n{FLOATS}element face 40000000000\n"), "1 2 3\n"),
+            "bareface.ply: the count of element “face” is 40000000000, over the limit of \
+             2147483648",
+        ),
+        (
+            "list32.ply",
+            faces("uint int", "4294967295 0 1 2\n"),
+            "list32.ply: element “face”, row 0, byte 171: the line ends before the value of \
+             “vertex_indices”",
+        ),
+        (
+            "listminus.ply",
+            faces("int int", "-1\n"),
+            "listminus.ply: element “face”, row 0, byte 170: the list “vertex_indices” has the \
+             impossible length -1",
+        ),
+        (
+            "listhalf.ply",
+            faces("float int", "2.5 0 1 2\n"),
+            "listhalf.ply: element “face”, row 0, byte 172: the list “vertex_indices” has the \
+             impossible length 2.5",
+        ),
+        (
+            "index.ply",
+            faces("uchar int", "3 0 1 3\n"),
+            "index.ply: element “face”, row 0, byte 172: refers to vertex 3, but there are 3 (0 … \
+             2)",
+        ),
+        (
+            "indexminus.ply",
+            faces("uchar int", "3 0 1 -1\n"),
+            "indexminus.ply: element “face”, row 0, byte 172: refers to vertex -1, but there are 3 \
+             (0 … 2)",
+        ),
+        (
+            "columns.ply",
+            ply(&format!("element vertex 1\n{}", "property float x\n".repeat(5000)), ""),
+            "columns.ply: header line 4099: more than 4096 elements and properties",
+        ),
+        (
+            "endless.ply",
+            format!("ply\nformat ascii 1.0\n{}", "comment\n".repeat(200_000)).into(),
+            "endless.ply: header line 131072: the header is longer than 1048576 bytes, with no \
+             line “end_header” in them",
+        ),
+        // PLY: numbers that are not finite, or not numbers.
+        (
+            "nan.ply",
+            vertices("2", "1 2 3\n1 nan 3\n"),
+            "nan.ply: element “vertex”, row 1, byte 106: the position [1, NaN, 3] is not finite",
+        ),
+        (
+            "inf.ply",
+            vertices("1", "1 2 inf\n"),
+            "inf.ply: element “vertex”, row 0, byte 100: the position [1, 2, inf] is not finite",
+        ),
+        (
+            "minusinf.ply",
+            vertices("1", "-Infinity 2 3\n"),
+            "minusinf.ply: element “vertex”, row 0, byte 100: the position [-inf, 2, 3] is not \
+             finite",
+        ),
+        (
+            "far.ply",
+            vertices("2", "0 0 0\n1e30 0 0\n"),
+            "far.ply: positions: spread from [0.0, 0.0, 0.0] to [1e30, 0.0, 0.0], more than 32 \
+             bits can hold",
+        ),
+        (
+            "comma.ply",
+            vertices("1", "1,5 2,5 3,5\n"),
+            "comma.ply: element “vertex”, row 0, byte 100: “1,5” is not a number (for “x”)",
+        ),
+        (
+            "words.ply",
+            vertices("1", "one two three\n"),
+            "words.ply: element “vertex”, row 0, byte 100: “one” is not a number (for “x”)",
+        ),
+        (
+            "more.ply",
+            vertices("1", "1 2 3 4\n"),
+            "more.ply: element “vertex”, row 0, byte 100: the line has more values than the header \
+             names",
+        ),
+        (
+            "fewer.ply",
+            vertices("1", "1 2\n"),
+            "fewer.ply: element “vertex”, row 0, byte 100: the line ends before the value of “z”",
+        ),
+        // PLY: files that strict parsers refuse, but that exist in practice.
+        (
+            "crlf.ply",
+            String::from_utf8_lossy(&vertices("2", "1 2 3\n4 5 6\n")).replace('\n', "\r\n").into(),
+            "mesh 2 0 0",
+        ),
+        (
+            "mac.ply",
+            String::from_utf8_lossy(&vertices("2", "1 2 3\n4 5 6\n")).replace('\n', "\r").into(),
+            "mesh 2 0 0",
+        ),
         ("blank.ply", vertices("2", "1 2 3\n\n\n4 5 6\n"), "mesh 2 0 0"),
-        ("latin.ply", [&b"ply\nformat ascii 1.0\ncomment caf\xe9 \xff\n"[..], &after_header("ply\nformat ascii 1.0\n", "")].concat(), "mesh 1 0 0"),
-        ("scalar.ply", ply(&format!("element vertex 1\n{FLOATS}property float scalar.x\n"), "1 2 3 4\n"), "mesh 1 0 0"),
-        ("nannormal.ply", ply(&format!("element vertex 1\n{FLOATS}property float nx\nproperty float ny\nproperty float nz\n"), "1 2 3 nan NaN -nan\n"), "mesh 1 0 0"),
-        ("double.ply", vertices("2", "4500000.001 5400000.002 100.003\n4500000.004 5400000.009 100\n"), "mesh 2 0 0"),
-        ("grid.ply", ply(&format!("obj_info num_cols 2\nobj_info num_rows 1\nelement vertex 1\n{FLOATS}element range_grid 2\nproperty list uchar int vertex_indices\n"), "1 2 3\n1 0\n0\n"), "mesh 1 0 0"),
+        (
+            "latin.ply",
+            [
+                &b"ply\nformat ascii 1.0\ncomment caf\xe9 \xff\n"[..],
+                &after_header("ply\nformat ascii 1.0\n", ""),
+            ]
+            .concat(),
+            "mesh 1 0 0",
+        ),
+        (
+            "scalar.ply",
+            ply(&format!("element vertex 1\n{FLOATS}property float scalar.x\n"), "1 2 3 4\n"),
+            "mesh 1 0 0",
+        ),
+        (
+            "nannormal.ply",
+            ply(
+                &format!(
+                    "element vertex 1\n{FLOATS}property float nx\nproperty float ny\n\
+                 property float nz\n"
+                ),
+                "1 2 3 nan NaN -nan\n",
+            ),
+            "mesh 1 0 0",
+        ),
+        (
+            "double.ply",
+            vertices("2", "4500000.001 5400000.002 100.003\n4500000.004 5400000.009 100\n"),
+            "mesh 2 0 0",
+        ),
+        (
+            "grid.ply",
+            ply(
+                &format!(
+                    "obj_info num_cols 2\nobj_info num_rows 1\nelement vertex 1\n\
+                 {FLOATS}element range_grid 2\nproperty list uchar int vertex_indices\n"
+                ),
+                "1 2 3\n1 0\n0\n",
+            ),
+            "mesh 1 0 0",
+        ),
         ("one.ply", vertices("1", "1 2 3\n"), "mesh 1 0 0"),
         ("same.ply", vertices("3", "1 2 3\n1 2 3\n1 2 3\n"), "mesh 3 0 0"),
         ("flat.ply", faces("uchar int", "3 0 0 1\n"), "mesh 3 1 0"),
-        ("nofaces.ply", ply(&format!("element vertex 1\n{FLOATS}element face 0\nproperty list uchar int vertex_indices\n"), "1 2 3\n"), "mesh 1 0 0"),
-        ("empty.ply", Vec::new(), "empty.ply: header line 1: the header has no “end_header” line; the file is cut or is no PLY"),
-        ("zeros.ply", vec![0; 100], "zeros.ply: header line 1: the header has no “end_header” line; the file is cut or is no PLY"),
-        // OBJ and what it refers to.
-        ("zero.obj", "v 0 0 0\nf 0 1 1\n".into(), "zero.obj: line 2: a face refers to vertex 0, but there are 1 (1 … 1, or −1 … −1)"),
-        ("beyond.obj", "v 0 0 0\nf 1 1 2\n".into(), "beyond.obj: line 2: a face refers to vertex 2, but there are 1 (1 … 1, or −1 … −1)"),
-        ("minus.obj", "v 0 0 0\nf 1 1 -2\n".into(), "minus.obj: line 2: a face refers to vertex -2, but there are 1 (1 … 1, or −1 … −1)"),
-        ("huge.obj", "v 0 0 0\nf 1 1 99999999999999999999\n".into(), "huge.obj: line 2: “99999999999999999999” is no corner of a face"),
-        ("nan.obj", "v 0 nan 0\nf 1 1 1\n".into(), "nan.obj: line 1: the position “nan” is not finite"),
-        ("inf.obj", "v 1 2 3\nv 0 1e999 0\nf 1 2 1\n".into(), "inf.obj: vertex 1 of the faces: the position [0, inf, 0] is not finite"),
-        ("comma.obj", "v 1,5 2,5 3,5\nf 1 1 1\n".into(), "comma.obj: line 1: “1,5” is not a number"),
+        (
+            "nofaces.ply",
+            ply(
+                &format!(
+                    "element vertex 1\n{FLOATS}element face 0\nproperty list uchar int \
+                 vertex_indices\n"
+                ),
+                "1 2 3\n",
+            ),
+            "mesh 1 0 0",
+        ),
+        (
+            "empty.ply",
+            Vec::new(),
+            "empty.ply: header line 1: the header has no “end_header” line; the file is cut or is \
+             no PLY",
+        ),
+        (
+            "zeros.ply",
+            vec![0; 100],
+            "zeros.ply: header line 1: the header has no “end_header” line; the file is cut or is \
+             no PLY",
+        ),
+        // OBJ and the files that it refers to.
+        (
+            "zero.obj",
+            "v 0 0 0\nf 0 1 1\n".into(),
+            "zero.obj: line 2: a face refers to vertex 0, but there are 1 (1 … 1, or −1 … −1)",
+        ),
+        (
+            "beyond.obj",
+            "v 0 0 0\nf 1 1 2\n".into(),
+            "beyond.obj: line 2: a face refers to vertex 2, but there are 1 (1 … 1, or −1 … −1)",
+        ),
+        (
+            "minus.obj",
+            "v 0 0 0\nf 1 1 -2\n".into(),
+            "minus.obj: line 2: a face refers to vertex -2, but there are 1 (1 … 1, or −1 … −1)",
+        ),
+        (
+            "huge.obj",
+            "v 0 0 0\nf 1 1 99999999999999999999\n".into(),
+            "huge.obj: line 2: “99999999999999999999” is no corner of a face",
+        ),
+        (
+            "nan.obj",
+            "v 0 nan 0\nf 1 1 1\n".into(),
+            "nan.obj: line 1: the position “nan” is not finite",
+        ),
+        (
+            "inf.obj",
+            "v 1 2 3\nv 0 1e999 0\nf 1 2 1\n".into(),
+            "inf.obj: vertex 1 of the faces: the position [0, inf, 0] is not finite",
+        ),
+        (
+            "comma.obj",
+            "v 1,5 2,5 3,5\nf 1 1 1\n".into(),
+            "comma.obj: line 1: “1,5” is not a number",
+        ),
         ("commas.obj", "v 1,5 2,5 3,5\n".into(), "commas.obj: line 1: “1,5” is not a number"),
         ("crlf.obj", "v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nf 1 2 3\r\n".into(), "mesh 3 1 0"),
         ("numbers.obj", "v 1 2 3 4 5 6 7 8 9\nv 4 5 6\n".into(), "mesh 2 0 0"),
         ("latin.obj", [&b"# caf\xe9\n"[..], &obj("")].concat(), "mesh 3 1 0"),
         ("flat.obj", "v 0 0 0\nf 1 1 1\n".into(), "mesh 1 1 0"),
-        ("corner.obj", "v 0 0 0\nf 1\n".into(), "corner.obj: file: has faces, but none of three corners or more"),
-        ("slashes.obj", "v 0 0 0\nf //// 1 1\n".into(), "slashes.obj: line 2: “////” is no corner of a face"),
-        ("none.obj", "vn 0 0 1\n".into(), "none.obj: file: has no vertices (no line that begins with “v ”)"),
-        ("up.obj", obj("mtllib ../up.mtl"), "up.obj: mtllib: refers to “../up.mtl”, which leads out of the file's own folder"),
-        ("absolute.obj", obj("mtllib /etc/hostname"), "absolute.obj: mtllib: refers to “/etc/hostname”, an absolute path; only files in the same folder or below it are read"),
-        ("address.obj", obj("mtllib file:///etc/hostname"), "address.obj: mtllib: refers to “file:///etc/hostname”, an address or a drive; only files in the same folder or below it are read"),
-        ("drive.obj", obj("mtllib C:\\up.mtl"), "drive.obj: mtllib: refers to “C:/up.mtl”, an address or a drive; only files in the same folder or below it are read"),
-        ("share.obj", obj("mtllib \\\\server\\share\\up.mtl"), "share.obj: mtllib: refers to “//server/share/up.mtl”, an absolute path; only files in the same folder or below it are read"),
-        ("back.obj", obj("mtllib ..\\..\\up.mtl"), "back.obj: mtllib: refers to “../../up.mtl”, which leads out of the file's own folder"),
-        ("self.obj", obj("mtllib self.obj"), "self.obj: mtllib: refers to “self.obj”, the file itself"),
-        ("folder.obj", obj("mtllib folder"), "folder.obj: mtllib: refers to “folder”, which is not a regular file"),
-        ("chain.obj", obj("mtllib chain.mtl\nusemtl m"), "chain.obj: material “m”: refers to “../a.png”, which leads out of the file's own folder"),
+        (
+            "corner.obj",
+            "v 0 0 0\nf 1\n".into(),
+            "corner.obj: file: has faces, but none of three corners or more",
+        ),
+        (
+            "slashes.obj",
+            "v 0 0 0\nf //// 1 1\n".into(),
+            "slashes.obj: line 2: “////” is no corner of a face",
+        ),
+        (
+            "none.obj",
+            "vn 0 0 1\n".into(),
+            "none.obj: file: has no vertices (no line that begins with “v ”)",
+        ),
+        (
+            "up.obj",
+            obj("mtllib ../up.mtl"),
+            "up.obj: mtllib: refers to “../up.mtl”, which leads out of the file's own folder",
+        ),
+        (
+            "absolute.obj",
+            obj("mtllib /etc/hostname"),
+            "absolute.obj: mtllib: refers to “/etc/hostname”, an absolute path; only files in the \
+             same folder or below it are read",
+        ),
+        (
+            "address.obj",
+            obj("mtllib file:///etc/hostname"),
+            "address.obj: mtllib: refers to “file:///etc/hostname”, an address or a drive; only \
+             files in the same folder or below it are read",
+        ),
+        (
+            "drive.obj",
+            obj("mtllib C:\\up.mtl"),
+            "drive.obj: mtllib: refers to “C:/up.mtl”, an address or a drive; only files in the \
+             same folder or below it are read",
+        ),
+        (
+            "share.obj",
+            obj("mtllib \\\\server\\share\\up.mtl"),
+            "share.obj: mtllib: refers to “//server/share/up.mtl”, an absolute path; only files in \
+             the same folder or below it are read",
+        ),
+        (
+            "back.obj",
+            obj("mtllib ..\\..\\up.mtl"),
+            "back.obj: mtllib: refers to “../../up.mtl”, which leads out of the file's own folder",
+        ),
+        (
+            "self.obj",
+            obj("mtllib self.obj"),
+            "self.obj: mtllib: refers to “self.obj”, the file itself",
+        ),
+        (
+            "folder.obj",
+            obj("mtllib folder"),
+            "folder.obj: mtllib: refers to “folder”, which is not a regular file",
+        ),
+        (
+            "chain.obj",
+            obj("mtllib chain.mtl\nusemtl m"),
+            "chain.obj: material “m”: refers to “../a.png”, which leads out of the file's own \
+             folder",
+        ),
         ("missing.obj", obj("mtllib missing.mtl"), "mesh 3 1 0"),
         // STL.
-        ("count.stl", at(stl(), 80, &u32::MAX.to_le_bytes()), "count.stl: the count of facets is 4294967295, over the limit of 2147483648"),
-        ("none.stl", stl()[..80].iter().copied().chain([0; 4]).collect(), "none.stl: file: holds no facets"),
-        ("nan.stl", at(stl(), 96, &f32::NAN.to_le_bytes()), "nan.stl: facet 0: the position [NaN, 0, 0] is not finite"),
+        (
+            "count.stl",
+            at(stl(), 80, &u32::MAX.to_le_bytes()),
+            "count.stl: the count of facets is 4294967295, over the limit of 2147483648",
+        ),
+        (
+            "none.stl",
+            stl()[..80].iter().copied().chain([0; 4]).collect(),
+            "none.stl: file: holds no facets",
+        ),
+        (
+            "nan.stl",
+            at(stl(), 96, &f32::NAN.to_le_bytes()),
+            "nan.stl: facet 0: the position [NaN, 0, 0] is not finite",
+        ),
         ("flat.stl", at(stl(), 96, &[0; 36]), "mesh 3 1 0"),
-        ("comma.stl", STL_TEXT.replace("1 0 0", "1,5 0 0").into(), "comma.stl: line 5: a vertex needs three numbers"),
+        (
+            "comma.stl",
+            STL_TEXT.replace("1 0 0", "1,5 0 0").into(),
+            "comma.stl: line 5: a vertex needs three numbers",
+        ),
         // glTF: references.
-        ("up.gltf", buffer("../up.bin"), "up.gltf: buffer 0: refers to “../up.bin”, which leads out of the file's own folder"),
-        ("stride.gltf", changed(r#""byteLength":36"#, r#""byteLength":36,"byteStride":9223372036854775808"#), "stride.gltf: mesh 0, primitive 0, accessor 0: 3 elements from byte 0 reach beyond the view's 36"),
-        ("coded.gltf", buffer("%2e%2e%2fup.bin"), "coded.gltf: buffer 0: refers to “../up.bin”, which leads out of the file's own folder"),
-        ("bytes.gltf", buffer("%ff%fe.bin"), "bytes.gltf: buffer 0: refers to “%ff%fe.bin”, whose % codes are no UTF-8 text"),
-        ("percent.gltf", buffer("100%.bin"), "percent.gltf: buffer 0: refers to “100%.bin”, whose % codes are no UTF-8 text"),
-        ("absolute.gltf", buffer("/etc/hostname"), "absolute.gltf: buffer 0: refers to “/etc/hostname”, an absolute path; only files in the same folder or below it are read"),
-        ("address.gltf", buffer("file:///etc/hostname"), "address.gltf: buffer 0: refers to “file:///etc/hostname”, an address or a drive; only files in the same folder or below it are read"),
-        ("net.gltf", buffer("http://example.org/a.bin"), "net.gltf: buffer 0: refers to “http://example.org/a.bin”, an address or a drive; only files in the same folder or below it are read"),
-        ("drive.gltf", buffer("C:\\\\a.bin"), "drive.gltf: buffer 0: refers to “C:\\a.bin”, an address or a drive; only files in the same folder or below it are read"),
-        ("share.gltf", buffer("\\\\\\\\server\\\\share\\\\a.bin"), "share.gltf: buffer 0: refers to “\\\\server\\share\\a.bin”, an absolute path; only files in the same folder or below it are read"),
-        ("self.gltf", buffer("self.gltf"), "self.gltf: buffer 0: refers to “self.gltf”, the file itself"),
-        ("folder.gltf", buffer("folder"), "folder.gltf: buffer 0: refers to “folder”, which is not a regular file"),
-        ("missing.gltf", buffer("missing.bin"), "missing.gltf: buffer 0: refers to “missing.bin”: No such file or directory (os error 2)"),
-        ("zero.gltf", buffer("a%00.bin"), "zero.gltf: buffer 0: refers to “a%00.bin”, whose % codes are no UTF-8 text"),
-        ("base64.gltf", buffer("data:;base64,????"), "base64.gltf: buffer 0: is no base64: Invalid symbol 63, offset 0."),
-        ("short.gltf", buffer("data:;base64,AAAA"), "short.gltf: buffer 0: claims 42 bytes but holds 3"),
-        ("comma.gltf", buffer("data:;base64"), "comma.gltf: buffer 0: has a data URI without a comma"),
+        (
+            "up.gltf",
+            buffer("../up.bin"),
+            "up.gltf: buffer 0: refers to “../up.bin”, which leads out of the file's own folder",
+        ),
+        (
+            "stride.gltf",
+            changed(r#""byteLength":36"#, r#""byteLength":36,"byteStride":9223372036854775808"#),
+            "stride.gltf: mesh 0, primitive 0, accessor 0: 3 elements from byte 0 reach beyond the \
+             view's 36",
+        ),
+        (
+            "coded.gltf",
+            buffer("%2e%2e%2fup.bin"),
+            "coded.gltf: buffer 0: refers to “../up.bin”, which leads out of the file's own folder",
+        ),
+        (
+            "bytes.gltf",
+            buffer("%ff%fe.bin"),
+            "bytes.gltf: buffer 0: refers to “%ff%fe.bin”, whose % codes are no UTF-8 text",
+        ),
+        (
+            "percent.gltf",
+            buffer("100%.bin"),
+            "percent.gltf: buffer 0: refers to “100%.bin”, whose % codes are no UTF-8 text",
+        ),
+        (
+            "absolute.gltf",
+            buffer("/etc/hostname"),
+            "absolute.gltf: buffer 0: refers to “/etc/hostname”, an absolute path; only files in \
+             the same folder or below it are read",
+        ),
+        (
+            "address.gltf",
+            buffer("file:///etc/hostname"),
+            "address.gltf: buffer 0: refers to “file:///etc/hostname”, an address or a drive; only \
+             files in the same folder or below it are read",
+        ),
+        (
+            "net.gltf",
+            buffer("http://example.org/a.bin"),
+            "net.gltf: buffer 0: refers to “http://example.org/a.bin”, an address or a drive; only \
+             files in the same folder or below it are read",
+        ),
+        (
+            "drive.gltf",
+            buffer("C:\\\\a.bin"),
+            "drive.gltf: buffer 0: refers to “C:\\a.bin”, an address or a drive; only files in the \
+             same folder or below it are read",
+        ),
+        (
+            "share.gltf",
+            buffer("\\\\\\\\server\\\\share\\\\a.bin"),
+            "share.gltf: buffer 0: refers to “\\\\server\\share\\a.bin”, an absolute path; only \
+             files in the same folder or below it are read",
+        ),
+        (
+            "self.gltf",
+            buffer("self.gltf"),
+            "self.gltf: buffer 0: refers to “self.gltf”, the file itself",
+        ),
+        (
+            "folder.gltf",
+            buffer("folder"),
+            "folder.gltf: buffer 0: refers to “folder”, which is not a regular file",
+        ),
+        (
+            "missing.gltf",
+            buffer("missing.bin"),
+            "missing.gltf: buffer 0: refers to “missing.bin”: No such file or directory (os error \
+             2)",
+        ),
+        (
+            "zero.gltf",
+            buffer("a%00.bin"),
+            "zero.gltf: buffer 0: refers to “a%00.bin”, whose % codes are no UTF-8 text",
+        ),
+        (
+            "base64.gltf",
+            buffer("data:;base64,????"),
+            "base64.gltf: buffer 0: is no base64: Invalid symbol 63, offset 0.",
+        ),
+        (
+            "short.gltf",
+            buffer("data:;base64,AAAA"),
+            "short.gltf: buffer 0: claims 42 bytes but holds 3",
+        ),
+        (
+            "comma.gltf",
+            buffer("data:;base64"),
+            "comma.gltf: buffer 0: has a data URI without a comma",
+        ),
         // glTF: counts and nodes.
-        ("cycle.gltf", scene(r#"{"children":[1]},{"children":[0],"mesh":0}"#), "cycle.gltf: node 0: is its own ancestor, or has two parents"),
-        ("self.node.gltf", scene(r#"{"children":[0],"mesh":0}"#), "self.node.gltf: node 0: is its own ancestor, or has two parents"),
-        ("twice.gltf", scene(r#"{"children":[1,1]},{"mesh":0}"#), "twice.gltf: node 1: is its own ancestor, or has two parents"),
+        (
+            "cycle.gltf",
+            scene(r#"{"children":[1]},{"children":[0],"mesh":0}"#),
+            "cycle.gltf: node 0: is its own ancestor, or has two parents",
+        ),
+        (
+            "self.node.gltf",
+            scene(r#"{"children":[0],"mesh":0}"#),
+            "self.node.gltf: node 0: is its own ancestor, or has two parents",
+        ),
+        (
+            "twice.gltf",
+            scene(r#"{"children":[1,1]},{"mesh":0}"#),
+            "twice.gltf: node 1: is its own ancestor, or has two parents",
+        ),
         ("node.gltf", scene(r#"{"children":[9]}"#), "node.gltf: node 9: there are 1 nodes"),
         ("mesh.gltf", scene(r#"{"mesh":9}"#), "mesh.gltf: mesh 9: there are 1 meshes"),
-        ("deep.gltf", chain(65), "deep.gltf: node 64: the depth of nesting is 65, over the limit of 64"),
+        (
+            "deep.gltf",
+            chain(65),
+            "deep.gltf: node 64: the depth of nesting is 65, over the limit of 64",
+        ),
         ("deepest.gltf", chain(64), "mesh 3 1 0"),
-        ("count.gltf", changed(r#""count":3,"type":"VEC3""#, r#""count":4294967296,"type":"VEC3""#), "count.gltf: the number of vertices is 4294967296, over the limit of 2147483648"),
-        ("count64.gltf", changed(r#""count":3,"type":"VEC3""#, r#""count":18446744073709551616,"type":"VEC3""#), "count64.gltf: JSON: invalid type: floating point `1.8446744073709552e+19`, expected u64 at line 1 column 231"),
-        ("more.gltf", changed(r#""count":3,"type":"VEC3""#, r#""count":4,"type":"VEC3""#), "more.gltf: mesh 0, primitive 0, accessor 0: 4 elements from byte 0 reach beyond the view's 36"),
-        ("index.gltf", changed(r#""count":3,"type":"VEC3""#, r#""count":2,"type":"VEC3""#), "index.gltf: mesh 0, primitive 0, accessor 1: index 2 refers to vertex 2, but there are 2"),
-        ("nothing.gltf", changed(r#""count":3,"type":"VEC3""#, r#""count":0,"type":"VEC3""#), "nothing.gltf: mesh 0, primitive 0, accessor 1: index 0 refers to vertex 0, but there are 0"),
+        (
+            "count.gltf",
+            changed(r#""count":3,"type":"VEC3""#, r#""count":4294967296,"type":"VEC3""#),
+            "count.gltf: the number of vertices is 4294967296, over the limit of 2147483648",
+        ),
+        (
+            "count64.gltf",
+            changed(r#""count":3,"type":"VEC3""#, r#""count":18446744073709551616,"type":"VEC3""#),
+            "count64.gltf: JSON: invalid type: floating point `1.8446744073709552e+19`, expected \
+             u64 at line 1 column 231",
+        ),
+        (
+            "more.gltf",
+            changed(r#""count":3,"type":"VEC3""#, r#""count":4,"type":"VEC3""#),
+            "more.gltf: mesh 0, primitive 0, accessor 0: 4 elements from byte 0 reach beyond the \
+             view's 36",
+        ),
+        (
+            "index.gltf",
+            changed(r#""count":3,"type":"VEC3""#, r#""count":2,"type":"VEC3""#),
+            "index.gltf: mesh 0, primitive 0, accessor 1: index 2 refers to vertex 2, but there \
+             are 2",
+        ),
+        (
+            "nothing.gltf",
+            changed(r#""count":3,"type":"VEC3""#, r#""count":0,"type":"VEC3""#),
+            "nothing.gltf: mesh 0, primitive 0, accessor 1: index 0 refers to vertex 0, but there \
+             are 0",
+        ),
         (
             "sparse.gltf",
             changed(
                 r#""bufferView":0,"componentType":5126,"count":3,"type":"VEC3""#,
-                r#""componentType":5126,"count":2000000000,"type":"VEC3","sparse":{"count":1,"indices":{"bufferView":1,"componentType":5123},"values":{"bufferView":0}}"#,
+                "\"componentType\":5126,\"count\":2000000000,\"type\":\"VEC3\",\
+                 \"sparse\":{\"count\":1,\"indices\":{\"bufferView\":1,\"componentType\":5123},\
+                 \"values\":{\"bufferView\":0}}",
             ),
-            "sparse.gltf: the size of the scene in bytes is 320000000120, over the limit of 34359738368",
+            "sparse.gltf: the size of the scene in bytes is 320000000120, over the limit of \
+             34359738368",
         ),
-        ("view.gltf", changed(r#""byteLength":36"#, r#""byteLength":99999"#), "view.gltf: buffer view 0: 99999 bytes from byte 0 reach beyond the buffer's 42"),
-        ("offset.gltf", changed(r#""byteOffset":36"#, r#""byteOffset":18446744073709551615"#), "offset.gltf: buffer view 1: 6 bytes from byte 18446744073709551615 reach beyond the buffer's 42"),
-        ("buffer.gltf", changed(r#""byteLength":42"#, r#""byteLength":9007199254740992"#), "buffer.gltf: buffer 0: claims 9007199254740992 bytes but holds 42"),
-        ("stride.gltf", changed(r#""byteLength":36"#, r#""byteLength":36,"byteStride":0"#), "stride.gltf: mesh 0, primitive 0, accessor 0: the stride of 0 bytes is less than an element's 12"),
-        ("nan.gltf", scene(r#"{"mesh":0,"translation":[1e39,0,0]}"#), "nan.gltf: JSON: number out of range at line 1 column 100"),
-        ("far.gltf", scene(r#"{"mesh":0,"scale":[1e30,1,1]}"#), "far.gltf: positions: spread from [0.0, 0.0, 0.0] to [1.0000000150474662e30, 1.0, 0.0], more than 32 bits can hold"),
-        ("lists.gltf", lists(100_000).into(), "lists.gltf: JSON: invalid type: sequence, expected index into child of root at line 1 column 3"),
-        ("extras.gltf", changed(r#""scene":0"#, &format!(r#""scene":0,"extras":{}{}"#, lists(1000), "]".repeat(1000))), "extras.gltf: JSON: invalid type: sequence, expected unit at line 1 column 47"),
-        ("extra.gltf", changed(r#""scene":0"#, r#""scene":0,"extras":{"a":{"b":[1]}}"#), "mesh 3 1 0"),
-        ("draco.gltf", changed(r#""scene":0"#, r#""scene":0,"extensionsRequired":["KHR_draco_mesh_compression"]"#), "draco.gltf: extensionsRequired: the extension KHR_draco_mesh_compression is not supported"),
-        ("chunk.glb", at(glb(), 12, &u32::MAX.to_le_bytes()), "chunk.glb: byte 12: a GLB chunk reaches beyond the end"),
-        ("version.glb", at(glb(), 4, &[9]), "version.glb: byte 4: the GLB version is 9; only version 2 is read"),
+        (
+            "view.gltf",
+            changed(r#""byteLength":36"#, r#""byteLength":99999"#),
+            "view.gltf: buffer view 0: 99999 bytes from byte 0 reach beyond the buffer's 42",
+        ),
+        (
+            "offset.gltf",
+            changed(r#""byteOffset":36"#, r#""byteOffset":18446744073709551615"#),
+            "offset.gltf: buffer view 1: 6 bytes from byte 18446744073709551615 reach beyond the \
+             buffer's 42",
+        ),
+        (
+            "buffer.gltf",
+            changed(r#""byteLength":42"#, r#""byteLength":9007199254740992"#),
+            "buffer.gltf: buffer 0: claims 9007199254740992 bytes but holds 42",
+        ),
+        (
+            "stride.gltf",
+            changed(r#""byteLength":36"#, r#""byteLength":36,"byteStride":0"#),
+            "stride.gltf: mesh 0, primitive 0, accessor 0: the stride of 0 bytes is less than an \
+             element's 12",
+        ),
+        (
+            "nan.gltf",
+            scene(r#"{"mesh":0,"translation":[1e39,0,0]}"#),
+            "nan.gltf: JSON: number out of range at line 1 column 100",
+        ),
+        (
+            "far.gltf",
+            scene(r#"{"mesh":0,"scale":[1e30,1,1]}"#),
+            "far.gltf: positions: spread from [0.0, 0.0, 0.0] to [1.0000000150474662e30, 1.0, \
+             0.0], more than 32 bits can hold",
+        ),
+        (
+            "lists.gltf",
+            lists(100_000).into(),
+            "lists.gltf: JSON: invalid type: sequence, expected index into child of root at line 1 \
+             column 3",
+        ),
+        (
+            "extras.gltf",
+            changed(
+                r#""scene":0"#,
+                &format!(r#""scene":0,"extras":{}{}"#, lists(1000), "]".repeat(1000)),
+            ),
+            "extras.gltf: JSON: invalid type: sequence, expected unit at line 1 column 47",
+        ),
+        (
+            "extra.gltf",
+            changed(r#""scene":0"#, r#""scene":0,"extras":{"a":{"b":[1]}}"#),
+            "mesh 3 1 0",
+        ),
+        (
+            "draco.gltf",
+            changed(
+                r#""scene":0"#,
+                "\"scene\":0,\"extensionsRequired\":[\"KHR_draco_mesh_\
+                 compression\"]",
+            ),
+            "draco.gltf: extensionsRequired: the extension KHR_draco_mesh_compression is not \
+             supported",
+        ),
+        (
+            "chunk.glb",
+            at(glb(), 12, &u32::MAX.to_le_bytes()),
+            "chunk.glb: byte 12: a GLB chunk reaches beyond the end",
+        ),
+        (
+            "version.glb",
+            at(glb(), 4, &[9]),
+            "version.glb: byte 4: the GLB version is 9; only version 2 is read",
+        ),
         // Pictures.
-        ("png.gltf", picture(&claim), "png.gltf: image 0: the number of texels is 4294967296, over the limit of 268435456"),
-        ("large.gltf", picture(&large), "large.gltf: image 0: the picture claims 16384 × 16384 texels, more than 86 bytes can hold"),
-        ("notpng.gltf", picture(b"not a picture"), "notpng.gltf: image 0: the picture cannot be decoded: The image format could not be determined"),
+        (
+            "png.gltf",
+            picture(&claim),
+            "png.gltf: image 0: the number of texels is 4294967296, over the limit of 268435456",
+        ),
+        (
+            "large.gltf",
+            picture(&large),
+            "large.gltf: image 0: the picture claims 16384 × 16384 texels, more than 86 bytes can \
+             hold",
+        ),
+        (
+            "notpng.gltf",
+            picture(b"not a picture"),
+            "notpng.gltf: image 0: the picture cannot be decoded: The image format could not be \
+             determined",
+        ),
         // LAS, LAZ, E57.
-        ("count.las", at(las(), 107, &u32::MAX.to_le_bytes()), "count.las: the number of points is 4294967295, over the limit of 2147483648"),
-        ("million.las", at(las(), 107, &1_000_000u32.to_le_bytes()), "million.las: header: counts 1000000 points of 20 bytes, 20000000 in all, but 100 bytes follow"),
+        (
+            "count.las",
+            at(las(), 107, &u32::MAX.to_le_bytes()),
+            "count.las: the number of points is 4294967295, over the limit of 2147483648",
+        ),
+        (
+            "million.las",
+            at(las(), 107, &1_000_000u32.to_le_bytes()),
+            "million.las: header: counts 1000000 points of 20 bytes, 20000000 in all, but 100 \
+             bytes follow",
+        ),
         ("none.las", at(las(), 107, &[0; 4]), "none.las: file: holds no points"),
-        ("scale.las", at(las(), 131, &f64::NAN.to_le_bytes()), "scale.las: header: has the scale [NaN, 0.01, 0.01] and the offset [0, 0, 0]"),
-        ("flat.las", at(las(), 131, &0f64.to_le_bytes()), "flat.las: header: has the scale [0, 0.01, 0.01] and the offset [0, 0, 0]"),
-        ("far.las", at(las(), 131, &1e300f64.to_le_bytes()), "far.las: positions: spread from [0.0, 0.0, 0.0] to [4e300, 0.08, 0.12], more than 32 bits can hold"),
-        ("start.las", at(las(), 96, &u32::MAX.to_le_bytes()), "start.las: header: puts the points at byte 4294967295, but the file has 327"),
-        ("size.las", at(las(), 105, &[1, 0]), "size.las: header: has points of 1 bytes, but those of format 0 need 20"),
-        ("format.las", at(las(), 104, &[63]), "format.las: header: has points of format 63, but only 0 to 10 are known"),
-        ("count.laz", at(laz(), 107, &1_000_000u32.to_le_bytes()), "count.laz: table of chunks: has 6 points, but the header counts 1000000"),
+        (
+            "scale.las",
+            at(las(), 131, &f64::NAN.to_le_bytes()),
+            "scale.las: header: has the scale [NaN, 0.01, 0.01] and the offset [0, 0, 0]",
+        ),
+        (
+            "flat.las",
+            at(las(), 131, &0f64.to_le_bytes()),
+            "flat.las: header: has the scale [0, 0.01, 0.01] and the offset [0, 0, 0]",
+        ),
+        (
+            "far.las",
+            at(las(), 131, &1e300f64.to_le_bytes()),
+            "far.las: positions: spread from [0.0, 0.0, 0.0] to [4e300, 0.08, 0.12], more than 32 \
+             bits can hold",
+        ),
+        (
+            "start.las",
+            at(las(), 96, &u32::MAX.to_le_bytes()),
+            "start.las: header: puts the points at byte 4294967295, but the file has 327",
+        ),
+        (
+            "size.las",
+            at(las(), 105, &[1, 0]),
+            "size.las: header: has points of 1 bytes, but those of format 0 need 20",
+        ),
+        (
+            "format.las",
+            at(las(), 104, &[63]),
+            "format.las: header: has points of format 63, but only 0 to 10 are known",
+        ),
+        (
+            "count.laz",
+            at(laz(), 107, &1_000_000u32.to_le_bytes()),
+            "count.laz: table of chunks: has 6 points, but the header counts 1000000",
+        ),
         ("records.laz", at(laz(), 100, &u32::MAX.to_le_bytes()), "mesh 5 0 0"),
-        ("laughs.e57", e57(|xml| xml.replacen("?>", &format!("?>{laughs}"), 1).replacen("file", "&l29;", 1)), "laughs.e57: file: is no E57 file that can be read: Invalid E57 content: Failed to parse XML data: XML with DTD detected"),
-        ("count.e57", e57(|xml| xml.replace("recordCount=\"2\"", "recordCount=\"18446744073709551615\"")), "count.e57: the number of points is 18446744073709551615, over the limit of 2147483648"),
-        ("more.e57", e57(|xml| xml.replace("recordCount=\"2\"", "recordCount=\"2000000000\"")), "more.e57: scan 0: ends after 2 points: Invalid E57 content: Found unknown packet ID when trying to read packet header"),
-        ("none.e57", e57(|xml| xml.replace("recordCount=\"2\"", "recordCount=\"0\"")), "none.e57: file: holds no points"),
-        // Tables of text.
-        ("comma.xyz", "1,5 2,5 3,5\n".into(), "comma.xyz: line 1: \"1,5 2,5 3,5\" is neither numbers nor names of columns"),
-        ("comma.csv", "x;y;z;value\n1,5;2,5;3,5;4,5\n".into(), "comma.csv: line 2: “1,5” is not a number"),
+        (
+            "laughs.e57",
+            e57(|xml| xml.replacen("?>", &format!("?>{laughs}"), 1).replacen("file", "&l29;", 1)),
+            "laughs.e57: file: is no E57 file that can be read: Invalid E57 content: Failed to \
+             parse XML data: XML with DTD detected",
+        ),
+        (
+            "count.e57",
+            e57(|xml| xml.replace("recordCount=\"2\"", "recordCount=\"18446744073709551615\"")),
+            "count.e57: the number of points is 18446744073709551615, over the limit of 2147483648",
+        ),
+        (
+            "more.e57",
+            e57(|xml| xml.replace("recordCount=\"2\"", "recordCount=\"2000000000\"")),
+            "more.e57: scan 0: ends after 2 points: Invalid E57 content: Found unknown packet ID \
+             when trying to read packet header",
+        ),
+        (
+            "none.e57",
+            e57(|xml| xml.replace("recordCount=\"2\"", "recordCount=\"0\"")),
+            "none.e57: file: holds no points",
+        ),
+        // Text tables.
+        (
+            "comma.xyz",
+            "1,5 2,5 3,5\n".into(),
+            "comma.xyz: line 1: \"1,5 2,5 3,5\" is neither numbers nor names of columns",
+        ),
+        (
+            "comma.csv",
+            "x;y;z;value\n1,5;2,5;3,5;4,5\n".into(),
+            "comma.csv: line 2: “1,5” is not a number",
+        ),
         ("nan.xyz", "1 2 3\n1 nan 3\n".into(), "nan.xyz: line 2: number 2 is NaN"),
         ("inf.xyz", "1 2 -inf\n".into(), "inf.xyz: line 1: number 3 is -inf"),
         ("one.xyz", "1 2 3\n".into(), "mesh 1 0 0"),
         ("same.xyz", "1 2 3\n1 2 3\n".into(), "mesh 2 0 0"),
-        ("count.pts", "18446744073709551615\n1 2 3\n".into(), "count.pts: line 1: counts 18446744073709551615 points, but there are 1"),
+        (
+            "count.pts",
+            "18446744073709551615\n1 2 3\n".into(),
+            "count.pts: line 1: counts 18446744073709551615 points, but there are 1",
+        ),
         ("none.pts", "0\n".into(), "none.pts: file: holds no lines of numbers"),
-        ("wide.csv", vec!["1"; 5000].join(",").into(), "wide.csv: line 1: has more than 4096 columns"),
+        (
+            "wide.csv",
+            vec!["1"; 5000].join(",").into(),
+            "wide.csv: line 1: has more than 4096 columns",
+        ),
         ("mark.csv", "\u{feff}x,y,z,value\r\n1,2,3,4\r\n".into(), "samples 1"),
         ("latin.csv", b"# caf\xe9\nx,y,z,value,n\xe9\n1,2,3,4,5\n".to_vec(), "samples 1"),
-        ("radius0.csv", "x,y,z,value,radius\n1,2,3,4,0\n".into(), "radius0.csv: samples: the radius of sample 0 is 0, but radii are above 0"),
+        (
+            "radius0.csv",
+            "x,y,z,value,radius\n1,2,3,4,0\n".into(),
+            "radius0.csv: samples: the radius of sample 0 is 0, but radii are above 0",
+        ),
         ("radius.csv", "x,y,z,value,radius\n1,2,3,4,1e38\n".into(), "samples 1"),
-        ("radiusinf.csv", "x,y,z,value,radius\n1,2,3,4,1e39\n".into(), "radiusinf.csv: samples: the radius of sample 0 is inf, but radii are above 0"),
-        ("far.csv", "x,y,z,value\n0,0,0,1\n1e30,0,0,1\n".into(), "far.csv: positions: spread from [0.0, 0.0, 0.0] to [1e30, 0.0, 0.0], more than 32 bits can hold"),
-        ("zeros.csv", vec![0; 1000], "zeros.csv: line 1: \"\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\" is neither numbers nor names of columns"),
+        (
+            "radiusinf.csv",
+            "x,y,z,value,radius\n1,2,3,4,1e39\n".into(),
+            "radiusinf.csv: samples: the radius of sample 0 is inf, but radii are above 0",
+        ),
+        (
+            "far.csv",
+            "x,y,z,value\n0,0,0,1\n1e30,0,0,1\n".into(),
+            "far.csv: positions: spread from [0.0, 0.0, 0.0] to [1e30, 0.0, 0.0], more than 32 \
+             bits can hold",
+        ),
+        (
+            "zeros.csv",
+            vec![0; 1000],
+            "zeros.csv: line 1: \"\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\\
+             0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\" is neither numbers nor \
+             names of columns",
+        ),
         // PCD.
-        ("count.pcd", pcd("18446744073709551615", b"DATA binary\n"), "count.pcd: the number of points is 18446744073709551615, over the limit of 2147483648"),
-        ("million.pcd", pcd("1000000", b"DATA binary\n0123456789"), "million.pcd: data: 10 bytes follow the header where 12000000 were expected"),
-        ("rows.pcd", b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 4294967296\nHEIGHT 4294967296\nDATA ascii\n".to_vec(), "rows.pcd: the number of points is 18446744073709551615, over the limit of 2147483648"),
-        ("fields.pcd", b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 18446744073709551615\nPOINTS 1\nDATA ascii\n".to_vec(), "fields.pcd: header: “COUNT 1 1 18446744073709551615” has what is no count of numbers"),
-        ("bomb.pcd", pcd("2", &[b"DATA binary_compressed\n".as_slice(), &counts(&[4, 24]), &[0, 0, 0xff, 0xff]].concat()), "bomb.pcd: byte 79: the packed data end early"),
+        (
+            "count.pcd",
+            pcd("18446744073709551615", b"DATA binary\n"),
+            "count.pcd: the number of points is 18446744073709551615, over the limit of 2147483648",
+        ),
+        (
+            "million.pcd",
+            pcd("1000000", b"DATA binary\n0123456789"),
+            "million.pcd: data: 10 bytes follow the header where 12000000 were expected",
+        ),
+        (
+            "rows.pcd",
+            b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 4294967296\nHEIGHT 4294967296\n\
+              DATA ascii\n"
+                .to_vec(),
+            "rows.pcd: the number of points is 18446744073709551615, over the limit of 2147483648",
+        ),
+        (
+            "fields.pcd",
+            b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 18446744073709551615\nPOINTS 1\n\
+              DATA ascii\n"
+                .to_vec(),
+            "fields.pcd: header: “COUNT 1 1 18446744073709551615” has what is no count of numbers",
+        ),
+        (
+            "bomb.pcd",
+            pcd(
+                "2",
+                &[b"DATA binary_compressed\n".as_slice(), &counts(&[4, 24]), &[0, 0, 0xff, 0xff]]
+                    .concat(),
+            ),
+            "bomb.pcd: byte 79: the packed data end early",
+        ),
         ("nan.pcd", pcd("2", b"DATA ascii\nnan nan nan\n1 2 3\n"), "mesh 1 0 0"),
-        ("comma.pcd", pcd("1", b"DATA ascii\n1,5 2,5 3,5\n"), "comma.pcd: line 6: “1,5” is not a number"),
-        ("endless.pcd", "# comment\n".repeat(200_000).into(), "endless.pcd: line 104859: the header is longer than 1048576 bytes"),
+        (
+            "comma.pcd",
+            pcd("1", b"DATA ascii\n1,5 2,5 3,5\n"),
+            "comma.pcd: line 6: “1,5” is not a number",
+        ),
+        (
+            "endless.pcd",
+            "# comment\n".repeat(200_000).into(),
+            "endless.pcd: line 104859: the header is longer than 1048576 bytes",
+        ),
         // NPY.
-        ("rows.npy", npy("(18446744073709551615, 4)", &[]), "rows.npy: the number of rows is 18446744073709551615, over the limit of 2147483648"),
-        ("million.npy", npy("(1000000, 4)", &[1.0]), "million.npy: data: there are 4 bytes where 16000000 were expected"),
+        (
+            "rows.npy",
+            npy("(18446744073709551615, 4)", &[]),
+            "rows.npy: the number of rows is 18446744073709551615, over the limit of 2147483648",
+        ),
+        (
+            "million.npy",
+            npy("(1000000, 4)", &[1.0]),
+            "million.npy: data: there are 4 bytes where 16000000 were expected",
+        ),
         ("none.npy", npy("(0, 4)", &[]), "none.npy: file: holds no samples"),
-        ("nan.npy", npy("(1, 4)", &[f32::NAN, 2.0, 3.0, 4.0]), "nan.npy: row 0: the position [NaN, 2, 3] is not finite"),
+        (
+            "nan.npy",
+            npy("(1, 4)", &[f32::NAN, 2.0, 3.0, 4.0]),
+            "nan.npy: row 0: the position [NaN, 2, 3] is not finite",
+        ),
         ("shape.npy", npy("((((((", &[]), "shape.npy: header: has no “shape”"),
         // NRRD.
-        ("size.nrrd", nrrd("4294967296 4294967296 4294967296", "encoding: raw", b""), "size.nrrd: header: 4294967296 × 4294967296 × 4294967296 samples are more than memory can hold"),
-        ("large.nrrd", nrrd("1000 1000 1000", "encoding: raw", b"1234"), "large.nrrd: data: there are 4 bytes where 1000000000 were expected"),
-        ("none.nrrd", nrrd("0 4 4", "encoding: raw", b""), "none.nrrd: header: a volume of 0 × 4 × 4 samples holds none"),
-        ("minus.nrrd", nrrd("-4 4 4", "encoding: raw", b""), "minus.nrrd: sizes: “-4 4 4” is not a list of 3 numbers"),
-        ("four.nrrd", nrrd("4 4 4 4", "encoding: raw", b""), "four.nrrd: sizes: “4 4 4 4” is not a list of 3 numbers"),
-        ("lie.nrrd", nrrd("1000 1000 1000", "encoding: gzip", &gzip(&[0; 1000])), "lie.nrrd: data: unpacks to 1000 bytes where 1000000000 were expected"),
-        ("bomb.nrrd", nrrd("1 1 1", "encoding: gzip", &gzip(&vec![0; 1 << 24])), "bomb.nrrd: data: unpacks to more bytes where 1 were expected"),
-        ("notgzip.nrrd", nrrd("1 1 1", "encoding: gzip", b"not packed"), "notgzip.nrrd: data: cannot be unpacked after 0 bytes: invalid gzip header"),
-        ("bzip.nrrd", nrrd("1 1 1", "encoding: bzip2", b""), "bzip.nrrd: encoding: “bzip2” is not supported"),
+        (
+            "size.nrrd",
+            nrrd("4294967296 4294967296 4294967296", "encoding: raw", b""),
+            "size.nrrd: header: 4294967296 × 4294967296 × 4294967296 samples are more than memory \
+             can hold",
+        ),
+        (
+            "large.nrrd",
+            nrrd("1000 1000 1000", "encoding: raw", b"1234"),
+            "large.nrrd: data: there are 4 bytes where 1000000000 were expected",
+        ),
+        (
+            "none.nrrd",
+            nrrd("0 4 4", "encoding: raw", b""),
+            "none.nrrd: header: a volume of 0 × 4 × 4 samples holds none",
+        ),
+        (
+            "minus.nrrd",
+            nrrd("-4 4 4", "encoding: raw", b""),
+            "minus.nrrd: sizes: “-4 4 4” is not a list of 3 numbers",
+        ),
+        (
+            "four.nrrd",
+            nrrd("4 4 4 4", "encoding: raw", b""),
+            "four.nrrd: sizes: “4 4 4 4” is not a list of 3 numbers",
+        ),
+        (
+            "lie.nrrd",
+            nrrd("1000 1000 1000", "encoding: gzip", &gzip(&[0; 1000])),
+            "lie.nrrd: data: unpacks to 1000 bytes where 1000000000 were expected",
+        ),
+        (
+            "bomb.nrrd",
+            nrrd("1 1 1", "encoding: gzip", &gzip(&vec![0; 1 << 24])),
+            "bomb.nrrd: data: unpacks to more bytes where 1 were expected",
+        ),
+        (
+            "notgzip.nrrd",
+            nrrd("1 1 1", "encoding: gzip", b"not packed"),
+            "notgzip.nrrd: data: cannot be unpacked after 0 bytes: invalid gzip header",
+        ),
+        (
+            "bzip.nrrd",
+            nrrd("1 1 1", "encoding: bzip2", b""),
+            "bzip.nrrd: encoding: “bzip2” is not supported",
+        ),
         ("same.nrrd", nrrd("2 2 1", "encoding: raw", &[7; 4]), "volume [2, 2, 1] [7.0, 7.0]"),
-        ("spacing.nrrd", nrrd("2 2 1", "spacings: 0 1 1\nencoding: raw", &[7; 4]), "spacing.nrrd: header: the spacing is 0 × 1 × 1, but every step needs a length"),
-        ("origin.nrrd", nrrd("2 2 1", "space origin: (nan,0,0)\nencoding: raw", &[7; 4]), "origin.nrrd: header: the origin and the steps between samples must be finite"),
-        ("skip.nrrd", nrrd("2 2 1", "byte skip: 99\nencoding: raw", &[7; 4]), "skip.nrrd: data: there are 0 bytes where 4 were expected"),
-        ("skips.nrrd", nrrd("2 2 1", "byte skip: 9223372036854775807\nencoding: gzip", &gzip(&[7; 4])), "skips.nrrd: the unpacked size in bytes is 9223372036854775811, over the limit of 34359738368"),
-        ("commas.nrrd", nrrd("2 2 1", "encoding: ascii", b"1,5 2,5"), "volume [2, 2, 1] [1.0, 5.0]"),
-        ("missing.nhdr", nrrd("2 2 1", "encoding: raw\ndata file: missing.raw", b""), "missing.nhdr: data file: refers to “missing.raw”: No such file or directory (os error 2)"),
-        ("up.nhdr", nrrd("2 2 1", "encoding: raw\ndata file: ../up.raw", b""), "up.nhdr: data file: refers to “../up.raw”, which leads out of the file's own folder"),
-        ("absolute.nhdr", nrrd("2 2 1", "encoding: raw\ndata file: /etc/hostname", b""), "absolute.nhdr: data file: refers to “/etc/hostname”, an absolute path; only files in the same folder or below it are read"),
-        ("drive.nhdr", nrrd("2 2 1", "encoding: raw\ndata file: C:\\up.raw", b""), "drive.nhdr: data file: refers to “C:\\up.raw”, an address or a drive; only files in the same folder or below it are read"),
-        ("address.nhdr", nrrd("2 2 1", "encoding: raw\ndata file: file:///etc/hostname", b""), "address.nhdr: data file: refers to “file:///etc/hostname”, an address or a drive; only files in the same folder or below it are read"),
-        ("self.nhdr", nrrd("2 2 1", "encoding: raw\ndata file: self.nhdr", b""), "self.nhdr: data file: refers to “self.nhdr”, the file itself"),
-        ("folder.nhdr", nrrd("2 2 1", "encoding: raw\ndata file: folder", b""), "folder.nhdr: data file: refers to “folder”, which is not a regular file"),
-        ("list.nhdr", nrrd("2 2 1", "encoding: raw\ndata file: LIST 1\n../a.raw\n/etc/hostname", b""), "list.nhdr: data file: refers to “../a.raw”, which leads out of the file's own folder"),
-        ("pattern.nhdr", nrrd("2 2 1", "encoding: raw\ndata file: ../a%03d.raw 1 2 1 1", b""), "pattern.nhdr: data file: refers to “../a001.raw”, which leads out of the file's own folder"),
+        (
+            "spacing.nrrd",
+            nrrd("2 2 1", "spacings: 0 1 1\nencoding: raw", &[7; 4]),
+            "spacing.nrrd: header: the spacing is 0 × 1 × 1, but every step needs a length",
+        ),
+        (
+            "origin.nrrd",
+            nrrd("2 2 1", "space origin: (nan,0,0)\nencoding: raw", &[7; 4]),
+            "origin.nrrd: header: the origin and the steps between samples must be finite",
+        ),
+        (
+            "skip.nrrd",
+            nrrd("2 2 1", "byte skip: 99\nencoding: raw", &[7; 4]),
+            "skip.nrrd: data: there are 0 bytes where 4 were expected",
+        ),
+        (
+            "skips.nrrd",
+            nrrd("2 2 1", "byte skip: 9223372036854775807\nencoding: gzip", &gzip(&[7; 4])),
+            "skips.nrrd: the unpacked size in bytes is 9223372036854775811, over the limit of \
+             34359738368",
+        ),
+        (
+            "commas.nrrd",
+            nrrd("2 2 1", "encoding: ascii", b"1,5 2,5"),
+            "volume [2, 2, 1] [1.0, 5.0]",
+        ),
+        (
+            "missing.nhdr",
+            nrrd("2 2 1", "encoding: raw\ndata file: missing.raw", b""),
+            "missing.nhdr: data file: refers to “missing.raw”: No such file or directory (os error \
+             2)",
+        ),
+        (
+            "up.nhdr",
+            nrrd("2 2 1", "encoding: raw\ndata file: ../up.raw", b""),
+            "up.nhdr: data file: refers to “../up.raw”, which leads out of the file's own folder",
+        ),
+        (
+            "absolute.nhdr",
+            nrrd("2 2 1", "encoding: raw\ndata file: /etc/hostname", b""),
+            "absolute.nhdr: data file: refers to “/etc/hostname”, an absolute path; only files in \
+             the same folder or below it are read",
+        ),
+        (
+            "drive.nhdr",
+            nrrd("2 2 1", "encoding: raw\ndata file: C:\\up.raw", b""),
+            "drive.nhdr: data file: refers to “C:\\up.raw”, an address or a drive; only files in \
+             the same folder or below it are read",
+        ),
+        (
+            "address.nhdr",
+            nrrd("2 2 1", "encoding: raw\ndata file: file:///etc/hostname", b""),
+            "address.nhdr: data file: refers to “file:///etc/hostname”, an address or a drive; \
+             only files in the same folder or below it are read",
+        ),
+        (
+            "self.nhdr",
+            nrrd("2 2 1", "encoding: raw\ndata file: self.nhdr", b""),
+            "self.nhdr: data file: refers to “self.nhdr”, the file itself",
+        ),
+        (
+            "folder.nhdr",
+            nrrd("2 2 1", "encoding: raw\ndata file: folder", b""),
+            "folder.nhdr: data file: refers to “folder”, which is not a regular file",
+        ),
+        (
+            "list.nhdr",
+            nrrd("2 2 1", "encoding: raw\ndata file: LIST 1\n../a.raw\n/etc/hostname", b""),
+            "list.nhdr: data file: refers to “../a.raw”, which leads out of the file's own folder",
+        ),
+        (
+            "pattern.nhdr",
+            nrrd("2 2 1", "encoding: raw\ndata file: ../a%03d.raw 1 2 1 1", b""),
+            "pattern.nhdr: data file: refers to “../a001.raw”, which leads out of the file's own \
+             folder",
+        ),
         // VTK.
-        ("extent.vti", vtk_xml("ImageData", "", &vti_piece("")).replace("0 1 0 1 0 0", "0 9223372036854775807 0 1 0 0").into(), "extent.vti: extent: 0 to 9223372036854775807 holds no points"),
-        ("wrap.vti", vtk_xml("ImageData", "", &vti_piece("")).replace("0 1 0 1 0 0", "-9223372036854775808 9223372036854775807 0 1 0 0").into(), "wrap.vti: extent: -9223372036854775808 to 9223372036854775807 holds no points"),
-        ("backwards.vti", vtk_xml("ImageData", "", &vti_piece(&array("format='ascii'", "1"))).replace("0 1 0 1 0 0", "1 0 0 1 0 0").into(), "backwards.vti: extent: 1 to 0 holds no points"),
-        ("large.vti", vtk_xml("ImageData", "", &vti_piece(&array("format='ascii'", "1"))).replace("0 1 0 1 0 0", "0 999 0 999 0 999").into(), "large.vti: DataArray “v”: there are 1 numbers where 1000000000 were expected"),
-        ("fewer.vti", vti("1 2 3"), "fewer.vti: DataArray “v”: there are 3 numbers where 4 were expected"),
-        ("more.vti", vti("1 2 3 4 5"), "more.vti: DataArray “v”: there are more than the 4 numbers expected"),
-        ("words.vti", vti("1 2 three 4"), "words.vti: DataArray “v”: number 2 is “three”, which is no u8"),
+        (
+            "extent.vti",
+            vtk_xml("ImageData", "", &vti_piece(""))
+                .replace("0 1 0 1 0 0", "0 9223372036854775807 0 1 0 0")
+                .into(),
+            "extent.vti: extent: 0 to 9223372036854775807 holds no points",
+        ),
+        (
+            "wrap.vti",
+            vtk_xml("ImageData", "", &vti_piece(""))
+                .replace("0 1 0 1 0 0", "-9223372036854775808 9223372036854775807 0 1 0 0")
+                .into(),
+            "wrap.vti: extent: -9223372036854775808 to 9223372036854775807 holds no points",
+        ),
+        (
+            "backwards.vti",
+            vtk_xml("ImageData", "", &vti_piece(&array("format='ascii'", "1")))
+                .replace("0 1 0 1 0 0", "1 0 0 1 0 0")
+                .into(),
+            "backwards.vti: extent: 1 to 0 holds no points",
+        ),
+        (
+            "large.vti",
+            vtk_xml("ImageData", "", &vti_piece(&array("format='ascii'", "1")))
+                .replace("0 1 0 1 0 0", "0 999 0 999 0 999")
+                .into(),
+            "large.vti: DataArray “v”: there are 1 numbers where 1000000000 were expected",
+        ),
+        (
+            "fewer.vti",
+            vti("1 2 3"),
+            "fewer.vti: DataArray “v”: there are 3 numbers where 4 were expected",
+        ),
+        (
+            "more.vti",
+            vti("1 2 3 4 5"),
+            "more.vti: DataArray “v”: there are more than the 4 numbers expected",
+        ),
+        (
+            "words.vti",
+            vti("1 2 three 4"),
+            "words.vti: DataArray “v”: number 2 is “three”, which is no u8",
+        ),
         ("comma.vti", vti("1,5 2,5"), "volume [2, 2, 1] [1.0, 5.0]"),
-        ("count.vti", binary("", &counts(&[u32::MAX, 1])), "count.vti: DataArray “v”: claims 4294967295 bytes where 4 were expected"),
-        ("blocks.vti", binary(" compressor='vtkZLibDataCompressor'", &counts(&[u32::MAX, 4, 4])), "blocks.vti: DataArray “v”: claims 4294967295 blocks of 4 bytes, the last of 4, where 4 bytes were expected"),
-        ("lie.vti", binary(" compressor='vtkZLibDataCompressor'", &counts(&[1, 4, 0, u32::MAX])), "lie.vti: DataArray “v”: block 0 claims 4294967295 bytes, but 0 are left"),
-        ("bomb.vti", binary(" compressor='vtkZLibDataCompressor'", &{ let b = zlib(&vec![0; 1 << 24]); [counts(&[1, 4, 0, b.len() as u32]), b].concat() }), "bomb.vti: DataArray “v”: block 0 unpacks to more than its 4 bytes"),
-        ("base64.vti", vtk_xml("ImageData", "", &vti_piece(&array("format='binary'", "????"))).into(), "base64.vti: DataArray “v”: is no base64 (after 3 bytes): Invalid symbol 63, offset 0."),
-        ("laughs.vti", format!("{laughs}{}", String::from_utf8_lossy(&vti("&l29;"))).into(), "laughs.vti: DataArray “v”: there are 0 numbers where 4 were expected"),
-        ("laughname.vti", format!("{laughs}{}", String::from_utf8_lossy(&vti("1 2 3 4")).replace("Name='v'", "Name='&l29;'")).into(), "laughname.vti: byte 1998: has a wrong attribute: at 1..4: unrecognized entity `l29`"),
-        ("deep.vti", vtk_xml("ImageData", "", &format!("{}{}", "<a>".repeat(100), "</a>".repeat(100))).into(), "deep.vti: byte 296: the depth of nesting is 65, over the limit of 64"),
-        ("lz4.vti", binary(" compressor='vtkLZ4DataCompressor'", &[]), "lz4.vti: VTKFile: compressor=“vtkLZ4DataCompressor” is not supported"),
-        ("corner.vtu", vtu("0 1 3").into(), "corner.vtu: Cells: a cell has the corner 3, but there are 3 points"),
-        ("minus.vtu", vtu("0 1 -1").into(), "minus.vtu: Cells: a cell has the corner -1, but there are 3 points"),
-        ("points.vtu", vtu("0 1 2").replace("NumberOfPoints='3'", "NumberOfPoints='18446744073709551615'").into(), "points.vtu: the number of points is 18446744073709551615, over the limit of 2147483648"),
-        ("cells.vtu", vtu("0 1 2").replace("NumberOfCells='1'", "NumberOfCells='4000000000'").into(), "cells.vtu: the number of cells is 4000000000, over the limit of 2147483648"),
-        ("count.vtk", vtk().replace("POINT_DATA 4", "POINT_DATA 18446744073709551615").into(), "count.vtk: a count of points or cells is 18446744073709551615, over the limit of 2147483648"),
-        ("million.vtk", vtk().replace("POINT_DATA 4", "POINT_DATA 1000000").into(), "million.vtk: byte 128: there are 4 numbers where 1000000 were expected: the file ends"),
-        ("twice.vtk", "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 2 float\n0 0 0 1 0 0\nCELLS 1 3\n2 0 1\nPOINTS 1 float\n0 0 0\nCELL_DATA 1\nSCALARS c float\nLOOKUP_TABLE d\n5\n".into(), "twice.vtk: byte 104: POINTS are given twice, or behind the cells"),
-        ("dims.vtk", vtk().replace("DIMENSIONS 2 2 1", "DIMENSIONS 4294967296 4294967296 4294967296").into(), "dims.vtk: POINT_DATA: claims 4 points, but the data set has 18446744073709551615"),
-        ("minus.vtk", vtk().replace("DIMENSIONS 2 2 1", "DIMENSIONS -2 2 1").into(), "minus.vtk: byte 65: needs three numbers"),
-        ("spacing.vtk", vtk().replace("SPACING 1 1 1", "SPACING 0 1 1").into(), "spacing.vtk: samples: the spacing is 0 × 1 × 1, but every step needs a length"),
+        (
+            "count.vti",
+            binary("", &counts(&[u32::MAX, 1])),
+            "count.vti: DataArray “v”: claims 4294967295 bytes where 4 were expected",
+        ),
+        (
+            "blocks.vti",
+            binary(" compressor='vtkZLibDataCompressor'", &counts(&[u32::MAX, 4, 4])),
+            "blocks.vti: DataArray “v”: claims 4294967295 blocks of 4 bytes, the last of 4, where \
+             4 bytes were expected",
+        ),
+        (
+            "lie.vti",
+            binary(" compressor='vtkZLibDataCompressor'", &counts(&[1, 4, 0, u32::MAX])),
+            "lie.vti: DataArray “v”: block 0 claims 4294967295 bytes, but 0 are left",
+        ),
+        (
+            "bomb.vti",
+            binary(" compressor='vtkZLibDataCompressor'", &{
+                let b = zlib(&vec![0; 1 << 24]);
+                [counts(&[1, 4, 0, b.len() as u32]), b].concat()
+            }),
+            "bomb.vti: DataArray “v”: block 0 unpacks to more than its 4 bytes",
+        ),
+        (
+            "base64.vti",
+            vtk_xml("ImageData", "", &vti_piece(&array("format='binary'", "????"))).into(),
+            "base64.vti: DataArray “v”: is no base64 (after 3 bytes): Invalid symbol 63, offset 0.",
+        ),
+        (
+            "laughs.vti",
+            format!("{laughs}{}", String::from_utf8_lossy(&vti("&l29;"))).into(),
+            "laughs.vti: DataArray “v”: there are 0 numbers where 4 were expected",
+        ),
+        (
+            "laughname.vti",
+            format!(
+                "{laughs}{}",
+                String::from_utf8_lossy(&vti("1 2 3 4")).replace("Name='v'", "Name='&l29;'")
+            )
+            .into(),
+            "laughname.vti: byte 1998: has a wrong attribute: at 1..4: unrecognized entity `l29`",
+        ),
+        (
+            "deep.vti",
+            vtk_xml("ImageData", "", &format!("{}{}", "<a>".repeat(100), "</a>".repeat(100)))
+                .into(),
+            "deep.vti: byte 296: the depth of nesting is 65, over the limit of 64",
+        ),
+        (
+            "lz4.vti",
+            binary(" compressor='vtkLZ4DataCompressor'", &[]),
+            "lz4.vti: VTKFile: compressor=“vtkLZ4DataCompressor” is not supported",
+        ),
+        (
+            "corner.vtu",
+            vtu("0 1 3").into(),
+            "corner.vtu: Cells: a cell has the corner 3, but there are 3 points",
+        ),
+        (
+            "minus.vtu",
+            vtu("0 1 -1").into(),
+            "minus.vtu: Cells: a cell has the corner -1, but there are 3 points",
+        ),
+        (
+            "points.vtu",
+            vtu("0 1 2")
+                .replace("NumberOfPoints='3'", "NumberOfPoints='18446744073709551615'")
+                .into(),
+            "points.vtu: the number of points is 18446744073709551615, over the limit of \
+             2147483648",
+        ),
+        (
+            "cells.vtu",
+            vtu("0 1 2").replace("NumberOfCells='1'", "NumberOfCells='4000000000'").into(),
+            "cells.vtu: the number of cells is 4000000000, over the limit of 2147483648",
+        ),
+        (
+            "count.vtk",
+            vtk().replace("POINT_DATA 4", "POINT_DATA 18446744073709551615").into(),
+            "count.vtk: a count of points or cells is 18446744073709551615, over the limit of \
+             2147483648",
+        ),
+        (
+            "million.vtk",
+            vtk().replace("POINT_DATA 4", "POINT_DATA 1000000").into(),
+            "million.vtk: byte 128: there are 4 numbers where 1000000 were expected: the file ends",
+        ),
+        (
+            "twice.vtk",
+            "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 2 float\n\
+             0 0 0 1 0 0\nCELLS 1 3\n2 0 1\nPOINTS 1 float\n0 0 0\nCELL_DATA 1\nSCALARS c float\n\
+             LOOKUP_TABLE d\n5\n"
+                .into(),
+            "twice.vtk: byte 104: POINTS are given twice, or behind the cells",
+        ),
+        (
+            "dims.vtk",
+            vtk().replace("DIMENSIONS 2 2 1", "DIMENSIONS 4294967296 4294967296 4294967296").into(),
+            "dims.vtk: POINT_DATA: claims 4 points, but the data set has 18446744073709551615",
+        ),
+        (
+            "minus.vtk",
+            vtk().replace("DIMENSIONS 2 2 1", "DIMENSIONS -2 2 1").into(),
+            "minus.vtk: byte 65: needs three numbers",
+        ),
+        (
+            "spacing.vtk",
+            vtk().replace("SPACING 1 1 1", "SPACING 0 1 1").into(),
+            "spacing.vtk: samples: the spacing is 0 × 1 × 1, but every step needs a length",
+        ),
         ("crlf.vtk", vtk().replace('\n', "\r\n").into(), "volume [2, 2, 1] [1.0, 4.0]"),
-        // Raw volumes, of 4 × 4 × 4 bytes.
-        ("short.raw", vec![1; 63], "short.raw: size: holds 63 bytes after the header, but 4 × 4 × 4 samples of type u8 need 64"),
-        ("long.raw", vec![1; 125], "long.raw: size: holds 125 bytes after the header, but 4 × 4 × 4 samples of type u8 need 64"),
+        // Raw volumes of 4 × 4 × 4 bytes.
+        (
+            "short.raw",
+            vec![1; 63],
+            "short.raw: size: holds 63 bytes after the header, but 4 × 4 × 4 samples of type u8 \
+             need 64",
+        ),
+        (
+            "long.raw",
+            vec![1; 125],
+            "long.raw: size: holds 125 bytes after the header, but 4 × 4 × 4 samples of type u8 \
+             need 64",
+        ),
         ("same.raw", vec![7; 64], "volume [4, 4, 4] [7.0, 7.0]"),
-        ("bomb.gz", gzip(&vec![0; 1 << 24]), "bomb.gz: gzip stream: unpacks to more bytes where 64 were expected"),
+        (
+            "bomb.gz",
+            gzip(&vec![0; 1 << 24]),
+            "bomb.gz: gzip stream: unpacks to more bytes where 64 were expected",
+        ),
         // Hierarchies and bricks.
-        ("future.splk", at(splk(true), 8, &99u32.to_le_bytes()), "future.splk: header: is of version 99; version 1 can be read"),
-        ("future.splv", at(bricks(), 8, &99u32.to_le_bytes()), "future.splv: header: is of version 99; version 1 can be read"),
-        ("tail.splk", [splk(true), vec![0]].concat(), "tail.splk: byte 560: the file has 1 bytes behind its end"),
-        ("tail.splv", [bricks(), vec![0]].concat(), "tail.splv: byte 477: 1 bytes stand behind the end"),
-        // Hierarchies and bricks whose checksums are right.
-        ("bomb.splk", crafted::page_of_zeros(64 << 20), "bomb.splk: page 0 (byte 229): it cannot be unpacked: Destination buffer is too small: 67108864 bytes needed, 960 given"),
-        ("shortpage.splk", crafted::page_of_zeros(8), "shortpage.splk: page 0 (byte 229): it unpacks to 8 bytes where 960 were expected"),
-        ("code.splk", crafted::page_of_code(7), "code.splk: page 0 (byte 229): it has the unknown code 7"),
-        ("nanpage.splk", crafted::with_node_bytes(0, &f32::NAN.to_le_bytes()), "nanpage.splk: page 0 (byte 229): its node 0 has a value that is not finite"),
-        ("infradius.splk", crafted::with_node_bytes(60, &f32::INFINITY.to_le_bytes()), "infradius.splk: page 0 (byte 229): its node 0 has a value that is not finite"),
-        ("cycle.splk", crafted::with_node_bytes(72, &0u32.to_le_bytes()), "cycle.splk: page 0 (byte 229): the children of its node 0 stand at 0, not at 1"),
-        ("beyond.splk", crafted::with_node_bytes(72, &u32::MAX.to_le_bytes()), "beyond.splk: page 0 (byte 229): the children of its node 0 stand at 4294967295, not at 1"),
-        ("children.splk", crafted::with_node_bytes(76, &u32::MAX.to_le_bytes()), "children.splk: page 0 (byte 229): its node 0 has 4294967295 children; 8 are the most"),
-        ("swapped.splk", crafted::swapped(false), "swapped.splk: page 1 (byte 130709): its checksum does not fit"),
-        ("swappedtold.splk", crafted::swapped(true), "swappedtold.splk: page 1 (byte 130709): it unpacks to 312880 bytes where 327680 were expected"),
-        ("far.splk", crafted::far_page(), "far.splk: directory: a page stands at byte 4294967525, not at 229"),
-        ("bomb.splv", crafted::brick_of_zeros(64 << 20), "bomb.splv: level 0, brick 1 (byte 420): it cannot be unpacked: Destination buffer is too small: 67108864 bytes needed, 33792 given"),
-        ("shortbrick.splv", crafted::brick_of_zeros(8), "shortbrick.splv: level 0, brick 1 (byte 420): it has 8 bytes where 33792 were expected"),
-        ("manybricks.splv", crafted::with_dims([1 << 60, 1 << 60, 1 << 60]), "manybricks.splv: header: 1152921504606846976 × 1152921504606846976 × 1152921504606846976 samples are more than memory can hold"),
-        ("endless.splv", crafted::with_dims([1 << 36, 1, 1]), "endless.splv: directory: the file is too short for the 4294967295 bricks of its header"),
-        ("foreign.splk", b"PK\x03\x04 and so on".to_vec(), "foreign.splk: header: is no hierarchy of splats"),
-        ("foreign.splv", b"PK\x03\x04 and so on".to_vec(), "foreign.splv: header: is no volume in bricks"),
+        (
+            "future.splk",
+            at(splk(true), 8, &99u32.to_le_bytes()),
+            "future.splk: header: is of version 99; version 1 can be read",
+        ),
+        (
+            "future.splv",
+            at(bricks(), 8, &99u32.to_le_bytes()),
+            "future.splv: header: is of version 99; version 1 can be read",
+        ),
+        (
+            "tail.splk",
+            [splk(true), vec![0]].concat(),
+            "tail.splk: byte 560: the file has 1 bytes behind its end",
+        ),
+        (
+            "tail.splv",
+            [bricks(), vec![0]].concat(),
+            "tail.splv: byte 477: 1 bytes stand behind the end",
+        ),
+        // Hierarchies and bricks with correct checksums.
+        (
+            "bomb.splk",
+            crafted::page_of_zeros(64 << 20),
+            "bomb.splk: page 0 (byte 229): it cannot be unpacked: Destination buffer is too small: \
+             67108864 bytes needed, 960 given",
+        ),
+        (
+            "shortpage.splk",
+            crafted::page_of_zeros(8),
+            "shortpage.splk: page 0 (byte 229): it unpacks to 8 bytes where 960 were expected",
+        ),
+        (
+            "code.splk",
+            crafted::page_of_code(7),
+            "code.splk: page 0 (byte 229): it has the unknown code 7",
+        ),
+        (
+            "nanpage.splk",
+            crafted::with_node_bytes(0, &f32::NAN.to_le_bytes()),
+            "nanpage.splk: page 0 (byte 229): its node 0 has a value that is not finite",
+        ),
+        (
+            "infradius.splk",
+            crafted::with_node_bytes(60, &f32::INFINITY.to_le_bytes()),
+            "infradius.splk: page 0 (byte 229): its node 0 has a value that is not finite",
+        ),
+        (
+            "cycle.splk",
+            crafted::with_node_bytes(72, &0u32.to_le_bytes()),
+            "cycle.splk: page 0 (byte 229): the children of its node 0 stand at 0, not at 1",
+        ),
+        (
+            "beyond.splk",
+            crafted::with_node_bytes(72, &u32::MAX.to_le_bytes()),
+            "beyond.splk: page 0 (byte 229): the children of its node 0 stand at 4294967295, not \
+             at 1",
+        ),
+        (
+            "children.splk",
+            crafted::with_node_bytes(76, &u32::MAX.to_le_bytes()),
+            "children.splk: page 0 (byte 229): its node 0 has 4294967295 children; 8 are the most",
+        ),
+        (
+            "swapped.splk",
+            crafted::swapped(false),
+            "swapped.splk: page 1 (byte 130709): its checksum does not fit",
+        ),
+        (
+            "swappedtold.splk",
+            crafted::swapped(true),
+            "swappedtold.splk: page 1 (byte 130709): it unpacks to 312880 bytes where 327680 were \
+             expected",
+        ),
+        (
+            "far.splk",
+            crafted::far_page(),
+            "far.splk: directory: a page stands at byte 4294967525, not at 229",
+        ),
+        (
+            "bomb.splv",
+            crafted::brick_of_zeros(64 << 20),
+            "bomb.splv: level 0, brick 1 (byte 420): it cannot be unpacked: Destination buffer is \
+             too small: 67108864 bytes needed, 33792 given",
+        ),
+        (
+            "shortbrick.splv",
+            crafted::brick_of_zeros(8),
+            "shortbrick.splv: level 0, brick 1 (byte 420): it has 8 bytes where 33792 were \
+             expected",
+        ),
+        (
+            "manybricks.splv",
+            crafted::with_dims([1 << 60, 1 << 60, 1 << 60]),
+            "manybricks.splv: header: 1152921504606846976 × 1152921504606846976 × \
+             1152921504606846976 samples are more than memory can hold",
+        ),
+        (
+            "endless.splv",
+            crafted::with_dims([1 << 36, 1, 1]),
+            "endless.splv: directory: the file is too short for the 4294967295 bricks of its \
+             header",
+        ),
+        (
+            "foreign.splk",
+            b"PK\x03\x04 and so on".to_vec(),
+            "foreign.splk: header: is no hierarchy of splats",
+        ),
+        (
+            "foreign.splv",
+            b"PK\x03\x04 and so on".to_vec(),
+            "foreign.splv: header: is no volume in bricks",
+        ),
         // Transfer functions.
-        ("clear.json", br#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 0]]}"#.to_vec(), "clear.json: transfer function: a transfer function without opacity shows nothing: every opacity is 0"),
-        ("missing.json", br#"{"color": [[0, 1, 1, 1]]}"#.to_vec(), "missing.json: transfer function: missing field `opacity` at line 1 column 25"),
-        ("none.json", br#"{"color": [], "opacity": []}"#.to_vec(), "none.json: transfer function: there are no color points"),
-        ("lists.json", lists(100_000).into(), "lists.json: transfer function: invalid type: sequence, expected f64 at line 1 column 3"),
-        ("colors.json", format!(r#"{{"color": {}"#, lists(100_000)).into(), "colors.json: transfer function: invalid type: sequence, expected f64 at line 1 column 12"),
-        ("huge.json", br#"{"color": [[1e999, 1, 1, 1]], "opacity": [[0, 1]]}"#.to_vec(), "huge.json: transfer function: number out of range at line 1 column 17"),
+        (
+            "clear.json",
+            br#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 0]]}"#.to_vec(),
+            "clear.json: transfer function: a transfer function without opacity shows nothing: \
+             every opacity is 0",
+        ),
+        (
+            "missing.json",
+            br#"{"color": [[0, 1, 1, 1]]}"#.to_vec(),
+            "missing.json: transfer function: missing field `opacity` at line 1 column 25",
+        ),
+        (
+            "none.json",
+            br#"{"color": [], "opacity": []}"#.to_vec(),
+            "none.json: transfer function: there are no color points",
+        ),
+        (
+            "lists.json",
+            lists(100_000).into(),
+            "lists.json: transfer function: invalid type: sequence, expected f64 at line 1 column \
+             3",
+        ),
+        (
+            "colors.json",
+            format!(r#"{{"color": {}"#, lists(100_000)).into(),
+            "colors.json: transfer function: invalid type: sequence, expected f64 at line 1 column \
+             12",
+        ),
+        (
+            "huge.json",
+            br#"{"color": [[1e999, 1, 1, 1]], "opacity": [[0, 1]]}"#.to_vec(),
+            "huge.json: transfer function: number out of range at line 1 column 17",
+        ),
         ("latin.json", b"{\"color\": \"\xe9\"}".to_vec(), "latin.json: byte 11: is not UTF-8 text"),
-        ("long.json", vec![b' '; 2 << 20], "long.json: file: has 2097152 bytes, but a transfer function has 1048576 at most"),
-        // Nothing.
+        (
+            "long.json",
+            vec![b' '; 2 << 20],
+            "long.json: file: has 2097152 bytes, but a transfer function has 1048576 at most",
+        ),
+        // Files of no format.
         ("nothing.bin", Vec::new(), "nothing.bin: file: is of no kind"),
         ("zeros.bin", vec![0; 4096], "zeros.bin: file: is of no kind"),
         ("text.bin", b"hello".to_vec(), "text.bin: file: is of no kind"),

@@ -1,5 +1,5 @@
-//! Hierarchies and bricks whose checksums are right and whose contents lie, made byte by byte after docs/splk.md and
-//! docs/splv.md.
+//! Hierarchies and bricks with correct checksums and wrong contents, made byte by byte after
+//! docs/splk.md and docs/splv.md.
 
 use super::*;
 
@@ -8,16 +8,16 @@ mod checksums;
 
 use checksums::{sum_bricks, sum_hierarchy};
 
-/// Nodes of a full page.
+/// Nodes in a full page.
 const PAGE_NODES: u32 = 4096;
-/// The first byte of pages that keep every bit.
+/// The first byte of a lossless page.
 const LOSSLESS: u8 = 0;
 
 fn word(bytes: &[u8], at: usize) -> usize {
     u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes")) as usize
 }
 
-/// Where the entries of a hierarchy's pages begin, and where its pages do.
+/// Byte offsets of a hierarchy's page entries and of its pages.
 fn pages(bytes: &[u8]) -> [usize; 2] {
     let entries = 160 + word(bytes, 136) + word(bytes, 140) + 4 + 16 * word(bytes, 124);
     [entries, entries + 44 * word(bytes, 128) + 4]
@@ -28,25 +28,26 @@ fn summed(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-/// A hierarchy of one page with another content.
+/// A hierarchy whose only page has the given content.
 fn with_page(content: &[u8]) -> Vec<u8> {
     let bytes = splk(true);
     let [_, start] = pages(&bytes);
     summed([&bytes[..start], content, &[0; 32]].concat())
 }
 
-/// So many zeros, packed as a page without loss.
+/// A page of `bytes` zeros, compressed and marked lossless.
 pub fn page_of_zeros(bytes: usize) -> Vec<u8> {
     let packed = zstd::bulk::compress(&vec![0; bytes], 19).expect("bytes");
     with_page(&[vec![LOSSLESS], packed].concat())
 }
 
-/// A page of an unknown code.
+/// A page with the given, unknown code.
 pub fn page_of_code(code: u8) -> Vec<u8> {
     with_page(&[code, 0, 0])
 }
 
-/// A page of a lossless hierarchy whose nodes have a number changed: `place` of the first node's 80 bytes.
+/// A lossless hierarchy with bytes of its first node replaced by `value`, from byte `place` of the
+/// 80 bytes of a node.
 pub fn with_node_bytes(place: usize, value: &[u8]) -> Vec<u8> {
     let bytes = splk(true);
     let [entries, start] = pages(&bytes);
@@ -59,7 +60,7 @@ pub fn with_node_bytes(place: usize, value: &[u8]) -> Vec<u8> {
     with_page(&[vec![LOSSLESS], zstd::bulk::compress(&planes, 3).expect("bytes")].concat())
 }
 
-/// A hierarchy of three pages and more, all of the same nodes.
+/// A lossless hierarchy of three pages or more.
 pub fn long_splk() -> Vec<u8> {
     let positions = (0..100 * 100)
         .map(|i| Vec3::new((i % 100) as f32, (i / 100) as f32, (i % 7) as f32))
@@ -71,8 +72,8 @@ pub fn long_splk() -> Vec<u8> {
     file::to_bytes(&tree, &options).expect("bytes")
 }
 
-/// The same with the last two pages in each other's place; with their own checksums where `is_told`, else with those of the
-/// places where they now stand.
+/// The same hierarchy with its last two pages swapped. If `is_told`, lengths and checksums in the
+/// directory are swapped with them; otherwise the directory stays as it was.
 pub fn swapped(is_told: bool) -> Vec<u8> {
     let bytes = long_splk();
     let [entries, _] = pages(&bytes);
@@ -90,14 +91,14 @@ pub fn swapped(is_told: bool) -> Vec<u8> {
     if !is_told {
         return out;
     }
-    // The lengths change places with the pages; sums and starts follow.
+    // Swap the lengths with the pages. `summed` then sets checksums and offsets.
     let [a, b] = [first, second].map(|entry| bytes[entry + 8..entry + 12].to_vec());
     out[first + 8..first + 12].copy_from_slice(&b);
     out[second + 8..second + 12].copy_from_slice(&a);
     summed(out)
 }
 
-/// A page whose place is told to be beyond what 32 bits count.
+/// A hierarchy whose directory places a page beyond 4 GiB.
 pub fn far_page() -> Vec<u8> {
     let mut bytes = splk(true);
     let [entries, start] = pages(&bytes);
@@ -107,13 +108,13 @@ pub fn far_page() -> Vec<u8> {
     bytes
 }
 
-/// A tree of equal nodes with eight children each: `full` pages of them, and below these eight times as many pages of leaves.
-/// Each page takes a hundred bytes, and 320 KiB where it is read.
+/// A tree of equal nodes with eight children each: `full` pages of inner nodes, and eight times as
+/// many pages of leaves below them. Each page takes 100 bytes in the file and 320 KiB in memory.
 pub fn pages_of_one_node(full: u32) -> Vec<u8> {
-    // 45 columns of one number each, and no symbols: four states as they begin.
+    // 45 columns of one number each, and no symbols: the four states as they begin.
     let page = |children: u8| {
         let mut heads = vec![0; 90];
-        // The children of each node: −1, folded, stands for 8.
+        // The column of child counts: −1, folded, stands for 8.
         heads[1] = children;
         let mut page = vec![1];
         page.extend([1f32, 0.0, 0.0, 0.0].iter().flat_map(|v| v.to_le_bytes()));
@@ -124,7 +125,7 @@ pub fn pages_of_one_node(full: u32) -> Vec<u8> {
         page.extend([1u32 << 16; 4].iter().flat_map(|v| v.to_le_bytes()));
         page
     };
-    // Siblings are on one page, and the root has none.
+    // Siblings share a page, and the root has none.
     let first_page = PAGE_NODES - 7;
     let inner = first_page + (full - 1) * PAGE_NODES;
     let nodes = 1 + 8 * inner;
@@ -142,7 +143,7 @@ pub fn pages_of_one_node(full: u32) -> Vec<u8> {
         let own = if number == 0 { first_page } else { PAGE_NODES.min(nodes - begin) };
         let first_child = nodes.min(1 + 8 * begin);
         begin += own;
-        // In the order of the file.
+        // Entries in the order of the file.
         directory.extend(u64::from(number).to_le_bytes());
         directory.extend(
             [content.len() as u32, 0, own, first_child].iter().flat_map(|v| v.to_le_bytes()),
@@ -155,7 +156,7 @@ pub fn pages_of_one_node(full: u32) -> Vec<u8> {
     summed([&head[..], &[0; 4], &block, &directory, &[0; 4], &contents, &[0; 32]].concat())
 }
 
-/// How many bricks and how many levels so many samples have.
+/// Numbers of bricks and of levels of a volume of `dims` samples.
 fn bricks_and_levels(dims: [u64; 3]) -> [u64; 2] {
     let (mut level, mut bricks, mut levels) = (dims, 0, 0);
     loop {
@@ -168,7 +169,8 @@ fn bricks_and_levels(dims: [u64; 3]) -> [u64; 2] {
     }
 }
 
-/// Bytes in bricks, all of one value: sixteen bytes for each brick of 32 KiB.
+/// A bricked volume of bytes that all have one value: 16 bytes in the file for each brick of 32
+/// KiB.
 pub fn bricks_of_one_value(dims: [u64; 3]) -> Vec<u8> {
     let [bricks, levels] = bricks_and_levels(dims);
     let mut head = splv(&Folder::new())[..192].to_vec();
@@ -182,7 +184,7 @@ pub fn bricks_of_one_value(dims: [u64; 3]) -> Vec<u8> {
     bytes
 }
 
-/// Bricks whose header claims so many samples, with a checksum that is right.
+/// A bricked volume whose header claims `dims` samples, with a correct checksum of the header.
 pub fn with_dims(dims: [u64; 3]) -> Vec<u8> {
     let mut bytes = splv(&Folder::new());
     let end = 192 + word(&bytes, 172) + word(&bytes, 176);
@@ -198,7 +200,7 @@ pub fn with_dims(dims: [u64; 3]) -> Vec<u8> {
     bytes
 }
 
-/// The last brick of a `.splv`, one of level 0, as so many zeros, packed.
+/// A `.splv` whose last brick, one of level 0, is replaced by `bytes` compressed zeros.
 pub fn brick_of_zeros(bytes: usize) -> Vec<u8> {
     let mut file = splv(&Folder::new());
     let header = 192 + word(&file, 172) + word(&file, 176) + 4;
@@ -207,7 +209,7 @@ pub fn brick_of_zeros(bytes: usize) -> Vec<u8> {
     let entry = header + 16 * (bricks as usize - 1);
     let start = file.len() - 32 - word(&file, entry);
     file.splice(start..file.len() - 32, packed);
-    // Packed, of different values.
+    // The code of a compressed brick of differing values.
     file[entry + 14] = 4;
     sum_bricks(&mut file).expect("bricks");
     file

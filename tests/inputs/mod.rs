@@ -1,4 +1,4 @@
-//! Small sound files of every format, and what reading one gives in a line of words.
+//! Small valid files of every format, and a summary in words of what reading each returns.
 
 pub mod crafted;
 
@@ -32,13 +32,15 @@ impl Folder {
 
     pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
         let path = self.0.join(name);
-        // Some file systems wait for the disk when a file is cut and written again, but not for a new one.
+        // Some file systems wait for the disk when a file is truncated and rewritten, but not for a
+        // new file.
         std::fs::remove_file(&path).ok();
         std::fs::write(&path, bytes).expect("a file");
         path
     }
 
-    /// What reading a file gives, in words; an error without the folder's name.
+    /// Returns a summary of what reading the file returns, or the error without the path of the
+    /// folder.
     pub fn outcome(&self, name: &str, limits: &Limits) -> String {
         match load(&self.0.join(name), limits) {
             Ok(told) => told,
@@ -66,7 +68,7 @@ fn of_volume(volume: &Volume) -> String {
     format!("volume {:?} {:?}", volume.lattice.dims, volume.range)
 }
 
-/// Reads a file by whatever reader its name and content ask for, as a whole.
+/// Reads a whole file by the reader that its name and content ask for.
 pub fn load(path: &Path, limits: &Limits) -> Result<String> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     if extension == "json" {
@@ -101,17 +103,17 @@ pub fn load(path: &Path, limits: &Limits) -> Result<String> {
 
 pub const FLOATS: &str = "property float x\nproperty float y\nproperty float z\n";
 
-/// A PLY of text with these elements and rows.
+/// An ASCII PLY file with the given elements and rows.
 pub fn ply(elements: &str, rows: &str) -> Vec<u8> {
     format!("ply\nformat ascii 1.0\n{elements}end_header\n{rows}").into_bytes()
 }
 
-/// A triangle in PLY, binary.
+/// A triangle as a binary PLY file.
 fn binary_ply(big: bool) -> Vec<u8> {
     let order = if big { "big" } else { "little" };
     let header = format!(
-        "ply\nformat binary_{order}_endian 1.0\nelement vertex 3\n{FLOATS}element face 1\nproperty list uchar int \
-         vertex_indices\nend_header\n"
+        "ply\nformat binary_{order}_endian 1.0\nelement vertex 3\n{FLOATS}element face 1\n\
+         property list uchar int vertex_indices\nend_header\n"
     );
     let corners = [0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let number = |n: f32| if big { n.to_be_bytes() } else { n.to_le_bytes() };
@@ -148,7 +150,7 @@ fn base64(bytes: &[u8]) -> String {
     base64::engine::general_purpose::STANDARD.encode(bytes)
 }
 
-/// A triangle whose buffer is in the text.
+/// A triangle as glTF with an embedded buffer.
 pub fn gltf() -> String {
     gltf_with(
         &format!("data:application/octet-stream;base64,{}", base64(&triangle_bytes())),
@@ -166,10 +168,16 @@ pub fn triangle_bytes() -> Vec<u8> {
         .collect()
 }
 
-/// The same with a buffer elsewhere and other nodes, of which node 0 is the scene's.
+/// The same with the buffer at `uri`, and with other nodes. Node 0 is the root of the scene.
 pub fn gltf_with(uri: &str, nodes: &str) -> String {
     format!(
-        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{nodes}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}},{{"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}}],"bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":6}}],"buffers":[{{"uri":"{uri}","byteLength":42}}]}}"#
+        "{{\"asset\":{{\"version\":\"2.0\"}},\"scene\":0,\"scenes\":[{{\"nodes\":[0]}}],\
+         \"nodes\":[{nodes}],\"meshes\":[{{\"primitives\":[{{\"attributes\":{{\"POSITION\":0}},\
+         \"indices\":1}}]}}],\"accessors\":[{{\"bufferView\":0,\"componentType\":5126,\"count\":3,\
+         \"type\":\"VEC3\"}},{{\"bufferView\":1,\"componentType\":5123,\"count\":3,\
+         \"type\":\"SCALAR\"}}],\"bufferViews\":[{{\"buffer\":0,\"byteLength\":36}},{{\"buffer\":0,\
+         \"byteOffset\":36,\"byteLength\":6}}],\"buffers\":[{{\"uri\":\"{uri}\",\
+         \"byteLength\":42}}]}}"
     )
 }
 
@@ -200,8 +208,8 @@ pub fn stl() -> Vec<u8> {
     bytes
 }
 
-pub const STL_TEXT: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n\
-    endfacet\nendsolid a\n";
+pub const STL_TEXT: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n\
+     vertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
 
 fn las_header(format: u8, start: usize, records: u32, points: u32) -> Vec<u8> {
     let mut header = vec![0; 227];
@@ -254,7 +262,7 @@ pub fn laz() -> Vec<u8> {
     file.into_inner()
 }
 
-/// Two points, and the description of them changed.
+/// An E57 file of two points. `change` edits its XML.
 pub fn e57(change: impl Fn(String) -> String) -> Vec<u8> {
     use e57::{E57Writer, Record, RecordDataType, RecordName, RecordValue};
     let mut out = Cursor::new(Vec::new());
@@ -290,11 +298,11 @@ pub fn nrrd(sizes: &str, fields: &str, data: &[u8]) -> Vec<u8> {
         .concat()
 }
 
-/// A VTK file of XML: `kind` around `pieces`.
+/// An XML file of VTK: `kind` around `pieces`.
 pub fn vtk_xml(kind: &str, attributes: &str, pieces: &str) -> String {
     format!(
-        "<?xml version='1.0'?><VTKFile type='{kind}' byte_order='LittleEndian'{attributes}><{kind} WholeExtent='0 1 0 1 0 0'>\
-         {pieces}</{kind}></VTKFile>"
+        "<?xml version='1.0'?><VTKFile type='{kind}' byte_order='LittleEndian'{attributes}><{kind} \
+         WholeExtent='0 1 0 1 0 0'>{pieces}</{kind}></VTKFile>"
     )
 }
 
@@ -306,7 +314,7 @@ pub fn array(attributes: &str, content: &str) -> String {
     format!("<DataArray type='UInt8' Name='v' {attributes}>{content}</DataArray>")
 }
 
-/// Four bytes packed by zlib in one block, with their counts.
+/// Four bytes compressed by zlib as one block, preceded by its sizes.
 fn packed_block() -> Vec<u8> {
     let packed = zlib(&[1, 2, 3, 4]);
     let mut bytes: Vec<u8> =
@@ -322,22 +330,25 @@ fn appended(xml: &str, encoding: &str, data: &[u8]) -> Vec<u8> {
 }
 
 pub fn vtk() -> String {
-    "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 1\nORIGIN 0 0 0\nSPACING 1 1 1\n\
-     POINT_DATA 4\nSCALARS v unsigned_char 1\nLOOKUP_TABLE default\n1 2 3 4\n"
+    "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 1\n\
+     ORIGIN 0 0 0\nSPACING 1 1 1\nPOINT_DATA 4\nSCALARS v unsigned_char 1\nLOOKUP_TABLE default\n\
+     1 2 3 4\n"
         .into()
 }
 
 pub fn vtu(corners: &str) -> String {
     let numbers = |name: &str, kind: &str, text: &str, components: u32| {
         format!(
-            "<DataArray type='{kind}' Name='{name}' NumberOfComponents='{components}' format='ascii'>{text}</DataArray>"
+            "<DataArray type='{kind}' Name='{name}' NumberOfComponents='{components}' \
+             format='ascii'>{text}</DataArray>"
         )
     };
     vtk_xml(
         "UnstructuredGrid",
         "",
         &format!(
-            "<Piece NumberOfPoints='3' NumberOfCells='1'><CellData>{}</CellData><Points>{}</Points><Cells>{}{}{}</Cells></Piece>",
+            "<Piece NumberOfPoints='3' NumberOfCells='1'><CellData>{}</CellData><Points>{}</Points>\
+             <Cells>{}{}{}</Cells></Piece>",
             numbers("v", "Float32", "7", 1),
             numbers("p", "Float32", "0 0 0 1 0 0 0 1 0", 3),
             numbers("connectivity", "Int32", corners, 1),
@@ -360,7 +371,7 @@ pub fn splk(lossless: bool) -> Vec<u8> {
     file::to_bytes(&tree(), &options).expect("bytes")
 }
 
-/// Bricks of several levels, some of one value.
+/// Bricks of several levels; some bricks hold a single value.
 pub fn splv(folder: &Folder) -> Vec<u8> {
     let volume = Phantom::Specimen.sample_bytes([34, 5, 3]).expect("a volume");
     let path = folder.0.join("made.splv");
@@ -376,11 +387,12 @@ pub const OBJ: &str =
     "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
 pub const MTL: &str = "newmtl m\nKd 0.5 0.5 0.5\nmap_Kd a.png\n";
 
-/// The name of a file, its bytes, and whether it may load where it is cut before a byte.
+/// A file name, its bytes, and whether the file may load if it is cut before a given byte.
 pub type Format = (&'static str, Vec<u8>, fn(&[u8], usize) -> bool);
 
-/// A file of every format: its name, its bytes, and whether it may load where it is cut before byte `at`. Text without counts
-/// or an end reads as less where it is cut; the rest must notice, or have lost nothing but its last line break.
+/// A file of every format: its name, its bytes, and whether it may load if it is cut before byte
+/// `at`. Text without counts or an end mark reads as fewer values if it is cut. All other readers
+/// must notice, unless only the last line break is lost.
 pub fn every_format(folder: &Folder) -> Vec<Format> {
     fn never(_: &[u8], _: usize) -> bool {
         false
@@ -391,7 +403,7 @@ pub fn every_format(folder: &Folder) -> Vec<Format> {
     fn but_for_spaces(bytes: &[u8], at: usize) -> bool {
         bytes[at..].iter().all(u8::is_ascii_whitespace)
     }
-    // The last number may be cut to a shorter one.
+    // The last number may be cut to a shorter number.
     fn last_number(bytes: &[u8], at: usize) -> bool {
         bytes[at..].trim_ascii_end().iter().all(|&b| b.is_ascii_digit() || b == b'.')
     }
@@ -402,7 +414,7 @@ pub fn every_format(folder: &Folder) -> Vec<Format> {
     );
     let floats: Vec<u8> =
         [1f32, 2.0, 3.0, 4.0, 5.0, 6.0].iter().flat_map(|v| v.to_le_bytes()).collect();
-    // LZF: a run of 24 bytes as they are; fields stand one behind the other.
+    // LZF: 24 literal bytes. Fields are stored one after the other.
     let lzf = [&[23u8][..], &floats].concat();
     let packed = [&(lzf.len() as u32).to_le_bytes()[..], &24u32.to_le_bytes(), &lzf].concat();
     let text = "0 0 0\n1 0 0\n0 1 0\n";
@@ -415,7 +427,8 @@ pub fn every_format(folder: &Folder) -> Vec<Format> {
         format!("<DataArray type='Float32' Name='x' format='ascii'>{axis}</DataArray>")
     };
     let vtr_piece = format!(
-        "<Piece Extent='0 1 0 1 0 0'><PointData Scalars='v'>{}</PointData><Coordinates>{}{}{}</Coordinates></Piece>",
+        "<Piece Extent='0 1 0 1 0 0'><PointData Scalars='v'>{}</PointData><Coordinates>\
+         {}{}{}</Coordinates></Piece>",
         array("format='ascii'", "1 2 3 4"),
         places("0 1"),
         places("0 2"),
@@ -455,7 +468,8 @@ pub fn every_format(folder: &Folder) -> Vec<Format> {
         ("gzip.nrrd", nrrd("4 4 4", "encoding: gzip", &gzip(&raw)), never),
         ("ascii.nrrd", nrrd("2 2 1", "encoding: ascii", b"1 2 3 44\n"), last_number),
         ("hex.nrrd", nrrd("2 2 1", "encoding: hex", b"01020304\n"), but_for_spaces),
-        // The name of the data may be cut to none that is there, and the empty line is not needed.
+        // The name of the data file may be cut to one that does not exist; the empty line is not
+        // needed.
         (
             "detached.nhdr",
             nrrd("2 2 1", "encoding: raw\ndata file: beside.raw", b""),

@@ -1,6 +1,7 @@
-//! Makes the checksums, the hash and the lengths of a changed file right, so that what is behind them is put to the test.
+//! Corrects the checksums, the hash and the lengths of a changed file, so that tests reach the code
+//! behind these checks.
 
-/// The number of 32 bits at a place.
+/// The 32-bit number at byte `at`.
 fn word(bytes: &[u8], at: usize) -> Option<usize> {
     Some(u32::from_le_bytes(*bytes.get(at..)?.first_chunk()?) as usize)
 }
@@ -10,20 +11,21 @@ fn put(bytes: &mut [u8], at: usize, value: &[u8]) -> Option<()> {
     Some(())
 }
 
-/// Puts the checksum of a range behind it.
+/// Writes the checksum of a range right behind it.
 fn sum(bytes: &mut [u8], start: usize, end: usize) -> Option<()> {
     let sum = crc32fast::hash(bytes.get(start..end)?);
     put(bytes, end, &sum.to_le_bytes())
 }
 
-/// Puts the hash of all at the end.
+/// Writes the hash of all bytes before it to the end.
 fn hash(bytes: &mut [u8]) -> Option<()> {
     let end = bytes.len().checked_sub(32)?;
     let hash = *blake3::hash(&bytes[..end]).as_bytes();
     put(bytes, end, &hash)
 }
 
-/// Of a `.splk`; docs/splk.md tells what stands where. `None` where the bytes are too few for what they claim.
+/// Corrects a `.splk`; docs/splk.md describes its layout. Returns `None` if there are fewer bytes
+/// than the file claims.
 pub fn sum_hierarchy(bytes: &mut [u8]) -> Option<()> {
     put(bytes, 0, b"SPLK\r\n\x1a\n\x01\0\0\0")?;
     let length = bytes.len() as u64;
@@ -54,7 +56,8 @@ pub fn sum_hierarchy(bytes: &mut [u8]) -> Option<()> {
     hash(bytes)
 }
 
-/// Of a `.splv`; docs/splv.md tells what stands where. `None` where the bytes are too few for what they claim.
+/// Corrects a `.splv`; docs/splv.md describes its layout. Returns `None` if there are fewer bytes
+/// than the file claims.
 pub fn sum_bricks(bytes: &mut [u8]) -> Option<()> {
     put(bytes, 0, b"SPLV\r\n\x1a\n\x01\0\0\0")?;
     let length = bytes.len() as u64;

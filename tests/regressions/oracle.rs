@@ -1,8 +1,9 @@
-//! What must hold of every input, whatever its bytes: the reader gives an error or something sound, within little time and
-//! memory. The fuzz targets (`fuzz/`) and the regression tests (`tests/regressions.rs`) share these entry points, one per
-//! format, each named as its fuzz target and its folder of regressions.
+//! What must hold for every input, whatever its bytes: the reader returns an error or a valid
+//! result, in little time and memory. The fuzz targets (`fuzz/`) and the regression tests
+//! (`tests/regressions.rs`) share these entry points. There is one per format, with the name of its
+//! fuzz target and of its folder of regressions.
 //!
-//! A function here panics where the library breaks a promise, and returns otherwise.
+//! A function here panics if the library breaks a promise, and returns otherwise.
 
 mod checksums;
 
@@ -28,10 +29,10 @@ use splatkit::{
 };
 use std::path::{Path, PathBuf};
 
-/// Looks at bytes as those of one format.
+/// Reads bytes as a file of one format and checks the result.
 pub type Look = fn(&[u8]);
 
-/// All formats by name.
+/// All entry points, by name.
 pub const FORMATS: &[(&str, Look)] = &[
     ("ply", ply),
     ("obj", obj),
@@ -60,31 +61,31 @@ pub const FORMATS: &[(&str, Look)] = &[
     ("convert_render", convert_render),
 ];
 
-/// So little that whatever is slow or large within it is a bug.
+/// Limits so low that any input that is slow or large within them shows a bug.
 pub fn limits() -> Limits {
     Limits { points: 1 << 16, bytes: 64 << 20, texels: 1 << 16, ..Limits::default() }
 }
 
-/// Samples of a volume that are looked at as a whole.
+/// The most samples of a bricked volume that is checked.
 const MOST_SAMPLES: usize = 1 << 20;
 
-/// Reads bytes in memory under a name.
+/// Reads bytes in memory under a file name.
 fn read<T>(name: &str, bytes: &[u8], read: impl Fn(&Source) -> Result<T>) -> Option<T> {
     let limits = limits();
     let source = Source::from_bytes(Path::new(name), bytes, &limits).expect("small enough");
     accepted(read(&source))
 }
 
-/// What was read; of an error, that it says something.
+/// Returns what was read, or asserts that the error has a message.
 fn accepted<T>(result: Result<T>) -> Option<T> {
     match result {
         Ok(read) => Some(read),
         Err(Error::Input { place, message, .. }) => {
-            assert!(!place.is_empty() && !message.is_empty(), "an error without words");
+            assert!(!place.is_empty() && !message.is_empty(), "an error without a message");
             None
         }
         Err(error) => {
-            assert!(!error.to_string().is_empty(), "an error without words");
+            assert!(!error.to_string().is_empty(), "an error without a message");
             None
         }
     }
@@ -121,7 +122,7 @@ fn sound_mesh(mesh: &Mesh) {
             |t: &splatkit::surface::Texture| t.texels.len() == t.width as usize * t.height as usize;
         assert!(
             material.texture.as_deref().is_none_or(whole),
-            "a texture of another size than its texels"
+            "a texture whose size does not match its texels"
         );
     }
 }
@@ -163,7 +164,7 @@ fn volume(name: &str, bytes: &[u8], reader: fn(&Source) -> Result<Volume>) {
     read(name, bytes, reader).iter().for_each(sound_volume);
 }
 
-/// What is read in pieces tells of as many points as what is read as a whole.
+/// A stream counts at least as many points and triangles as a whole read returns.
 fn stream(name: &str, bytes: &[u8], whole: Option<&Mesh>) {
     let limits = limits();
     let source = Source::from_bytes(Path::new(name), bytes, &limits).expect("small enough");
@@ -183,7 +184,8 @@ pub fn ply(bytes: &[u8]) {
     samples("input.ply", bytes, formats::read_samples);
 }
 
-/// An OBJ file; behind a line `#mtl` its materials, `input.mtl`, and behind a line `#png` their picture, `input.png`.
+/// An OBJ file. A line `#mtl` may separate its materials, `input.mtl`, and a line `#png` after them
+/// their picture, `input.png`.
 pub fn obj(bytes: &[u8]) {
     let Some((model, rest)) = cut(bytes, b"\n#mtl\n") else {
         mesh("input.obj", bytes, formats::obj::read);
@@ -194,7 +196,7 @@ pub fn obj(bytes: &[u8]) {
     mesh_beside(("input.obj", model), &others, formats::obj::read);
 }
 
-/// Reads a mesh whose file refers to others beside it.
+/// Reads a mesh whose file refers to other files beside it.
 fn mesh_beside(
     (name, bytes): (&str, &[u8]),
     others: &[(&str, &[u8])],
@@ -214,7 +216,7 @@ fn cut<'a>(bytes: &'a [u8], mark: &[u8]) -> Option<(&'a [u8], &'a [u8])> {
     Some((&bytes[..at + 1], &bytes[at + mark.len()..]))
 }
 
-/// A folder that nothing but what is written here is in.
+/// A folder that holds only the files written here.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -244,7 +246,8 @@ pub fn stl(bytes: &[u8]) {
     mesh("input.stl", bytes, formats::stl::read);
 }
 
-/// A glTF file; behind a line `#bin` its buffer, `input.bin`, and behind a line `#png` its picture, `input.png`.
+/// A glTF file. A line `#bin` may separate its buffer, `input.bin`, and a line `#png` after it its
+/// picture, `input.png`.
 pub fn gltf(bytes: &[u8]) {
     let Some((model, rest)) = cut(bytes, b"\n#bin\n") else {
         mesh("input.glb", bytes, formats::gltf::read);
@@ -264,7 +267,7 @@ pub fn e57(bytes: &[u8]) {
     mesh("input.e57", bytes, formats::e57::read);
 }
 
-/// An E57 file with the checksums of its pages made right.
+/// An E57 file whose page checksums are corrected first.
 pub fn e57_summed(bytes: &[u8]) {
     const PAGE: usize = 1024;
     let mut bytes = bytes.to_vec();
@@ -275,7 +278,7 @@ pub fn e57_summed(bytes: &[u8]) {
     e57(&bytes);
 }
 
-/// The checksum of E57's pages: CRC-32 of Castagnoli's polynomial.
+/// The checksum of E57 pages: CRC-32 with Castagnoli's polynomial.
 fn crc32c(bytes: &[u8]) -> u32 {
     let turn = |sum: u32| if sum & 1 == 1 { sum >> 1 ^ 0x82f6_3b78 } else { sum >> 1 };
     !bytes.iter().fold(!0, |sum, &byte| (0..8).fold(sum ^ u32::from(byte), |sum, _| turn(sum)))
@@ -297,8 +300,8 @@ pub fn npy(bytes: &[u8]) {
     read("input.npy", bytes, formats::npy::read).iter().for_each(sound_samples);
 }
 
-/// A NRRD file; behind lines `#data` the files that it may refer to: `0.raw`, `1.raw` and so on. With these it is also read
-/// slice by slice.
+/// An NRRD file. Lines `#data` may separate the files that it refers to: `0.raw`, `1.raw` and so
+/// on. With such files it is also read slice by slice.
 pub fn nrrd(bytes: &[u8]) {
     let Some((header, mut rest)) = cut(bytes, DATA) else {
         volume("input.nrrd", bytes, formats::nrrd::read);
@@ -323,8 +326,8 @@ pub fn nrrd(bytes: &[u8]) {
     let stream = accepted(VolumeStream::open(&path, &limits, None)).flatten();
     if let (Some(whole), Some(stream)) = (whole, stream) {
         assert_eq!((stream.lattice(), stream.scalar()), (&whole.lattice, whole.samples.scalar()));
-        let samples = stream.slices(0..whole.lattice.dims[2]).expect("what is read as a whole");
-        assert!(samples.bytes() == whole.samples.bytes(), "other samples slice by slice");
+        let samples = stream.slices(0..whole.lattice.dims[2]).expect("what was read as a whole");
+        assert!(samples.bytes() == whole.samples.bytes(), "the slices have other samples");
     }
 }
 
@@ -345,7 +348,8 @@ pub fn vtk(bytes: &[u8]) {
     samples("input.vtk", bytes, formats::vtk::read_samples);
 }
 
-/// A raw volume: six numbers of 8 bits tell how it lies (three sizes, type, spacing, bytes to skip), then come its bytes.
+/// A raw volume. Six bytes describe it (three sizes, type, spacing, bytes to skip); its samples
+/// follow.
 pub fn raw(bytes: &[u8]) {
     const TYPES: [SampleType; 6] = [
         SampleType::U8,
@@ -358,7 +362,7 @@ pub fn raw(bytes: &[u8]) {
     let Some((&[nx, ny, nz, kind, spacing, header], bytes)) = bytes.split_first_chunk() else {
         return;
     };
-    // The largest sizes stand for sizes beyond all memory.
+    // The largest value stands for a size beyond all memory.
     let size = |n: u8| if n == 255 { usize::MAX >> 3 } else { usize::from(n) };
     let layout = RawLayout {
         dims: [nx, ny, nz].map(size),
@@ -372,7 +376,7 @@ pub fn raw(bytes: &[u8]) {
         .for_each(sound_volume);
 }
 
-/// A file whose name does not tell its format.
+/// A file whose name does not reveal its format.
 pub fn any(bytes: &[u8]) {
     let kind =
         |with_scalar| read("input", bytes, |source| Kind::of_source(source, with_scalar)).flatten();
@@ -392,7 +396,8 @@ pub fn any(bytes: &[u8]) {
     }
 }
 
-/// A PLY file, or else a LAS or LAZ file, converted region by region: has as many points as one that is read as a whole.
+/// A PLY file, or otherwise a LAS or LAZ file, converted in regions. The conversion has as many
+/// points as a whole read.
 pub fn regions(bytes: &[u8]) {
     let folder = Folder::new();
     let path =
@@ -415,13 +420,13 @@ pub fn regions(bytes: &[u8]) {
         &|_, _, _| {},
     ));
     let Some(converted) = converted else {
-        return assert!(!made.exists(), "a file beside an error");
+        return assert!(!made.exists(), "the conversion failed, but left a file");
     };
     if let Some(whole) = whole {
         assert_eq!(
             converted.points,
             whole.positions.len() as u64,
-            "points in pieces, and as a whole"
+            "points in regions and as a whole"
         );
     }
     let hierarchy = Hierarchy::open(&made, &limits).expect("what was written");
@@ -430,7 +435,8 @@ pub fn regions(bytes: &[u8]) {
     assert_eq!(hierarchy.leaves().expect("what was written").splats.len() as u64, converted.splats);
 }
 
-/// A hierarchy's bytes as they are: what opens can be read or tells what is wrong, and what is found sound can be read.
+/// The bytes of a hierarchy as they are. Whatever opens can be read or yields an error, and
+/// whatever `check` finds sound can be read.
 pub fn splk(bytes: &[u8]) {
     let Some(hierarchy) =
         accepted(Hierarchy::from_bytes(bytes.to_vec(), Path::new("input.splk"), &limits()))
@@ -457,19 +463,19 @@ pub fn splk(bytes: &[u8]) {
     }
 }
 
-/// As [`splk`], with all checksums, the hash, and the places of the pages made right.
+/// Like [`splk`], with all checksums, the hash and the page offsets corrected first.
 pub fn splk_summed(bytes: &[u8]) {
     let mut bytes = bytes.to_vec();
     sum_hierarchy(&mut bytes);
     splk(&bytes);
 }
 
-/// A bricked volume's bytes as they are.
+/// The bytes of a bricked volume as they are.
 pub fn splv(bytes: &[u8]) {
     let Some(bricks) = accepted(Bricks::from_bytes(bytes.to_vec(), Path::new("input.splv"))) else {
         return;
     };
-    // A few bytes may stand for bricks of one value; more than these take their time.
+    // A few bytes may describe many bricks of one value; reading more than these takes long.
     if bricks.levels().iter().map(|level| level.bricks()).sum::<usize>() > MOST_SAMPLES >> 15 {
         return;
     }
@@ -487,19 +493,20 @@ pub fn splv(bytes: &[u8]) {
     }
 }
 
-/// As [`splv`], with all checksums and the hash made right, and lengths that fit.
+/// Like [`splv`], with all checksums, the hash and the lengths corrected first.
 pub fn splv_summed(bytes: &[u8]) {
     let mut bytes = bytes.to_vec();
     sum_bricks(&mut bytes);
     splv(&bytes);
 }
 
-/// A transfer function as JSON: what loads comes back from what it is written as, and gives numbers for all values.
+/// A transfer function as JSON. It survives writing and reading, and returns valid numbers for all
+/// values.
 pub fn transfer(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     let transfer = match TransferFunction::from_json(text) {
         Ok(transfer) => transfer,
-        Err(message) => return assert!(!message.is_empty(), "an error without words"),
+        Err(message) => return assert!(!message.is_empty(), "an error without a message"),
     };
     let again =
         TransferFunction::from_json(&transfer.to_json()).expect("what was written can be read");
@@ -522,17 +529,15 @@ pub fn transfer(bytes: &[u8]) {
     }
     for range in [[-1.0, 1.0], [0.0, 1e30], [7.0, 7.0]] {
         let finite = |entry: &[f32; 4]| entry.iter().all(|v| !v.is_nan());
-        assert!(
-            transfer.table(range, 16).iter().all(finite),
-            "a table over {range:?} has no numbers"
-        );
+        assert!(transfer.table(range, 16).iter().all(finite), "a table over {range:?} holds NaN");
         transfer.visible(range);
         let spread = transfer.clone().spread_over(range);
         assert!(spread.validate().is_ok(), "spread over {range:?}: {:?}", spread.validate());
     }
 }
 
-/// A number as it is, and as programs get wrong: small, fine, of any size, or any bits.
+/// A number as usual, or of a kind that programs get wrong: small, fine, of any magnitude, or any
+/// bits.
 #[derive(Debug, Arbitrary)]
 enum Number {
     Small(i8),
@@ -555,7 +560,7 @@ impl Number {
     }
 }
 
-/// A tiny model and how it is drawn.
+/// A tiny model, and how it is drawn.
 #[derive(Debug, Arbitrary)]
 struct Model {
     points: Vec<[Number; 3]>,
@@ -567,12 +572,13 @@ struct Model {
     is_perspective: bool,
 }
 
-/// Few surfels for little models.
+/// Options that make few surfels of a tiny model.
 fn surfel_options() -> SurfelOptions {
     SurfelOptions { largest_spacing: 0.5, most_triangles: 256, ..SurfelOptions::default() }
 }
 
-/// From a tiny model to surfels, to a hierarchy, to its file and back, to a picture on the CPU.
+/// Converts a tiny model to surfels and a hierarchy, writes and reads the file, and draws it on the
+/// CPU.
 pub fn convert_render(bytes: &[u8]) {
     const MOST: usize = 48;
     let Ok(model) = Model::arbitrary(&mut Unstructured::new(bytes)) else { return };
@@ -615,11 +621,11 @@ pub fn convert_render(bytes: &[u8]) {
     let Some(picture) = accepted(reference::render(&scene, &camera, &settings)) else { return };
     for (color, depth) in picture.color.iter().zip(&picture.depth) {
         assert!(color.iter().all(|v| (-1e-4..=1.0001).contains(v)), "the colour {color:?}");
-        assert!(!depth.is_nan(), "a depth is no number");
+        assert!(!depth.is_nan(), "a depth is not a number");
     }
 }
 
-/// A camera that looks at the whole of a box.
+/// A camera that frames a whole box.
 fn framing(bounds: splatkit::math::Bounds, is_perspective: bool) -> Camera {
     let mut camera = Camera::framing(&bounds, DVec3::new(0.3, 0.2, -1.0), DVec3::Y, 1.0);
     if !is_perspective {

@@ -1,4 +1,4 @@
-//! The ways to show a field: lattices, kernels, modes, classification, optics, isosurfaces, clips.
+//! Ways to show a field: lattices, kernels, modes, classification, optics, isosurfaces, clips.
 
 use super::*;
 use splatkit::{
@@ -8,7 +8,7 @@ use splatkit::{
 };
 use std::sync::Arc;
 
-/// A case of the usual camera.
+/// A case with the usual camera.
 fn case(name: &'static str, scene: Scene, settings: Settings) -> Case {
     Case { name, scene, camera: camera(SLANT, PERSPECTIVE), settings }
 }
@@ -17,7 +17,7 @@ fn volume_scene(volume: Volume, kernel: Kernel, transfer: TransferFunction) -> S
     Scene::new().with_volume(volume, kernel, transfer)
 }
 
-/// The blobs on a lattice of any kind about the scenes' middle, as floats of 0 … 1.
+/// The blobs on a lattice of any kind around the centre of the scenes, as floats of 0 … 1.
 fn blobs_on(dims: [usize; 3], axes: DMat3, arrangement: Arrangement) -> Volume {
     let mut lattice = Lattice { dims, origin: DVec3::ZERO, axes, arrangement };
     let [low, high] = lattice.step_range();
@@ -31,7 +31,7 @@ fn cubic() -> Volume {
     blobs_on([20, 20, 20], DMat3::from_diagonal(DVec3::splat(0.1)), Arrangement::Cartesian)
 }
 
-/// A transfer function with a shell thinner than a sheet and a step.
+/// A transfer function with a step, and a shell thinner than a sheet.
 fn steep() -> TransferFunction {
     TransferFunction {
         opacity: vec![(0.1, 0.0), (0.12, 0.6), (0.14, 0.0), (0.5, 0.0), (0.5, 0.9)],
@@ -58,7 +58,8 @@ pub fn body_centred() -> Case {
     case("body_centred", scene, settings())
 }
 
-/// From afar, where sections are the same for all pixels; in sheets classified by their means.
+/// From far away, where sections are the same for all pixels. Sheets are classified by their mean
+/// values.
 pub fn body_centred_from_afar() -> Case {
     let mut case = body_centred();
     case.camera.position = ORIGIN + 30.0 * SLANT;
@@ -100,7 +101,7 @@ pub fn b_spline() -> Case {
     )
 }
 
-/// A Gaussian from a table, cut so far out that it is the one in closed form.
+/// A tabulated Gaussian, cut off so far out that it equals the closed form.
 pub fn table_of_a_gaussian() -> Case {
     let values =
         (0..=512).map(|i| (-0.5 * (f64::from(i) / 512.0 * 2.7 / 0.6).powi(2)).exp()).collect();
@@ -112,7 +113,7 @@ pub fn table_of_a_gaussian() -> Case {
     )
 }
 
-/// The same with the closed form.
+/// The same Gaussian in closed form.
 pub fn closed_form_of_that_gaussian() -> Case {
     let kernel = Kernel::gaussian(0.6, 2.7).expect("a kernel");
     let scene = volume_scene(cubic(), kernel, transfer(1.0, Some(Shade::default())));
@@ -123,7 +124,8 @@ pub fn thin_shells() -> Case {
     case("thin_shells", volume_scene(cubic(), Kernel::default(), steep()), settings())
 }
 
-/// The same where the sample of one corner is that of a broken sensor: the function stands for a small part of the range.
+/// Thin shells with a corner sample of a broken sensor. The transfer function covers only a small
+/// part of the range of values.
 pub fn one_value_far_off() -> Case {
     let mut volume = cubic();
     let values = (0..volume.len())
@@ -133,7 +135,8 @@ pub fn one_value_far_off() -> Case {
     case("one_value_far_off", volume_scene(volume, Kernel::default(), steep()), settings())
 }
 
-/// The same with points of all functions that are far off, and nothing that shows changes up to there.
+/// Thin shells whose colour, opacity and gradient functions have points far off. Nothing visible
+/// changes up to there.
 pub fn points_far_off() -> Case {
     let mut transfer =
         TransferFunction { gradient: vec![(0.2, 0.0), (1.5, 1.0), (3e5, 1.0)], ..steep() };
@@ -192,12 +195,12 @@ pub fn single_ellipsoids() -> Case {
     case("single_ellipsoids", Scene::new().with_splats(ellipsoids()), settings)
 }
 
-/// The same along parallel rays.
+/// The case along parallel rays.
 pub fn orthographic(case: Case) -> Case {
     Case { camera: camera(SLANT, ORTHOGRAPHIC), ..case }
 }
 
-/// The same from within.
+/// The case from within the scene.
 pub fn from_inside(case: Case) -> Case {
     Case {
         camera: camera(DVec3::new(0.5, -0.4, 0.35), Projection::Perspective { view_angle: 75.0 }),
@@ -205,7 +208,7 @@ pub fn from_inside(case: Case) -> Case {
     }
 }
 
-/// Scattered samples that count differently and have slopes, classified after interpolation or before.
+/// Scattered samples with slopes and different weights.
 pub fn samples_with_slopes(classification: Classification) -> Case {
     let mut random = Random(16);
     let mut set = scattered();
@@ -235,7 +238,7 @@ pub fn one_isosurface() -> Case {
     case("one_isosurface", volume_scene(cubic(), Kernel::default(), transfer), settings())
 }
 
-/// Two translucent surfaces and an opaque one within what the transfer function shows.
+/// Two translucent isosurfaces and an opaque one inside what the transfer function shows.
 pub fn isosurfaces_in_fog() -> Case {
     let list =
         [(0.5, [0.2, 0.9, 0.3], 0.5), (0.2, [0.9, 0.3, 0.2], 0.3), (0.7, [0.2, 0.3, 0.9], 1.0)];
@@ -300,7 +303,7 @@ pub fn clipped_surface_in_a_volume() -> Case {
     case("clipped_surface_in_a_volume", mixed_scene(), Settings { clips: clips(), ..settings() })
 }
 
-/// Carrying coefficients instead of samples.
+/// A volume that carries coefficients instead of samples.
 pub fn sharp() -> Case {
     let kernel = Kernel::gaussian(0.7, 3.0).expect("a kernel");
     let volume = cubic().sharpened(&kernel).expect("a volume that can be made sharp");

@@ -1,5 +1,5 @@
-//! Small scenes, of every kind that a picture can be made of, for holding renderers to each other. All are the same in
-//! every run, and the reference draws each in about a second.
+//! Small scenes of every kind, to compare renderers with each other. They are the same in every
+//! run, and the reference draws each in about a second.
 
 pub mod methods;
 
@@ -11,7 +11,7 @@ use splatkit::{
     volume::{Lattice, Samples, Shade, TransferFunction, Volume},
 };
 
-/// A scene and how to look at it.
+/// A scene, its camera and its settings.
 pub struct Case {
     pub name: &'static str,
     pub scene: Scene,
@@ -42,7 +42,7 @@ impl Random {
         u32::from_le_bytes([red, green, blue, 255])
     }
 
-    /// A skewed ellipsoid of about `size`, with colour and normal.
+    /// A skewed ellipsoid of about `size`, with a colour and a normal.
     fn ellipsoid(&mut self, center: Vec3, size: f32) -> Splat {
         let mut side = || size * self.within(0.4, 1.2);
         let [b00, b11, b22] = [side(), side(), side()];
@@ -58,14 +58,15 @@ impl Random {
     }
 }
 
-/// Splats about a place away from the world's origin, which their own coordinates are relative to.
+/// Splats around `ORIGIN`, away from the origin of the world. Their coordinates are relative to
+/// it.
 fn set(payload: Payload, extent: f32, splats: Vec<Splat>) -> SplatSet {
     SplatSet { origin: ORIGIN, payload, splats, extent, overlap: 1.0 }
 }
 
 pub const ORIGIN: DVec3 = DVec3::new(10.0, -20.0, 30.0);
 
-/// Looks at the scenes' middle from `from` (relative to it).
+/// A camera that looks at the centre of the scenes from `from`, which is relative to it.
 fn camera(from: DVec3, projection: Projection) -> Camera {
     Camera { position: ORIGIN + from, focal_point: ORIGIN, view_up: DVec3::Z, projection }
 }
@@ -140,7 +141,7 @@ pub fn ellipsoids_without_normals() -> Case {
     }
 }
 
-/// Ellipsoids as large as the scene, that lie in most of its sheets, among small ones.
+/// Ellipsoids as large as the scene among small ones. The large ones lie in most sheets.
 pub fn huge_among_small() -> Case {
     let mut random = Random(2);
     let mut splats = ellipsoids();
@@ -176,7 +177,7 @@ pub fn splats_below_a_pixel() -> Case {
     }
 }
 
-/// A wall of flat discs that faces the camera.
+/// A wall of flat discs that face the camera.
 pub fn flat_discs_head_on() -> Case {
     let mut random = Random(4);
     let splats = (0..400).map(|i| {
@@ -189,7 +190,8 @@ pub fn flat_discs_head_on() -> Case {
     Case { name: "flat_discs_head_on", scene, camera, settings: settings() }
 }
 
-/// Seen from among the splats: some lie behind the camera, some reach over the near bound and around the eye.
+/// Seen from among the splats. Some lie behind the camera, and some reach across the near bound and
+/// around the eye.
 pub fn camera_among_ellipsoids() -> Case {
     let mut splats = ellipsoids();
     let mut random = Random(5);
@@ -203,14 +205,14 @@ pub fn camera_among_ellipsoids() -> Case {
     Case { name: "camera_among_ellipsoids", scene, camera, settings: settings() }
 }
 
-/// A view angle of 90 degrees upward, much more across.
+/// A vertical view angle of 90 degrees; the horizontal one is much larger.
 pub fn wide_angle() -> Case {
     let scene = Scene::new().with_splats(ellipsoids());
     let camera = camera(DVec3::new(0.9, -1.2, 0.7), Projection::Perspective { view_angle: 90.0 });
     Case { name: "wide_angle", scene, camera, settings: Settings::new([96, 48]) }
 }
 
-/// Colours from blue to red and opacity that grows, over values of 0 … 1 times `scale`.
+/// Colours from blue to red and a growing opacity, over values of 0 … `scale`.
 fn transfer(scale: f64, shade: Option<Shade>) -> TransferFunction {
     TransferFunction {
         color: vec![
@@ -225,7 +227,8 @@ fn transfer(scale: f64, shade: Option<Shade>) -> TransferFunction {
     }
 }
 
-/// Blobs of height 0 … 1, 0 far from them; in coordinates relative to the scenes' middle.
+/// A field of blobs of height 0 … 1, and 0 far from them. `at` is relative to the centre of the
+/// scenes.
 fn blobs(at: DVec3) -> f64 {
     let blob = |x: f64, y: f64, z: f64, size: f64| {
         let squared = (at - DVec3::new(x, y, z)).length_squared() / (size * size);
@@ -266,7 +269,8 @@ pub fn scattered_samples_orthographic() -> Case {
     }
 }
 
-/// A lattice about the scenes' middle with given steps, and what a function of the place has on it.
+/// A lattice around the centre of the scenes with the given steps, and the values of a function of
+/// position on it.
 fn sampled<T>(dims: [usize; 3], axes: DMat3, value: impl Fn(DVec3) -> T) -> (Lattice, Vec<T>) {
     let start = -0.5 * (axes * DVec3::from(dims.map(|n| n as f64 - 1.0)));
     let index = |i: usize| {
@@ -331,7 +335,8 @@ pub fn camera_inside_a_volume() -> Case {
     Case { name: "camera_inside_a_volume", scene: blob_scene(), camera, settings: settings() }
 }
 
-/// Marschner and Lobb's test signal (1994) on floats, the axes turned against the world's.
+/// Marschner and Lobb's test signal (1994) as floats, on axes that are turned against those of the
+/// world.
 pub fn marschner_lobb() -> Case {
     let axes = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.6) * (2.0 / 23.0);
     let signal = |at: DVec3| {
@@ -379,7 +384,7 @@ pub fn sheared_lattice_central() -> Case {
     }
 }
 
-/// One value everywhere. Unlit: the gradient of a constant is nothing but rounding.
+/// One value everywhere. Unlit, as the gradient of a constant is nothing but rounding.
 pub fn constant_field() -> Case {
     let axes = DMat3::from_axis_angle(DVec3::Y, 0.3) * 0.1;
     let (lattice, values) = sampled([16, 14, 12], axes, |_| 180);

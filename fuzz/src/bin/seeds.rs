@@ -1,5 +1,6 @@
-//! Writes the first inputs of every fuzz target to the folder that is given: small files of each format, from the library's
-//! own writers, from the writers of the formats' crates, and as text. A fuzzer that begins with these need not guess headers.
+//! Writes the seed inputs of every fuzz target to the given folder. They are small files of each
+//! format, made by the library's own writers, by the writers of the formats' crates, or as text.
+//! With them a fuzzer need not guess headers.
 
 use flate2::{Compression, write::GzEncoder};
 use glam::{DVec3, Vec2, Vec3};
@@ -15,7 +16,7 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 fn main() -> Result<()> {
     let Some(folder) = std::env::args_os().nth(1).map(PathBuf::from) else {
-        return Err("give the folder that the inputs are written to".into());
+        return Err("name the folder to write the inputs to".into());
     };
     let mut seeds = Seeds { folder, count: 0 };
     ply(&mut seeds)?;
@@ -37,7 +38,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The folder with a folder for each target.
+/// The output folder, with a subfolder for each target.
 struct Seeds {
     folder: PathBuf,
     count: usize,
@@ -52,7 +53,8 @@ impl Seeds {
         Ok(())
     }
 
-    /// As [`put`](Self::put), also for the target of files without a name.
+    /// Like [`put`](Self::put), and also adds the input to `any`, the target of files without a
+    /// name. PLY and LAS files go to `regions` as well.
     fn known(&mut self, target: &str, bytes: impl AsRef<[u8]>) -> Result<()> {
         self.put("any", &bytes)?;
         if matches!(target, "ply" | "las") {
@@ -61,7 +63,7 @@ impl Seeds {
         self.put(target, bytes)
     }
 
-    /// What a writer writes to a path.
+    /// Returns the bytes that `write` writes to a temporary path.
     fn written<E: Error + 'static>(
         &self,
         write: impl FnOnce(&Path) -> std::result::Result<(), E>,
@@ -75,7 +77,7 @@ impl Seeds {
     }
 }
 
-/// A tetrahedron with all attributes that a mesh has.
+/// A tetrahedron with every attribute that a mesh can have.
 fn tetrahedron() -> Mesh {
     let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
     Mesh {
@@ -104,18 +106,21 @@ fn ply(seeds: &mut Seeds) -> Result<()> {
     seeds.known("ply", gaussians)?;
     seeds.known(
         "ply",
-        "ply\nformat ascii 1.0\ncomment text\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
-         property uchar red\nproperty uchar green\nproperty uchar blue\nproperty float value\nelement face 2\n\
-         property list uchar int vertex_indices\nend_header\n0 0 0 1 2 3 0.5\n1 0 0 1 2 3 1.5\n1 1 0 1 2 3 2\n0 1 0 1 2 3 4\n\
-         4 0 1 2 3\n3 0 1 2\n",
+        "ply\nformat ascii 1.0\ncomment text\nelement vertex 4\nproperty float x\n\
+         property float y\nproperty float z\nproperty uchar red\nproperty uchar green\n\
+         property uchar blue\nproperty float value\nelement face 2\nproperty list uchar int \
+         vertex_indices\nend_header\n0 0 0 1 2 3 0.5\n1 0 0 1 2 3 1.5\n1 1 0 1 2 3 2\n\
+         0 1 0 1 2 3 4\n4 0 1 2 3\n3 0 1 2\n",
     )?;
     seeds.known(
         "ply",
-        "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\nproperty double z\n\
-         property float scalar\nproperty float radius\nend_header\n0 0 0 1 0.5\n1 2 3 4 0.25\n",
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\n\
+         property double z\nproperty float scalar\nproperty float radius\nend_header\n0 0 0 1 0.5\n\
+         1 2 3 4 0.25\n",
     )?;
-    let header = "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty short x\nproperty short y\nproperty short z\n\
-         element face 1\nproperty list uint8 uint32 vertex_indices\nproperty list uchar float texcoord\nend_header\n";
+    let header = "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty short x\n\
+         property short y\nproperty short z\nelement face 1\nproperty list uint8 uint32 \
+         vertex_indices\nproperty list uchar float texcoord\nend_header\n";
     let mut turned = header.as_bytes().to_vec();
     [0i16, 0, 0, 5, 0, 0, 0, 5, 0].iter().for_each(|v| turned.extend(v.to_be_bytes()));
     turned.push(3);
@@ -134,11 +139,13 @@ fn picture(format: image::ImageFormat) -> Result<Vec<u8>> {
 }
 
 fn obj(seeds: &mut Seeds) -> Result<()> {
-    let square = "mtllib input.mtl\nv 0 0 0\nv 1 0 0 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\no a\n\
-         usemtl red\nf 1/1/1 2/2/1 3/3/1\ng b\ns off\nusemtl plain\nf 1 3 4\nf -4//-1 -3//-1 -2//-1 -1//-1\nl 1 2\np 1\n";
+    let square = "mtllib input.mtl\nv 0 0 0\nv 1 0 0 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\n\
+         vt 1 1\nvn 0 0 1\no a\nusemtl red\nf 1/1/1 2/2/1 3/3/1\ng b\ns off\nusemtl plain\n\
+         f 1 3 4\nf -4//-1 -3//-1 -2//-1 -1//-1\nl 1 2\np 1\n";
     seeds.put("obj", square)?;
     seeds.put("obj", "v 1e3 -2 .5\r\nv 1 2 3 \\\r\n 4\r\nv 0 0 0\r\n# text\r\nf 1 2 3\r\n")?;
-    let materials = "newmtl red\nKd 1 0 0\nd 0.5\nmap_Kd -s 1 1 1 input.png\nnewmtl plain\nKd 0.5\nTr 0.25\nillum 2\n";
+    let materials = "newmtl red\nKd 1 0 0\nd 0.5\nmap_Kd -s 1 1 1 input.png\nnewmtl plain\nKd 0.5\n\
+         Tr 0.25\nillum 2\n";
     for format in [image::ImageFormat::Png, image::ImageFormat::Jpeg] {
         let parts =
             [square.as_bytes(), b"\n#mtl\n", materials.as_bytes(), b"\n#png\n", &picture(format)?]
@@ -151,7 +158,8 @@ fn obj(seeds: &mut Seeds) -> Result<()> {
 fn stl(seeds: &mut Seeds) -> Result<()> {
     seeds.known(
         "stl",
-        "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n",
+        "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n\
+         endloop\nendfacet\nendsolid a\n",
     )?;
     let mut binary = vec![b' '; 80];
     binary.extend(2u32.to_le_bytes());
@@ -163,7 +171,7 @@ fn stl(seeds: &mut Seeds) -> Result<()> {
 }
 
 fn gltf(seeds: &mut Seeds) -> Result<()> {
-    // Positions, indices, a normal each, and texture coordinates of a triangle.
+    // The positions, indices, normals and texture coordinates of one triangle.
     let mut data = floats([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
     [0u16, 1, 2, 0].iter().for_each(|v| data.extend(v.to_le_bytes()));
     data.extend(floats([0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]));
@@ -176,15 +184,26 @@ fn gltf(seeds: &mut Seeds) -> Result<()> {
     let size = picture.len();
     let document = |buffer: &str| {
         format!(
-            r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],
-"nodes":[{{"children":[1],"translation":[1,2,3],"rotation":[0,0,0,1],"scale":[1,2,1]}},{{"mesh":0,"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}],
-"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"NORMAL":2,"TEXCOORD_0":3}},"indices":1,"material":0,"mode":4}}]}}],
-"materials":[{{"pbrMetallicRoughness":{{"baseColorFactor":[1,0.5,0,1],"baseColorTexture":{{"index":0,"extensions":{{"KHR_texture_transform":{{"offset":[0.5,0],"scale":[2,2],"rotation":1}}}}}}}}}}],
-"textures":[{{"source":0}}],"images":[{{"bufferView":4,"mimeType":"image/png"}}],
-"buffers":[{{"byteLength":{length}{buffer}}}],
-"bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":6}},{{"buffer":0,"byteOffset":44,"byteLength":36}},{{"buffer":0,"byteOffset":80,"byteLength":12,"byteStride":4}},{{"buffer":0,"byteOffset":{place},"byteLength":{size}}}],
-"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}},{{"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}},{{"bufferView":2,"componentType":5126,"count":3,"type":"VEC3"}},
-{{"bufferView":3,"componentType":5123,"normalized":true,"count":3,"type":"VEC2","sparse":{{"count":1,"indices":{{"bufferView":1,"componentType":5123}},"values":{{"bufferView":3}}}}}}]}}"#
+            "{{\"asset\":{{\"version\":\"2.0\"}},\"scene\":0,\"scenes\":[{{\"nodes\":[0]}}],\n\
+             \"nodes\":[{{\"children\":[1],\"translation\":[1,2,3],\"rotation\":[0,0,0,1],\
+             \"scale\":[1,2,1]}},{{\"mesh\":0,\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}}],\n\
+             \"meshes\":[{{\"primitives\":[{{\"attributes\":{{\"POSITION\":0,\"NORMAL\":2,\
+             \"TEXCOORD_0\":3}},\"indices\":1,\"material\":0,\"mode\":4}}]}}],\n\
+             \"materials\":[{{\"pbrMetallicRoughness\":{{\"baseColorFactor\":[1,0.5,0,1],\
+             \"baseColorTexture\":{{\"index\":0,\"extensions\":{{\"KHR_texture_transform\":{{\"\
+             offset\":[0.5,0],\"scale\":[2,2],\"rotation\":1}}}}}}}}}}],\n\
+             \"textures\":[{{\"source\":0}}],\"images\":[{{\"bufferView\":4,\"mimeType\":\"image\
+             /png\"}}],\n\"buffers\":[{{\"byteLength\":{length}{buffer}}}],\n\
+             \"bufferViews\":[{{\"buffer\":0,\"byteLength\":36}},{{\"buffer\":0,\"byteOffset\":36,\
+             \"byteLength\":6}},{{\"buffer\":0,\"byteOffset\":44,\"byteLength\":36}},\
+             {{\"buffer\":0,\"byteOffset\":80,\"byteLength\":12,\"byteStride\":4}},{{\"buffer\":0,\
+             \"byteOffset\":{place},\"byteLength\":{size}}}],\n\"accessors\":[{{\"bufferView\":0,\
+             \"componentType\":5126,\"count\":3,\"type\":\"VEC3\",\"min\":[0,0,0],\"max\":[1,1,\
+             0]}},{{\"bufferView\":1,\"componentType\":5123,\"count\":3,\"type\":\"SCALAR\"}},\
+             {{\"bufferView\":2,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}},\n\
+             {{\"bufferView\":3,\"componentType\":5123,\"normalized\":true,\"count\":3,\
+             \"type\":\"VEC2\",\"sparse\":{{\"count\":1,\"indices\":{{\"bufferView\":1,\
+             \"componentType\":5123}},\"values\":{{\"bufferView\":3}}}}}}]}}"
         )
     };
     let mut text = document("").into_bytes();
@@ -206,7 +225,9 @@ fn gltf(seeds: &mut Seeds) -> Result<()> {
     seeds.put("gltf", [beside.as_bytes(), b"\n#bin\n", &data, b"\n#png\n", &picture].concat())?;
     seeds.known(
         "gltf",
-        r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0,1]}],"nodes":[{"children":[1]},{"children":[0],"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"accessors":[{"componentType":5126,"count":3,"type":"VEC3"}]}"#,
+        "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0,1]}],\"nodes\":[{\"children\":[\
+         1]},{\"children\":[0],\"mesh\":0}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"\
+         POSITION\":0}}]}],\"accessors\":[{\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}]}",
     )
 }
 
@@ -223,7 +244,7 @@ fn base64(bytes: &[u8]) -> String {
     bytes.chunks(3).map(group).collect()
 }
 
-/// Bytes of a point of each format.
+/// Size of a point record in each LAS point format, in bytes.
 const RECORD: [usize; 9] = [20, 28, 26, 34, 57, 63, 30, 36, 38];
 
 fn las_header(format: u8, start: usize, records: u32, points: u32) -> Vec<u8> {
@@ -377,9 +398,9 @@ fn tables(seeds: &mut Seeds) -> Result<()> {
 fn pcd(seeds: &mut Seeds) -> Result<()> {
     let header = |data: &str| {
         format!(
-            "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z rgb normal_x normal_y normal_z\n\
-             SIZE 4 4 4 4 4 4 4\nTYPE F F F U F F F\nCOUNT 1 1 1 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 1 2 9 1 0 0 0\n\
-             POINTS 2\nDATA {data}\n"
+            "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z rgb normal_x \
+             normal_y normal_z\nSIZE 4 4 4 4 4 4 4\nTYPE F F F U F F F\nCOUNT 1 1 1 1 1 1 1\n\
+             WIDTH 2\nHEIGHT 1\nVIEWPOINT 1 2 9 1 0 0 0\nPOINTS 2\nDATA {data}\n"
         )
         .into_bytes()
     };
@@ -390,7 +411,7 @@ fn pcd(seeds: &mut Seeds) -> Result<()> {
         rows.chunks(32).flat_map(|run| [&[run.len() as u8 - 1], run].concat()).collect();
     let sizes = [runs.len(), rows.len()].map(|size| (size as u32).to_le_bytes()).concat();
     seeds.known("pcd", [header("binary_compressed"), sizes, runs].concat())?;
-    // A copy of what came before, which overlaps itself.
+    // A copy of earlier output that overlaps itself.
     let packed = [&[0, 0, 0xe0, 45, 0][..], &[0, 1]].concat();
     let sizes = [packed.len() as u32, 56].map(u32::to_le_bytes).concat();
     seeds.known("pcd", [header("binary_compressed"), sizes, packed].concat())
@@ -422,8 +443,9 @@ fn volumes(seeds: &mut Seeds) -> Result<()> {
     let volume = Volume::new(lattice, samples)?;
     let written = seeds.written(|path| formats::nrrd::write(&volume, path))?;
     seeds.known("nrrd", written)?;
-    let head = "NRRD0005\n# text\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: 2 2 2\n\
-         space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\nendian: big\n";
+    let head = "NRRD0005\n# text\ntype: short\ndimension: 3\nspace: left-posterior-superior\n\
+         sizes: 2 2 2\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\n\
+         endian: big\n";
     seeds.known("nrrd", [head.as_bytes(), b"encoding: raw\n\n0123456789abcdef"].concat())?;
     seeds.known("nrrd", format!("{head}encoding: hex\n\n00010203040506070809 0a0b0c0d0e0f"))?;
     seeds.known("nrrd", format!("{head}lattice:=bcc\nencoding: ascii\n\n1 2 3 4 5 6 7 -8"))?;
@@ -451,21 +473,28 @@ fn volumes(seeds: &mut Seeds) -> Result<()> {
 }
 
 fn vtk(seeds: &mut Seeds) -> Result<()> {
-    let image = "<VTKFile type=\"ImageData\" byte_order=\"LittleEndian\"><ImageData WholeExtent=\"0 2 0 1 0 0\" \
-         Origin=\"0 0 0\" Spacing=\"1 1 2\"><Piece Extent=\"0 2 0 1 0 0\"><PointData Scalars=\"s\">";
+    let image = "<VTKFile type=\"ImageData\" byte_order=\"LittleEndian\"><ImageData \
+         WholeExtent=\"0 2 0 1 0 0\" Origin=\"0 0 0\" Spacing=\"1 1 2\"><Piece Extent=\"0 2 0 1 0 \
+         0\"><PointData Scalars=\"s\">";
     let end = "</PointData></Piece></ImageData></VTKFile>";
     seeds.known(
         "vti",
-        format!("{image}<DataArray type=\"UInt8\" Name=\"s\" format=\"ascii\">0 1 2 3 4 5</DataArray>{end}"),
+        format!(
+            "{image}<DataArray type=\"UInt8\" Name=\"s\" format=\"ascii\">0 1 2 3 4 \
+             5</DataArray>{end}"
+        ),
     )?;
     let inline = base64(&[&6u32.to_le_bytes()[..], &[0, 1, 2, 3, 4, 5]].concat());
     seeds.known(
         "vti",
-        format!("{image}<DataArray type=\"UInt8\" Name=\"s\" format=\"binary\">{inline}</DataArray>{end}"),
+        format!(
+            "{image}<DataArray type=\"UInt8\" Name=\"s\" format=\"binary\">{inline}</DataArray>\
+             {end}"
+        ),
     )?;
     let appended = format!(
-        "{image}<DataArray type=\"UInt8\" Name=\"s\" format=\"appended\" offset=\"0\"/></PointData></Piece></ImageData>\
-         <AppendedData encoding=\"raw\">_"
+        "{image}<DataArray type=\"UInt8\" Name=\"s\" format=\"appended\" offset=\"0\"/></PointData>\
+         </Piece></ImageData><AppendedData encoding=\"raw\">_"
     );
     let data =
         [&6u32.to_le_bytes()[..], &[0, 1, 2, 3, 4, 5], b"</AppendedData></VTKFile>"].concat();
@@ -479,22 +508,25 @@ fn vtk(seeds: &mut Seeds) -> Result<()> {
     seeds.known(
         "vti",
         format!(
-            "{packed_image}<DataArray type=\"UInt8\" Name=\"s\" format=\"binary\">{}{}</DataArray>{end}",
+            "{packed_image}<DataArray type=\"UInt8\" Name=\"s\" format=\"binary\">{}{}</DataArray>\
+             {end}",
             base64(&sizes),
             base64(&packed)
         ),
     )?;
     let array = |kind: &str, name: &str, parts: u32, text: &str| {
         format!(
-            "<DataArray type='{kind}' Name='{name}' NumberOfComponents='{parts}' format='ascii'>{text}</DataArray>"
+            "<DataArray type='{kind}' Name='{name}' NumberOfComponents='{parts}' format='ascii'>\
+             {text}</DataArray>"
         )
     };
     let places = ["0 1 5", "-1 1", "7"].map(|text| array("Float64", "p", 1, text)).concat();
     seeds.known(
         "vtr",
         format!(
-            "<VTKFile type='RectilinearGrid'><RectilinearGrid WholeExtent='0 2 0 1 0 0'><Piece Extent='0 2 0 1 0 0'>\
-             <PointData Scalars='s'>{}</PointData><Coordinates>{places}</Coordinates></Piece></RectilinearGrid></VTKFile>",
+            "<VTKFile type='RectilinearGrid'><RectilinearGrid WholeExtent='0 2 0 1 0 0'><Piece \
+             Extent='0 2 0 1 0 0'><PointData Scalars='s'>{}</PointData><Coordinates>\
+             {places}</Coordinates></Piece></RectilinearGrid></VTKFile>",
             array("UInt8", "s", 1, "0 1 2 3 4 5")
         ),
     )?;
@@ -510,35 +542,38 @@ fn vtk(seeds: &mut Seeds) -> Result<()> {
         seeds.known(
             "vtu",
             format!(
-                "<VTKFile type='UnstructuredGrid'><UnstructuredGrid><Piece NumberOfPoints='4' NumberOfCells='1'>\
-                 <PointData>{point_data}</PointData><CellData>{cell_data}</CellData><Points>{points}</Points>\
-                 <Cells>{cells}</Cells></Piece></UnstructuredGrid></VTKFile>"
+                "<VTKFile type='UnstructuredGrid'><UnstructuredGrid><Piece NumberOfPoints='4' \
+                 NumberOfCells='1'><PointData>{point_data}</PointData><CellData>\
+                 {cell_data}</CellData><Points>{points}</Points><Cells>{cells}</Cells></Piece>\
+                 </UnstructuredGrid></VTKFile>"
             ),
         )?;
     }
     seeds.known(
         "vtu",
         format!(
-            "<VTKFile type='PolyData'><PolyData><Piece NumberOfPoints='4' NumberOfVerts='0' NumberOfPolys='1'><PointData>{}\
-             </PointData><Points>{points}</Points><Polys>{cells}</Polys></Piece></PolyData></VTKFile>",
+            "<VTKFile type='PolyData'><PolyData><Piece NumberOfPoints='4' NumberOfVerts='0' \
+             NumberOfPolys='1'><PointData>{}</PointData><Points>{points}</Points><Polys>\
+             {cells}</Polys></Piece></PolyData></VTKFile>",
             array("Float32", "value", 1, "1 2 3 4")
         ),
     )?;
     let head = |encoding: &str| format!("# vtk DataFile Version 3.0\ntitle\n{encoding}\n");
-    let image = "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 1\nORIGIN 10 20 30\nSPACING 0.5 1 2\nPOINT_DATA 6\n\
-         SCALARS density unsigned_char 1\nLOOKUP_TABLE default\n";
+    let image = "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 1\nORIGIN 10 20 30\nSPACING 0.5 1 2\n\
+         POINT_DATA 6\nSCALARS density unsigned_char 1\nLOOKUP_TABLE default\n";
     seeds.known("vtk", format!("{}{image}0 1 2 30 4 255\n", head("ASCII")))?;
     seeds.known(
         "vtk",
         [head("BINARY").as_bytes(), image.as_bytes(), &[0, 1, 2, 3, 4, 5]].concat(),
     )?;
     for rest in [
-        "DATASET RECTILINEAR_GRID\nDIMENSIONS 3 2 1\nX_COORDINATES 3 double\n0 1 5\nY_COORDINATES 2 float\n-1 1\n\
-         Z_COORDINATES 1 float\n7\nPOINT_DATA 6\nFIELD FieldData 1\nf 1 6 float\n0 1 2 3 4 5.5\n",
-        "DATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 2 0 0 0 2 0 0 0 2\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n\
-         CELL_DATA 1\nSCALARS c int 1\nLOOKUP_TABLE default\n5\n",
-        "DATASET POLYDATA\nPOINTS 3 float\n0 0 0 2 0 0 0 2 0\nPOLYGONS 1 4\n3 0 1 2\nPOINT_DATA 3\nSCALARS value float\n\
-         LOOKUP_TABLE default\n1 2 3\n",
+        "DATASET RECTILINEAR_GRID\nDIMENSIONS 3 2 1\nX_COORDINATES 3 double\n0 1 5\n\
+         Y_COORDINATES 2 float\n-1 1\nZ_COORDINATES 1 float\n7\nPOINT_DATA 6\nFIELD FieldData 1\n\
+         f 1 6 float\n0 1 2 3 4 5.5\n",
+        "DATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 2 0 0 0 2 0 0 0 2\nCELLS 1 5\n4 0 1 2 3\n\
+         CELL_TYPES 1\n10\nCELL_DATA 1\nSCALARS c int 1\nLOOKUP_TABLE default\n5\n",
+        "DATASET POLYDATA\nPOINTS 3 float\n0 0 0 2 0 0 0 2 0\nPOLYGONS 1 4\n3 0 1 2\nPOINT_DATA 3\n\
+         SCALARS value float\nLOOKUP_TABLE default\n1 2 3\n",
     ] {
         seeds.known("vtk", format!("{}{rest}", head("ASCII")))?;
     }
@@ -597,14 +632,17 @@ fn in_bricks(seeds: &mut Seeds) -> Result<()> {
 fn transfer(seeds: &mut Seeds) -> Result<()> {
     for text in [
         r#"{"color": [[0, 1, 0.5, 0], [1, 0, 0, 1]], "opacity": [[0, 0], [1, 0.5], [1, 1]]}"#,
-        r#"{"color": [[-1e3, 1, 1, 1]], "opacity": [[5, 0.1]], "unit": 2.5, "shade": {"ambient": 0.2, "diffuse": 0.7, "specular": 0.3, "power": 10}, "gradient": [[0, 0], [3, 1]], "isosurfaces": [{"value": 80, "color": [1, 1, 1], "opacity": 1}]}"#,
+        "{\"color\": [[-1e3, 1, 1, 1]], \"opacity\": [[5, 0.1]], \"unit\": 2.5, \"shade\": \
+         {\"ambient\": 0.2, \"diffuse\": 0.7, \"specular\": 0.3, \"power\": 10}, \"gradient\": \
+         [[0, 0], [3, 1]], \"isosurfaces\": [{\"value\": 80, \"color\": [1, 1, 1], \"opacity\": \
+         1}]}",
     ] {
         seeds.put("transfer", text)?;
     }
     Ok(())
 }
 
-/// Bytes that are taken for models whatever they are: the fuzzer finds the rest.
+/// Random bytes, which the target decodes as a model. The fuzzer finds the rest.
 fn models(seeds: &mut Seeds) -> Result<()> {
     let mut state = 1u32;
     for length in [40, 200, 600] {
