@@ -174,8 +174,8 @@ pub(crate) fn nest(block: &mut Block, heights: &[u32], outer: Sphere) {
         }
         if !outer.holds(&own) {
             descendants(nodes, index, levels, &mut around);
-            // Descendants that reach beyond the outer sphere are replaced by their children. Leaves
-            // never reach beyond it.
+            // While descendants reach beyond the outer sphere, go one level deeper. Leaves never
+            // reach beyond it.
             while levels < heights[index] && Sphere::reach(outer.center, &around) > outer.radius {
                 levels += 1;
                 descendants(nodes, index, levels, &mut around);

@@ -79,7 +79,7 @@ impl Findings {
 /// - The footprint of a leaf lies in its sphere.
 /// - Children come after their parents, in order.
 /// - Blocks replace portals, which bound their roots.
-/// - The box contains all footprints.
+/// - The box is the one around all footprints.
 /// - All values can be drawn.
 ///
 /// Bounds may be off by the rounding of 32-bit numbers: 10⁻⁶ of a radius or a cosine, 10⁻³ of a

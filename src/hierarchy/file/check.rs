@@ -1,4 +1,4 @@
-//! Looking for damage.
+//! Checks a file for damage.
 
 use super::{
     directory::{NO_PORTAL, PageEntry},
@@ -17,7 +17,7 @@ use crate::{
 };
 use std::path::Path;
 
-/// What [`check`](check()) found.
+/// The result of [`check`](check()).
 #[derive(Debug, Clone, Default)]
 pub struct Report {
     /// Empty for a sound file.
@@ -30,10 +30,10 @@ impl Report {
     }
 }
 
-/// Checks a file: header, directory, every checksum and the hash, then every promise of the tree
+/// Checks a file: header, directory, every checksum and the hash, then every invariant of the tree
 /// ([`validate`](crate::hierarchy::validate())) block by block. One block is in memory at a time.
 ///
-/// Nothing is an error: a file that cannot be opened is a finding.
+/// This never fails: a file that cannot be opened is a finding.
 pub fn check(path: &Path, limits: &Limits) -> Report {
     let mut findings = Findings::default();
     match Hierarchy::open(path, limits) {
@@ -44,7 +44,7 @@ pub fn check(path: &Path, limits: &Limits) -> Report {
 }
 
 impl Hierarchy {
-    /// As [`check`](check()), of a file that is open already, or of its bytes. Of a tree in memory see
+    /// The same as [`check`](check()), for a file or bytes already opened. For a tree in memory see
     /// [`validate`](crate::hierarchy::validate()).
     pub fn check(&self) -> Report {
         let mut findings = Findings::default();
@@ -56,7 +56,6 @@ impl Hierarchy {
 fn contents(hierarchy: &Hierarchy, findings: &mut Findings) {
     let bytes = hierarchy.bytes();
     if let Some(start) = hash_start(bytes) {
-        // Threads help where there are many bytes.
         let found = blake3::hash(&bytes[..start]);
         if bytes[start..] != *found.as_bytes() {
             let message = "the hash of the whole file does not fit";
@@ -114,7 +113,7 @@ fn contents(hierarchy: &Hierarchy, findings: &mut Findings) {
     }
 }
 
-/// Checks what the directory tells of the pages of a block.
+/// Checks the directory's entries for the pages of a block.
 fn check_entries(
     first: usize,
     stated: &[PageEntry],
