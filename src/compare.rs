@@ -40,7 +40,7 @@ pub fn compare(a: &[u8], b: &[u8], size: [u32; 2]) -> Result<Comparison> {
         if found as u128 != bytes {
             let [width, height] = size;
             return Err(Error::Argument(format!(
-                "the {name} picture has {found} bytes where {width}x{height} pixels take {bytes}"
+                "the {name} picture has {found} bytes, but {width}x{height} pixels need {bytes}"
             )));
         }
     }
@@ -100,7 +100,7 @@ fn compare_pixels(
     let count = width.saturating_mul(height);
     if count == 0 {
         return Err(Error::Argument(format!(
-            "pictures of {width}x{height} pixels have none to compare"
+            "pictures of {width}x{height} pixels have no pixels to compare"
         )));
     }
     let channels = if (0..count).all(|at| a(at)[3] == 1.0 && b(at)[3] == 1.0) { 3 } else { 4 };
@@ -234,8 +234,8 @@ mod tests {
 
     #[test]
     fn similarity_agrees_with_an_independent_implementation() {
-        // The expected values come from a direct evaluation of Wang et al.'s formula with NumPy (2D windows, no
-        // separation), rounded to 10 digits.
+        // The expected values come from a direct evaluation of Wang et al.'s formula with NumPy (2D
+        // windows, no separation), rounded to 10 digits.
         let size = [24usize, 17];
         let a = texture(size, |x, y| ((x * x * 7 + y * 29 + x * y * 3) % 251) as u8);
         let b = texture(size, |x, y| {

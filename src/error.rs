@@ -34,7 +34,7 @@ pub enum Error {
 
     /// The operating system refused memory. It was requested before the work began, so nothing is
     /// half done.
-    #[error("{what} needs {bytes} bytes of memory, which the system does not give")]
+    #[error("{what} needs {bytes} bytes of memory, which the system refused")]
     Memory { what: String, bytes: u64 },
 
     /// The scene contains nothing visible.

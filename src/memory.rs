@@ -25,7 +25,7 @@ pub(crate) fn check(what: &str, bytes: u64) -> std::result::Result<(), String> {
     let most = most().unwrap_or(u64::MAX).min(isize::MAX as u64);
     if bytes > most {
         return Err(format!(
-            "{what} takes {bytes} bytes of memory, more than the {most} that may be taken here"
+            "{what} takes {bytes} bytes of memory, more than the {most} that a process may use"
         ));
     }
     Ok(())

@@ -176,8 +176,9 @@ impl SplatSet {
         let (step, size) = (farthest * f64::from(f32::EPSILON), sizes / self.splats.len() as f64);
         if step > 0.25 * size {
             return Err(Error::Argument(format!(
-                "splats lie up to {farthest:.0} from the first input, where 32 bits hold places in steps of {step:.3}, but \
-                 their deviation is {size:.3} in the mean; convert inputs that lie so far apart to files of their own"
+                "splats are up to {farthest:.0} from the first input, where 32-bit coordinates \
+                 have steps of {step:.3}, but their mean deviation is {size:.3}; convert inputs that \
+                 are this far apart to separate files"
             )));
         }
         Ok(())
@@ -221,7 +222,7 @@ mod tests {
             set.splats.iter().map(|s| set.origin.x + f64::from(s.center[0])).collect();
         assert!((places[0] - 1.0).abs() < 1e-4 && (places[1] - 1.25).abs() < 1e-4, "{places:?}");
         let error = set.move_origin(DVec3::new(4e6, 0.0, 0.0)).unwrap_err().to_string();
-        assert!(error.contains("in steps of 0.477"), "{error}");
+        assert!(error.contains("have steps of 0.477"), "{error}");
         let (before, nowhere) = (set.origin, DVec3::new(0.0, f64::NAN, 0.0));
         let error = set.move_origin(nowhere).unwrap_err().to_string();
         assert!(error.contains("is not finite") && set.origin == before, "{error}");

@@ -37,7 +37,7 @@ impl AtomicFile {
         if wanted.metadata().is_ok_and(|found| !found.is_file()) {
             return Err(fail(io::Error::new(
                 io::ErrorKind::InvalidInput,
-                "there is something of that name that is no file",
+                "something of this name exists that is not a regular file",
             )));
         }
         let target = target(wanted).map_err(fail)?;

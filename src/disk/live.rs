@@ -39,7 +39,7 @@ pub struct Abandoned {
 
 /// Removes all files in progress, for a process that is about to end without unwinding. A Ctrl-C
 /// handler calls this and then exits while it still holds the result.
-#[must_use = "files that are dropped while the process ends must not come up again"]
+#[must_use = "dropping this lets other threads create files again while the process ends"]
 pub fn abandon() -> Abandoned {
     let mut held = live();
     for path in std::mem::take(&mut *held).into_values() {
@@ -97,7 +97,10 @@ impl Part {
                 Err(e) => return Err(e),
             }
         }
-        Err(io::Error::new(io::ErrorKind::AlreadyExists, format!("{MOST} others are writing it")))
+        Err(io::Error::new(
+            io::ErrorKind::AlreadyExists,
+            format!("{MOST} other writers have begun this file"),
+        ))
     }
 
     pub fn file(&self) -> &File {

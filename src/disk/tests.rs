@@ -205,7 +205,7 @@ fn what_is_there_is_left_as_it_is() {
     let folder = Folder::new();
     std::fs::create_dir(folder.path().join("a.png")).unwrap();
     for (name, message) in
-        [("a.png", "that is no file"), ("none/a.png", "a.png: cannot be written")]
+        [("a.png", "that is not a regular file"), ("none/a.png", "a.png: cannot be written")]
     {
         let error = write(&folder.path().join(name), b"new").unwrap_err();
         assert!(

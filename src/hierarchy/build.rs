@@ -252,7 +252,7 @@ pub fn check_splats(set: &SplatSet) -> Result<()> {
     }
     if u32::try_from(set.splats.len()).is_err() {
         return Err(Error::Argument(
-            "a set holds more splats than 32 bits can name; build it in blocks".into(),
+            "a set contains more splats than 32 bits can number; build it in blocks".into(),
         ));
     }
     if !set.origin.is_finite() {
@@ -269,10 +269,11 @@ pub fn check_splats(set: &SplatSet) -> Result<()> {
     if let Some(index) = set.splats.par_iter().position_first(|splat| !is_sound(splat)) {
         let Splat { center, strength, factor, .. } = set.splats[index];
         let message = format!(
-            "splat {index} at {center:?}, of factor {factor:?} and optical depth {strength}"
+            "splat {index} at {center:?} with factor {factor:?} and optical depth {strength}"
         );
         return Err(Error::Argument(format!(
-            "{message}: places and shapes up to {FARTHEST:e} and optical depths from 0 to {most:e} can be merged"
+            "{message}: only coordinates and shapes up to {FARTHEST:e}, and optical depths from 0 \
+             to {most:e}, can be merged"
         )));
     }
     Ok(())

@@ -76,7 +76,8 @@ pub struct Cut {
     pub(crate) fineness: f32,
     /// Whether nodes that face away are culled.
     pub(crate) culls: bool,
-    /// The picture's four sides: a view-space sphere at c of radius r is outside where n·c + d < −r.
+    /// The picture's four sides. A view-space sphere with centre c and radius r is outside if n·c +
+    /// d < −r.
     pub(crate) sides: [Vec4; 4],
 }
 

@@ -23,7 +23,8 @@ pub enum Severity {
 /// A violated invariant.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finding {
-    /// A name for this kind of finding, the same in every release: `sphere`, `cone`, `size`, `order`, …
+    /// The name of this kind of finding, the same in every release: `sphere`, `cone`, `size`,
+    /// `order`, …
     pub code: &'static str,
     pub severity: Severity,
     /// The place: a block and a node, a page, or the header.
@@ -141,7 +142,7 @@ impl Footprints {
         let needed = leaf.center().distance(center) + reach;
         (needed * (1.0 - ROUNDING) > leaf.radius).then(|| {
             format!(
-                "its footprint ends {needed} from its centre, its sphere has radius {}",
+                "its footprint reaches {needed} from its centre, but its sphere has radius {}",
                 leaf.radius
             )
         })
@@ -160,7 +161,8 @@ impl Footprints {
         if off > most {
             let [low, high, told_low, told_high] = [found.min, found.max, told.min, told.max];
             let message = format!(
-                "footprints lie between {low} and {high}, and it tells of {told_low} and {told_high}"
+                "footprints lie between {low} and {high}, but the box stated is from {told_low} to \
+                 {told_high}"
             );
             findings.push(Finding::error("bounds", place, message));
         }
@@ -187,7 +189,7 @@ pub fn check_block(
         }
         let width = WIDTH * deviation(&node.splat);
         if width * (1.0 - ROUNDING) > node.size {
-            let message = format!("its size is {}, its splat {width} wide", node.size);
+            let message = format!("its size is {}, but its splat is {width} wide", node.size);
             findings.push(Finding::error("size", place(index), message));
         }
         if let (true, Some(footprints)) = (node.is_leaf(), &mut footprints)
@@ -211,7 +213,7 @@ pub fn check_portals(
 ) {
     let mut portal = |message: String| findings.push(Finding::error("portal", "block 0", message));
     if let Some(own) = own_portal {
-        portal(format!("it hangs below node {own}; it is the one that others hang below"));
+        portal(format!("it has the portal {own}, but the block that joins the others has none"));
     }
     if roots.is_empty() {
         return;
@@ -222,16 +224,16 @@ pub fn check_portals(
             portal_of.map(|at| at as usize).filter(|&at| top.get(at).is_some_and(Node::is_leaf));
         match at {
             Some(at) if !taken[at] => taken[at] = true,
-            Some(at) => portal(format!("two blocks hang below node {at}")),
+            Some(at) => portal(format!("two blocks have the portal {at}")),
             None => {
-                portal(format!("block {} hangs below {portal_of:?}, which is no leaf", number + 1))
+                portal(format!("block {} has the portal {portal_of:?}, not a leaf", number + 1))
             }
         }
     }
     for (index, _) in
         top.iter().enumerate().filter(|&(index, node)| node.is_leaf() && !taken[index])
     {
-        portal(format!("no block hangs below node {index}"));
+        portal(format!("no block has the portal {index}"));
     }
     for (number, (portal_of, root)) in roots.iter().enumerate() {
         if let (Some(node), Some(root)) = (portal_of.and_then(|at| top.get(at as usize)), root) {
@@ -293,7 +295,7 @@ pub fn fault_of_box(origin: DVec3, bounds: &Bounds) -> Option<&'static str> {
         && bounds.min.is_finite()
         && bounds.max.is_finite()
         && !bounds.is_empty();
-    (!is_sound).then_some("its origin or its bounds are none")
+    (!is_sound).then_some("its origin or its bounds are not valid")
 }
 
 /// Returns a message if the extent of footprints, in standard deviations, is not valid.
@@ -309,12 +311,13 @@ fn bounds(node: &Node, below: &Node, place: impl Fn() -> String, findings: &mut 
     let (reach, radius) = (reach(center, below), f64::from(node.radius));
     if reach > radius * (1.0 + 1e-6) {
         let message = format!(
-            "its sphere ends {reach} from its parent's centre, whose own has radius {radius}"
+            "its sphere reaches {reach} from its parent's centre, but the parent's sphere has \
+             radius {radius}"
         );
         findings.push(Finding::error("sphere", place(), message));
     }
     if below.size > node.size {
-        let message = format!("its size is {}, its parent's {}", below.size, node.size);
+        let message = format!("its size is {}, but its parent's is {}", below.size, node.size);
         findings.push(Finding::error("size", place(), message));
     }
     if node.cone > -1.0 {
@@ -324,7 +327,8 @@ fn bounds(node: &Node, below: &Node, place: impl Fn() -> String, findings: &mut 
         let wanted = libm::cos(joint_angle(node, &Node { cone, ..*below }));
         if f64::from(node.cone) > wanted + 1e-6 {
             let message = format!(
-                "its cone needs one of cosine {wanted} around its parent's normal, which has {}",
+                "its cone needs a cosine of at most {wanted} around its parent's normal, but the \
+                 parent's is {}",
                 node.cone
             );
             findings.push(Finding::error("cone", place(), message));

@@ -92,7 +92,7 @@ impl<T: Pod> Bins<T> {
         for &(at, count) in &self.runs[bin as usize] {
             let run = bytemuck::cast_slice_mut(&mut records[next..next + count]);
             let read = file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(run));
-            read.map_err(|e| Error::file(&self.wanted, "read what was put beside", e))?;
+            read.map_err(|e| Error::file(&self.wanted, "read the temporary file beside it", e))?;
             next += count;
         }
         records[next..].copy_from_slice(&self.waiting[bin as usize]);

@@ -185,12 +185,13 @@ impl<'a> Crowd<'a> {
         // The triangles to be subdivided are limited by memory, not by the points in a region.
         if held >= self.most.saturating_mul(MOST_TIMES) && Some(region) != self.long {
             let message = format!(
-                "more than {held} lie within a two-millionth of the way to the farthest ones, more than fit into memory at once"
+                "more than {held} points lie within a two-millionth of the distance to the \
+                 farthest ones, and do not fit in memory together"
             );
             return Err(self
                 .stream
                 .error("points", message)
-                .hint("remove points that are far off, or allow more memory"));
+                .hint("remove points that are far away, or allow more memory"));
         }
         if !self.is_cloud || held < self.most {
             return Ok(true);

@@ -107,7 +107,8 @@ pub(super) fn look_at_long(
     }
     let [count, mib] = [seen.long.len() as u64, need(seen.cut as u64) >> 20];
     let message = format!(
-        "{count} of them have edges longer than {:e}, and are cut into about {} together, which takes about {mib} MiB",
+        "{count} of them have edges longer than {:e}; subdivided together into about {} \
+         triangles, they need about {mib} MiB",
         pieces.length, seen.cut
     );
     let error: Error = stream.error("triangles", message);

@@ -122,7 +122,7 @@ pub fn convert(
         let options = &ExternalOptions { surfels, ..options.clone() };
         let input =
             survey::survey(stream, most, options, watch).map_err(|error| error.in_file(file))?;
-        tracing::info!(file = %file.display(), regions = input.regions(), "cut in regions");
+        tracing::info!(file = %file.display(), regions = input.regions(), "split into regions");
         inputs.push(distribute::distribute(input, [most, options.memory], path, watch)?);
     }
     let Some(first) = inputs.first() else {
@@ -155,7 +155,7 @@ pub fn convert(
         work.input(input, path).map_err(|error| error.in_file(file))?;
     }
     if work.splats == 0 {
-        return Err(Error::NothingToDraw("no point is left, or no triangle has an area".into()));
+        return Err(Error::NothingToDraw("no points are left, or no triangle has an area".into()));
     }
     done.splats = work.splats;
     watch(Stage::Writing, 0, 0);

@@ -30,7 +30,7 @@ pub fn is_solid(
     let fits = |more: u64| of_places + more <= (memory / 2).max(LEAST_MEMORY);
     let give_up = || {
         tracing::info!(
-            "too little memory to tell whether all parts are turned outward: backs will be drawn"
+            "too little memory to check whether all parts face outward: back faces will be drawn"
         );
         Ok(false)
     };

@@ -102,14 +102,14 @@ fn contents(hierarchy: &Hierarchy, findings: &mut Findings) {
     let header = hierarchy.header();
     let is_whole = roots.iter().all(|(_, root)| root.is_some());
     if is_whole && leaves != header.leaves {
-        let message = format!("it tells of {} leaves, and {leaves} are there", header.leaves);
+        let message = format!("it states {} leaves, but there are {leaves}", header.leaves);
         findings.push(Finding::error("counts", "header", message));
     }
     if is_whole {
         footprints.check_box(header.origin, &header.bounds, "header", findings);
     }
     if is_whole && has_normals != header.has_normals {
-        findings.push(Finding::error("attributes", "header", "what it tells of normals is not so"));
+        findings.push(Finding::error("attributes", "header", "its flag for normals is wrong"));
     }
 }
 
@@ -128,7 +128,7 @@ fn check_entries(
     let runs = pages(nodes);
     let around = arounds(nodes, &runs);
     if runs.len() != stated.len() {
-        let message = format!("its nodes fill {} pages, and it has {}", runs.len(), stated.len());
+        let message = format!("its nodes fill {} pages, but it has {}", runs.len(), stated.len());
         findings.push(Finding::error("directory", format!("page {first}"), message));
         return;
     }
@@ -146,8 +146,9 @@ fn check_entries(
             largest_size: entry.largest_parent_size,
         };
         if entry.nodes as usize != runs[index].nodes.len() || found != wanted {
-            let message =
-                format!("the parents of its nodes are in {wanted:?}, and it tells of {found:?}");
+            let message = format!(
+                "the parents of its nodes have the bounds {wanted:?}, but it states {found:?}"
+            );
             findings.push(Finding::error("directory", format!("page {}", first + index), message));
         }
     }

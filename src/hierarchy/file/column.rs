@@ -152,7 +152,7 @@ impl<'a> Planes<'a> {
             let length = cursor.u32()? as usize;
             cursor.take(length)
         };
-        let (heads, classes) = part().zip(part()).ok_or("it ends within its columns")?;
+        let (heads, classes) = part().zip(part()).ok_or("it ends inside its columns")?;
         let classes = Decoder::new(classes).ok_or("it has no classes")?;
         let bits = BitReader::new(cursor.take(cursor.remaining()).unwrap_or(&[]));
         Ok(Self { heads: Cursor::new(heads), classes, bits, slots: Box::new(Slots::new()) })
@@ -162,11 +162,14 @@ impl<'a> Planes<'a> {
     pub fn column(&mut self, count: usize) -> Result<Vec<i32>, String> {
         let head = self.heads.u8().ok_or("it ends before its last column")?;
         if head == 0 {
-            return Ok(vec![self.constant().ok_or("a column's number is none")?; count]);
+            return Ok(vec![
+                self.constant().ok_or("the value of a constant column is not valid")?;
+                count
+            ]);
         }
         let length = usize::from(head & !DIFFERENCES);
-        let table =
-            Table::read(length, &mut self.bits).ok_or("the frequencies of a column are none")?;
+        let table = Table::read(length, &mut self.bits)
+            .ok_or("the frequencies of a column are not valid")?;
         let mut values = vec![0; count];
         let mut places = values.iter_mut();
         let bits = &mut self.bits;
@@ -179,7 +182,7 @@ impl<'a> Planes<'a> {
             *places.next()? = value;
             Some(())
         };
-        self.classes.take(count, &table, &mut self.slots, each).ok_or("it ends within a column")?;
+        self.classes.take(count, &table, &mut self.slots, each).ok_or("it ends inside a column")?;
         Ok(values)
     }
 
@@ -202,7 +205,7 @@ impl<'a> Planes<'a> {
         if self.heads.remaining() == 0 && self.classes.is_at_end() && self.bits.is_at_end() {
             Ok(())
         } else {
-            Err("its columns do not end where it does".into())
+            Err("its columns do not end where the page does".into())
         }
     }
 }

@@ -285,7 +285,10 @@ impl Directory {
                 block.portal < self.blocks[0].nodes
             };
             if !is_portal {
-                return Err(format!("block {number} hangs below node {} of block 0", block.portal));
+                return Err(format!(
+                    "the portal of block {number} is node {}, which block 0 does not have",
+                    block.portal
+                ));
             }
             portals.push(block.portal);
             let pages = pages.start as usize..pages.end as usize;
@@ -302,13 +305,13 @@ impl Directory {
         }
         if nodes != stored.header.nodes {
             return Err(format!(
-                "its blocks hold {nodes} nodes and the header tells of {}",
+                "its blocks contain {nodes} nodes, but the header states {}",
                 stored.header.nodes
             ));
         }
         portals.sort_unstable();
         if joined && portals.windows(2).any(|pair| pair[0] == pair[1]) {
-            return Err("two blocks hang below the same node".into());
+            return Err("two blocks have the same portal".into());
         }
         let mut places: Vec<Place> = self.pages.iter().map(|page| page.place).collect();
         places.sort_unstable_by_key(|place| place.offset);
@@ -333,7 +336,7 @@ fn number_nodes(block: u32, nodes: u32, pages: &mut [PageEntry]) -> Result<(), (
     for (index, page) in pages.iter_mut().enumerate() {
         let fail = |message: String| Err((index, message));
         if !(1..=PAGE_NODES as u32).contains(&page.nodes) {
-            return fail(format!("it claims {} nodes; 1 to {PAGE_NODES} are possible", page.nodes));
+            return fail(format!("it states {} nodes; 1 to {PAGE_NODES} are possible", page.nodes));
         }
         // Children come after their parents, and every node except the root is a child.
         let first = index == 0;
@@ -349,13 +352,13 @@ fn number_nodes(block: u32, nodes: u32, pages: &mut [PageEntry]) -> Result<(), (
         if !around.iter().all(|v| v.is_finite())
             || !(endless || sound(page.parents_radius) && sound(page.largest_parent_size))
         {
-            return fail("the sphere of its parents is none".into());
+            return fail("the sphere around its parents is not valid".into());
         }
         (page.block, page.first_node) = (block, next as u32);
         next_child = page.first_child;
         next += u64::from(page.nodes);
         if next > u64::from(nodes) {
-            return fail(format!("it ends behind the {nodes} nodes of its block"));
+            return fail(format!("it ends after the {nodes} nodes of its block"));
         }
     }
     if next != u64::from(nodes) {

@@ -136,7 +136,7 @@ impl Stored {
             1 => Some(UpAxis::X),
             2 => Some(UpAxis::Y),
             3 => Some(UpAxis::Z),
-            _ => return Some(Err(Refusal::Damaged("it names an axis that there is not"))),
+            _ => return Some(Err(Refusal::Damaged("its up axis is unknown"))),
         };
         let (Ok(unit), Ok(source)) = (copy::text(&texts[..unit]), copy::text(&texts[unit..]))
         else {

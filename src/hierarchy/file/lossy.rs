@@ -237,7 +237,7 @@ pub fn decode(
 ) -> Result<Vec<Node>, String> {
     let mut cursor = Cursor::new(bytes);
     let mut begin = || Some((cursor.f32()?, cursor.f32s()?, cursor.u32()? as i32));
-    let (strength, center, fine) = begin().ok_or("it ends within its beginning")?;
+    let (strength, center, fine) = begin().ok_or("it ends inside its first fields")?;
     let mut planes = Planes::new(cursor.take(cursor.remaining()).unwrap_or(&[]))?;
     let children: Option<Vec<u8>> = planes.column(count)?.into_iter().map(children).collect();
     let children = children.ok_or("a node has too many children")?;
@@ -254,7 +254,7 @@ pub fn decode(
     let mut nodes = Vec::with_capacity(count);
     for children in children {
         let is_leaf = children == 0;
-        let fail = || format!("node {} has a code that tells of none", nodes.len());
+        let fail = || format!("the code of node {} is not valid", nodes.len());
         let group = usize::from(!is_leaf);
         let code = groups[group].take(&mut taken[group]).ok_or_else(fail)?;
         let (splat, shape) = code.decode(is_leaf, &mut before).ok_or_else(fail)?;
@@ -277,7 +277,7 @@ pub fn decode(
             (node.first_child, node.children) = (next, u32::from(children));
             next = next
                 .checked_add(u32::from(children))
-                .ok_or("it has more children than can be numbered")?;
+                .ok_or("it has more children than 32 bits can number")?;
         }
         nodes.push(node);
     }

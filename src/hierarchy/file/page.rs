@@ -210,8 +210,9 @@ pub fn decode(
                 node.first_child
             ));
         }
-        next =
-            next.checked_add(node.children).ok_or("it has more children than can be numbered")?;
+        next = next
+            .checked_add(node.children)
+            .ok_or("it has more children than 32 bits can number")?;
     }
     Ok(nodes)
 }

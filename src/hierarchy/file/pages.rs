@@ -12,12 +12,12 @@ pub fn in_order(nodes: &[Node]) -> Result<(), String> {
         return Err("there are no nodes".into());
     }
     if u32::try_from(nodes.len()).is_err() {
-        return Err(format!("there are {} nodes, more than 32 bits can name", nodes.len()));
+        return Err(format!("there are {} nodes, more than 32 bits can number", nodes.len()));
     }
     let mut next = 1;
     for (index, node) in nodes.iter().enumerate() {
         if next <= index {
-            return Err(format!("node {index} is nobody's child"));
+            return Err(format!("node {index} has no parent"));
         }
         if node.children as usize > MOST_CHILDREN {
             return Err(format!(
@@ -35,7 +35,10 @@ pub fn in_order(nodes: &[Node]) -> Result<(), String> {
         next += node.children as usize;
     }
     if next != nodes.len() {
-        return Err(format!("{} nodes are there, and {next} are pointed to", nodes.len()));
+        return Err(format!(
+            "there are {} nodes, but the nodes with children refer to {next}",
+            nodes.len()
+        ));
     }
     Ok(())
 }

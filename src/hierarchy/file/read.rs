@@ -172,10 +172,8 @@ impl Hierarchy {
         sorted.sort_unstable();
         sorted.dedup();
         if tree.is_joined() && (sorted.len() != leaves || portals.len() != leaves) {
-            let message = format!(
-                "{} blocks hang below the {leaves} portals of the hierarchy",
-                portals.len()
-            );
+            let message =
+                format!("the hierarchy has {} blocks below {leaves} portals", portals.len());
             return Err(Error::Argument(message));
         }
         directory.link();
@@ -409,7 +407,7 @@ impl Hierarchy {
         let counted: u64 = nodes.iter().map(|node| u64::from(node.children)).sum();
         if counted != u64::from(children.end - children.start) {
             let message = format!(
-                "its nodes have {counted} children where the directory tells of {}",
+                "its nodes have {counted} children, but the directory states {}",
                 children.len()
             );
             return Err(damaged(&self.path, place(), message));
@@ -447,7 +445,7 @@ impl Hierarchy {
                 damaged(
                     &self.path,
                     format!("page {page}"),
-                    format!("no block hangs below the portal at node {number}"),
+                    format!("no block has the portal at node {number}"),
                 )
             })?;
             Ok(self.directory.blocks[*block as usize].first_page)
@@ -588,8 +586,10 @@ pub(super) fn refused(path: &Path, refusal: Refusal) -> Error {
 }
 
 pub(super) fn incomplete(path: &Path, place: impl Into<String>) -> Error {
-    Error::input(path, place, "the file is incomplete: it ends before its last page")
-        .hint("copy or convert it again; what is there can be opened as a prefix once header and directory are whole")
+    Error::input(path, place, "the file is incomplete: it ends before its last page").hint(
+        "copy or convert it again; once the header and the directory are complete, the \
+             available part can be opened as a prefix",
+    )
 }
 
 pub(super) fn damaged(path: &Path, place: impl Into<String>, message: impl Into<String>) -> Error {

@@ -148,7 +148,7 @@ fn a_file_is_written_whole_and_is_sound() {
     assert_eq!(
         std::fs::read_dir(folder.path()).unwrap().count(),
         1,
-        "nothing is left of what was not finished"
+        "an unfinished file leaves nothing"
     );
 }
 
@@ -170,7 +170,7 @@ fn input_error(result: crate::Result<impl Sized>, what: &str) {
             );
         }
         Err(other) => panic!("{what}: {other}"),
-        Ok(_) => panic!("{what} was not told"),
+        Ok(_) => panic!("{what} was not reported"),
     }
 }
 
@@ -547,8 +547,8 @@ fn numbers_that_cannot_be_drawn_are_refused() {
     }
     refused(&|tree| tree.extent = 8.1, "its extent is 8.1; it must lie in 0 … 8");
     refused(&|tree| tree.extent = f32::NAN, "its extent is NaN; it must lie in 0 … 8");
-    refused(&|tree| tree.origin.y = f64::INFINITY, "its origin or its bounds are none");
-    refused(&|tree| tree.bounds.max.x = f64::NAN, "its origin or its bounds are none");
+    refused(&|tree| tree.origin.y = f64::INFINITY, "its origin or its bounds are not valid");
+    refused(&|tree| tree.bounds.max.x = f64::NAN, "its origin or its bounds are not valid");
 }
 
 /// If a splat can be drawn, so can its quantised value.

@@ -169,7 +169,7 @@ impl Writer {
             (None, 1) => std::mem::take(&mut self.directory),
             (None, count) => {
                 return Err(Error::Argument(format!(
-                    "nothing joins the {count} blocks of the hierarchy"
+                    "the {count} blocks of the hierarchy need a block that joins them"
                 )));
             }
             (Some(top), _) => self.join(top)?,
@@ -228,7 +228,9 @@ impl Writer {
             if !nodes.get(portal).is_some_and(Node::is_leaf)
                 || std::mem::replace(&mut is_taken[portal], true)
             {
-                return Err(refuse(format!("node {portal} is no portal, or that of two blocks")));
+                return Err(refuse(format!(
+                    "node {portal} is not a leaf, or is the portal of two blocks"
+                )));
             }
             nodes[portal] = Node { first_child: 0, children: 0, ..*root };
         }
