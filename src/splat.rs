@@ -63,8 +63,8 @@ pub const NO_NORMAL: u32 = 0x8000_8000;
 pub const FOOTPRINT_BLUR: f64 = 0.35;
 
 /// When a radiance splat with a normal is widened, it moves back along the normal by this many of
-/// the added standard deviations. Where opaque splats overlap, half of the light is absorbed at
-/// about this distance from their centres, so the shift keeps silhouettes in place.
+/// the added standard deviations. Where opaque splats overlap, half of the light is absorbed about
+/// this many standard deviations from their centres, so the shift keeps silhouettes in place.
 pub const STEP_BACK: f64 = 2.4;
 
 /// What the splats of a set carry.
@@ -177,8 +177,8 @@ impl SplatSet {
         if step > 0.25 * size {
             return Err(Error::Argument(format!(
                 "splats are up to {farthest:.0} from the first input, where 32-bit coordinates \
-                 have steps of {step:.3}, but their mean deviation is {size:.3}; convert inputs that \
-                 are this far apart to separate files"
+                 have steps of {step:.3}, but their mean deviation is {size:.3}; convert inputs \
+                 this far apart to separate files"
             )));
         }
         Ok(())
