@@ -119,8 +119,8 @@ impl Picture {
         }
     }
 
-    /// Encodes the depths as a 16-bit grey PNG: 65535 at the nearest depth of the picture, falling
-    /// linearly to 1 at the farthest, and 0 where there is no depth.
+    /// Encodes the depths as a 16-bit grey PNG. The nearest depth of the picture is 65535, falling
+    /// linearly to 1 at the farthest. Pixels without a depth are 0.
     ///
     /// # Errors
     /// [`Error::Argument`] if the format cannot store the picture, or if the picture does not have

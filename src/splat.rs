@@ -150,9 +150,9 @@ impl SplatSet {
     /// Changes the origin of the set; all splats stay where they are in the world.
     ///
     /// # Errors
-    /// [`Error::Argument`] if the origin is not finite, or if 32-bit coordinates around it are
-    /// coarser than a quarter of the splats' mean deviation, so that neighbouring splats would
-    /// coincide.
+    /// [`Error::Argument`] if the origin is not finite, or if 32-bit coordinates around it are too
+    /// coarse. Their steps may be at most a quarter of the splats' mean deviation, or neighbouring
+    /// splats would coincide.
     pub fn move_origin(&mut self, origin: DVec3) -> Result<()> {
         if !origin.is_finite() {
             return Err(Error::Argument(format!(

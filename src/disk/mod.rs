@@ -1,5 +1,5 @@
-//! How results are written to disk: files that appear whole or not at all ([`AtomicFile`]), and
-//! scratch files for data that does not fit in memory, which leave nothing behind (`Scratch`).
+//! How results are written to disk. Files appear whole or not at all ([`AtomicFile`]). Scratch
+//! files for data that does not fit in memory leave nothing behind (`Scratch`).
 //!
 //! Whatever ends a process, a file under the requested name is the old one or the new one. If the
 //! process could clean up (after an error, a panic, or a signal that it catches and answers with

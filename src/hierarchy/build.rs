@@ -231,8 +231,8 @@ const FARTHEST: f32 = 1e9;
 /// Checks that a hierarchy can be built of the splats.
 ///
 /// # Errors
-/// [`Error::Argument`] if values are not finite or too large to be added up in 32 bits, if an
-/// optical depth is above [`MOST_OPTICAL_DEPTH`](Splat::MOST_OPTICAL_DEPTH), and for samples;
+/// [`Error::Argument`] if values are not finite, or too large to be added up in 32 bits; if an
+/// optical depth is above [`MOST_OPTICAL_DEPTH`](Splat::MOST_OPTICAL_DEPTH); and for samples.
 /// [`Error::NothingToDraw`] if there are no splats.
 pub fn check_splats(set: &SplatSet) -> Result<()> {
     if set.payload != Payload::Radiance {

@@ -175,8 +175,8 @@ impl Cut {
 }
 
 /// Returns whether all normals of a cone face away. `along` is the cosine between the cone's axis
-/// and the view direction, `cone` the cosine of its half-angle, and `near` the sine of the angular
-/// radius of the node's sphere.
+/// and the view direction. `cone` is the cosine of its half-angle. `near` is the sine of the
+/// angular radius of the node's sphere.
 fn faces_away(along: f32, cone: f32, near: f32) -> bool {
     let (sin_margin, cos_margin) = cone_margin();
     if along <= 0.0 || near >= 1.0 {

@@ -45,8 +45,8 @@ enum Fewer {
 }
 
 impl Levels {
-    /// Returns `None` for sets that are drawn as they are: they are small, no tree can be built of
-    /// them, or a tree would take half of the available memory.
+    /// Returns `None` for sets that are drawn as they are. They are small, or no tree can be built
+    /// of them, or a tree would take half of the available memory.
     pub fn new(set: &Arc<SplatSet>) -> Option<Self> {
         let count = set.splats.len();
         let bytes = 2 * (count * size_of::<Node>()) as u64;

@@ -1,8 +1,8 @@
 //! Merged splats: one splat that stands for several, seen from afar.
 //!
-//! A merged splat keeps the mass of its splats (optical depth times area), their mean position,
-//! colour and normal, and the second moments of their mass about the mean. If one of the splats
-//! were chosen to stand for all, surfaces would thin out from level to level.
+//! A merged splat keeps the mass of its splats (optical depth times area) and their mean position,
+//! colour and normal. It also keeps the second moments of their mass about the mean. If one of the
+//! splats were chosen to stand for all, surfaces would thin out from level to level.
 
 use super::Node;
 use crate::splat::{Splat, decode_normal, encode_normal};
@@ -67,9 +67,9 @@ fn factor(m: &Moments) -> [f32; 6] {
 pub(super) const THIRD: [f32; 6] =
     [0.500_002_7, 0.408_164, -0.054_907_8, 0.016_816_5, -0.004_783_6, 0.000_734_3];
 
-/// Returns the mean variance along the axes, and the matrix divided by it. 32 bits cannot hold
-/// products of the variances themselves for splats smaller than 1e-10 or larger than 1e9. All zero
-/// if there is no variance.
+/// Returns the mean variance along the axes, and the matrix divided by it; all zero if there is no
+/// variance. Products of the variances themselves are lost in 32 bits for splats smaller than 1e-10
+/// or larger than 1e9.
 fn by_mean([xx, xy, xz, yy, yz, zz]: &Moments) -> (f32, Moments) {
     let mean = ((xx + yy + zz) / 3.0).max(0.0);
     let per_mean = if mean > 0.0 { 1.0 / mean } else { 0.0 };

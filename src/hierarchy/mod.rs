@@ -1,6 +1,6 @@
-//! Hierarchies of splats. Each node is one splat that stands for those below it, so that a picture
-//! needs only as many splats as its pixels can show (Rusinkiewicz & Levoy 2000). docs/hierarchy.md
-//! explains how a scan becomes a tree, and a tree a picture.
+//! Hierarchies of splats. Each node is one splat that stands for those below it. So a picture needs
+//! only as many splats as its pixels can show (Rusinkiewicz & Levoy 2000). The page
+//! docs/hierarchy.md explains how a scan becomes a tree, and a tree a picture.
 
 mod build;
 mod cluster;

@@ -30,9 +30,9 @@ const FITTED_HEIGHT: u32 = 3;
 /// How many levels below the children these descendants are.
 const LEVELS_BELOW: u32 = 1;
 /// If leaves lie on the surface of a sphere, any sphere inside the smallest one around all leaves
-/// that contains some of them is nearly as large. The root of a block may therefore reach `ROOM`
-/// times as far as the sphere around all blocks, if it would otherwise be more than `MOST_WIDER`
-/// times as wide as necessary.
+/// that contains some of them is nearly as large. If that would make the root of a block more than
+/// `MOST_WIDER` times as wide as necessary, it may reach farther: `ROOM` times as far as the sphere
+/// around all blocks.
 const ROOM: f64 = 1.04;
 const MOST_WIDER: f64 = 1.5;
 

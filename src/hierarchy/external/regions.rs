@@ -233,8 +233,8 @@ impl Larger {
         Self((0..levels).map(count).collect())
     }
 
-    /// Returns the smallest cell, this one or one around it, that contains enough points to
-    /// estimate their spacing: the key bits below it, and its number of points.
+    /// Returns the smallest cell, this one or one around it, with enough points to estimate their
+    /// spacing. The result is its number of key bits below, and its number of points.
     fn enough(&self, cell: &Cell) -> (u32, u64) {
         let around = self.0.iter().enumerate().rev().map(|(level, counts)| {
             let below = 3 * (FINE_BITS - level as u32);

@@ -1,7 +1,7 @@
 //! Splats as integers: the resolution of each quantity, encoding and decoding.
 //!
-//! Decoding uses only operations that every machine rounds alike (+ − × ÷ √ in 64 bits) and tables
-//! computed with `libm`, so a file gives the same nodes everywhere.
+//! Decoding uses only operations that every machine rounds alike (+ − × ÷ √ in 64 bits), and tables
+//! computed with `libm`. So a file gives the same nodes everywhere.
 
 use super::direction::{self, Directions};
 use crate::{
@@ -273,7 +273,7 @@ fn turn([x, y, z]: [DVec3; 3]) -> [i32; 4] {
 struct Course {
     axes: [DVec3; 3],
     start: f64,
-    /// The slope of the surface along the first two axes, if it is smooth: the chord of a parabola
+    /// The slope of the surface along the first two axes, if it is smooth. The chord of a parabola
     /// is perpendicular to the mean of the normals at its ends.
     fall: [f64; 2],
 }

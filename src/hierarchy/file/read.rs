@@ -134,8 +134,8 @@ impl Hierarchy {
     ///
     /// # Errors
     /// [`Error::Argument`] if the nodes of a block are not in the order that [`Block`] requires, if
-    /// blocks do not match portals, and for values that cannot be drawn: those that
-    /// [`validate`](crate::hierarchy::validate()) finds in a single node.
+    /// blocks do not match portals, or if values cannot be drawn. Those are the values that
+    /// [`validate`](crate::hierarchy::validate()) rejects in a single node.
     pub fn from_tree(tree: Tree) -> Result<Self> {
         let mut directory = Directory::default();
         let mut portals = Vec::new();

@@ -146,9 +146,9 @@ impl Writer {
     /// grow as necessary.
     ///
     /// # Errors
-    /// [`Error::Argument`] if `top` does not fit the blocks that were written or has values that
-    /// cannot be drawn, and if the origin or the bounds are not finite; [`Error::Output`] if the
-    /// file cannot be written.
+    /// [`Error::Argument`] if `top` does not fit the blocks that were written, if it has values
+    /// that cannot be drawn, or if the origin or the bounds are not finite. [`Error::Output`] if
+    /// the file cannot be written.
     pub fn finish(self, top: Option<Top>, whole: &Whole) -> Result<()> {
         let path = self.path.clone();
         let target = || path.as_deref().map_or(Ok(Target::Memory(Vec::new())), Target::at);
