@@ -213,7 +213,7 @@ pub fn check_portals(
 ) {
     let mut portal = |message: String| findings.push(Finding::error("portal", "block 0", message));
     if let Some(own) = own_portal {
-        portal(format!("it has the portal {own}, but the block that joins the others has none"));
+        portal(format!("it has the portal {own}; the block that joins others must have none"));
     }
     if roots.is_empty() {
         return;
