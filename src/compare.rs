@@ -1,7 +1,8 @@
-//! How much two pictures differ.
+//! Measures how much two pictures differ.
 //!
-//! Colours are compared multiplied by their opacity, so what cannot be seen does not count; opacity itself is compared as
-//! a fourth channel unless both pictures are opaque everywhere. A value that is not a number is infinitely wrong.
+//! Colours are compared premultiplied by opacity, so invisible colours do not count. Opacity is
+//! compared as a fourth channel unless both pictures are opaque everywhere. A NaN counts as an
+//! infinite difference.
 
 use crate::{
     Error, Result,
@@ -12,34 +13,35 @@ use crate::{
 };
 use std::{collections::VecDeque, path::Path, sync::Arc};
 
-/// What [`compare`] and its like find.
+/// The result of [`compare`] and its variants.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Comparison {
-    /// Peak signal-to-noise ratio in decibels, 10·log₁₀(1 / mean squared difference) for channels of 0 … 1; none where the
-    /// pictures are identical.
+    /// Peak signal-to-noise ratio in decibels, 10·log₁₀(1 / mean squared difference) for channels
+    /// of 0 … 1; `None` if the pictures are identical.
     pub psnr: Option<f64>,
-    /// Structural similarity of the pictures' brightness, at most 1 (Wang, Bovik, Sheikh & Simoncelli 2004): the mean over
-    /// all Gaussian windows of 11 × 11 pixels with σ = 1.5 that lie inside the picture, K₁ = 0.01 and K₂ = 0.03. Brightness
-    /// is 0.299 red + 0.587 green + 0.114 blue, over black.
+    /// Structural similarity of the pictures' brightness, at most 1 (Wang, Bovik, Sheikh &
+    /// Simoncelli 2004). It is the mean over all Gaussian windows of 11 × 11 pixels that lie inside
+    /// the picture, with σ = 1.5, K₁ = 0.01 and K₂ = 0.03. Brightness is 0.299 red + 0.587 green +
+    /// 0.114 blue, over black.
     pub ssim: f64,
-    /// The largest difference of any channel, where the channels' range is 0 … 1.
+    /// The largest difference in any channel, for channels of 0 … 1.
     pub max_difference: f64,
-    /// Pixels of which some channel differs by more than half a step of 8 bits.
+    /// The number of pixels in which a channel differs by more than half an 8-bit step.
     pub different_pixels: u64,
 }
 
-/// Compares two pictures of `size` pixels (width, height): rows from the top, red, green, blue and opacity of 8 bits, not
-/// premultiplied.
+/// Compares two pictures of `size` pixels (width, height). Both have rows from the top and 8 bits
+/// each of red, green, blue and opacity, not premultiplied.
 ///
 /// # Errors
-/// [`Error::Argument`] where a picture has another number of bytes than its size asks for, or no pixels.
+/// [`Error::Argument`] if a picture's length does not match the size, or if the size has no pixels.
 pub fn compare(a: &[u8], b: &[u8], size: [u32; 2]) -> Result<Comparison> {
     let bytes = 4 * u128::from(size[0]) * u128::from(size[1]);
     for (name, found) in [("first", a.len()), ("second", b.len())] {
         if found as u128 != bytes {
             let [width, height] = size;
             return Err(Error::Argument(format!(
-                "the {name} picture has {found} bytes where {width}x{height} pixels take {bytes}"
+                "the {name} picture has {found} bytes, but {width}x{height} pixels need {bytes}"
             )));
         }
     }
@@ -50,10 +52,11 @@ pub fn compare(a: &[u8], b: &[u8], size: [u32; 2]) -> Result<Comparison> {
     compare_pixels(|at| premultiplied(a, at), |at| premultiplied(b, at), size)
 }
 
-/// Compares the colours and opacities of two pictures; their depths are not compared.
+/// Compares the colours and opacities of two pictures, but not their depths.
 ///
 /// # Errors
-/// [`Error::Argument`] where the sizes differ, and where a picture has not as many colours as pixels.
+/// [`Error::Argument`] if the sizes differ, or if a picture does not have one colour for each
+/// pixel.
 pub fn compare_pictures(a: &Picture, b: &Picture) -> Result<Comparison> {
     let size = same_size([a.width, a.height], [b.width, b.height])?;
     a.check_colors()?;
@@ -61,11 +64,12 @@ pub fn compare_pictures(a: &Picture, b: &Picture) -> Result<Comparison> {
     compare_pixels(|at| a.color[at].map(f64::from), |at| b.color[at].map(f64::from), size)
 }
 
-/// Compares two PNG or JPEG files (told apart by their content) at 8 bits a channel. The limits hold for both together.
+/// Compares two PNG or JPEG files at 8 bits a channel; their content decides the format. The limits
+/// apply to both files together.
 ///
 /// # Errors
-/// [`Error::File`], [`Error::Input`] and [`Error::Limit`] for files that are no such pictures; [`Error::Argument`] where
-/// the sizes differ.
+/// [`Error::File`], [`Error::Input`] and [`Error::Limit`] if a file is not a readable picture;
+/// [`Error::Argument`] if the sizes differ.
 pub fn compare_files(a: &Path, b: &Path, limits: &Limits) -> Result<Comparison> {
     let first = Source::open(a, limits)?;
     let a = picture(&first)?;
@@ -87,7 +91,7 @@ fn same_size(a: [u32; 2], b: [u32; 2]) -> Result<[u32; 2]> {
     Err(Error::Argument(format!("pictures of {aw}x{ah} and {bw}x{bh} pixels cannot be compared")))
 }
 
-/// Compares what two functions tell of each pixel.
+/// Compares two pictures, each given by a function from a pixel's index to its channels.
 fn compare_pixels(
     a: impl Fn(usize) -> [f64; 4],
     b: impl Fn(usize) -> [f64; 4],
@@ -97,7 +101,7 @@ fn compare_pixels(
     let count = width.saturating_mul(height);
     if count == 0 {
         return Err(Error::Argument(format!(
-            "pictures of {width}x{height} pixels have none to compare"
+            "pictures of {width}x{height} pixels have no pixels to compare"
         )));
     }
     let channels = if (0..count).all(|at| a(at)[3] == 1.0 && b(at)[3] == 1.0) { 3 } else { 4 };
@@ -123,13 +127,15 @@ fn compare_pixels(
     Ok(comparison)
 }
 
-/// The mean structural similarity of two pictures of one channel of 0 … 1, told pixel by pixel.
+/// The mean structural similarity of two pictures of one channel of 0 … 1. `pixel` returns both
+/// values of a pixel.
 fn structural_similarity(pixel: impl Fn(usize) -> [f64; 2], [width, height]: [usize; 2]) -> f64 {
-    // A Gaussian over x and y is one over x after one over y.
+    // The Gaussian is separable: filter along x, then along y.
     let [across, down] = [window(width), window(height)];
     let columns = width + 1 - across.len();
     let (c1, c2) = (0.01 * 0.01, 0.03 * 0.03);
-    // Of as many rows as a window is high: averages along the row of both, their squares and their product.
+    // The last rows, as many as the window is high. Each contains the averages along x of both
+    // values, their squares and their product.
     let mut rows: VecDeque<Vec<[f64; 5]>> = VecDeque::with_capacity(down.len());
     let mut own = Vec::with_capacity(width);
     let mut sum = 0.0;
@@ -161,7 +167,7 @@ fn structural_similarity(pixel: impl Fn(usize) -> [f64; 2], [width, height]: [us
     sum / (columns * (height + 1 - down.len())) as f64
 }
 
-/// The sum of some numbers times weights.
+/// Returns the weighted sum of the values.
 fn average<'a>(window: &[f64], values: impl Iterator<Item = &'a [f64; 5]>) -> [f64; 5] {
     window
         .iter()
@@ -169,7 +175,8 @@ fn average<'a>(window: &[f64], values: impl Iterator<Item = &'a [f64; 5]>) -> [f
         .fold([0.0; 5], |sum, (weight, value)| std::array::from_fn(|i| sum[i] + weight * value[i]))
 }
 
-/// The weights of a window along an axis of `length` pixels, of sum 1: 11 of them, or as many as the axis has.
+/// The weights, summing to 1, of a window along an axis of `length` pixels: 11, or `length` if that
+/// is smaller.
 fn window(length: usize) -> Vec<f64> {
     let taps = length.min(11);
     let weight = |i: usize| {
@@ -184,7 +191,7 @@ fn window(length: usize) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Grey pictures of a made-up texture, all opaque.
+    /// A grey, opaque picture with the given values.
     fn texture(size: [usize; 2], value: impl Fn(usize, usize) -> u8) -> Vec<u8> {
         let pixels = (0..size[0] * size[1]).map(|i| value(i % size[0], i / size[0]));
         pixels.flat_map(|v| [v, v, v, 255]).collect()
@@ -222,14 +229,14 @@ mod tests {
         let found = compare(&a, &b, [4, 5]).unwrap();
         assert_eq!(found.different_pixels, 1);
         close(found.max_difference, 0.2);
-        // 0.2² in one of 60 channels: opacity does not count where all is opaque.
+        // 0.2² in one of 60 channels: opacity does not count, because all pixels are opaque.
         close(found.psnr.unwrap(), 10.0 * (60.0 / 0.04_f64).log10());
     }
 
     #[test]
     fn similarity_agrees_with_an_independent_implementation() {
-        // The expected values come from a direct evaluation of Wang et al.'s formula with NumPy (2D windows, no
-        // separation), rounded to 10 digits.
+        // The expected values come from a direct evaluation of Wang et al.'s formula with NumPy (2D
+        // windows, no separation), rounded to 10 digits.
         let size = [24usize, 17];
         let a = texture(size, |x, y| ((x * x * 7 + y * 29 + x * y * 3) % 251) as u8);
         let b = texture(size, |x, y| {
@@ -297,7 +304,7 @@ mod tests {
         ));
         let small = Limits { texels: 64 * 47, ..Limits::default() };
         assert!(matches!(compare_files(&png, &png, &small), Err(Error::Limit { .. })));
-        // Room for one of them, and for both: a pixel counts 16 bytes while it is decoded.
+        // Limits for one picture, and for both: a pixel counts as 16 bytes while it is decoded.
         let of_one = std::fs::metadata(&png).unwrap().len() + 16 * 64 * 48;
         for (bytes, fits) in [(of_one - 1, false), (2 * of_one - 1, false), (2 * of_one, true)] {
             let found = compare_files(&png, &png, &Limits { bytes, ..limits.clone() });

@@ -1,4 +1,4 @@
-//! The time that work on an input may take.
+//! Time limits for work on an input.
 
 use crate::{Error, Result};
 use std::{
@@ -8,8 +8,9 @@ use std::{
 
 /// The moment by which work on an input must be done. By default there is none.
 ///
-/// The options of every step between a file and its splats carry one, so that a file of a few bytes cannot keep a program
-/// busy. The steps look at the clock every few thousand items, and end with [`Error::Timeout`].
+/// The options of every step between a file and its splats contain a deadline, so that a file of a
+/// few bytes cannot keep a program busy. The steps check the clock every few thousand items, and
+/// end with [`Error::Timeout`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Deadline {
     end: Option<Instant>,
@@ -25,12 +26,12 @@ impl Deadline {
         Self { end: Instant::now().checked_add(Duration::from_secs(seconds)), seconds }
     }
 
-    /// Whether the deadline has passed.
+    /// Returns whether the deadline has passed.
     pub fn is_over(&self) -> bool {
         self.end.is_some_and(|end| Instant::now() >= end)
     }
 
-    /// Refuses to go on once the deadline has passed; `what` names the work in the error.
+    /// Returns an error if the deadline has passed; `what` names the work in the error.
     ///
     /// # Errors
     /// [`Error::Timeout`].
@@ -49,10 +50,11 @@ impl Default for Deadline {
     }
 }
 
-/// Items between two looks at the clock.
+/// Items between two checks of the clock.
 const ITEMS: usize = 1 << 8;
 
-/// A deadline that many threads watch in one loop. Once it has passed, each of them skips the rest of its items.
+/// A deadline shared by the threads of a parallel loop. Once it has passed, every thread skips its
+/// remaining items.
 pub(crate) struct Clock {
     deadline: Deadline,
     is_over: AtomicBool,
@@ -63,7 +65,7 @@ impl Clock {
         Self { deadline, is_over: AtomicBool::new(false) }
     }
 
-    /// Whether to skip the item of this number. The system's clock is read for a few items only.
+    /// Returns whether to skip the item with this number. Only some items read the system's clock.
     pub fn is_over(&self, item: usize) -> bool {
         if item.is_multiple_of(ITEMS) && self.deadline.is_over() {
             self.is_over.store(true, Relaxed);
@@ -71,7 +73,7 @@ impl Clock {
         self.is_over.load(Relaxed)
     }
 
-    /// Ends the loop. Its result is incomplete where this is an error.
+    /// Ends the loop. If this returns an error, the loop's result is incomplete.
     pub fn finish(self, what: &str) -> Result<()> {
         if self.is_over.into_inner() { Err(self.deadline.error(what)) } else { Ok(()) }
     }

@@ -1,5 +1,5 @@
-//! The one error type of the library. Every message names the file and the place in it, what was found and what
-//! was expected; the hint says what to do.
+//! The one error type of the library. Every message names the file and the place in it, what was
+//! found and what was expected; the hint says what to do.
 
 use std::path::{Path, PathBuf};
 
@@ -7,11 +7,11 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A file that does not hold what its format promises.
+    /// A file that does not follow its format.
     #[error("{}: {place}: {message}", file.display())]
     Input { file: PathBuf, place: String, message: String, hint: Option<String> },
 
-    /// A file (or a claim in it) larger than the [`Limits`](crate::input::Limits) allow.
+    /// A file, or a value stated in it, that exceeds the [`Limits`](crate::input::Limits).
     #[error("{}: {what} is {found}, over the limit of {limit}", file.display())]
     Limit { file: PathBuf, what: String, kind: LimitKind, found: u64, limit: u64 },
 
@@ -19,35 +19,37 @@ pub enum Error {
     #[error("{}: cannot {action}: {source}", file.display())]
     File { file: PathBuf, action: &'static str, source: std::io::Error },
 
-    /// A result that the operating system did not take; what was there before is there still.
+    /// The operating system could not write a result. A file that was there before is unchanged.
     #[error("{}: cannot be written: {source}", file.display())]
     Output { file: PathBuf, source: std::io::Error },
 
-    /// A value given by the caller that makes no picture (a size of 0, a kernel with no width, …).
+    /// An argument from which no picture can be made (a size of 0, a kernel of no width, …).
     #[error("{0}")]
     Argument(String),
 
-    /// Work on an input that takes longer than its [`Deadline`](crate::Deadline) allows.
+    /// Work on an input took longer than its [`Deadline`](crate::Deadline) allows.
     #[error("{what} takes longer than the limit of {limit} s")]
     Timeout { what: String, limit: u64 },
 
-    /// Memory that the operating system refuses. It was asked for before the work began, so nothing is half done.
-    #[error("{what} needs {bytes} bytes of memory, which the system does not give")]
+    /// The operating system refused memory. It was requested before the work began, so nothing is
+    /// half done.
+    #[error("{what} needs {bytes} bytes of memory, which the system refused")]
     Memory { what: String, bytes: u64 },
 
-    /// The scene holds nothing that could be seen.
+    /// The scene contains nothing visible.
     #[error("nothing to draw: {0}")]
     NothingToDraw(String),
 
-    /// No adapter, or none of the wanted name.
+    /// There is no adapter, or none with the requested name.
     #[error("no usable GPU: {0}")]
     NoAdapter(String),
 
-    /// The device ran out of memory, or could not do what was asked of it. It can be used further.
+    /// The device ran out of memory or rejected an operation. It can still be used.
     #[error("GPU: {0}")]
     Gpu(String),
 
-    /// The device is gone, with all that lay on it ([`Gpu::reopened`](crate::engine::Gpu::reopened)).
+    /// The device is lost, with all its resources
+    /// ([`Gpu::reopened`](crate::engine::Gpu::reopened)).
     #[error("GPU: {0}")]
     DeviceLost(String),
 }
@@ -63,7 +65,7 @@ pub enum LimitKind {
 }
 
 impl Error {
-    /// An [`Error::Input`] without a hint.
+    /// Creates an [`Error::Input`] without a hint.
     pub fn input(file: &Path, place: impl Into<String>, message: impl Into<String>) -> Self {
         Self::Input {
             file: file.to_owned(),
@@ -73,17 +75,17 @@ impl Error {
         }
     }
 
-    /// An [`Error::File`].
+    /// Creates an [`Error::File`].
     pub fn file(file: &Path, action: &'static str, source: std::io::Error) -> Self {
         Self::File { file: file.to_owned(), action, source }
     }
 
-    /// An [`Error::Output`].
+    /// Creates an [`Error::Output`].
     pub fn output(file: &Path, source: std::io::Error) -> Self {
         Self::Output { file: file.to_owned(), source }
     }
 
-    /// Names the file that an error is about, where the error does not know it.
+    /// Adds the file's name to errors that do not contain one.
     #[must_use]
     pub fn in_file(self, file: &Path) -> Self {
         let named = |what: String| format!("{}: {what}", file.display());
@@ -95,7 +97,7 @@ impl Error {
         }
     }
 
-    /// Adds what the user can do about an [`Error::Input`]; other errors pass unchanged.
+    /// Adds what the user can do about an [`Error::Input`]. Other errors are returned unchanged.
     #[must_use]
     pub fn hint(mut self, text: impl Into<String>) -> Self {
         if let Self::Input { hint, .. } = &mut self {

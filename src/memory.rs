@@ -1,11 +1,11 @@
-//! How much memory there is.
+//! How much memory there is, and checks before large allocations.
 
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 
-/// The bytes that a process should take at most: three quarters of the machine's memory, or of what its control group may have;
-/// `None` where the system does not tell.
+/// Returns the most bytes that a process should use: three quarters of the machine's memory or of
+/// its control group's limit, whichever is smaller. `None` if the system reports neither.
 pub fn most() -> Option<u64> {
     let asked = RefreshKind::nothing().with_memory(MemoryRefreshKind::nothing().with_ram());
     let machine = System::new_with_specifics(asked)
@@ -18,22 +18,22 @@ pub fn most() -> Option<u64> {
     limits.chain(machine).min().map(|bytes| bytes / 4 * 3)
 }
 
-/// Says in words where something takes more bytes than a process should: asked before it is allocated, because what cannot be
-/// allocated ends the process.
+/// Returns an error message if `what` needs more bytes than a process should use. Call it before
+/// allocating, because a failed allocation ends the process.
 pub(crate) fn check(what: &str, bytes: u64) -> std::result::Result<(), String> {
-    // Nothing that is allocated is larger than that.
+    // No single allocation can be larger than this.
     let most = most().unwrap_or(u64::MAX).min(isize::MAX as u64);
     if bytes > most {
         return Err(format!(
-            "{what} takes {bytes} bytes of memory, more than the {most} that may be taken here"
+            "{what} takes {bytes} bytes of memory, more than the {most} that a process may use"
         ));
     }
     Ok(())
 }
 
-/// Asks the system for memory that `what` is about to take, and gives it back at once.
+/// Requests memory that `what` is about to use from the system, and frees it at once.
 ///
-/// Allocations that fail end the process. Where all of a step's memory is asked for before it begins, the step returns an
+/// A failed allocation ends the process. A step that first requests all its memory here returns an
 /// error instead.
 ///
 /// # Errors
@@ -42,7 +42,7 @@ pub(crate) fn room(what: &str, bytes: u64) -> Result<()> {
     let ask = |bytes: usize| {
         let mut probe: Vec<u8> = Vec::new();
         let is_there = probe.try_reserve_exact(bytes).is_ok();
-        // Otherwise a compiler may leave out an allocation that nothing uses.
+        // Keeps the compiler from removing the unused allocation.
         std::hint::black_box(&mut probe);
         is_there.then_some(probe)
     };
@@ -55,10 +55,11 @@ pub(crate) fn room(what: &str, bytes: u64) -> Result<()> {
     }
 }
 
-/// Blocks, and bytes of a block, that must be left for the small lists of all threads.
+/// Number and size, in bytes, of the blocks that must remain free for the small lists of all
+/// threads.
 const RESERVE: (usize, usize) = (32, 128 << 10);
 
-/// Makes room in a list for more items.
+/// Reserves capacity for `more` items in a list.
 ///
 /// # Errors
 /// [`Error::Memory`].
@@ -67,8 +68,8 @@ pub(crate) fn reserve<T>(list: &mut Vec<T>, more: usize, what: &str) -> Result<(
     list.try_reserve(more).map_err(|_| Error::Memory { what: what.into(), bytes })
 }
 
-/// The files that may tell the limit of the process's control group, or of one that it is in: of version 2, and of version 1.
-/// There are none but on Linux.
+/// The files that may contain the memory limit of the process's control group and of the groups
+/// around it, for control groups version 2 and version 1. Empty except on Linux.
 fn groups() -> Vec<PathBuf> {
     let text = std::fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
     let mut files = Vec::new();
@@ -96,7 +97,8 @@ mod tests {
 
     #[test]
     fn the_machine_tells_its_memory() {
-        // No machine that builds this has less, and none has so much more.
+        // No machine that builds this has less memory than the lower bound, or more than the upper
+        // one.
         let found = most().expect("an amount");
         assert!((1 << 28..1 << 50).contains(&found), "{found}");
         assert!(check("that", 1 << 20).is_ok());

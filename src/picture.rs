@@ -3,19 +3,22 @@
 use crate::{Error, Result, disk};
 use std::path::Path;
 
-/// A picture as a renderer leaves it. Rows from the top.
+/// A rendered picture, with rows from the top.
 #[derive(Debug, Clone)]
 pub struct Picture {
     pub width: u32,
     pub height: u32,
-    /// Red, green, blue multiplied by opacity, and opacity, 0 … 1, as displayed (not linear light).
+    /// Red, green and blue multiplied by opacity, then opacity; 0 … 1, as displayed (not linear
+    /// light).
     pub color: Vec<[f32; 4]>,
-    /// View-space z at which half of the light is taken, in world units; infinite where the ray stays brighter.
+    /// View-space z, in world units, at which half of the light is absorbed; infinite if less than
+    /// half is absorbed along the ray.
     pub depth: Vec<f32>,
 }
 
 impl Picture {
-    /// 8 bits a channel over a background colour; `None` keeps the opacity (not premultiplied).
+    /// Converts the picture to 8 bits a channel over a background colour. `None` keeps the opacity
+    /// (not premultiplied).
     pub fn to_rgba8(&self, background: Option<[f32; 3]>) -> Vec<u8> {
         let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
         let mut out = Vec::with_capacity(4 * self.color.len());
@@ -32,7 +35,7 @@ impl Picture {
         out
     }
 
-    /// Refuses a picture that has not as many colours as pixels.
+    /// Returns an error if the number of colours is not the number of pixels.
     pub(crate) fn check_colors(&self) -> Result<()> {
         self.check("colours", self.color.len())
     }
@@ -51,11 +54,12 @@ impl Picture {
         )))
     }
 
-    /// Averages blocks of `factor` × `factor` pixels: the second half of supersampling. Depth takes the nearest. Rows and
-    /// columns beyond the last whole block are left out.
+    /// Averages blocks of `factor` × `factor` pixels, the second half of supersampling. The depth
+    /// of a block is its nearest depth. Rows and columns beyond the last whole block are dropped.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a factor of 0, and where the picture has not as many colours and depths as pixels.
+    /// [`Error::Argument`] if the factor is 0, or if the picture does not have one colour and one
+    /// depth for each pixel.
     pub fn reduced(&self, factor: u32) -> Result<Self> {
         self.check_colors()?;
         self.check_depths()?;
@@ -83,19 +87,23 @@ impl Picture {
         Ok(Self { width, height, color, depth })
     }
 
-    /// Writes a PNG or JPEG, chosen by the extension. JPEG has no opacity: without a background it gets black.
+    /// Writes a PNG or JPEG, chosen by the extension. JPEG has no opacity: without a background,
+    /// the picture is drawn over black.
     ///
     /// # Errors
-    /// [`Error::Argument`] for another extension, [`Error::Output`] where the file cannot be written.
+    /// [`Error::Argument`] for other extensions, and [`Error::Output`] if the file cannot be
+    /// written.
     pub fn save(&self, path: &Path, background: Option<[f32; 3]>) -> Result<()> {
         let bytes = self.encode(PictureFormat::of(path)?, background)?;
         disk::write(path, &bytes)
     }
 
-    /// The bytes of a picture file. JPEG has no opacity: without a background it gets black.
+    /// Returns the bytes of a picture file. JPEG has no opacity: without a background, the picture
+    /// is drawn over black.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a picture that the format cannot hold, or that has not as many colours as pixels.
+    /// [`Error::Argument`] if the format cannot store the picture, or if the picture does not have
+    /// one colour for each pixel.
     pub fn encode(&self, format: PictureFormat, background: Option<[f32; 3]>) -> Result<Vec<u8>> {
         self.check_colors()?;
         let rgba = |back| {
@@ -111,11 +119,12 @@ impl Picture {
         }
     }
 
-    /// The depths as a grey PNG of 16 bits: 65535 at the nearest depth of the picture, falling evenly to 1 at the farthest;
-    /// 0 where there is none.
+    /// Encodes the depths as a 16-bit grey PNG. The nearest depth of the picture is 65535, falling
+    /// linearly to 1 at the farthest. Pixels without a depth are 0.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a picture that the format cannot hold, or that has not as many depths as pixels.
+    /// [`Error::Argument`] if the format cannot store the picture, or if the picture does not have
+    /// one depth for each pixel.
     pub fn encode_depth(&self) -> Result<Vec<u8>> {
         self.check_depths()?;
         let finite = self.depth.iter().copied().filter(|d| d.is_finite());
@@ -124,7 +133,7 @@ impl Picture {
         let grey = |&depth: &f32| match (far - depth) / (far - near) {
             _ if !depth.is_finite() => 0,
             share if share.is_finite() => 1 + (65534.0 * share).round() as u16,
-            // All depths are the same.
+            // All depths are equal.
             _ => u16::MAX,
         };
         let pixels: Vec<u16> = self.depth.iter().map(grey).collect();
@@ -134,7 +143,7 @@ impl Picture {
     }
 }
 
-/// A kind of picture file.
+/// The format of a picture file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PictureFormat {
     Png,
@@ -142,10 +151,10 @@ pub enum PictureFormat {
 }
 
 impl PictureFormat {
-    /// The format that a file's extension names.
+    /// Returns the format for a file's extension.
     ///
     /// # Errors
-    /// [`Error::Argument`] where it names none of these.
+    /// [`Error::Argument`] for other extensions.
     pub fn of(path: &Path) -> Result<Self> {
         match image::ImageFormat::from_path(path) {
             Ok(image::ImageFormat::Png) => Ok(Self::Png),

@@ -6,10 +6,10 @@ use glam::{DVec3, Vec3};
 use half::f16;
 use rayon::prelude::*;
 
-/// An ellipsoidal Gaussian splat as it lies in memory and on the GPU (48 bytes).
+/// An ellipsoidal Gaussian splat as stored in memory and on the GPU (48 bytes).
 ///
-/// The covariance is Σ = B·Bᵀ with B lower triangular; in the whitened space x′ = B⁻¹(x − center) the kernel is the unit
-/// Gaussian exp(−|x′|²/2).
+/// The covariance is Σ = B·Bᵀ with B lower triangular. In the whitened space x′ = B⁻¹(x − center),
+/// the kernel is the unit Gaussian exp(−|x′|²/2).
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Splat {
@@ -19,18 +19,21 @@ pub struct Splat {
     pub strength: f32,
     /// B row by row: b00, b10, b11, b20, b21, b22, in world units.
     pub factor: [f32; 6],
-    /// Radiance: red, green, blue, opacity of 8 bits each, red lowest. Scalar: the weight and the first part of the slope,
-    /// 16-bit floats ([`Splat::sample`]).
+    /// Radiance: red, green, blue and opacity, 8 bits each, red in the lowest bits. Scalar: the
+    /// weight and the first component of the slope, as 16-bit floats ([`Splat::sample`]).
     pub color: u32,
-    /// Radiance: unit normal, octahedral, two signed 16-bit parts ([`encode_normal`]); [`NO_NORMAL`] for none (drawn
-    /// unshaded). Scalar: the other parts of the slope.
+    /// Radiance: the unit normal, octahedral, two signed 16-bit components ([`encode_normal`]);
+    /// [`NO_NORMAL`] if there is none, which draws the splat unshaded. Scalar: the other two
+    /// components of the slope.
     pub normal: u32,
 }
 
 impl Splat {
-    /// A scattered sample at `center` with a `value`. Its kernel, of the given `factor`, counts `weight` times in the
-    /// weighted mean that is the field, and carries not the value alone but value + slope·x′, x′ the place in whitened space:
-    /// with the right slopes a linear field comes out linear (Franke & Nielson 1980).
+    /// A scattered sample at `center` with a `value`. The field is a weighted mean, in which this
+    /// sample's kernel has the given `factor` and counts `weight` times.
+    ///
+    /// The kernel carries value + slope·x′, where x′ is the position in whitened space. With the
+    /// right slopes, a linear field is reproduced exactly (Franke & Nielson 1980).
     pub fn sample(center: Vec3, value: f32, factor: [f32; 6], weight: f32, slope: Vec3) -> Self {
         let pack = |low: f32, high: f32| {
             u32::from(f16::from_f32(low).to_bits()) | u32::from(f16::from_f32(high).to_bits()) << 16
@@ -55,24 +58,25 @@ impl Splat {
 /// The [`Splat::normal`] of a splat that has none.
 pub const NO_NORMAL: u32 = 0x8000_8000;
 
-/// Standard deviation, in pixels, by which every splat is widened in the picture, so that none falls between the pixels.
-/// Lattice samples are not: their kernels overlap.
+/// Standard deviation, in pixels, by which every splat is widened in the picture so that none falls
+/// between the pixels. Lattice samples are not widened, because their kernels overlap.
 pub const FOOTPRINT_BLUR: f64 = 0.35;
 
-/// How far radiance with a normal steps back along it when it is widened, in the standard deviations that are added. Where
-/// opaque splats overlap, half of the light is gone about so far from their middle: outlines stay where they are.
+/// When a radiance splat with a normal is widened, it moves back along the normal by this many of
+/// the added standard deviations. Where opaque splats overlap, half of the light is absorbed about
+/// this many standard deviations from their centres, so the shift keeps silhouettes in place.
 pub const STEP_BACK: f64 = 2.4;
 
 /// What the splats of a set carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Payload {
-    /// Colour, optical depth and normal; classified before.
+    /// Colour, optical depth and normal, already classified.
     Radiance,
-    /// A sample value; classified after interpolation, by the scene's transfer function.
+    /// A sample value, classified after interpolation by the scene's transfer function.
     Scalar,
 }
 
-/// Splats of one payload around a common origin.
+/// Splats with the same payload around a common origin.
 #[derive(Debug, Clone)]
 pub struct SplatSet {
     /// World position that the centres are relative to.
@@ -81,12 +85,12 @@ pub struct SplatSet {
     pub splats: Vec<Splat>,
     /// Footprints end this many standard deviations from the centre.
     pub extent: f32,
-    /// Scalars: what the weighted kernels add up to inside the set, on average; read where samples are classified before
-    /// they are added. 1 for radiance.
+    /// Scalar payload: the average sum of the weighted kernels inside the set. Used when samples
+    /// are classified before they are added. 1 for radiance.
     pub overlap: f32,
 }
 
-/// Packs a unit vector in 32 bits (octahedral, Meyer et al. 2010).
+/// Packs a unit vector into 32 bits (octahedral, Meyer et al. 2010).
 pub fn encode_normal(n: Vec3) -> u32 {
     let sum = n.x.abs() + n.y.abs() + n.z.abs();
     if sum == 0.0 || !sum.is_finite() {
@@ -100,7 +104,7 @@ pub fn encode_normal(n: Vec3) -> u32 {
     pack(x) | pack(y) << 16
 }
 
-/// The unit vector behind [`encode_normal`]; `None` for [`NO_NORMAL`].
+/// Unpacks the unit vector packed by [`encode_normal`]; `None` for [`NO_NORMAL`].
 pub fn decode_normal(packed: u32) -> Option<Vec3> {
     if packed == NO_NORMAL {
         return None;
@@ -113,10 +117,11 @@ pub fn decode_normal(packed: u32) -> Option<Vec3> {
 }
 
 impl Splat {
-    /// The largest optical depth: what is above it is as opaque, and sums of it lose what lies beside.
+    /// The largest optical depth. Anything above it is just as opaque, and would swallow its
+    /// neighbours' depths in sums.
     pub const MOST_OPTICAL_DEPTH: f32 = 1e10;
 
-    /// The standard deviations along the axes: the half extents of an ellipsoid are the lengths of the rows of its factor.
+    /// The standard deviations along the coordinate axes: the lengths of the rows of the factor.
     pub(crate) fn deviations(&self) -> Vec3 {
         let [b00, b10, b11, b20, b21, b22] = self.factor;
         Vec3::new(
@@ -128,25 +133,26 @@ impl Splat {
 }
 
 impl SplatSet {
-    /// The widest footprint that the engine takes, in standard deviations.
+    /// The largest `extent` that the engine accepts, in standard deviations.
     pub const MAX_EXTENT: f32 = 8.0;
 
-    /// A set of the same kind without splats.
+    /// Returns a set of the same kind without splats.
     pub(crate) fn empty(&self) -> Self {
         Self { splats: Vec::new(), ..*self }
     }
 
-    /// The smallest and the largest value of a set of scalars.
+    /// Returns the smallest and the largest value of a scalar set.
     pub fn value_range(&self) -> [f64; 2] {
         let values = self.splats.iter().map(|splat| f64::from(splat.strength));
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
     }
 
-    /// Gives the set another origin, with all splats where they were.
+    /// Changes the origin of the set; all splats stay where they are in the world.
     ///
     /// # Errors
-    /// [`Error::Argument`] for an origin that is not finite, and where 32 bits hold places around it less finely than a quarter of the splats' mean deviation: splats
-    /// beside each other would become one.
+    /// [`Error::Argument`] if the origin is not finite, or if 32-bit coordinates around it are too
+    /// coarse. Their steps may be at most a quarter of the splats' mean deviation, or neighbouring
+    /// splats would coincide.
     pub fn move_origin(&mut self, origin: DVec3) -> Result<()> {
         if !origin.is_finite() {
             return Err(Error::Argument(format!(
@@ -170,14 +176,15 @@ impl SplatSet {
         let (step, size) = (farthest * f64::from(f32::EPSILON), sizes / self.splats.len() as f64);
         if step > 0.25 * size {
             return Err(Error::Argument(format!(
-                "splats lie up to {farthest:.0} from the first input, where 32 bits hold places in steps of {step:.3}, but \
-                 their deviation is {size:.3} in the mean; convert inputs that lie so far apart to files of their own"
+                "splats are up to {farthest:.0} from the first input, where 32-bit coordinates \
+                 have steps of {step:.3}, but their mean deviation is {size:.3}; convert inputs \
+                 this far apart to separate files"
             )));
         }
         Ok(())
     }
 
-    /// The box around all footprints, in world coordinates.
+    /// Returns the box around all footprints, in world coordinates.
     pub fn bounds(&self) -> Bounds {
         let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let grow = |(low, high): (Vec3, Vec3), splat: &Splat| {
@@ -215,7 +222,7 @@ mod tests {
             set.splats.iter().map(|s| set.origin.x + f64::from(s.center[0])).collect();
         assert!((places[0] - 1.0).abs() < 1e-4 && (places[1] - 1.25).abs() < 1e-4, "{places:?}");
         let error = set.move_origin(DVec3::new(4e6, 0.0, 0.0)).unwrap_err().to_string();
-        assert!(error.contains("in steps of 0.477"), "{error}");
+        assert!(error.contains("have steps of 0.477"), "{error}");
         let (before, nowhere) = (set.origin, DVec3::new(0.0, f64::NAN, 0.0));
         let error = set.move_origin(nowhere).unwrap_err().to_string();
         assert!(error.contains("is not finite") && set.origin == before, "{error}");

@@ -12,31 +12,32 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// A file on its way: written beside the one that is wanted, whose name it takes by [`commit`](Self::commit). Dropped before,
-/// it is removed.
+/// A file being written. Its bytes go to a temporary file beside the requested one;
+/// [`commit`](Self::commit) renames it to the requested name. If it is dropped before that, it is
+/// removed.
 ///
-/// Where the wanted file is a symbolic link, the link stays: the file that it leads to is the one that is written, beside
-/// which the new one is made. A link that leads nowhere is an error.
+/// If the requested path is a symbolic link, the link remains. The file that it points to is
+/// replaced, and the temporary file is created beside that one. A dangling link is an error.
 pub struct AtomicFile {
-    /// The name that errors use.
+    /// The requested path, as errors name it.
     wanted: PathBuf,
-    /// The file that it leads to.
+    /// The path after following symbolic links.
     target: PathBuf,
     part: Part,
 }
 
 impl AtomicFile {
-    /// Begins a file.
+    /// Creates the temporary file.
     ///
     /// # Errors
-    /// [`Error::Output`] where nothing can be written beside `wanted`, and where `wanted` is something else than a file, or
-    /// leads nowhere.
+    /// [`Error::Output`] if nothing can be written beside `wanted`, or if `wanted` is not a regular
+    /// file or is a dangling link.
     pub fn create(wanted: &Path) -> Result<Self> {
         let fail = |e| Error::output(wanted, e);
         if wanted.metadata().is_ok_and(|found| !found.is_file()) {
             return Err(fail(io::Error::new(
                 io::ErrorKind::InvalidInput,
-                "there is something of that name that is no file",
+                "something of this name exists that is not a regular file",
             )));
         }
         let target = target(wanted).map_err(fail)?;
@@ -44,21 +45,24 @@ impl AtomicFile {
         Ok(Self { wanted: wanted.to_owned(), target, part })
     }
 
-    /// Gives the file its name, once all of it is on the disk.
+    /// Gives the file its name, once its whole content is on disk.
     ///
     /// # Errors
-    /// [`Error::Output`]; then nothing is left of the file.
+    /// [`Error::Output`]; then the temporary file is removed.
     pub fn commit(self) -> Result<()> {
         let Self { wanted, target, part } = self;
         let fail = |e| Error::output(&wanted, e);
-        // Who may read a file does not change because its content does; it may have changed since the part was made.
+        // New content must not change who may read a file. The permissions may have changed since
+        // the temporary file was created.
         if let Ok(old) = target.metadata() {
             part.file().set_permissions(old.permissions()).map_err(fail)?;
         }
-        // A name that gets to the disk before the content would, after a power cut, be that of a file with holes.
+        // If the name reached the disk before the content, a power cut could leave a file with
+        // holes under it.
         sync(part.file(), Step::Sync).map_err(fail)?;
         part.rename(&target).map_err(fail)?;
-        // The name, too, must get there. Where a folder cannot be synced, the system sees to it.
+        // The name must reach the disk too. If a folder cannot be synced, that is left to the
+        // system.
         if let Ok(folder) = File::open(folder(&target)) {
             sync(&folder, Step::SyncFolder).ok();
         }
@@ -66,7 +70,7 @@ impl AtomicFile {
     }
 }
 
-/// The file that a name leads to: itself, but for symbolic links.
+/// Follows symbolic links to the file that is to be written.
 fn target(wanted: &Path) -> io::Result<PathBuf> {
     if !wanted.is_symlink() {
         return Ok(wanted.to_owned());
@@ -80,7 +84,8 @@ fn target(wanted: &Path) -> io::Result<PathBuf> {
     })
 }
 
-/// Waits until something is on the disk. Tests pull no plugs, and do it a thousand times.
+/// Waits until a file or folder is on disk. Tests skip the wait: they cut no power, and sync
+/// thousands of times.
 fn sync(file: &File, what: Step) -> io::Result<()> {
     step(what)?;
     if cfg!(test) { Ok(()) } else { file.sync_all() }
@@ -97,18 +102,18 @@ impl Write for AtomicFile {
     }
 }
 
-/// Writes a file as a whole.
+/// Writes a whole file.
 ///
 /// # Errors
-/// [`Error::Output`]; then the file is as it was.
+/// [`Error::Output`]; then the file is unchanged.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_with(path, |out| out.write_all(bytes))
 }
 
-/// Writes a file by a function.
+/// Writes a file with a function.
 ///
 /// # Errors
-/// As of [`write`](write()).
+/// The same as [`write`](write()).
 pub fn write_with(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<AtomicFile>) -> io::Result<()>,

@@ -1,5 +1,5 @@
-//! The temporary files of this process that have names: made, renamed and removed under one lock, so that one call can do
-//! away with all of them.
+//! The named temporary files of this process. They are created, renamed and removed under one lock,
+//! so that one call can remove all of them.
 
 use super::{
     folder,
@@ -16,30 +16,30 @@ use std::{
     },
 };
 
-/// Those that are there, by a number of their own: names come again.
+/// The existing temporary files, by a unique number, because names are reused.
 type Live = BTreeMap<u64, PathBuf>;
 
 static LIVE: Mutex<Live> = Mutex::new(Live::new());
 
-/// How their names end.
+/// The extension of temporary files.
 const EXTENSION: &str = "splatkit-part";
 
-/// So many files of one name may be on their way at once.
+/// The most files with the same name that can be in progress at once.
 const MOST: u32 = 100;
 
 fn live() -> MutexGuard<'static, Live> {
-    // Whoever panicked left a list that is right.
+    // A thread that panicked with the lock still left a correct list.
     LIVE.lock().unwrap_or_else(|e| e.into_inner())
 }
 
-/// While it lives, no file takes its name and no new one begins: whoever tries waits.
+/// While this exists, no file is renamed and none is created: threads that try wait.
 pub struct Abandoned {
     _held: MutexGuard<'static, Live>,
 }
 
-/// Removes all files that are on their way, for a process that is about to end without unwinding: a handler of Ctrl-C calls
-/// this and then exits, with the result still in its hands.
-#[must_use = "files that are dropped while the process ends must not come up again"]
+/// Removes all files in progress, for a process that is about to end without unwinding. A Ctrl-C
+/// handler calls this and then exits while it still holds the result.
+#[must_use = "dropping this lets other threads create files again while the process ends"]
 pub fn abandon() -> Abandoned {
     let mut held = live();
     for path in std::mem::take(&mut *held).into_values() {
@@ -48,7 +48,8 @@ pub fn abandon() -> Abandoned {
     Abandoned { _held: held }
 }
 
-/// A temporary file, locked as long as its process lives: what is not locked was left behind by one that was killed.
+/// A temporary file, locked while its process lives. An unlocked one was left behind by a process
+/// that was killed.
 pub struct Part {
     number: u64,
     path: PathBuf,
@@ -56,9 +57,10 @@ pub struct Part {
 }
 
 impl Part {
-    /// Makes one beside the file that is wanted. Nobody may read it who may not read the file that it replaces.
+    /// Creates one beside the requested file. Nobody can read it who may not read the file that it
+    /// replaces.
     pub fn create(wanted: &Path) -> io::Result<Self> {
-        // Names may be too long already.
+        // The full name may leave no room for the suffix.
         let name: String =
             wanted.file_name().unwrap_or_default().to_string_lossy().chars().take(50).collect();
         let permissions = wanted.metadata().ok().map(|found| found.permissions());
@@ -67,15 +69,16 @@ impl Part {
         for try_number in 0..MOST {
             let path = folder(wanted).join(format!(".{name}.{try_number}.{EXTENSION}"));
             remove_stale(&path);
-            // Never one that is there, nor one that a link leads to.
+            // Never opens an existing file, nor one behind a link.
             match create_new(&path, permissions.as_ref()) {
                 Ok(file) => {
                     race("created", &path);
-                    // Where files cannot be locked, none is taken for stale.
+                    // Where files cannot be locked, none is treated as stale.
                     if matches!(file.try_lock(), Err(TryLockError::WouldBlock))
                         || !names(&path, &file)
                     {
-                        // Another process held it for stale before it was locked, and may have made its own.
+                        // Another process took it for stale before it was locked, and may have
+                        // created its own file under this name.
                         continue;
                     }
                     static NEXT: AtomicU64 = AtomicU64::new(0);
@@ -83,7 +86,8 @@ impl Part {
                     live.insert(number, path.clone());
                     let part = Self { number, path, file };
                     drop(live);
-                    // Not all systems take permissions as a file is made, and some take fewer than were asked for.
+                    // Not all systems set permissions on creation, and some set fewer than
+                    // requested.
                     if let Some(permissions) = permissions {
                         part.file.set_permissions(permissions)?;
                     }
@@ -93,14 +97,17 @@ impl Part {
                 Err(e) => return Err(e),
             }
         }
-        Err(io::Error::new(io::ErrorKind::AlreadyExists, format!("{MOST} others are writing it")))
+        Err(io::Error::new(
+            io::ErrorKind::AlreadyExists,
+            format!("{MOST} other writers have begun this file"),
+        ))
     }
 
     pub fn file(&self) -> &File {
         &self.file
     }
 
-    /// Takes the place of the file that is wanted.
+    /// Renames the file to the requested path.
     pub fn rename(self, wanted: &Path) -> io::Result<()> {
         let mut live = live();
         step(Step::Rename)?;
@@ -118,7 +125,8 @@ impl Part {
 impl Drop for Part {
     fn drop(&mut self) {
         let mut live = live();
-        // What was renamed or abandoned is not listed, and whatever has the name now is not this one.
+        // A renamed or abandoned file is not listed. Any file that has its name now is a different
+        // one.
         if live.remove(&self.number).is_some()
             && step(Step::Remove).is_ok()
             && names(&self.path, &self.file)
@@ -128,14 +136,15 @@ impl Drop for Part {
     }
 }
 
-/// Makes a file that is not there yet, with no more permissions than these from its first moment on.
+/// Creates a file that must not exist yet, with no more than these permissions from the first
+/// moment on.
 fn create_new(path: &Path, permissions: Option<&Permissions>) -> io::Result<File> {
     let mut options = File::options();
     options.read(true).write(true).create_new(true);
     #[cfg(unix)]
     if let Some(permissions) = permissions {
         use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
-        // Its owner must be able to write it.
+        // The owner must be able to write it.
         options.mode(permissions.mode() & 0o777 | 0o600);
     }
     #[cfg(not(unix))]
@@ -150,15 +159,15 @@ fn remove_stale(path: &Path) {
         && file.try_lock().is_ok()
     {
         race("locked", path);
-        // While it was not locked, its writer may have finished it, and another one may have made a new file of its name. Once
-        // it is locked, nobody else removes it or takes it for its own.
+        // Before it was locked, its writer may have finished it, and another one may have created a
+        // new file with the same name. Once it is locked, nobody else removes or reuses it.
         if names(path, &file) {
             std::fs::remove_file(path).ok();
         }
     }
 }
 
-/// Whether a path is the name of an open file.
+/// Returns whether the path still names the open file.
 fn names(path: &Path, file: &File) -> bool {
     match (path.symlink_metadata(), file.metadata()) {
         (Ok(named), Ok(open)) => is_same(&named, &open),
@@ -172,7 +181,7 @@ fn is_same(a: &Metadata, b: &Metadata) -> bool {
     (a.dev(), a.ino()) == (b.dev(), b.ino())
 }
 
-/// Elsewhere an open file keeps its name: it can be neither removed nor replaced.
+/// On other systems an open file keeps its name: it can be neither removed nor replaced.
 #[cfg(not(unix))]
 fn is_same(a: &Metadata, b: &Metadata) -> bool {
     a.is_file() && b.is_file()

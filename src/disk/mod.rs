@@ -1,10 +1,11 @@
-//! How results get to the disk: files that appear whole or not at all ([`AtomicFile`]), and room for what does not fit in
-//! memory, of which nothing stays (`Scratch`).
+//! How results are written to disk. Files appear whole or not at all ([`AtomicFile`]). Scratch
+//! files for data that does not fit in memory leave nothing behind (`Scratch`).
 //!
-//! Whatever ends a process, a file under the name that was asked for is the old one or the new one. Where the process could
-//! clean up (an error, a panic, a signal that it catches and answers by [`abandon`]), nothing else is left. Where it could
-//! not (a kill, a power cut), a file may stay whose name begins with a dot and ends in `.splatkit-part`; the next one to
-//! write the same file removes it.
+//! Whatever ends a process, a file under the requested name is the old one or the new one. If the
+//! process could clean up (after an error, a panic, or a signal that it catches and answers with
+//! [`abandon`]), nothing else remains. If it could not (a kill, a power cut), a file may remain
+//! whose name begins with a dot and ends in `.splatkit-part`. The next process to write the same
+//! file removes it.
 
 mod atomic;
 mod live;
@@ -21,10 +22,10 @@ pub(crate) use step::faults;
 
 use std::path::Path;
 
-/// Bytes that wait in memory before they are written. Tests want many writes.
+/// Size of write buffers in bytes. Tests need many writes.
 pub(crate) const BUFFER: usize = if cfg!(test) { 1 << 8 } else { 1 << 20 };
 
-/// The folder that a file is in.
+/// Returns the folder that contains a file.
 fn folder(path: &Path) -> &Path {
     path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

@@ -1,4 +1,4 @@
-//! Room on the disk for what does not fit in memory.
+//! Scratch space on disk for data that does not fit in memory.
 
 use super::{
     folder,
@@ -11,14 +11,15 @@ use std::{
     path::Path,
 };
 
-/// A file without a name: the system takes it away with the process, whatever ends that.
+/// A file without a name. The system removes it when the process ends, however it ends.
 pub struct Scratch(File);
 
 impl Scratch {
-    /// Beside a file that is to be, where there must be room for about as much.
+    /// Creates one beside the file that is to be written, because that disk must have room for
+    /// about as many bytes anyway.
     ///
     /// # Errors
-    /// [`Error::Output`] for the file that is to be.
+    /// [`Error::Output`], naming the file that is to be written.
     pub fn beside(wanted: &Path) -> Result<Self> {
         let file = step(Step::Create).and_then(|()| tempfile::tempfile_in(folder(wanted)));
         file.map(Self).map_err(|e| Error::output(wanted, e))

@@ -1,11 +1,11 @@
-//! The steps of writing, each of which can be made to fail in tests.
+//! The steps of writing, each of which tests can make fail.
 
 use std::{
     fs::File,
     io::{self, Write},
 };
 
-/// What is about to be done.
+/// A step that is about to be done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Step {
     Create,
@@ -18,7 +18,7 @@ pub(crate) enum Step {
     Remove,
 }
 
-/// Asks whether a step may be done.
+/// Returns an error if the step is to fail.
 #[cfg(not(test))]
 pub(super) fn step(_: Step) -> io::Result<()> {
     Ok(())
@@ -27,10 +27,10 @@ pub(super) fn step(_: Step) -> io::Result<()> {
 #[cfg(test)]
 pub(super) use faults::step;
 
-/// By this the steps fail that a process would have done had it lived.
+/// The error of the steps that a killed process would not have reached.
 const AFTER: io::ErrorKind = io::ErrorKind::NotConnected;
 
-/// Writes; where that is to fail, half of it gets there.
+/// Writes bytes. If the step is to fail, half of them are written first.
 pub(super) fn write_step(mut file: &File, bytes: &[u8]) -> io::Result<usize> {
     if let Err(error) = step(Step::Write) {
         if error.kind() != AFTER {
@@ -41,7 +41,7 @@ pub(super) fn write_step(mut file: &File, bytes: &[u8]) -> io::Result<usize> {
     file.write(bytes)
 }
 
-/// Faults of the disk, made on purpose. They are those of the thread that asks for them.
+/// Simulated disk faults. They affect only the thread that requests them.
 #[cfg(test)]
 pub(crate) mod faults {
     use super::Step;
@@ -49,18 +49,18 @@ pub(crate) mod faults {
 
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     pub(crate) enum Fault {
-        /// One step fails, as on a full disk; those after it work.
+        /// One step fails as on a full disk; the steps after it work.
         Full,
-        /// The process is killed: neither that step nor any after it is done.
+        /// The process is killed: neither this step nor any after it is done.
         Killed,
     }
 
-    /// What another process does at a moment when it can do harm.
+    /// An action of another process at a moment when it can do harm.
     type Race = Box<dyn FnMut(&str, &Path)>;
 
     #[derive(Default)]
     struct Plan {
-        /// At which step, counted from 0.
+        /// The number of the step that fails, counted from 0.
         at: Option<(usize, Fault)>,
         done: Vec<Step>,
     }
@@ -70,12 +70,12 @@ pub(crate) mod faults {
         static RACE: RefCell<Option<Race>> = const { RefCell::new(None) };
     }
 
-    /// Lets another process act: after a file was “created”, or “locked” because it looks stale.
+    /// Lets another process act after a file was “created”, or “locked” because it looks stale.
     pub(in crate::disk) fn race(moment: &str, path: &Path) {
         RACE.with_borrow_mut(|race| race.iter_mut().for_each(|race| race(moment, path)));
     }
 
-    /// Runs something while another process acts at those moments.
+    /// Calls `run` while another process acts at those moments.
     pub(crate) fn against<T>(
         other: impl FnMut(&str, &Path) + 'static,
         run: impl FnOnce() -> T,
@@ -91,7 +91,7 @@ pub(crate) mod faults {
             let number = plan.done.len();
             plan.done.push(step);
             match plan.at {
-                // Cleaning up is what is looked at; it does not fail but where there is no process any more.
+                // The tests check the cleaning up, so removal fails only if the process is gone.
                 Some((at, Fault::Full)) if at == number && step != Step::Remove => {
                     Err(io::Error::from(io::ErrorKind::StorageFull))
                 }
@@ -102,7 +102,7 @@ pub(crate) mod faults {
         })
     }
 
-    /// Runs something with a fault; gives the steps that it came to too.
+    /// Calls `run` with a fault, and also returns the steps that it reached.
     pub(crate) fn with<T>(at: Option<(usize, Fault)>, run: impl FnOnce() -> T) -> (T, Vec<Step>) {
         PLAN.set(Plan { at, done: Vec::new() });
         let found = run();

@@ -1,4 +1,4 @@
-//! Every writer, stopped at each of its steps.
+//! Stops every writer at each of its steps.
 
 use super::{
     AtomicFile,
@@ -25,7 +25,7 @@ use std::{io::Write, path::Path};
 
 const OLD: &[u8] = b"what was there before";
 
-/// Names in a folder but those of the inputs, which begin with “in.”
+/// The names in a folder, except for inputs, whose names begin with “in.”.
 fn names(folder: &Folder) -> Vec<String> {
     let entries = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
     let mut names: Vec<_> = entries.map(|name| name.into_string().unwrap()).collect();
@@ -34,14 +34,16 @@ fn names(folder: &Folder) -> Vec<String> {
     names
 }
 
-/// Stops a writer at each of its steps, in both ways, with a file there before and without in turn; gives how often.
+/// Stops a writer at each of its steps in both ways, alternately with and without an existing file.
+/// Returns the number of stops.
 fn stop_everywhere(name: &str, writer: impl Fn(&Path) -> Result<()>) -> usize {
     let folder = Folder::new();
     let path = folder.path().join(name);
     let (done, steps) = faults::with(None, || writer(&path));
     done.unwrap();
     let new = std::fs::read(&path).unwrap();
-    // What a power cut may leave: the content gets to the disk before the name does, and the name at last.
+    // What a power cut may leave: the content must reach the disk before the name does, and the
+    // name last.
     let at = |step| steps.iter().position(|&s| s == step).unwrap();
     let last_write = steps.iter().rposition(|&step| step == Step::Write).unwrap();
     assert!(last_write < at(Step::Sync) && at(Step::Sync) < at(Step::Rename), "{name}: {steps:?}");
@@ -58,7 +60,7 @@ fn stop_everywhere(name: &str, writer: impl Fn(&Path) -> Result<()>) -> usize {
             let found = std::fs::read(&path).ok();
             if fault == Fault::Full {
                 match done {
-                    // Nothing is lost where the folder could not be synced.
+                    // Nothing is lost if the folder could not be synced.
                     Ok(()) => {
                         assert!(step == Step::SyncFolder && found.as_ref() == Some(&new), "{told}")
                     }
@@ -92,7 +94,7 @@ fn stop_everywhere(name: &str, writer: impl Fn(&Path) -> Result<()>) -> usize {
     2 * steps.len()
 }
 
-/// Whether bytes are taken for a hierarchy or a volume in bricks.
+/// Returns whether the bytes are readable as a hierarchy or a volume in bricks.
 fn is_read(name: &str, bytes: Vec<u8>) -> bool {
     let name = Path::new(name);
     match name.extension().and_then(|extension| extension.to_str()) {
@@ -118,7 +120,7 @@ fn hierarchies_are_whole_or_not_there() {
 fn hierarchies_made_in_regions_are_whole_or_not_there() {
     let inputs = Folder::new();
     let input = inputs.path().join("in.ply");
-    // Triangles as coarse as these would be cut in a great many.
+    // Triangles as coarse as these would be subdivided into very many.
     ply::write(&Mesh { triangles: Vec::new(), normals: Vec::new(), ..Mesh::sphere(4) }, &input)
         .unwrap();
     let options = ExternalOptions {
@@ -189,7 +191,7 @@ fn several_write_one_file_and_the_last_one_stays() {
     for (number, file) in files.iter_mut().enumerate() {
         write!(file, "{number}").unwrap();
     }
-    // None is taken for a leftover while it is being written.
+    // A file in progress is not taken for a leftover.
     assert_eq!(names(&folder).len(), 3);
     drop(files.remove(0));
     for (file, content) in files.into_iter().zip(["1", "2"]) {
@@ -204,7 +206,7 @@ fn what_is_there_is_left_as_it_is() {
     let folder = Folder::new();
     std::fs::create_dir(folder.path().join("a.png")).unwrap();
     for (name, message) in
-        [("a.png", "that is no file"), ("none/a.png", "a.png: cannot be written")]
+        [("a.png", "that is not a regular file"), ("none/a.png", "a.png: cannot be written")]
     {
         let error = write(&folder.path().join(name), b"new").unwrap_err();
         assert!(
@@ -213,7 +215,7 @@ fn what_is_there_is_left_as_it_is() {
         );
     }
     assert_eq!(names(&folder), ["a.png"]);
-    // What has the name of a leftover but is none, nor a file.
+    // A folder and a link that have the names of leftovers.
     let path = folder.path().join("b.txt");
     std::fs::create_dir(folder.path().join(".b.txt.0.splatkit-part")).unwrap();
     let other = folder.write("other", OLD);
@@ -224,18 +226,19 @@ fn what_is_there_is_left_as_it_is() {
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        // Who may read it does not change.
+        // The permissions do not change.
         std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o600)).unwrap();
         write(&path, b"newer").unwrap();
         assert_eq!(path.metadata().unwrap().permissions().mode() & 0o777, 0o600);
     }
-    // Names that leave no room for more.
+    // A name too long for a suffix.
     let long = folder.path().join(format!("{}.txt", "ö".repeat(120)));
     write(&long, b"new").unwrap();
     assert_eq!(std::fs::read(&long).unwrap(), b"new");
 }
 
-/// Two processes take the same leftover for stale: the slower one locks it when the faster one has made its own of that name.
+/// Two processes take the same leftover for stale. The slower one locks it after the faster one has
+/// created its own file under that name.
 #[cfg(unix)]
 #[test]
 fn a_new_part_is_not_taken_for_the_leftover_before_it() {
@@ -251,7 +254,7 @@ fn a_new_part_is_not_taken_for_the_leftover_before_it() {
                 let file = std::fs::File::options().write(true).create_new(true).open(at).unwrap();
                 file.lock().unwrap();
                 (&file).write_all(b"of another process").unwrap();
-                // Its lock is held as long as this process lives.
+                // The lock is held as long as this process lives.
                 std::mem::forget(file);
             }
             assert!(at.starts_with(wanted.parent().unwrap()));
@@ -262,7 +265,8 @@ fn a_new_part_is_not_taken_for_the_leftover_before_it() {
     assert_eq!(std::fs::read(&path).unwrap(), b"new");
 }
 
-/// A part that another process took for stale before it was locked, and replaced by its own, is not written to by its name.
+/// Another process took the temporary file for stale before it was locked, and replaced it with its
+/// own. It is not written to by name.
 #[cfg(unix)]
 #[test]
 fn a_part_that_was_replaced_is_not_used() {
@@ -283,7 +287,8 @@ fn a_part_that_was_replaced_is_not_used() {
     assert_eq!(std::fs::read(&path).unwrap(), b"new");
 }
 
-/// What is renamed is what was written: a part that another program replaced meanwhile is an error.
+/// Only what was written is renamed: if another program replaced the temporary file meanwhile, that
+/// is an error.
 #[cfg(unix)]
 #[test]
 fn a_part_that_is_replaced_while_it_is_written_is_an_error() {
@@ -311,7 +316,7 @@ fn nobody_reads_a_part_who_may_not_read_the_file() {
     let part = folder.path().join(".a.txt.0.splatkit-part");
     for mode in [0o600, 0o640, 0o400, 0o664] {
         std::fs::set_permissions(&path, std::fs::Permissions::from_mode(mode)).unwrap();
-        // From its first moment on.
+        // The permissions at creation.
         let at = part.clone();
         let first = std::rc::Rc::new(std::cell::Cell::new(0));
         let seen = first.clone();
@@ -345,7 +350,8 @@ fn links_stay_and_what_they_lead_to_is_written() {
     symlink("round.txt", &round).unwrap();
     for (link, content) in [(&one, "first"), (&two, "second")] {
         let file = AtomicFile::create(link).unwrap();
-        // Where it can be renamed: beside the target, which may be on another disk than the link.
+        // The temporary file must be where it can be renamed: beside the target, which may be on
+        // another disk than the link.
         assert_eq!(names(&folder).len(), 4);
         assert_eq!(names(&other), [".target.txt.0.splatkit-part", "target.txt"]);
         drop(file);
@@ -365,7 +371,8 @@ fn links_stay_and_what_they_lead_to_is_written() {
     assert_eq!(names(&other), ["target.txt"]);
 }
 
-/// Several writers of one file, some of which begin where others are killed: each ends well, and the file is a whole one.
+/// Several threads write one file at once. Each write succeeds, and a reader always finds a whole
+/// file.
 #[test]
 fn writers_at_once_leave_a_whole_file() {
     let folder = Folder::new();

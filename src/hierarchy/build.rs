@@ -1,4 +1,4 @@
-//! From splats to a tree of them.
+//! Builds a tree from splats.
 
 use super::{
     Block, Node, Tree,
@@ -19,7 +19,7 @@ use std::{
     sync::atomic::{AtomicU64, Ordering},
 };
 
-/// How much time building may take for how good a tree.
+/// Trades the time of building against the quality of the tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Preset {
     Fastest,
@@ -30,17 +30,17 @@ pub enum Preset {
     Best,
 }
 
-/// How a tree is built.
+/// Options for building a tree.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BuildOptions {
     pub preset: Preset,
     /// See [`Tree::closed`].
     pub closed: bool,
-    /// Points of the source; the number of splats where `None`.
+    /// Points in the source; `None` for the number of splats.
     pub source_points: Option<u64>,
-    /// Splats of a block; larger sets become several blocks.
+    /// Splats in a block. Larger sets become several blocks.
     pub block_splats: usize,
-    /// When the hierarchy must be built.
+    /// The moment by which the hierarchy must be built.
     pub deadline: Deadline,
 }
 
@@ -56,18 +56,19 @@ impl Default for BuildOptions {
     }
 }
 
-/// Told of each finished part: how many splats have been built into blocks, of how many.
+/// Called after each finished part, with the splats built into blocks so far and the total.
 pub type Watch<'a> = &'a (dyn Fn(u64, u64) + Sync);
 
 impl Tree {
-    /// Builds the tree of a set of splats that carry radiance. The same set gives the same tree.
+    /// Builds the tree of a set of radiance splats. The same set gives the same tree.
     ///
     /// # Errors
-    /// Those of [`check_splats`]; [`Error::Timeout`] after the deadline; [`Error::Memory`] where there is too little.
+    /// Those of [`check_splats`]; [`Error::Timeout`] after the deadline; [`Error::Memory`] if there
+    /// is too little memory.
     pub fn build(set: &SplatSet, options: &BuildOptions, watch: Watch<'_>) -> Result<Self> {
         let _span = tracing::info_span!("build").entered();
         check_splats(set)?;
-        // A set has up to a fourth more nodes than leaves.
+        // There are at most a quarter more nodes than leaves.
         let nodes = (set.splats.len() * size_of::<Node>()) as u64 / 4 * 5;
         memory::room(WORK, nodes + order_bytes(set) + at_work(options.block_splats))?;
         let parts = partition::blocks(&set.splats, options.block_splats.max(64));
@@ -103,10 +104,12 @@ impl Tree {
     }
 }
 
-/// Builds the tree of a set and writes it, a few blocks at a time, so that no more of it is in memory.
+/// Builds the tree of a set and writes it a few blocks at a time, so that only these blocks are in
+/// memory.
 ///
 /// # Errors
-/// Those of [`Tree::build`], and [`Error::Output`] where the file cannot be written; then there is none.
+/// Those of [`Tree::build`], and [`Error::Output`] if the file cannot be written; then there is no
+/// file.
 pub fn build_file(
     set: &SplatSet,
     path: &Path,
@@ -139,25 +142,26 @@ pub fn build_file(
     })
 }
 
-/// What errors call the work of this module.
+/// The name of this module's work in errors.
 pub(crate) const WORK: &str = "building the hierarchy";
 
-/// Bytes in which splats are put in order.
+/// Bytes needed to sort the splats.
 fn order_bytes(set: &SplatSet) -> u64 {
     24 * set.splats.len() as u64
 }
 
-/// Bytes of the blocks at work at once: for each splat its box, the pairs above it, nodes, and what is written of them.
+/// Bytes needed by the blocks that are built at once: the box of each splat, the pairs above it,
+/// its nodes, and their encoded form.
 pub(crate) fn at_work(block_splats: usize) -> u64 {
     const OF_SPLAT: u64 = 600;
     let blocks = 2 * rayon::current_num_threads() as u64;
     blocks.saturating_mul(OF_SPLAT).saturating_mul(block_splats.max(64) as u64)
 }
 
-/// Writes blocks as they come, and joins them at the end.
+/// Writes blocks as they arrive, and joins them at the end.
 pub(crate) struct Builder {
     writer: Writer,
-    /// What holds all leaves.
+    /// A sphere around all leaves.
     pub outer: Sphere,
     preset: Preset,
     roots: Vec<Node>,
@@ -189,7 +193,7 @@ impl Builder {
     }
 }
 
-/// The block of some splats of a set; its root's sphere lies in `outer`.
+/// Builds the block of the splats with the indices `part`. Its root's sphere lies in `outer`.
 pub(crate) fn block_of(set: &SplatSet, part: &[u32], preset: Preset, outer: Sphere) -> Block {
     let splat = |i: u32| &set.splats[part[i as usize] as usize];
     let measures = Measures::of(&set.splats, part);
@@ -202,7 +206,8 @@ pub(crate) fn block_of(set: &SplatSet, part: &[u32], preset: Preset, outer: Sphe
     block
 }
 
-/// The block above the roots of others, all of which lie in `outer`, and the place of each root's portal in it.
+/// Builds the block above the roots of other blocks, all of which lie in `outer`. Also returns the
+/// index of each root's portal in it.
 pub(crate) fn join(roots: &[Node], preset: Preset, outer: Sphere) -> (Block, Vec<u32>) {
     let boxes: Vec<_> = roots.iter().map(|root| box_of(&root.splat)).collect();
     let leaf = |i: u32| Node { children: 0, first_child: 0, ..roots[i as usize] };
@@ -219,15 +224,16 @@ pub(crate) fn join(roots: &[Node], preset: Preset, outer: Sphere) -> (Block, Vec
     (block, portals)
 }
 
-/// Places and shapes up to this can be merged: masses have their squares times optical
-/// depths, and sums of many must fit in 32 bits.
+/// The largest coordinate and factor element that can be merged. Masses are their squares times
+/// optical depths, and sums of many masses must fit in 32 bits.
 const FARTHEST: f32 = 1e9;
 
-/// Whether a hierarchy can be built of splats.
+/// Checks that a hierarchy can be built of the splats.
 ///
 /// # Errors
-/// [`Error::Argument`] for splats that are no finite numbers, of more than 32 bits can add up, or of an optical depth above
-/// [`MOST_OPTICAL_DEPTH`](Splat::MOST_OPTICAL_DEPTH), and for samples; [`Error::NothingToDraw`] where there are none.
+/// [`Error::Argument`] if values are not finite, or too large to be added up in 32 bits; if an
+/// optical depth is above [`MOST_OPTICAL_DEPTH`](Splat::MOST_OPTICAL_DEPTH); and for samples.
+/// [`Error::NothingToDraw`] if there are no splats.
 pub fn check_splats(set: &SplatSet) -> Result<()> {
     if set.payload != Payload::Radiance {
         return Err(Error::Argument(
@@ -246,7 +252,7 @@ pub fn check_splats(set: &SplatSet) -> Result<()> {
     }
     if u32::try_from(set.splats.len()).is_err() {
         return Err(Error::Argument(
-            "a set holds more splats than 32 bits can name; build it in blocks".into(),
+            "a set contains more splats than 32 bits can number; build it in blocks".into(),
         ));
     }
     if !set.origin.is_finite() {
@@ -263,10 +269,11 @@ pub fn check_splats(set: &SplatSet) -> Result<()> {
     if let Some(index) = set.splats.par_iter().position_first(|splat| !is_sound(splat)) {
         let Splat { center, strength, factor, .. } = set.splats[index];
         let message = format!(
-            "splat {index} at {center:?}, of factor {factor:?} and optical depth {strength}"
+            "splat {index} at {center:?} with factor {factor:?} and optical depth {strength}"
         );
         return Err(Error::Argument(format!(
-            "{message}: places and shapes up to {FARTHEST:e} and optical depths from 0 to {most:e} can be merged"
+            "{message}: only coordinates and shapes up to {FARTHEST:e}, and optical depths from 0 \
+             to {most:e}, can be merged"
         )));
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! Which nodes become siblings: pairs found by obvhs, joined to groups of up to eight.
+//! Which nodes become siblings: pairs found by obvhs, joined into groups of up to eight.
 
 use super::{
     Block, MOST_CHILDREN, Node, Preset,
@@ -13,9 +13,11 @@ use obvhs::{
 };
 use std::{borrow::Cow, collections::HashMap};
 
-/// The block above leaves that have these boxes: every node but for its sphere. `leaf` makes the leaf of a box. There is at
-/// least one; the root is one only where it is the only one. `mass` tells the mass of a leaf. Also tells which box is behind each
-/// leaf.
+/// Builds the block above leaves with these boxes, of which there is at least one. All nodes are
+/// complete except for their spheres. The root is a leaf only if there is a single box.
+///
+/// `leaf` and `mass` return the leaf and the mass for a box. The second result is the index of the
+/// box for each leaf.
 pub(super) fn cluster(
     boxes: &[Aabb],
     leaf: impl Fn(u32) -> Node,
@@ -29,7 +31,7 @@ pub(super) fn cluster(
     let groups = groups(&pairs);
     let room = boxes.len() + boxes.len() / 4;
     let mut nodes: Vec<Node> = Vec::with_capacity(room);
-    // The pair behind each node, breadth first.
+    // The pair for each node, breadth first.
     let mut order = Vec::with_capacity(room);
     order.push(0u32);
     let blank = leaf(0);
@@ -51,7 +53,7 @@ pub(super) fn cluster(
                     nodes.push(leaf(source));
                     sources.push(source);
                 } else {
-                    // Its place is taken by what is made below.
+                    // A placeholder until the node is merged below.
                     nodes.push(blank);
                     sources.push(0);
                 }
@@ -75,20 +77,23 @@ pub(super) fn cluster(
     (Block { nodes, portal: None }, sources)
 }
 
-/// The box by which a splat finds its neighbours: its place counts, and its size where sizes differ; whole footprints
-/// overlap too much to tell neighbours.
+/// The box by which a splat finds its neighbours. Its position counts, and its size where sizes
+/// differ. Whole footprints overlap too much to distinguish neighbours.
 pub(super) fn box_of(splat: &Splat) -> Aabb {
     let [xx, _, _, yy, _, zz] = covariance(&splat.factor);
     let (center, reach) = (Vec3::from(splat.center), 0.5 * WIDTH * (0.5 * (xx + yy + zz)).sqrt());
     Aabb::new((center - reach).into(), (center + reach).into())
 }
 
-/// Boxes of one place and size are set apart where there are many of them: a search for the nearest finds all the same there,
-/// and would join one pair in a round, so that the hierarchy became a chain. In the row that they make, halves of halves are
-/// ever nearer to each other.
+/// Separates boxes with the same position and size if there are many of them. A nearest-neighbour
+/// search cannot distinguish them; it would join one pair in each round, and the hierarchy would
+/// become a chain.
+///
+/// They are placed in a row, spaced so that the members of each half, quarter and so on are nearer
+/// to each other than to the rest.
 fn apart(boxes: &[Aabb]) -> Cow<'_, [Aabb]> {
     let mut keys: Vec<u64> = boxes.iter().map(|own| mixed(key(own))).collect();
-    // Where few have the same first bits, fewer have all of them.
+    // If few keys share their first bits, even fewer are equal.
     let mut counts = vec![0u8; 1 << BUCKET_BITS];
     let most = keys.iter().fold(0, |most: u8, key| {
         let count = &mut counts[(key >> (u64::BITS - BUCKET_BITS)) as usize];
@@ -111,7 +116,7 @@ fn apart(boxes: &[Aabb]) -> Cow<'_, [Aabb]> {
             (0..u64::BITS - before.leading_zeros()).map(|level| (*before >> level) << level).sum();
         *before += 1;
         let width = (own.max.x - own.min.x) / 1024.0;
-        // Far from the origin numbers of 32 bits are wider than that.
+        // Far from the origin, the spacing of 32-bit numbers is wider than that.
         let step = width.max(own.max.x.abs().max(own.min.x.abs()) * 2f32.powi(-22));
         let shift = Vec3::X * (step * place as f32);
         Aabb::new((Vec3::from(own.min) + shift).into(), (Vec3::from(own.max) + shift).into())
@@ -119,9 +124,9 @@ fn apart(boxes: &[Aabb]) -> Cow<'_, [Aabb]> {
     Cow::Owned(boxes.iter().map(set_apart).collect())
 }
 
-/// So many equal boxes do no harm.
+/// The maximum number of equal boxes that does no harm.
 const MOST_ALIKE: usize = 32;
-/// Buckets in which boxes are counted.
+/// Bits of a key that choose its bucket, in which keys are counted.
 const BUCKET_BITS: u32 = 15;
 
 /// All bits of a box.
@@ -130,14 +135,14 @@ fn key(own: &Aabb) -> [u32; 6] {
         .map(|value| (value + 0.0).to_bits())
 }
 
-/// The bits in one number (Knuth 1973: by the golden ratio).
+/// Hashes the bits into one number (Knuth 1973: by the golden ratio).
 fn mixed(key: [u32; 6]) -> u64 {
     key.iter().fold(0, |sum: u64, &part| {
         (sum.rotate_left(21) ^ u64::from(part)).wrapping_mul(0x9e37_79b9_7f4a_7c15)
     })
 }
 
-/// A binary hierarchy over the leaves' boxes.
+/// Builds a binary hierarchy over the boxes of leaves.
 fn pairs(boxes: &[Aabb], preset: Preset) -> Bvh2 {
     let (distance, threshold) = match preset {
         Preset::Fastest => (PlocSearchDistance::Minimum, 0),
@@ -150,9 +155,11 @@ fn pairs(boxes: &[Aabb], preset: Preset) -> Bvh2 {
     PlocBuilder::new().build(distance, boxes, indices, SortPrecision::U64, threshold)
 }
 
-/// Which inner nodes of the binary hierarchy stay nodes: bottom-up, two pairs join while they hold at most eight items
-/// together; else both are closed, and count as one item each from then on. (Closing small ones would waste nodes, so a pair
-/// of one or two items stays open.)
+/// Decides which inner nodes of the binary hierarchy remain nodes. Bottom-up, two pairs join while
+/// they contain at most eight items together. Otherwise both are closed, and count as one item each
+/// from then on.
+///
+/// Closing small pairs would waste nodes, so a pair of one or two items stays open where it can.
 fn groups(pairs: &Bvh2) -> Vec<bool> {
     let mut items = vec![1u8; pairs.nodes.len()];
     let mut closed = vec![false; pairs.nodes.len()];
@@ -193,7 +200,7 @@ fn post_order(pairs: &Bvh2) -> Vec<u32> {
     order
 }
 
-/// The items of a closed pair, in order.
+/// Collects the items of a closed pair, in order.
 fn gather(pairs: &Bvh2, closed: &[bool], at: usize, items: &mut Vec<u32>) {
     let first = pairs.nodes[at].first_index;
     for half in [first, first + 1] {
@@ -210,7 +217,7 @@ mod tests {
     use super::*;
     use crate::splat::NO_NORMAL;
 
-    /// Levels below the root.
+    /// The number of levels below the root.
     fn depth(nodes: &[Node]) -> u32 {
         let mut heights = vec![0; nodes.len()];
         for (index, node) in nodes.iter().enumerate().rev().filter(|(_, node)| !node.is_leaf()) {

@@ -1,10 +1,13 @@
-//! Cuts: which nodes stand for the rest in a view.
+//! Cuts: which nodes are drawn in a view, in place of all those below them.
 //!
-//! Every node decides for itself, by its own bounds and its parent's, so that a cut needs no walk from the root: a node is
-//! drawn where its parent is refined and it is not. How far a node is refined is a number from 0 to 1 that grows with its
-//! size in the picture; it never is larger than its parent's, because neither its size nor its nearness is. A node's share in
-//! the picture is its parent's number less its own. Along every way from the root to a leaf the shares add up to one: a node
-//! fades out while its children fade in, and nothing pops.
+//! Every node decides for itself, by its own bounds and its parent's, so a cut needs no walk from
+//! the root. A node is drawn if its parent is refined and the node itself is not. Its refinement is
+//! a number from 0 to 1 that grows with its size in the picture. It never exceeds the parent's,
+//! because a node is neither larger nor nearer than its parent.
+//!
+//! A node's share in the picture is its parent's refinement minus its own. Along every path from
+//! the root to a leaf the shares add up to one. A node fades out while its children fade in, and
+//! nothing pops.
 
 use super::{
     Block, Node, Tree,
@@ -18,21 +21,22 @@ use crate::{
 use glam::{DMat3, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
-/// How fine a hierarchy is drawn.
+/// The level of detail at which a hierarchy is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Detail {
-    /// No splat is wider than this many pixels (at half the height of its footprint, see [`Node::size`]), but leaves; 0 draws
-    /// the leaves.
+    /// No splat except a leaf is wider than this many pixels (full width at half maximum of its
+    /// footprint, see [`Node::size`]). 0 draws the leaves.
     Pixels(f64),
-    /// About as many splats as this, of all hierarchies together; as fine as they suffice for.
+    /// As fine as about this many splats allow, counted over all hierarchies together.
     Splats(u64),
-    /// Frames take about as many milliseconds as this while the camera moves; when it rests, each is finer than the last.
+    /// Frames take about this many milliseconds while the camera moves. While it rests, each frame
+    /// is finer than the last.
     Milliseconds(f64),
 }
 
 impl Detail {
-    /// The cut where none is told: finer ones draw two to four times as many splats, and come at most 0.4 dB nearer to what
-    /// many rays a pixel show (docs/hierarchy.md, section 5).
+    /// The default cut. Finer ones draw two to four times as many splats, and come at most 0.4 dB
+    /// nearer to a picture of many rays a pixel (docs/hierarchy.md, section 5).
     pub const PIXELS: f64 = 2.0;
 }
 
@@ -42,41 +46,46 @@ impl Default for Detail {
     }
 }
 
-/// Nodes between the cut's size and this many times it are refined in part.
+/// Nodes between the cut's width and this many times that width are partly refined.
 pub const BLEND_BAND: f32 = 1.5;
 
-/// Shares are counted in parts of this.
+/// Shares are integers in units of one over this.
 pub const SHARE_UNIT: u32 = 1023;
 
-/// Sizes in pixels are kept between these, so that their quotients are finite.
+/// Bounds on sizes in pixels, so that their quotients are finite.
 const LEAST_PIXELS: f64 = 1e-9;
 pub(crate) const MOST_PIXELS: f32 = 1e9;
 
-/// Normals within a splat turn: a node counts as facing away only where its cone is turned away by this angle more.
+/// Normals vary within a splat, so a node counts as facing away only if its cone is turned away by
+/// this additional angle.
 const CONE_MARGIN_DEGREES: f64 = 25.0;
 
-/// A cut of one hierarchy in one view. All in 32 bits, as on the GPU, which does the same (shaders/cut.wgsl).
+/// A cut of one hierarchy in one view. Everything is in 32 bits, as on the GPU, which computes the
+/// same (shaders/cut.wgsl).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cut {
-    /// Columns of the turn from the hierarchy's frame to view space, and the view-space place of its origin.
+    /// Columns of the rotation from the hierarchy's frame to view space, and the view-space
+    /// position of its origin.
     pub(crate) axes: [Vec3; 3],
     pub(crate) origin: Vec3,
     pub(crate) perspective: bool,
-    /// Pixels per world unit, at distance 1 in perspective.
+    /// Pixels per world unit, in perspective at distance 1.
     pub(crate) scale: f32,
-    /// One over the pixels that a splat may be wide; so large for leaves that nothing else is fine enough.
+    /// One over the allowed width of a splat in pixels. To draw the leaves, it is so large that
+    /// nothing else is fine enough.
     pub(crate) fineness: f32,
-    /// Whether what faces away is left out.
+    /// Whether nodes that face away are culled.
     pub(crate) culls: bool,
-    /// The picture's four sides: a view-space sphere at c of radius r is outside where n·c + d < −r.
+    /// The picture's four sides. A view-space sphere with centre c and radius r is outside if n·c +
+    /// d < −r.
     pub(crate) sides: [Vec4; 4],
 }
 
 impl Cut {
-    /// The cut of a hierarchy around `origin` at so many `pixels`.
+    /// Creates the cut of a hierarchy around `origin` at a width of `pixels`.
     pub fn new(view: &View, origin: DVec3, pixels: f64, culls: bool) -> Self {
         let DMat3 { x_axis, y_axis, z_axis } = view.rotation;
-        // A pixel on every side for footprints' widening.
+        // The margin of one pixel covers the widening of footprints.
         let sides = view.sides(1.0).map(|(normal, reach)| normal.extend(reach).as_vec4());
         Self {
             axes: [x_axis, y_axis, z_axis].map(|axis| axis.as_vec3()),
@@ -93,7 +102,8 @@ impl Cut {
         self.axes[0] * place[0] + self.axes[1] * place[1] + self.axes[2] * place[2] + self.origin
     }
 
-    /// How wide a splat of this size looks, in pixels, from the nearest point of a sphere.
+    /// Returns the width in pixels of a splat with the sphere's size, seen from the nearest point
+    /// of the sphere.
     pub fn pixels(&self, sphere: &CutSphere) -> f32 {
         if self.perspective {
             let nearest = self.to_view(sphere.center).length() - sphere.radius;
@@ -103,19 +113,19 @@ impl Cut {
         }
     }
 
-    /// The same as a multiple of what the cut allows.
+    /// Returns that width as a multiple of the cut's.
     pub(super) fn widths(&self, sphere: &CutSphere) -> f32 {
         self.pixels(sphere) * self.fineness
     }
 
-    /// How far what has this sphere is refined, in parts of [`SHARE_UNIT`].
+    /// Returns the refinement of a node with these bounds, in units of 1/[`SHARE_UNIT`].
     pub fn refinement(&self, sphere: &CutSphere) -> u32 {
         let excess = (self.widths(sphere) - 1.0) / (BLEND_BAND - 1.0);
         (excess.clamp(0.0, 1.0) * SHARE_UNIT as f32 + 0.5) as u32
     }
 
-    /// The share of a node in the picture, in parts of [`SHARE_UNIT`]; `parent` is `None` for the root. `has_children`: they
-    /// could be drawn instead.
+    /// Returns the share of a node in the picture, in units of 1/[`SHARE_UNIT`]. `parent` is `None`
+    /// for the root. `has_children` says whether children could be drawn instead.
     pub fn share(&self, node: &Node, parent: Option<&CutSphere>, has_children: bool) -> u32 {
         let above = parent.map_or(SHARE_UNIT, |parent| self.refinement(parent));
         if above == 0 {
@@ -125,9 +135,10 @@ impl Cut {
         if above <= own || self.is_hidden(node) { 0 } else { above - own }
     }
 
-    /// Whether nothing of a node's splat can be seen: it is beside the picture, or faces away.
+    /// Returns whether nothing of a node's splat is visible: it is outside the picture, or faces
+    /// away.
     pub(super) fn is_hidden(&self, node: &Node) -> bool {
-        // A merged footprint may reach beyond what it stands for.
+        // A merged footprint may reach beyond the splats that it replaces.
         let reach = node.radius + 1.3 * node.size;
         let center = self.to_view(node.splat.center);
         if self.is_outside(center, reach) {
@@ -148,22 +159,24 @@ impl Cut {
         faces_away(axis.dot(toward), node.cone, near)
     }
 
-    /// Whether a sphere is beside the picture or behind the eye.
+    /// Returns whether a view-space sphere is outside the picture or behind the eye.
     pub fn is_outside(&self, center: Vec3, radius: f32) -> bool {
         self.sides.iter().any(|side| side.truncate().dot(center) + side.w < -radius)
             || (self.perspective && center.z < -radius)
     }
 
-    /// Whether something with a parent in these bounds may be drawn: a sphere that holds all the parents' spheres, and the
-    /// largest of their sizes. May say yes too often, never no too often.
+    /// Returns whether a node may be drawn if its parent lies within these bounds: a sphere around
+    /// all the parents' spheres, and their largest size. May return true too often, but never false
+    /// too often.
     pub fn may_refine(&self, parents: &CutSphere) -> bool {
         let reach = parents.radius + 1.3 * parents.size;
         self.refinement(parents) > 0 && !self.is_outside(self.to_view(parents.center), reach)
     }
 }
 
-/// Whether all normals of a cone (cosine `cone` of its half-angle) around an axis face away: `along` is the cosine between
-/// axis and view, `near` the sine of the angle that the sphere takes up.
+/// Returns whether all normals of a cone face away. `along` is the cosine between the cone's axis
+/// and the view direction. `cone` is the cosine of its half-angle. `near` is the sine of the
+/// angular radius of the node's sphere.
 fn faces_away(along: f32, cone: f32, near: f32) -> bool {
     let (sin_margin, cos_margin) = cone_margin();
     if along <= 0.0 || near >= 1.0 {
@@ -171,7 +184,7 @@ fn faces_away(along: f32, cone: f32, near: f32) -> bool {
     }
     let cos_near = (1.0 - near * near).sqrt();
     let sin_cone = (1.0 - cone * cone).max(0.0).sqrt();
-    // Cosine and sine of cone + near + margin.
+    // Cosine and sine of cone + near, then of cone + near + margin.
     let (c, s) = (cone * cos_near - sin_cone * near, sin_cone * cos_near + cone * near);
     let (c, s) = (c * cos_margin - s * sin_margin, s * cos_margin + c * sin_margin);
     c > 0.0 && along >= s
@@ -184,14 +197,15 @@ pub(crate) fn cone_margin() -> (f32, f32) {
 }
 
 impl Tree {
-    /// The splats of a cut, each with its share of its optical depth, in the order of the nodes. The whole tree is looked
-    /// through: this is the oracle of what the engine selects.
+    /// Returns the splats of a cut in the order of the nodes, each with its share of its optical
+    /// depth. This visits the whole tree: it is the oracle for the engine's selection.
     ///
-    /// A number of splats is kept to as by the engine, by cuts an eighth of an octave apart; a frame time is not known here,
-    /// and taken for the usual cut.
+    /// A splat budget is kept the way the engine keeps it, by cuts an eighth of an octave apart.
+    /// The time of a frame is not known here, so [`Detail::Milliseconds`] draws the default cut.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a tree whose nodes are not in order, as [`Block`](super::Block) tells.
+    /// [`Error::Argument`] if the nodes of the tree are not in the order that
+    /// [`Block`](super::Block) requires.
     pub fn cut(
         &self,
         view: &View,
@@ -221,7 +235,7 @@ impl Tree {
         Ok(self.at_cut(&cut))
     }
 
-    /// The splats of a cut, as those of [`Self::cut`], of a tree whose nodes are in order.
+    /// Returns the splats of a cut, as [`Self::cut`] does, of a tree whose nodes are in order.
     pub(super) fn at_cut(&self, cut: &Cut) -> SplatSet {
         let splats =
             self.selected(cut).iter().map(|(node, share)| faded(&node.splat, *share)).collect();
@@ -234,10 +248,11 @@ impl Tree {
         }
     }
 
-    /// The nodes of a cut, with their shares in parts of [`SHARE_UNIT`].
+    /// Returns the nodes of a cut with their shares in units of 1/[`SHARE_UNIT`].
     ///
     /// # Panics
-    /// Where the nodes of a block are not in order, as [`cut`](Self::cut) finds out and [`validate`](super::validate()) tells.
+    /// If the nodes of a block are not in order. [`cut`](Self::cut) returns an error for such
+    /// trees, and [`validate`](super::validate()) a finding.
     pub fn selected(&self, cut: &Cut) -> Vec<(&Node, u32)> {
         let own = self
             .blocks
@@ -247,7 +262,7 @@ impl Tree {
         own.collect::<Vec<_>>().concat()
     }
 
-    /// Those of one block.
+    /// The selected nodes of one block.
     fn selected_of<'a>(
         &'a self,
         index: usize,
@@ -261,7 +276,7 @@ impl Tree {
             top.nodes.iter().find(holds).map(CutSphere::of)
         });
         if above.is_some_and(|above| cut.refinement(&above) == 0) {
-            // Nothing below is refined further than what is above.
+            // No node below is refined further than the parent of its root.
             return Vec::new();
         }
         let mut parents: Vec<Option<CutSphere>> = vec![None; block.nodes.len()];
@@ -272,7 +287,7 @@ impl Tree {
         parents[0] = above;
         let mut selected = Vec::new();
         for (node, parent) in block.nodes.iter().zip(&parents) {
-            // The root of its block stands in a portal's place.
+            // A portal is replaced by the root of its block.
             let is_portal = self.is_joined() && index == 0 && node.is_leaf();
             let share =
                 if is_portal { 0 } else { cut.share(node, parent.as_ref(), !node.is_leaf()) };
@@ -284,7 +299,7 @@ impl Tree {
     }
 }
 
-/// A node's splat with only a share of its optical depth.
+/// Returns a node's splat with its share of the optical depth.
 pub(crate) fn faded(splat: &Splat, share: u32) -> Splat {
     Splat { strength: splat.strength * (share as f32 / SHARE_UNIT as f32), ..*splat }
 }

@@ -1,4 +1,4 @@
-//! The finest level alone.
+//! The finest level on its own.
 
 use super::Hierarchy;
 use crate::{
@@ -8,13 +8,14 @@ use crate::{
 use rayon::prelude::*;
 
 impl Hierarchy {
-    /// The splats of the finest level, page by page: what the hierarchy was built of, as its file keeps them.
+    /// Returns the splats of the finest level, page by page: those that the hierarchy was built
+    /// from, as stored in its file.
     ///
     /// # Errors
     /// Those of [`read_tree`](Self::read_tree), and [`Error::Memory`](crate::Error::Memory).
     pub fn leaves(&self) -> Result<SplatSet> {
         self.check_size()?;
-        // Page by page, and as a whole.
+        // Once page by page, and once joined.
         memory::room(
             "reading the splats of the finest level",
             2 * size_of::<Splat>() as u64 * self.header().leaves,

@@ -1,6 +1,7 @@
-//! Levels of detail of splats that come without a hierarchy, as raw meshes and clouds do. Where most of them are far smaller
-//! than what a picture can show, it takes fewer: of splats that carry colour a cut of a tree that is built in memory, once; of
-//! scattered samples one for each cell of a grid.
+//! Levels of detail for splats without a hierarchy, such as those of raw meshes and point clouds.
+//! If most of them are far smaller than a picture can show, fewer are drawn. Splats with colour are
+//! drawn as a cut of a tree, built once in memory; scattered samples are merged, one for each cell
+//! of a grid.
 
 use super::{
     BuildOptions, Cut, Node, Preset, Tree, check_splats, file::CutSphere, merge::leaf,
@@ -13,38 +14,39 @@ use crate::{
 use glam::DVec3;
 use std::sync::Arc;
 
-/// Fewer splats than this are drawn as fast as a tree of them is built.
+/// Fewer splats than this are drawn as fast as their tree is built.
 const FEWEST: usize = 1 << 17;
-/// Splats of a set that are measured to decide whether a cut pays.
+/// Splats of a set that are measured to decide whether a cut is worthwhile.
 const PROBES: usize = 1 << 12;
-/// A splat is fine where it is narrower than this part of what a cut allows. Over a surface, one node of the cut then stands for
-/// sixteen of them or more.
+/// A splat is fine if it is narrower than this fraction of the cut's width. On a surface, one node
+/// of the cut then stands for sixteen splats or more.
 const FINE: f32 = 0.25;
-/// The edge of a cell of samples as a part of what a cut allows: as of bricks, a sample counts as two steps wide.
+/// The edge of a cell of samples as a fraction of the cut's width. As with bricks, a sample counts
+/// as two steps wide.
 const CELL: f64 = 0.5;
 
-/// A set of splats, and what was made of it for pictures.
+/// A set of splats, and the smaller sets derived from it.
 #[derive(Debug)]
 pub struct Levels {
     set: Arc<SplatSet>,
     probes: Vec<Node>,
-    /// Splats of the set that each probe stands for.
+    /// The number of splats in the set for each probe.
     each: usize,
     fewer: Fewer,
 }
 
-/// What stands for the set where it is too fine.
+/// What is drawn in place of the set if it is too fine.
 #[derive(Debug)]
 enum Fewer {
     Nothing,
     Tree(Tree),
-    /// Samples merged in cells of an edge of 2 to this power.
+    /// Samples merged in cells whose edge is 2 to this power.
     Cells(i32, Arc<SplatSet>),
 }
 
 impl Levels {
-    /// `None` for sets that are drawn as they are: they are small, a tree of them cannot be built, or it would take half of
-    /// the memory that there is.
+    /// Returns `None` for sets that are drawn as they are. They are small, or no tree can be built
+    /// of them, or a tree would take half of the available memory.
     pub fn new(set: &Arc<SplatSet>) -> Option<Self> {
         let count = set.splats.len();
         let bytes = 2 * (count * size_of::<Node>()) as u64;
@@ -53,17 +55,17 @@ impl Levels {
             return None;
         }
         let each = count.div_ceil(PROBES);
-        // Samples have no normals, but only their places and widths are looked at.
+        // Samples have no normals, but only the positions and widths of probes are used.
         let probes = set.splats.iter().step_by(each).map(|splat| leaf(splat, set.extent)).collect();
         Some(Self { set: set.clone(), probes, each, fewer: Fewer::Nothing })
     }
 
-    /// What the set's places count from.
+    /// The origin of the set's positions.
     pub fn origin(&self) -> DVec3 {
         self.set.origin
     }
 
-    /// The set that a cut draws: the whole one, or what stands for it.
+    /// Returns the set to draw for a cut: the whole set, or a smaller one in its place.
     ///
     /// # Errors
     /// Those of [`Tree::build`].
@@ -105,7 +107,7 @@ impl Levels {
         set
     }
 
-    /// Whether most of the splats in view are fine, and they are many.
+    /// Returns whether most of the splats in view are fine, and there are many of them.
     fn pays(&self, cut: &Cut) -> bool {
         let (mut seen, mut fine) = (0, 0);
         for probe in self.probes.iter().filter(|probe| !cut.is_hidden(probe)) {
@@ -160,7 +162,7 @@ mod tests {
         let few = count(&mut levels, 40, 2.0);
         assert!(few < 4000, "{few}");
         assert!(count(&mut levels, 1, 2.0) < 40);
-        // Leaves were asked for.
+        // A cut of 0 draws the leaves.
         assert_eq!(count(&mut levels, 40, 0.0), set.splats.len());
         assert!(Levels::new(&grid(300)).is_none());
     }

@@ -1,5 +1,5 @@
-//! What building asks of every leaf, eight splats at once. All sums and products are those of [`merge`](super::merge), in the
-//! same order, so that a splat has the same measures either way, to the last bit.
+//! Measures of all leaves, eight splats at once. All sums and products are those of
+//! [`merge`](super::merge), in the same order, so both give the same measures to the last bit.
 
 use super::{
     Node,
@@ -12,28 +12,28 @@ use obvhs::aabb::Aabb;
 
 type Lanes<S> = f32x8<S>;
 
-/// What is known of a splat before its node is.
+/// The measures of a splat from which its node is made.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Measures {
     /// The largest standard deviation.
     sigma: f32,
-    /// As of [`Mass`].
+    /// As in [`Mass`].
     area: f32,
-    /// How far the box reaches by which the splat finds its neighbours.
+    /// How far the splat's box extends from its centre. Boxes are used to find neighbours.
     reach: f32,
-    /// As of [`Node`].
+    /// As in [`Node`].
     cone: f32,
 }
 
 impl Measures {
-    /// Those of the splats of these numbers.
+    /// Measures the splats with the indices `numbers`.
     pub fn of(splats: &[Splat], numbers: &[u32]) -> Vec<Self> {
         let mut out = vec![Self::default(); numbers.len()];
         dispatch!(Level::new(), simd => all(simd, splats, numbers, &mut out));
         out
     }
 
-    /// As [`merge::leaf`](super::merge::leaf).
+    /// The same as [`merge::leaf`](super::merge::leaf).
     pub fn leaf(&self, splat: &Splat, extent: f32) -> Node {
         Node {
             splat: *splat,
@@ -46,12 +46,12 @@ impl Measures {
         }
     }
 
-    /// As [`Mass::of`].
+    /// The same as [`Mass::of`].
     pub fn mass(&self, splat: &Splat) -> Mass {
         Mass::with(splat, self.area, covariance(&splat.factor))
     }
 
-    /// As [`cluster::box_of`](super::cluster::box_of).
+    /// The same as [`cluster::box_of`](super::cluster::box_of).
     pub fn box_of(&self, splat: &Splat) -> Aabb {
         let center = Vec3::from(splat.center);
         Aabb::new((center - self.reach).into(), (center + self.reach).into())
@@ -79,7 +79,7 @@ fn all<S: Simd>(simd: S, splats: &[Splat], numbers: &[u32], out: &mut [Measures]
     }
 }
 
-/// Standard deviation, area, reach and cone.
+/// Returns standard deviation, area, reach and cone.
 #[inline(always)]
 fn measures<S: Simd>(simd: S, factor: &[[f32; 8]; 6], normal: &[[f32; 8]; 2]) -> [[f32; 8]; 4] {
     let number = |value: f32| Lanes::splat(simd, value);
@@ -124,7 +124,8 @@ fn measures<S: Simd>(simd: S, factor: &[[f32; 8]; 6], normal: &[[f32; 8]; 2]) ->
     [sigma.into(), area.into(), reach.into(), cone.into()]
 }
 
-/// As [`decode_normal`](crate::splat::decode_normal), of the parts of packed normals.
+/// The same as [`decode_normal`](crate::splat::decode_normal), for the components of packed
+/// normals.
 #[inline(always)]
 fn unpacked<S: Simd>(simd: S, normal: &[[f32; 8]; 2]) -> [Lanes<S>; 3] {
     let (none, one) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, 1.0));
@@ -137,7 +138,7 @@ fn unpacked<S: Simd>(simd: S, normal: &[[f32; 8]; 2]) -> [Lanes<S>; 3] {
     [x * recip, y * recip, z * recip]
 }
 
-/// As of [`merge`](super::merge).
+/// The same as in [`merge`](super::merge).
 #[inline(always)]
 fn thin_axis<S: Simd>(simd: S, factor: [Lanes<S>; 6], from: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
     let one = Lanes::splat(simd, 1.0);

@@ -1,8 +1,8 @@
-//! Merged splats: what stands for several splats, seen from afar.
+//! Merged splats: one splat that stands for several, seen from afar.
 //!
-//! A merged splat keeps the mass of the splats it stands for (optical depth times area), their mean place, colour and
-//! normal, and the moments of their mass about the mean. Were one of them taken for all instead, a surface would thin out
-//! from level to level.
+//! A merged splat keeps the mass of its splats (optical depth times area) and their mean position,
+//! colour and normal. It also keeps the second moments of their mass about the mean. If one of the
+//! splats were chosen to stand for all, surfaces would thin out from level to level.
 
 use super::Node;
 use crate::splat::{Splat, decode_normal, encode_normal};
@@ -11,32 +11,33 @@ use glam::Vec3;
 /// Full width at half height of a Gaussian, in standard deviations.
 pub(crate) const WIDTH: f32 = 2.354_82;
 
-/// A patch of even mass L across has a variance of L²/12 along it. Gaussians of that variance, L apart, leave 0.4 of the
-/// mean where four meet; with a spread of 1.3, 0.6.
+/// Factor on the variance between the splats. A patch of uniform mass and width L has the variance
+/// L²/12 along it. Gaussians of that variance, spaced L apart, leave 0.4 of the mean where four
+/// meet; with a factor of 1.3 they leave 0.6.
 const SPREAD: f32 = 1.3;
 
-/// From this optical depth on splats count as opaque: then what spreading thins out is made up for, so that irregular
-/// groups leave no holes between them.
+/// Splats with at least this optical depth count as opaque. The thinning by `SPREAD` is compensated
+/// for them in full, so that irregular groups leave no holes between them.
 const OPAQUE: f32 = 4.0;
 
-/// Merged strengths stay below this: beyond it a splat only grows wider.
+/// Upper bound on merged strengths. Beyond it, a splat only grows wider.
 const MOST_STRENGTH: f32 = 64.0;
 
 /// A symmetric matrix: xx, xy, xz, yy, yz, zz.
 pub(crate) type Moments = [f32; 6];
 
-/// What is known of a node while its parent is made.
+/// The values of a node that its parent is merged from.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Mass {
     /// Optical depth, weighted by opacity, times area.
     pub mass: f32,
     pub area: f32,
     pub mean: Vec3,
-    /// About the mean, over the mass.
+    /// Central second moments, divided by the mass.
     pub moments: Moments,
 }
 
-/// The covariance behind a splat's factor.
+/// Returns the covariance of a splat from its factor.
 pub(crate) fn covariance(factor: &[f32; 6]) -> Moments {
     let [b00, b10, b11, b20, b21, b22] = *factor;
     [
@@ -49,7 +50,7 @@ pub(crate) fn covariance(factor: &[f32; 6]) -> Moments {
     ]
 }
 
-/// Cholesky's lower factor, with floors that keep it regular.
+/// The lower Cholesky factor, with lower bounds that keep it regular.
 fn factor(m: &Moments) -> [f32; 6] {
     let [xx, xy, xz, yy, yz, zz] = *m;
     let least = 1e-9 * (xx + yy + zz) + f32::MIN_POSITIVE;
@@ -61,19 +62,22 @@ fn factor(m: &Moments) -> [f32; 6] {
     [b00, b10, b11, b20, b21, b22]
 }
 
-/// cos(acos(r)/3) as a polynomial of √(1 + r), by rising powers: at most 3·10⁻⁶ off.
+/// Coefficients, by rising powers, of a polynomial in √(1 + r) for cos(acos(r)/3). The error is at
+/// most 3·10⁻⁶.
 pub(super) const THIRD: [f32; 6] =
     [0.500_002_7, 0.408_164, -0.054_907_8, 0.016_816_5, -0.004_783_6, 0.000_734_3];
 
-/// The mean variance along the axes, and the matrix in it: products of variances themselves are lost in 32 bits where a
-/// splat is smaller than 1e-10 or larger than 1e9. 0 where there is no variance.
+/// Returns the mean variance along the axes, and the matrix divided by it; all zero if there is no
+/// variance. Products of the variances themselves are lost in 32 bits for splats smaller than 1e-10
+/// or larger than 1e9.
 fn by_mean([xx, xy, xz, yy, yz, zz]: &Moments) -> (f32, Moments) {
     let mean = ((xx + yy + zz) / 3.0).max(0.0);
     let per_mean = if mean > 0.0 { 1.0 / mean } else { 0.0 };
     (mean, [xx, xy, xz, yy, yz, zz].map(|value| value * per_mean))
 }
 
-/// The largest eigenvalue, by the trigonometric solution of the characteristic polynomial (Smith 1961).
+/// The largest eigenvalue, by the trigonometric solution of the characteristic polynomial (Smith
+/// 1961).
 fn largest(m: &Moments) -> f32 {
     let (mean, [xx, xy, xz, yy, yz, zz]) = by_mean(m);
     let (x, y, z) = (xx - 1.0, yy - 1.0, zz - 1.0);
@@ -87,7 +91,8 @@ fn largest(m: &Moments) -> f32 {
     mean + mean * 2.0 * p * THIRD.iter().rev().fold(0.0, |sum, factor| sum * root + factor)
 }
 
-/// About σ₁·σ₂: the root of the sum of the principal minors, which for a flat splat is the larger two axes' alone.
+/// Approximates σ₁·σ₂ by the root of the sum of the principal minors. For a flat splat, only the
+/// two larger axes contribute.
 fn area(m: &Moments) -> f32 {
     let (mean, [xx, xy, xz, yy, yz, zz]) = by_mean(m);
     mean * (xx * yy - xy * xy + xx * zz - xz * xz + yy * zz - yz * yz).max(0.0).sqrt()
@@ -98,13 +103,13 @@ pub(crate) fn deviation(splat: &Splat) -> f32 {
     largest(&covariance(&splat.factor)).max(0.0).sqrt()
 }
 
-/// A leaf's node; `extent` is where footprints end, in standard deviations.
+/// Returns the node of a leaf, whose footprint ends `extent` standard deviations from its centre.
 pub(crate) fn leaf(splat: &Splat, extent: f32) -> Node {
     let sigma = deviation(splat);
     Node {
         splat: *splat,
         center: splat.center,
-        // Room for rounding.
+        // With a margin for rounding.
         radius: extent * sigma * (1.0 + 1e-5),
         size: WIDTH * sigma,
         cone: decode_normal(splat.normal)
@@ -114,21 +119,22 @@ pub(crate) fn leaf(splat: &Splat, extent: f32) -> Node {
     }
 }
 
-/// A surface is culled by its shading normals, but what faces away is the surface. Surfels lie across a normal that is this
-/// near that of their triangles (cosine of 20°), which the margin of culling covers.
+/// Culling tests shading normals, but the surface itself is what faces away. If a surfel's plane is
+/// this near to that of its triangles (cosine of 20°), the margin of culling covers the difference.
 pub(super) const ALIKE: f32 = 0.94;
 
-/// The cone of a leaf that lies across an axis of this cosine with its normal.
+/// Returns the cone of a leaf, given the cosine between its normal and its thinnest axis.
 pub(crate) fn leaf_cone(cosine: f32) -> f32 {
-    // Room for rounding.
+    // With a margin for rounding.
     if cosine.abs() < ALIKE { (cosine.abs() - 2e-6).max(0.0) } else { 1.0 }
 }
 
-/// The axis along which a splat is thinnest, seen from a direction near it: two steps of inverse iteration.
+/// Returns the axis along which a splat is thinnest, by two steps of inverse iteration from a
+/// nearby direction.
 fn thin_axis(factor: &[f32; 6], from: Vec3) -> Vec3 {
     let scale = factor.iter().fold(f32::MIN_POSITIVE, |most, v| most.max(v.abs())).recip();
     let [b00, b10, b11, b20, b21, b22] = factor.map(|v| v * scale);
-    // Of what is flat without end, nearly.
+    // Lower bounds for splats that are nearly infinitely flat.
     let [c00, c11, c22] = [b00, b11, b22].map(|v| v.abs().max(1e-6).copysign(v).recip());
     let mut axis = from;
     for _ in 0..2 {
@@ -142,22 +148,23 @@ fn thin_axis(factor: &[f32; 6], from: Vec3) -> Vec3 {
 }
 
 impl Mass {
-    /// Of a splat that is not merged, or whose parts are no longer known.
+    /// Returns the mass of a splat that is not merged, or whose parts are no longer known.
     pub fn of(splat: &Splat) -> Self {
         let covariance = covariance(&splat.factor);
         Self::with(splat, area(&covariance), covariance)
     }
 
-    /// As [`of`](Self::of), where the area and the covariance are known.
+    /// Returns the mass of a splat whose area and covariance are known.
     pub fn with(splat: &Splat, area: f32, covariance: Moments) -> Self {
         let alpha = (splat.color >> 24) as f32 / 255.0;
-        // What is fully transparent still has a place.
+        // A fully transparent splat still counts for the mean position.
         let mass = (splat.strength.min(MOST_STRENGTH) * alpha * area).max(f32::MIN_POSITIVE);
         Self { mass, area, mean: Vec3::from(splat.center), moments: covariance }
     }
 }
 
-/// The node above `children`, whose masses are `masses`, but for its sphere and its place in the tree.
+/// Merges `children` with the given masses into their parent. Its sphere and its first child are
+/// set later.
 pub(crate) fn merge(children: &[Node], masses: &[Mass]) -> (Node, Mass) {
     let total: f32 = masses.iter().map(|m| m.mass).sum();
     let share = |m: &Mass| m.mass / total;
@@ -208,7 +215,8 @@ pub(crate) fn merge(children: &[Node], masses: &[Mass]) -> (Node, Mass) {
     (node, Mass { mass: total, area: masses.iter().map(|m| m.area).sum(), mean, moments })
 }
 
-/// The cosine of the half-angle of the cone around an axis that holds the cones of all children.
+/// Returns the cosine of the half-angle of the cone around `axis` that contains the cones of all
+/// children.
 fn cone(axis: u32, children: &[Node]) -> f32 {
     let Some(axis) = decode_normal(axis) else { return -1.0 };
     let mut narrowest = 1.0f32;
@@ -218,12 +226,12 @@ fn cone(axis: u32, children: &[Node]) -> f32 {
         };
         let (cos, sin) = (axis.dot(own), axis.cross(own).length());
         let (own_cos, own_sin) = (child.cone, (1.0 - child.cone * child.cone).max(0.0).sqrt());
-        // Two angles that add up to more than half a turn leave no cone.
+        // Two angles that add up to more than half a turn have no cone.
         if sin * own_cos + cos * own_sin < 0.0 {
             return -1.0;
         }
         narrowest = narrowest.min(cos * own_cos - sin * own_sin);
     }
-    // Room for rounding.
+    // With a margin for rounding.
     (narrowest - 2e-6).max(-1.0)
 }

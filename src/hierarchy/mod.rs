@@ -1,5 +1,6 @@
-//! Hierarchies of splats: each node one splat that stands for those below it, so that a picture takes what its pixels can
-//! show and no more (Rusinkiewicz & Levoy 2000). docs/hierarchy.md tells how a scan becomes a tree becomes a picture.
+//! Hierarchies of splats. Each node is one splat that stands for those below it. So a picture needs
+//! only as many splats as its pixels can show (Rusinkiewicz & Levoy 2000). The page
+//! docs/hierarchy.md explains how a scan becomes a tree, and a tree a picture.
 
 mod build;
 mod cluster;

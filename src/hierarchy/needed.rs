@@ -7,13 +7,13 @@ use super::{
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Room for rounding in bounds of several nodes.
+/// Margin for rounding in the bounds of several nodes.
 const ROOM: f32 = 1.00001;
 
-/// The order in which the pages of a hierarchy are wanted.
+/// The order in which the pages of a hierarchy are loaded.
 #[derive(Debug)]
 pub struct Needed {
-    /// All pages, the coarse ones first.
+    /// All pages, coarse ones first.
     order: Vec<u32>,
 }
 
@@ -22,7 +22,7 @@ impl Needed {
         Self { order: hierarchy.coarse_first() }
     }
 
-    /// The pages that a cut may need, the coarse ones first, with all pages above them.
+    /// Returns the pages that a cut may need and all pages above them, coarse ones first.
     pub fn of(&self, hierarchy: &Hierarchy, cut: &Cut) -> Vec<u32> {
         let pages = hierarchy.pages();
         let test = |(page, entry): (usize, &PageEntry)| {
@@ -40,7 +40,7 @@ impl Needed {
         self.order.iter().copied().filter(|&page| needed[page as usize]).collect()
     }
 
-    /// The finest cut, in pixels, whose pages hold no more than `most` nodes.
+    /// Returns the finest cut, as a width in pixels, whose pages contain at most `most` nodes.
     pub fn finest_within(&self, hierarchy: &Hierarchy, most: u64, cut: impl Fn(f64) -> Cut) -> f64 {
         let pages = hierarchy.pages();
         let nodes = |pixels: f64| {
@@ -59,7 +59,7 @@ impl Needed {
     }
 }
 
-/// A sphere that holds the spheres of all parents of a page's nodes, and the largest of their sizes.
+/// Returns a sphere around the spheres of all parents of a page's nodes, with their largest size.
 fn parents_of(entry: &PageEntry) -> CutSphere {
     CutSphere {
         center: entry.parents_center,
@@ -68,8 +68,8 @@ fn parents_of(entry: &PageEntry) -> CutSphere {
     }
 }
 
-/// What holds the spheres and sizes of the parents of some successive nodes of a page, so that none is refined where this is
-/// not. Nothing where one of them is a root, which is always looked at.
+/// Returns bounds around the parents of `count` successive nodes of a page: if the bounds are not
+/// refined, no parent is. `None` if one of the nodes is a root, which is always tested.
 pub fn parents_around(page: &Page, first: usize, count: usize) -> Option<CutSphere> {
     let end = (first + count).min(page.nodes.len());
     let parents: Option<Vec<&CutSphere>> =

@@ -1,29 +1,31 @@
-//! What a hierarchy is made of: nodes, in blocks, in a tree.
+//! The parts of a hierarchy: nodes in blocks, blocks in a tree.
 
 use crate::{math::Bounds, splat::Splat};
 use glam::{DVec3, Vec3};
 
-/// The most children of a node.
+/// The maximum number of children of a node.
 pub const MOST_CHILDREN: usize = 8;
 
-/// A node: one splat that stands for all the leaves below it, and bounds of them. Lengths are world units, places relative
-/// to the tree's origin.
+/// A node: one splat that stands for all the leaves below it, with their bounds. Lengths are in
+/// world units, positions relative to the tree's origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Node {
-    /// A leaf's own splat; else the leaves below merged into one.
+    /// The splat of a leaf, or the merged splat of all leaves below.
     pub splat: Splat,
-    /// The sphere around the footprints of all leaves below; every child's lies in its parent's.
+    /// Bounding sphere of the footprints of all leaves below. A child's sphere lies inside its
+    /// parent's.
     pub center: [f32; 3],
     pub radius: f32,
-    /// How wide the splat looks: the width of its footprint at half its height along its longest axis (2.355 σ), and never
-    /// less than a child's. A cut compares this, seen from the nearest point of the sphere, with pixels.
+    /// The apparent width of the splat: the full width at half maximum of its footprint along its
+    /// longest axis (2.355 σ), and never less than a child's. A cut projects this width from the
+    /// nearest point of the sphere and compares it with pixels.
     pub size: f32,
-    /// Cosine of the half-angle of a cone around the splat's normal that holds the normals of all leaves below; −1 where
-    /// there is no such cone.
+    /// Cosine of the half-angle of a cone around the splat's normal that contains the normals of
+    /// all leaves below; −1 if there is no such cone.
     pub cone: f32,
-    /// Where its children stand in its block, side by side; 0 for a leaf.
+    /// Index of the first child in the block; siblings are adjacent. 0 for a leaf.
     pub first_child: u32,
-    /// How many there are: 0 for a leaf, at most [`MOST_CHILDREN`].
+    /// The number of children: 0 for a leaf, at most [`MOST_CHILDREN`].
     pub children: u32,
 }
 
@@ -37,39 +39,42 @@ impl Node {
     }
 }
 
-/// Nodes breadth first: node 0 is the root, siblings stand side by side, children behind their parents.
+/// Nodes in breadth-first order: node 0 is the root, siblings are adjacent, and children come after
+/// their parents.
 #[derive(Debug, Clone, Default)]
 pub struct Block {
     pub nodes: Vec<Node>,
-    /// The leaf of block 0 that this block hangs below, in whose place its root stands; `None` for block 0 itself.
+    /// The leaf of block 0 that this block's root replaces; `None` for block 0 itself.
     pub portal: Option<u32>,
 }
 
-/// A hierarchy of splats in memory. Large ones consist of several blocks, each built on its own: block 0 joins the others,
-/// and its leaves are portals to them. A single block has ordinary leaves.
+/// A hierarchy of splats in memory. A large one consists of several blocks, each built on its own.
+/// Block 0 joins the others, and its leaves are portals to them. If there is only one block, it has
+/// ordinary leaves.
 #[derive(Debug, Clone)]
 pub struct Tree {
-    /// World position that all places are relative to.
+    /// World position of the origin of all positions.
     pub origin: DVec3,
     /// Footprints end this many standard deviations from the centre.
     pub extent: f32,
-    /// Whether the source was solid ([`Mesh::is_solid`](crate::surface::Mesh::is_solid)): each side of its surfaces hides the
-    /// other from every point outside, so that what faces away need not be drawn.
+    /// Whether the source was solid ([`Mesh::is_solid`](crate::surface::Mesh::is_solid)). From
+    /// every point outside, the front of a solid's surface hides its back, so back faces need not
+    /// be drawn.
     pub closed: bool,
     /// The box around all footprints, in world coordinates.
     pub bounds: Bounds,
-    /// Points of the source: vertices or samples.
+    /// Points in the source: vertices or samples.
     pub source_points: u64,
     pub blocks: Vec<Block>,
 }
 
 impl Tree {
-    /// Whether the leaves of block 0 are portals.
+    /// Returns whether the leaves of block 0 are portals.
     pub fn is_joined(&self) -> bool {
         self.blocks.len() > 1
     }
 
-    /// All nodes that are drawn: those of all blocks but portals.
+    /// Returns all nodes that can be drawn: those of all blocks, without portals.
     pub fn nodes(&self) -> impl Iterator<Item = &Node> {
         let joined = self.is_joined();
         let blocks = self.blocks.iter().enumerate();
@@ -78,7 +83,7 @@ impl Tree {
         })
     }
 
-    /// How many splats of the source the tree holds.
+    /// Returns the number of leaves: the splats of the finest level.
     pub fn leaf_count(&self) -> u64 {
         self.nodes().filter(|node| node.is_leaf()).count() as u64
     }

@@ -1,16 +1,16 @@
-//! Cutting many splats in blocks of neighbours, by the curve that Morton (1966) drew through space.
+//! Splits many splats into blocks of neighbours along the space-filling curve of Morton (1966).
 
 use crate::splat::Splat;
 use glam::Vec3;
 use rayon::prelude::*;
 use rdst::RadixSort;
 
-/// Bits of a Morton key along each axis.
+/// Bits of a Morton key on each axis.
 const BITS: u32 = 10;
-/// And of a fine one.
+/// Bits of a fine key on each axis.
 pub(crate) const FINE_BITS: u32 = 21;
 
-/// A cube around some points, in which keys are counted.
+/// The cube around some points in which their keys are computed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cube {
     low: Vec3,
@@ -23,14 +23,14 @@ impl Cube {
         Self { low, scale: (1 << BITS) as f32 / edge }
     }
 
-    /// The Morton key of a place: ten bits along each axis, interleaved.
+    /// Returns the Morton key of a position: ten bits of each axis, interleaved.
     pub fn key(&self, place: Vec3) -> u32 {
         let cell = ((place - self.low) * self.scale)
             .clamp(Vec3::ZERO, Vec3::splat(((1 << BITS) - 1) as f32));
         spread(cell.x as u32) | spread(cell.y as u32) << 1 | spread(cell.z as u32) << 2
     }
 
-    /// As [`key`](Self::key), of [`FINE_BITS`] bits along each axis.
+    /// Returns the Morton key with [`FINE_BITS`] bits of each axis.
     pub fn fine_key(&self, place: Vec3) -> u64 {
         let scale = f64::from(self.scale) * f64::from(1 << (FINE_BITS - BITS));
         let cell = (place - self.low).as_dvec3() * scale;
@@ -44,13 +44,13 @@ impl Cube {
         part(0) | part(BITS) << (3 * BITS) | part(2 * BITS) << (6 * BITS)
     }
 
-    /// The edge of the cube.
+    /// Returns the edge length of the cube.
     pub fn edge(&self) -> f32 {
         (1 << BITS) as f32 / self.scale
     }
 }
 
-/// Two empty bits between each of the lowest ten.
+/// Inserts two zero bits between each of the lowest ten bits.
 fn spread(mut bits: u32) -> u32 {
     bits = (bits | bits << 16) & 0x0300_00ff;
     bits = (bits | bits << 8) & 0x0300_f00f;
@@ -58,8 +58,8 @@ fn spread(mut bits: u32) -> u32 {
     (bits | bits << 2) & 0x0924_9249
 }
 
-/// The order of the splats along the curve, cut in blocks of about `wanted` splats: equal shares, so that they can be built
-/// beside each other.
+/// Sorts the splats along the curve and splits them into blocks of about `wanted` splats. Blocks
+/// are equal in size, so that they can be built in parallel.
 pub(crate) fn blocks(splats: &[Splat], wanted: usize) -> Vec<Vec<u32>> {
     if splats.len() <= wanted {
         return vec![(0..splats.len() as u32).collect()];

@@ -1,11 +1,14 @@
 //! Tight bounding spheres, each inside its parent's.
 //!
-//! The smallest sphere around spheres is found by moving a centre towards what reaches farthest, by smaller and smaller
-//! steps (Bădoiu & Clarkson 2003). Built from children alone, spheres grow on their way up: each sticks out of what it
-//! holds, and the next must hold that too. So the root gets the smallest sphere around the leaves, and from there down every
-//! node one that lies in its parent's: that around its children where it does, or around descendants some levels below,
-//! which stick out less; else its centre moves towards the parent's until it does. At the parent's own centre it would be
-//! the parent's sphere.
+//! The smallest sphere around other spheres is found by moving its centre towards the farthest of
+//! them, in smaller and smaller steps (Bădoiu & Clarkson 2003).
+//!
+//! If spheres are built from children alone, they grow on the way up: each reaches beyond its
+//! leaves, and its parent must contain that too. So the root gets the smallest sphere around the
+//! leaves, and from there down every node gets one inside its parent's. That is the sphere around
+//! its children if it fits, or around descendants some levels below, which reach out less.
+//! Otherwise the centre moves towards the parent's centre until the sphere fits; at the parent's
+//! own centre, it would be the parent's sphere.
 
 use super::{Block, Node, merge::leaf};
 use crate::splat::Splat;
@@ -19,16 +22,17 @@ pub(crate) struct Sphere {
     pub radius: f64,
 }
 
-/// Steps towards the smallest sphere where there are many nodes, and where there are few.
+/// Steps towards the smallest sphere, for all nodes and for the few high ones.
 const FEW_ROUNDS: u32 = 4;
 const MANY_ROUNDS: u32 = 16;
-/// Nodes this many levels above the leaves, and higher ones, are fitted to descendants below their children.
+/// Nodes at least this many levels above the leaves are fitted to descendants below their children.
 const FITTED_HEIGHT: u32 = 3;
 /// How many levels below the children these descendants are.
 const LEVELS_BELOW: u32 = 1;
-/// Where leaves lie on a sphere themselves, nothing but nearly all of it lies in the smallest sphere around them and holds some of
-/// them. So the root of a block may reach this many times as far as what is around all blocks, where it would else be wider than
-/// it need be by more than the second factor.
+/// If leaves lie on the surface of a sphere, any sphere inside the smallest one around all leaves
+/// that contains some of them is nearly as large. If that would make the root of a block more than
+/// `MOST_WIDER` times as wide as necessary, it may reach farther: `ROOM` times as far as the sphere
+/// around all blocks.
 const ROOM: f64 = 1.04;
 const MOST_WIDER: f64 = 1.5;
 
@@ -37,19 +41,20 @@ impl Sphere {
         Self { center: node.center().as_dvec3(), radius: f64::from(node.radius) }
     }
 
-    /// Sets a node's sphere to this one, rounded so that it holds whatever this one holds.
+    /// Sets a node's sphere to this one, rounded so that it contains everything that this one
+    /// contains.
     fn give(&self, node: &mut Node) {
         node.center = self.center.as_vec3().to_array();
         let shift = node.center().as_dvec3().distance(self.center);
         node.radius = ((self.radius + shift) as f32).next_up();
     }
 
-    /// How far a sphere reaches from a centre.
+    /// Returns how far the spheres reach from a centre.
     pub fn reach(center: DVec3, spheres: &[Self]) -> f64 {
         spheres.iter().map(|s| s.center.distance(center) + s.radius).fold(0.0, f64::max)
     }
 
-    /// A sphere around others that is nearly the smallest.
+    /// Returns a sphere around others that is nearly the smallest.
     pub fn around(spheres: &[Self], rounds: u32) -> Self {
         let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (low, high) = spheres.iter().fold(none, |(low, high), s| {
@@ -76,26 +81,27 @@ impl Sphere {
         best
     }
 
-    /// Whether this one holds another, with room for what rounding to 32 bits adds: to the radius, and to a centre that may be
-    /// far from the origin.
+    /// Returns whether this sphere contains another. The margin covers rounding to 32 bits, both of
+    /// the radius and of a centre far from the origin.
     fn holds(&self, other: &Self) -> bool {
         other.center.distance(self.center) + other.radius <= self.room()
     }
 
-    /// How far what this one holds may reach.
+    /// Returns how far the contents of this sphere may reach from its centre.
     fn room(&self) -> f64 {
         let rounded = 4.0 * self.radius + 2.0 * self.center.abs().max_element();
         self.radius - rounded * f64::from(f32::EPSILON)
     }
 
-    /// A sphere around others that lies in `outer`, which holds them all, with a centre as near to `self`'s as can be on the
-    /// way to that of `outer`.
+    /// Returns a sphere around `spheres` that lies in `outer`, which contains them all. Its centre
+    /// is on the segment between the centres of `self` and `outer`, as near to `self`'s as
+    /// possible.
     fn moved_inside(self, outer: &Self, spheres: &[Self]) -> Self {
         let at = |part: f64| {
             let center = self.center.lerp(outer.center, part);
             Self { center, radius: Self::reach(center, spheres) }
         };
-        // Without roots, and only up to the first sphere that sticks out.
+        // Without square roots, and only up to the first sphere that does not fit.
         let room = outer.room();
         let fits = |part: f64| {
             let center = self.center.lerp(outer.center, part);
@@ -113,13 +119,14 @@ impl Sphere {
             }
             (within < 1.0).then(|| at(within))
         };
-        // Rounding may take what is only just inside for what is not.
+        // Rounding may accept a sphere that just does not fit, or reject one that does.
         let quick = search(&fits).filter(|found| outer.holds(found));
         quick.or_else(|| search(&|part| outer.holds(&at(part)))).unwrap_or(*outer)
     }
 }
 
-/// Gives every inner node of a block a sphere around its children's, and tells how many levels there are below each node.
+/// Gives every inner node of a block a sphere around its children's. Returns the number of levels
+/// below each node.
 pub(crate) fn raise(block: &mut Block) -> Vec<u32> {
     let nodes = &mut block.nodes;
     let mut heights = vec![0u32; nodes.len()];
@@ -137,8 +144,9 @@ pub(crate) fn raise(block: &mut Block) -> Vec<u32> {
     heights
 }
 
-/// Moves the spheres of a raised block into their parents', and makes those of higher nodes smaller. The root's lies in
-/// `outer`, or where that does not hold all leaves in one that does; where leaves lie on `outer`, in one a little larger.
+/// Moves the spheres of a raised block into their parents', and shrinks those of higher nodes. The
+/// root's sphere lies in `outer`, which is enlarged if it does not contain all leaves. If leaves
+/// lie on the surface of `outer`, the root's sphere may be slightly larger.
 pub(crate) fn nest(block: &mut Block, heights: &[u32], outer: Sphere) {
     let nodes = &mut block.nodes;
     let leaves = nodes.iter().filter(|node| node.is_leaf()).map(Sphere::of);
@@ -166,7 +174,8 @@ pub(crate) fn nest(block: &mut Block, heights: &[u32], outer: Sphere) {
         }
         if !outer.holds(&own) {
             descendants(nodes, index, levels, &mut around);
-            // What sticks out of the outer sphere is looked at more closely; the leaves do not.
+            // While descendants reach beyond the outer sphere, go one level deeper. Leaves never
+            // reach beyond it.
             while levels < heights[index] && Sphere::reach(outer.center, &around) > outer.radius {
                 levels += 1;
                 descendants(nodes, index, levels, &mut around);
@@ -187,7 +196,8 @@ pub(crate) fn children_of(node: &Node) -> std::ops::Range<usize> {
     node.first_child as usize..(node.first_child + node.children) as usize
 }
 
-/// The spheres of descendants some levels below the children of a node, or of leaves where there are none so deep.
+/// Collects the spheres of descendants `levels` levels below a node's children, or of leaves that
+/// are less deep.
 fn descendants(nodes: &[Node], index: usize, levels: u32, found: &mut Vec<Sphere>) {
     fn walk(nodes: &[Node], index: usize, levels: u32, found: &mut Vec<Sphere>) {
         for child in children_of(&nodes[index]) {
@@ -202,7 +212,8 @@ fn descendants(nodes: &[Node], index: usize, levels: u32, found: &mut Vec<Sphere
     walk(nodes, index, levels, found);
 }
 
-/// Directions in which the farthest spheres are looked for: the axes of a cube, of its edges and of its corners.
+/// Directions in which the farthest spheres are searched: the axes of a cube, and those through its
+/// edges and corners.
 pub(super) const DIRECTIONS: [[f32; 3]; 13] = [
     [1.0, 0.0, 0.0],
     [0.0, 1.0, 0.0],
@@ -219,7 +230,7 @@ pub(super) const DIRECTIONS: [[f32; 3]; 13] = [
     [-1.0, 1.0, 1.0],
 ];
 
-/// The first of the splats that are farthest in each direction and in its opposite.
+/// Returns, for each direction and its opposite, the first of the splats that are farthest in it.
 fn extremes(splats: &[Splat]) -> Vec<usize> {
     let chunks: Vec<&[Splat]> = splats.chunks(CHUNK).collect();
     let found: Vec<[Ends; DIRECTIONS.len()]> =
@@ -243,13 +254,13 @@ fn extremes(splats: &[Splat]) -> Vec<usize> {
     out
 }
 
-/// Splats whose extremes are found together.
+/// Splats in a unit of parallel work.
 const CHUNK: usize = 1 << 14;
 
-/// How far something reaches in a direction, and in its opposite.
+/// The farthest distances in a direction, and in its opposite.
 type Ends = [f32; 2];
 
-/// How far centres lie in each direction, and in its opposite.
+/// Returns how far the centres reach in each direction, and in its opposite.
 #[inline(always)]
 fn ends<S: Simd>(simd: S, splats: &[Splat]) -> [Ends; DIRECTIONS.len()] {
     let none = f32x8::splat(simd, f32::NEG_INFINITY);
@@ -257,7 +268,7 @@ fn ends<S: Simd>(simd: S, splats: &[Splat]) -> [Ends; DIRECTIONS.len()] {
     let mut places = [[0.0f32; 8]; 3];
     for eight in splats.chunks(8) {
         for lane in 0..8 {
-            // What lacks to eight is the last once more.
+            // The last splat fills incomplete groups of eight.
             let splat = eight.get(lane).unwrap_or(&eight[eight.len() - 1]);
             for (places, place) in places.iter_mut().zip(splat.center) {
                 places[lane] = place;
@@ -278,22 +289,23 @@ fn ends<S: Simd>(simd: S, splats: &[Splat]) -> [Ends; DIRECTIONS.len()] {
     out
 }
 
-/// How often what lies farthest outside is taken in.
+/// How often the farthest sphere outside is added to the core set.
 const MOST_GROWTHS: usize = 12;
-/// What may lie outside before the sphere is grown to hold it, in parts of its radius.
+/// How far splats may reach outside before the sphere is refitted, as a fraction of its radius.
 const OUTSIDE: f64 = 0.005;
 
-/// A sphere around the footprints of very many splats that is nearly the smallest: around what is farthest in some
-/// directions, then what lies farthest outside of that, and so on (a core set, Bădoiu & Clarkson 2003). Footprints end
-/// `extent` standard deviations from their centres.
+/// Returns a sphere around the footprints of very many splats that is nearly the smallest. It
+/// starts with the splats farthest in some directions, then repeatedly adds the one that reaches
+/// farthest outside (a core set, Bădoiu & Clarkson 2003). Footprints end `extent` standard
+/// deviations from their centres.
 pub(crate) fn enclosing(splats: &[Splat], extent: f32) -> Sphere {
     let sphere = |splat: &Splat| Sphere::of(&leaf(splat, extent));
     let mut core: Vec<Sphere> =
         extremes(splats).iter().map(|&index| sphere(&splats[index])).collect();
     let mut around = Sphere::around(&core, 1 << 12);
     for growth in 0.. {
-        // Most splats lie so far inside that their size need not be known: a splat's largest standard deviation is at most
-        // the root of the sum of all variances.
+        // Most splats are so far inside that their exact size is not needed. A splat's largest
+        // standard deviation is at most the root of the sum of all variances.
         let center = around.center.as_vec3();
         let outside = |splat: &Splat| {
             let variances: f32 = splat.factor.iter().map(|entry| entry * entry).sum();
@@ -307,7 +319,7 @@ pub(crate) fn enclosing(splats: &[Splat], extent: f32) -> Sphere {
         let all = splats.par_iter().with_min_len(1 << 14).filter_map(outside);
         let farthest = all.reduce(|| (0.0, around), farther);
         if growth == MOST_GROWTHS || farthest.0 <= around.radius * (1.0 + OUTSIDE) {
-            // Room for rounding.
+            // With a margin for rounding.
             around.radius = around.radius.max(farthest.0) * (1.0 + 1e-5);
             break;
         }

@@ -1,4 +1,4 @@
-//! Trees for tests: sound, and made the plainest way.
+//! Sound trees for tests, built in the simplest way.
 
 use super::{Block, Node, Tree, file};
 use crate::{
@@ -7,11 +7,11 @@ use crate::{
 };
 use glam::{DMat3, DVec3, Vec3};
 
-/// A sequence of numbers that looks random and is always the same.
+/// A reproducible pseudo-random sequence.
 pub struct Random(pub u64);
 
 impl Random {
-    /// In 0..1.
+    /// Returns a number in 0..1.
     pub fn next(&mut self) -> f64 {
         self.0 =
             self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -34,7 +34,7 @@ impl Random {
 
 pub const EXTENT: f32 = 3.0;
 
-/// The lower triangular factor of axes · diag(σ²) · axesᵀ.
+/// Returns the lower triangular factor of axes · diag(σ²) · axesᵀ.
 pub fn factor(axes: [DVec3; 3], sigma: [f64; 3]) -> [f32; 6] {
     let columns = [axes[0] * sigma[0], axes[1] * sigma[1], axes[2] * sigma[2]];
     let sum = |i: usize, j: usize| columns.iter().map(|c| c[i] * c[j]).sum::<f64>();
@@ -45,7 +45,7 @@ pub fn factor(axes: [DVec3; 3], sigma: [f64; 3]) -> [f32; 6] {
     [b00, b10, b11, b20, b21, (sum(2, 2) - b20 * b20 - b21 * b21).sqrt()].map(|value| value as f32)
 }
 
-/// B·Bᵀ.
+/// Returns B·Bᵀ.
 pub fn covariance(splat: &Splat) -> DMat3 {
     let [b00, b10, b11, b20, b21, b22] = splat.factor.map(f64::from);
     let b = DMat3::from_cols(
@@ -56,13 +56,13 @@ pub fn covariance(splat: &Splat) -> DMat3 {
     b * b.transpose()
 }
 
-/// Standard deviations, falling, and axes.
+/// Returns the standard deviations, descending, and the axes.
 pub fn ellipsoid(splat: &Splat) -> ([f64; 3], [DVec3; 3]) {
     let (squares, axes) = eigen(covariance(splat));
     (squares.map(f64::sqrt), axes)
 }
 
-/// Surfels of a smooth closed surface with waves on it, `count` of them, evenly spread.
+/// Returns `count` surfels of a smooth closed surface with waves, evenly spread.
 pub fn surface(count: usize, seed: u64) -> Vec<Splat> {
     let mut random = Random(seed);
     let turn = std::f64::consts::PI * (3.0 - 5f64.sqrt());
@@ -102,7 +102,7 @@ pub fn surface(count: usize, seed: u64) -> Vec<Splat> {
     (0..count).map(splat).collect()
 }
 
-/// Ellipsoids of all shapes in a cloud, some without normals.
+/// Returns ellipsoids of all shapes in a ball, some without normals.
 pub fn cloud(count: usize, seed: u64) -> Vec<Splat> {
     let mut random = Random(seed);
     let splat = |_| {
@@ -127,7 +127,7 @@ pub fn cloud(count: usize, seed: u64) -> Vec<Splat> {
     (0..count).map(splat).collect()
 }
 
-/// A leaf as builders make them.
+/// Returns a leaf, as builders make it.
 pub fn leaf(splat: Splat) -> Node {
     let largest = ellipsoid(&splat).0[0];
     Node {
@@ -154,7 +154,8 @@ impl Branch {
     }
 }
 
-/// A block over leaves: cut in halves along the longest side until there are up to eight groups, and so on.
+/// Builds a block over leaves. Groups are halved along their longest side until there are up to
+/// eight, then each is treated the same way.
 pub fn grow(mut leaves: Vec<Node>) -> Vec<Node> {
     let root = branch(&mut leaves);
     let mut nodes = vec![*root.node()];
@@ -181,7 +182,7 @@ fn branch(leaves: &mut [Node]) -> Branch {
     let node = merge(leaves);
     let count = leaves.len();
     let mut groups = vec![leaves];
-    // Not every node has all children that it could have.
+    // Not every node has the maximum number of children.
     let most = if count <= 8 { 8 } else { 4 + (node.splat.center[0].to_bits() % 5) as usize };
     while groups.len() < most {
         let Some(largest) =
@@ -201,7 +202,7 @@ fn branch(leaves: &mut [Node]) -> Branch {
     Branch::Inner(node, groups.into_iter().map(branch).collect())
 }
 
-/// The moments of leaves in one splat; bounds come later.
+/// Merges the moments of leaves into one splat. Bounds are added later.
 fn merge(leaves: &[Node]) -> Node {
     let count = leaves.len() as f64;
     let place = |node: &Node| Vec3::from(node.splat.center).as_dvec3();
@@ -234,13 +235,13 @@ fn merge(leaves: &[Node]) -> Node {
     Node { size: (2.355 * sigma[0]) as f32, cone, radius: 0.0, ..leaf(splat) }
 }
 
-/// A tree of one block.
+/// Builds a tree of one block.
 pub fn tree(splats: &[Splat]) -> Tree {
     let nodes = grow(splats.iter().copied().map(leaf).collect());
     whole(vec![Block { nodes, portal: None }], splats.len())
 }
 
-/// A tree of `count` blocks below one that joins them.
+/// Builds a tree of `count` blocks below one that joins them.
 pub fn joined(splats: &[Splat], count: usize) -> Tree {
     let mut leaves: Vec<Node> = splats.iter().copied().map(leaf).collect();
     leaves.sort_by(|a, b| a.center[0].total_cmp(&b.center[0]));

@@ -1,4 +1,4 @@
-//! What must hold in every hierarchy.
+//! The invariants of every hierarchy, and their validation.
 
 use super::{
     Node, Tree,
@@ -11,22 +11,23 @@ use crate::{
 };
 use glam::{DVec3, Vec3};
 
-/// How bad a finding is.
+/// The severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Severity {
-    /// Worth knowing; pictures are right.
+    /// Worth knowing, but pictures are right.
     Warning,
     /// Pictures may be wrong, or nothing can be read.
     Error,
 }
 
-/// Something that is not as it must be.
+/// A violated invariant.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finding {
-    /// A name for this kind of finding, the same in every release: `sphere`, `cone`, `size`, `order`, …
+    /// The name of this kind of finding, the same in every release: `sphere`, `cone`, `size`,
+    /// `order`, …
     pub code: &'static str,
     pub severity: Severity,
-    /// Where: a block and a node, a page, the header.
+    /// The place: a block and a node, a page, or the header.
     pub place: String,
     /// What was found and what was expected.
     pub message: String,
@@ -38,14 +39,14 @@ impl Finding {
     }
 }
 
-/// Findings, but no more of one kind than anyone reads.
+/// Findings, with at most `MOST` of each kind; the rest are counted.
 #[derive(Debug, Default)]
 pub struct Findings {
     list: Vec<Finding>,
     left_out: Vec<(&'static str, usize)>,
 }
 
-/// Findings of one kind that are told one by one.
+/// The maximum number of findings of one kind that are listed.
 const MOST: usize = 16;
 
 impl Findings {
@@ -71,11 +72,19 @@ impl Findings {
     }
 }
 
-/// Checks every promise of [`Node`], [`Block`](super::Block) and [`Tree`]: each child's sphere in its parent's, each child's
-/// cone in its parent's, no size below a child's or that of its own splat, leaves' footprints in their spheres, children
-/// behind their parents and in order, blocks in the places of portals that bound their roots, the box around all footprints,
-/// numbers such that can be drawn. Bounds may miss by what 32-bit numbers round: 10⁻⁶ of the radius and of the cosine, 10⁻³ of a footprint.
-/// Finds nothing in a sound tree.
+/// Checks every invariant of [`Node`], [`Block`](super::Block) and [`Tree`]; a sound tree has no
+/// findings. The invariants are:
+///
+/// - A child's sphere lies in its parent's, and its cone in its parent's.
+/// - A node's size is at least a child's, and at least that of its own splat.
+/// - The footprint of a leaf lies in its sphere.
+/// - Children come after their parents, in order.
+/// - Blocks replace portals, which bound their roots.
+/// - The box is the one around all footprints.
+/// - All values can be drawn.
+///
+/// Bounds may be off by the rounding of 32-bit numbers: 10⁻⁶ of a radius or a cosine, 10⁻³ of a
+/// footprint.
 pub fn validate(tree: &Tree) -> Vec<Finding> {
     let mut findings = Findings::default();
     if let Some(fault) = fault_of_box(tree.origin, &tree.bounds) {
@@ -100,20 +109,21 @@ pub fn validate(tree: &Tree) -> Vec<Finding> {
     findings.finish()
 }
 
-/// Where the footprints of all leaves are.
+/// The extent of the footprints of all leaves.
 pub struct Footprints {
-    /// In standard deviations.
+    /// End of footprints, in standard deviations.
     extent: f32,
     low: Vec3,
     high: Vec3,
-    /// The farthest that one reaches from its centre.
+    /// The largest distance from a footprint's centre to its end.
     widest: f32,
 }
 
-/// What rounding may take from a footprint: 32 bits tell the width of a disc, by its covariance, to some 10⁻⁴.
+/// Tolerance for footprints. In 32 bits, the covariance of a disc determines its width to about
+/// 10⁻⁴.
 const ROUNDING: f32 = 1e-3;
-/// What the box may miss by, of its diagonal and of the widest footprint: splats are moved and widened where they are
-/// written with few bits.
+/// Tolerance for the box, as fractions of its diagonal and of the widest footprint. Splats move and
+/// widen when they are written with few bits.
 const BOX: f64 = 0.01;
 const BOX_OF_WIDEST: f64 = 0.5;
 
@@ -122,7 +132,7 @@ impl Footprints {
         Self { extent, low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, widest: 0.0 }
     }
 
-    /// Adds a leaf; what is wrong with its sphere.
+    /// Adds a leaf. Returns a message if its sphere is too small.
     fn add(&mut self, leaf: &Node) -> Option<String> {
         let (center, reach) =
             (Vec3::from(leaf.splat.center), self.extent * leaf.splat.deviations());
@@ -132,13 +142,13 @@ impl Footprints {
         let needed = leaf.center().distance(center) + reach;
         (needed * (1.0 - ROUNDING) > leaf.radius).then(|| {
             format!(
-                "its footprint ends {needed} from its centre, its sphere has radius {}",
+                "its footprint reaches {needed} from its centre, but its sphere has radius {}",
                 leaf.radius
             )
         })
     }
 
-    /// Checks the box that is told of; nothing where there were no leaves.
+    /// Checks the stated box. Does nothing if there were no leaves.
     pub fn check_box(&self, origin: DVec3, told: &Bounds, place: &str, findings: &mut Findings) {
         if !self.low.cmple(self.high).all() {
             return;
@@ -151,14 +161,16 @@ impl Footprints {
         if off > most {
             let [low, high, told_low, told_high] = [found.min, found.max, told.min, told.max];
             let message = format!(
-                "footprints lie between {low} and {high}, and it tells of {told_low} and {told_high}"
+                "footprints lie between {low} and {high}, but the box stated is from {told_low} to \
+                 {told_high}"
             );
             findings.push(Finding::error("bounds", place, message));
         }
     }
 }
 
-/// Checks the nodes of a block, whose leaves are added to the `footprints`; those of a block of portals are none.
+/// Checks the nodes of a block and adds its leaves to `footprints`, which is `None` for a block of
+/// portals.
 pub fn check_block(
     number: usize,
     nodes: &[Node],
@@ -177,7 +189,7 @@ pub fn check_block(
         }
         let width = WIDTH * deviation(&node.splat);
         if width * (1.0 - ROUNDING) > node.size {
-            let message = format!("its size is {}, its splat {width} wide", node.size);
+            let message = format!("its size is {}, but its splat is {width} wide", node.size);
             findings.push(Finding::error("size", place(index), message));
         }
         if let (true, Some(footprints)) = (node.is_leaf(), &mut footprints)
@@ -192,7 +204,7 @@ pub fn check_block(
     }
 }
 
-/// Checks that each portal has its block, and bounds its root.
+/// Checks that each portal has one block, and bounds its root.
 pub fn check_portals(
     top: &[Node],
     own_portal: Option<u32>,
@@ -201,7 +213,7 @@ pub fn check_portals(
 ) {
     let mut portal = |message: String| findings.push(Finding::error("portal", "block 0", message));
     if let Some(own) = own_portal {
-        portal(format!("it hangs below node {own}; it is the one that others hang below"));
+        portal(format!("it has the portal {own}; the block that joins others must have none"));
     }
     if roots.is_empty() {
         return;
@@ -212,16 +224,16 @@ pub fn check_portals(
             portal_of.map(|at| at as usize).filter(|&at| top.get(at).is_some_and(Node::is_leaf));
         match at {
             Some(at) if !taken[at] => taken[at] = true,
-            Some(at) => portal(format!("two blocks hang below node {at}")),
+            Some(at) => portal(format!("two blocks have the portal {at}")),
             None => {
-                portal(format!("block {} hangs below {portal_of:?}, which is no leaf", number + 1))
+                portal(format!("block {} has the portal {portal_of:?}, not a leaf", number + 1))
             }
         }
     }
     for (index, _) in
         top.iter().enumerate().filter(|&(index, node)| node.is_leaf() && !taken[index])
     {
-        portal(format!("no block hangs below node {index}"));
+        portal(format!("no block has the portal {index}"));
     }
     for (number, (portal_of, root)) in roots.iter().enumerate() {
         if let (Some(node), Some(root)) = (portal_of.and_then(|at| top.get(at as usize)), root) {
@@ -230,21 +242,22 @@ pub fn check_portals(
     }
 }
 
-/// Coordinates of centres and elements of factors up to this can be drawn: their squares fit in 32 bits.
+/// The largest coordinate of a centre and element of a factor that can be drawn: their squares fit
+/// in 32 bits.
 const LARGEST: f32 = 1e18;
 
 fn fits(values: &[f32]) -> bool {
     values.iter().all(|value| value.abs() <= LARGEST)
 }
 
-/// Whether the numbers of a node's splat can be drawn.
+/// Returns whether the values of a splat can be drawn.
 pub fn is_drawable(splat: &Splat) -> bool {
     fits(&splat.center)
         && fits(&splat.factor)
         && (0.0..=Splat::MOST_OPTICAL_DEPTH).contains(&splat.strength)
 }
 
-/// The fault that a node has by itself.
+/// Returns a message if a node's own values cannot be drawn.
 pub fn fault(node: &Node) -> Option<String> {
     let Node { splat, center, radius, size, cone, .. } = node;
     let is_length = |value: f32| value >= 0.0 && value.is_finite();
@@ -276,43 +289,46 @@ pub fn fault(node: &Node) -> Option<String> {
     })
 }
 
-/// What is wrong with where a whole hierarchy is.
+/// Returns a message if the origin or the bounds of a hierarchy are not valid.
 pub fn fault_of_box(origin: DVec3, bounds: &Bounds) -> Option<&'static str> {
     let is_sound = origin.is_finite()
         && bounds.min.is_finite()
         && bounds.max.is_finite()
         && !bounds.is_empty();
-    (!is_sound).then_some("its origin or its bounds are none")
+    (!is_sound).then_some("its origin or its bounds are not valid")
 }
 
-/// What is wrong with where footprints end, in standard deviations.
+/// Returns a message if the extent of footprints, in standard deviations, is not valid.
 pub fn fault_of_extent(extent: f32) -> Option<String> {
     let most = SplatSet::MAX_EXTENT;
     let is_sound = extent > 0.0 && extent <= most;
     (!is_sound).then(|| format!("its extent is {extent}; it must lie in 0 … {most}"))
 }
 
-/// Checks that a node bounds one below it.
+/// Checks that a node bounds a node below it.
 fn bounds(node: &Node, below: &Node, place: impl Fn() -> String, findings: &mut Findings) {
     let center: DVec3 = node.center().as_dvec3();
     let (reach, radius) = (reach(center, below), f64::from(node.radius));
     if reach > radius * (1.0 + 1e-6) {
         let message = format!(
-            "its sphere ends {reach} from its parent's centre, whose own has radius {radius}"
+            "its sphere reaches {reach} from its parent's centre, but the parent's sphere has \
+             radius {radius}"
         );
         findings.push(Finding::error("sphere", place(), message));
     }
     if below.size > node.size {
-        let message = format!("its size is {}, its parent's {}", below.size, node.size);
+        let message = format!("its size is {}, but its parent's is {}", below.size, node.size);
         findings.push(Finding::error("size", place(), message));
     }
     if node.cone > -1.0 {
-        // Of a leaf its normal: what more its disc needs the first builds did not tell, whose files are sound.
+        // Leaves are checked by their normal alone. The first builds did not store the additional
+        // width that a leaf's disc needs, and their files are sound.
         let cone = if below.is_leaf() && below.cone > -1.0 { 1.0 } else { below.cone };
         let wanted = libm::cos(joint_angle(node, &Node { cone, ..*below }));
         if f64::from(node.cone) > wanted + 1e-6 {
             let message = format!(
-                "its cone needs one of cosine {wanted} around its parent's normal, which has {}",
+                "its cone needs a cosine of at most {wanted} around its parent's normal, but the \
+                 parent's is {}",
                 node.cone
             );
             findings.push(Finding::error("cone", place(), message));

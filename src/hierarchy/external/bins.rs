@@ -1,4 +1,4 @@
-//! Records sorted in bins by their arrival, in a file without a name.
+//! Records sorted into bins as they arrive, in a file without a name.
 
 use crate::{Error, Result, disk::Scratch};
 use bytemuck::Pod;
@@ -7,29 +7,29 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The most bytes that wait in memory for all bins together.
+/// The maximum size, in bytes, of the buffers of all bins together.
 const MOST_WAITING: u64 = 64 << 20;
 
-/// Some bins of records. Each keeps its records in the order in which they came.
+/// Bins of records. Each keeps its records in the order of arrival.
 pub struct Bins<T> {
     file: Scratch,
-    /// The file beside which this one is, for errors.
+    /// The file beside which the scratch file is, for errors.
     wanted: PathBuf,
-    /// Where the file ends.
+    /// Length of the scratch file.
     end: u64,
     waiting: Vec<Vec<T>>,
-    /// Records of a bin that wait at most.
+    /// The maximum number of buffered records in a bin.
     most: usize,
-    /// Where the runs of each bin are in the file, and how many records they hold.
+    /// For each bin, the position of each batch in the file and its number of records.
     runs: Vec<Vec<(u64, usize)>>,
     counts: Vec<usize>,
 }
 
 impl<T: Pod> Bins<T> {
-    /// So many empty bins, in a file beside `wanted`; an eighth of `memory` may wait to be written.
+    /// Creates empty bins in a file beside `wanted`. Their buffers use up to an eighth of `memory`.
     ///
     /// # Errors
-    /// [`Error::Output`] where none can be made.
+    /// [`Error::Output`] if the file cannot be created.
     pub fn beside(wanted: &Path, bins: usize, memory: u64) -> Result<Self> {
         let waiting = (memory / 8).min(MOST_WAITING) as usize;
         let most = (waiting / bins.max(1) / size_of::<T>()).clamp(64, 1 << 16);
@@ -71,7 +71,7 @@ impl<T: Pod> Bins<T> {
         Ok(())
     }
 
-    /// Writes what waits, and gives the memory back.
+    /// Writes all buffered records, and frees the buffers.
     pub fn settle(&mut self) -> Result<()> {
         for bin in 0..self.waiting.len() {
             self.flush(bin)?;
@@ -80,19 +80,19 @@ impl<T: Pod> Bins<T> {
         Ok(())
     }
 
-    /// How many records a bin holds.
+    /// Returns the number of records in a bin.
     pub fn count(&self, bin: u32) -> usize {
         self.counts[bin as usize]
     }
 
-    /// The records of a bin.
+    /// Returns the records of a bin.
     pub fn read(&mut self, bin: u32) -> Result<Vec<T>> {
         let mut records = vec![T::zeroed(); self.count(bin)];
         let (file, mut next) = (&mut self.file, 0);
         for &(at, count) in &self.runs[bin as usize] {
             let run = bytemuck::cast_slice_mut(&mut records[next..next + count]);
             let read = file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(run));
-            read.map_err(|e| Error::file(&self.wanted, "read what was put beside", e))?;
+            read.map_err(|e| Error::file(&self.wanted, "read the temporary file beside it", e))?;
             next += count;
         }
         records[next..].copy_from_slice(&self.waiting[bin as usize]);

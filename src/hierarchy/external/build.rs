@@ -1,4 +1,4 @@
-//! Region by region: surfels, blocks of them, and these written.
+//! Builds an input region by region: its surfels, blocks of them, and the blocks in the file.
 
 use super::{
     super::{
@@ -24,32 +24,32 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// Of the core's radius: how far the surfels of a cloud are taken to reach. Where one reaches farther, its block's sphere
-/// sticks out, and what is above grows with it.
+/// How far the surfels of a point cloud are assumed to reach, as a fraction of the core's radius.
+/// If one reaches farther, its block's sphere sticks out, and the spheres above grow with it.
 const CLOUD_REACH: f64 = 0.01;
 
-/// What is built of all inputs.
+/// The result of all inputs so far.
 pub struct Work<'a> {
     pub builder: Builder,
     pub origin: DVec3,
     pub bounds: Bounds,
     pub options: &'a ExternalOptions,
-    /// Of all inputs.
+    /// Points of all inputs.
     pub points: u64,
-    /// Points whose region is done.
+    /// Points in finished regions.
     pub built: u64,
     pub splats: u64,
     pub watch: StageWatch<'a>,
-    /// Seconds that a region may take, and when the one at work must be done.
+    /// Seconds that a region may take, and the deadline of the current one.
     pub seconds: u64,
     pub deadline: Deadline,
 }
 
-/// A point's number, and its normal as surfels have it.
+/// The index of a point, and the packed normal of its surfel.
 type Side = [u32; 2];
 
 impl Distributed<'_> {
-    /// A sphere around all footprints, relative to `origin`.
+    /// Returns a sphere around all footprints, relative to `origin`.
     pub fn around(&self, origin: DVec3, options: &ExternalOptions) -> Sphere {
         let scale = f64::from(options.surfels.radius_scale);
         let reach = match &self.input.mesh {
@@ -95,7 +95,7 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// Builds the blocks of some splats around the origin of their input.
+    /// Builds blocks of the splats, which are relative to the origin of their input.
     fn add(&mut self, splats: Vec<Splat>, origin: DVec3) -> Result<()> {
         if splats.is_empty() {
             return Ok(());
@@ -119,12 +119,12 @@ impl Work<'_> {
     }
 }
 
-/// A region as a mesh of its own.
+/// A region as a separate mesh.
 struct Part {
     mesh: Mesh,
-    /// The number of each point in the input, rising.
+    /// The index of each point in the input, ascending.
     indices: Vec<u32>,
-    /// Whether the region answers for it.
+    /// Whether the region owns each point.
     owned: Vec<bool>,
 }
 
@@ -166,7 +166,8 @@ impl Part {
         mesh.pieces.surfels(&self.mesh, &self.owned, is_long, options)
     }
 
-    /// Sides that other regions told are followed, and what is near others told to those that come later.
+    /// Orients normals like those that other regions passed on, and passes on normals near other
+    /// regions to those that come later.
     fn of_cloud(
         &self,
         input: &Distributed,

@@ -1,4 +1,4 @@
-//! The second look at an input: every point and triangle to the regions that need it.
+//! The second pass over an input: gives every point and triangle to the regions that need it.
 
 use super::{
     Stage, StageWatch,
@@ -12,29 +12,29 @@ use crate::{
 use glam::Vec3;
 use std::{collections::HashSet, path::Path};
 
-/// An input in regions: each answers for its own points, and has what is around them. The last region of a mesh answers for
-/// the corners of triangles that are to be cut, wherever they are.
+/// An input split into regions. Each region owns its points, and also holds those around them. In a
+/// mesh, the last region owns the corners of triangles to be subdivided, wherever they are.
 pub struct Distributed<'a> {
     pub input: Surveyed<'a>,
     pub points: Bins<StreamPoint>,
     pub triangles: Option<Bins<[u32; 3]>>,
-    /// How far the farthest point is from the centre of the core.
+    /// Distance from the centre of the core to the farthest point.
     pub radius: f64,
 }
 
 impl Surveyed<'_> {
-    /// How many regions answer for points.
+    /// Returns the number of regions that own points.
     pub fn regions(&self) -> usize {
         self.regions.count() + usize::from(self.long_region().is_some())
     }
 
-    /// The one that answers for the corners of triangles that are to be cut, where there are any.
+    /// Returns the region that owns the corners of triangles to be subdivided, if there are any.
     pub fn long_region(&self) -> Option<u32> {
         let has_long = self.mesh.as_ref().is_some_and(|mesh| !mesh.long.is_empty());
         has_long.then_some(self.regions.count() as u32)
     }
 
-    /// The region that answers for a point at a place.
+    /// Returns the region that owns a point at a position.
     pub fn owner(&self, place: Vec3) -> u32 {
         match &self.mesh {
             Some(mesh) if !mesh.long.is_empty() && mesh.long.contains(&name(place)) => {
@@ -45,14 +45,15 @@ impl Surveyed<'_> {
     }
 }
 
-/// What a piece of the input gives to each region, in order.
+/// The items that a part of the input contributes to each region, in order.
 struct Shares<T> {
     items: Vec<(u32, T)>,
     seen: u64,
     radius: f64,
 }
 
-/// Distributes an input to files beside `wanted`, in regions of at most so many points, with so many bytes of memory.
+/// Distributes an input to files beside `wanted`, in regions of at most `most` points, using up to
+/// `memory` bytes.
 pub fn distribute<'a>(
     input: Surveyed<'a>,
     [most, memory]: [u64; 2],
@@ -64,7 +65,8 @@ pub fn distribute<'a>(
     let mut radius = 0.0f64;
     let total = input.stream.point_count();
     let mut done = 0;
-    // Points at one place are one, and where they are more than a region may hold only the first is taken.
+    // Points at the same position count as one. Once a region is full, only the first at each
+    // position is kept.
     let mut crowd = Crowd::new(&input, most);
     let share = |found: &[StreamPoint]| shares(&input, found);
     input.stream.points(share, |shares| {
@@ -101,7 +103,8 @@ pub fn distribute<'a>(
     Ok(Distributed { input, points, triangles, radius })
 }
 
-/// The points of a piece for their owners and, of a cloud, for the regions around.
+/// Returns the points of a part with their owners and, for a point cloud, with the regions around
+/// them.
 fn shares(input: &Surveyed, found: &[StreamPoint]) -> Shares<StreamPoint> {
     let mut items = Vec::with_capacity(found.len() + found.len() / 8);
     let mut around = Vec::new();
@@ -120,7 +123,8 @@ fn shares(input: &Surveyed, found: &[StreamPoint]) -> Shares<StreamPoint> {
 
 type Owned<T> = Vec<(u32, T)>;
 
-/// The triangles of a piece for all regions that own a corner, and the corners that these do not own.
+/// Returns the triangles of a part for every region that owns a corner, and the corners that this
+/// region does not own.
 fn triangle_shares(input: &Surveyed, found: &[[u32; 3]]) -> (Owned<[u32; 3]>, Owned<StreamPoint>) {
     let mut triangles = Vec::with_capacity(found.len() + found.len() / 8);
     let mut foreign = Vec::new();
@@ -138,23 +142,23 @@ fn triangle_shares(input: &Surveyed, found: &[[u32; 3]]) -> (Owned<[u32; 3]>, Ow
     (triangles, foreign)
 }
 
-/// How many times as many points as it should a region may have, at most.
+/// How far a region may exceed its limit of points, as a factor.
 const MOST_TIMES: usize = 4;
 
-/// Keeps points at one place from filling a region of a cloud.
+/// Keeps coincident points from filling a region of a point cloud.
 struct Crowd<'a> {
     stream: &'a Stream<'a>,
     most: usize,
     is_cloud: bool,
-    /// The region of triangles that are to be cut.
+    /// The region of triangles to be subdivided.
     long: Option<u32>,
-    /// The places of regions that have more points than they may.
+    /// For each full region, the positions of points added since it was full.
     places: Vec<Option<HashSet<[u32; 3]>>>,
 }
 
 impl<'a> Crowd<'a> {
     fn new(input: &'a Surveyed<'_>, most: u64) -> Self {
-        // A region's neighbours may make it larger.
+        // Points around a region may double it.
         let most = usize::try_from(most).unwrap_or(usize::MAX).saturating_mul(2);
         let places = vec![None; input.regions()];
         Self {
@@ -166,10 +170,11 @@ impl<'a> Crowd<'a> {
         }
     }
 
-    /// Whether a region keeps a point.
+    /// Returns whether a region keeps a point.
     ///
     /// # Errors
-    /// [`Error::Input`](crate::Error::Input) where more points lie together than can be told apart from where the farthest ones are.
+    /// [`Error::Input`](crate::Error::Input) if too many points are too close together to be
+    /// distinguished, compared with the distance to the farthest points.
     fn takes(
         &mut self,
         points: &mut Bins<StreamPoint>,
@@ -177,15 +182,16 @@ impl<'a> Crowd<'a> {
         point: &StreamPoint,
     ) -> Result<bool> {
         let held = points.count(region);
-        // Triangles that are cut together are as many as memory suffices for, however many points of a region that is.
+        // The triangles to be subdivided are limited by memory, not by the points in a region.
         if held >= self.most.saturating_mul(MOST_TIMES) && Some(region) != self.long {
             let message = format!(
-                "more than {held} lie within a two-millionth of the way to the farthest ones, more than fit into memory at once"
+                "more than {held} points lie within a two-millionth of the distance to the \
+                 farthest ones, and do not fit in memory together"
             );
             return Err(self
                 .stream
                 .error("points", message)
-                .hint("remove points that are far off, or allow more memory"));
+                .hint("remove points that are far away, or allow more memory"));
         }
         if !self.is_cloud || held < self.most {
             return Ok(true);

@@ -1,4 +1,4 @@
-//! How much memory conversions take.
+//! Memory needed by conversions.
 
 use super::{ExternalOptions, Stage, StageWatch, survey::look};
 use crate::{
@@ -10,14 +10,16 @@ use crate::{
 };
 use std::path::PathBuf;
 
-/// What blocks at work take, and what a conversion in regions takes in any case.
+/// Bytes for the blocks that are built at once, and the minimum for a conversion in regions.
 pub const BLOCKS: u64 = 200 << 20;
-/// What each triangle takes that cutting adds, with three quarters of a vertex.
+/// Bytes for each triangle that subdivision adds, with three quarters of a vertex.
 const OF_CUT: u64 = 131;
 
-/// About how many bytes making a hierarchy takes where all is in memory: of a mesh its arrays, which corners meet at its
-/// vertices, and splats in parts and as a whole; of a cloud its arrays, the tree that finds neighbours, what is found of them,
-/// and the edges along which sides are told; with splats, their order.
+/// Estimates the bytes needed to build a hierarchy in memory.
+///
+/// For a mesh: its arrays, the corners that meet at each vertex, and the splats in parts and as a
+/// whole. For a point cloud: its arrays, the tree for finding neighbours, the neighbours found, the
+/// edges along which normals are oriented, and the splats with their order.
 fn of_counts(counts: Counts) -> u64 {
     if counts.triangles > 0 {
         140 * counts.points + 26 * counts.triangles
@@ -26,34 +28,37 @@ fn of_counts(counts: Counts) -> u64 {
     }
 }
 
-/// The counts once triangles are cut to so many: where none are neighbours, each is cut with corners of its own.
+/// Returns the counts after subdivision into `triangles`. Assumes the worst case, in which no long
+/// triangles are neighbours, so each is subdivided with its own corners.
 fn once_cut(counts: Counts, triangles: u64) -> Counts {
     let more = triangles.saturating_sub(counts.triangles);
     Counts { points: counts.points + more.div_ceil(4) * 3, triangles: counts.triangles + more }
 }
 
-/// How many triangles there may be, once they are cut, where so many bytes are to suffice.
+/// Returns how many triangles may exist after subdivision if `bytes` are available.
 fn room(counts: Counts, bytes: u64) -> usize {
     let spare = bytes.saturating_sub(of_counts(counts));
     usize::try_from(counts.triangles + spare / OF_CUT).unwrap_or(usize::MAX)
 }
 
-/// Between what lies how many bytes making a hierarchy takes of what has these counts, where all of it is in memory: without any
-/// triangle cut, and with as many as cutting may lead to.
+/// Returns a lower and an upper bound, in bytes, on the memory needed to build a hierarchy from an
+/// in-memory mesh or point cloud with these counts. The lower bound assumes that no triangle is
+/// subdivided, the upper bound the most that `options` allow.
 pub fn memory_between(counts: Counts, options: &SurfelOptions) -> [u64; 2] {
     let triangles = usize::try_from(counts.triangles).unwrap_or(usize::MAX);
     let most = if triangles == 0 { 0 } else { options.most_once_cut(triangles) as u64 };
     [0, most].map(|triangles| of_counts(once_cut(counts, triangles)))
 }
 
-/// About how many bytes splats take from when they are gathered until a hierarchy is made of them: twice their own, for a list of
-/// them that grows moves.
+/// Estimates the bytes that splats need from when they are collected until a hierarchy is built of
+/// them. That is twice their size, because a growing list is moved.
 pub fn memory_of_splats(splats: usize) -> u64 {
     (2 * size_of::<Splat>() * splats) as u64
 }
 
-/// About how many bytes making a hierarchy of a mesh or cloud takes, but for the [`BLOCKS`] at work; less where that is not more
-/// than `enough` anyway.
+/// Estimates the bytes needed to build a hierarchy of a mesh or point cloud, without the [`BLOCKS`]
+/// built at once. The estimate is only as precise as a comparison with `enough` needs: if the
+/// bounds decide it, returns the lower bound.
 ///
 /// # Errors
 /// Those of [`Mesh::triangles_once_cut`].
@@ -67,8 +72,9 @@ pub fn memory_of_mesh(mesh: &Mesh, options: &SurfelOptions, enough: u64) -> Resu
     Ok(of_counts(once_cut(counts, mesh.triangles_once_cut(options, room(counts, enough))? as u64)))
 }
 
-/// About how many bytes making a hierarchy of a file takes where all of it is in memory, but for the [`BLOCKS`] at work: it is
-/// looked through for triangles that are cut. Where it is more than `enough`, it may be more than what is told.
+/// Estimates the bytes needed to build a hierarchy of a file in memory, without the [`BLOCKS`]
+/// built at once. This visits the triangles to count those that are subdivided. If the result is
+/// more than `enough`, the true value may be larger still.
 ///
 /// # Errors
 /// Those of reading the file.
@@ -83,8 +89,8 @@ pub fn memory_of_stream(stream: &mut Stream, options: &SurfelOptions, enough: u6
     Ok(of_counts(once_cut(counts, others + seen.cut as u64)))
 }
 
-/// Looks at the triangles of a mesh that is converted in regions, and refuses one whose long triangles are too many to be cut
-/// together.
+/// Visits the triangles of a mesh that is converted in regions. Returns an error if there are too
+/// many long ones to be subdivided together.
 pub(super) fn look_at_long(
     stream: &Stream,
     options: &ExternalOptions,
@@ -102,19 +108,20 @@ pub(super) fn look_at_long(
     }
     let [count, mib] = [seen.long.len() as u64, need(seen.cut as u64) >> 20];
     let message = format!(
-        "{count} of them have edges longer than {:e}, and are cut into about {} together, which takes about {mib} MiB",
+        "{count} of them have edges longer than {:e}; subdivided together into about {} \
+         triangles, they need about {mib} MiB",
         pieces.length, seen.cut
     );
     let error: Error = stream.error("triangles", message);
     Err(error.hint("allow more memory"))
 }
 
-/// Refuses files as [`convert`](super::convert) does before it writes anything, as far as their headers, places and triangles
-/// tell.
+/// Rejects files that [`convert`](super::convert) would reject before it writes anything, as far as
+/// headers, positions and triangles show.
 ///
 /// # Errors
-/// Those of [`Stream::open`] and of reading on, and [`Error::Input`] for a mesh of so many long triangles, which are cut
-/// together, that the memory does not suffice.
+/// Those of [`Stream::open`] and of reading the file; [`Error::Input`] for a mesh with so many long
+/// triangles, which are subdivided together, that the memory does not suffice.
 pub fn check(
     files: &[PathBuf],
     limits: &Limits,

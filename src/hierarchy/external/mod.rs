@@ -1,12 +1,14 @@
-//! From files larger than memory to a hierarchy: in regions, one after the other.
+//! Converts files larger than memory to a hierarchy, one region after another.
 //!
-//! A first look finds where the points are (`survey`) and cuts space in regions of about as many points each (`regions`). A
-//! second one gives each region its points and what is around them (`distribute`), by way of files without names beside the
-//! one that is wanted (`bins`). Then each region's surfels are made, built into blocks and written (`build`).
+//! A first pass finds where the points are (`survey`) and splits space into regions with about
+//! equally many points (`regions`). A second pass gives each region its points and those around
+//! them (`distribute`), in files without names beside the output (`bins`). Then the surfels of each
+//! region are made, built into blocks and written (`build`).
 //!
-//! The leaves are those of the whole that fits in memory: of meshes exactly, but where cutting long edges puts a vertex at
-//! the place of another that no long edge meets. Points of a cloud are judged by the neighbours found within the region and
-//! some way beyond; sides of normals are handed on from region to region.
+//! The leaves are those of the same input converted in memory. For meshes they are identical,
+//! unless subdividing a long edge puts a vertex at the position of another vertex that is on no
+//! long edge. For point clouds, points are judged by neighbours within the region and some distance
+//! beyond, and the orientation of normals is passed on from region to region.
 
 mod bins;
 mod build;
@@ -31,36 +33,36 @@ pub use memory::{
     BLOCKS, check, memory_between, memory_of_mesh, memory_of_splats, memory_of_stream,
 };
 
-/// What is at work.
+/// The stage of a conversion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// Going through the input.
+    /// Reading the input.
     Reading,
-    /// Giving points and triangles to the regions.
+    /// Distributing points and triangles to the regions.
     Distributing,
-    /// Making surfels and blocks of them.
+    /// Making surfels and building blocks of them.
     Building,
-    /// Putting the file together.
+    /// Assembling the file.
     Writing,
 }
 
-/// Told of each finished part: how much of a stage is done, of how much; points, triangles or splats. A stage may begin anew
-/// for the next input, or the next look at it.
+/// Called after each finished part, with the stage, its progress and its total, in points,
+/// triangles or splats. A stage may start again for the next input, or for the next pass over it.
 pub type StageWatch<'a> = &'a (dyn Fn(Stage, u64, u64) + Sync);
 
-/// How a file is converted in regions.
+/// Options for converting a file in regions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExternalOptions {
-    /// Bytes of memory that are to suffice, about; regions are made as small as that needs, down to a thousand points. A
-    /// few hundred million are taken in any case.
+    /// The approximate memory to use, in bytes. Regions are made as small as this requires, down to
+    /// a thousand points. A few hundred million bytes are used in any case.
     pub memory: u64,
     pub preset: Preset,
-    /// Splats of a block.
+    /// Splats in a block.
     pub block_splats: usize,
     pub surfels: SurfelOptions,
 }
 
-/// What was converted.
+/// The result of a conversion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Converted {
     pub points: u64,
@@ -70,22 +72,32 @@ pub struct Converted {
     pub regions: usize,
 }
 
-/// Bytes that a region takes for each of its points at most, with its triangles, neighbours, surfels and their blocks.
+/// The most bytes that a region needs for each of its points, with its triangles, neighbours,
+/// surfels and their blocks.
 const OF_POINT: u64 = 1000;
-/// The most points of a region; larger ones make nothing better.
+/// The most points in a region; larger regions bring no benefit.
 const MOST_POINTS: u64 = 1 << 22;
 const FEWEST_POINTS: u64 = 1 << 10;
 
-/// Converts files, each read as a [`Stream`], to one hierarchy, as [`build_file`](super::build_file) makes it of the surfels
-/// of all. Memory is for one region at a time; the disk beside `path` has to hold about 40 bytes a point and 14 a triangle
-/// meanwhile.
+/// Converts files, each read as a [`Stream`], to one hierarchy, like the one that
+/// [`build_file`](super::build_file) makes of the surfels of all files.
+///
+/// Memory is needed for one region at a time. Meanwhile the disk of `path` needs about 40 bytes a
+/// point and 14 a triangle.
 ///
 /// # Errors
-/// Those of [`Stream::open`] and of reading on; [`Error::Argument`] for a file that can only be read as a whole, and for
-/// options of [`Mesh::surfels`](crate::surface::Mesh::surfels) that are no positive numbers; [`Error::Input`] for a mesh
-/// of so many long triangles, which are cut together, that the memory does not suffice; [`Error::NothingToDraw`] where
-/// nothing is left; [`Error::Timeout`] where counting long triangles, or a region, takes longer than
-/// [`Limits::seconds`]; [`Error::Memory`] where there is too little; [`Error::Output`] where something cannot be written. Then nothing is left of the file.
+/// After an error, nothing is left of the file.
+///
+/// - Those of [`Stream::open`] and of reading the files.
+/// - [`Error::Argument`] for a file that can only be read as a whole, and for options of
+///   [`Mesh::surfels`](crate::surface::Mesh::surfels) that are not positive numbers.
+/// - [`Error::Input`] for a mesh with so many long triangles, which are subdivided together, that
+///   the memory does not suffice.
+/// - [`Error::NothingToDraw`] if no splats are left.
+/// - [`Error::Timeout`] if counting long triangles, or a region, takes longer than
+///   [`Limits::seconds`].
+/// - [`Error::Memory`] if there is too little memory.
+/// - [`Error::Output`] if something cannot be written.
 pub fn convert(
     files: &[PathBuf],
     limits: &Limits,
@@ -105,12 +117,13 @@ pub fn convert(
             ))
         })?;
         stream.warn();
-        // Long triangles are cut once to be counted, and once to be drawn.
+        // Long triangles are subdivided once to count them, and once to make surfels. Each has its
+        // own deadline.
         let surfels = SurfelOptions { deadline: limits.deadline(), ..options.surfels.clone() };
         let options = &ExternalOptions { surfels, ..options.clone() };
         let input =
             survey::survey(stream, most, options, watch).map_err(|error| error.in_file(file))?;
-        tracing::info!(file = %file.display(), regions = input.regions(), "cut in regions");
+        tracing::info!(file = %file.display(), regions = input.regions(), "split into regions");
         inputs.push(distribute::distribute(input, [most, options.memory], path, watch)?);
     }
     let Some(first) = inputs.first() else {
@@ -143,7 +156,7 @@ pub fn convert(
         work.input(input, path).map_err(|error| error.in_file(file))?;
     }
     if work.splats == 0 {
-        return Err(Error::NothingToDraw("no point is left, or no triangle has an area".into()));
+        return Err(Error::NothingToDraw("no points are left, or no triangle has an area".into()));
     }
     done.splats = work.splats;
     watch(Stage::Writing, 0, 0);

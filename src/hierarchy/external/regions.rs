@@ -1,7 +1,9 @@
-//! Regions of about as many points each: runs of cells along the curve that Morton (1966) drew through space.
+//! Regions with about equally many points each: ranges of cells along the space-filling curve of
+//! Morton (1966).
 //!
-//! Cells are halved until none holds more than a region may, so that points that are crowded are cut as evenly as others.
-//! Only points at one place, or nearly, are more: they stay together.
+//! Cells are subdivided until none contains more points than a region may, so that crowded points
+//! are split as evenly as others. Only points at the same position, or nearly, stay together
+//! however many there are.
 
 use super::super::partition::{Cube, FINE_BITS};
 use crate::Result;
@@ -10,44 +12,48 @@ use std::collections::{BTreeMap, HashMap};
 
 /// Bits of a fine key below those of a coarse cell.
 const BELOW_COARSE: u32 = 3 * (FINE_BITS - 7);
-/// Bits by which a cell is cut at a time.
+/// Bits by which a cell is subdivided at a time.
 const CUT: u32 = 12;
-/// Neighbours of a point lie within so many mean spacings of the points of its cell, taken as those of a surface …
+/// How far the neighbours of a point may be, in mean spacings of the points in its cell. Their
+/// spacing is estimated as on a surface …
 const REACH_ON_SURFACE: f32 = 6.0;
-/// … or as those of a solid, whichever is farther …
+/// … and as in a solid, and the larger distance counts.
 const REACH_IN_SOLID: f32 = 2.0;
-/// … where it is a cell of as many points.
+/// The cell used is the smallest with at least this many points.
 const ENOUGH: u64 = 64;
-/// The distance of the neighbour that points are judged by, the sixth, in mean spacings: of points strewn on a surface the sixth
-/// lies in a circle of area 6 around a point, of one each.
+/// Distance to the sixth neighbour, by which points are judged, in mean spacings. For random points
+/// on a surface with one point per unit area, the sixth lies in a circle of area 6 around a point.
 const SIXTH: f32 = 1.382;
-/// In the table of cells, one that is in several regions, or that is cut.
+/// In the table of coarse cells: the cell is split among several regions.
 const SEVERAL: u32 = u32::MAX;
 
-/// Which region a place is in.
+/// The regions of the points in a cube.
 pub struct Regions {
     cube: Cube,
     /// The first key of each region.
     starts: Vec<u64>,
     /// The region of each coarse cell.
     coarse: Vec<u32>,
-    /// How far the neighbours of the points in each coarse cell may be; of cut ones in `cut`.
+    /// How far the neighbours of the points in each coarse cell may be. Negative for subdivided
+    /// cells, whose reach is in `cut`.
     reach: Vec<f32>,
     cut: BTreeMap<u64, f32>,
-    /// About the median distance of the neighbours that points are judged by, taken as those of a surface.
+    /// Approximate median distance to the neighbour by which points are judged, estimated as on a
+    /// surface.
     pub spacing: f32,
 }
 
-/// A cell that is not cut any further.
+/// A cell that is not subdivided further.
 struct Cell {
     start: u64,
-    /// Bits of keys in it.
+    /// The number of key bits below the cell's own.
     below: u32,
     count: u64,
 }
 
 impl Regions {
-    /// Cuts the cube in regions of at most `most` points. `pass` calls what it is given with the fine keys of all points.
+    /// Splits the cube into regions of at most `most` points. `pass` calls its argument with the
+    /// fine keys of all points, in parts.
     pub fn cut(
         cube: Cube,
         most: u64,
@@ -65,7 +71,7 @@ impl Regions {
         for (index, count) in (0u64..).zip(coarse) {
             sort(Cell { start: index << BELOW_COARSE, below: BELOW_COARSE, count }, &mut open);
         }
-        // All that are open have the same number of bits below.
+        // All open cells have the same number of bits below.
         while let Some(below) = open.first().map(|cell| cell.below) {
             let next = below.saturating_sub(CUT);
             let mut inside: HashMap<u64, Vec<u64>> = open
@@ -110,7 +116,7 @@ impl Regions {
             let spacings = (REACH_ON_SURFACE / (count as f32).sqrt())
                 .max(REACH_IN_SOLID / (count as f32).cbrt());
             let own = edge * spacings.min(1.0);
-            // Points at one place count as one.
+            // Coincident points count as one.
             typical
                 .push((edge / (count as f32).sqrt(), if cell.below > 0 { cell.count } else { 1 }));
             if cell.below == BELOW_COARSE {
@@ -121,14 +127,14 @@ impl Regions {
             }
         }
         if starts.len() == 1 {
-            // Nothing is to be looked up; many files together would take much memory for that.
+            // One region needs no tables. With many files, they would take much memory.
             (reach, cut) = (Vec::new(), BTreeMap::new());
         }
         let coarse = table(&starts, reach.len());
         Self { cube, starts, coarse, reach, cut, spacing: SIXTH * middle(typical) }
     }
 
-    /// How many regions there are, 1 at least.
+    /// Returns the number of regions, at least 1.
     pub fn count(&self) -> usize {
         self.starts.len()
     }
@@ -137,7 +143,7 @@ impl Regions {
         self.starts.partition_point(|&start| start <= key) as u32 - 1
     }
 
-    /// The region that a place is in.
+    /// Returns the region of a position.
     pub fn of(&self, place: Vec3) -> u32 {
         self.of_key(self.cube.fine_key(place))
     }
@@ -152,7 +158,7 @@ impl Regions {
         }
     }
 
-    /// The other regions that a point at a place may be a neighbour in.
+    /// Finds the other regions in which a point at this position may be a neighbour.
     pub fn around(&self, place: Vec3, found: &mut Vec<u32>) {
         found.clear();
         if self.starts.len() == 1 {
@@ -164,8 +170,8 @@ impl Regions {
         if reach < 0.0 {
             reach = self.cut.range(..=key).next_back().map_or(0.0, |(_, &reach)| reach);
         }
-        // Where the cell of the point is no narrower than the reach, none of its size is missed between three places along
-        // each axis. Where points are few, more are looked at.
+        // If coarse cells are at least as wide as the reach, three positions on each axis miss no
+        // cell of that size. Where points are sparse, more positions are tried.
         let steps: &[f32] = if reach <= self.cube.edge() / 128.0 {
             &[-1.0, 0.0, 1.0]
         } else {
@@ -184,9 +190,9 @@ impl Regions {
     }
 }
 
-/// The region of each of so many coarse cells, of the first keys of the regions.
+/// Returns the region of each coarse cell, given the first key of each region.
 fn table(starts: &[u64], cells: usize) -> Vec<u32> {
-    // Cells that no region has as a whole are those that a region begins within.
+    // A cell keeps `SEVERAL` if a region begins inside it.
     let mut table = vec![SEVERAL; cells];
     for (region, &start) in (0..).zip(starts) {
         let first = start.div_ceil(1 << BELOW_COARSE) as usize;
@@ -199,7 +205,7 @@ fn table(starts: &[u64], cells: usize) -> Vec<u32> {
     table
 }
 
-/// The median of values that count so many times.
+/// Returns the median of weighted values.
 fn middle(mut values: Vec<(f32, u64)>) -> f32 {
     values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let mut left = values.iter().map(|(_, count)| count).sum::<u64>() / 2;
@@ -211,7 +217,7 @@ fn middle(mut values: Vec<(f32, u64)>) -> f32 {
     at.map_or(0.0, |(value, _)| *value)
 }
 
-/// How many points there are in the cells larger than the coarse ones, by level: one cell, eight, …
+/// The number of points in the cells larger than the coarse ones, by level: one cell, eight, …
 struct Larger(Vec<Vec<u64>>);
 
 impl Larger {
@@ -227,8 +233,8 @@ impl Larger {
         Self((0..levels).map(count).collect())
     }
 
-    /// The smallest cell around one, or itself, that holds enough points to tell their spacing: the bits below it, and how
-    /// many it holds.
+    /// Returns the smallest cell, this one or one around it, with enough points to estimate their
+    /// spacing. The result is its number of key bits below, and its number of points.
     fn enough(&self, cell: &Cell) -> (u32, u64) {
         let around = self.0.iter().enumerate().rev().map(|(level, counts)| {
             let below = 3 * (FINE_BITS - level as u32);
@@ -269,7 +275,7 @@ mod tests {
     #[test]
     fn none_holds_more_than_it_may() {
         let even: Vec<Vec3> = spread(1000).collect();
-        // All but two in one coarse cell.
+        // All but two points are in one coarse cell.
         let crowded: Vec<Vec3> =
             even.iter().map(|p| p * 1e-4).chain([Vec3::ONE, -Vec3::ONE]).collect();
         for places in [even, crowded] {

@@ -1,4 +1,4 @@
-//! Whether a closed mesh that is read in pieces is solid.
+//! Determines whether a closed mesh that is read in pieces is solid.
 
 use super::{Stage, StageWatch};
 use crate::{
@@ -9,14 +9,15 @@ use crate::{
 };
 use glam::Vec3;
 
-/// Bytes that are taken in any case.
+/// Bytes that may be used in any case.
 const LEAST_MEMORY: u64 = 32 << 20;
-/// Bytes of a vertex where those at one place are one: the places, their order and the first ones.
+/// Bytes for each vertex if coincident vertices count as one: the positions, their order, and the
+/// first vertex at each.
 const OF_PLACE: u64 = 24;
 
-/// As [`Mesh::is_solid`](crate::surface::Mesh::is_solid), of a mesh that is closed this way. Where half of `memory` does not
-/// hold what joins its triangles to parts, and what is known of each part, the answer is no: then nothing is left out of
-/// pictures.
+/// Returns the same as [`Mesh::is_solid`](crate::surface::Mesh::is_solid), for a mesh that is
+/// closed in the given way. If half of `memory` cannot hold the data that joins triangles into
+/// parts, and the state of each part, the answer is `false`. Then nothing is culled.
 pub fn is_solid(
     stream: &Stream,
     closing: PiecesClosing,
@@ -29,7 +30,7 @@ pub fn is_solid(
     let fits = |more: u64| of_places + more <= (memory / 2).max(LEAST_MEMORY);
     let give_up = || {
         tracing::info!(
-            "too little memory to tell whether all parts are turned outward: backs will be drawn"
+            "too little memory to check whether all parts face outward: back faces will be drawn"
         );
         Ok(false)
     };
@@ -82,7 +83,7 @@ pub fn is_solid(
     Ok(sides.are_solid())
 }
 
-/// Tells how far a look through the triangles is.
+/// Reports the progress of a visit to the triangles.
 struct Seen<'a> {
     done: u64,
     of: u64,
@@ -97,7 +98,7 @@ impl Seen<'_> {
     }
 }
 
-/// The places of all vertices.
+/// Returns the positions of all vertices.
 fn places(stream: &Stream) -> Result<Vec<Vec3>> {
     let mut places = Vec::with_capacity(stream.counts().points as usize);
     stream.points(
@@ -115,7 +116,7 @@ mod tests {
     use super::*;
     use crate::input::{Limits, testing::Folder};
 
-    /// Tetrahedra side by side, none of which shares a vertex, as a binary PLY file.
+    /// Returns a binary PLY file of separate tetrahedra, which share no vertices.
     fn tetrahedra(count: u32) -> Vec<u8> {
         let mut out =
             format!("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", 4 * count);
@@ -143,7 +144,7 @@ mod tests {
         out
     }
 
-    /// Triangles alone fit in what is taken in any case, but not what is known of each part.
+    /// The memory that may be used in any case holds the triangles, but not the state of each part.
     #[test]
     fn parts_that_take_too_much_memory_are_not_solid() {
         let folder = Folder::new();

@@ -1,4 +1,4 @@
-//! The first looks at an input: where its points are, and what its triangles are like.
+//! The first passes over an input: where its points are, and how long its triangles are.
 
 use super::{
     super::{
@@ -18,35 +18,36 @@ use crate::{
 use glam::{DVec3, Vec3};
 use std::collections::HashSet;
 
-/// An input that has been looked through.
+/// An input after the first passes.
 pub struct Surveyed<'a> {
     pub stream: Stream<'a>,
     pub regions: Regions,
-    /// Nearly the smallest around those points that are farthest in some directions.
+    /// Nearly the smallest sphere around the points that are farthest in some directions.
     pub core: Sphere,
     /// The mean of all points.
     pub center: DVec3,
-    /// Of a mesh.
+    /// `None` for point clouds.
     pub mesh: Option<Triangulated>,
 }
 
-/// What is known of the triangles of a mesh.
+/// The properties of a mesh's triangles.
 pub struct Triangulated {
     pub pieces: MeshPieces,
-    /// As of [`Mesh::is_solid`](crate::surface::Mesh::is_solid).
+    /// See [`Mesh::is_solid`](crate::surface::Mesh::is_solid).
     pub is_solid: bool,
-    /// The places of the corners of triangles that are to be cut: what is at them is made on its own.
+    /// The positions of the corners of triangles to be subdivided. Surfels at these are made
+    /// separately.
     pub long: HashSet<[u32; 3]>,
-    /// The longest edge that stays.
+    /// The longest edge that is not subdivided.
     pub longest: f32,
 }
 
-/// What names a place, whatever the sign of its zeros.
+/// Identifies a position, regardless of the sign of zeros.
 pub fn name(place: Vec3) -> [u32; 3] {
     (place + Vec3::ZERO).to_array().map(f32::to_bits)
 }
 
-/// Goes through the input as often as it takes, and cuts it in regions of at most `most` points.
+/// Reads the input as often as necessary, and splits it into regions of at most `most` points.
 pub fn survey<'a>(
     mut stream: Stream<'a>,
     most: u64,
@@ -90,8 +91,8 @@ pub fn survey<'a>(
     Ok(Surveyed { core: extremes.core(), stream, regions, center, mesh })
 }
 
-/// Goes through the triangles until it is known which of them are cut, and into how many; no farther than there is `room` for so
-/// many triangles.
+/// Visits the triangles until it is known which are subdivided, and into how many. Stops early if
+/// there are more than `room` triangles after subdivision.
 pub fn look(
     stream: &Stream,
     options: &SurfelOptions,
@@ -144,7 +145,7 @@ fn triangulated(
     Ok(Triangulated { pieces, is_solid, long, longest })
 }
 
-/// The places that are farthest in each of some directions, and against it.
+/// The farthest positions in each of some directions, and in its opposite.
 struct Extremes([[(f32, Vec3); 2]; DIRECTIONS.len()]);
 
 impl Default for Extremes {

@@ -1,4 +1,5 @@
-//! Bounds of inner nodes as whole numbers, made from below, so that they hold for what is read.
+//! Bounds of inner nodes as integers. They are made from the bottom up, so that they hold for the
+//! decoded values.
 
 use super::{
     direction::unpacked,
@@ -10,29 +11,31 @@ use crate::hierarchy::{Node, merge::leaf_cone, sphere::Sphere};
 use glam::DVec3;
 use std::{f64::consts::PI, sync::LazyLock};
 
-/// Steps of radii and of sizes in parts of a doubling.
+/// Steps of radii and of sizes, in units of 1/[`PARTS`] octave.
 const RADIUS: i32 = PARTS / 12;
 const SIZE: i32 = PARTS / 16;
-/// Half-angles of cones are this far apart.
+/// Step between the half-angles of cones.
 const CONE_STEP: f64 = PI / 30.0;
-/// The cone of half a turn, beyond which there is none worth telling.
+/// The code for no cone (a half-angle of π). Half-angles above 90° are not stored.
 const NO_CONE: i32 = 16;
-/// The farthest that a centre may be: beyond, no number of 32 bits tells it.
+/// Upper bound on a centre's distance in steps. 32-bit numbers cannot represent larger ones.
 const MOST_STEPS: f64 = (1 << 20) as f64;
 const MOST_POWER: i32 = PARTS * 64;
 
-/// Large nodes have fine spheres, for what they lose adds up on the way to the root: those of at least this part of the
-/// root's size. The others stand around the splat's centre.
+/// Nodes of at least this fraction of the root's size have fine spheres, because the losses of
+/// large nodes add up on the way to the root. The others have spheres around the splat's centre.
 const FINE_PART: f64 = 1.0 / 48.0;
-/// Steps of fine centres and radii in the reach of the smallest of these nodes: the same for all, however large.
+/// The number of steps in the reach of the smallest node with a fine sphere. All fine centres and
+/// radii use this step, however large the node.
 const FINE_STEPS: f64 = 6.0;
 
-/// The code of the largest standard deviation from which on nodes below a root have fine spheres.
+/// Returns the smallest code of the largest standard deviation for which nodes below a root have
+/// fine spheres.
 pub fn fine_from(root: &Node) -> i32 {
     inner_sigma(f64::from(root.size) / FULL_WIDTH * FINE_PART)
 }
 
-/// The steps of the sphere of a node that has a fine one.
+/// Returns the step of a node's sphere if it is fine.
 pub fn fine_step(sigma: i32, fine: i32, extent: f32) -> Option<f64> {
     (sigma >= fine).then(|| f64::from(extent) * sigma_of_inner(fine) / FINE_STEPS)
 }
@@ -40,29 +43,30 @@ pub fn fine_step(sigma: i32, fine: i32, extent: f32) -> Option<f64> {
 /// The bounds of an inner node.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Code {
-    /// From the splat's centre along its axes; 0 where spheres are coarse.
+    /// Steps from the splat's centre along its axes; 0 for coarse spheres.
     pub center: [i32; 3],
-    /// How much wider than the splat's own footprint.
+    /// Code of the radius: relative to the splat's own footprint, or in fine steps.
     pub radius: i32,
     pub cone: i32,
-    /// How much larger than the splat's own width.
+    /// Code of the size, relative to the splat's own width.
     pub size: i32,
 }
 
-/// What is known of a node's bounds before its children are: those of a leaf.
+/// Sets the bounds of a node before its children are known, which are those of a leaf.
 pub fn leaf(node: &mut Node, shape: &Shape, extent: f32) {
     let largest = shape.largest();
     node.center = node.splat.center;
-    // What rounding takes from 32 bits is less than what this adds.
+    // The factor covers the rounding to 32 bits.
     node.radius = (f64::from(extent) * largest * 1.000_001) as f32;
     node.size = (FULL_WIDTH * largest) as f32;
     node.cone = unpacked(node.splat.normal).map_or(-1.0, |normal| {
-        // The axis along which it is thinnest lies between the normal and the third one, if that is the thinnest.
+        // If the third axis is the thinnest, the approximation of the thinnest axis lies between it
+        // and the normal.
         let [first, second, third] = shape.sigma;
         if third <= first && third <= second && shape.axes[2].dot(normal) > 0.999 {
             return 1.0;
         }
-        // As of `merge::leaf`, by the axes themselves.
+        // The same as `merge::leaf`, computed from the axes.
         let along = |i: usize| {
             let (thinner, axis) = (shape.sigma[2] / shape.sigma[i], shape.axes[i]);
             axis * (axis.dot(normal) * thinner * thinner * thinner * thinner)
@@ -84,7 +88,7 @@ fn cones() -> &'static [f32; NO_CONE as usize + 1] {
 }
 
 impl Code {
-    /// Gives a node the bounds; `None` for codes of none.
+    /// Sets the decoded bounds of a node; `None` if the code is not valid.
     pub fn decode(
         &self,
         node: &mut Node,
@@ -114,8 +118,8 @@ impl Code {
             .then_some(())
     }
 
-    /// The tightest bounds around the children that the centre of the node, nearly, can have. `None` where no code tells
-    /// them.
+    /// Encodes the tightest bounds around the children with about the node's centre. `None` if no
+    /// code can represent them.
     pub fn encode(
         node: &mut Node,
         children: &[Node],
@@ -136,7 +140,8 @@ impl Code {
         code.decode(node, shape, extent, fine)?;
         let mut radius = around(node);
         if fine.is_some_and(|step| radius > step * f64::from(MOST_POWER / RADIUS - 1)) {
-            // A sphere that lies in its parent's may be far wider than it need be; around the splat's centre it is not.
+            // A sphere that lies in its parent's may be far wider than necessary. Around the
+            // splat's centre it is not.
             code.center = [0; 3];
             code.decode(node, shape, extent, fine)?;
             radius = around(node);
@@ -146,7 +151,7 @@ impl Code {
             children.iter().map(|child| joint_cosine(node, child)).fold(1.0, f64::min) - 1e-12;
         let narrow = |cone: &f32| *cone == -1.0 || f64::from(*cone) <= cosine;
         code.cone = cones().iter().position(narrow)? as i32;
-        // Estimates, then up to what really holds.
+        // Estimates first, then increased until the bounds hold.
         let steps = |ratio: f64, step: i32| {
             let steps = (logarithm(ratio) * f64::from(PARTS / step)).ceil();
             steps.clamp(-4096.0, 4096.0) as i32 - 1
@@ -167,8 +172,8 @@ impl Code {
     }
 }
 
-/// The steps from a node's splat to a place next to its centre, the one from which its children reach least far: what rounding
-/// loses adds up to the root.
+/// Returns the steps from a node's splat to the grid point next to its centre from which its
+/// children reach least far. The losses of rounding add up on the way to the root.
 fn nearest_center(node: &Node, children: &[Node], shape: &Shape, step: f64) -> Option<[i32; 3]> {
     let spheres: Vec<Sphere> = children.iter().map(Sphere::of).collect();
     let splat = DVec3::from(node.splat.center.map(f64::from));

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-/// Reads numbers one after another; `None` where the bytes end before.
+/// Reads numbers one after another. Returns `None` if the bytes end too early.
 #[derive(Clone)]
 pub struct Cursor<'a> {
     rest: &'a [u8],

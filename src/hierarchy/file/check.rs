@@ -1,4 +1,4 @@
-//! Looking for damage.
+//! Checks a file for damage.
 
 use super::{
     directory::{NO_PORTAL, PageEntry},
@@ -17,7 +17,7 @@ use crate::{
 };
 use std::path::Path;
 
-/// What [`check`](check()) found.
+/// The result of [`check`](check()).
 #[derive(Debug, Clone, Default)]
 pub struct Report {
     /// Empty for a sound file.
@@ -30,10 +30,10 @@ impl Report {
     }
 }
 
-/// Checks a file: header, directory, every checksum and the hash, then every promise of the tree
+/// Checks a file: header, directory, every checksum and the hash, then every invariant of the tree
 /// ([`validate`](crate::hierarchy::validate())) block by block. One block is in memory at a time.
 ///
-/// Nothing is an error: a file that cannot be opened is a finding.
+/// This never fails: a file that cannot be opened is a finding.
 pub fn check(path: &Path, limits: &Limits) -> Report {
     let mut findings = Findings::default();
     match Hierarchy::open(path, limits) {
@@ -44,7 +44,7 @@ pub fn check(path: &Path, limits: &Limits) -> Report {
 }
 
 impl Hierarchy {
-    /// As [`check`](check()), of a file that is open already, or of its bytes. Of a tree in memory see
+    /// The same as [`check`](check()), for a file or bytes already opened. For a tree in memory see
     /// [`validate`](crate::hierarchy::validate()).
     pub fn check(&self) -> Report {
         let mut findings = Findings::default();
@@ -56,7 +56,6 @@ impl Hierarchy {
 fn contents(hierarchy: &Hierarchy, findings: &mut Findings) {
     let bytes = hierarchy.bytes();
     if let Some(start) = hash_start(bytes) {
-        // Threads help where there are many bytes.
         let found = blake3::hash(&bytes[..start]);
         if bytes[start..] != *found.as_bytes() {
             let message = "the hash of the whole file does not fit";
@@ -103,18 +102,18 @@ fn contents(hierarchy: &Hierarchy, findings: &mut Findings) {
     let header = hierarchy.header();
     let is_whole = roots.iter().all(|(_, root)| root.is_some());
     if is_whole && leaves != header.leaves {
-        let message = format!("it tells of {} leaves, and {leaves} are there", header.leaves);
+        let message = format!("it states {} leaves, but there are {leaves}", header.leaves);
         findings.push(Finding::error("counts", "header", message));
     }
     if is_whole {
         footprints.check_box(header.origin, &header.bounds, "header", findings);
     }
     if is_whole && has_normals != header.has_normals {
-        findings.push(Finding::error("attributes", "header", "what it tells of normals is not so"));
+        findings.push(Finding::error("attributes", "header", "its flag for normals is wrong"));
     }
 }
 
-/// Checks what the directory tells of the pages of a block.
+/// Checks the directory's entries for the pages of a block.
 fn check_entries(
     first: usize,
     stated: &[PageEntry],
@@ -129,7 +128,7 @@ fn check_entries(
     let runs = pages(nodes);
     let around = arounds(nodes, &runs);
     if runs.len() != stated.len() {
-        let message = format!("its nodes fill {} pages, and it has {}", runs.len(), stated.len());
+        let message = format!("its nodes fill {} pages, but it has {}", runs.len(), stated.len());
         findings.push(Finding::error("directory", format!("page {first}"), message));
         return;
     }
@@ -147,8 +146,9 @@ fn check_entries(
             largest_size: entry.largest_parent_size,
         };
         if entry.nodes as usize != runs[index].nodes.len() || found != wanted {
-            let message =
-                format!("the parents of its nodes are in {wanted:?}, and it tells of {found:?}");
+            let message = format!(
+                "the parents of its nodes have the bounds {wanted:?}, but it states {found:?}"
+            );
             findings.push(Finding::error("directory", format!("page {}", first + index), message));
         }
     }

@@ -1,7 +1,7 @@
-//! Columns of whole numbers as bytes.
+//! Encodes columns of integers as bytes.
 //!
-//! Every number becomes a class, which tells its size to a quarter, and the bits below. Classes take about their entropy;
-//! the bits below are as good as random and stand as they are.
+//! Every number is split into a class, which gives its size to a quarter of an octave, and its low
+//! bits. Classes are entropy-coded. The low bits are nearly random and are stored directly.
 
 use super::{
     bytes::{Cursor, Put},
@@ -9,7 +9,7 @@ use super::{
     quantise::logarithm,
 };
 
-/// Added to the count of classes where a column tells differences.
+/// Added to the number of classes if a column stores differences.
 const DIFFERENCES: u8 = 128;
 
 const fn fold(value: i32) -> u32 {
@@ -20,7 +20,8 @@ const fn unfold(value: u32) -> i32 {
     (value >> 1) as i32 ^ -((value & 1) as i32)
 }
 
-/// The class of a number and how many bits below it has. Numbers below 16 are their own class.
+/// Returns the class of a number and how many low bits it has. Numbers below 16 are their own
+/// class.
 fn class(value: u32) -> (u8, u32) {
     if value < 16 {
         return (value as u8, 0);
@@ -29,7 +30,7 @@ fn class(value: u32) -> (u8, u32) {
     ((8 + bits * 4 + (value >> bits & 3)) as u8, bits)
 }
 
-/// The least number of each class and how many bits below it has.
+/// The smallest number of each class, and its number of low bits.
 const CLASSES: [(u32, u8); SYMBOLS] = {
     let mut classes = [(0, 0); SYMBOLS];
     let mut class = 0;
@@ -42,13 +43,13 @@ const CLASSES: [(u32, u8); SYMBOLS] = {
     classes
 };
 
-/// Collects the columns of a page. Numbers and their differences are of 30 bits at most.
+/// Collects the columns of a page. Numbers and their differences have at most 30 bits.
 #[derive(Default)]
 pub struct Columns {
-    /// How each column is told, and the numbers of constant ones.
+    /// The head of each column, with the values of constant ones.
     heads: Vec<u8>,
     classes: Vec<u8>,
-    /// How many classes each column has that is not constant.
+    /// The length and the table of each column that is not constant.
     tables: Vec<(usize, Table)>,
     bits: Bits,
 }
@@ -70,7 +71,7 @@ impl Columns {
         let start = self.classes.len();
         let mut counts = [0; SYMBOLS];
         let mut before = 0;
-        // The table stands before the bits below, so classes come first.
+        // The table comes before the low bits, so classes are determined first.
         let coded = |value: i32, before: &mut i32| {
             let coded = fold(value - *before);
             *before = if differences { value } else { 0 };
@@ -92,7 +93,8 @@ impl Columns {
         self.tables.push((values.len(), table));
     }
 
-    /// The bytes: the heads of the columns, all classes, then the bits below; the first two behind their lengths.
+    /// Appends the encoded columns: their heads, all classes, then the low bits. The first two are
+    /// preceded by their lengths.
     pub fn finish(self, out: &mut Vec<u8>) {
         let mut encoder = Encoder::new(self.classes.len());
         let mut end = self.classes.len();
@@ -111,12 +113,13 @@ impl Columns {
     }
 }
 
-/// Numbers of a column by which it is told.
+/// Numbers of a column that are sampled to choose its encoding.
 const SAMPLE: usize = 512;
 
-/// Whether the differences from one number to the next take fewer bits than the numbers, by the entropy of the classes.
+/// Returns whether the differences between successive numbers need fewer bits than the numbers, by
+/// the entropy of the classes.
 fn is_shorter_in_differences(values: &[i32]) -> bool {
-    // A part tells as well as all.
+    // A sample is representative enough.
     let values = &values[values.len().saturating_sub(SAMPLE) / 2..][..values.len().min(SAMPLE)];
     let cost = |of: &dyn Fn(usize) -> i32| {
         let mut counts = [0u32; SYMBOLS];
@@ -133,7 +136,7 @@ fn is_shorter_in_differences(values: &[i32]) -> bool {
     cost(&|at| values[at] - values[at - 1]) < cost(&|at| values[at])
 }
 
-/// Takes the columns of a page one after another.
+/// Reads the columns of a page one after another.
 pub struct Planes<'a> {
     heads: Cursor<'a>,
     classes: Decoder<'a>,
@@ -142,28 +145,31 @@ pub struct Planes<'a> {
 }
 
 impl<'a> Planes<'a> {
-    /// What [`Columns::finish`] gave, which ends with `bytes`.
+    /// Opens the output of [`Columns::finish`], which `bytes` must end with.
     pub fn new(bytes: &'a [u8]) -> Result<Self, String> {
         let mut cursor = Cursor::new(bytes);
         let mut part = || {
             let length = cursor.u32()? as usize;
             cursor.take(length)
         };
-        let (heads, classes) = part().zip(part()).ok_or("it ends within its columns")?;
+        let (heads, classes) = part().zip(part()).ok_or("it ends inside its columns")?;
         let classes = Decoder::new(classes).ok_or("it has no classes")?;
         let bits = BitReader::new(cursor.take(cursor.remaining()).unwrap_or(&[]));
         Ok(Self { heads: Cursor::new(heads), classes, bits, slots: Box::new(Slots::new()) })
     }
 
-    /// The next column, of `count` numbers.
+    /// Returns the next column, of `count` numbers.
     pub fn column(&mut self, count: usize) -> Result<Vec<i32>, String> {
         let head = self.heads.u8().ok_or("it ends before its last column")?;
         if head == 0 {
-            return Ok(vec![self.constant().ok_or("a column's number is none")?; count]);
+            return Ok(vec![
+                self.constant().ok_or("the value of a constant column is not valid")?;
+                count
+            ]);
         }
         let length = usize::from(head & !DIFFERENCES);
-        let table =
-            Table::read(length, &mut self.bits).ok_or("the frequencies of a column are none")?;
+        let table = Table::read(length, &mut self.bits)
+            .ok_or("the frequencies of a column are not valid")?;
         let mut values = vec![0; count];
         let mut places = values.iter_mut();
         let bits = &mut self.bits;
@@ -176,11 +182,12 @@ impl<'a> Planes<'a> {
             *places.next()? = value;
             Some(())
         };
-        self.classes.take(count, &table, &mut self.slots, each).ok_or("it ends within a column")?;
+        self.classes.take(count, &table, &mut self.slots, each).ok_or("it ends inside a column")?;
         Ok(values)
     }
 
-    /// The number of a constant column: seven bits a byte, lowest first, the highest bit where more follow.
+    /// Reads the value of a constant column: seven bits a byte, lowest first, with the highest bit
+    /// set if more follow.
     fn constant(&mut self) -> Option<i32> {
         let mut folded = 0;
         for shift in (0..32).step_by(7) {
@@ -193,12 +200,12 @@ impl<'a> Planes<'a> {
         None
     }
 
-    /// That nothing is left over.
+    /// Returns an error if bytes are left over.
     pub fn end(self) -> Result<(), String> {
         if self.heads.remaining() == 0 && self.classes.is_at_end() && self.bits.is_at_end() {
             Ok(())
         } else {
-            Err("its columns do not end where it does".into())
+            Err("its columns do not end where the page does".into())
         }
     }
 }

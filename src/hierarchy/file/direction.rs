@@ -1,16 +1,16 @@
-//! Directions told from the one before: steps on a map of the sphere with equal areas (Lambert 1772) that has it in the
-//! middle. Every operation is one that all machines round alike.
+//! Directions encoded relative to the previous one: steps on an equal-area map of the sphere
+//! (Lambert 1772) centred on it. All machines round every operation used here alike.
 
 use crate::splat::{NO_NORMAL, decode_normal};
 use glam::DVec3;
 
-/// How fine directions are told: steps of this part of the sphere's radius on the map.
+/// The resolution of directions: one step on the map is the sphere's radius divided by this.
 #[derive(Debug, Clone, Copy)]
 pub struct Directions(pub i32);
 
 impl Directions {
-    /// The steps from one unit direction, with two `across` it, to another. The half of the sphere behind has a map of its
-    /// own, aside from that before.
+    /// Returns the steps from one unit direction to another, on axes given by the two vectors
+    /// `across`. The hemisphere behind has its own map, offset from the one in front.
     pub fn encode(self, from: DVec3, across: [DVec3; 2], to: DVec3) -> [i32; 2] {
         let height = to.dot(from);
         let scale = f64::from(self.0) / ((1.0 + height.abs()) * 0.5).sqrt();
@@ -21,7 +21,7 @@ impl Directions {
         if height >= 0.0 { [u, v] } else { [u + if u < 0 { -4 * self.0 } else { 4 * self.0 }, v] }
     }
 
-    /// The unit direction behind the steps; `None` for those beyond the map.
+    /// Returns the unit direction at the steps; `None` if they are outside the map.
     pub fn decode(self, from: DVec3, across: [DVec3; 2], [u, v]: [i32; 2]) -> Option<DVec3> {
         let is_behind = u.unsigned_abs() >= 2 * self.0 as u32;
         let u = if is_behind {
@@ -40,7 +40,7 @@ impl Directions {
     }
 }
 
-/// Two unit vectors that make a right-handed frame with a unit vector (Duff et al. 2017).
+/// Returns two unit vectors that form a right-handed frame with a unit vector (Duff et al. 2017).
 pub fn across(n: DVec3) -> [DVec3; 2] {
     let sign = if n.z < 0.0 { -1.0 } else { 1.0 };
     let a = -1.0 / (sign + n.z);
@@ -51,7 +51,7 @@ pub fn across(n: DVec3) -> [DVec3; 2] {
     ]
 }
 
-/// A unit direction as that of a [`Splat`](crate::splat::Splat): on an octahedron.
+/// Packs a unit direction like the normal of a [`Splat`](crate::splat::Splat), octahedrally.
 pub fn packed(n: DVec3) -> u32 {
     let scale = 32767.0 / (n.x.abs() + n.y.abs() + n.z.abs());
     let (mut x, mut y) = (n.x * scale, n.y * scale);
@@ -62,7 +62,7 @@ pub fn packed(n: DVec3) -> u32 {
     pack(x) | pack(y) << 16
 }
 
-/// The unit direction of a splat's normal.
+/// Returns the unit direction of a splat's normal.
 pub fn unpacked(normal: u32) -> Option<DVec3> {
     if normal == NO_NORMAL { None } else { decode_normal(normal)?.as_dvec3().try_normalize() }
 }

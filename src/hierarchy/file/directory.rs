@@ -1,4 +1,5 @@
-//! The directory: which pages there are, where they stand in the file, and what must be refined for each to be needed.
+//! The directory: the pages, their positions in the file, and what must be refined for each to be
+//! needed.
 
 use super::{
     HASH, PAGE_NODES,
@@ -10,32 +11,34 @@ use super::{
 use crate::hierarchy::Node;
 use std::ops::Range;
 
-/// A page as the directory knows it.
+/// A page, as listed in the directory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PageEntry {
-    /// The block that its nodes belong to.
+    /// The block that contains its nodes.
     pub block: u32,
-    /// The number of its first node in the block.
+    /// Index of its first node in the block.
     pub first_node: u32,
-    /// How many nodes it holds, at most [`PAGE_NODES`].
+    /// The number of its nodes, at most [`PAGE_NODES`].
     pub nodes: u32,
-    /// The number in the block of the first child of its nodes.
+    /// Index, in the block, of the first child of its nodes.
     pub first_child: u32,
-    /// The pages before it that hold parents of its nodes; empty for the page of the root. The first page of a joined block
-    /// has the page with the parent of its portal. Nodes whose parents are in the page itself are beside the question:
-    /// where any of them is wanted, one whose parent is elsewhere is.
+    /// The earlier pages that contain parents of its nodes; empty for the root's page. For the
+    /// first page of a joined block, the page with the parent of its portal.
+    ///
+    /// Nodes whose parents are in the same page do not matter: if one is needed, so is a node whose
+    /// parent is elsewhere.
     pub parent_pages: Range<u32>,
-    /// A sphere around the spheres of all the parents, relative to the tree's origin; of infinite radius for the page of
-    /// the root.
+    /// A sphere around the spheres of all the parents, relative to the tree's origin. Its radius is
+    /// infinite for the root's page.
     pub parents_center: [f32; 3],
     pub parents_radius: f32,
-    /// The largest size among the parents; infinite for the page of the root. No page is needed whose sphere and size, as
-    /// those of a node, would not be refined.
+    /// The largest size of a parent; infinite for the root's page. If a node of this sphere and
+    /// size would not be refined, the page is not needed.
     pub largest_parent_size: f32,
     pub(super) place: Place,
 }
 
-/// Where the bytes of a page stand.
+/// Position, length and checksum of a page's bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Place {
     pub offset: u64,
@@ -49,7 +52,7 @@ pub struct BlockEntry {
     pub first_page: u32,
     pub pages: u32,
     pub nodes: u32,
-    /// The leaf of block 0 in whose place its root stands; [`NO_PORTAL`] for block 0.
+    /// The leaf of block 0 that its root replaces; [`NO_PORTAL`] for block 0.
     pub portal: u32,
 }
 
@@ -67,18 +70,18 @@ pub struct Directory {
 }
 
 impl Directory {
-    /// Bytes of a directory with its checksum.
+    /// Returns the size in bytes of a directory with its checksum.
     pub fn length(blocks: usize, pages: usize) -> u64 {
         blocks as u64 * BLOCK_BYTES as u64 + pages as u64 * PAGE_BYTES as u64 + 4
     }
 
-    /// Bytes that it takes in memory, with what is made of it.
+    /// Returns the bytes that it needs in memory, including data derived from it.
     pub fn memory(&self) -> u64 {
         (self.blocks.len() * 2 * size_of::<BlockEntry>()
             + self.pages.len() * 2 * size_of::<PageEntry>()) as u64
     }
 
-    /// Adds a block, before it is known what portal it hangs below.
+    /// Adds a block whose portal is not known yet.
     pub fn push_block(&mut self, runs: &[Run], around: &[Around], places: &[Place]) {
         let (block, first_page) = (self.blocks.len() as u32, self.pages.len() as u32);
         let nodes = runs.last().map_or(0, |run| run.nodes.end as u32);
@@ -103,7 +106,8 @@ impl Directory {
         }
     }
 
-    /// Hangs all blocks but the first below portals of it: what must be refined for their first pages is now known.
+    /// Attaches all blocks except the first to their portals in the first. This also determines
+    /// what must be refined for their first pages.
     pub fn hang(&mut self, top: &[Node], portals: &[u32]) {
         let parents = parents(top);
         for (block, &portal) in self.blocks[1..].iter_mut().zip(portals) {
@@ -128,13 +132,13 @@ impl Directory {
         );
     }
 
-    /// The numbers, in their block, of the nodes of a page.
+    /// Returns the range of a page's nodes in their block.
     pub fn nodes(&self, page: u32) -> Range<u32> {
         let entry = &self.pages[page as usize];
         entry.first_node..entry.first_node + entry.nodes
     }
 
-    /// The numbers, in their block, of the children of the nodes of a page.
+    /// Returns the range, in the block, of the children of a page's nodes.
     pub fn children(&self, page: u32) -> Range<u32> {
         let entry = &self.pages[page as usize];
         let block = &self.blocks[entry.block as usize];
@@ -146,21 +150,21 @@ impl Directory {
         entry.first_child..end
     }
 
-    /// The page that holds a node of a block.
+    /// Returns the page that contains a node of a block.
     pub fn page_of(&self, block: u32, node: u32) -> u32 {
         let BlockEntry { first_page, pages, .. } = self.blocks[block as usize];
         let entries = &self.pages[first_page as usize..(first_page + pages) as usize];
         first_page + entries.partition_point(|entry| entry.first_node <= node) as u32 - 1
     }
 
-    /// The page among whose nodes' children a node of a block is; not for a root.
+    /// Returns the page that contains the parent of a node of a block, which must not be a root.
     pub fn parent_page_of(&self, block: u32, node: u32) -> u32 {
         let BlockEntry { first_page, pages, .. } = self.blocks[block as usize];
         let entries = &self.pages[first_page as usize..(first_page + pages) as usize];
         first_page + entries.partition_point(|entry| entry.first_child <= node).max(1) as u32 - 1
     }
 
-    /// Fills in which pages hold the parents of the nodes of each, once portals are known.
+    /// Sets, for each page, the pages that contain the parents of its nodes. Portals must be known.
     pub fn link(&mut self) {
         for page in 0..self.pages.len() as u32 {
             let block = self.pages[page as usize].block;
@@ -180,7 +184,8 @@ impl Directory {
         }
     }
 
-    /// Pages in the order of falling size of what they refine, each behind those of its parents.
+    /// Returns the pages by descending size of the nodes that they refine, each after the pages of
+    /// its parents.
     pub fn coarse_first(&self) -> Vec<u32> {
         let mut sizes = vec![f32::INFINITY; self.pages.len()];
         for (page, entry) in self.pages.iter().enumerate() {
@@ -211,9 +216,10 @@ impl Directory {
         out
     }
 
-    /// Reads the directory behind the header; `bytes` are all that is present of the file.
+    /// Reads the directory after the header; `bytes` is the available part of the file.
     ///
-    /// What it says is checked against the header and against itself, so that what follows can rely on it.
+    /// The contents are checked against the header and for consistency, so that later code can rely
+    /// on them.
     pub fn decode(bytes: &[u8], stored: &Stored) -> Result<Self, Trouble> {
         let start = stored.length();
         let length = Self::length(stored.blocks as usize, stored.pages as usize);
@@ -261,7 +267,7 @@ impl Directory {
         Some(Self { blocks, pages })
     }
 
-    /// Numbers the nodes, and refuses what contradicts itself.
+    /// Numbers the nodes, and returns a message if the directory contradicts itself.
     fn consistent(&mut self, stored: &Stored, pages_start: u64) -> Result<(), String> {
         let joined = self.blocks.len() > 1;
         let mut next_page = 0u64;
@@ -279,7 +285,10 @@ impl Directory {
                 block.portal < self.blocks[0].nodes
             };
             if !is_portal {
-                return Err(format!("block {number} hangs below node {} of block 0", block.portal));
+                return Err(format!(
+                    "the portal of block {number} is node {}, which block 0 does not have",
+                    block.portal
+                ));
             }
             portals.push(block.portal);
             let pages = pages.start as usize..pages.end as usize;
@@ -296,13 +305,13 @@ impl Directory {
         }
         if nodes != stored.header.nodes {
             return Err(format!(
-                "its blocks hold {nodes} nodes and the header tells of {}",
+                "its blocks contain {nodes} nodes, but the header states {}",
                 stored.header.nodes
             ));
         }
         portals.sort_unstable();
         if joined && portals.windows(2).any(|pair| pair[0] == pair[1]) {
-            return Err("two blocks hang below the same node".into());
+            return Err("two blocks have the same portal".into());
         }
         let mut places: Vec<Place> = self.pages.iter().map(|page| page.place).collect();
         places.sort_unstable_by_key(|place| place.offset);
@@ -320,16 +329,16 @@ impl Directory {
     }
 }
 
-/// Gives each page of a block its first node.
+/// Sets the first node of each page in a block.
 fn number_nodes(block: u32, nodes: u32, pages: &mut [PageEntry]) -> Result<(), (usize, String)> {
     let mut next = 0u64;
     let mut next_child = 1;
     for (index, page) in pages.iter_mut().enumerate() {
         let fail = |message: String| Err((index, message));
         if !(1..=PAGE_NODES as u32).contains(&page.nodes) {
-            return fail(format!("it claims {} nodes; 1 to {PAGE_NODES} are possible", page.nodes));
+            return fail(format!("it states {} nodes; 1 to {PAGE_NODES} are possible", page.nodes));
         }
-        // Children stand behind their parents, and every node but the root is somebody's.
+        // Children come after their parents, and every node except the root is a child.
         let first = index == 0;
         let behind = if first { page.first_child == 1 } else { u64::from(page.first_child) > next };
         if !behind || page.first_child < next_child || page.first_child > nodes {
@@ -343,13 +352,13 @@ fn number_nodes(block: u32, nodes: u32, pages: &mut [PageEntry]) -> Result<(), (
         if !around.iter().all(|v| v.is_finite())
             || !(endless || sound(page.parents_radius) && sound(page.largest_parent_size))
         {
-            return fail("the sphere of its parents is none".into());
+            return fail("the sphere around its parents is not valid".into());
         }
         (page.block, page.first_node) = (block, next as u32);
         next_child = page.first_child;
         next += u64::from(page.nodes);
         if next > u64::from(nodes) {
-            return fail(format!("it ends behind the {nodes} nodes of its block"));
+            return fail(format!("it ends after the {nodes} nodes of its block"));
         }
     }
     if next != u64::from(nodes) {
@@ -358,7 +367,7 @@ fn number_nodes(block: u32, nodes: u32, pages: &mut [PageEntry]) -> Result<(), (
     Ok(())
 }
 
-/// Why a directory is not taken.
+/// Why a directory is rejected.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Trouble {
     Incomplete,

@@ -1,48 +1,51 @@
-//! Symbols in about as many bits as their frequencies say: range asymmetric numeral systems (Duda 2009), four states that
-//! take turns, so that a processor works on several symbols at once; words of 16 bits in and out.
+//! Entropy coding of symbols by a range asymmetric numeral system (Duda 2009). Four states take
+//! turns, so that a processor works on several symbols at once. Input and output are words of 16
+//! bits.
 
 use super::bytes::Cursor;
 
-/// Frequencies of a column add up to 2 to this.
+/// The frequencies of a column add up to 2 to the power of this.
 const SCALE: u32 = 12;
 const WHOLE: u32 = 1 << SCALE;
-/// States lie between this and 65536 times it.
+/// The lowest state. States are less than 65536 times as large.
 const LOWEST: u32 = 1 << 16;
-/// States that take turns.
+/// The number of states that take turns.
 const STATES: usize = 4;
 
-/// Symbols are below this.
+/// One more than the largest symbol.
 pub const SYMBOLS: usize = 127;
 
-/// The weights that a table can tell: 0, 1, and those with two significant bits.
+/// The number of weights that a table can contain: 0, 1, and those with two significant bits.
 const WEIGHTS: u32 = 26;
 
 fn weight(code: u32) -> u32 {
     if code < 2 { code } else { (2 + code % 2) << (code / 2 - 1) }
 }
 
-/// The code of the weight nearest to a count, in parts of it.
+/// Returns the code of the weight nearest to a count, as a ratio.
 fn nearest(count: u32) -> u32 {
     if count < 2 {
         return count;
     }
     let power = count.ilog2();
-    // In parts of 2 to the power: from √1.5 up 1.5 is nearer, from √3 up 2 is.
+    // The count divided by 2^`power`, with 16 fractional bits. From √1.5 on, 1.5 is nearer than 1;
+    // from √3 on, 2 is nearer.
     let part = (u64::from(count) << 16) >> power;
     (2 * power + u32::from(part >= 80_264) + u32::from(part >= 113_512)).min(WEIGHTS - 1)
 }
 
-/// How often each symbol of a column comes, in parts of [`WHOLE`].
+/// The frequency of each symbol of a column, in units of 1/[`WHOLE`].
 #[derive(Clone, Copy)]
 pub struct Table {
-    /// Symbols are below this.
+    /// One more than the largest symbol of the column.
     length: usize,
     frequencies: [u16; SYMBOLS],
 }
 
 impl Table {
-    /// Writes the table for symbols with these counts, all below 8192: a weight for each up to the last that comes, each as
-    /// the difference to the one before, by a code of Rice's.
+    /// Writes the table for symbols with these counts, all below 8192. There is a weight for each
+    /// symbol up to the last that occurs, stored as a Rice code of its difference from the weight
+    /// before.
     pub fn write(counts: &[u32; SYMBOLS], length: usize, bits: &mut Bits) -> Self {
         let mut before = 0;
         let mut codes = [0; SYMBOLS];
@@ -57,7 +60,7 @@ impl Table {
         Self::of(&codes[..length]).expect("what was counted has frequencies")
     }
 
-    /// Reads a table; `None` for what is none.
+    /// Reads a table; `None` if it is not valid.
     pub fn read(length: usize, bits: &mut BitReader) -> Option<Self> {
         let mut codes = [0; SYMBOLS];
         let mut before = 0;
@@ -76,7 +79,8 @@ impl Table {
         Self::of(&codes[..length])
     }
 
-    /// Frequencies in proportion to the weights, none less than 1; the largest takes what is left over or missing.
+    /// Frequencies in proportion to the weights, at least 1. The largest absorbs the rounding error
+    /// of the sum.
     fn of(codes: &[u32]) -> Option<Self> {
         let total: u32 = codes.iter().map(|&code| weight(code)).sum();
         let mut frequencies = [0; SYMBOLS];
@@ -103,7 +107,8 @@ impl Table {
         })
     }
 
-    /// For each number below [`WHOLE`]: frequency − 1, how far from the start, and the symbol, 12, 12 and 8 bits.
+    /// For each number below [`WHOLE`]: the frequency − 1, the distance from the start, and the
+    /// symbol, in 12, 12 and 8 bits.
     fn slots(&self, slots: &mut Slots) {
         let mut at = 0;
         for (symbol, &frequency) in self.frequencies[..self.length].iter().enumerate() {
@@ -116,7 +121,7 @@ impl Table {
     }
 }
 
-/// What decoding looks up; room that columns share.
+/// Lookup table for decoding. Its memory is shared by all columns.
 pub struct Slots([u32; WHOLE as usize]);
 
 impl Slots {
@@ -125,22 +130,22 @@ impl Slots {
     }
 }
 
-/// Encodes columns, the last symbol first.
+/// Encodes columns, starting with the last symbol.
 pub struct Encoder {
     states: [u32; STATES],
-    /// How many symbols are to come.
+    /// Symbols still to be encoded.
     left: usize,
-    /// Last word first.
+    /// In reverse order.
     words: Vec<u16>,
 }
 
 impl Encoder {
-    /// For `count` symbols in all.
+    /// Creates an encoder for `count` symbols in total.
     pub fn new(count: usize) -> Self {
         Self { states: [LOWEST; STATES], left: count, words: Vec::with_capacity(count / 2) }
     }
 
-    /// Puts a column before those that are there.
+    /// Encodes a column, in front of those already encoded.
     pub fn put(&mut self, symbols: &[u8], table: &Table) {
         let starts = table.starts();
         for &symbol in symbols.iter().rev() {
@@ -157,17 +162,17 @@ impl Encoder {
         }
     }
 
-    /// The bytes, the states first.
+    /// Appends the bytes, beginning with the states.
     pub fn finish(self, out: &mut Vec<u8>) {
         self.states.iter().for_each(|state| out.extend(state.to_le_bytes()));
         self.words.iter().rev().for_each(|word| out.extend(word.to_le_bytes()));
     }
 }
 
-/// Decodes what an [`Encoder`] gave, the first symbol first.
+/// Decodes the output of an [`Encoder`], starting with the first symbol.
 pub struct Decoder<'a> {
     states: [u32; STATES],
-    /// Symbols that were taken.
+    /// Symbols decoded so far.
     taken: usize,
     words: std::slice::Iter<'a, [u8; 2]>,
 }
@@ -183,7 +188,8 @@ impl<'a> Decoder<'a> {
         Some(Self { states, taken: 0, words: words.iter() })
     }
 
-    /// Gives the next symbols to `each`; `None` where the bytes end before, or where it is none.
+    /// Calls `each` with the next symbols. Returns `None` if the bytes end too early, or if `each`
+    /// returns `None`.
     pub fn take(
         &mut self,
         count: usize,
@@ -192,7 +198,7 @@ impl<'a> Decoder<'a> {
         mut each: impl FnMut(u8) -> Option<()>,
     ) -> Option<()> {
         table.slots(slots);
-        // The states in the order of their turns.
+        // The states, in the order of their turns.
         let mut states: [u32; STATES] =
             std::array::from_fn(|turn| self.states[(self.taken + turn) % STATES]);
         let mut step = |state: &mut u32| {
@@ -219,13 +225,13 @@ impl<'a> Decoder<'a> {
         Some(())
     }
 
-    /// Whether all is taken, and was what was put.
+    /// Returns whether all bytes are consumed, and the states are back where the encoder began.
     pub fn is_at_end(&self) -> bool {
         self.words.len() == 0 && self.states == [LOWEST; STATES]
     }
 }
 
-/// Bits, lowest first.
+/// A list of bits, lowest first.
 #[derive(Default)]
 pub struct Bits {
     bytes: Vec<u8>,
@@ -234,7 +240,7 @@ pub struct Bits {
 }
 
 impl Bits {
-    /// Appends the lowest `count` bits of a number, 32 at most.
+    /// Appends the lowest `count` bits of a number, at most 32.
     pub fn put(&mut self, value: u32, count: u32) {
         self.held |= (u64::from(value) & ((1 << count) - 1)) << self.count;
         self.count += count;
@@ -263,7 +269,7 @@ impl<'a> BitReader<'a> {
         Self { rest: bytes, held: 0, count: 0 }
     }
 
-    /// The next bits, 32 at most; `None` where they end before.
+    /// Returns the next `count` bits, at most 32; `None` if they end too early.
     #[inline]
     pub fn take(&mut self, count: u32) -> Option<u32> {
         if self.count < count {
@@ -291,7 +297,7 @@ impl<'a> BitReader<'a> {
         }
     }
 
-    /// Fewer than eight bits may be left, all 0.
+    /// Up to seven bits may be left, all of them 0.
     pub fn is_at_end(&self) -> bool {
         self.rest.is_empty() && self.count < 8 && self.held == 0
     }

@@ -1,4 +1,4 @@
-//! The header: what the file as a whole holds.
+//! The header: properties of the whole file.
 
 use super::{
     MAGIC, VERSION,
@@ -19,10 +19,10 @@ pub enum UpAxis {
     Z,
 }
 
-/// What a file tells about the whole hierarchy. Lengths are world units.
+/// The properties of the whole hierarchy. Lengths are in world units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
-    /// World position that all places are relative to.
+    /// World position of the origin of all positions.
     pub origin: DVec3,
     /// The box around all footprints, in world coordinates.
     pub bounds: Bounds,
@@ -34,26 +34,26 @@ pub struct Header {
     pub has_color: bool,
     /// Whether any leaf has a normal.
     pub has_normals: bool,
-    /// Whether every bit of the nodes is kept.
+    /// Whether every bit of the nodes is stored.
     pub lossless: bool,
-    /// Points of the source: vertices or samples.
+    /// Points in the source: vertices or samples.
     pub source_points: u64,
     /// Splats at the finest level.
     pub leaves: u64,
-    /// All nodes, portals among them.
+    /// All nodes, including portals.
     pub nodes: u64,
-    /// Unknown where `None`.
+    /// `None` if unknown.
     pub up: Option<UpAxis>,
-    /// The name of the world's unit (`"m"`); empty where unknown.
+    /// The name of the world's unit (`"m"`); empty if unknown.
     pub unit: String,
-    /// The name of the file that this one was made from; empty where there is none.
+    /// The name of the file that this one was made from; empty if there is none.
     pub source: String,
 }
 
-/// What stands before the texts.
+/// Bytes before the texts.
 pub const FIXED: usize = 160;
 
-/// A header as it stands in the file, with what the reader needs to find the rest.
+/// The header as stored, with what the reader needs to find the rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stored {
     pub header: Header,
@@ -64,7 +64,7 @@ pub struct Stored {
 }
 
 impl Stored {
-    /// Bytes of the header with its checksum.
+    /// Returns the size in bytes of the header with its checksum.
     pub fn length(&self) -> usize {
         FIXED + self.header.unit.len() + self.header.source.len() + 4
     }
@@ -111,7 +111,8 @@ impl Stored {
         if version != VERSION {
             return Err(Refusal::Version(version));
         }
-        // The texts' lengths decide where the checksum stands, which decides whether they can be believed.
+        // The lengths of the texts decide where the checksum is, and the checksum whether the
+        // lengths can be trusted.
         let (unit, source) = texts(bytes).ok_or(Refusal::Incomplete)?;
         let end = FIXED + unit + source;
         let text = bytes.get(..end).ok_or(Refusal::Incomplete)?;
@@ -135,7 +136,7 @@ impl Stored {
             1 => Some(UpAxis::X),
             2 => Some(UpAxis::Y),
             3 => Some(UpAxis::Z),
-            _ => return Some(Err(Refusal::Damaged("it names an axis that there is not"))),
+            _ => return Some(Err(Refusal::Damaged("its up axis is unknown"))),
         };
         let (Ok(unit), Ok(source)) = (copy::text(&texts[..unit]), copy::text(&texts[unit..]))
         else {
@@ -175,14 +176,14 @@ fn texts(bytes: &[u8]) -> Option<(usize, usize)> {
     Some((cursor.u32()? as usize, cursor.u32()? as usize))
 }
 
-/// Why a header is not taken.
+/// Why a header is rejected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
-    /// The bytes end before it does.
+    /// The file ends inside the header.
     Incomplete,
-    /// Another kind of file.
+    /// A different kind of file.
     Foreign,
-    /// Another version of this kind.
+    /// An unknown version.
     Version(u32),
     Damaged(&'static str),
 }

@@ -1,12 +1,12 @@
-//! Pages that keep every bit: the bytes of the nodes, sorted by where in a node they stand, then compressed.
+//! Lossless pages: the bytes of the nodes, sorted by their position in a node, then compressed.
 
 use super::bytes::Cursor;
 use crate::{hierarchy::Node, splat::Splat};
 
-/// Bytes of a node as it is kept: the splat, centre, radius, size, cone, where its children are and how many.
+/// Bytes of a stored node: splat, centre, radius, size, cone, first child, and number of children.
 const NODE_BYTES: usize = 80;
 
-/// What zstd does for the size. Higher levels take much longer for a few parts in a thousand.
+/// The zstd level. Higher levels take much longer, and save only a few parts in a thousand.
 const LEVEL: i32 = 3;
 
 pub fn encode(nodes: &[Node]) -> Vec<u8> {
@@ -19,7 +19,7 @@ pub fn encode(nodes: &[Node]) -> Vec<u8> {
     zstd::bulk::compress(&planes, LEVEL).expect("memory can be compressed")
 }
 
-/// The nodes of a page of `count`; what is wrong where there are none.
+/// Decodes a page of `count` nodes. An error says what is wrong with the page.
 pub fn decode(bytes: &[u8], count: usize) -> Result<Vec<Node>, String> {
     let length = count * NODE_BYTES;
     let planes =
@@ -45,7 +45,7 @@ fn to_bytes(node: &Node) -> [u8; NODE_BYTES] {
     out
 }
 
-/// The bits of all fields.
+/// Returns the bits of all fields.
 pub fn words(node: &Node) -> [u32; NODE_BYTES / 4] {
     let Node { splat, center, radius, size, cone, first_child, children } = *node;
     let [b0, b1, b2, b3, b4, b5] = splat.factor.map(f32::to_bits);

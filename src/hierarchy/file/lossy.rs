@@ -1,4 +1,4 @@
-//! Pages of whole numbers: columns of codes, leaves and other nodes each in their own.
+//! Lossy pages: columns of integer codes, separate for leaves and for inner nodes.
 
 use super::{
     bounds,
@@ -11,7 +11,7 @@ use crate::{
     splat::Splat,
 };
 
-/// The codes of the splats of a page, and the shapes behind those of its inner nodes.
+/// The codes of a page's splats, and the decoded shapes of its inner nodes.
 pub struct Codes {
     strength: f32,
     center: [f32; 3],
@@ -21,14 +21,14 @@ pub struct Codes {
 }
 
 impl Codes {
-    /// The shapes of inner nodes, each behind the code of its largest standard deviation.
+    /// Returns the shapes of inner nodes, each with the code of its largest standard deviation.
     pub fn shapes(&self) -> impl Iterator<Item = (i32, Shape)> {
         self.inner.sigmas().iter().copied().zip(self.shapes.iter().copied())
     }
 }
 
-/// Replaces the splats of a page by those that will be read, and gives leaves their bounds. `None` where a splat has no
-/// code; the nodes may be changed then.
+/// Replaces the splats of a page by their decoded values, and sets the bounds of leaves. `None` if
+/// a splat has no code; the nodes may then be partly changed.
 pub fn quantise(nodes: &mut [Node], extent: f32) -> Option<Codes> {
     let strength = nodes
         .iter()
@@ -59,19 +59,19 @@ pub fn quantise(nodes: &mut [Node], extent: f32) -> Option<Codes> {
     Some(out)
 }
 
-/// The codes of leaves or those of inner nodes, in columns.
+/// The codes of leaves or of inner nodes, in columns.
 struct Group {
-    /// Those that every node has: axes, shape, position, colour, strength.
+    /// Codes that every node has: axes, shape, position, colour, strength.
     all: [Vec<i32>; 12],
-    /// Of nodes with the axes of their normal.
+    /// For nodes with axes by their normal.
     angle: Vec<i32>,
-    /// Of nodes with other axes.
+    /// For nodes with other axes.
     turn: [Vec<i32>; 4],
-    /// Of nodes with a normal.
+    /// For nodes with a normal.
     normal: [Vec<i32>; 2],
 }
 
-/// How many codes of a group were taken, of each kind.
+/// The number of codes consumed from each kind of column.
 #[derive(Default)]
 struct Taken {
     all: usize,
@@ -154,7 +154,7 @@ impl Group {
         Some(Code { axes, sigma, ratio, thickness, angle, turn, normal, position, color, strength })
     }
 
-    /// The codes of the largest standard deviations.
+    /// Returns the codes of the largest standard deviations.
     fn sigmas(&self) -> &[i32] {
         &self.all[1]
     }
@@ -185,8 +185,8 @@ fn columns<const N: usize>(planes: &mut Planes, count: usize) -> Result<[Vec<i32
     Ok(out)
 }
 
-/// The page's bytes; `bounds` are those of its inner nodes, those with a `fine` code of their largest standard deviation, or
-/// a larger one, fine.
+/// Appends the bytes of a page; `bounds` are those of its inner nodes. The spheres of nodes are
+/// fine if the code of their largest standard deviation is at least `fine`.
 pub fn encode(
     nodes: &[Node],
     codes: &Codes,
@@ -215,7 +215,8 @@ pub fn encode(
     columns.finish(out);
 }
 
-/// Children as a column has them: the most, which many have, as a small number.
+/// Returns the number of children as stored. The maximum, which is frequent, becomes a small
+/// number.
 fn stored_children(children: u32) -> i32 {
     if children == MOST_CHILDREN as u32 { -1 } else { children as i32 }
 }
@@ -227,7 +228,7 @@ fn children(stored: i32) -> Option<u8> {
     }
 }
 
-/// The nodes of a page of `count`.
+/// Decodes a page of `count` nodes.
 pub fn decode(
     bytes: &[u8],
     count: usize,
@@ -236,7 +237,7 @@ pub fn decode(
 ) -> Result<Vec<Node>, String> {
     let mut cursor = Cursor::new(bytes);
     let mut begin = || Some((cursor.f32()?, cursor.f32s()?, cursor.u32()? as i32));
-    let (strength, center, fine) = begin().ok_or("it ends within its beginning")?;
+    let (strength, center, fine) = begin().ok_or("it ends inside its first fields")?;
     let mut planes = Planes::new(cursor.take(cursor.remaining()).unwrap_or(&[]))?;
     let children: Option<Vec<u8>> = planes.column(count)?.into_iter().map(children).collect();
     let children = children.ok_or("a node has too many children")?;
@@ -253,7 +254,7 @@ pub fn decode(
     let mut nodes = Vec::with_capacity(count);
     for children in children {
         let is_leaf = children == 0;
-        let fail = || format!("node {} has a code that tells of none", nodes.len());
+        let fail = || format!("the code of node {} is not valid", nodes.len());
         let group = usize::from(!is_leaf);
         let code = groups[group].take(&mut taken[group]).ok_or_else(fail)?;
         let (splat, shape) = code.decode(is_leaf, &mut before).ok_or_else(fail)?;
@@ -276,14 +277,14 @@ pub fn decode(
             (node.first_child, node.children) = (next, u32::from(children));
             next = next
                 .checked_add(u32::from(children))
-                .ok_or("it has more children than can be numbered")?;
+                .ok_or("it has more children than 32 bits can number")?;
         }
         nodes.push(node);
     }
     Ok(nodes)
 }
 
-/// A node of which only the splat is known.
+/// A node with its splat only.
 fn blank(splat: Splat) -> Node {
     Node {
         splat,

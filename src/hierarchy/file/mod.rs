@@ -1,8 +1,8 @@
-//! The file of a hierarchy, `.splk`: pages of nodes, coarse ones first, behind a directory that tells where they stand.
-//! docs/splk.md describes it byte by byte.
+//! The file of a hierarchy, `.splk`: pages of nodes, coarse ones first, after a directory with
+//! their positions. docs/splk.md describes it byte by byte.
 //!
-//! [`write`](write()) and [`Writer`] make it, [`Hierarchy`] reads it page by page or as a whole, [`check`](check()) looks for
-//! damage.
+//! [`write`](write()) and [`Writer`] write it, [`Hierarchy`] reads it page by page or as a whole,
+//! and [`check`](check()) looks for damage.
 
 #![deny(clippy::disallowed_methods)]
 
@@ -32,13 +32,13 @@ pub use header::{Header, UpAxis};
 pub use read::{CutSphere, Hierarchy, NO_PAGE, Page};
 pub use write::{Top, Whole, WriteOptions, Writer, to_bytes, write};
 
-/// The most nodes of a page.
+/// The maximum number of nodes in a page.
 pub const PAGE_NODES: usize = 4096;
 
-/// How a file begins: a name, and line ends that a transfer as text would change.
+/// The first bytes of a file: a name, and line ends that a transfer as text would change.
 const MAGIC: [u8; 8] = *b"SPLK\r\n\x1a\n";
 
-/// The version that is written, and the newest that is read.
+/// The version that is written, and the only one that is read.
 const VERSION: u32 = 1;
 
 /// Bytes of the BLAKE3 hash at the end of a file.

@@ -1,4 +1,4 @@
-//! Pages as bytes: which code each has, and how a block becomes pages.
+//! Encodes a block as pages, and chooses the code of each.
 
 use super::{
     bounds, lossless, lossy,
@@ -20,7 +20,7 @@ use rayon::prelude::*;
 const LOSSLESS: u8 = 0;
 const LOSSY: u8 = 1;
 
-/// A block in pages, and its nodes as these will be read.
+/// An encoded block, with its nodes as a reader will decode them.
 pub struct Coded {
     pub nodes: Vec<Node>,
     pub runs: Vec<Run>,
@@ -68,15 +68,15 @@ fn lossless_page(nodes: &[Node]) -> Vec<u8> {
     out
 }
 
-/// What is known of a page before the bounds of its inner nodes are.
+/// The codes of a page before its inner nodes have bounds.
 struct PageCodes {
-    /// `None` for a page that only the lossless way can tell.
+    /// `None` if the page can only be stored losslessly.
     codes: Option<lossy::Codes>,
-    /// How many inner nodes it has.
+    /// The number of inner nodes.
     inner: usize,
 }
 
-/// Replaces all splats by those that will be read.
+/// Replaces all splats by their decoded values.
 fn quantise(nodes: &mut [Node], runs: &[Run], extent: f32) -> Vec<PageCodes> {
     let mut rest = nodes;
     let mut parts = Vec::with_capacity(runs.len());
@@ -96,8 +96,8 @@ fn quantise(nodes: &mut [Node], runs: &[Run], extent: f32) -> Vec<PageCodes> {
     parts.into_par_iter().map(page).collect()
 }
 
-/// The nodes with siblings in an order in which each is near the one before, from group to group: nothing depends on their
-/// order, and short ways take few bits.
+/// Returns the nodes with siblings in a different order, each near the one before, also from one
+/// group to the next. Nothing depends on the order of siblings, and short steps need fewer bits.
 fn line_up(nodes: &[Node]) -> Vec<Node> {
     let mut out = Vec::with_capacity(nodes.len());
     out.push(nodes[0]);
@@ -128,8 +128,8 @@ fn line_up(nodes: &[Node]) -> Vec<Node> {
     out
 }
 
-/// Gives all inner nodes bounds around their children as these will be read, level by level from below; `None` where only
-/// the lossless way can tell them.
+/// Gives all inner nodes bounds around their decoded children, level by level from below. A result
+/// is `None` if the bounds can only be stored losslessly.
 fn bound(
     nodes: &mut [Node],
     levels: &[usize],
@@ -178,7 +178,8 @@ fn bound(
     out
 }
 
-/// The nodes of a page of `count`, the children of the first of which stand at `first_child`; or what is wrong with it.
+/// Decodes a page of `count` nodes, whose children begin at `first_child`. An error says what is
+/// wrong with the page.
 pub fn decode(
     bytes: &[u8],
     count: usize,
@@ -209,13 +210,15 @@ pub fn decode(
                 node.first_child
             ));
         }
-        next =
-            next.checked_add(node.children).ok_or("it has more children than can be numbered")?;
+        next = next
+            .checked_add(node.children)
+            .ok_or("it has more children than 32 bits can number")?;
     }
     Ok(nodes)
 }
 
-/// Grows the nodes of a block, from below, until each bounds its children: sphere, size and cone.
+/// Enlarges the nodes of a block, from below, until each bounds its children: sphere, size and
+/// cone.
 pub fn enclose(nodes: &mut [Node]) {
     for index in (0..nodes.len()).rev() {
         if nodes[index].is_leaf() {
@@ -240,7 +243,7 @@ fn enclose_children(node: &mut Node, children: &[Node]) {
         .fold(node.cone, f32::min);
 }
 
-/// The cosine of [`joint_angle`].
+/// Returns the cosine of [`joint_angle`].
 pub fn joint_cosine(node: &Node, child: &Node) -> f64 {
     let normals = (decode_normal(node.splat.normal), decode_normal(child.splat.normal));
     let (Some(own), Some(its)) = normals else { return -1.0 };
@@ -256,7 +259,8 @@ pub fn joint_cosine(node: &Node, child: &Node) -> f64 {
     if sine * cone + cosine * side < 0.0 { -1.0 } else { cosine * cone - sine * side }
 }
 
-/// The half-angle of the cone around the normal of a node that holds a child's; π where there is none.
+/// Returns the half-angle of the cone around a node's normal that contains a child's cone; π if
+/// there is none.
 pub fn joint_angle(node: &Node, child: &Node) -> f64 {
     let normals = (decode_normal(node.splat.normal), decode_normal(child.splat.normal));
     let (Some(own), Some(its)) = normals else { return std::f64::consts::PI };
@@ -269,7 +273,7 @@ pub fn joint_angle(node: &Node, child: &Node) -> f64 {
     (between + cone).min(std::f64::consts::PI)
 }
 
-/// The cosine of a half-angle, never above it.
+/// Returns the cosine of a half-angle, rounded down.
 pub fn cosine_below(angle: f64) -> f32 {
     if angle >= std::f64::consts::PI {
         return -1.0;

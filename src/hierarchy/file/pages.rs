@@ -1,23 +1,23 @@
-//! How a block is cut into pages, and what a page must know of the nodes above it.
+//! Splits a block into pages, and computes what a page must know of the nodes above it.
 
 use super::PAGE_NODES;
 use crate::hierarchy::{MOST_CHILDREN, Node};
 use glam::DVec3;
 use std::ops::Range;
 
-/// Whether the nodes stand breadth first with the children of one after those of the one before, which makes where
-/// children stand follow from how many there are.
+/// Checks that the nodes are in breadth-first order and that the children of successive nodes are
+/// adjacent. Then the position of children follows from the number of children before them.
 pub fn in_order(nodes: &[Node]) -> Result<(), String> {
     if nodes.is_empty() {
         return Err("there are no nodes".into());
     }
     if u32::try_from(nodes.len()).is_err() {
-        return Err(format!("there are {} nodes, more than 32 bits can name", nodes.len()));
+        return Err(format!("there are {} nodes, more than 32 bits can number", nodes.len()));
     }
     let mut next = 1;
     for (index, node) in nodes.iter().enumerate() {
         if next <= index {
-            return Err(format!("node {index} is nobody's child"));
+            return Err(format!("node {index} has no parent"));
         }
         if node.children as usize > MOST_CHILDREN {
             return Err(format!(
@@ -35,22 +35,25 @@ pub fn in_order(nodes: &[Node]) -> Result<(), String> {
         next += node.children as usize;
     }
     if next != nodes.len() {
-        return Err(format!("{} nodes are there, and {next} are pointed to", nodes.len()));
+        return Err(format!(
+            "there are {} nodes, but the nodes with children refer to {next}",
+            nodes.len()
+        ));
     }
     Ok(())
 }
 
-/// A page of a block: numbers in the block.
+/// A page of a block, as ranges of nodes in the block.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Run {
     pub nodes: Range<usize>,
-    /// A range that holds the parents of its nodes, but for the root, which has none.
+    /// A range that contains the parents of its nodes, except for the root, which has none.
     pub parents: Range<usize>,
-    /// Where the children of its nodes stand.
+    /// The children of its nodes.
     pub children: Range<usize>,
 }
 
-/// Cuts a block into pages, and no group of siblings in two.
+/// Splits a block into pages without separating siblings.
 pub fn pages(nodes: &[Node]) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::with_capacity(nodes.len() / (PAGE_NODES - MOST_CHILDREN) + 1);
     let (mut start, mut end, mut first_parent, mut first_child) = (0, 1, 0, 1);
@@ -71,7 +74,7 @@ pub fn pages(nodes: &[Node]) -> Vec<Run> {
     runs
 }
 
-/// Where each level of a block begins, and where the last one ends.
+/// Returns where each level of a block begins, and where the last one ends.
 pub fn levels(nodes: &[Node]) -> Vec<usize> {
     let mut bounds = vec![0, 1];
     loop {
@@ -84,7 +87,7 @@ pub fn levels(nodes: &[Node]) -> Vec<usize> {
     }
 }
 
-/// A sphere around the spheres of some nodes, and the largest of their sizes.
+/// A sphere around the spheres of several nodes, and their largest size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Around {
     pub center: [f32; 3],
@@ -93,11 +96,11 @@ pub struct Around {
 }
 
 impl Around {
-    /// What is around everything: a page with a root that has no parent is always needed.
+    /// Bounds around everything: the page of a root without a parent is always needed.
     pub const EVERYTHING: Self =
         Self { center: [0.0; 3], radius: f32::INFINITY, largest_size: f32::INFINITY };
 
-    /// Around the nodes that have children.
+    /// Returns the bounds around the nodes that have children.
     pub fn parents(nodes: &[Node]) -> Self {
         let nodes = nodes.iter().filter(|node| !node.is_leaf());
         let (low, high) =
@@ -112,12 +115,12 @@ impl Around {
     }
 }
 
-/// How far a node's sphere reaches from a place.
+/// Returns how far a node's sphere reaches from a position.
 pub fn reach(from: DVec3, node: &Node) -> f64 {
     from.distance(node.center().as_dvec3()) + f64::from(node.radius)
 }
 
-/// The next 32-bit number above, with room for the rounding of what led to it.
+/// Rounds up to a 32-bit number, with a margin for the rounding of the operations before.
 pub fn round_up(value: f64) -> f32 {
     let value = value * (1.0 + 1e-12);
     let near = value as f32;

@@ -1,7 +1,7 @@
-//! Splats as whole numbers: how fine each quantity is kept, and the way back.
+//! Splats as integers: the resolution of each quantity, encoding and decoding.
 //!
-//! Everything that decoding computes is made of operations that every machine rounds alike (+ − × ÷ √ on 64 bits) and of
-//! tables from `libm`, so that a file gives the same nodes everywhere.
+//! Decoding uses only operations that every machine rounds alike (+ − × ÷ √ in 64 bits), and tables
+//! computed with `libm`. So a file gives the same nodes everywhere.
 
 use super::direction::{self, Directions};
 use crate::{
@@ -11,29 +11,30 @@ use crate::{
 use glam::{DMat3, DQuat, DVec3};
 use std::{f64::consts::PI, sync::LazyLock};
 
-/// The width at half height of a Gaussian, in standard deviations: 2·√(2·ln 2).
+/// Full width at half maximum of a Gaussian, in standard deviations: 2·√(2·ln 2).
 pub const FULL_WIDTH: f64 = 2.354_820_045_030_949_3;
 
-/// Parts of a doubling that powers are told in.
+/// Powers of two are stored in units of 1/96 octave.
 pub const PARTS: i32 = 96;
 
-/// How fine the splats of leaves, or those of other nodes, are kept.
+/// The resolution at which the splats of leaves, or of inner nodes, are stored.
 struct Fineness {
-    /// Steps in parts of a doubling: of the largest standard deviation, of the ratios to the second and the third, and of
-    /// the strength.
+    /// Steps in units of 1/[`PARTS`] octave: of the largest standard deviation, of the ratios to
+    /// the second and the third, and of the strength.
     sigma: i32,
     ratio: i32,
     thickness: i32,
     strength: i32,
     directions: Directions,
-    /// Steps of positions in the width of a splat.
+    /// Position steps in the width of a splat.
     position: f64,
-    /// The directions of an ellipse's first axis, by the cosines and sines of half a turn's part: the rounder the ellipse,
-    /// the fewer tell.
+    /// For each ratio of an ellipse's axes, the cosines and sines of the possible directions of its
+    /// first axis, spread over half a turn. The rounder the ellipse, the fewer directions are
+    /// needed.
     angles: Vec<Vec<[f64; 2]>>,
 }
 
-/// Nodes that are no leaves are drawn where they are a pixel or two wide.
+/// Inner nodes are coarser, because they are drawn when they are only a pixel or two wide.
 static FINENESS: LazyLock<[Fineness; 2]> = LazyLock::new(|| {
     let inner = Fineness {
         sigma: PARTS / 4,
@@ -56,16 +57,17 @@ static FINENESS: LazyLock<[Fineness; 2]> = LazyLock::new(|| {
     [inner, leaf]
 });
 
-/// Where the next node is looked for, in widths of its splat: ahead, on a way that goes on as it went.
+/// How far ahead the next node is predicted, in widths of its splat, in the direction of the last
+/// step.
 const AHEAD: f64 = 0.25;
 
-/// Steps of a quaternion's parts, each way.
+/// Steps of a quaternion's components, in each direction.
 const TURN_STEPS: i32 = 511;
 
 /// The code of a strength of 0.
 const NO_STRENGTH: i32 = i16::MIN as i32;
 
-/// The codes that may be, in parts of a doubling: what is beyond makes no splat.
+/// Upper bounds on codes, in units of 1/[`PARTS`] octave. Codes beyond them are not valid splats.
 const MOST_SIGMA: i32 = 160 * PARTS;
 const MOST_RATIO: i32 = 16 * PARTS;
 const MOST_THICKNESS: i32 = 20 * PARTS;
@@ -80,8 +82,8 @@ pub fn power(k: i32) -> f64 {
     TABLE[k.rem_euclid(PARTS) as usize] * f64::from_bits(((exponent + 1023) as u64) << 52)
 }
 
-/// The logarithm to the base of 2 of a positive number that is not denormal, 10⁻⁸ off at most: the series of the inverse
-/// hyperbolic tangent.
+/// The base-2 logarithm of a positive normal number, from the series of the inverse hyperbolic
+/// tangent. The error is at most 10⁻⁸.
 pub fn logarithm(value: f64) -> f64 {
     const SQRT_2: f64 = std::f64::consts::SQRT_2;
     let bits = value.to_bits();
@@ -94,29 +96,29 @@ pub fn logarithm(value: f64) -> f64 {
     exponent + 0.5 + t * sum * (2.0 / std::f64::consts::LN_2)
 }
 
-/// The code of the largest standard deviation of a node that is no leaf.
+/// Returns the code of the largest standard deviation of an inner node.
 pub fn inner_sigma(sigma: f64) -> i32 {
     nearest(logarithm(sigma.max(f64::MIN_POSITIVE)) * f64::from(PARTS / FINENESS[0].sigma))
 }
 
-/// What such a code stands for.
+/// Returns the standard deviation for the code of an inner node.
 pub fn sigma_of_inner(code: i32) -> f64 {
     power(code.saturating_mul(FINENESS[0].sigma))
 }
 
-/// To the nearest whole number; halves away from 0.
+/// Rounds to the nearest integer, halves away from 0.
 fn nearest(value: f64) -> i32 {
     (value + 0.5f64.copysign(value)) as i32
 }
 
-/// What the axes of a splat are.
+/// How the axes of a splat are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axes {
-    /// Two lie across its normal, the third along it.
+    /// Two axes lie across its normal, and the third along it.
     Normal = 0,
-    /// Its own; and it has a normal.
+    /// Its own axes; the splat has a normal.
     Own = 1,
-    /// Its own; and it has no normal.
+    /// Its own axes; the splat has no normal.
     Bare = 2,
 }
 
@@ -126,44 +128,47 @@ impl Axes {
     }
 }
 
-/// A splat as whole numbers.
+/// A splat as integers.
 #[derive(Debug, Clone, Copy)]
 pub struct Code {
     pub axes: Axes,
-    /// The larger standard deviation in the plane of the first two axes.
+    /// The larger standard deviation along the first two axes.
     pub sigma: i32,
-    /// How much smaller the second is than the first, and the third than the second.
+    /// How much smaller the second standard deviation is than the first, and the third than the
+    /// second.
     pub ratio: i32,
     pub thickness: i32,
-    /// The direction of the first axis in the plane across the normal.
+    /// The direction of the first axis in the plane perpendicular to the normal.
     pub angle: i32,
-    /// The axes as a quaternion: which part is the largest, and the others.
+    /// The axes as a quaternion: the index of its largest component, then the other components.
     pub turn: [i32; 4],
-    /// Steps from the normal before.
+    /// Steps from the previous normal.
     pub normal: [i32; 2],
-    /// Steps from where the way goes on to: ahead, to the left and along the normal; or along the axes.
+    /// Steps from the predicted position: ahead, to the left and along the normal; or along the
+    /// splat's own axes.
     pub position: [i32; 3],
-    /// Luma and two chromas, less those of the node before; opacity.
+    /// Luma and two chromas, as differences from the previous node; then opacity.
     pub color: [i32; 4],
     pub strength: i32,
 }
 
-/// What a page says at its beginning, and what is behind, from which the next node is told.
+/// The values, from the page's start and the previous node, relative to which the next node is
+/// stored.
 #[derive(Debug, Clone, Copy)]
 pub struct Before {
-    /// The strength that others are told from.
+    /// The base of all strengths.
     strength: f32,
     center: [f32; 3],
     color: [i32; 3],
-    /// The last normal, and two directions across it.
+    /// The last normal, and two directions perpendicular to it.
     normal: DVec3,
     across: [DVec3; 2],
-    /// The way to the last node.
+    /// The step to the last node.
     way: DVec3,
 }
 
 impl Before {
-    /// The beginning of a page.
+    /// The state at the beginning of a page.
     pub fn new(strength: f32, center: [f32; 3]) -> Self {
         let across = direction::across(DVec3::Z);
         Self { strength, center, color: [0; 3], normal: DVec3::Z, across, way: DVec3::ZERO }
@@ -188,7 +193,8 @@ impl Shape {
         self.sigma[0].max(self.sigma[2])
     }
 
-    /// The lower triangular factor of its covariance (Cholesky). By the adjugate: nothing is subtracted but what has to be.
+    /// Returns the lower Cholesky factor of the covariance. It uses the adjugate, so that nothing
+    /// is subtracted unnecessarily.
     fn factor(&self) -> [f32; 6] {
         let [first, second, third] = self.sigma;
         let [a, b, c] = [self.axes[0] * first, self.axes[1] * second, self.axes[2] * third];
@@ -206,15 +212,15 @@ impl Shape {
         [b00, b10, minor * one, b20, b21, first * second * third * two].map(|value| value as f32)
     }
 
-    /// The steps of positions.
+    /// Returns the step of positions.
     fn step(&self, fineness: &Fineness) -> f64 {
         let [first, second, _] = self.sigma;
-        // Along a long ellipse no coarser than across it.
+        // Along a long ellipse, the step is no coarser than across it.
         first.min(2.0 * second) * FULL_WIDTH / fineness.position
     }
 }
 
-/// For each ratio of the axes of an ellipse, the directions of the first.
+/// Returns the possible directions of the first axis, for each ratio of the axes of an ellipse.
 fn angles(step: i32, density: f64) -> Vec<Vec<[f64; 2]>> {
     let of = |ratio: i32| {
         let wide = libm::exp2(f64::from(ratio * step) / f64::from(PARTS));
@@ -225,7 +231,7 @@ fn angles(step: i32, density: f64) -> Vec<Vec<[f64; 2]>> {
     (0..=MOST_RATIO / step).map(of).collect()
 }
 
-/// The axes of a quaternion of which the largest part is left out.
+/// Returns the axes of a quaternion whose largest component is left out.
 fn axes_of_turn([largest, parts @ ..]: [i32; 4]) -> Option<[DVec3; 3]> {
     let part = |value: i32| f64::from(value) / (f64::from(TURN_STEPS) * std::f64::consts::SQRT_2);
     let [a, b, c] = parts.map(part);
@@ -246,7 +252,7 @@ fn axes_of_turn([largest, parts @ ..]: [i32; 4]) -> Option<[DVec3; 3]> {
     ])
 }
 
-/// The quaternion of three unit axes, right-handed.
+/// Returns the quaternion of three right-handed unit axes.
 fn turn([x, y, z]: [DVec3; 3]) -> [i32; 4] {
     let parts = DQuat::from_mat3(&DMat3::from_cols(x, y, z)).normalize().to_array();
     let largest =
@@ -262,13 +268,13 @@ fn turn([x, y, z]: [DVec3; 3]) -> [i32; 4] {
     out
 }
 
-/// Directions in which the position of a node is told, and where zero is: for nodes with the axes of their normal ahead on
-/// the way to the node before, to the left of it and along the normal.
+/// The frame in which a node's position is stored, and its zero. For axes by the normal, the frame
+/// is ahead in the direction of the last step, to the left of it, and along the normal.
 struct Course {
     axes: [DVec3; 3],
     start: f64,
-    /// How steeply the surface falls along the first two, where it is smooth: a chord of a parabola lies across the mean of
-    /// the normals at its ends.
+    /// The slope of the surface along the first two axes, if it is smooth. The chord of a parabola
+    /// is perpendicular to the mean of the normals at its ends.
     fall: [f64; 2],
 }
 
@@ -292,14 +298,14 @@ impl Course {
         Self { axes: [ahead, left, normal], start, fall }
     }
 
-    /// The place at so many steps.
+    /// Returns the displacement for a number of steps.
     fn place(&self, [x, y, z]: [i32; 3], step: f64) -> DVec3 {
         let (x, y) = (step * (f64::from(x) + self.start), step * f64::from(y));
         let z = step * f64::from(z) - (x * self.fall[0] + y * self.fall[1]);
         self.axes[0] * x + self.axes[1] * y + self.axes[2] * z
     }
 
-    /// The steps to a place.
+    /// Returns the steps to a displacement.
     fn steps(&self, place: DVec3, step: f64) -> Option<[i32; 3]> {
         let whole = |steps: f64| (steps.abs() < MOST_STEPS).then_some(nearest(steps));
         let x = whole(place.dot(self.axes[0]) / step - self.start)?;
@@ -309,7 +315,7 @@ impl Course {
     }
 }
 
-/// Luma and chromas of red, green and blue, reversibly (YCoCg-R, Malvar & Sullivan 2003).
+/// Converts red, green and blue to luma and chromas, reversibly (YCoCg-R, Malvar & Sullivan 2003).
 fn luma(color: u32) -> [i32; 3] {
     let [r, g, b] = [0, 8, 16].map(|shift| (color >> shift & 255) as i32);
     let orange = r - b;
@@ -318,7 +324,7 @@ fn luma(color: u32) -> [i32; 3] {
     [half + (green >> 1), orange, green]
 }
 
-/// Red, green and blue; `None` where one is none of 8 bits.
+/// Returns red, green and blue; `None` if one does not fit in 8 bits.
 fn color([luma, orange, green]: [i32; 3]) -> Option<u32> {
     let half = luma.wrapping_sub(green >> 1);
     let g = green.wrapping_add(half);
@@ -329,7 +335,8 @@ fn color([luma, orange, green]: [i32; 3]) -> Option<u32> {
 }
 
 impl Code {
-    /// The splat behind a code, and its shape; `None` for codes of no splat. `before` becomes what this node leaves.
+    /// Decodes a splat and its shape; `None` if the code is not valid. Updates `before` for the
+    /// next node.
     pub fn decode(&self, is_leaf: bool, before: &mut Before) -> Option<(Splat, Shape)> {
         let fineness = &FINENESS[usize::from(is_leaf)];
         let last = before.normal;
@@ -338,7 +345,7 @@ impl Code {
         Some((self.splat(fineness, &shape, &course, before)?, shape))
     }
 
-    /// The ellipsoid, and the normal as the new one before.
+    /// Decodes the ellipsoid, and sets the normal in `before`.
     fn shape(&self, fineness: &Fineness, before: &mut Before) -> Option<Shape> {
         let sigma = self.sigma.checked_mul(fineness.sigma)?;
         let ratio = self.ratio.checked_mul(fineness.ratio)?;
@@ -366,7 +373,7 @@ impl Code {
         Some(Shape { axes, sigma: [sigma, sigma - ratio, sigma - ratio - thickness].map(power) })
     }
 
-    /// All that is left once the shape is known.
+    /// Decodes the rest of the splat, given its shape.
     fn splat(
         &self,
         fineness: &Fineness,
@@ -398,8 +405,8 @@ impl Code {
         is_drawable(&splat).then_some(splat)
     }
 
-    /// The code of a splat, and what comes back of it. `None` for splats beyond what codes can tell: without width, of
-    /// negative strength, too far from the node before.
+    /// Encodes a splat, and returns its decoded value and shape as well. `None` if no code can
+    /// represent it: it has no width, a negative strength, or is too far from the previous node.
     pub fn encode(
         splat: &Splat,
         is_leaf: bool,
@@ -443,7 +450,7 @@ impl Code {
             strength,
         };
         let last = before.normal;
-        // The angle is told across the normal as it is read, and the position in the frame and the steps of all that.
+        // The angle refers to the decoded normal, and the position to the decoded frame and step.
         let mut shape = code.shape(fineness, before)?;
         if axes == Axes::Normal {
             let angles = &fineness.angles[ratio as usize];
@@ -466,7 +473,8 @@ impl Code {
     }
 }
 
-/// Standard deviations and axes of a splat, those of its normal where they are near enough.
+/// Returns the standard deviations and axes of a splat. The axes are those by its normal if they
+/// are near enough.
 fn ellipsoid(splat: &Splat, normal: Option<DVec3>, is_leaf: bool) -> Option<(Axes, Shape)> {
     let [b00, b10, b11, b20, b21, b22] = splat.factor.map(f64::from);
     let columns = [DVec3::new(b00, b10, b20), DVec3::new(0.0, b11, b21), DVec3::new(0.0, 0.0, b22)];
@@ -479,8 +487,9 @@ fn ellipsoid(splat: &Splat, normal: Option<DVec3>, is_leaf: bool) -> Option<(Axe
         let (mean, half) = ((xx + yy) * 0.5, (xx - yy) * 0.5);
         let root = (half * half + xy * xy).sqrt();
         let (large, small) = (mean + root, mean - root);
-        // What is neither along the normal nor across: by the angle between the normal and the ellipsoid's own axis for
-        // leaves, 1° at most; other nodes are drawn where their tilt cannot be seen.
+        // The tilt is the part of the covariance neither along the normal nor across it. For
+        // leaves, the normal and the ellipsoid's axis may differ by at most 1°. Inner nodes may
+        // tilt more, because they are drawn where a tilt is not visible.
         let tilt = DVec3::new(x.dot(z), y.dot(z), 0.0).length();
         let most =
             if is_leaf { 0.0175 * (small - zz).max(0.0) + 1e-6 * large } else { 0.25 * large };
@@ -502,7 +511,7 @@ fn ellipsoid(splat: &Splat, normal: Option<DVec3>, is_leaf: bool) -> Option<(Axe
     Some((if normal.is_some() { Axes::Own } else { Axes::Bare }, Shape { axes, sigma }))
 }
 
-/// Widths that codes can tell; none is flat without end.
+/// Limits standard deviations to what codes can represent. None is infinitely flat.
 fn sound([first, second, third]: [f64; 3]) -> Option<[f64; 3]> {
     let second = second.max(first * 2f64.powi(-15));
     (first > 0.0 && first.is_finite()).then_some([

@@ -1,4 +1,5 @@
-//! Reading: the directory at once, pages one by one as a picture needs them, or everything.
+//! Reads a hierarchy: the directory at once, pages one by one as a picture needs them, or
+//! everything.
 
 use super::{
     HASH,
@@ -25,10 +26,11 @@ use std::{
     sync::{Arc, Mutex},
 };
 
-/// In [`Page::child_pages`]: a leaf, which has none.
+/// In [`Page::child_pages`]: a leaf, which has no children.
 pub const NO_PAGE: u32 = u32::MAX;
 
-/// What decides whether a node is refined. Lengths are world units, the centre relative to the tree's origin.
+/// The bounds that decide whether a node is refined. Lengths are in world units, the centre
+/// relative to the tree's origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CutSphere {
     pub center: [f32; 3],
@@ -42,37 +44,37 @@ impl CutSphere {
     }
 }
 
-/// A page as it was read.
+/// A decoded page.
 #[derive(Debug, Clone)]
 pub struct Page {
-    /// Its nodes, which follow one another in their block; [`Node::first_child`] counts in the block.
+    /// Its nodes, adjacent in their block; [`Node::first_child`] is an index in the block.
     pub nodes: Vec<Node>,
-    /// The parents of its nodes, each once, with the very values that they have as nodes of their own pages. The parent of
-    /// a block's root is that of its portal.
+    /// The parents of its nodes, each once, with exactly the values that they have in their own
+    /// pages. The parent of a block's root is that of its portal.
     pub parents: Vec<CutSphere>,
-    /// For each node, which of `parents` is its own; `u32::MAX` for the root of the tree.
+    /// For each node, the index of its parent in `parents`; `u32::MAX` for the root of the tree.
     pub parent: Vec<u32>,
-    /// For each node, the page that holds its children, or, for a portal, the first page of its block; [`NO_PAGE`] for a
-    /// leaf.
+    /// For each node, the page that contains its children or, for a portal, the first page of its
+    /// block; [`NO_PAGE`] for a leaf.
     pub child_pages: Vec<u32>,
     /// Whether the leaves of this page are portals, which are never drawn.
     pub has_portals: bool,
 }
 
 impl Page {
-    /// Whether a node is a portal: its block's root is to be drawn in its place.
+    /// Returns whether a node is a portal, which the root of its block replaces.
     pub fn is_portal(&self, node: usize) -> bool {
         self.has_portals && self.nodes[node].is_leaf()
     }
 }
 
-/// A hierarchy to read from: a file, its bytes, or a tree in memory.
+/// A hierarchy opened from a file, from bytes, or from a tree in memory.
 pub struct Hierarchy {
     path: PathBuf,
     store: Store,
     header: Header,
     directory: Directory,
-    /// Which block stands in the place of a leaf of block 0.
+    /// The block for each portal, a leaf of block 0.
     portals: HashMap<u32, u32>,
     families: Mutex<Families>,
     limits: Limits,
@@ -97,27 +99,27 @@ impl Hierarchy {
     /// Opens a file: reads and checks the header and the directory, and maps the rest.
     ///
     /// # Errors
-    /// [`Error::Input`] for other files, other versions, damaged headers and directories, and files that are cut off;
-    /// [`Error::Limit`] and [`Error::File`] as for every input.
+    /// [`Error::Input`] for other kinds of files, other versions, damaged headers and directories,
+    /// and incomplete files; [`Error::Limit`] and [`Error::File`] as for every input.
     pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
         let map = Source::map(path, limits)?;
         Self::new(path, Store::Mapped(map), limits, false)
     }
 
-    /// Opens the beginning of a file that is still coming, or was cut off: a coarser model. Pages that are not there are
-    /// told by [`is_present`](Self::is_present).
+    /// Opens the beginning of a file that is still being transferred, or was cut off, as a coarser
+    /// model. [`is_present`](Self::is_present) returns which pages are available.
     ///
     /// # Errors
-    /// As of [`open`](Self::open), where not even the header and the directory are whole.
+    /// Those of [`open`](Self::open), if the header or the directory is not complete.
     pub fn open_prefix(path: &Path, limits: &Limits) -> Result<Self> {
         let map = Source::map(path, limits)?;
         Self::new(path, Store::Mapped(map), limits, true)
     }
 
-    /// Takes the bytes of a file; `name` is what errors call it.
+    /// Opens the bytes of a file, which errors call `name`.
     ///
     /// # Errors
-    /// As of [`open`](Self::open).
+    /// Those of [`open`](Self::open).
     pub fn from_bytes(bytes: Vec<u8>, name: &Path, limits: &Limits) -> Result<Self> {
         Self::new(name, Store::Bytes(bytes), limits, false)
     }
@@ -129,11 +131,12 @@ impl Hierarchy {
         Ok(Self::assemble(path, store, header, directory, limits.clone()))
     }
 
-    /// Takes a tree as it is; nothing is encoded.
+    /// Uses a tree directly, without encoding it.
     ///
     /// # Errors
-    /// [`Error::Argument`] where the nodes of a block are not in the order of [`Block`], or blocks and portals do not fit, and
-    /// for numbers that cannot be drawn: those that [`validate`](crate::hierarchy::validate()) finds by themselves.
+    /// [`Error::Argument`] if the nodes of a block are not in the order that [`Block`] requires, if
+    /// blocks do not match portals, or if values cannot be drawn. Those are the values that
+    /// [`validate`](crate::hierarchy::validate()) rejects in a single node.
     pub fn from_tree(tree: Tree) -> Result<Self> {
         let mut directory = Directory::default();
         let mut portals = Vec::new();
@@ -170,10 +173,8 @@ impl Hierarchy {
         sorted.sort_unstable();
         sorted.dedup();
         if tree.is_joined() && (sorted.len() != leaves || portals.len() != leaves) {
-            let message = format!(
-                "{} blocks hang below the {leaves} portals of the hierarchy",
-                portals.len()
-            );
+            let message =
+                format!("the hierarchy has {} blocks below {leaves} portals", portals.len());
             return Err(Error::Argument(message));
         }
         directory.link();
@@ -224,27 +225,28 @@ impl Hierarchy {
         &self.header
     }
 
-    /// The box around all footprints, in world coordinates.
+    /// Returns the box around all footprints, in world coordinates.
     pub fn bounds(&self) -> Bounds {
         self.header.bounds
     }
 
-    /// All pages, block by block; the first is that of the root.
+    /// Returns all pages, block by block; the root's page is first.
     pub fn pages(&self) -> &[PageEntry] {
         &self.directory.pages
     }
 
-    /// The numbers of all pages, those of coarse nodes first, each behind those of its parents.
+    /// Returns the indices of all pages, coarse ones first, each after the pages of its parents.
     pub(crate) fn coarse_first(&self) -> Vec<u32> {
         self.directory.coarse_first()
     }
 
-    /// Whether the leaves of block 0 are portals.
+    /// Returns whether the leaves of block 0 are portals.
     pub fn is_joined(&self) -> bool {
         self.directory.blocks.len() > 1
     }
 
-    /// Whether a page is there: all are, but where only the beginning of a file is, and those that the directory does not tell of.
+    /// Returns whether a page is available. In a complete file all pages are; if only its beginning
+    /// is open, some are not. `false` for a page that the directory does not contain.
     pub fn is_present(&self, page: u32) -> bool {
         let Some(entry) = self.directory.pages.get(page as usize) else { return false };
         let Place { offset, bytes, .. } = entry.place;
@@ -254,11 +256,12 @@ impl Hierarchy {
         }
     }
 
-    /// Reads and decodes a page, its checksum checked. Any thread may; pages whose parents were read lately are faster.
+    /// Reads and decodes a page, and verifies its checksum. Can be called from any thread. Pages
+    /// whose parents were read recently are faster.
     ///
     /// # Errors
-    /// [`Error::Input`] for a page that is damaged or not there, and where the pages above it are; [`Error::Argument`] for
-    /// a page that there is not.
+    /// [`Error::Input`] if the page, or a page above it, is damaged or not available;
+    /// [`Error::Argument`] if there is no such page.
     pub fn read_page(&self, page: u32) -> Result<Page> {
         let entry = self.entry(page)?;
         let nodes = self.read_nodes(page)?;
@@ -310,10 +313,11 @@ impl Hierarchy {
         Ok(Page { nodes, parents, parent, child_pages, has_portals })
     }
 
-    /// Reads everything.
+    /// Reads the whole tree.
     ///
     /// # Errors
-    /// Those of [`read_page`](Self::read_page), and [`Error::Limit`] where the tree is larger than the limits allow.
+    /// Those of [`read_page`](Self::read_page), and [`Error::Limit`] if the tree is larger than the
+    /// limits allow.
     pub fn read_tree(&self) -> Result<Tree> {
         self.check_size()?;
         let blocks = (0..self.directory.blocks.len() as u32).map(|block| self.read_block(block));
@@ -327,16 +331,17 @@ impl Hierarchy {
         })
     }
 
-    /// Refuses a tree that is larger than the limits allow: a page of equal nodes takes a few bytes of the file.
+    /// Returns an error if the tree is larger than the limits allow. A few bytes of the file may
+    /// decode to a whole page of equal nodes.
     pub(in crate::hierarchy) fn check_size(&self) -> Result<()> {
-        // As pages, and joined.
+        // Once as pages, and once joined.
         let found = self.header.nodes.saturating_mul(2 * size_of::<Node>() as u64);
         self.limits.check(LimitKind::Bytes, &self.path, "the size of the tree in bytes", found)
     }
 
     pub(super) fn read_block(&self, block: u32) -> Result<Block> {
         let entry = self.directory.blocks[block as usize];
-        // A page of equal nodes takes a few bytes of the file.
+        // A few bytes of the file may decode to a whole page of equal nodes.
         let found = u64::from(entry.nodes) * 2 * size_of::<Node>() as u64;
         self.limits.check(
             LimitKind::Bytes,
@@ -345,7 +350,7 @@ impl Hierarchy {
             found,
         )?;
         let pages = entry.first_page..entry.first_page + entry.pages;
-        // Of several damaged pages the first is told, whichever thread finds one first.
+        // Reports the first of several damaged pages, whichever thread finds one first.
         let pages: Vec<Result<Vec<Node>>> =
             pages.into_par_iter().map(|page| self.read_nodes(page)).collect();
         let pages: Vec<Vec<Node>> = pages.into_iter().collect::<Result<_>>()?;
@@ -359,7 +364,7 @@ impl Hierarchy {
         &self.directory
     }
 
-    /// All bytes of a file; none of a tree in memory.
+    /// Returns all bytes of a file; empty for a tree in memory.
     pub(super) fn bytes(&self) -> &[u8] {
         self.store.bytes()
     }
@@ -372,7 +377,7 @@ impl Hierarchy {
             .ok_or_else(|| Error::Argument(format!("there is no page {page} among {count}")))
     }
 
-    /// The nodes of a page alone.
+    /// Reads the nodes of a page without their parents.
     fn read_nodes(&self, page: u32) -> Result<Vec<Node>> {
         let entry = self.entry(page)?;
         if let Store::Blocks(blocks) = &self.store {
@@ -390,7 +395,8 @@ impl Hierarchy {
         }
         let broken =
             |message: String| self.store.why(&self.path, damaged(&self.path, place(), message));
-        // A copy: what is decoded is what has the checksum, whoever writes to the file.
+        // Decodes a copy, so that the bytes decoded are those that were verified, whoever writes to
+        // the file.
         let bytes = all[offset as usize..end as usize].to_vec();
         if crc32fast::hash(&bytes) != crc {
             return Err(broken("its checksum does not fit".into()));
@@ -402,7 +408,7 @@ impl Hierarchy {
         let counted: u64 = nodes.iter().map(|node| u64::from(node.children)).sum();
         if counted != u64::from(children.end - children.start) {
             let message = format!(
-                "its nodes have {counted} children where the directory tells of {}",
+                "its nodes have {counted} children, but the directory states {}",
                 children.len()
             );
             return Err(damaged(&self.path, place(), message));
@@ -410,7 +416,7 @@ impl Hierarchy {
         Ok(nodes)
     }
 
-    /// The nodes of a page that have children.
+    /// Returns the nodes of a page that have children.
     fn families(&self, page: u32) -> Result<Arc<[Family]>> {
         if let Some(held) = self.families.lock().unwrap_or_else(|e| e.into_inner()).get(page) {
             return Ok(held);
@@ -423,7 +429,7 @@ impl Hierarchy {
     fn child_pages(&self, page: u32, nodes: &[Node]) -> Result<Vec<u32>> {
         let entry = &self.directory.pages[page as usize];
         let has_portals = self.is_joined() && entry.block == 0;
-        // Children follow one another, so their pages do.
+        // Children are adjacent, so their pages are too.
         let mut below = NO_PAGE;
         let child_page = |(index, node): (usize, &Node)| {
             if !node.is_leaf() {
@@ -440,7 +446,7 @@ impl Hierarchy {
                 damaged(
                     &self.path,
                     format!("page {page}"),
-                    format!("no block hangs below the portal at node {number}"),
+                    format!("no block has the portal at node {number}"),
                 )
             })?;
             Ok(self.directory.blocks[*block as usize].first_page)
@@ -448,13 +454,13 @@ impl Hierarchy {
         nodes.iter().enumerate().map(child_page).collect()
     }
 
-    /// A page that does not fit those above it.
+    /// The error for a page that does not fit the pages above it.
     fn torn(&self, page: u32) -> Error {
         damaged(&self.path, format!("page {page}"), "its nodes are not the children of those above")
     }
 }
 
-/// What stands at the beginning of a file, checked.
+/// Reads and checks the beginning of a file.
 fn begin(
     path: &Path,
     bytes: &[u8],
@@ -491,7 +497,8 @@ fn begin(
 }
 
 impl Store {
-    /// Why there is an error: checksums and the like find what changed, but not that it did.
+    /// Finds the cause of an error. A failed checksum shows damage, but not whether the file was
+    /// changed while it was read.
     fn why(&self, path: &Path, error: Error) -> Error {
         match self {
             Self::Mapped(map) => intact(map, path).err().unwrap_or(error),
@@ -508,7 +515,7 @@ impl Store {
     }
 }
 
-/// A node with children, as these see it.
+/// A node with children, as these need it.
 #[derive(Debug, Clone, Copy)]
 struct Family {
     first_child: u32,
@@ -532,7 +539,8 @@ fn families(nodes: &[Node]) -> Vec<Family> {
     inner.map(family).collect()
 }
 
-/// The inner nodes of the pages that were read last, so that reading from coarse to fine decodes each page once.
+/// The inner nodes of the pages that were read last, so that reading from coarse to fine decodes
+/// each page once.
 #[derive(Default)]
 struct Families {
     held: HashMap<u32, Arc<[Family]>>,
@@ -541,7 +549,7 @@ struct Families {
     count: usize,
 }
 
-/// Inner nodes that are held: 56 MiB.
+/// The maximum number of inner nodes in the cache: 56 MiB.
 const MOST_FAMILIES: usize = 2 << 20;
 
 impl Families {
@@ -579,15 +587,17 @@ pub(super) fn refused(path: &Path, refusal: Refusal) -> Error {
 }
 
 pub(super) fn incomplete(path: &Path, place: impl Into<String>) -> Error {
-    Error::input(path, place, "the file is incomplete: it ends before its last page")
-        .hint("copy or convert it again; what is there can be opened as a prefix once header and directory are whole")
+    Error::input(path, place, "the file is incomplete: it ends before its last page").hint(
+        "copy or convert it again; once the header and the directory are complete, the \
+             available part can be opened as a prefix",
+    )
 }
 
 pub(super) fn damaged(path: &Path, place: impl Into<String>, message: impl Into<String>) -> Error {
     Error::input(path, place, message).hint("the file is damaged: copy or convert it again")
 }
 
-/// Where the hash of a file begins.
+/// Returns where the hash of a file begins.
 pub(super) fn hash_start(bytes: &[u8]) -> Option<usize> {
     bytes.len().checked_sub(HASH)
 }

@@ -1,4 +1,5 @@
-//! Where pages wait until the directory before them is known, and where a finished file goes.
+//! Temporary storage of pages until the directory before them is known, and the destination of a
+//! finished file.
 
 use crate::{
     Error, Result,
@@ -9,14 +10,14 @@ use std::{
     path::Path,
 };
 
-/// Pages in the order in which they came.
+/// Pages in the order in which they were added.
 pub enum Spill {
     Memory(Vec<u8>),
     Disk { file: BufWriter<Scratch>, length: u64 },
 }
 
 impl Spill {
-    /// Beside a file that is to be.
+    /// Creates the storage beside the file that is to be written.
     pub fn beside(wanted: &Path) -> Result<Self> {
         Ok(Self::Disk {
             file: BufWriter::with_capacity(BUFFER, Scratch::beside(wanted)?),
@@ -24,7 +25,7 @@ impl Spill {
         })
     }
 
-    /// Appends bytes and tells where they stand.
+    /// Appends bytes, and returns their position.
     pub fn push(&mut self, bytes: &[u8]) -> std::io::Result<u64> {
         match self {
             Self::Memory(all) => {
@@ -39,7 +40,7 @@ impl Spill {
         }
     }
 
-    /// Hands out pieces, given by place and length, in the order of `pieces`.
+    /// Calls `each` with pieces, given by position and length, in the order of `pieces`.
     pub fn replay(
         self,
         pieces: impl Iterator<Item = (u64, u32)>,
@@ -58,7 +59,7 @@ impl Spill {
                 let mut bytes = Vec::new();
                 file.seek(SeekFrom::Start(0))?;
                 for (offset, length) in pieces {
-                    // Most pages follow one another, and a relative step keeps what was read ahead.
+                    // Most pages are adjacent, and a relative seek keeps the read-ahead buffer.
                     file.seek_relative(offset as i64 - at as i64)?;
                     bytes.resize(length as usize, 0);
                     file.read_exact(&mut bytes)?;
@@ -71,7 +72,7 @@ impl Spill {
     }
 }
 
-/// Where a finished file goes.
+/// The destination of a finished file.
 pub enum Target {
     Memory(Vec<u8>),
     Disk(BufWriter<AtomicFile>),
@@ -82,7 +83,8 @@ impl Target {
         Ok(Self::Disk(BufWriter::with_capacity(BUFFER, AtomicFile::create(path)?)))
     }
 
-    /// Ends the file that is wanted: the bytes where it was written to memory, none where it has its name now.
+    /// Finishes the file. Returns its bytes if it was written to memory; otherwise gives it its
+    /// name and returns no bytes.
     pub fn end(self, wanted: &Path) -> Result<Vec<u8>> {
         match self {
             Self::Memory(bytes) => Ok(bytes),

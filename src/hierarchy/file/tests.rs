@@ -1,4 +1,4 @@
-//! Files of whole hierarchies: what is read is what was written, and damage is told.
+//! Whole files: what is read is what was written, and damage is reported.
 
 use super::*;
 use crate::{
@@ -67,7 +67,7 @@ fn lossless_keeps_every_bit() {
     }
 }
 
-/// Every page against the tree that it came from.
+/// Compares every page with the tree that it came from.
 fn pages_tell_their_parents(hierarchy: &Hierarchy) {
     let tree = hierarchy.read_tree().unwrap();
     let parents: Vec<Vec<Option<u32>>> =
@@ -148,11 +148,11 @@ fn a_file_is_written_whole_and_is_sound() {
     assert_eq!(
         std::fs::read_dir(folder.path()).unwrap().count(),
         1,
-        "nothing is left of what was not finished"
+        "an unfinished file leaves nothing"
     );
 }
 
-/// What one file is read as: a tree, or the error of opening or of some page.
+/// Opens a file and reads every page: returns the tree, or the first error.
 fn try_all(bytes: Vec<u8>) -> crate::Result<Tree> {
     let hierarchy = Hierarchy::from_bytes(bytes, Path::new("memory"), &Limits::default())?;
     for page in 0..hierarchy.pages().len() as u32 {
@@ -170,7 +170,7 @@ fn input_error(result: crate::Result<impl Sized>, what: &str) {
             );
         }
         Err(other) => panic!("{what}: {other}"),
-        Ok(_) => panic!("{what} was not told"),
+        Ok(_) => panic!("{what} was not reported"),
     }
 }
 
@@ -193,7 +193,7 @@ fn every_flipped_byte_is_told() {
             if at < hash {
                 input_error(try_all(broken.clone()), &format!("byte {at}"));
             }
-            // Files are slow to write, so that not every one of those is.
+            // Writing files is slow, so only some of these are written.
             if at >= hash || at % 61 == 0 {
                 let path = folder.write("broken.splk", &broken);
                 assert!(!check(&path, &Limits::default()).is_sound(), "byte {at}");
@@ -249,7 +249,7 @@ fn the_beginning_of_a_file_is_a_coarse_model() {
     assert!(most > 5);
 }
 
-/// A file with its header changed, checksums and hash made to fit.
+/// Changes the header of a file, and corrects checksums and hash.
 fn forged(bytes: &[u8], change: impl Fn(&mut [u8])) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let stored = header::Stored::decode(&bytes).unwrap();
@@ -272,7 +272,7 @@ fn lies_are_told_though_checksums_fit() {
     let bytes = to_bytes(&joined(&surface(9_000, 8), 2), &options(false)).unwrap();
     assert!(try_all(forged(&bytes, |_| ())).is_ok());
     let start = header::Stored::decode(&bytes).unwrap().length();
-    // Versions, counts of leaves, nodes, blocks and pages; then every word of the directory.
+    // The version, the counts of leaves, nodes, blocks and pages; then every word of the directory.
     let directory_end =
         start + directory::Directory::length(3, open(bytes.clone()).pages().len()) as usize - 4;
     for at in [8, 16, 104, 112, 124, 128].into_iter().chain((start..directory_end).step_by(4)) {
@@ -296,7 +296,7 @@ fn lies_are_told_though_checksums_fit() {
     }
 }
 
-/// Pages whose checksums fit but whose bytes are anything: an error or some nodes, never a panic.
+/// Pages with correct checksums but random bytes give an error or some nodes, never a panic.
 #[test]
 fn pages_of_noise_are_survived() {
     let mut random = crate::hierarchy::testing::Random(11);
@@ -350,7 +350,7 @@ fn bounds_hold_exactly_for_what_is_read() {
     }
 }
 
-/// Leaves in the order of their colours, as that among siblings may change.
+/// Returns the leaves sorted by colour, because the order of siblings may change.
 fn sorted_leaves(tree: &Tree) -> Vec<crate::hierarchy::Node> {
     let mut leaves: Vec<_> =
         tree.blocks[0].nodes.iter().copied().filter(|node| node.is_leaf()).collect();
@@ -362,7 +362,7 @@ fn sorted_leaves(tree: &Tree) -> Vec<crate::hierarchy::Node> {
 fn losses_keep_to_the_promises() {
     use crate::hierarchy::testing::ellipsoid;
     let mut splats = surface(30_000, 6);
-    // A colour of its own tells each leaf.
+    // A unique colour identifies each leaf.
     splats
         .iter_mut()
         .enumerate()
@@ -384,7 +384,7 @@ fn losses_keep_to_the_promises() {
         let ([one, two], [three, four]) =
             ([0, 1].map(|i| ellipsoid(&a.splat).0[i]), [0, 1].map(|i| ellipsoid(&b.splat).0[i]));
         assert!((three / one - 1.0).abs() < 0.05 && (four / two - 1.0).abs() < 0.11);
-        // The ellipse as a whole: how much wider or narrower it is in any direction.
+        // The ellipse as a whole: its widening or narrowing in each direction.
         let [own, its] = [a, b].map(|node| crate::hierarchy::testing::covariance(&node.splat));
         let along = ellipsoid(&a.splat).1;
         for axis in &along[..2] {
@@ -404,7 +404,7 @@ fn losses_keep_to_the_promises() {
 #[test]
 fn what_was_read_loses_little_more() {
     for mut splats in [surface(9, 2), surface(4_000, 3)] {
-        // A colour of its own tells each leaf.
+        // A unique colour identifies each leaf.
         splats
             .iter_mut()
             .enumerate()
@@ -413,7 +413,8 @@ fn what_was_read_loses_little_more() {
         let again = open(to_bytes(&first, &options(false)).unwrap()).read_tree().unwrap();
         let (before, after) = (sorted_leaves(&first), sorted_leaves(&again));
         for (a, b) in before.iter().zip(&after) {
-            // Siblings may change places, and with them what positions and normals are told from.
+            // Siblings may change places, and with them the values relative to which positions and
+            // normals are stored.
             let away = glam::Vec3::from(a.splat.center).distance(glam::Vec3::from(b.splat.center));
             assert!(away <= a.size / 100.0);
             let normals = [a, b].map(|node| direction::unpacked(node.splat.normal).unwrap());
@@ -459,7 +460,7 @@ fn disorder_is_refused() {
     refused(|tree| tree.blocks[0].nodes[3].radius = f32::NAN);
     refused(|tree| tree.extent = 0.0);
     refused(|tree| tree.blocks.push(tree.blocks[0].clone()));
-    // Nor is it drawn.
+    // It is not drawn either.
     let view =
         Camera::framing(&sound.bounds, DVec3::X, DVec3::Z, 1.0).view([9, 9]).expect("a view");
     assert!(!sound.cut(&view, Detail::Pixels(1.0), None).expect("a cut").splats.is_empty());
@@ -482,7 +483,7 @@ fn validation_finds_what_is_loose() {
     found(|nodes| nodes[0].radius *= 0.99, "sphere");
     found(|nodes| nodes[1].center[0] += 0.5, "sphere");
     found(|nodes| nodes[0].size = nodes[1].size * 0.5, "size");
-    // What is above a leaf does not tell of it.
+    // The nodes above a leaf do not have this fault.
     let found_at_leaf = |change: fn(&mut crate::hierarchy::Node), code: &str| {
         let mut tree = sound.clone();
         if let Some(leaf) = tree.blocks[0].nodes.iter_mut().find(|node| node.is_leaf()) {
@@ -504,7 +505,7 @@ fn validation_finds_what_is_loose() {
     found(|nodes| nodes[2].splat.center[1] = f32::INFINITY, "values");
 }
 
-/// Numbers that make no picture come neither from a tree nor into a file, nor out of one.
+/// Values that cannot be drawn are rejected in trees, on writing and on reading.
 #[test]
 fn numbers_that_cannot_be_drawn_are_refused() {
     let sound = tree(&surface(50, 1));
@@ -546,15 +547,15 @@ fn numbers_that_cannot_be_drawn_are_refused() {
     }
     refused(&|tree| tree.extent = 8.1, "its extent is 8.1; it must lie in 0 … 8");
     refused(&|tree| tree.extent = f32::NAN, "its extent is NaN; it must lie in 0 … 8");
-    refused(&|tree| tree.origin.y = f64::INFINITY, "its origin or its bounds are none");
-    refused(&|tree| tree.bounds.max.x = f64::NAN, "its origin or its bounds are none");
+    refused(&|tree| tree.origin.y = f64::INFINITY, "its origin or its bounds are not valid");
+    refused(&|tree| tree.bounds.max.x = f64::NAN, "its origin or its bounds are not valid");
 }
 
-/// What few bits tell of a splat does not go beyond what can be drawn where the splat itself does not.
+/// If a splat can be drawn, so can its quantised value.
 #[test]
 fn rounding_stays_within_what_can_be_drawn() {
     let mut kept = [0; 2];
-    // The steps count from the root's strength, here the mean of so many.
+    // Steps are relative to the root's strength, here the mean of `count` splats.
     for count in 50..62 {
         let mut splats = surface(count, 1);
         splats[7].strength = Splat::MOST_OPTICAL_DEPTH;
@@ -563,6 +564,6 @@ fn rounding_stays_within_what_can_be_drawn() {
         let most = read.nodes().map(|node| node.splat.strength).fold(0.0, f32::max);
         kept[usize::from(most == Splat::MOST_OPTICAL_DEPTH)] += 1;
     }
-    // Some are rounded down; where it would be up the page keeps all bits.
+    // Some are rounded down. If one would be rounded up, the page is stored losslessly.
     assert!(kept[0] > 0 && kept[1] > 0, "{kept:?}");
 }

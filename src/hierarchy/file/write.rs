@@ -1,4 +1,4 @@
-//! Writing: block by block, so that no more than one block is in memory at a time.
+//! Writes a hierarchy block by block. Only the blocks being written are in memory.
 
 use super::{
     HASH,
@@ -24,10 +24,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// How a hierarchy is written, and what the file says of where it comes from.
+/// Options for writing a hierarchy, and what the file says about its source.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct WriteOptions {
-    /// Keep every bit, at about eight times the size.
+    /// Store every bit, at about eight times the size.
     pub lossless: bool,
     /// Which axis of the source points up.
     pub up: Option<UpAxis>,
@@ -37,10 +37,10 @@ pub struct WriteOptions {
     pub source: String,
 }
 
-/// What is known of a hierarchy once all its blocks are.
+/// The properties of a hierarchy that are known once all its blocks are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Whole {
-    /// World position that all places are relative to.
+    /// World position of the origin of all positions.
     pub origin: DVec3,
     /// The box around all footprints, in world coordinates.
     pub bounds: Bounds,
@@ -51,31 +51,32 @@ pub struct Whole {
 /// The block that joins the others.
 #[derive(Debug, Clone, Copy)]
 pub struct Top<'a> {
-    /// Its nodes, breadth first; its leaves are portals.
+    /// Its nodes, breadth first. Its leaves are portals.
     pub nodes: &'a [Node],
-    /// For each block, in the order in which they were written, the leaf in whose place its root stands.
+    /// For each block, in the order of writing, the leaf that its root replaces.
     pub portals: &'a [u32],
 }
 
-/// Writes a file block by block. The pages wait in a file beside it; it appears whole, with [`finish`](Self::finish), or
-/// not at all.
+/// Writes a file block by block. Pages are kept in a temporary file beside it.
+/// [`finish`](Self::finish) makes the whole file appear; without that, there is none.
 pub struct Writer {
     path: Option<PathBuf>,
     options: WriteOptions,
     extent: f32,
     spill: Spill,
-    /// Of the ordinary blocks.
+    /// Of the ordinary blocks, without the one that joins them.
     directory: Directory,
     roots: Vec<Node>,
     contents: Contents,
 }
 
 impl Writer {
-    /// Begins a file of splats whose footprints end `extent` standard deviations from their centres.
+    /// Begins a file of splats whose footprints end `extent` standard deviations from their
+    /// centres.
     ///
     /// # Errors
-    /// [`Error::Output`] where nothing can be written beside `path`; [`Error::Argument`] for an extent that is no positive
-    /// number, or above [`MAX_EXTENT`](crate::splat::SplatSet::MAX_EXTENT).
+    /// [`Error::Output`] if nothing can be written beside `path`; [`Error::Argument`] if the extent
+    /// is not a positive number, or above [`MAX_EXTENT`](crate::splat::SplatSet::MAX_EXTENT).
     pub fn new(path: &Path, extent: f32, options: &WriteOptions) -> Result<Self> {
         Self::begin(Some(path.to_owned()), extent, options, || Spill::beside(path))
     }
@@ -100,17 +101,18 @@ impl Writer {
         })
     }
 
-    /// Writes an ordinary block, breadth first, places relative to the tree's origin, and gives its root as it will be
-    /// read: what the block that joins it with others has to stand above.
+    /// Writes an ordinary block, breadth first, with positions relative to the tree's origin.
+    /// Returns its root as it will be decoded, which the block that joins the others must bound.
     ///
     /// # Errors
-    /// [`Error::Argument`] for nodes that are not in the order of [`Block`](crate::hierarchy::Block), or have values that
-    /// are not finite or cannot be drawn; [`Error::Output`] where they cannot be written.
+    /// [`Error::Argument`] if the nodes are not in the order that
+    /// [`Block`](crate::hierarchy::Block) requires, or if values are not finite or cannot be drawn;
+    /// [`Error::Output`] if the block cannot be written.
     pub fn block(&mut self, nodes: &[Node]) -> Result<Node> {
         Ok(self.blocks(&[nodes])?[0])
     }
 
-    /// As [`block`](Self::block), several blocks at once, which threads share.
+    /// Writes several blocks in parallel, as [`block`](Self::block) writes one.
     ///
     /// # Errors
     /// Those of [`block`](Self::block).
@@ -139,13 +141,14 @@ impl Writer {
         Ok(self.roots[written..].to_vec())
     }
 
-    /// Ends the file. One block needs nothing above it; several need the block that joins them, whose leaves take the
-    /// bounds of the roots in their place, and whose other nodes grow where they must.
+    /// Finishes the file. A single block needs no `top`; several need the block that joins them.
+    /// The leaves of that block get the bounds of the roots that replace them, and its other nodes
+    /// grow as necessary.
     ///
     /// # Errors
-    /// [`Error::Argument`] where `top` does not fit the blocks that were written, or has values that cannot be drawn, and for
-    /// an origin or bounds that are not finite; [`Error::Output`] where the file cannot
-    /// be written.
+    /// [`Error::Argument`] if `top` does not fit the blocks that were written, if it has values
+    /// that cannot be drawn, or if the origin or the bounds are not finite. [`Error::Output`] if
+    /// the file cannot be written.
     pub fn finish(self, top: Option<Top>, whole: &Whole) -> Result<()> {
         let path = self.path.clone();
         let target = || path.as_deref().map_or(Ok(Target::Memory(Vec::new())), Target::at);
@@ -166,7 +169,7 @@ impl Writer {
             (None, 1) => std::mem::take(&mut self.directory),
             (None, count) => {
                 return Err(Error::Argument(format!(
-                    "nothing joins the {count} blocks of the hierarchy"
+                    "the {count} blocks of the hierarchy need a block that joins them"
                 )));
             }
             (Some(top), _) => self.join(top)?,
@@ -205,7 +208,7 @@ impl Writer {
         out.end(wanted)
     }
 
-    /// The directory of all blocks, with the one on top written too.
+    /// Writes the block on top, and returns the directory of all blocks.
     fn join(&mut self, top: Top) -> Result<Directory> {
         let refuse = |message: String| {
             Error::Argument(format!("the block that joins the others: {message}"))
@@ -225,7 +228,9 @@ impl Writer {
             if !nodes.get(portal).is_some_and(Node::is_leaf)
                 || std::mem::replace(&mut is_taken[portal], true)
             {
-                return Err(refuse(format!("node {portal} is no portal, or that of two blocks")));
+                return Err(refuse(format!(
+                    "node {portal} is not a leaf, or is the portal of two blocks"
+                )));
             }
             nodes[portal] = Node { first_child: 0, children: 0, ..*root };
         }
@@ -269,14 +274,14 @@ impl Writer {
     }
 }
 
-/// Refuses nodes whose numbers cannot be drawn.
+/// Returns an error if a node has values that cannot be drawn.
 pub(super) fn check_nodes(nodes: &[Node]) -> Result<(), String> {
     let found =
         nodes.par_iter().enumerate().find_map_first(|(index, node)| Some((index, fault(node)?)));
     found.map_or(Ok(()), |(index, fault)| Err(format!("node {index} has {fault}")))
 }
 
-/// What the leaves of ordinary blocks have.
+/// Properties of the leaves of ordinary blocks.
 #[derive(Default)]
 struct Contents {
     leaves: u64,
@@ -297,7 +302,7 @@ impl Contents {
     }
 }
 
-/// What is around the parents of the nodes of each page of a block.
+/// Returns, for each page of a block, the bounds around the parents of its nodes.
 pub(super) fn arounds(nodes: &[Node], runs: &[Run]) -> Vec<Around> {
     let around = |run: &Run| match run.nodes.start {
         0 => Around::EVERYTHING,
@@ -306,7 +311,7 @@ pub(super) fn arounds(nodes: &[Node], runs: &[Run]) -> Vec<Around> {
     runs.par_iter().map(around).collect()
 }
 
-/// The parent of each node of a block; `None` for the root.
+/// Returns the parent of each node of a block; `None` for the root.
 pub(super) fn parents(nodes: &[Node]) -> Vec<Option<u32>> {
     let mut parents = vec![None];
     for (index, node) in nodes.iter().enumerate() {
@@ -315,19 +320,19 @@ pub(super) fn parents(nodes: &[Node]) -> Vec<Option<u32>> {
     parents
 }
 
-/// Writes a whole hierarchy: a temporary file beside `path` that takes its name once it is complete.
+/// Writes a whole hierarchy to a temporary file beside `path`, which is renamed once it is
+/// complete.
 ///
 /// # Errors
-/// Those of [`Writer`]; also [`Error::Argument`] where the blocks of a joined tree do not say which portals they hang
-/// below.
+/// Those of [`Writer`]; also [`Error::Argument`] if a block of a joined tree has no portal.
 pub fn write(tree: &Tree, path: &Path, options: &WriteOptions) -> Result<()> {
     all(tree, Writer::new(path, tree.extent, options)?, || Target::at(path)).map(|_| ())
 }
 
-/// The bytes of the file that [`write`](write()) would write.
+/// Returns the bytes of the file that [`write`](write()) would write.
 ///
 /// # Errors
-/// As of [`write`](write()).
+/// Those of [`write`](write()).
 pub fn to_bytes(tree: &Tree, options: &WriteOptions) -> Result<Vec<u8>> {
     let writer = Writer::begin(None, tree.extent, options, || Ok(Spill::Memory(Vec::new())))?;
     all(tree, writer, || Ok(Target::Memory(Vec::new())))
