@@ -293,7 +293,7 @@
         ("future.splk", at(splk(true), 8, &99u32.to_le_bytes()), "future.splk: header: is of version 99; version 1 can be read"),
         ("future.splv", at(bricks(), 8, &99u32.to_le_bytes()), "future.splv: header: is of version 99; version 1 can be read"),
         ("tail.splk", [splk(true), vec![0]].concat(), "tail.splk: byte 560: the file has 1 bytes behind its end"),
-        ("tail.splv", [bricks(), vec![0]].concat(), "tail.splv: byte 477: 1 bytes stand behind the end"),
+        ("tail.splv", [bricks(), vec![0]].concat(), "tail.splv: byte 477: 1 bytes follow the end"),
         // Hierarchies and bricks whose checksums are right.
         ("bomb.splk", crafted::page_of_zeros(64 << 20), "bomb.splk: page 0 (byte 229): it cannot be unpacked: Destination buffer is too small: 67108864 bytes needed, 960 given"),
         ("shortpage.splk", crafted::page_of_zeros(8), "shortpage.splk: page 0 (byte 229): it unpacks to 8 bytes where 960 were expected"),
@@ -311,7 +311,7 @@
         ("manybricks.splv", crafted::with_dims([1 << 60, 1 << 60, 1 << 60]), "manybricks.splv: header: 1152921504606846976 × 1152921504606846976 × 1152921504606846976 samples are more than memory can hold"),
         ("endless.splv", crafted::with_dims([1 << 36, 1, 1]), "endless.splv: directory: the file is too short for the 4294967295 bricks of its header"),
         ("foreign.splk", b"PK\x03\x04 and so on".to_vec(), "foreign.splk: header: is no hierarchy of splats"),
-        ("foreign.splv", b"PK\x03\x04 and so on".to_vec(), "foreign.splv: header: is no volume in bricks"),
+        ("foreign.splv", b"PK\x03\x04 and so on".to_vec(), "foreign.splv: header: is not a volume in bricks"),
         // Transfer functions.
         ("clear.json", br#"{"color": [[0, 1, 1, 1]], "opacity": [[0, 0]]}"#.to_vec(), "clear.json: transfer function: a transfer function without opacity shows nothing: every opacity is 0"),
         ("missing.json", br#"{"color": [[0, 1, 1, 1]]}"#.to_vec(), "missing.json: transfer function: missing field `opacity` at line 1 column 25"),
