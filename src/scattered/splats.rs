@@ -17,8 +17,9 @@ const EXTENT: f32 = 3.0;
 /// average 5.4 kernels overlap at a position. Random samples leave no empty ball within the
 /// footprints' reach of 2.1 spacings: a ball of that size occurs once in e³⁹ samples.
 const SPREAD: f64 = 0.7;
-/// The range of weights, whose median is 1 or more. Samples beyond it count for less or more than they should by their volume, but
-/// 16 bits hold them with all their digits, and nothing beside others of weight 1 could be seen of a smaller one.
+/// The range of weights, whose median is 1 or more. Samples outside it count for more or less than
+/// their volume. In this range, 16 bits hold weights with all their digits. A smaller weight would
+/// be invisible beside others of weight 1.
 const WEIGHTS: [f64; 2] = [1e-4, 6e4];
 /// Over the whole extent of its kernel, a sample's value changes by at most this many widths of the
 /// range of its neighbours.

@@ -24,8 +24,9 @@ const FLAT: f32 = 30.0;
 pub(super) const ALIKE: f32 = 0.94;
 /// A triangle is steep if its normal's dot product with the surfel's is less than this.
 pub(super) const STEEP: f32 = 0.95;
-/// Covariance of a surfel in that of the triangles around its vertex. On a mesh of equilateral triangles of side 1 the
-/// standard deviation is 0.35, and the surfels' sum is nowhere below 0.767 times the strength of one.
+/// Covariance of a surfel, as a multiple of that of the triangles around its vertex. On a mesh of
+/// equilateral triangles of side 1 the standard deviation is 0.35. The surfels' sum is then nowhere
+/// below 0.767 times the strength of one.
 pub(super) const SPREAD: f32 = 0.35 * 0.35 * 24.0 / 5.0;
 /// Largest squared distances, in standard deviations, of a surfel from three kinds of points. These
 /// are the midpoints of the edges at its vertex, the centroids of the triangles, and the vertex
