@@ -91,7 +91,7 @@ impl Camera {
         aspect: f64,
         view_angle: f64,
     ) -> Self {
-        // The camera stands far enough from a single point that the two differ in their coordinates.
+        // The camera is far enough from a single point that the two differ in their coordinates.
         let least = f64::MIN_POSITIVE.sqrt().max(1e-13 * bounds.center().abs().max_element());
         let radius = (0.5 * bounds.diagonal()).max(least);
         let half = (0.5 * view_angle).to_radians();
