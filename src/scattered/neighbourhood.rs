@@ -37,7 +37,6 @@ pub(super) struct Place {
 ///
 /// # Errors
 /// [`Error::Timeout`](crate::Error::Timeout).
-/// [`Error::Timeout`](crate::Error::Timeout).
 pub(super) fn places(
     points: &Points,
     neighbours: usize,

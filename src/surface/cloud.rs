@@ -33,7 +33,7 @@ const LONE: f32 = 4.0;
 /// surfaces this much more coarsely than near ones.
 const LARGEST: f32 = 16.0;
 
-/// What errors call the work of this module.
+/// The name of this module's work in errors.
 const WORK: &str = "finding the neighbours of points";
 /// Bytes of temporary memory per point: the tree, its neighbourhood, the edges of the graph that
 /// orients normals, and its surfel.

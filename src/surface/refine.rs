@@ -26,7 +26,7 @@ pub(super) const STRETCH: f32 = 2.5;
 /// triangle is not cut for it.
 const MOST_REPEATS: f64 = 16.0;
 
-/// What errors call the work of this module.
+/// The name of this module's work in errors.
 const WORK: &str = "cutting long triangles";
 
 /// With too many triangles, lengths grow by whole steps of this factor. Two passes over the same

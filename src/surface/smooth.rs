@@ -12,14 +12,14 @@ use rayon::prelude::*;
 /// in the plane of their group.
 const SHARPEST: f32 = 60.0;
 
-/// What errors call the work of this module.
+/// The name of this module's work in errors.
 const WORK: &str = "finding the normals of the triangles' corners";
 
 /// The smooth groups of the triangles around one vertex.
 ///
-/// A group is a cone around its first normal. The group's normal is therefore never far from the
-/// plane of a triangle in it, even if many small steps add up to a large turn. There are never more
-/// than a few groups.
+/// A group is a cone around its first normal. A surfel in the plane of the group's normal is thus
+/// never far from its triangles, even if many small steps add up to a large turn. There are never
+/// more than a few groups.
 pub(super) struct Groups {
     /// Cosine of the crease angle.
     crease: f32,
@@ -67,7 +67,6 @@ impl Groups {
 /// or zero.
 ///
 /// # Errors
-/// [`Error::Timeout`](crate::Error::Timeout) and [`Error::Memory`](crate::Error::Memory).
 /// [`Error::Timeout`](crate::Error::Timeout) and [`Error::Memory`](crate::Error::Memory).
 pub(crate) fn corner_normals(
     mesh: &Mesh,

@@ -22,8 +22,7 @@ const BEYOND: f32 = 0.25;
 #[derive(Debug, Default, Clone, Copy)]
 struct Part {
     sums: Sums,
-    /// Area where given normals point to the side from which the triangle runs counter-clockwise,
-    /// and to the other side.
+    /// Area where given normals agree with the winding of the triangle, and where they oppose it.
     along: f64,
     against: f64,
 }

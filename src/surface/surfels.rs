@@ -31,8 +31,8 @@ use std::{borrow::Cow, ops::RangeInclusive};
 pub struct SurfelOptions {
     /// Factor on all radii. Below 1 the surface may show holes.
     pub radius_scale: f32,
-    /// Optical depth at the centre of a surfel. Nearly everywhere on a triangle the total depth is
-    /// close to this, and never below 0.28 of it inside.
+    /// Optical depth at the centre of a surfel. Nearly everywhere on a triangle, the total depth is
+    /// most of this. Inside a triangle it is never below 0.28 times this.
     pub optical_depth: f32,
     /// Neighbouring triangles whose normals differ by more than this angle meet in a crease; at
     /// most 60.
@@ -53,7 +53,7 @@ impl SurfelOptions {
     /// does not fit in 32 bits. From 1 on, no edge is cut.
     pub const SPACINGS: RangeInclusive<f32> = 1e-9..=f32::MAX;
 
-    /// Most triangles that cutting this many may produce.
+    /// Returns the most triangles that cutting `triangles` of them may produce.
     pub(crate) fn most_once_cut(&self, triangles: usize) -> usize {
         budget(self.most_triangles, triangles)
     }
@@ -75,7 +75,7 @@ impl Default for SurfelOptions {
 /// Where footprints end, in standard deviations.
 pub(crate) const EXTENT: f32 = 3.0;
 
-/// What errors call the work of this module.
+/// The name of this module's work in errors.
 const WORK: &str = "making surfels";
 
 /// Vertices per parallel task.

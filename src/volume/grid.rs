@@ -21,6 +21,8 @@ pub struct Grid {
 }
 
 impl Grid {
+    /// Returns the grid that contains the samples of a lattice.
+    ///
     /// # Errors
     /// [`Error::Argument`] for a rectilinear lattice, and for a body-centred lattice of a single
     /// layer, whose mirror image would coincide with itself.

@@ -18,10 +18,15 @@ pub struct Reconstruction<'a> {
 }
 
 impl<'a> Reconstruction<'a> {
+    /// Prepares the reconstruction of a volume by a kernel.
+    ///
     /// # Errors
-    /// [`Error::Argument`] for a rectilinear lattice, for a volume that was made sharp for another
-    /// kernel, for a tensor product on any lattice but a Cartesian one, and for a volume or a
-    /// kernel that was built by hand and is inconsistent.
+    /// [`Error::Argument`] in these cases:
+    ///
+    /// - The lattice is rectilinear, or the kernel is a tensor product and the lattice is not
+    ///   Cartesian.
+    /// - The volume was made sharp for another kernel.
+    /// - The volume or the kernel was built by hand and is inconsistent.
     pub fn new(volume: &'a Volume, kernel: &'a Kernel) -> Result<Self> {
         volume.validate().map_err(Error::Argument)?;
         kernel.validate()?;
