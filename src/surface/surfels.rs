@@ -236,7 +236,7 @@ impl Mesh {
         if !self.triangle_materials.par_iter().all(|&index| (index as usize) < self.materials.len())
         {
             return Err(Error::Argument(
-                "a triangle refers to a material that does not exist".into(),
+                "a triangle refers to a material that is not there".into(),
             ));
         }
         let whole = |t: &super::Texture| {
