@@ -1,8 +1,9 @@
 //! Cameras and the view frame.
 //!
-//! World frame: right-handed, any unit. View frame: x to the right of the picture, y **down**, z away from the viewer, with
-//! the origin at the camera's position; so a view-space point projects to pixel (cx + f·x/z, cy + f·y/z), rows counted
-//! from the top and pixel centres at half-integers.
+//! World frame: right-handed, any unit. View frame: x to the right of the picture, y **down**, z
+//! away from the viewer, with the origin at the camera's position. A view-space point projects to
+//! pixel (cx + f·x/z, cy + f·y/z). Rows are counted from the top, and pixel centres are at
+//! half-integers.
 
 use crate::{Error, Result};
 use glam::{DMat3, DVec2, DVec3};
@@ -15,7 +16,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The box of no points; growing it by a point gives that point.
+    /// The box of no points. Its union with a point is that point.
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
     pub fn is_empty(&self) -> bool {
@@ -46,7 +47,7 @@ impl Bounds {
         })
     }
 
-    /// Distances from `point` to the nearest and the farthest point of the box.
+    /// Returns the distances from `point` to the nearest and the farthest point of the box.
     pub fn distances(&self, point: DVec3) -> [f64; 2] {
         let nearest = point.clamp(self.min, self.max);
         let farthest = (point - self.min).abs().max((point - self.max).abs());
@@ -54,7 +55,7 @@ impl Bounds {
     }
 }
 
-/// How the picture plane is reached.
+/// How points are projected onto the picture plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Projection {
     /// Full vertical view angle in degrees.
@@ -63,7 +64,7 @@ pub enum Projection {
     Orthographic { height: f64 },
 }
 
-/// Where the picture is taken from. World units.
+/// Where the picture is taken from, in world units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
     pub position: DVec3,
@@ -73,15 +74,16 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// VTK's default, so that the same scene fits the same picture in both.
+    /// VTK's default, so that the same scene has the same size in both.
     pub const DEFAULT_VIEW_ANGLE: f64 = 30.0;
 
-    /// Looks along `direction` at the whole of `bounds`: its bounding sphere fits the shorter side of the picture.
+    /// Looks along `direction` at the whole of `bounds`: its bounding sphere fits the shorter side
+    /// of the picture.
     pub fn framing(bounds: &Bounds, direction: DVec3, view_up: DVec3, aspect: f64) -> Self {
         Self::framing_with(bounds, direction, view_up, aspect, Self::DEFAULT_VIEW_ANGLE)
     }
 
-    /// As [`framing`](Self::framing), with a vertical view angle in degrees, between 0 and 180.
+    /// Like [`framing`](Self::framing), with a vertical view angle in degrees, between 0 and 180.
     pub fn framing_with(
         bounds: &Bounds,
         direction: DVec3,
@@ -89,7 +91,7 @@ impl Camera {
         aspect: f64,
         view_angle: f64,
     ) -> Self {
-        // The camera stands far enough from a single point that its coordinates differ.
+        // The camera is far enough from a single point that the two differ in their coordinates.
         let least = f64::MIN_POSITIVE.sqrt().max(1e-13 * bounds.center().abs().max_element());
         let radius = (0.5 * bounds.diagonal()).max(least);
         let half = (0.5 * view_angle).to_radians();
@@ -104,8 +106,9 @@ impl Camera {
         }
     }
 
-    /// Narrows or widens the view until the corners of `bounds` just fit a picture of `size` pixels, with a margin of this
-    /// share of its sides. Does nothing where a corner is not in front of the camera.
+    /// Narrows or widens the view until the corners of `bounds` just fit a picture of `size`
+    /// pixels, with a margin of `margin` times its sides. Does nothing if a corner is not in front
+    /// of the camera.
     ///
     /// # Errors
     /// As [`view`](Self::view).
@@ -137,13 +140,14 @@ impl Camera {
 
     /// Turns the camera about the focal point around the view-up axis, in degrees (VTK's Azimuth).
     pub fn azimuth(&mut self, degrees: f64) {
-        // Around no axis nothing turns; `view` tells of it.
+        // Without an axis nothing turns; `view` reports it.
         let Some(axis) = self.view_up.try_normalize() else { return };
         let turn = glam::DQuat::from_axis_angle(axis, degrees.to_radians());
         self.position = self.focal_point + turn * (self.position - self.focal_point);
     }
 
-    /// Turns the camera about the focal point around the picture's horizontal axis, in degrees (VTK's Elevation).
+    /// Turns the camera about the focal point around the picture's horizontal axis, in degrees
+    /// (VTK's Elevation).
     pub fn elevation(&mut self, degrees: f64) {
         let Some(forward) = (self.focal_point - self.position).try_normalize() else { return };
         // Along the view-up axis any horizontal axis will do.
@@ -153,7 +157,7 @@ impl Camera {
             .unwrap_or_else(|| forward.any_orthonormal_vector());
         let turn = glam::DQuat::from_axis_angle(right, -degrees.to_radians());
         self.position = self.focal_point + turn * (self.position - self.focal_point);
-        // Past a pole the old up would point along the view; the turned one never does.
+        // Past a pole the old view-up could point along the view; the turned one never does.
         self.view_up = turn * self.view_up;
     }
 
@@ -165,7 +169,7 @@ impl Camera {
         }
     }
 
-    /// The same view without perspective: what lies in the focal plane keeps its size.
+    /// Switches to the same view without perspective: objects in the focal plane keep their size.
     pub fn make_orthographic(&mut self) {
         if let Projection::Perspective { view_angle } = self.projection {
             let distance = (self.focal_point - self.position).length();
@@ -176,6 +180,10 @@ impl Camera {
     }
 
     /// Resolves the camera for a picture of `size` pixels (width, height).
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a picture without pixels, a coordinate that is not finite, a camera
+    /// at its own focal point, and a view angle or height outside its range.
     pub fn view(&self, size: [u32; 2]) -> Result<View> {
         let bad = |what: &str| Err(Error::Argument(format!("the camera {what}")));
         if size[0] == 0 || size[1] == 0 {
@@ -190,9 +198,10 @@ impl Camera {
         }
         let forward = match (self.focal_point - self.position).try_normalize() {
             Some(forward) => forward,
-            None => return bad("stands in its own focal point"),
+            None => return bad("is at its own focal point"),
         };
-        // A view-up along the view direction has no meaning; any perpendicular one serves better than an error.
+        // A view-up along the view direction has no meaning. Any perpendicular one serves better
+        // than an error.
         let right = (forward.cross(self.view_up).try_normalize())
             .unwrap_or_else(|| forward.any_orthonormal_vector());
         let down = forward.cross(right);
@@ -225,7 +234,7 @@ impl Camera {
 pub struct View {
     /// World position of the view frame's origin.
     pub position: DVec3,
-    /// View-space direction of a world direction.
+    /// Rotates world directions to view space.
     pub rotation: DMat3,
     pub perspective: bool,
     /// Perspective: focal length in pixels. Orthographic: pixels per world unit.
@@ -235,19 +244,20 @@ pub struct View {
     pub size: [u32; 2],
 }
 
-/// How far from the camera things may be, how many pixels may show a length of 1, and its inverse how few: their squares fit
-/// in 32 bits.
+/// The largest distance from the camera, and the most pixels for a length of 1. Its inverse is the
+/// fewest. The squares fit in 32 bits.
 const FARTHEST: f64 = 1e18;
 
 impl View {
-    /// Checks that what lies in `bounds` has places in the picture that 32-bit numbers hold.
+    /// Checks that 32-bit numbers can hold the positions in the picture of everything in `bounds`.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a camera that is too far away, and one whose pixels are too large or too small.
+    /// [`Error::Argument`] for a camera that is too far away, and for one whose pixels are too
+    /// large or too small.
     pub fn validate_for(&self, bounds: &Bounds) -> Result<()> {
         let [_, far] = bounds.distances(self.position);
         let wrong = |message: String| Err(Error::Argument(format!("the camera {message}")));
-        // NaN is no more.
+        // NaN is refused too.
         if far.is_nan() || far > FARTHEST {
             return wrong(format!(
                 "is {far:e} away from the far side of the scene; {FARTHEST:e} is the most"
@@ -256,20 +266,21 @@ impl View {
         if !(1.0 / FARTHEST..=FARTHEST).contains(&self.scale) {
             let least = 1.0 / FARTHEST;
             return wrong(format!(
-                "shows a length of 1 by {:e} pixels; {least:e} to {FARTHEST:e} can be",
+                "shows a length of 1 with {:e} pixels; {least:e} to {FARTHEST:e} are allowed",
                 self.scale
             ));
         }
         Ok(())
     }
 
-    /// View-space position of a world point.
+    /// Returns the view-space position of a world point.
     pub fn to_view(&self, world: DVec3) -> DVec3 {
         self.rotation * (world - self.position)
     }
 
-    /// The planes through the picture's four sides, widened by some pixels: what has view-space positions p with
-    /// n·p + d < 0 for one of these (n, d), n of unit length, is beside the picture.
+    /// Returns the planes through the picture's four sides, moved outwards by `pixels`. A plane is
+    /// (n, d) with n of unit length. Points whose view-space positions p have n·p + d < 0 for one
+    /// of the planes are outside the picture.
     pub fn sides(&self, pixels: f64) -> [(DVec3, f64); 4] {
         let [width, height] = self.size.map(f64::from);
         let ends = [
@@ -287,8 +298,9 @@ impl View {
         })
     }
 
-    /// The ray of a point of the picture: view-space origin and unit direction. Distances along rays are counted from
-    /// this origin: from the eye in perspective, from the plane z = 0 in orthographic views.
+    /// Returns the ray of a point of the picture: view-space origin and unit direction. Distances
+    /// along rays are measured from this origin: from the eye in perspective, from the plane z = 0
+    /// in orthographic views.
     pub fn ray(&self, pixel: DVec2) -> (DVec3, DVec3) {
         let p = (pixel - self.center) / self.scale;
         if self.perspective {
@@ -298,7 +310,8 @@ impl View {
         }
     }
 
-    /// Smallest and largest distance from the view's origin (perspective) or from its plane (orthographic) in a box.
+    /// Returns the smallest and largest distance of a box from the view's origin (perspective) or
+    /// from its plane (orthographic).
     pub fn distances(&self, bounds: &Bounds) -> [f64; 2] {
         if self.perspective {
             return bounds.distances(self.position);

@@ -1,21 +1,25 @@
-//! The cosine transform of a field that goes on mirrored beyond its first and last samples along every axis (DCT-I:
-//! whole-sample symmetry, Martucci, "Symmetric convolution and the discrete sine and cosine transforms", 1994).
+//! The cosine transform of a field that continues mirrored beyond its first and last samples along
+//! every axis (DCT-I: whole-sample symmetry; Martucci, "Symmetric convolution and the discrete sine
+//! and cosine transforms", 1994).
 
 use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner, num_complex::Complex};
 use std::{f64::consts::PI, sync::Arc};
 
-/// Columns that one task gathers at a time, two for each complex line: what a cache line holds.
+/// Columns that one task gathers at a time, two for each complex line: as many as a cache line
+/// holds.
 const TILE: usize = 8;
 
-/// Multiplies the spectrum of a field of `dims` samples, first axis fastest, by what `factor` does to its rows. The row
-/// (j, k) holds the frequencies [`frequency`]`(i, dims[0])`, `(j, dims[1])`, `(k, dims[2])` for all i.
+/// Filters a field of `dims` samples, first axis fastest: `factor` multiplies each row of its
+/// spectrum. The row (j, k) holds the frequencies [`frequency`]`(i, dims[0])`, `(j, dims[1])`, `(k,
+/// dims[2])` for all i.
 ///
-/// A period is 2(n − 1) samples long, and the spectrum of a mirrored field is real: one complex line carries two real
-/// ones. The transform is its own inverse but for the period. Besides the field, a thread holds some lines.
+/// A period is 2(n − 1) samples long. The spectrum of a mirrored field is real, so one complex line
+/// carries two real ones. The transform is its own inverse except for a factor of the period.
+/// Memory beside the field: some lines per thread.
 ///
 /// # Panics
-/// Where the field has another number of samples.
+/// If the field has another number of samples.
 pub fn filter(
     values: &mut [f64],
     dims: [usize; 3],
@@ -37,12 +41,12 @@ pub fn filter(
     transform(values, dims, &plans);
 }
 
-/// The angle per sample of the `index`-th frequency of an axis of `count` samples.
+/// Returns the angle per sample of the `index`-th frequency of an axis of `count` samples.
 pub fn frequency(index: usize, count: usize) -> f64 {
     if count > 1 { PI * index as f64 / (count - 1) as f64 } else { 0.0 }
 }
 
-/// The sample that a mirrored axis of `count` samples shows at a place on or beyond it.
+/// Returns the sample that a mirrored axis of `count` samples has at a position on or beyond it.
 pub fn mirrored(place: isize, count: usize) -> usize {
     let last = count - 1;
     let around = place.unsigned_abs() % (2 * last).max(1);
@@ -77,7 +81,7 @@ fn transform(values: &mut [f64], [nx, ny, _]: [usize; 3], plans: &[Plan; 3]) {
     }
 }
 
-/// Transforms every column of some rows.
+/// Transforms every column of the rows.
 fn across(plan: &dyn Fft<f64>, mut rows: Vec<&mut [f64]>) {
     let (count, width, period) = (rows.len(), rows[0].len(), plan.len());
     let mut tile = vec![Complex::ZERO; TILE.div_ceil(2) * period];
@@ -124,7 +128,8 @@ mod tests {
         assert_eq!([-3, 0, 2].map(|at| mirrored(at, 1)), [0; 3]);
     }
 
-    /// A filter of the spectrum does what convolution with mirrored borders does, whatever the lengths of the axes.
+    /// Filtering the spectrum equals convolution with mirrored borders, whatever the lengths of the
+    /// axes.
     #[test]
     fn filters_as_convolution_does() {
         let weights = [0.5, 0.25, -0.125];

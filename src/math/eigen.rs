@@ -2,7 +2,8 @@
 
 use glam::{DMat3, DVec3};
 
-/// Eigenvalues, falling, and unit eigenvectors of a symmetric matrix (Jacobi's rotations).
+/// Returns eigenvalues, in descending order, and unit eigenvectors of a symmetric matrix (Jacobi's
+/// rotations).
 pub(crate) fn eigen(matrix: DMat3) -> ([f64; 3], [DVec3; 3]) {
     let mut a = matrix.to_cols_array_2d();
     let mut v = DMat3::IDENTITY.to_cols_array_2d();

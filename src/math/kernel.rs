@@ -1,5 +1,5 @@
-//! The reconstruction kernel of lattice samples: a radial function in units of the sample spacing, or a product of functions
-//! along the lattice's axes.
+//! The reconstruction kernel of lattice samples: a radial function in units of the sample spacing,
+//! or a product of functions along the lattice's axes.
 
 use crate::{Error, Result};
 use std::{f64::consts::PI, sync::Arc};
@@ -7,12 +7,14 @@ use std::{f64::consts::PI, sync::Arc};
 /// The shape of a kernel over the distance r from its sample, in sample spacings.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Profile {
-    /// exp(−r²/2σ²) with this σ. Its footprint ends at the extent; along the ray it is whole.
+    /// exp(−r²/2σ²) with this σ. Its footprint ends at the extent; along the ray it is not
+    /// truncated.
     Gaussian(f64),
-    /// The cubic B-spline, stretched so that it ends at the extent (2 is its own).
+    /// The cubic B-spline, stretched so that it ends at the extent (its own is 2).
     BSpline,
-    /// The low-pass filter of a ball, 3(sin x − x cos x)/x³ at x = πr, under a Hann window that ends at the extent:
-    /// cos²(πr / 2·extent). (A radial sin(πr)/πr is the filter of no band: over space it sums to less than nothing.)
+    /// The low-pass filter whose pass band is a ball, 3(sin x − x cos x)/x³ at x = πr, under a Hann
+    /// window that ends at the extent: cos²(πr / 2·extent). (A radial sin(πr)/πr is not a low-pass
+    /// filter: its integral over space is negative.)
     Hann,
     /// Values at evenly spaced radii from 0 to the extent, linear in between.
     Table(Arc<[f64]>),
@@ -24,25 +26,27 @@ pub enum Profile {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kernel {
     pub profile: Profile,
-    /// Radius of the footprint, in sample spacings; of a tensor product, half its width along each axis.
+    /// Radius of the footprint, in sample spacings; for a tensor product, half its width along each
+    /// axis.
     pub extent: f64,
 }
 
 impl Default for Kernel {
-    /// A Gaussian of σ = 0.6 with extent 2: its sum over a Cartesian lattice ripples by 1.3 %; dividing by that sum
-    /// removes it from the picture.
+    /// A Gaussian of σ = 0.6 with extent 2. Its sum over a Cartesian lattice ripples by 1.3 %;
+    /// dividing by that sum removes the ripple from the picture.
     fn default() -> Self {
         Self { profile: Profile::Gaussian(0.6), extent: 2.0 }
     }
 }
 
 impl Kernel {
-    /// The widest footprint that the engine takes, in sample spacings.
+    /// The widest footprint that the engine accepts, in sample spacings.
     pub const MAX_EXTENT: f64 = 16.0;
-    /// The most values of a [`Profile::Table`].
+    /// Most values of a [`Profile::Table`].
     pub const MAX_TABLE: usize = 65_536;
 
-    /// A Gaussian of standard deviation `sigma` cut at radius `extent`, both in sample spacings.
+    /// A Gaussian of standard deviation `sigma` truncated at radius `extent`, both in sample
+    /// spacings.
     pub fn gaussian(sigma: f64, extent: f64) -> Result<Self> {
         if !(sigma > 0.0 && sigma.is_finite()) {
             return Err(Error::Argument(format!("a kernel needs a sigma above 0, found {sigma}")));
@@ -50,7 +54,8 @@ impl Kernel {
         let kernel = Self::with_extent(Profile::Gaussian(sigma), extent)?;
         if kernel.radius() < 1.0 {
             return Err(Error::Argument(format!(
-                "a Gaussian of sigma {sigma} cut at {extent} samples is a block; cut it at {sigma} or more"
+                "a Gaussian of sigma {sigma} cut at {extent} samples is a block; \
+                 cut it at {sigma} or more"
             )));
         }
         Ok(kernel)
@@ -61,12 +66,12 @@ impl Kernel {
         Self::with_extent(Profile::BSpline, extent)
     }
 
-    /// A Hann-windowed sinc that ends at `extent`.
+    /// The low-pass filter of [`Profile::Hann`], which ends at `extent`.
     pub fn hann(extent: f64) -> Result<Self> {
         Self::with_extent(Profile::Hann, extent)
     }
 
-    /// A kernel of the caller's own: its values at evenly spaced radii from 0 to `extent`.
+    /// A kernel of your own: its values at evenly spaced radii from 0 to `extent`.
     pub fn table(values: Vec<f64>, extent: f64) -> Result<Self> {
         let (count, most) = (values.len(), Self::MAX_TABLE);
         if !(2..=most).contains(&count) || !values.iter().all(|value| value.is_finite()) {
@@ -81,12 +86,12 @@ impl Kernel {
         Ok(kernel)
     }
 
-    /// A tensor-product kernel, whose extent is its own.
+    /// A tensor-product kernel, which has its own extent.
     pub fn tensor(tensor: Tensor) -> Self {
         Self { profile: Profile::Tensor(tensor), extent: tensor.extent() }
     }
 
-    /// The function along the axes, where the kernel is a product of them.
+    /// Returns the function along the axes, if the kernel is a tensor product.
     pub fn as_tensor(&self) -> Option<Tensor> {
         match self.profile {
             Profile::Tensor(tensor) => Some(tensor),
@@ -95,7 +100,8 @@ impl Kernel {
     }
 
     fn with_extent(profile: Profile, extent: f64) -> Result<Self> {
-        // Below 0.71 samples (half the diagonal of a face) a ray can pass between the samples of a lattice.
+        // Below 0.71 samples (half the diagonal of a face) a ray can pass between the samples of a
+        // lattice.
         if !(0.71..=Self::MAX_EXTENT).contains(&extent) {
             let most = Self::MAX_EXTENT;
             return Err(Error::Argument(format!(
@@ -105,7 +111,7 @@ impl Kernel {
         Ok(Self { profile, extent })
     }
 
-    /// Checks what the constructors do, of a kernel that may have been put together by hand.
+    /// Checks what the constructors check, for a kernel that may have been built by hand.
     pub(crate) fn validate(&self) -> Result<()> {
         match &self.profile {
             Profile::Gaussian(sigma) => Self::gaussian(*sigma, self.extent),
@@ -121,7 +127,8 @@ impl Kernel {
         .map(|_| ())
     }
 
-    /// The length, in sample spacings, that kernel space counts in: σ of a Gaussian, one spacing of any other.
+    /// The unit of length of kernel space, in sample spacings: σ for a Gaussian, one spacing for
+    /// any other kernel.
     pub fn unit(&self) -> f64 {
         match self.profile {
             Profile::Gaussian(sigma) => sigma,
@@ -134,8 +141,9 @@ impl Kernel {
         self.extent / self.unit()
     }
 
-    /// The value at distance `r`, in sample spacings; 0 beyond the extent, 1 at the sample unless a table says otherwise. Of a
-    /// tensor product this is the function along one axis.
+    /// Returns the value at distance `r`, in sample spacings. It is 0 beyond the extent, and 1 at
+    /// the sample unless a table says otherwise. For a tensor product this is the function along
+    /// one axis.
     pub fn value(&self, r: f64) -> f64 {
         if r > self.extent {
             return 0.0;
@@ -152,7 +160,7 @@ impl Kernel {
             }
             Profile::Hann => {
                 let x = PI * r;
-                // Near 0 the difference cancels; the series does not.
+                // Near 0 the difference suffers cancellation; the series does not.
                 let filter = if x < 0.02 {
                     1.0 - 0.1 * x * x
                 } else {
@@ -170,7 +178,7 @@ impl Kernel {
         }
     }
 
-    /// Whether the kernel has negative values.
+    /// Returns whether the kernel has negative values.
     pub fn is_signed(&self) -> bool {
         match &self.profile {
             Profile::Gaussian(_) | Profile::BSpline => false,
@@ -180,14 +188,16 @@ impl Kernel {
         }
     }
 
-    /// What kernels must add up to at a point for it to have a value: where lobes of both signs all but cancel, at the edge
-    /// of what is drawn, their mean would be of any size. Tensor products add up to 1 everywhere.
+    /// Returns the smallest kernel sum at which a point has a value. At the edge of the drawn
+    /// region, lobes of both signs nearly cancel, and their mean could have any size. Tensor
+    /// products sum to 1 everywhere.
     pub fn least_sum(&self) -> f64 {
         if self.is_signed() && self.as_tensor().is_none() { 0.3 * self.integral() } else { 1e-4 }
     }
 
-    /// ∫ of the kernel over space, in cubed sample spacings: what its copies at every sample of a Cartesian lattice sum to
-    /// on average. A Gaussian is cut by its footprint's cylinder alone.
+    /// Returns ∫ of the kernel over space, in cubed sample spacings. That is the average sum of its
+    /// copies at every sample of a Cartesian lattice. A Gaussian is truncated by its footprint's
+    /// cylinder only.
     pub fn integral(&self) -> f64 {
         if let Profile::Gaussian(sigma) = self.profile {
             return (2.0 * PI).powf(1.5) * sigma.powi(3) * -(-0.5 * self.radius().powi(2)).exp_m1();
@@ -207,24 +217,25 @@ impl Kernel {
     }
 }
 
-/// A function of the steps along one axis of a Cartesian lattice. The kernel is the product of three of them; its copies at
-/// all samples add up to 1 everywhere.
+/// A function of the steps along one axis of a Cartesian lattice. The kernel is the product of
+/// three of them. Its copies at all samples sum to 1 everywhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Tensor {
     /// 1 − |x|: trilinear interpolation, of two samples along each axis.
     Linear,
-    /// The cubic of Catmull and Rom ("A class of local interpolating splines", 1974), which is that of Keys ("Cubic convolution
-    /// interpolation for digital image processing", 1981) with a = −½. It passes through the samples; its slope is continuous.
+    /// The cubic of Catmull and Rom ("A class of local interpolating splines", 1974). It equals
+    /// that of Keys ("Cubic convolution interpolation for digital image processing", 1981) with a =
+    /// −½. It passes through the samples; its slope is continuous.
     CatmullRom,
-    /// The uniform cubic B-spline: its curvature is continuous. It smooths the samples, unless the volume is made sharp for it
-    /// ([`Volume::sharpened`](crate::volume::Volume::sharpened)).
+    /// The uniform cubic B-spline, whose curvature is continuous. It smooths the samples, unless
+    /// the volume is made sharp for it ([`Volume::sharpened`](crate::volume::Volume::sharpened)).
     CubicBSpline,
 }
 
 impl Tensor {
     pub const ALL: [Self; 3] = [Self::Linear, Self::CatmullRom, Self::CubicBSpline];
 
-    /// The name, as the command spells it.
+    /// Returns the name, as the command spells it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
@@ -233,23 +244,25 @@ impl Tensor {
         }
     }
 
-    /// Where the function ends, in steps.
+    /// Returns where the function ends, in steps.
     pub fn extent(self) -> f64 {
         if self == Self::Linear { 1.0 } else { 2.0 }
     }
 
-    /// Whether the field passes through the samples.
+    /// Returns whether the field passes through the samples.
     pub fn interpolates(self) -> bool {
         self != Self::CubicBSpline
     }
 
-    /// The largest sum of the weights' magnitudes at a place in space: how much further than the samples the field may reach.
+    /// Returns the largest sum of the weights' magnitudes at any position in space. It bounds how
+    /// far the field may exceed the samples.
     pub fn lebesgue(self) -> f64 {
-        // Half-way between samples the cubic of Catmull and Rom has the weights −1/16, 9/16, 9/16 and −1/16.
+        // Halfway between samples the cubic of Catmull and Rom has the weights −1/16, 9/16, 9/16
+        // and −1/16.
         if self == Self::CatmullRom { 1.25f64.powi(3) } else { 1.0 }
     }
 
-    /// The function at x steps from the sample.
+    /// Returns the function at x steps from the sample.
     pub fn value(self, x: f64) -> f64 {
         let x = x.abs();
         match self {
@@ -262,7 +275,8 @@ impl Tensor {
         }
     }
 
-    /// The derivative of the function at x steps from the sample; where it has a kink, that of the side of larger x.
+    /// Returns the derivative of the function at x steps from the sample. At a kink, it is that of
+    /// the side of larger x.
     pub fn slope(self, x: f64) -> f64 {
         let (r, sign) = (x.abs(), 1f64.copysign(x));
         match self {
@@ -276,8 +290,8 @@ impl Tensor {
         }
     }
 
-    /// The weights of four successive samples at a place that lies t (0 to 1) steps behind the second of them, as polynomials:
-    /// for each sample the factors of 1, t, t² and t³.
+    /// Returns the weights of four consecutive samples as polynomials in t. The position is t (0 to
+    /// 1) steps after the second sample. For each sample these are the factors of 1, t, t² and t³.
     pub fn polynomials(self) -> [[f64; 4]; 4] {
         match self {
             Self::Linear => [[0.0; 4], [1.0, -1.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0; 4]],
@@ -326,7 +340,8 @@ mod tests {
                 let expected = (tensor.value(x + step) - tensor.value(x - step)) / (2.0 * step);
                 assert!((tensor.slope(x) - expected).abs() < 1e-8, "{tensor:?} at {x}: {expected}");
             }
-            // The field passes through the samples: 1 at its own, 0 at the others.
+            // If the field passes through the samples, the function is 1 at its own sample and 0 at
+            // the others.
             let at_samples = [0.0, 1.0, 2.0].map(|x| tensor.value(x));
             assert_eq!(at_samples == [1.0, 0.0, 0.0], tensor.interpolates());
             let kernel = Kernel::tensor(tensor);

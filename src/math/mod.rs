@@ -1,4 +1,4 @@
-//! Pure functions shared by everything downstream: the camera, the sheets, the kernel, and points in space.
+//! Pure functions that the rest builds on: the camera, the sheets, the kernel, and points in space.
 
 mod camera;
 pub(crate) mod cosine;

@@ -1,9 +1,11 @@
 //! The nearest neighbours of points, by kiddo's k-d tree.
 //!
-//! kiddo halves along x, y and z in turn to a depth fixed by the number of points. Halving points on an axis-parallel plane
-//! or line across it does nothing, so that they would end up in large leaves: with kiddo 6.3, a million points on a plane
-//! take 3 to 4 times as long and 200 000 on a line 80 times as long as with a tree that chooses its axes. So the tree is
-//! built over points turned to where no axis is special, in integers, which keeps equal distances equal.
+//! kiddo splits along x, y and z in turn, to a depth fixed by the number of points. Across an
+//! axis-parallel plane or line of points a split does nothing, so the points would end up in large
+//! leaves. With kiddo 6.3, a million points on a plane take 3 to 4 times as long, and 200 000 on a
+//! line 80 times as long, as with a tree that chooses its axes. The tree is therefore built over
+//! points rotated so that no axis is special. The rotation is in integers, which keeps equal
+//! distances equal.
 
 use super::weld::first_of;
 use glam::{DMat3, DVec3, Vec3};
@@ -11,7 +13,7 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 use std::num::NonZero;
 
-/// Turns space and makes it `SCALE` times as large.
+/// Rotates space and scales it by `SCALE`.
 const TURN: DMat3 = DMat3::from_cols(
     DVec3::new(2.0, 3.0, 6.0),
     DVec3::new(3.0, -6.0, 2.0),
@@ -25,28 +27,32 @@ pub(crate) struct Neighbours<'a> {
 }
 
 impl<'a> Neighbours<'a> {
-    /// Takes at most `u32::MAX` points, all finite. Coincident points are best made one before: they are found, but each
-    /// question at a place looks at all its points (a second for 20 000 questions at a place of 20 000).
+    /// Takes at most `u32::MAX` points, all finite. Merge coincident points first. They are found,
+    /// but each query at a position visits all points there (a second for 20 000 queries at a
+    /// position of 20 000 points).
     pub fn new(points: &'a [Vec3]) -> Self {
         let turned: Vec<[f64; 3]> = points.par_iter().map(|&point| turned(point)).collect();
         let tree = ImmutableKdTree::new_from_slice(&turned).expect("an index of 32 bits");
         Self { points, tree }
     }
 
-    /// For each point the index of the first at the same place, as far as a tree tells places apart: for points that differ by
-    /// less than 64 bits hold beside their distance from the origin, too.
+    /// Returns for each point the index of the first one at the same position, as far as the tree
+    /// can distinguish positions. Points also count as equal if 64 bits cannot represent their
+    /// difference at their distance from the origin.
     pub fn first_of_equals(points: &[Vec3]) -> Vec<u32> {
         first_of(points.len(), |index| {
             turned(points[index as usize]).map(|value| (value + 0.0).to_bits())
         })
     }
 
-    /// The points' indices in an order in which neighbours are near each other: asking in it is about twice as fast.
+    /// Returns the points' indices in an order in which neighbours are close to each other.
+    /// Querying in it is about twice as fast.
     pub fn order(&self) -> Vec<u32> {
         self.tree.iter().map(|(index, _)| index).collect()
     }
 
-    /// Distance and index of the `count` points nearest to point `index`, itself left out, nearest first.
+    /// Returns distance and index of the `count` points nearest to point `index`, which is
+    /// excluded, nearest first.
     pub fn of(&self, index: u32, count: usize) -> Vec<(f32, u32)> {
         let at = turned(self.points[index as usize]);
         let wanted = NonZero::<usize>::MIN.saturating_add(count);
@@ -64,7 +70,8 @@ fn turned(point: Vec3) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    /// Asks about every `step`-th point for several numbers of neighbours, and compares with a search through all.
+    /// Queries every `step`-th point for several numbers of neighbours, and compares with a search
+    /// through all points.
     fn check(points: &[Vec3], step: usize) {
         let tree = Neighbours::new(points);
         for index in (0..points.len()).step_by(step) {
@@ -90,7 +97,7 @@ mod tests {
         }
     }
 
-    /// Places whose differences are lost beside where they are would all be asked about as one.
+    /// Positions whose differences vanish by rounding count as one.
     #[test]
     fn what_the_tree_cannot_tell_apart_is_one() {
         let near = |i: usize| Vec3::new(1e10, i as f32 * 1e-14, 0.0);
@@ -130,7 +137,7 @@ mod tests {
             &random(3000, Vec3::new(1.0, 1e-4, 1e4)).iter().map(|p| p + 100.0).collect::<Vec<_>>(),
             7,
         );
-        // On a plane, on a line, on grids, and many at few places.
+        // On a plane, on a line, on grids, and many at few positions.
         check(&random(3000, Vec3::new(1.0, 0.0, 1.0)), 7);
         check(&random(3000, Vec3::Y), 7);
         for points in [grid(14, 14, 14), grid(1, 50, 60), grid(3000, 1, 1)] {

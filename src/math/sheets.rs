@@ -1,20 +1,21 @@
-//! The sheets: a monotone list of distances along the rays that cuts the scene into layers.
+//! The sheets: an ascending list of distances along the rays that divides the scene into layers.
 //!
-//! Distances are counted along each pixel's ray, so that sheets are planes parallel to the picture in orthographic views
-//! and shells around the eye in perspective. Shells keep a sheet equally thick for every pixel, leave it where it is when
-//! the camera turns in place, and make the sections of an isotropic kernel the same for all pixels of its footprint
-//! (with planes they shift towards the picture's corners, because the rays are slanted). See docs/engine.md.
+//! Distances are measured along each pixel's ray. Sheets are therefore planes parallel to the
+//! picture in orthographic views, and shells around the eye in perspective. Shells keep a sheet
+//! equally thick for every pixel and in place when the camera turns on the spot. They also make the
+//! sections of an isotropic kernel the same for all pixels of its footprint. With planes, the
+//! sections shift towards the picture's corners, because the rays are slanted. See docs/engine.md.
 
 use super::View;
 
 /// Boundaries s₀ < s₁ < … of the sheets; sheet k reaches from `planes[k]` to `planes[k + 1]`.
 ///
-/// Up to `turn` each sheet is thicker than the one before it by the factor `ratio` (a fixed number of pixels, for
-/// surfaces in perspective), from there on all are `step` thick (for lattices).
+/// Up to `turn`, each sheet is thicker than the one before it by the factor `ratio`: a fixed number
+/// of pixels, for surfaces in perspective. From there on all are `step` thick, for lattices.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sheets {
     pub planes: Vec<f64>,
-    /// Growth of the geometric part; 1 where there is none.
+    /// Growth of the geometric part; 1 if there is none.
     pub ratio: f64,
     /// Number of geometric sheets.
     pub turn: usize,
@@ -23,11 +24,11 @@ pub struct Sheets {
 }
 
 impl Sheets {
-    /// More sheets than this are not opened; the list gets thicker sheets instead.
+    /// Most sheets of a scene. If more are needed, sheets become thicker instead.
     pub const MAX: usize = 4093;
 
-    /// Sheets from `near` to `far` (world units), at most `thickness` thick, and at most `pixels` pixels thick
-    /// (`None`: no such bound). At least one of the two must bind.
+    /// Returns sheets from `near` to `far` (world units), at most `thickness` thick and at most
+    /// `pixels` pixels thick (`None`: no such bound). At least one of the two must be set.
     pub fn new(
         view: &View,
         [near, far]: [f64; 2],
@@ -71,7 +72,7 @@ impl Sheets {
         } else {
             step = uniform.min(if view.perspective { f64::INFINITY } else { per_pixel });
         }
-        // What the step is compared with lies between the bounds.
+        // The values that the step is compared with lie between the bounds.
         let step = step.min(far - near);
         let turn = planes.len() - 1;
         let start = planes[turn];

@@ -1,17 +1,17 @@
-//! Points at the same place.
+//! Points at the same position.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// For each position the index of the first one that is equal to it (often itself).
+/// Returns for each position the index of the first one that is equal to it (often itself).
 pub(crate) fn first_of_equals(positions: &[Vec3]) -> Vec<u32> {
-    // Adding zero makes the two zeros one.
+    // Adding zero turns −0 into 0.
     first_of(positions.len(), |index| {
         (positions[index as usize] + Vec3::ZERO).to_array().map(f32::to_bits)
     })
 }
 
-/// For each of `count` things the index of the first one of the same key.
+/// Returns for each of `count` items the index of the first one with the same key.
 pub(crate) fn first_of<K: Ord>(count: usize, key: impl Fn(u32) -> K + Sync) -> Vec<u32> {
     let mut order: Vec<u32> = (0..count as u32).collect();
     order.par_sort_unstable_by_key(|&index| (key(index), index));

@@ -1,17 +1,19 @@
-//! Samples that lie within a cell of space, merged into one: levels of detail for pictures that cannot tell them apart.
+//! Samples within a cell of space, merged into one: levels of detail for pictures that cannot
+//! resolve the separate samples.
 
 use super::splats::{LARGEST_SLOPE, factor};
 use crate::splat::{Splat, SplatSet};
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Cells along an axis that a key holds.
+/// Cells along an axis that fit in a key.
 const MOST_CELLS: f64 = (1u64 << 21) as f64;
 
-/// The set with the samples of each cell of a grid merged, `edge` long in world units. The grid begins at the set's origin. A
-/// merged sample keeps the sums of its samples: of their kernels, of these times place and values, and of the products that
-/// make its covariance and its slope. The same set gives the same result. A set that reaches over too many cells stays as it
-/// is.
+/// Returns the set with the samples merged per cell of a grid. Cells are `edge` long in world
+/// units, and the grid begins at the set's origin. A merged sample keeps the sums over its samples:
+/// of their kernels, of kernels times position and value, and of the products that give its
+/// covariance and slope. The same set always gives the same result. A set that spans too many cells
+/// is returned unchanged.
 pub(crate) fn merged(set: &SplatSet, edge: f64) -> SplatSet {
     let centers = || set.splats.par_iter().map(|splat| Vec3::from_array(splat.center));
     let low = centers().reduce(|| Vec3::INFINITY, Vec3::min).as_dvec3();
@@ -33,7 +35,7 @@ pub(crate) fn merged(set: &SplatSet, edge: f64) -> SplatSet {
     SplatSet { splats, ..set.empty() }
 }
 
-/// The sample that stands for those of a cell.
+/// Returns the sample that stands for those of a cell.
 fn one_of(set: &SplatSet, cell: &[(u64, u32)]) -> Splat {
     let own = || cell.iter().map(|&(_, index)| &set.splats[index as usize]);
     let first = &set.splats[cell[0].1 as usize];
@@ -54,14 +56,14 @@ fn one_of(set: &SplatSet, cell: &[(u64, u32)]) -> Splat {
         let share = part.mass / mass;
         covariance += share
             * (part.factor * part.factor.transpose() + DMat3::from_cols(d * d.x, d * d.y, d * d.z));
-        // The kernel's own part of it is Σ·g with g = B⁻ᵀ·s.
+        // The kernel's own contribution is Σ·g with g = B⁻ᵀ·s.
         rise += share * ((part.value - value) * d + part.factor * part.slope);
     }
     let DMat3 { x_axis, y_axis, z_axis } = covariance;
     let terms =
         [x_axis.x, x_axis.y, x_axis.z, y_axis.y, y_axis.z, z_axis.z].map(|term| term as f32);
     let Some([b00, b10, b11, b20, b21, b22]) = factor(&terms) else { return *first };
-    // Slopes are per whitened length: B⁻¹ of what values rise with place.
+    // Slopes are per whitened length: B⁻¹ times the covariance of value and position.
     let x = rise.x / b00;
     let y = (rise.y - b10 * x) / b11;
     let z = (rise.z - b20 * x - b21 * y) / b22;
@@ -72,9 +74,9 @@ fn one_of(set: &SplatSet, cell: &[(u64, u32)]) -> Splat {
     Splat::sample(middle.as_vec3(), value as f32, factor, weight as f32, slope.as_vec3())
 }
 
-/// A sample, for sums.
+/// A sample in the form that sums need.
 struct Part {
-    /// What its kernel adds up to over space, up to a common factor.
+    /// The integral of its kernel over space, up to a common factor.
     mass: f64,
     center: DVec3,
     value: f64,
@@ -105,7 +107,7 @@ mod tests {
     use super::*;
     use crate::scattered::{Points, SampleOptions};
 
-    /// Merged samples keep a linear field, the sum of all kernels, and the place of it.
+    /// Merged samples keep a linear field, and the sum of all kernels.
     #[test]
     fn merged_samples_keep_a_linear_field() {
         let field = |p: Vec3| 3.0 + 2.0 * p.x - p.y + 0.5 * p.z;

@@ -1,7 +1,9 @@
-//! Scattered samples: points in space with a scalar, in no order and at any density, and the splats that draw them.
+//! Scattered samples: points in space with a scalar, in any order and at any density, and the
+//! splats that draw them.
 //!
-//! The field between them is the weighted mean of what their kernels carry (Shepard 1968), each its value and a slope
-//! (Franke & Nielson 1980, "Smooth interpolation of large sets of scattered data").
+//! The field between them is the weighted mean of what their kernels carry (Shepard 1968). Each
+//! kernel carries its value and a slope (Franke & Nielson 1980, "Smooth interpolation of large sets
+//! of scattered data").
 
 mod merge;
 mod neighbourhood;
@@ -16,17 +18,19 @@ use crate::volume::Volume;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Points with a value each, in the file's own unit, relative to `origin` (so that doubles far from zero keep their
-/// precision in 32 bits). `radii` and `covariances` are either empty or as long as `positions`.
+/// Points with one value each, in the file's own unit, relative to `origin`, so that doubles far
+/// from zero keep their precision in 32 bits. `radii` and `covariances` are either empty or as long
+/// as `positions`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Points {
     pub origin: DVec3,
     pub positions: Vec<Vec3>,
     pub values: Vec<f32>,
-    /// How far each sample reaches, in world units; two standard deviations of its kernel unless
-    /// [`SampleOptions::deviations`] says otherwise.
+    /// The reach of each sample, in world units: two standard deviations of its kernel, or as many
+    /// as [`SampleOptions::deviations`] sets.
     pub radii: Vec<f32>,
-    /// The covariance of each sample's kernel: xx, xy, xz, yy, yz, zz, in squared world units. It counts before a radius.
+    /// The covariance of each sample's kernel: xx, xy, xz, yy, yz, zz, in squared world units. It
+    /// takes precedence over a radius.
     pub covariances: Vec<[f32; 6]>,
 }
 
@@ -40,15 +44,16 @@ impl Points {
         self.positions.is_empty()
     }
 
-    /// Says in words what makes the points unusable, with the first one that is wrong: lists of different lengths, none or
-    /// more than 2³² points, numbers that are not finite, radii not above 0, covariances that no Gaussian has.
+    /// Checks that the points are usable. The message names the first one that is wrong. Causes are
+    /// lists of different lengths, no points or more than 2³², numbers that are not finite, radii
+    /// not above 0, and covariances that are not positive definite.
     pub fn validate(&self) -> Result<(), String> {
         let count = self.len();
         if count == 0 {
             return Err("there are no samples".into());
         }
         if u32::try_from(count).is_err() {
-            return Err(format!("{count} samples are more than 32 bits count"));
+            return Err(format!("{count} samples are more than 32 bits can count"));
         }
         let given = [("radii", self.radii.len()), ("covariances", self.covariances.len())];
         let mut lists = vec![("values", self.values.len())];
@@ -90,7 +95,7 @@ impl Points {
         Ok(())
     }
 
-    /// Smallest and largest value.
+    /// Returns the smallest and largest value.
     pub fn range(&self) -> [f64; 2] {
         let none = || [f32::INFINITY, f32::NEG_INFINITY];
         let ends = self
@@ -101,7 +106,7 @@ impl Points {
         ends.map(f64::from)
     }
 
-    /// Smallest and largest world coordinates of the positions. Kernels reach further.
+    /// Returns the smallest and largest world coordinates of the positions. Kernels reach further.
     pub fn bounds(&self) -> [DVec3; 2] {
         let none = || [Vec3::INFINITY, Vec3::NEG_INFINITY];
         let ends = self
@@ -112,17 +117,17 @@ impl Points {
         ends.map(|end| self.origin + end.as_dvec3())
     }
 
-    /// How many values fall into each of `bins` equal parts of the range, the largest in the last bin; equal values all
-    /// fill the first bin.
+    /// Counts the values in each of `bins` equal parts of the range. The largest value counts in
+    /// the last bin. If all values are equal, they fill the first bin.
     ///
     /// # Errors
-    /// [`Error::Argument`](crate::Error::Argument) for more bins than [`Volume::MAX_BINS`].
+    /// [`Error::Argument`](crate::Error::Argument) for more than [`Volume::MAX_BINS`] bins.
     pub fn histogram(&self, bins: usize) -> crate::Result<Vec<u64>> {
         Volume::check_bins(bins)?;
         Ok(self.counts(bins))
     }
 
-    /// The [`histogram`](Self::histogram) of so many bins, which are known to be few enough.
+    /// The [`histogram`](Self::histogram), for a number of bins that is known to be allowed.
     pub(crate) fn counts(&self, bins: usize) -> Vec<u64> {
         let mut counts = vec![0; bins];
         let [low, high] = self.range();

@@ -1,4 +1,5 @@
-//! What the nearest neighbours of a sample tell: how much room it has, and how the values change around it.
+//! Derives from the nearest neighbours of a sample how much space it has, and how the values change
+//! around it.
 
 use super::Points;
 use crate::{
@@ -10,28 +11,29 @@ use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// The most neighbours that a sample is judged by.
+/// Most neighbours that a sample may use.
 pub(super) const MOST: usize = 64;
 
-/// A direction in which the variance of the neighbours is below this part of the largest one has no extent that could be
-/// told from rounding: no slope, and no share in the room between samples.
+/// A direction has no significant extent if the variance of the neighbours along it is below this
+/// fraction of the largest one. It gets no slope and does not count towards the spacing.
 const FLAT: f64 = 1e-4;
 
-/// A place that holds one sample, or several at exactly the same position.
+/// A position that holds one sample, or several that coincide exactly.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Place {
-    /// The samples at it.
+    /// The number of samples at this position.
     pub samples: u32,
-    /// The edge of the cube that the place has for its own; 0 where it is the only one.
+    /// The edge of the cube that belongs to the position; 0 if it is the only one.
     pub spacing: f64,
-    /// Change of the value per world unit; 0 where it cannot be told.
+    /// Change of the value per world unit; 0 if it cannot be determined.
     pub gradient: DVec3,
-    /// From the smallest to the largest value of the neighbours and itself.
+    /// The range of the values of the neighbours and its own: largest minus smallest.
     pub width: f64,
 }
 
-/// The places of all samples, and for each sample the index of its own. Coincident samples share a place: the tree is
-/// asked about different positions only, so that a distance is never 0 and no number of copies takes up all neighbours.
+/// Returns the distinct positions of all samples, and for each sample the index of its position.
+/// Coincident samples share one, so the tree is only queried for distinct positions. A distance is
+/// then never 0, and copies cannot fill all neighbours.
 ///
 /// # Errors
 /// [`Error::Timeout`](crate::Error::Timeout).
@@ -96,14 +98,15 @@ impl Surroundings<'_> {
         let [low, high] = around
             .iter()
             .fold([0.0f64; 2], |[low, high], &(_, rise, _)| [low.min(rise), high.max(rise)]);
-        // The ball, disc or line to the k-th neighbour holds k samples besides the own one in its middle.
+        // The ball, disc or line out to the k-th neighbour holds k samples besides the one in its
+        // middle.
         let k = around.len() as f64;
         let spacing = match fit.dimensions {
             3 => (4.0 / 3.0 * PI / k).cbrt(),
             2 => (PI / k).sqrt(),
             _ => 2.0 / k,
         };
-        // A few samples all lie on the border, and so have less room.
+        // A few samples all lie on the boundary, and so have less space.
         let spacing = farthest * spacing.min(1.0);
         Place {
             samples,
@@ -114,17 +117,18 @@ impl Surroundings<'_> {
     }
 }
 
-/// A linear function through the values around a sample, by weighted least squares.
+/// A linear function fitted to the values around a sample by weighted least squares.
 struct Fit {
     /// The number of directions in which the samples spread.
     dimensions: usize,
-    /// The slope; 0 along the directions that have no extent.
+    /// The slope; 0 along directions without extent.
     gradient: DVec3,
 }
 
 impl Fit {
-    /// Offsets, rises of the value and distances of the neighbours, the farthest one's last. Their weights fall off with the
-    /// distance, but not to 0 at the farthest: on a lattice all may be equally far.
+    /// Takes offsets, value differences and distances of the neighbours, the farthest one last. The
+    /// weights fall off with distance, but not to 0 at the farthest: on a lattice all may be
+    /// equally far.
     fn new(around: &[(DVec3, f64, f64)], farthest: f64) -> Self {
         let weight = |distance: f64| 1.0 - 0.64 * (distance / farthest).powi(2);
         let own = (DVec3::ZERO, 0.0, 0.0);
@@ -148,7 +152,8 @@ impl Fit {
             trend += d * (rise - mean_rise) * weight;
         }
         let trace: f64 = scatter.x_axis.x + scatter.y_axis.y + scatter.z_axis.z;
-        // The product of the variances over the cube of their sum is at most the smallest over the largest.
+        // The product of the variances over the cube of their sum is at most the smallest over the
+        // largest.
         if scatter.determinant() > FLAT * trace.powi(3) {
             return Self { dimensions: 3, gradient: scatter.inverse() * trend };
         }
@@ -160,9 +165,10 @@ impl Fit {
     }
 }
 
-/// Shortens a gradient until what it says of the neighbours' places lies inside the range of their values widened by half
-/// its width (Barth & Jespersen 1989, but for the widening). A linear field is never cut, not even at the border of the
-/// samples; a step is, where its gradient would lead far beyond both sides.
+/// Shortens a gradient until its predictions at the neighbours' positions lie inside the range of
+/// their values, widened by half its width (Barth & Jespersen 1989, except for the widening). A
+/// linear field is never limited, not even at the border of the samples. A step is limited if its
+/// gradient would overshoot far on both sides.
 fn limited(gradient: DVec3, around: &[(DVec3, f64, f64)], [low, high]: [f64; 2]) -> DVec3 {
     let room = 0.5 * (high - low);
     let share = around.iter().map(|&(offset, ..)| {

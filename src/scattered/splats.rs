@@ -11,33 +11,38 @@ use crate::{
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Footprints end this many standard deviations from the sample: 1.1 % of the kernel's height.
+/// Footprints end this many standard deviations from the sample, at 1.1 % of the kernel's height.
 const EXTENT: f32 = 3.0;
-/// Standard deviation of a kernel that is made from the neighbours, in the spacing of the samples. On average 5.4 kernels
-/// are added at a place, and random samples leave no empty ball within the footprints' reach of 2.1 spacings: one of that
-/// size turns up once in e³⁹ of them.
+/// Standard deviation of a kernel that is made from the neighbours, in spacings of the samples. On
+/// average 5.4 kernels overlap at a position. Random samples leave no empty ball within the
+/// footprints' reach of 2.1 spacings: a ball of that size occurs once in e³⁹ samples.
 const SPREAD: f64 = 0.7;
-/// The range of weights, whose median is 1 or more. Samples beyond it count for less or more than they should by their volume, but
-/// 16 bits hold them with all their digits, and nothing beside others of weight 1 could be seen of a smaller one.
+/// The range of weights, whose median is 1 or more. Samples outside it count for more or less than
+/// their volume. In this range, 16 bits hold weights with all their digits. A smaller weight would
+/// be invisible beside others of weight 1.
 const WEIGHTS: [f64; 2] = [1e-4, 6e4];
-/// Over the whole extent of its kernel a sample's value changes by at most this many widths of the range around it.
+/// Over the whole extent of its kernel, a sample's value changes by at most this many widths of the
+/// range of its neighbours.
 const LARGEST_RISE: f64 = 2.5;
-/// What 16 bits hold of a slope.
+/// The largest magnitude of a slope in 16 bits.
 pub(super) const LARGEST_SLOPE: f64 = 65_504.0;
 
-/// Bytes that a sample takes meanwhile: the tree, what its neighbours tell twice, its kernel and its splat.
+/// Bytes of temporary memory per sample: the tree, its neighbourhood twice, its kernel and its
+/// splat.
 const OF_SAMPLE: u64 = 350;
 
 /// How scattered samples become splats.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampleOptions {
-    /// The nearest neighbours that a sample's room and slope are taken from; 4 to 64. More make wide kernels even.
+    /// Nearest neighbours that a sample's spacing and slope are computed from, 4 to 64. More of
+    /// them make wide kernels even.
     pub neighbours: usize,
     /// One radius for all samples, in world units, instead of their own.
     pub radius: Option<f64>,
-    /// Standard deviations of the kernel in a radius.
+    /// Standard deviations of the kernel per radius.
     pub deviations: f64,
-    /// Whether samples carry slopes. Without, values stay inside the samples' range but show steps (Shepard 1968).
+    /// Whether samples carry slopes. Without slopes, values stay inside the samples' range but show
+    /// steps (Shepard 1968).
     pub slopes: bool,
     /// When the splats must be ready.
     pub deadline: Deadline,
@@ -55,7 +60,7 @@ impl Default for SampleOptions {
     }
 }
 
-/// The shape of a kernel, and what is counted of it.
+/// The shape of a kernel, and its weight.
 struct Shape {
     /// B of Σ = B·Bᵀ, row by row.
     factor: [f64; 6],
@@ -63,30 +68,36 @@ struct Shape {
 }
 
 impl Points {
-    /// The splats that draw the samples, in their order.
+    /// Makes the splats that draw the samples, in their order.
     ///
-    /// **Kernels** have the sample's covariance, or are round: the radius of the options, else the sample's own, is
-    /// [`SampleOptions::deviations`] standard deviations; without any, the standard deviation is 0.7 of the spacing of the
-    /// samples around, the edge of a cube that holds one of them (a single sample: 0.5 world units).
+    /// **Kernels** have the sample's covariance, or are round. For a round kernel the radius of the
+    /// options, else the sample's own, is [`SampleOptions::deviations`] standard deviations.
+    /// Without a radius, the standard deviation is 0.7 of the local spacing of the samples: the
+    /// edge of a cube that holds one of them. A single sample gets 0.5 world units.
     ///
-    /// **Weights** keep the density of the samples from showing: kernels from neighbours have 1, given ones the volume of
-    /// the sample's cube over the kernel's, up to a common factor. Samples at the same position share the weight of one; the
-    /// field there is their mean.
+    /// **Weights** keep the density of the samples from showing. Kernels from neighbours have
+    /// weight 1. Given kernels have the volume of the sample's cube over that of the kernel, up to
+    /// a common factor. Samples at the same position share the weight of one sample, and the field
+    /// there is their mean.
     ///
-    /// **Slopes** are fitted to the neighbours by weighted least squares and limited by the range of their values; they are 0
-    /// where the samples have no extent. Those of 6·10⁻⁵ and less lose digits in 16 bits, those under 6·10⁻⁸ are 0.
+    /// **Slopes** are fitted to the neighbours by weighted least squares and limited by the range
+    /// of their values. They are 0 in directions in which the samples have no extent. Slopes of
+    /// 6·10⁻⁵ and less lose digits in 16 bits; those under 6·10⁻⁸ are 0.
     ///
     /// # Errors
-    /// [`Error::Argument`] for what [`validate`](Self::validate) finds, for options out of their ranges, and for values that
-    /// change by more than 65,504 within a kernel (without slopes they are no trouble); [`Error::Timeout`] after the deadline;
-    /// [`Error::Memory`] where there is too little.
+    /// - [`Error::Argument`] for what [`validate`](Self::validate) finds, for options outside their
+    ///   ranges, and for values that change by more than 65,504 within a kernel, unless slopes are
+    ///   off.
+    /// - [`Error::Timeout`] after the deadline.
+    /// - [`Error::Memory`] if there is too little.
     pub fn to_splats(&self, options: &SampleOptions) -> Result<SplatSet> {
         self.validate().map_err(Error::Argument)?;
         options.validate()?;
         memory::room("making splats of samples", OF_SAMPLE.saturating_mul(self.len() as u64))?;
         let (places, place_of) = places(self, options.neighbours, options.deadline)?;
         let place = |index: usize| places[place_of[index] as usize];
-        // 32-bit coordinates cannot tell distances below this: a kernel so narrow would only hide in rounding.
+        // 32-bit coordinates cannot resolve distances below this, so a narrower kernel would vanish
+        // in rounding.
         let [low, high] = self.bounds();
         let finest = ((high - low).length() * 1e-7).max(f64::from(f32::MIN_POSITIVE));
         let mut shapes: Vec<Shape> = (0..self.len())
@@ -101,8 +112,8 @@ impl Points {
             .find_first(|&index| slope(index).abs().max_element() > LARGEST_SLOPE)
         {
             return Err(Error::Argument(format!(
-                "around sample {index} the values change by {:.3e} within a kernel, but 16 bits hold slopes up to \
-                 {LARGEST_SLOPE}; scale the values down, or leave the slopes out",
+                "around sample {index} the values change by {:.3e} within a kernel, but 16 bits \
+                 hold slopes up to {LARGEST_SLOPE}; scale the values down, or leave the slopes out",
                 slope(index).length()
             )));
         }
@@ -129,7 +140,7 @@ impl Points {
         })
     }
 
-    /// The kernel of a sample, with its weight up to a common factor.
+    /// Returns the kernel of a sample, with its weight up to a common factor.
     fn shape(&self, options: &SampleOptions, index: usize, place: Place, finest: f64) -> Shape {
         let share = 1.0 / f64::from(place.samples);
         let round = |deviation: f64| {
@@ -148,7 +159,7 @@ impl Points {
             let deviation = if place.spacing > 0.0 { SPREAD * place.spacing } else { 0.5 };
             return Shape { factor: round(deviation), weight: share };
         };
-        // A single place has no room of its own, and needs no weight.
+        // A single position has no spacing and needs no weight.
         let room = if place.spacing > 0.0 { place.spacing.max(finest) } else { 1.0 };
         let [b00, _, b11, _, _, b22] = factor;
         Shape { factor, weight: share * (room / b00) * (room / b11) * (room / b22) }
@@ -160,7 +171,7 @@ impl SampleOptions {
         let wrong = |message: String| Err(Error::Argument(message));
         if !(4..=MOST).contains(&self.neighbours) {
             return wrong(format!(
-                "samples are judged by 4 to {MOST} neighbours, found {}",
+                "the number of neighbours must be 4 to {MOST}, found {}",
                 self.neighbours
             ));
         }
@@ -175,7 +186,8 @@ impl SampleOptions {
     }
 }
 
-/// The lower triangular B of Σ = B·Bᵀ, row by row (Cholesky); none where Σ is not positive definite in 32 bits.
+/// Returns the lower triangular B of Σ = B·Bᵀ, row by row (Cholesky); `None` if Σ is not positive
+/// definite in 32 bits.
 pub(super) fn factor(covariance: &[f32; 6]) -> Option<[f64; 6]> {
     let [xx, xy, xz, yy, yz, zz] = covariance.map(f64::from);
     let root = |left: f64, of: f64| (left > 1e-6 * of && left.is_finite()).then(|| left.sqrt());
@@ -188,9 +200,10 @@ pub(super) fn factor(covariance: &[f32; 6]) -> Option<[f64; 6]> {
     factor.iter().all(|term| term.is_finite()).then_some(factor)
 }
 
-/// Brings the weights' median to 1 and all of them into their range. Where most kernels are far smaller than their room, the
-/// median stays above 1: weights of volume over b³ add up to (2π)^1.5 on average over space, and are to add up to 1 at least,
-/// or the wide kernels between the small ones would count as empty.
+/// Scales the weights to a median of 1 and clamps them to their range. If most kernels are far
+/// smaller than the spacing, the median stays above 1. The weights of volume over b³ sum to
+/// (2π)^1.5 on average over space, and must sum to at least 1. Otherwise the wide kernels between
+/// the small ones would count as empty.
 fn settle_weights(shapes: &mut [Shape]) {
     let mut weights: Vec<f64> = shapes.iter().map(|shape| shape.weight).collect();
     let middle = weights.len() / 2;
@@ -201,15 +214,16 @@ fn settle_weights(shapes: &mut [Shape]) {
         .for_each(|shape| shape.weight = (shape.weight / unit).clamp(WEIGHTS[0], WEIGHTS[1]));
 }
 
-/// The slope in the kernel's whitened space, Bᵀ·g.
+/// Returns the slope in the kernel's whitened space, Bᵀ·g.
 fn slope([b00, b10, b11, b20, b21, b22]: &[f64; 6], place: &Place) -> DVec3 {
     let g = place.gradient;
     let slope = DVec3::new(b00 * g.x + b10 * g.y + b20 * g.z, b11 * g.y + b21 * g.z, b22 * g.z);
     slope.clamp_length_max(LARGEST_RISE * place.width / f64::from(EXTENT))
 }
 
-/// What the weighted kernels add up to at the samples, on average over some of them spread through the list. All kernels
-/// are tried at each: those of very different sizes have no common neighbourhood to look in.
+/// Returns the sum of the weighted kernels at the samples, averaged over some of them spread
+/// through the list. All kernels are evaluated at each one, because kernels of very different sizes
+/// have no common search radius.
 fn overlap(splats: &[Splat]) -> f32 {
     let tried = ((1 << 26) / splats.len()).clamp(16, 512).min(splats.len());
     let sums = (0..tried).into_par_iter().map(|sample| {
@@ -221,12 +235,12 @@ fn overlap(splats: &[Splat]) -> f32 {
     (sums.sum::<f64>() / tried as f64) as f32
 }
 
-/// Weight times kernel of a splat at a place, 0 beyond its extent.
+/// Returns weight times kernel of a splat at a position, 0 beyond its extent.
 fn weighted_kernel(splat: &Splat, at: Vec3) -> f64 {
     let d = at - Vec3::from(splat.center);
     let [b00, b10, b11, b20, b21, b22] = splat.factor;
     let x = d.x / b00;
-    // Most kernels are far away along the first axis alone.
+    // Most kernels are far away along the first axis already.
     if x.abs() > EXTENT {
         return 0.0;
     }

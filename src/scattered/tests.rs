@@ -4,7 +4,7 @@ use crate::{
     splat::{Splat, SplatSet},
 };
 
-/// Evenly spread numbers in 0 … 1, always the same.
+/// Evenly distributed numbers in 0 … 1, always the same sequence.
 struct Random(u64);
 
 impl Random {
@@ -33,7 +33,7 @@ fn splats(points: &Points) -> SplatSet {
     points.to_splats(&SampleOptions::default()).unwrap()
 }
 
-/// The weighted kernel sum and the normalised sum at a place, by all splats.
+/// The weighted kernel sum and the normalised sum at a position, over all splats.
 fn field(set: &SplatSet, at: Vec3) -> (f64, f64) {
     let (mut sum, mut values) = (0.0, 0.0);
     for splat in &set.splats {
@@ -66,7 +66,7 @@ fn kernels_follow_the_room_between_samples() {
         };
         splats(&points((0..n[0] * n[1] * n[2]).map(place).collect(), |_| 1.0))
     };
-    // 16 neighbours: in space the farthest is √2 steps away, in a plane √5, on a line 8.
+    // 16 neighbours: the farthest is √2 steps away in space, √5 in a plane, 8 on a line.
     for (n, middle, spacing) in [
         ([9, 9, 9], 364, 10.0 * 2f64.sqrt() * (4.0 / 3.0 * std::f64::consts::PI / 16.0).cbrt()),
         ([9, 9, 1], 40, 10.0 * 5f64.sqrt() * (std::f64::consts::PI / 16.0).sqrt()),
@@ -80,7 +80,7 @@ fn kernels_follow_the_room_between_samples() {
     }
 }
 
-/// Random samples leave no hole between them, at 1,000 places.
+/// Random samples leave no hole between them, at 1,000 positions.
 #[test]
 fn no_place_inside_is_left_out() {
     let set = splats(&random(8000, |_| 1.0));
@@ -89,7 +89,7 @@ fn no_place_inside_is_left_out() {
     let least = sums.iter().copied().fold(f64::INFINITY, f64::min);
     assert!(least > 0.5, "{least}");
     let mean = sums.iter().sum::<f64>() / sums.len() as f64;
-    // (2π)^1.5 · 0.7³ = 5.4, and each sample's own kernel where it is measured at the samples.
+    // (2π)^1.5 · 0.7³ = 5.4, plus each sample's own kernel when measured at the samples.
     assert!(
         (5.0..6.5).contains(&mean) && (f64::from(set.overlap) - mean).abs() < 1.5,
         "{mean} {}",
@@ -97,8 +97,9 @@ fn no_place_inside_is_left_out() {
     );
 }
 
-/// A linear field comes out linear, at the border and beyond it too. What is left is that 16 bits round slopes to 2⁻¹²:
-/// over the extent of the widest kernel here, at a corner, 2⁻¹² · 3 · 0.45.
+/// A linear field is reproduced, at the border and beyond it too. The remaining error comes from
+/// rounding slopes to 2⁻¹² in 16 bits: over the extent of the widest kernel here, at a corner, 2⁻¹²
+/// · 3 · 0.45.
 #[test]
 fn linear_fields_are_exact() {
     let truth = |p: Vec3| 3.0 + 2.0 * p.x - 5.0 * p.y + 0.5 * p.z;
@@ -122,7 +123,8 @@ fn linear_fields_are_exact() {
     assert!(slanted < 4e-4, "{slanted}");
 }
 
-/// One half holds eight times as many samples; a linear field across the border between comes out as if it did not.
+/// One half has eight times the density of samples. A linear field across the border between them
+/// does not show it.
 #[test]
 fn the_density_of_samples_does_not_show() {
     let mut positions = Vec::new();
@@ -135,7 +137,7 @@ fn the_density_of_samples_does_not_show() {
     }
     let truth = |p: Vec3| 4.0 * p.x + p.y;
     let mut samples = points(positions, truth);
-    // Mean and largest error in the sheet around the border.
+    // Mean and largest error in the layer around the border.
     let error = |set: &SplatSet| {
         let mut random = Random(5);
         let places =
@@ -148,7 +150,8 @@ fn the_density_of_samples_does_not_show() {
     };
     let (shift, most) = error(&splats(&samples));
     assert!(shift.abs() < 2e-5 && most < 3e-4, "{shift} {most}");
-    // Kernels of one size: without slopes only the weights keep the dense side from pulling the mean to its own values.
+    // Kernels of one size, without slopes: only the weights keep the dense side from pulling the
+    // mean towards its own values.
     samples.radii = vec![0.15; samples.len()];
     let mut set =
         samples.to_splats(&SampleOptions { slopes: false, ..SampleOptions::default() }).unwrap();
@@ -198,7 +201,7 @@ fn few_samples_and_flat_ones_are_fine() {
     let two = splats(&points(vec![Vec3::ZERO, Vec3::X], |p| p.x));
     assert!((deviation(&two, 0) - 0.7).abs() < 1e-6);
     assert!((field(&two, Vec3::X * 0.25).1 - 0.25).abs() < 1e-3);
-    // A slanted plane, and a slanted line: linear in them, nothing across.
+    // A slanted plane, and a slanted line: linear in them, constant across.
     for flat in [DVec3::new(1.0, 1.0, 0.0), DVec3::ZERO] {
         let mut random = Random(6);
         let along = DVec3::new(1.0, -1.0, 0.5);
@@ -218,7 +221,7 @@ fn few_samples_and_flat_ones_are_fine() {
     }
 }
 
-/// A step stays near its values: their gradient is limited.
+/// A step stays near its values, because its gradient is limited.
 #[test]
 fn steps_overshoot_little() {
     let set = splats(&random(4000, |p| if p.x > 0.5 { 1.0 } else { 0.0 }));
@@ -256,7 +259,7 @@ fn covariances_become_factors() {
         b20 * b20 + b21 * b21 + b22 * b22,
     ];
     assert!(found.iter().zip(terms).all(|(a, b)| (a - b).abs() < 1e-5), "{found:?}");
-    // A radius of the caller's own counts before.
+    // A radius in the options takes precedence.
     let round = samples
         .to_splats(&SampleOptions { radius: Some(1.0), ..SampleOptions::default() })
         .unwrap();
@@ -269,7 +272,7 @@ fn slopes_too_steep_for_16_bits_are_told() {
     let message = steep.to_splats(&SampleOptions::default()).unwrap_err().to_string();
     assert!(message.contains("16 bits") && message.contains("leave the slopes out"), "{message}");
     steep.to_splats(&SampleOptions { slopes: false, ..SampleOptions::default() }).unwrap();
-    // Large values alone are no trouble.
+    // Large values alone are no problem.
     let set = splats(&random(100, |p| 1e6 + p.x));
     assert!((field(&set, Vec3::splat(0.5)).1 - 1e6 - 0.5).abs() < 0.1);
 }
@@ -329,7 +332,7 @@ fn ranges_bounds_and_histograms() {
     assert!(!transfer.visible([-4.0, -4.0]) && transfer.visible([4.0, 4.0]));
 }
 
-/// Figures for the documentation.
+/// Timings for the documentation.
 #[test]
 #[ignore = "takes seconds, measures only"]
 fn a_million_samples() {

@@ -7,7 +7,7 @@ use std::borrow::Cow;
 
 /// The corners at each vertex. Corner `3·t + i` is the `i`-th of triangle `t`.
 pub(super) struct Adjacency {
-    /// Vertices of each part but the last.
+    /// Vertices of each part except the last.
     step: usize,
     parts: Vec<Part>,
 }
@@ -22,8 +22,8 @@ struct Part {
 impl Adjacency {
     /// All indices must be below `vertices`, and there must be at most `u32::MAX` corners.
     pub fn new(triangles: &[[u32; 3]], vertices: usize) -> Self {
-        // Each task looks at all triangles, but cares for its own vertices alone: no two write to the same place, and the
-        // order does not depend on their number.
+        // Each task scans all triangles but handles only its own vertices. No two tasks write to
+        // the same memory, and the order does not depend on the number of tasks.
         let step = vertices.div_ceil(rayon::current_num_threads()).max(1);
         let parts = (0..vertices.div_ceil(step)).into_par_iter().map(|part| {
             let first = part * step;
@@ -32,7 +32,7 @@ impl Adjacency {
         Self { step, parts: parts.collect() }
     }
 
-    /// The corners at a vertex, in ascending order.
+    /// Returns the corners at a vertex, in ascending order.
     pub fn corners(&self, vertex: usize) -> &[u32] {
         let part = &self.parts[vertex / self.step];
         let vertex = vertex % self.step;
@@ -45,14 +45,15 @@ impl Part {
         let mut starts = vec![0u32; count as usize + 1];
         for triangle in triangles {
             for &vertex in triangle {
-                // Smaller ones wrap around and are too large.
+                // Smaller vertex numbers wrap around and become too large.
                 let own = vertex.wrapping_sub(first);
                 if own < count {
                     starts[own as usize] += 1;
                 }
             }
         }
-        // From counts to the ends of the ranges; filling from the back turns ends into starts.
+        // Turns counts into the ends of the ranges. Filling from the back then turns the ends into
+        // starts.
         let mut end = 0;
         for entry in &mut starts {
             end += *entry;
@@ -73,20 +74,22 @@ impl Part {
     }
 }
 
-/// A mesh's triangles, as its surface hangs together.
+/// A mesh's triangles, with the vertices that are connected identified.
 pub(super) struct Connected<'a> {
-    /// The triangles by places: vertices at one place are the first of them.
+    /// The triangles by position: of vertices at one position, the first represents all.
     pub places: Cow<'a, [[u32; 3]]>,
     pub adjacency: Adjacency,
 }
 
 impl<'a> Connected<'a> {
-    /// With `is_split`, vertices at one place are one; but not where the file has normals, which may be split to be seen.
+    /// With `is_split`, vertices at one position count as one. The adjacency does not merge them if
+    /// the file has normals, because then the split may be intended.
     ///
     /// # Errors
     /// [`Error::Memory`](crate::Error::Memory).
     pub fn new(mesh: &'a Mesh, is_split: bool) -> Result<Self> {
-        // The corners and where those of each vertex begin; with `is_split`, the order of the places and the triangles by them.
+        // The corners, and the start of each vertex's corners. With `is_split`, also the sorted
+        // positions and the merged triangles.
         let [vertices, triangles] =
             [mesh.positions.len(), mesh.triangles.len()].map(|count| count as u64);
         let (of_vertex, of_triangle) = if is_split { (12, 24) } else { (4, 12) };
@@ -106,14 +109,14 @@ impl<'a> Connected<'a> {
     }
 }
 
-/// Whether several vertices of a mesh may lie at one place. Files split vertices at seams of texture and material, or give
-/// every triangle its own; a seam must not show.
+/// Returns whether several vertices of a mesh may lie at one position. Files split vertices at
+/// seams of texture and material, or give every triangle its own. A seam must not be visible.
 pub(super) fn is_split(mesh: &Mesh) -> bool {
     let has_seams = !mesh.uvs.is_empty() || mesh.materials.len() > 1;
     may_be_split(has_seams, mesh.positions.len(), mesh.triangles.len())
 }
 
-/// As [`is_split`], of what is known of a mesh.
+/// Like [`is_split`], from the mesh's counts.
 pub(super) fn may_be_split(has_seams: bool, vertices: usize, triangles: usize) -> bool {
     has_seams || vertices > triangles / 4 * 3
 }

@@ -1,4 +1,5 @@
-//! Surfels of a point cloud: the plane and the spacing of each point from its nearest neighbours.
+//! Surfels of a point cloud: the plane and the spacing of each point come from its nearest
+//! neighbours.
 
 use super::{
     Mesh, SurfelOptions,
@@ -16,27 +17,29 @@ use crate::{
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Neighbours that a point is judged by.
+/// Neighbours that a point's plane and spacing are computed from.
 const COUNT: usize = 10;
-/// Standard deviation of a surfel, in the median distance to the neighbours (1.2 spacings on a square grid of points,
-/// of which 0.39 are needed there; the rest is for irregular ones).
+/// Standard deviation of a surfel, in units of the median distance to the neighbours. On a square
+/// grid of points that is 1.2 spacings, and 0.39 would be enough; the rest is for irregular point
+/// clouds.
 const SPREAD: f32 = 0.45;
-/// A point is drawn at most this many times as wide as its neighbours are by their own neighbours: honest spacings change
-/// gradually.
+/// A point is drawn at most this many times as wide as its neighbours, measured by their own
+/// neighbours. In correct data the spacing changes gradually.
 const WIDER: f32 = 2.0;
-/// A point is lone where its neighbours are this many times as far from it as from their own neighbours.
+/// A point is isolated if its neighbours are this many times as far from it as from their own
+/// neighbours.
 const LONE: f32 = 4.0;
-/// No point is drawn more than this many times as wide as the median one. Scanners sample what is far this much more
-/// coarsely than what is near.
+/// No point is drawn more than this many times as wide as the median one. Scanners sample distant
+/// surfaces this much more coarsely than near ones.
 const LARGEST: f32 = 16.0;
 
-/// What errors call the work of this module.
+/// The name of this module's work in errors.
 const WORK: &str = "finding the neighbours of points";
-/// Bytes that a point takes meanwhile: the tree, what is found of its neighbours, the edges along which sides spread, and its
-/// surfel.
+/// Bytes of temporary memory per point: the tree, its neighbourhood, the edges of the graph that
+/// orients normals, and its surfel.
 const OF_POINT: u64 = 330;
 
-/// The neighbours of a point; itself where there are fewer.
+/// The neighbours of a point; filled up with the point itself if there are fewer.
 type Nearest = [u32; COUNT];
 
 /// The neighbourhood of a point.
@@ -44,14 +47,15 @@ type Nearest = [u32; COUNT];
 struct Surroundings {
     /// Median distance to the neighbours; 0 without any.
     distance: f32,
-    /// Unit normal of the plane of the neighbours, of either side; zero where they show none.
+    /// Unit normal of the plane of the neighbours, of either sign; zero if they define none.
     normal: Vec3,
-    /// The direction in which the neighbours lie furthest apart, and how much further than across it, at most 2.
+    /// The direction in which the neighbours are furthest apart, and the ratio to the extent across
+    /// it, at most 2.
     long: Vec3,
     stretch: f32,
 }
 
-/// Surfels in the order of the points; for those that coincide, of the first one.
+/// Makes surfels in the order of the points. Of points that coincide, only the first produces one.
 ///
 /// # Errors
 /// [`Error::Timeout`](crate::Error::Timeout) and [`Error::Memory`](crate::Error::Memory).
@@ -60,7 +64,8 @@ pub(super) fn surfels(mesh: &Mesh, options: &SurfelOptions) -> Result<Vec<Splat>
     Ok(judged.places.par_iter().map(|&place| judged.surfel(place as usize, options)).collect())
 }
 
-/// The surfels of those points that are wanted, with their indices. What is `known` is named by index.
+/// Makes the surfels of the wanted points, and returns them with their indices. `known` refers to
+/// points by index.
 pub(super) fn some_surfels(
     mesh: &Mesh,
     options: &SurfelOptions,
@@ -73,10 +78,11 @@ pub(super) fn some_surfels(
     Ok(wanted.map(|place| (judged.kept[place], judged.surfel(place, options))).collect())
 }
 
-/// What has been found out of the points at different places, in an order in which neighbours are near each other.
+/// Results for the points at different positions, in an order in which neighbours are close to each
+/// other.
 struct Judged<'a> {
     mesh: &'a Mesh,
-    /// The place of each point in the order.
+    /// The rank of each point in that order.
     places: Vec<u32>,
     /// The index of each in the mesh.
     kept: Vec<u32>,
@@ -101,7 +107,8 @@ impl<'a> Judged<'a> {
             kept.par_iter().map(|&index| mesh.positions[index as usize]).collect();
         deadline.check(WORK)?;
         let tree = Neighbours::new(&points);
-        // All that follows is in the tree's order, where neighbours are near each other in memory too.
+        // From here on everything is in the tree's order, in which neighbours are close in memory
+        // too.
         let order = tree.order();
         let mut places = vec![0u32; points.len()];
         order.iter().zip(0..).for_each(|(&point, place)| places[point as usize] = place);
@@ -119,7 +126,7 @@ impl<'a> Judged<'a> {
         clock.finish(WORK)?;
         drop(tree);
         let points: Vec<Vec3> = order.par_iter().map(|&point| points[point as usize]).collect();
-        // Points that coincide with another are not known.
+        // Normals are dropped for points that coincide with an earlier one.
         known.normals.retain_mut(|(index, _)| {
             let found = kept.binary_search(index).map(|point| *index = places[point]);
             found.is_ok()
@@ -137,12 +144,12 @@ impl<'a> Judged<'a> {
         Ok(Self { mesh, places, kept, points, around, spacing, lone, normals, free })
     }
 
-    /// The surfel of the point at a place in the order.
+    /// Makes the surfel of the point at a rank in the order.
     fn surfel(&self, at: usize, options: &SurfelOptions) -> Splat {
-        // Points as near as the least numbers still have a width.
+        // Points with spacings near the smallest float still have a width.
         let width =
             f64::from((self.spacing[at] * SPREAD * options.radius_scale).max(f32::MIN_POSITIVE));
-        // The plane of a lone point's neighbours is not its own.
+        // The plane of an isolated point's neighbours is not its own.
         let known = !self.lone[at] || !self.free[at];
         let normal =
             Some(self.normals[at].as_dvec3()).filter(|normal| known && *normal != DVec3::ZERO);
@@ -156,7 +163,8 @@ impl<'a> Judged<'a> {
     }
 }
 
-/// How far apart the points are around each, where about so much is typical, and which are lone: those take the spacing of their neighbours.
+/// Returns the spacing around each point, and which points are isolated. An isolated point takes
+/// the spacing of its neighbours. `typical` is about the median spacing, if known.
 fn spacings(
     around: &[Surroundings],
     nearest: &[Nearest],
@@ -172,7 +180,7 @@ fn spacings(
         }
     };
     let typical = typical.unwrap_or_else(median);
-    // A single point has no scale of its own; it becomes a ball of about unit diameter.
+    // A single point has no scale of its own. It becomes a ball of about unit diameter.
     let typical = if typical > 0.0 { typical } else { 0.5 };
     around
         .par_iter()
@@ -187,7 +195,8 @@ fn spacings(
         .unzip()
 }
 
-/// Puts in the normals that the file gives, and turns those that a scanner saw towards it. What is left is free.
+/// Sets the normals that the file has, and turns normals towards the scanner that saw the point.
+/// Returns which normals are still free to be turned.
 fn settle_known(mesh: &Mesh, kept: &[u32], normals: &mut [Vec3]) -> Vec<bool> {
     let mut free: Vec<bool> = normals
         .par_iter_mut()
@@ -216,15 +225,15 @@ fn settle_known(mesh: &Mesh, kept: &[u32], normals: &mut [Vec3]) -> Vec<bool> {
 fn report(coincident: usize, lone: &[bool]) {
     let lone = lone.par_iter().filter(|&&lone| lone).count();
     if coincident > 0 {
-        tracing::info!(coincident, "points at the place of another are left out");
+        tracing::info!(coincident, "points at the position of another point are left out");
     }
     if lone > 0 {
         tracing::info!(lone, "points far from all others are drawn no wider than their neighbours");
     }
 }
 
-/// The factor of a point's surfel: a disc in the plane of its normal, drawn out where the neighbours lie further apart in
-/// one direction; a ball where there is no normal.
+/// Returns the factor of a point's surfel: a disc in the plane of its normal, stretched along the
+/// direction in which the neighbours are further apart. Without a normal it is a ball.
 fn shape(around: &Surroundings, width: f64, normal: Option<DVec3>) -> [f32; 6] {
     let Some(normal) = normal else {
         return lower([DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * width));
@@ -238,7 +247,7 @@ fn shape(around: &Surroundings, width: f64, normal: Option<DVec3>) -> [f32; 6] {
     factor(tensor, x, normal.cross(x), normal)
 }
 
-/// What is around a point; `places` numbers its neighbours.
+/// Computes the neighbourhood of a point; `places` gives the ranks of its neighbours.
 fn surroundings(
     points: &[Vec3],
     tree: &Neighbours,

@@ -1,4 +1,5 @@
-//! The ellipse of a surfel: fitted to a piece of surface, and widened until it reaches what it has to cover.
+//! The ellipse of a surfel: fitted to a piece of surface, then widened until it covers what it has
+//! to.
 
 use super::ellipse::lower;
 use glam::{Vec2, Vec3};
@@ -7,7 +8,7 @@ use glam::{Vec2, Vec3};
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Moments {
     area: f32,
-    /// Integrals of the place and of its products.
+    /// Integrals of the position and of its products.
     place: Vec2,
     xx: f32,
     xy: f32,
@@ -31,7 +32,8 @@ impl Moments {
         self.area
     }
 
-    /// The ellipse of these moments times `spread`, around the mean place or around the corner.
+    /// Returns the ellipse of these moments times `spread`, around the mean position or around the
+    /// corner.
     pub fn ellipse(&self, around_mean: bool, spread: f32) -> Ellipse {
         let share = spread / self.area;
         let center = if around_mean { self.place / self.area } else { Vec2::ZERO };
@@ -39,7 +41,7 @@ impl Moments {
             self.xx * share - spread * center.x * center.x,
             self.yy * share - spread * center.y * center.y,
         );
-        // Never thinner than 1 : 300, whatever rounding made of a needle.
+        // Never thinner than 1 : 300, even if rounding flattened a needle further.
         let least = (xx + yy).max(0.0) * 1e-5 + f32::MIN_POSITIVE;
         let xy = self.xy * share - spread * center.x * center.y;
         Ellipse { center, xx: xx + least, xy, yy: yy + least }
@@ -57,17 +59,19 @@ pub(super) struct Ellipse {
 
 impl Ellipse {
     fn determinant(&self) -> f32 {
-        // Rounding leaves nothing of it in a needle.
+        // For a needle, rounding can cancel the determinant completely.
         (self.xx * self.yy - self.xy * self.xy).max(self.xx * self.yy * 1e-6)
     }
 
-    /// Widens the ellipse just so far toward a point that its squared distance, in standard deviations, is at most `most`.
+    /// Widens the ellipse towards a point, by just enough that its squared distance, in standard
+    /// deviations, is at most `most`.
     pub fn reach(&mut self, point: Vec2, most: f32) {
         let d = point - self.center;
         let square = self.yy * d.x * d.x - 2.0 * self.xy * d.x * d.y + self.xx * d.y * d.y;
         let determinant = self.determinant();
         if square > most * determinant {
-            // Adding m·d·dᵀ to the covariance takes the squared distance q to q / (1 + m·q) (Sherman & Morrison 1950).
+            // Adding m·d·dᵀ to the covariance changes the squared distance q to q / (1 + m·q)
+            // (Sherman & Morrison 1950).
             let more = 1.0 / most - determinant / square;
             self.xx += more * d.x * d.x;
             self.xy += more * d.x * d.y;
@@ -82,8 +86,9 @@ impl Ellipse {
         (determinant / (mean + (mean * mean - determinant).max(0.0).sqrt())).sqrt()
     }
 
-    /// The lower triangular factor B of a surfel's covariance B·Bᵀ (rows: b00, b10, b11, b20, b21, b22): its ellipse in the
-    /// plane of `x` and `y`, `scale` times as large, and as thick along `normal` as given.
+    /// Returns the lower triangular factor B of a surfel's covariance B·Bᵀ (rows: b00, b10, b11,
+    /// b20, b21, b22). The ellipse lies in the plane of `x` and `y`, scaled by `scale`, and is
+    /// `thickness` thick along `normal`.
     pub fn factor(&self, [x, y, normal]: [Vec3; 3], scale: f32, thickness: f32) -> [f32; 6] {
         let determinant = self.determinant();
         // Columns of some factor R.
@@ -91,7 +96,7 @@ impl Ellipse {
         let l10 = self.xy / self.xx * l00;
         let l11 = (determinant / self.xx).sqrt() * scale;
         let (u, v, w) = (x * l00 + y * l10, y * l11, normal * thickness);
-        // R = B·Q with Q a rotation: rows of R, made orthogonal one after the other.
+        // R = B·Q with Q a rotation: orthogonalise the rows of R one after the other.
         let row = |i: usize| Vec3::new(u[i], v[i], w[i]);
         let (r0, r1, r2) = (row(0), row(1), row(2));
         let b00 = r0.length();
@@ -100,12 +105,12 @@ impl Ellipse {
         let rest = r1 - b10 * q0;
         let b11 = rest.length();
         let q1 = rest / b11;
-        // The volume tells the last number more exactly than what is left of a row.
+        // The volume gives the last entry more precisely than the remainder of a row.
         let factor = [b00, b10, b11, r2.dot(q0), r2.dot(q1), l00 * l11 * thickness / (b00 * b11)];
         if factor.iter().all(|v| v.is_finite()) {
             return factor;
         }
-        // Of a needle nothing may be left in 32 bits, and the volume of a giant is beyond them.
+        // A needle may vanish in 32 bits, and the volume of a huge surfel overflows them.
         lower([u, v, w].map(Vec3::as_dvec3))
     }
 }
@@ -148,7 +153,7 @@ mod tests {
         let d = point - ellipse.center;
         let square = ellipse.yy * d.x * d.x - 2.0 * ellipse.xy * d.x * d.y + ellipse.xx * d.y * d.y;
         assert!((square / ellipse.determinant() - 4.0).abs() < 1e-4);
-        // Across that direction it is as wide as before.
+        // Across that direction its width is unchanged.
         let across = d.perp().normalize();
         let wide = |e: &Ellipse| {
             e.xx * across.x * across.x

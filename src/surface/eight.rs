@@ -1,6 +1,6 @@
-//! The surfels of eight vertices at once, where each has but one: a fan of triangles that are nearly flat together, without given
-//! normals. All sums and products are those of [`fan`](super::fan), in the same order: a vertex has the same surfel either way,
-//! to the last bit.
+//! The surfels of eight vertices at once, for vertices with a single surfel: a fan of nearly flat
+//! triangles, without given normals. All sums and products are those of [`fan`](super::fan), in the
+//! same order. A vertex gets the same surfel either way, to the last bit.
 
 use super::fan::{
     ALIKE, CENTROID, CORNER, LEAST_RATIO_SQUARED, LEAST_SQUARE, MIDDLE, SAG, SPREAD, STEEP,
@@ -10,14 +10,14 @@ use crate::splat::STEP_BACK;
 use fearless_simd::{Simd, f32x8, mask32x8, prelude::*};
 use glam::Vec3;
 
-/// Vertices of more triangles are left to others.
+/// Vertices with more triangles are left to the scalar code.
 pub(super) const MOST_CORNERS: usize = 16;
 
 type Lanes<S> = f32x8<S>;
 type Triple<S> = [Lanes<S>; 3];
 type Eight = [f32; 8];
 
-/// A triangle at each of eight vertices. What is not there has its corners where the vertex is.
+/// A triangle at each of eight vertices. A missing triangle has its corners at the vertex.
 #[derive(Clone, Copy, Default)]
 struct Corner {
     next: [Eight; 3],
@@ -34,45 +34,46 @@ struct Corner {
 pub(super) struct Fans {
     here: [Eight; 3],
     corners: [Corner; MOST_CORNERS],
-    /// How many triangles each has, and the most of them.
+    /// The number of triangles of each vertex, and the largest of these numbers.
     counts: Eight,
     most: usize,
     rims: [u64; 8],
 }
 
-/// What is the same for all vertices.
+/// Values that all vertices share.
 pub(super) struct Common {
     pub unit: f32,
     pub outward: f32,
     pub radius_scale: f32,
-    /// Cosine of the angle to the first normal within which triangles are flat together.
+    /// Cosine of the angle to the first normal within which triangles count as flat together.
     pub flat: f32,
 }
 
-/// What came of eight vertices.
+/// The results for eight vertices.
 #[derive(Default)]
 pub(super) struct Found {
-    /// Whether the vertex has just the surfel that is told.
+    /// Whether the vertex has exactly the surfel given here.
     pub is_made: [bool; 8],
     pub center: [Eight; 3],
     pub factor: [Eight; 6],
-    /// The parts of the packed normal.
+    /// The components of the packed normal.
     pub normal: [Eight; 2],
-    /// The square of the longest edge, in units; the area of all triangles, and their normals times their areas.
+    /// The square of the longest edge, in units; the area of all triangles; and the sum of their
+    /// normals times their areas.
     pub longest: Eight,
     pub area: Eight,
     pub cross: [Eight; 3],
 }
 
 impl Fans {
-    /// Forgets the vertices before.
+    /// Forgets the previous vertices.
     pub fn clear(&mut self) {
         self.most = 0;
         self.counts = [0.0; 8];
         self.rims = [0; 8];
     }
 
-    /// Puts a vertex in a lane that is free yet, with so many triangles to come.
+    /// Puts a vertex in a free lane and announces its number of triangles.
     pub fn begin(&mut self, lane: usize, here: Vec3, count: usize) {
         for axis in 0..3 {
             self.here[axis][lane] = here[axis];
@@ -81,7 +82,8 @@ impl Fans {
         self.most = self.most.max(count);
     }
 
-    /// Puts a triangle of a vertex: the places of the next corner and the last one, and the numbers of these places.
+    /// Adds a triangle of a vertex: the positions of the next corner and the last one, and the
+    /// numbers of these positions.
     pub fn put(&mut self, lane: usize, at: usize, [next, last]: [Vec3; 2], numbers: [u32; 2]) {
         let corner = &mut self.corners[at];
         for axis in 0..3 {
@@ -167,7 +169,8 @@ impl Fans {
         found.is_made = made.map(|made| made > 0.0);
     }
 
-    /// Lays the edges on the plane of the first two axes, and gives the sum of the heights over it, weighted by area.
+    /// Projects the edges onto the plane of the first two axes. Returns the sum of the heights over
+    /// it, weighted by area.
     #[inline(always)]
     fn lay<S: Simd>(
         &mut self,
@@ -201,7 +204,7 @@ impl Fans {
         height
     }
 
-    /// Where triangles do not lie all around: there a neighbour is met once.
+    /// Returns which fans are open: in an open fan, some neighbour occurs only once.
     #[inline(always)]
     fn is_open<S: Simd>(&self, simd: S) -> mask32x8<S> {
         let mut open = [0.0f32; 8];
@@ -212,7 +215,7 @@ impl Fans {
         open.simd_gt(0.0)
     }
 
-    /// The ellipse of the triangles' moments, and their area.
+    /// Returns the ellipse of the triangles' moments, and their area.
     #[inline(always)]
     fn ellipse<S: Simd>(&self, simd: S, is_open: mask32x8<S>) -> (Ellipse<S>, Lanes<S>) {
         let none = Lanes::splat(simd, 0.0);
@@ -239,7 +242,7 @@ impl Fans {
         (Ellipse { center: [x, y], xx: xx + least, xy, yy: yy + least }, total)
     }
 
-    /// Widens the ellipse as far as the triangles ask for.
+    /// Widens the ellipse as far as the triangles require.
     #[inline(always)]
     fn widen<S: Simd>(
         &self,
@@ -270,7 +273,7 @@ impl Corner {
     }
 }
 
-/// Eight ellipses, as of [`disc`](super::disc).
+/// Eight ellipses, as in [`disc`](super::disc).
 struct Ellipse<S: Simd> {
     center: [Lanes<S>; 2],
     xx: Lanes<S>,
@@ -362,7 +365,7 @@ fn product<S: Simd>(a: Triple<S>, b: Triple<S>) -> Triple<S> {
     [a[1] * b[2] - b[1] * a[2], a[2] * b[0] - b[2] * a[0], a[0] * b[1] - b[0] * a[1]]
 }
 
-/// Two unit vectors across unit vectors, as glam's `any_orthonormal_pair`.
+/// Returns two unit vectors perpendicular to a unit vector, like glam's `any_orthonormal_pair`.
 #[inline(always)]
 fn across<S: Simd>(simd: S, [x, y, z]: Triple<S>) -> (Triple<S>, Triple<S>) {
     let sign = Lanes::splat(simd, 1.0).copysign(z);
@@ -371,7 +374,7 @@ fn across<S: Simd>(simd: S, [x, y, z]: Triple<S>) -> (Triple<S>, Triple<S>) {
     ([sign * x * x * a + 1.0, sign * b, -sign * x], [b, sign + y * y * a, -y])
 }
 
-/// As [`fan::angle`](super::fan).
+/// Like [`fan::angle`](super::fan).
 #[inline(always)]
 fn angle<S: Simd>(simd: S, sine: Lanes<S>, cosine: Lanes<S>) -> Lanes<S> {
     use std::f32::consts::{FRAC_PI_2, PI};
@@ -387,7 +390,7 @@ fn angle<S: Simd>(simd: S, sine: Lanes<S>, cosine: Lanes<S>) -> Lanes<S> {
     cosine.simd_lt(0.0).select(number(PI) - acute, acute)
 }
 
-/// The parts of a packed normal, as [`encode_normal`](crate::splat::encode_normal).
+/// Returns the components of a packed normal, like [`encode_normal`](crate::splat::encode_normal).
 #[inline(always)]
 fn octahedral<S: Simd>(simd: S, [x, y, z]: Triple<S>) -> [Lanes<S>; 2] {
     let one = Lanes::splat(simd, 1.0);
@@ -398,7 +401,7 @@ fn octahedral<S: Simd>(simd: S, [x, y, z]: Triple<S>) -> [Lanes<S>; 2] {
     [whole(simd, is_below.select(folded[0], x)), whole(simd, is_below.select(folded[1], y))]
 }
 
-/// Parts of a normal as the nearest of their steps, halves away from 0.
+/// Rounds the components of a normal to the nearest step, halves away from 0.
 #[inline(always)]
 fn whole<S: Simd>(simd: S, part: Lanes<S>) -> Lanes<S> {
     let one = Lanes::splat(simd, 1.0);

@@ -1,8 +1,8 @@
-//! The ellipses of a cloud's surfels: symmetric 2×2 tensors, and covariances in space.
+//! The ellipses of a point cloud's surfels: symmetric 2×2 tensors, and covariances in space.
 
 use glam::{DVec2, DVec3};
 
-/// The thickness of a surfel, in its smaller tangent standard deviation.
+/// The thickness of a surfel, as a multiple of its smaller tangent standard deviation.
 const THICKNESS: f64 = 0.12;
 
 /// A symmetric tensor (xx, xy, yy) in a tangent plane.
@@ -14,7 +14,7 @@ pub(super) struct Tensor {
 }
 
 impl Tensor {
-    /// The larger and the smaller eigenvalue, and the unit axis of the larger.
+    /// Returns the larger and the smaller eigenvalue, and the unit axis of the larger.
     pub fn axes(self) -> ([f64; 2], DVec2) {
         let mean = (self.xx + self.yy) * 0.5;
         let half = (self.xx - self.yy) * 0.5;
@@ -25,8 +25,8 @@ impl Tensor {
     }
 }
 
-/// The lower triangular factor B of a surfel's covariance (rows: b00, b10, b11, b20, b21, b22), from its ellipse in the
-/// tangent plane of the axes `x`, `y` and its unit `normal`.
+/// Returns the lower triangular factor B of a surfel's covariance (rows: b00, b10, b11, b20, b21,
+/// b22). The ellipse lies in the tangent plane of the axes `x` and `y`, with unit normal `normal`.
 pub(super) fn factor(tensor: Tensor, x: DVec3, y: DVec3, normal: DVec3) -> [f32; 6] {
     let ([large, small], axis) = tensor.axes();
     let small = small.max(large * 1e-6);
@@ -34,7 +34,7 @@ pub(super) fn factor(tensor: Tensor, x: DVec3, y: DVec3, normal: DVec3) -> [f32;
     lower([a * large.sqrt(), b * small.sqrt(), normal * (THICKNESS * small.sqrt())])
 }
 
-/// The lower triangular factor of R·Rᵀ, R having these columns (Cholesky).
+/// Returns the lower triangular factor of R·Rᵀ, where R has these columns (Cholesky).
 pub(super) fn lower(columns: [DVec3; 3]) -> [f32; 6] {
     let sum = |i: usize, j: usize| columns.iter().map(|c| c[i] * c[j]).sum::<f64>();
     let b00 = sum(0, 0).sqrt();

@@ -16,34 +16,42 @@ use crate::{
 use fearless_simd::{Level, Simd, dispatch};
 use glam::{DVec3, Vec2, Vec3};
 
-/// A surfel stands for triangles whose normals differ from the first one's by no more (degrees).
+/// A surfel stands for triangles whose normals differ from the first one's by at most this angle
+/// (degrees).
 const FLAT: f32 = 30.0;
-/// A surfel lies across its shading normal where that is no farther from its triangles' mean normal (cosine of 20°).
+/// A surfel is perpendicular to its shading normal if that is at most this far from its triangles'
+/// mean normal (cosine of 20°).
 pub(super) const ALIKE: f32 = 0.94;
-/// A triangle is steep where its normal's product with the surfel's is less.
+/// A triangle is steep if its normal's dot product with the surfel's is less than this.
 pub(super) const STEEP: f32 = 0.95;
-/// Covariance of a surfel in that of the triangles around its vertex. On a mesh of equilateral triangles of side 1 the
-/// standard deviation is 0.35, and the surfels' sum is nowhere below 0.767 times the strength of one.
+/// Covariance of a surfel, as a multiple of that of the triangles around its vertex. On a mesh of
+/// equilateral triangles of side 1 the standard deviation is 0.35. The surfels' sum is then nowhere
+/// below 0.767 times the strength of one.
 pub(super) const SPREAD: f32 = 0.35 * 0.35 * 24.0 / 5.0;
-/// The most squared distances, in standard deviations, that a surfel may have from the middles of the edges at its vertex,
-/// from the centroids of the triangles, and from the vertex itself. Two surfels at the middle of an edge, and three at a
-/// centroid, then have 0.31 and 0.29 of the strength of one; narrower ones leave holes, wider ones reach over outlines.
+/// Largest squared distances, in standard deviations, of a surfel from three kinds of points. These
+/// are the midpoints of the edges at its vertex, the centroids of the triangles, and the vertex
+/// itself. Two surfels at the midpoint of an edge, and three at a centroid, then have 0.31 and 0.29
+/// of the strength of one. Narrower surfels leave holes, wider ones reach over silhouettes.
 pub(super) const MIDDLE: f32 = 3.8;
 pub(super) const CENTROID: f32 = 4.7;
 pub(super) const CORNER: f32 = 5.0;
-/// The thickness of a surfel, in its smaller standard deviation.
+/// The thickness of a surfel, as a multiple of its smaller standard deviation.
 pub(super) const THICKNESS: f32 = 0.12;
-/// The square of twice an area, in units, below which products of moments are lost in 32 bits: edges of less than a millionth.
+/// The square of twice an area, in units, below which products of moments underflow in 32 bits:
+/// edges of less than a millionth.
 pub(super) const LEAST_SQUARE: f32 = 1e-26;
-/// A triangle whose height is less than the root of this part of its longest edge is a line at the precision of 32 bits.
+/// A triangle is a line at the precision of 32 bits if its height is less than the root of this,
+/// times its longest edge.
 pub(super) const LEAST_RATIO_SQUARED: f32 = 1e-12;
-/// How high above its vertex a surfel lies, of the mean height of the triangles around a vertex.
+/// Height of a surfel above its vertex, as a fraction of the mean height of the triangles around
+/// the vertex.
 pub(super) const SAG: f32 = 0.4;
 
-/// Vertices whose triangles are read together. They may lie anywhere in memory: asked for one by one, each is waited for.
+/// Vertices whose triangles are read together. They may lie anywhere in memory, and reading them
+/// one by one would wait for each.
 const TOGETHER: usize = 64;
 
-/// A triangle as one of its vertices sees it. Lengths are in the maker's unit.
+/// A triangle as seen from one of its vertices. Lengths are in the maker's unit.
 struct Around {
     at: u32,
     /// Unit normal.
@@ -51,7 +59,7 @@ struct Around {
     area: f32,
     /// At this vertex, in radians.
     angle: f32,
-    /// To the next corner and to the last one, and where those are.
+    /// Edges to the next corner and to the last one, and the vertices there by position.
     edges: [Vec3; 2],
     places: [u32; 2],
     /// The edges in the plane of the surfel.
@@ -65,17 +73,18 @@ pub(super) struct Maker<'a> {
     pub mesh: &'a Mesh,
     pub connected: &'a Connected<'a>,
     pub options: &'a SurfelOptions,
-    /// Where a mesh's triangles were cut, what they are cut from.
+    /// If the triangles of the mesh were cut, what they were cut from.
     pub origin: Option<&'a Origin<'a>>,
-    /// The lengths that edges are measured in: their products fit 32 bits whatever the mesh's size.
+    /// The length that edges are measured in. Products of lengths then fit in 32 bits, whatever the
+    /// mesh's size.
     pub unit: f32,
-    /// −1 where the mesh is inside out.
+    /// −1 if the mesh is inside out.
     pub outward: f32,
     /// Whether all corners at a vertex have its colour.
     pub plain: bool,
 }
 
-/// Surfels of some vertices, and what was seen of the triangles around them.
+/// Surfels of some vertices, and statistics of the triangles around them.
 pub(super) struct Made {
     pub splats: Vec<Splat>,
     /// The square of the longest edge, in units.
@@ -87,12 +96,12 @@ pub(super) struct Made {
     smooth: Groups,
     /// Normals of the smooth groups.
     normals: Vec<Vec3>,
-    /// Eight vertices, and what came of them.
+    /// Eight vertices, and their results.
     fans: Box<(Fans, Found)>,
 }
 
 impl Made {
-    /// Nothing yet, with room for `capacity` surfels.
+    /// Empty, with capacity for `capacity` surfels.
     pub fn new(options: &SurfelOptions, capacity: usize) -> Self {
         let crease = options.crease_angle_degrees;
         Self {
@@ -138,7 +147,7 @@ impl Maker<'_> {
         }
     }
 
-    /// Adds the surfels of vertices, eight at once; `rows` are the triangles of their corners.
+    /// Adds the surfels of vertices, eight at once. `rows` are the triangles of their corners.
     #[inline(always)]
     fn by_eight<S: Simd>(&self, simd: S, vertices: &[usize], rows: &[[u32; 3]], made: &mut Made) {
         let common = Common {
@@ -174,7 +183,8 @@ impl Maker<'_> {
         made.fans = fans;
     }
 
-    /// Puts a vertex in a lane, with the triangles of its corners; one of too many in none.
+    /// Puts a vertex in a lane, with the triangles of its corners. A vertex with too many gets
+    /// none.
     #[inline(always)]
     fn gather(
         &self,
@@ -196,7 +206,7 @@ impl Maker<'_> {
         }
     }
 
-    /// Adds what was found of the vertex in a lane.
+    /// Adds the result for the vertex in a lane.
     #[inline(always)]
     fn take(&self, found: &Found, lane: usize, vertex: usize, made: &mut Made) {
         let pack = |part: f32| u32::from(part as i16 as u16);
@@ -241,7 +251,8 @@ impl Maker<'_> {
         }
     }
 
-    /// What the vertex of a corner of a triangle sees; `longest` grows to the square of the longest edge there.
+    /// Returns a corner's triangle as seen from its vertex. `longest` grows to the square of the
+    /// longest edge there.
     fn around(&self, at: u32, row: [u32; 3], per_unit: f32, longest: &mut f32) -> Option<Around> {
         let [here, next, last] = turned(row, at).map(|v| self.mesh.positions[v as usize]);
         let (a, b) = ((next - here) * per_unit, (last - here) * per_unit);
@@ -267,7 +278,8 @@ impl Maker<'_> {
         })
     }
 
-    /// Finds the shading normals of the triangles' corners, and tells each which it is.
+    /// Computes the shading normals of the triangles' corners, and gives each triangle the index of
+    /// its own.
     fn shade(&self, around: &mut [Around], smooth: &mut Groups, normals: &mut Vec<Vec3>) {
         normals.clear();
         if let Some(origin) = self.origin {
@@ -288,7 +300,8 @@ impl Maker<'_> {
         normals.iter_mut().for_each(|normal| *normal = normal.normalize_or_zero());
     }
 
-    /// The surfel of a group of triangles; `shading` is their normal, of any length, where it is not their mean.
+    /// Returns the surfel of a group of triangles. `shading` is their normal, of any length, if it
+    /// differs from their mean.
     fn surfel(&self, vertex: usize, group: &mut [Around], shading: Option<Vec3>) -> Option<Splat> {
         let first = group.first()?.normal;
         let own =
@@ -299,13 +312,13 @@ impl Maker<'_> {
         let (x, y) = normal.any_orthonormal_pair();
         let mut moments = Moments::default();
         let mut height = 0.0;
-        // Around a whole vertex each neighbour is met twice: nothing is left of the bits of their numbers.
+        // Around a closed fan every neighbour occurs twice, so the bits of their numbers cancel.
         let mut rim = 0;
         for t in group.iter_mut() {
             t.laid = t.edges.map(|edge| Vec2::new(edge.dot(x), edge.dot(y)));
             let slope = normal.dot(t.normal);
-            // Seen along a steep triangle's normal the surfel must be wide enough, so edges are laid on its plane in that
-            // direction.
+            // Seen along a steep triangle's normal, the surfel must be wide enough. The triangle's
+            // edges are therefore projected onto the surfel's plane in that direction.
             if slope.abs() < STEEP {
                 let down = Vec2::new(t.normal.dot(x), t.normal.dot(y))
                     / (slope.signum() * slope.abs().max(0.5));
@@ -325,7 +338,7 @@ impl Maker<'_> {
             let [a, b] = t.laid;
             ellipse.reach(a * 0.5, MIDDLE);
             if is_open {
-                // Else it is the next triangle's first one.
+                // Otherwise this is the first edge of the next triangle.
                 ellipse.reach(b * 0.5, MIDDLE);
             }
             ellipse.reach((a + b) * (1.0 / 3.0), CENTROID);
@@ -333,7 +346,7 @@ impl Maker<'_> {
         let scale = self.options.radius_scale;
         let thickness = THICKNESS * ellipse.narrowest() * scale;
         let outward = if given.is_some() { shading } else { shading * self.outward };
-        // Where the surface is on average; and behind it by what the surfel reaches toward the outside.
+        // At the mean height of the surface, set back by as much as the surfel reaches outward.
         let sag = if is_open { 1.0 } else { SAG } * height / (3.0 * area);
         let aside = x * ellipse.center.x + y * ellipse.center.y;
         let offset = aside + normal * sag - outward * (STEP_BACK as f32 * thickness);
@@ -346,10 +359,10 @@ impl Maker<'_> {
         })
     }
 
-    /// The mean colour of the triangles at their corners.
+    /// Returns the mean colour of the triangles at their corners.
     fn color(&self, vertex: usize, group: &[Around], area: f32) -> u32 {
         if self.plain {
-            // Packed as it is in memory, red lowest.
+            // Packed as in memory, red lowest.
             return self
                 .mesh
                 .colors
@@ -365,7 +378,7 @@ impl Maker<'_> {
     }
 }
 
-/// The corners of a triangle, that of this number first.
+/// Returns the corners of a triangle, starting with the given one.
 #[inline(always)]
 fn turned([a, b, c]: [u32; 3], corner: u32) -> [u32; 3] {
     match corner % 3 {
@@ -375,13 +388,14 @@ fn turned([a, b, c]: [u32; 3], corner: u32) -> [u32; 3] {
     }
 }
 
-/// What tells whether a mesh is inside out, summed over the corners of its triangles.
+/// Sums over the corners of a mesh's triangles that decide whether it is inside out.
 #[derive(Debug, Default, Clone, Copy)]
 pub(super) struct Sums {
     area: f64,
-    /// Place times area.
+    /// Position times area.
     place: DVec3,
-    /// Normal times area, and the place's product with that: nine times the volume of the tetrahedra to the origin.
+    /// Normal times area, and its dot product with the position: nine times the volume of the
+    /// tetrahedra to the origin.
     cross: DVec3,
     volume: f64,
 }
@@ -395,7 +409,7 @@ impl Sums {
         self.volume += place.dot(cross);
     }
 
-    /// Adds the corners of a triangle; gives its normal times its area.
+    /// Adds the corners of a triangle. Returns its normal times its area.
     pub fn add_triangle(&mut self, corners: [Vec3; 3]) -> DVec3 {
         let [a, b, c] = corners.map(|corner| corner.as_dvec3());
         let cross = (b - a).cross(c - a) * 0.5;
@@ -421,14 +435,15 @@ impl Sums {
         }
     }
 
-    /// 1 where there is a volume, −1 where there is a negative one: then the surface is inside out. It is counted from the
-    /// centre of the area, so that an open surface has one only as far as it is curved. `unit` is the length that areas are
-    /// counted in the square of.
+    /// Returns 1 for a positive volume, and −1 for a negative one: then the surface is inside out.
+    /// The volume is relative to the centre of the area, so an open surface has one only as far as
+    /// it is curved. Areas are in squares of `unit`.
     pub fn side(&self, unit: f32) -> i8 {
         self.side_beyond(1e-3, unit)
     }
 
-    /// As [`side`](Self::side), of a closed surface, of which the least volume counts: it may be as thin as rounding allows.
+    /// Like [`side`](Self::side), for a closed surface, which may be as thin as rounding allows:
+    /// the smallest volume counts.
     pub fn side_of_closed(&self) -> i8 {
         self.side_beyond(1e-9, 1.0)
     }
@@ -441,14 +456,16 @@ impl Sums {
     }
 }
 
-/// Spreads the bits of a number, so that exclusive sums of different numbers do not cancel by chance.
+/// Mixes the bits of a number, so that exclusive-or sums of different numbers do not cancel by
+/// chance.
 #[inline]
 pub(super) fn mixed(place: u32) -> u64 {
     let product = (u64::from(place) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     product ^ (product >> 29)
 }
 
-/// The angle of a sine ≥ 0 and a cosine of any common length, within 1e-5 (Abramowitz & Stegun 1964, 4.4.47).
+/// Returns the angle of a sine ≥ 0 and a cosine of any common length, within 1e-5 (Abramowitz &
+/// Stegun 1964, 4.4.47).
 fn angle(sine: f32, cosine: f32) -> f32 {
     use std::f32::consts::{FRAC_PI_2, PI};
     let steep = cosine.abs();

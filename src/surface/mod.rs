@@ -1,4 +1,4 @@
-//! Surfaces: meshes and clouds, and the elliptic surfels that draw them.
+//! Surfaces: meshes and point clouds, and the elliptic surfels that draw them.
 
 mod adjacency;
 mod cloud;

@@ -1,36 +1,40 @@
-//! One side for all normals of a cloud.
+//! Consistent orientation of the normals of a point cloud.
 //!
-//! Planes fitted to neighbours have no side. Neighbouring normals that are nearly parallel tell each other's side most
-//! reliably, so sides spread along the minimum spanning tree of the neighbour graph under the weight 1 − |n·m| (Hoppe,
-//! DeRose, Duchamp, McDonald and Stuetzle, Surface Reconstruction from Unorganized Points, 1992). The tree is never
-//! walked: Kruskal's algorithm joins sets whose members know their side relative to the set's root.
+//! Planes fitted to neighbours have no side. Neighbouring normals that are nearly parallel are the
+//! most reliable to orient by each other. Orientation therefore spreads along the minimum spanning
+//! tree of the neighbour graph with weight 1 − |n·m| (Hoppe, DeRose, Duchamp, McDonald and
+//! Stuetzle, Surface Reconstruction from Unorganized Points, 1992). The tree is never traversed:
+//! Kruskal's algorithm joins sets whose members know their side relative to the set's root.
 //!
-//! Then every connected part is turned as a whole. By the divergence theorem the sum of area · n·p over a closed surface
-//! is three times its volume where the normals point outward, so its sign tells which side is out, whatever the shape; an
-//! open part is turned away from the centre of the cloud. Where the sum tells nothing, as on flat ground, the part
-//! faces up (+z).
+//! Then every connected part is turned as a whole. By the divergence theorem, the sum of area · n·p
+//! over a closed surface is three times its volume if the normals point outward. Its sign therefore
+//! gives the outside, whatever the shape. An open part is turned away from the centre of the point
+//! cloud. If the sum is indecisive, as on flat ground, the part faces up (+z).
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// A sum below this part of the largest possible one tells no side.
+/// A sum below this fraction of the largest possible one is indecisive.
 const LEAST_VOTE: f64 = 0.03;
-/// A part is taken as closed where its mean normal is shorter.
+/// A part counts as closed if its mean normal is shorter than this.
 const CLOSED: f64 = 0.2;
 
-/// What is known from outside of points that are a part of a cloud.
+/// What the caller knows about points that are a part of a point cloud.
 #[derive(Default)]
 pub(crate) struct Known {
-    /// About the median distance of neighbours in the cloud; that of the points where `None`.
+    /// The approximate median distance of neighbours in the whole cloud; that of these points if
+    /// `None`.
     pub spacing: Option<f32>,
-    /// The centre of the cloud; that of the points where `None`.
+    /// The centre of the whole cloud; that of these points if `None`.
     pub center: Option<DVec3>,
-    /// Normals whose side is settled, by point; the connected parts that they are in follow them.
+    /// Normals whose side is already decided, by point. The connected parts that contain them
+    /// follow.
     pub normals: Vec<(u32, Vec3)>,
 }
 
-/// Gives the normals one side. Zero normals have none and connect nothing, nor do those that are not `free`: these stay
-/// as they are. A point may be among its own `neighbours`. `spacing` tells the area that a point stands for.
+/// Gives the normals a consistent side. Zero normals have none and connect nothing. Normals that
+/// are not `free` connect nothing either and stay as they are. A point may be among its own
+/// `neighbours`. The area that a point stands for is its `spacing` squared.
 pub(super) fn orient<const N: usize>(
     points: &[Vec3],
     spacing: &[f32],
@@ -55,7 +59,7 @@ pub(super) fn orient<const N: usize>(
         if turned {
             normals[index] = -normals[index];
         }
-        // The part's number is kept with its root, counted from 1.
+        // The part's number is stored at its root, counted from 1.
         let root = root as usize;
         if parts[root] == 0 {
             votes.push(Votes::default());
@@ -82,10 +86,10 @@ pub(super) fn orient<const N: usize>(
     }
 }
 
-/// Bits of an edge below its weight: the number of its place among all neighbours.
+/// Bits of an edge below its weight: the number of its slot among all neighbours.
 const PLACE: u32 = 40;
 
-/// The edges of the neighbour graph, lightest first, each once.
+/// Returns the edges of the neighbour graph, lightest first, each once.
 fn edges<const N: usize>(neighbours: &[[u32; N]], free: &[bool], normals: &[Vec3]) -> Vec<u64> {
     let takes_part = |index: usize| free[index] && normals[index] != Vec3::ZERO;
     let mut edges: Vec<u64> = (0..neighbours.len())
@@ -94,7 +98,8 @@ fn edges<const N: usize>(neighbours: &[[u32; N]], free: &[bool], normals: &[Vec3
         .flat_map_iter(|from| {
             neighbours[from].iter().enumerate().filter_map(move |(slot, &to)| {
                 let to = to as usize;
-                // Where both name each other, the one with the smaller index does.
+                // If both points list each other, the edge of the one with the smaller index is
+                // kept.
                 let again = to < from && neighbours[to].contains(&(from as u32));
                 if again || to == from || !takes_part(to) {
                     return None;
@@ -114,10 +119,10 @@ fn ends<const N: usize>(edge: u64, neighbours: &[[u32; N]]) -> (usize, usize) {
     (place / N, neighbours[place / N][place % N] as usize)
 }
 
-/// Disjoint sets of points; each knows whether it is turned against its set's root.
+/// Disjoint sets of points. Each point knows whether it is flipped relative to its set's root.
 struct Sets {
     parent: Vec<u32>,
-    /// Against the parent.
+    /// Relative to the parent.
     turned: Vec<bool>,
     size: Vec<u32>,
 }
@@ -131,7 +136,7 @@ impl Sets {
         }
     }
 
-    /// The root of a point's set, and whether the point is turned against it.
+    /// Returns the root of a point's set, and whether the point is flipped relative to it.
     fn find(&mut self, point: u32) -> (u32, bool) {
         let mut at = point as usize;
         let mut turned = false;
@@ -149,7 +154,7 @@ impl Sets {
         }
     }
 
-    /// Makes one set of two. `opposed`: the two points are turned against each other as they were at first.
+    /// Joins two sets. `opposed`: the original normals of the two points are opposed.
     fn join(&mut self, a: u32, b: u32, opposed: bool) {
         let ((a, a_turned), (b, b_turned)) = (self.find(a), self.find(b));
         if a == b {
@@ -171,12 +176,12 @@ struct Votes {
     squares: f64,
     normals: DVec3,
     fluxes: f64,
-    /// How far the normals agree with settled ones.
+    /// How far the normals agree with those already decided.
     settled: f64,
 }
 
 impl Votes {
-    /// Adds a point, its position relative to the centre of the cloud.
+    /// Adds a point. Its position is relative to the centre of the point cloud.
     fn add(&mut self, position: DVec3, normal: DVec3, area: f64) {
         self.area += area;
         self.positions += position * area;
@@ -190,7 +195,8 @@ impl Votes {
             return self.settled < 0.0;
         }
         let own_center = self.positions / self.area.max(f64::MIN_POSITIVE);
-        // Around any centre the sum over a closed part is the same, but around its own it is most precise.
+        // Over a closed part the sum is the same around any centre, but most precise around its
+        // own.
         let closed = self.normals.length() < CLOSED * self.area;
         let center = if closed { own_center } else { DVec3::ZERO };
         let flux = self.fluxes - center.dot(self.normals);

@@ -3,12 +3,12 @@
 use super::{Material, Mesh, Texture};
 use glam::Vec2;
 
-/// Drawn where a mesh says nothing of its colour.
+/// The colour of a mesh that defines none.
 pub(super) const NEUTRAL: [f32; 4] = [0.8, 0.8, 0.8, 1.0];
 
 impl Texture {
-    /// The mean colour over the parallelogram from `uv` along `a` and `b`; its samples are about two texels apart, but at
-    /// most 8 in each direction.
+    /// Returns the mean colour over the parallelogram from `uv` along `a` and `b`. Samples are
+    /// about two texels apart, but at most 8 in each direction.
     fn mean(&self, uv: Vec2, a: Vec2, b: Vec2) -> [f32; 4] {
         let size = Vec2::new(self.width as f32, self.height as f32);
         let steps = |edge: Vec2| (((edge * size).length() / 2.0) as u32).clamp(1, 8);
@@ -28,8 +28,9 @@ impl Texture {
         sum.map(|sum| sum / (rows * columns) as f32)
     }
 
-    /// The colour at `uv`, between the four nearest texels, repeated in both directions; channels in 0 … 1. Texels that are not
-    /// there, in a texture that was put together by hand, are clear; coordinates that are not finite count as 0.
+    /// Returns the colour at `uv`, interpolated between the four nearest texels, with the texture
+    /// repeated in both directions. Channels are in 0 … 1. Missing texels, in a texture built by
+    /// hand, are transparent. Coordinates that are not finite count as 0.
     pub fn sample(&self, uv: Vec2) -> [f32; 4] {
         let axis = |part: f32, size: u32| {
             let part = if part.is_finite() { part - part.floor() } else { 0.0 };
@@ -53,7 +54,7 @@ impl Texture {
     }
 }
 
-/// The colour that a triangle shows around one of its corners; channels in 0 … 1.
+/// Returns the colour of a triangle around one of its corners; channels in 0 … 1.
 pub(super) fn corner_color(mesh: &Mesh, triangle: usize, corner: usize) -> [f32; 4] {
     let [vertex, next, last] =
         [0, 1, 2].map(|i| mesh.triangles[triangle][(corner + i) % 3] as usize);
@@ -71,7 +72,8 @@ pub(super) fn corner_color(mesh: &Mesh, triangle: usize, corner: usize) -> [f32;
     color
 }
 
-/// The colour at a place of a triangle, given by barycentric coordinates; channels in 0 … 1.
+/// Returns the colour at a position in a triangle, given by barycentric coordinates; channels in 0
+/// … 1.
 pub(crate) fn color_at(mesh: &Mesh, triangle: usize, weights: [f32; 3]) -> [f32; 4] {
     let vertices = mesh.triangles[triangle].map(|vertex| vertex as usize);
     let material =
@@ -103,12 +105,12 @@ fn base_color(mesh: &Mesh, material: Option<&Material>) -> [f32; 4] {
     }
 }
 
-/// The colour of a point that belongs to no triangle.
+/// Returns the colour of a point that belongs to no triangle.
 pub(super) fn point_color(mesh: &Mesh, vertex: usize) -> [f32; 4] {
     mesh.colors.get(vertex).map_or(NEUTRAL, |color| color.map(|part| f32::from(part) / 255.0))
 }
 
-/// A colour in 32 bits, red lowest.
+/// Packs a colour into 32 bits, red lowest.
 pub(super) fn pack(color: [f32; 4]) -> u32 {
     u32::from_le_bytes(color.map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8))
 }

@@ -1,48 +1,52 @@
-//! The connected parts of a closed surface: triangles that share an edge are of one part, those that share a vertex alone need
-//! not be.
+//! The connected parts of a closed surface. Triangles that share an edge belong to one part; those
+//! that only share a vertex need not.
 //!
-//! Neighbours mostly come near each other in a file, so each few thousand triangles are joined by themselves, in tables that stay
-//! in a core's cache. Edges of which they have one side alone are few; all of these together are sorted, and what meets there
-//! is joined. Where more than two triangles meet at an edge they are of one part, or of several that are closed each.
+//! Neighbours are usually close in the file. Batches of a few thousand triangles are therefore
+//! joined separately, in tables that fit in a core's cache. Few edges have only one side in their
+//! batch. These are collected and sorted, and the triangles that meet there are joined. If more
+//! than two triangles meet at an edge, they belong to one part, or to several parts that are each
+//! closed.
 
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// Triangles that are joined by themselves, and the places of their table: a third more than they have edges.
+/// Triangles per batch, and bits of the number of slots of its table: a third more slots than the
+/// triangles have edges.
 const FEW: usize = 1 << 13;
 const PLACE_BITS: u32 = 15;
 
-/// An edge in the table; an empty place is all zeros.
+/// An edge in the table. An empty slot is all zeros.
 #[derive(Debug, Clone, Copy, Default)]
 struct Place {
-    /// The smaller vertex above the larger one.
+    /// The smaller vertex in the high half, the larger in the low half.
     edge: u64,
-    /// The first triangle there, counted among the few.
+    /// The first triangle at the edge, counted within the batch.
     triangle: u32,
-    /// How many triangles run to the larger vertex less those that run to the smaller.
+    /// Triangles that run towards the larger vertex, minus those that run towards the smaller.
     balance: i32,
 }
 
-/// An edge with one side alone, above the triangle there.
+/// An edge with one side only, in the high half, and its triangle in the low half.
 type Open = u128;
 
-/// Joins triangles to parts, in any number of threads. Vertices may have any numbers that are the same where the surface hangs
-/// together.
+/// Joins triangles into parts, from any number of threads. Any vertex numbers will do, if vertices
+/// where the surface is connected have the same number.
 pub(crate) struct Joining(Sets);
 
 impl Joining {
-    /// So many triangles, at most `u32::MAX`.
+    /// Prepares this many triangles, at most `u32::MAX`.
     pub fn new(triangles: usize) -> Self {
         Self(Sets::new(triangles))
     }
 
-    /// Bytes that joining takes, of so many triangles and such edges as [`add`](Self::add) gives.
+    /// Bytes needed to join this many triangles, with this many edges from [`add`](Self::add).
     pub fn memory(triangles: u64, open: u64) -> u64 {
-        // Lists are made longer when they are full.
+        // Lists grow by doubling.
         triangles * size_of::<u32>() as u64 + 2 * open * size_of::<Open>() as u64
     }
 
-    /// Joins triangles by themselves, the first of which has this number, and gives the edges at which others are to come.
+    /// Joins a batch of triangles, the first of which has number `first`. Returns the edges at
+    /// which triangles of other batches are expected.
     pub fn add(&self, first: u32, triangles: &[[u32; 3]], name: impl Fn(u32) -> u32) -> Vec<Open> {
         let mut open = Vec::new();
         let mut table = vec![Place::default(); 1 << PLACE_BITS];
@@ -64,7 +68,8 @@ impl Joining {
                 self.0.0[(first + triangle) as usize]
                     .store(first + root(&mut own, triangle), Relaxed);
             }
-            // What has as many triangles of one direction as of the other is closed there, whatever else is.
+            // An edge with equally many triangles of both directions is closed here, whatever other
+            // batches contain.
             let left = table.iter().filter(|place| place.balance != 0);
             open.extend(
                 left.map(|place| Open::from(place.edge) << 32 | Open::from(first + place.triangle)),
@@ -73,7 +78,7 @@ impl Joining {
         open
     }
 
-    /// The parts, from all edges that [`add`](Self::add) gave.
+    /// Returns the parts, from all edges that [`add`](Self::add) returned.
     pub fn parts(self, mut open: Vec<Open>) -> Parts {
         open.par_sort_unstable();
         let same = open.par_windows(2).filter(|pair| pair[0] >> 32 == pair[1] >> 32);
@@ -82,10 +87,10 @@ impl Joining {
     }
 }
 
-/// Puts an edge of a triangle in the table, and gives the first triangle there.
+/// Puts an edge of a triangle in the table, and returns the first triangle at that edge.
 fn at_edge(table: &mut [Place], triangle: u32, [from, to]: [u32; 2]) -> u32 {
     let edge = u64::from(from.min(to)) << 32 | u64::from(from.max(to));
-    // By the golden ratio (Knuth 1973).
+    // Hashes by the golden ratio (Knuth 1973).
     let mut at = (edge.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (u64::BITS - PLACE_BITS)) as usize;
     while table[at].edge != edge && table[at].edge != 0 {
         at = (at + 1) % table.len();
@@ -98,7 +103,7 @@ fn at_edge(table: &mut [Place], triangle: u32, [from, to]: [u32; 2]) -> u32 {
     place.triangle
 }
 
-/// As of [`Sets`], for one thread alone.
+/// Like [`Sets::root`], for a single thread.
 fn root(above: &mut [u32], mut member: u32) -> u32 {
     while above[member as usize] != member {
         let higher = above[above[member as usize] as usize];
@@ -113,26 +118,27 @@ fn join(above: &mut [u32], a: u32, b: u32) {
     above[a.max(b) as usize] = a.min(b);
 }
 
-/// Which part each triangle is of.
+/// The part of each triangle.
 pub(crate) struct Parts {
     of: Vec<u32>,
     count: usize,
 }
 
 impl Parts {
-    /// How many there are; triangles that are but a point are parts of their own.
+    /// Number of parts. Triangles that are a single point are parts of their own.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// The part of the triangle of this number. Parts are numbered in the order of their first triangles.
+    /// Returns the part of a triangle. Parts are numbered in the order of their first triangles.
     pub fn of(&self, number: usize) -> u32 {
         self.of[number]
     }
 }
 
-/// Disjoint sets that any number of threads joins at once: each member links to itself, or to one of a smaller index, and a
-/// link is only taken by whoever finds a root there still (Anderson & Woll 1991).
+/// Disjoint sets that any number of threads can join at once. Each member links to itself or to one
+/// of a smaller index. A link is only set if the member is still a root at that moment (Anderson &
+/// Woll 1991).
 struct Sets(Vec<AtomicU32>);
 
 impl Sets {
@@ -148,7 +154,8 @@ impl Sets {
             }
             let higher = self.0[above as usize].load(Relaxed);
             if higher < above {
-                // Halves the way for the next time. It does no harm where another thread has done so.
+                // Halves the path for the next time. It does no harm if another thread has done so
+                // already.
                 self.0[member as usize].store(higher, Relaxed);
             }
             member = higher;
@@ -172,7 +179,7 @@ impl Sets {
         let mut of: Vec<u32> = self.0.into_iter().map(AtomicU32::into_inner).collect();
         let mut count = 0;
         for member in 0..of.len() {
-            // What it links to comes before it, and has its number already.
+            // The member it links to comes earlier and already has its number.
             let above = of[member] as usize;
             of[member] = if above < member { of[above] } else { count };
             count += u32::from(above == member);
@@ -185,7 +192,7 @@ impl Sets {
 mod tests {
     use super::*;
 
-    /// Each time so many triangles by themselves.
+    /// Joins batches of `few` triangles, each batch on its own.
     fn parts(triangles: &[[u32; 3]], few: usize) -> Parts {
         let joining = Joining::new(triangles.len());
         let chunks = triangles.par_chunks(few).enumerate().rev();
@@ -200,7 +207,7 @@ mod tests {
     fn parts_are_those_of_one_thread() {
         let sphere = crate::surface::Mesh::sphere(2);
         let per_sphere = sphere.positions.len() as u32;
-        // Each hangs by a vertex at the one before.
+        // Each shares one vertex with the one before.
         let shifted = |i: u32| {
             sphere.triangles.iter().map(move |t| t.map(|vertex| vertex + i * (per_sphere - 1)))
         };
@@ -219,17 +226,17 @@ mod tests {
     fn triangles_without_area_are_of_the_parts_around() {
         let sheet = [[0, 1, 2], [0, 2, 1], [1, 1, 2], [5, 5, 5]];
         assert_eq!(parts(&sheet, 4).of, [0, 0, 0, 1]);
-        // What has no area is of any part.
+        // Alone in its batch, a triangle without area belongs to no other part.
         assert_eq!(parts(&sheet, 1).of, [0, 0, 1, 2]);
     }
 
-    /// Two tetrahedra at one edge, which is four times there.
+    /// Two tetrahedra at one edge, which four triangles share.
     #[test]
     fn all_triangles_at_an_edge_are_of_one_part() {
         let tetrahedron = |[a, b, c, d]: [u32; 4]| [[a, c, b], [a, b, d], [b, c, d], [c, a, d]];
         let both = [tetrahedron([0, 1, 2, 3]), tetrahedron([0, 1, 4, 5])].concat();
         assert_eq!([1, 8].map(|few| parts(&both, few).count()), [1; 2]);
-        // Where each is closed before the other comes, they may be two.
+        // If each is closed before the other follows, they may be two parts.
         assert_eq!(parts(&both, 4).count(), 2);
         let by_a_vertex = [tetrahedron([0, 1, 2, 3]), tetrahedron([0, 6, 4, 5])].concat();
         assert_eq!([1, 3, 8].map(|few| parts(&by_a_vertex, few).count()), [2; 3]);

@@ -1,5 +1,5 @@
-//! Surfels of parts of meshes and clouds that are too large to be held as a whole: each part is a mesh of its own, with what
-//! is around the vertices that it answers for.
+//! Surfels of parts of meshes and point clouds that are too large for memory. Each part is a mesh
+//! of its own. It includes the surroundings of the vertices whose surfels it makes.
 
 use super::{
     Known, Mesh, SurfelOptions,
@@ -14,29 +14,30 @@ use crate::{Deadline, Result, splat::Splat};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// What going through the triangles of a mesh once tells of it. Two parts add up.
+/// What one pass over the triangles of a mesh collects. The results of two parts can be joined.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Triangles {
-    /// Sums as of [`Mesh::is_closed`], by index and by place.
+    /// Sums as in [`Mesh::is_closed`], by index and by position.
     edges: [u64; 2],
-    /// Which side is out.
+    /// Decides which side is outside.
     sums: Sums,
-    /// About how many triangles they will be once long edges are cut.
+    /// Estimated triangles after long edges are cut.
     pub expected: f64,
-    /// How many those with long edges become, once they are counted; about how many, where they are more than there is room for.
+    /// The number of triangles that those with long edges are cut into, once counted. An estimate
+    /// if it exceeds the limit.
     pub cut: usize,
     /// The smallest and the largest coordinates of corners.
     bounds: Option<[Vec3; 2]>,
-    /// The corners of those with an edge that is to be cut, and what names them.
+    /// The corners of the triangles that have an edge to cut. `names` holds their indices.
     pub long: Vec<[Vec3; 3]>,
     names: Vec<[u32; 3]>,
     pub longest: f32,
-    /// How many times too long an edge is.
+    /// The largest factor by which an edge is too long.
     excess: f32,
 }
 
 impl Triangles {
-    /// Adds a triangle by its indices and corners where edges longer than `length` are cut.
+    /// Adds a triangle by its indices and corners. Edges longer than `length` are to be cut.
     pub fn add(&mut self, [a, b, c]: [u32; 3], corners: [Vec3; 3], length: f32) {
         let [p, q, r] = corners;
         let sums = [
@@ -49,7 +50,7 @@ impl Triangles {
         self.sums.add_triangle(corners);
         self.surround([p.min(q).min(r), p.max(q).max(r)]);
         let edges = [(p, q), (q, r), (r, p)].map(|(a, b)| (a - b).length());
-        // A narrow triangle counts as less long, for its edges may be longer.
+        // The edges of a narrow triangle may be longer, so it counts as shorter.
         let allowed = length * stretch(edges, length);
         let longest = edges[0].max(edges[1]).max(edges[2]);
         self.longest = self.longest.max(longest);
@@ -80,7 +81,7 @@ impl Triangles {
         self.excess = self.excess.max(other.excess);
     }
 
-    /// Counts what those with long edges are cut into, where there is room for so many.
+    /// Counts the triangles that those with long edges are cut into, up to `room`.
     fn count_long(&mut self, length: f32, room: usize, deadline: Deadline) -> Result<()> {
         let mut vertices: Vec<u32> = self.names.as_flattened().to_vec();
         vertices.par_sort_unstable();
@@ -101,21 +102,21 @@ impl Triangles {
     }
 }
 
-/// How the surfels of all parts of a mesh are made, so that they are those of the whole.
+/// How the surfels of all parts of a mesh are made, so that they equal those of the whole.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MeshPieces {
     is_split: bool,
-    /// The length that edges are measured in, and −1 where the mesh is inside out.
+    /// The length that edges are measured in; and `outward`, −1 if the mesh is inside out.
     unit: f32,
     outward: f32,
     /// Whether any edge is cut.
     is_coarse: bool,
-    /// The longest that an edge may stay, where no triangle is narrow.
+    /// The longest edge that is not cut, unless its triangle is narrow.
     pub length: f32,
     pub closing: Option<PiecesClosing>,
 }
 
-/// What closes a mesh, as of [`Mesh::is_closed`].
+/// How a mesh is closed, as in [`Mesh::is_closed`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PiecesClosing {
     Vertices,
@@ -123,9 +124,10 @@ pub(crate) enum PiecesClosing {
 }
 
 impl MeshPieces {
-    /// Of a mesh whose vertices lie between these `bounds`, relative to its origin; `look` goes through its triangles where
-    /// edges longer than what it is given are cut. Also gives what the last look told. Where there is no `room` for so many
-    /// triangles, what they are cut into is more than that.
+    /// Prepares a mesh with this many points and triangles and with these `bounds`, relative to its
+    /// origin. `look(length)` visits its triangles with edges longer than `length` to be cut.
+    /// Returns the result of the last visit as well. If cutting would give more than `room`
+    /// triangles, `cut` of that result is an estimate above `room`.
     pub fn new(
         [points, triangles]: [usize; 2],
         [has_normals, has_uvs]: [bool; 2],
@@ -137,7 +139,8 @@ impl MeshPieces {
         let budget = options.most_once_cut(triangles);
         let around_all = largest_edge(bounds, f64::INFINITY, options);
         let first = look(around_all)?;
-        // Vertices that no triangle has do not count, and the area may.
+        // Vertices that no triangle uses do not count towards the bounds, and the area may limit
+        // the length.
         let unit = largest_edge(first.bounds.unwrap_or_default(), first.sums.area() / 3.0, options);
         let mut first = (unit == around_all).then_some(first);
         let (length, seen) = affordable(
@@ -178,13 +181,14 @@ impl MeshPieces {
         ))
     }
 
-    /// The longest edge that may stay.
+    /// The longest edge after cutting.
     pub fn longest(&self) -> f32 {
         self.length * STRETCH
     }
 
-    /// The surfels of those vertices of a part that are `owned`; all triangles at them must be in it. Where `is_long`, also
-    /// those that cutting long edges adds; then all triangles that are cut must be in it.
+    /// Makes the surfels of the `owned` vertices of a part, which must contain all triangles at
+    /// them. If `is_long`, also makes the surfels that cutting long edges adds. The part must then
+    /// contain all triangles that are cut.
     pub fn surfels(
         &self,
         part: &Mesh,
@@ -207,7 +211,8 @@ impl MeshPieces {
     }
 }
 
-/// The surfels of those points of a part of a cloud that are `owned`, with their indices; the others are their neighbours.
+/// Makes the surfels of the `owned` points of a part of a point cloud, with their indices. The
+/// other points are neighbours.
 pub(crate) fn cloud_piece(
     part: &Mesh,
     owned: &[bool],
@@ -231,8 +236,8 @@ mod tests {
         seen
     }
 
-    /// A few long triangles below a scan that has all triangles of the budget: they are cut, and the scan is not gone through again
-    /// and again.
+    /// A few long triangles below a scan that already has as many triangles as the budget. The long
+    /// ones are cut, and the scan is visited only a few times.
     #[test]
     fn the_long_ones_of_a_large_scan_are_cut() {
         let mut mesh = Mesh::cube(1.0);
@@ -257,12 +262,13 @@ mod tests {
         )
         .unwrap();
         assert!(pieces.unit < 0.1 && told.cut > counts[1] / 20, "{} and {}", pieces.unit, told.cut);
-        assert!(looks < 8, "{looks} looks");
+        assert!(looks < 8, "{looks} visits");
         let fine = mesh.triangles_once_cut(&options, usize::MAX).unwrap();
         assert_eq!(fine, counts[1] - told.long.len() + told.cut);
     }
 
-    /// Pieces are cut as the whole is, also where there is a budget, and no farther than there is room.
+    /// Pieces are cut like the whole mesh, also with a budget, and never further than `room`
+    /// allows.
     #[test]
     fn the_budget_is_that_of_the_whole() {
         let mut mixed = Mesh::cube(1.0);

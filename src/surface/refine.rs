@@ -1,8 +1,9 @@
 //! Cutting large triangles, so that surfels at the corners stay small.
 //!
-//! In each round the longest edges of every triangle that has edges over the wanted length are halved, and the triangles
-//! beside them cut in two, three or four. Both neighbours of an edge see it halved, so no gap opens between them.
-//! Halving would also multiply needles (two long edges and a short one) across, so these are cut in slabs.
+//! Each round halves the longest edges of every triangle that has edges over the wanted length, and
+//! cuts the triangles beside them in two, three or four. Both neighbours of an edge see it halved,
+//! so no gap opens between them. Halving would also multiply needles (two long edges and a short
+//! one) across their width, so these are cut into slabs.
 
 use super::{Mesh, Texture, smooth::corner_normals};
 use crate::{Deadline, Result, memory};
@@ -12,47 +13,49 @@ use std::borrow::Cow;
 
 /// A texture is sampled about this many texels apart …
 const TEXELS: f32 = 1.5;
-/// … but no closer than this part of the longest edge that is allowed.
+/// … but no closer than this fraction of the longest allowed edge.
 const FINEST: f32 = 1.0 / 8.0;
 
-/// A triangle is narrow where its shortest edge is no longer than this part of the longest that is allowed …
+/// A triangle is narrow if its shortest edge is at most this fraction of the longest allowed one …
 const NARROW: f32 = 1.0 / 8.0;
-/// … and then its edges may be this many times as long: an ellipse can be as long and narrow as it, where cutting it across would give
-/// many.
+/// … and then its edges may be this many times as long. An ellipse can be just as long and narrow,
+/// whereas cutting across would give many.
 pub(super) const STRETCH: f32 = 2.5;
 
-/// A texture that repeats this often between two of its finest samples cannot be resolved: its triangle is not cut for it.
+/// If a texture repeats this often between two of its finest samples, it cannot be resolved: its
+/// triangle is not cut for it.
 const MOST_REPEATS: f64 = 16.0;
 
-/// What errors call the work of this module.
+/// The name of this module's work in errors.
 const WORK: &str = "cutting long triangles";
 
-/// Where there would be too many triangles, lengths grow by whole steps of this factor: two that look at the same triangles, in
-/// whatever order they add them up, take the same number of steps.
+/// With too many triangles, lengths grow by whole steps of this factor. Two passes over the same
+/// triangles then take the same number of steps, in whatever order they add them up.
 const STEP: f64 = 1.05;
 
-/// What edges may stay.
+/// Which edges may stay uncut.
 struct Wanted<'a> {
     mesh: &'a Mesh,
-    /// The longest edge that was asked for.
+    /// The longest edge that the caller asked for.
     asked: f32,
     length: f32,
     /// Factor on [`TEXELS`] and [`FINEST`] that keeps to the budget.
     coarser: f32,
     steps: i32,
-    /// Triangles whose texture cannot be resolved; empty where no mesh has a texture.
+    /// Triangles whose texture cannot be resolved; empty if the mesh has no texture.
     is_blurred: Vec<bool>,
 }
 
 /// A mesh of small triangles.
 pub(super) struct Refined<'a> {
     pub mesh: Cow<'a, Mesh>,
-    /// Which triangle of the mesh before each was cut from; none where nothing was cut.
+    /// The triangle of the original mesh that each was cut from; `None` if nothing was cut.
     pub sources: Option<Vec<u32>>,
 }
 
-/// The mesh with no edge longer than `length` (in its unit), and textured triangles cut to about the size of the texels.
-/// Lengths grow where there would be more triangles than the [`budget`].
+/// Returns the mesh with no edge longer than `length` (in its unit), and textured triangles cut to
+/// about the size of the texels. If there would be more triangles than the [`budget`], lengths
+/// grow.
 ///
 /// # Errors
 /// [`Error::Timeout`](crate::Error::Timeout) and [`Error::Memory`](crate::Error::Memory).
@@ -77,18 +80,18 @@ pub(super) fn refine(
     Ok(Refined { mesh: Cow::Owned(fine), sources: Some(sources) })
 }
 
-/// How many triangles cutting may lead to: `most`, or an eighth more than there are, so that the few long ones of a large scan are
-/// cut, too.
+/// Returns the most triangles after cutting: `most`, or an eighth more than there are. The latter
+/// lets the few long triangles of a large scan be cut too.
 pub(super) fn budget(most: usize, triangles: usize) -> usize {
     most.max(triangles.saturating_add(triangles / 8))
 }
 
-/// How many triangles there will be.
+/// How many triangles to expect.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Expected {
-    /// Those that stay whole.
+    /// Triangles that stay whole.
     pub whole: f64,
-    /// About how many others are cut into.
+    /// Estimated pieces of the other triangles.
     pub cut: f64,
 }
 
@@ -101,15 +104,17 @@ impl Expected {
         Self { whole: self.whole + other.whole, cut: self.cut + other.cut }
     }
 
-    /// How many steps longer edges have to be. Those that stay whole are no fewer then.
+    /// Returns by how many steps lengths have to grow. Longer lengths do not reduce the triangles
+    /// that stay whole.
     fn steps(self, budget: usize) -> i32 {
         let wanted = (self.cut / (budget as f64 - self.whole).max(1.0)).sqrt().ln() / STEP.ln();
         wanted.ceil().clamp(1.0, 1e3) as i32
     }
 }
 
-/// The steps to take after so many attempts led to too many triangles. The first are single ones, because estimates are
-/// nearly right for what scanners and artists make. Later ones double: whatever the input is, there are few attempts.
+/// Returns the steps to take after `failed` attempts gave too many triangles. The first are single
+/// steps, because estimates are nearly right for scans and modelled meshes. Later ones double, so
+/// that any input needs few attempts.
 fn steps_after(failed: u32) -> i32 {
     1 << failed.saturating_sub(SINGLE_STEPS).min(9)
 }
@@ -119,7 +124,7 @@ const SINGLE_STEPS: u32 = 24;
 /// Why cutting ended early.
 #[derive(Debug)]
 enum Stop {
-    /// There would be more triangles than allowed: about so many.
+    /// There would be more triangles than allowed. Holds an estimate of their number.
     TooMany(usize),
     Failed(crate::Error),
 }
@@ -130,11 +135,11 @@ impl From<crate::Error> for Stop {
     }
 }
 
-/// As [`refine`], with the number of the triangle that each was cut from in its material's place; `None` where nothing is to be
-/// cut.
+/// Like [`refine`], but the material of each triangle is the number of the triangle that it was cut
+/// from. `None` if nothing is to be cut.
 ///
 /// # Errors
-/// [`Stop::TooMany`] for more than `room`, before there are as many.
+/// [`Stop::TooMany`] for more than `room` triangles, before there are that many.
 fn refined(
     mesh: &Mesh,
     length: f32,
@@ -155,7 +160,7 @@ fn refined(
             wanted.coarsen(expected.steps(budget));
             continue;
         }
-        // A triangle is also cut where its neighbours are, so that only cutting tells how many there are.
+        // A triangle is also cut if its neighbours are, so only cutting gives the exact number.
         memory::room(WORK, mesh.bytes().saturating_add(4 * mesh.triangles.len() as u64))?;
         let mut fine =
             Mesh { triangle_materials: (0..mesh.triangles.len() as u32).collect(), ..mesh.clone() };
@@ -190,7 +195,8 @@ impl<'a> Origin<'a> {
         Ok(Self { mesh, sources, normals: corner_normals(mesh, crease_angle_degrees, deadline)? })
     }
 
-    /// The normal at a corner of the `fine` mesh, interpolated between those of the whole triangle; of any length.
+    /// Returns the normal at a corner of the `fine` mesh, interpolated between those of the
+    /// original triangle. It is not normalised.
     pub fn normal(&self, fine: &Mesh, at: u32) -> Vec3 {
         let source = self.sources[at as usize / 3] as usize;
         let [a, b, c] = self.mesh.triangles[source]
@@ -210,10 +216,11 @@ impl<'a> Origin<'a> {
     }
 }
 
-/// How many triangles there are once the mesh is refined; about how many, where they are more than `room`.
+/// Returns the number of triangles after the mesh is refined. If there are more than `room`, the
+/// result is an estimate above `room`.
 ///
 /// # Errors
-/// Those of [`refine`].
+/// As [`refine`].
 pub(super) fn count_of_refined(
     mesh: &Mesh,
     length: f32,
@@ -242,11 +249,11 @@ pub(super) fn count_of_refined(
     }
 }
 
-/// How many triangles there are once those of a mesh without texture are cut until no edge is longer than `length`; about how
-/// many, where they are more than `room`.
+/// Returns the number of triangles after those of a mesh without texture are cut until no edge is
+/// longer than `length`. If there are more than `room`, the result is an estimate above `room`.
 ///
 /// # Errors
-/// Those of [`refine`].
+/// As [`refine`].
 pub(super) fn count_once_cut(
     mesh: &Mesh,
     length: f32,
@@ -256,9 +263,10 @@ pub(super) fn count_once_cut(
     count_of_refined(mesh, length, usize::MAX, room, deadline)
 }
 
-/// The length that edges without texture may have where there is a budget of triangles, which are no more already: `length`, or
-/// longer, as [`refine`] chooses it. `look` tells what a length leads to, `expected` how many triangles these are, and
-/// `fits` whether those that are really made keep to the budget.
+/// Chooses the longest edge without texture for a budget of triangles that the input does not
+/// exceed: `length`, or longer, as [`refine`] chooses it. `look` visits the triangles for a length,
+/// and `expected` estimates how many there will be. `fits` cuts them and returns whether the exact
+/// number keeps to the budget.
 pub(super) fn affordable<S, E>(
     length: f32,
     budget: usize,
@@ -282,7 +290,7 @@ pub(super) fn affordable<S, E>(
     }
 }
 
-/// A factor on lengths after so many steps.
+/// Returns the factor on lengths after this many steps.
 fn coarser(steps: i32) -> f32 {
     STEP.powi(steps) as f32
 }
@@ -290,7 +298,7 @@ fn coarser(steps: i32) -> f32 {
 /// Cuts until every edge may stay.
 ///
 /// # Errors
-/// [`Stop::TooMany`] for more than `most` triangles, before there are as many.
+/// [`Stop::TooMany`] for more than `most` triangles, before there are that many.
 fn cut_all(
     fine: &mut Mesh,
     wanted: &Wanted,
@@ -302,7 +310,7 @@ fn cut_all(
     loop {
         deadline.check(WORK)?;
         slice_needles(fine, wanted, settled, most)?;
-        // Three edges at most are marked, in parts and as a whole.
+        // At most three edges per triangle are marked, in one list per task and in one joint list.
         let open = (fine.triangles.len() - settled) as u64;
         memory::room(WORK, open.saturating_mul(6 * size_of::<(u32, u32)>() as u64))?;
         let mut marked = marked_edges(fine, wanted, settled);
@@ -327,7 +335,8 @@ impl<'a> Wanted<'a> {
         wanted
     }
 
-    /// Whether the texture of a triangle runs too fast along an edge to be resolved, however much it is cut.
+    /// Returns whether a triangle's texture runs too fast along an edge to be resolved, however
+    /// finely the edge is cut.
     fn is_blurred(&self, triangle: usize, t: &[u32; 3]) -> bool {
         let Some(texture) = self.texture(triangle) else { return false };
         let size = DVec2::new(texture.width.into(), texture.height.into());
@@ -345,7 +354,7 @@ impl<'a> Wanted<'a> {
         })
     }
 
-    /// The texture of a triangle of the mesh.
+    /// Returns the texture of a triangle of the mesh.
     fn texture(&self, triangle: usize) -> Option<&Texture> {
         let &material = self.mesh.triangle_materials.get(triangle)?;
         self.mesh.materials[material as usize].texture.as_deref()
@@ -356,7 +365,7 @@ impl<'a> Wanted<'a> {
             && self.mesh.materials.iter().any(|material| material.texture.is_some())
     }
 
-    /// Takes so many steps. Those of a texture's triangles come first, up to the length of others.
+    /// Takes this many steps. Textured triangles become coarser first, up to the length of others.
     fn coarsen(&mut self, steps: i32) {
         self.steps = self.steps.saturating_add(steps);
         let first = if self.is_textured() { 1.0 } else { 1.0 / FINEST };
@@ -364,7 +373,7 @@ impl<'a> Wanted<'a> {
         self.length = self.asked * (self.coarser * FINEST).max(1.0);
     }
 
-    /// The size of a texel along an edge, in texels: how long it is in its triangle's texture; 0 without one.
+    /// Returns the length of an edge in texels of its triangle's texture; 0 without one.
     fn texels(&self, mesh: &Mesh, source: usize, a: u32, b: u32) -> f32 {
         let Some(texture) = self.texture(source).filter(|_| !self.is_blurred[source]) else {
             return 0.0;
@@ -375,8 +384,8 @@ impl<'a> Wanted<'a> {
         ((a - b) * Vec2::new(texture.width as f32, texture.height as f32)).length()
     }
 
-    /// How many times too long an edge is in a triangle of this stretch; up to 1 it may stay. One that numbers of 32 bits have
-    /// no middle for stays.
+    /// Returns how many times too long an edge is in a triangle of this stretch; up to 1 it may
+    /// stay. An edge whose midpoint is not distinct in 32 bits stays.
     fn excess(&self, mesh: &Mesh, source: usize, stretch: f32, [a, b]: [u32; 2]) -> f32 {
         let ends = [mesh.positions[a as usize], mesh.positions[b as usize]];
         if ends.contains(&(ends[0] * 0.5 + ends[1] * 0.5)) {
@@ -388,24 +397,24 @@ impl<'a> Wanted<'a> {
         (length / (self.length * stretch)).max(texels.min(finest))
     }
 
-    /// How many times too long the edges of a triangle are, from its first corner on.
+    /// Returns how many times too long each edge of a triangle is, starting at the first corner.
     fn excesses(&self, mesh: &Mesh, source: usize, t: [u32; 3]) -> [f32; 3] {
         let [a, b, c] = t.map(|vertex| mesh.positions[vertex as usize]);
         let stretch = stretch([a - b, b - c, c - a].map(Vec3::length), self.length);
         [(0, 1), (1, 2), (2, 0)].map(|(i, j)| self.excess(mesh, source, stretch, [t[i], t[j]]))
     }
 
-    /// Whether a triangle of the mesh may stay whole.
+    /// Returns whether a triangle of the mesh may stay whole.
     fn is_small(&self, triangle: usize, t: [u32; 3]) -> bool {
         self.excesses(self.mesh, triangle, t).iter().all(|excess| *excess <= 1.0)
     }
 
-    /// Whether all triangles of the mesh may.
+    /// Returns whether all triangles of the mesh may stay whole.
     fn are_small(&self) -> bool {
         self.mesh.triangles.par_iter().enumerate().all(|(index, &t)| self.is_small(index, t))
     }
 
-    /// About how many triangles there will be.
+    /// Estimates how many triangles there will be.
     fn expected(&self) -> Expected {
         let parts = |(source, t): (usize, &[u32; 3])| {
             let excess = self.excesses(self.mesh, source, *t).map(f64::from);
@@ -413,7 +422,8 @@ impl<'a> Wanted<'a> {
             let edges = [a - b, b - c, c - a].map(Vec3::length);
             let stretch = stretch(edges, self.length);
             let plain = edges.map(|edge| f64::from(edge / (self.length * stretch)));
-            // Edges that texels make longer need not be those of any triangle: then two of them tell the most that there can be.
+            // Lengths that texels dominate need not form a triangle. Then the longer two give an
+            // upper bound.
             if excess.iter().all(|excess| *excess <= 1.0) {
                 Expected { whole: 1.0, cut: 0.0 }
             } else if excess.iter().zip(plain).all(|(excess, plain)| *excess <= plain) {
@@ -431,29 +441,32 @@ impl<'a> Wanted<'a> {
     }
 }
 
-/// How many times as long as others the edges of a triangle may be, that has edges of these lengths.
+/// Returns how many times the normal length the edges of a triangle may have, for a triangle of
+/// these edges.
 pub(super) fn stretch(edges: [f32; 3], length: f32) -> f32 {
     let shortest = edges[0].min(edges[1]).min(edges[2]);
     if shortest <= length * NARROW { STRETCH } else { 1.0 }
 }
 
-/// Whether no edge of the mesh has to be cut where `length` is the longest that is allowed.
+/// Returns whether no edge of the mesh has to be cut if `length` is the longest allowed.
 pub(super) fn is_fine(mesh: &Mesh, length: f32) -> bool {
     Wanted::new(mesh, length).are_small()
 }
 
-/// About how many triangles are made of one whose edges are so many times too long.
+/// Estimates the pieces of a triangle whose edges are these many times too long.
 pub(super) fn pieces([p, q, r]: [f64; 3]) -> f64 {
     if p.max(q).max(r) <= 1.0 {
         return 1.0;
     }
-    // The triangle measured in the lengths that are wanted, by Heron; a cut leaves edges of about 0.7.
+    // The triangle's area in units of the wanted length, by Heron's formula. A cut leaves edges of
+    // about 0.7.
     let s = (p + q + r) * 0.5;
     let area = (s * (s - p) * (s - q) * (s - r)).max(0.0).sqrt();
     (area / 0.21).max(p.max(q).max(r)).max(1.0)
 }
 
-/// The most triangles that one is cut into whose edges are so many times too long, whether or not there is such a triangle.
+/// Returns an upper bound on the pieces of a triangle whose edges are these many times too long.
+/// The lengths need not form a triangle.
 fn most_pieces(mut edges: [f64; 3]) -> f64 {
     edges.sort_by(f64::total_cmp);
     let [short, middle, long] = edges;
@@ -463,17 +476,17 @@ fn most_pieces(mut edges: [f64; 3]) -> f64 {
     (0.5 * short.max(1.0) * middle.max(1.0) / 0.21).max(long)
 }
 
-/// A needle's corners from its tip on, and into how many parts its long edges are to be cut.
+/// A needle's corners, starting at its tip, and the number of parts of its long edges.
 struct Needle {
     triangle: usize,
     corners: [u32; 3],
     parts: u32,
 }
 
-/// Cuts the triangles with two long edges and a short one in slabs across, each as long as it may be.
+/// Cuts triangles with two long edges and a short one into slabs across, each as long as allowed.
 ///
 /// # Errors
-/// [`Stop::TooMany`] for more than `most` triangles, before there are as many.
+/// [`Stop::TooMany`] for more than `most` triangles, before there are that many.
 fn slice_needles(
     mesh: &mut Mesh,
     wanted: &Wanted,
@@ -497,7 +510,7 @@ fn slice_needles(
             parts: (longest / step).ceil().min(1e6) as u32,
         })
     };
-    // A list in parts, and as a whole; then the edges of each needle.
+    // One list per task and one joint list; then the edges of each needle.
     let open = (mesh.triangles.len() - settled) as u64;
     memory::room(WORK, open.saturating_mul(2 * size_of::<Needle>() as u64))?;
     let needles: Vec<Needle> =
@@ -505,7 +518,8 @@ fn slice_needles(
     if needles.is_empty() {
         return Ok(());
     }
-    // The long edges with the parts that the more demanding neighbour asks for, and where each one's new vertices begin.
+    // The long edges with the number of parts that the more demanding neighbour needs, and the
+    // first new vertex of each.
     memory::room(WORK, needles.len() as u64 * 4 * size_of::<((u32, u32), u32)>() as u64)?;
     let mut edges: Vec<((u32, u32), u32)> = needles
         .iter()
@@ -575,7 +589,8 @@ fn slice_needles(
     Ok(())
 }
 
-/// Every edge (smaller index first) that is too long for one of its triangles, possibly twice.
+/// Returns every edge (smaller index first) that is too long for one of its triangles, possibly
+/// twice.
 fn marked_edges(mesh: &Mesh, wanted: &Wanted, settled: usize) -> Vec<(u32, u32)> {
     mesh.triangles[settled..]
         .par_iter()
@@ -584,7 +599,8 @@ fn marked_edges(mesh: &Mesh, wanted: &Wanted, settled: usize) -> Vec<(u32, u32)>
             let edges = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
             let source = mesh.triangle_materials[settled + index] as usize;
             let excess = wanted.excesses(mesh, source, t);
-            // Only the longest, and those about as long: a flat triangle is cut along its length first.
+            // Only the longest, and those of similar length: a flat triangle is cut along its
+            // length first.
             let least = (excess.iter().fold(0.0, |a: f32, &b| a.max(b)) * 0.7).max(1.0);
             edges
                 .into_iter()
@@ -598,14 +614,14 @@ fn sorted((a, b): (u32, u32)) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
-/// The pieces of a triangle, how many they are, and what they were cut from.
+/// The pieces of a triangle, their number, and the triangle that they were cut from.
 type Pieces = (([[u32; 3]; 4], usize), u32);
 
-/// Halves the marked edges of the triangles from `settled` on. The triangles without any come first afterwards; gives
-/// the number of all that are settled.
+/// Halves the marked edges of the triangles from `settled` on. Afterwards the triangles without any
+/// come first. Returns the new number of settled triangles.
 ///
 /// # Errors
-/// [`Stop::TooMany`] for more than `most` triangles, before there are as many.
+/// [`Stop::TooMany`] for more than `most` triangles, before there are that many.
 fn cut(
     mesh: &mut Mesh,
     marked: &[(u32, u32)],
@@ -652,7 +668,7 @@ fn cut(
     Ok(now_settled)
 }
 
-/// Appends vertices between pairs of others, each at a part of the way.
+/// Appends vertices between pairs of others, each at a fraction of the way.
 fn add_vertices(mesh: &mut Mesh, new: &[(u32, u32, f32)]) -> Result<()> {
     fn extend<T: Copy + Send + Sync>(
         values: &mut Vec<T>,
@@ -669,7 +685,8 @@ fn add_vertices(mesh: &mut Mesh, new: &[(u32, u32, f32)]) -> Result<()> {
         }
         Ok(())
     }
-    // Written so that the middle is the same from either end: vertices that coincide go on doing so.
+    // Written so that the midpoint is the same from either end: vertices that coincide continue to
+    // do so.
     extend(&mut mesh.positions, new, |a: Vec3, b, part| a * (1.0 - part) + b * part)?;
     extend(&mut mesh.normals, new, |a: Vec3, b, part| a.lerp(b, part).normalize_or_zero())?;
     extend(&mut mesh.uvs, new, |a: Vec2, b, part| a.lerp(b, part))?;
@@ -680,7 +697,7 @@ fn add_vertices(mesh: &mut Mesh, new: &[(u32, u32, f32)]) -> Result<()> {
     })
 }
 
-/// The pieces of a triangle whose edges (0–1, 1–2, 2–0) have these midpoints.
+/// Returns the pieces of a triangle whose edges (0–1, 1–2, 2–0) have these midpoints.
 fn split(t: [u32; 3], halves: [Option<u32>; 3], positions: &[Vec3]) -> ([[u32; 3]; 4], usize) {
     let none = [0; 3];
     let turn = |by: usize| [t[by % 3], t[(by + 1) % 3], t[(by + 2) % 3]];
@@ -689,7 +706,8 @@ fn split(t: [u32; 3], halves: [Option<u32>; 3], positions: &[Vec3]) -> ([[u32; 3
         [Some(x), Some(y), Some(z)] => ([[t[0], x, z], [x, t[1], y], [z, y, t[2]], [x, y, z]], 4),
         _ => {
             let count = halves.iter().flatten().count();
-            // Turned so that with one midpoint it is on the first edge, and with two the last edge has none.
+            // Rotated so that a single midpoint is on the first edge, and with two midpoints the
+            // last edge has none.
             let by = (0..3).find(|&by| {
                 let has = |i: usize| halves[(by + i) % 3].is_some();
                 has(0) && !has(2) && (count == 1 || has(1))
@@ -756,7 +774,7 @@ mod tests {
         assert!(refine(&mesh, 0.01, 1 << 20, NEVER).unwrap().mesh.triangles.len() < 400);
     }
 
-    /// Whatever the triangles are like, and however little there is too much of.
+    /// Whatever the triangles are like, and however small the excess is.
     #[test]
     fn the_budget_holds() {
         let apexes = [
@@ -799,7 +817,7 @@ mod tests {
         let origin = Origin::new(&sphere, fine.sources.unwrap(), 60.0, NEVER).unwrap();
         for (index, triangle) in fine.mesh.triangles.iter().enumerate() {
             for (corner, &vertex) in triangle.iter().enumerate() {
-                // Normals that change linearly over a triangle, as its places do, go on being the same.
+                // Normals that change linearly over a triangle, like positions, stay the same.
                 let found = origin.normal(&fine.mesh, (3 * index + corner) as u32).normalize();
                 assert!(
                     found.dot(fine.mesh.positions[vertex as usize].normalize()) > 0.9999,

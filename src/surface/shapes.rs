@@ -1,4 +1,5 @@
-//! Meshes made by formula, for tests, examples and the demo. All are closed, with normals outward by their winding.
+//! Meshes made by formula, for tests, examples and the demo. All are closed, and their winding
+//! makes normals point outward.
 
 use super::Mesh;
 use glam::Vec3;
@@ -8,7 +9,8 @@ use std::{
 };
 
 impl Mesh {
-    /// A sphere of radius 1: an icosahedron whose triangles are cut in four `subdivisions` times (at most 9).
+    /// A sphere of radius 1: an icosahedron whose triangles are split in four `subdivisions` times
+    /// (at most 9).
     pub fn sphere(subdivisions: u32) -> Self {
         let g = (1.0 + 5f32.sqrt()) / 2.0;
         let mut positions: Vec<Vec3> = [
@@ -27,7 +29,7 @@ impl Mesh {
         ]
         .map(|p| Vec3::from_array(p).normalize())
         .to_vec();
-        // The faces are the triples of vertices that are all neighbours; turned outward.
+        // The faces are the triples of vertices that are all neighbours, oriented outward.
         let near = |a: usize, b: usize| positions[a].distance(positions[b]) < 1.1;
         let mut triangles = Vec::new();
         for a in 0..12 {
@@ -61,7 +63,8 @@ impl Mesh {
         Self { positions, triangles, ..Self::default() }
     }
 
-    /// An axis-parallel cube around the origin, with edges of this length: 8 vertices, 12 triangles.
+    /// An axis-parallel cube around the origin, with edges of this length: 8 vertices, 12
+    /// triangles.
     pub fn cube(size: f32) -> Self {
         let half = |bit: usize| if bit == 0 { -size / 2.0 } else { size / 2.0 };
         let positions = (0..8).map(|i| Vec3::new(half(i & 1), half(i & 2), half(i & 4))).collect();
@@ -71,8 +74,9 @@ impl Mesh {
         Self { positions, triangles, ..Self::default() }
     }
 
-    /// The demo's object: a tube of radius 0.35 along a trefoil knot about 3 in radius, its colour running through the
-    /// hues. `along` vertices along the tube and `around` it, 3 at least of each; at most 65,536.
+    /// The demo's object: a tube of radius 0.35 along a trefoil knot of radius about 3, whose
+    /// colour runs through the hues. It has `along` vertices along the tube and `around` around it.
+    /// Both are clamped to 3 … 65,536.
     pub fn knot(along: u32, around: u32) -> Self {
         let (along, around) = (along.clamp(3, 1 << 16), around.clamp(3, 1 << 16));
         let curve = |t: f32| {
@@ -110,7 +114,7 @@ impl Mesh {
     }
 }
 
-/// A colour of the rainbow, its angle in radians.
+/// Returns a colour of the rainbow; the angle is in radians.
 fn hue(angle: f32, value: f32) -> [u8; 4] {
     let part = |shift: f32| ((0.55 + 0.45 * (angle + shift).cos()) * value * 255.0) as u8;
     [part(0.0), part(-2.0 * PI / 3.0), part(2.0 * PI / 3.0), 255]

@@ -8,16 +8,18 @@ use crate::{Deadline, Result, deadline::Clock, memory};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Creases sharper than this stay creases, whatever the options say (degrees): surfels lie in the plane of their group.
+/// Creases sharper than this (degrees) stay creases, whatever the options say, because surfels lie
+/// in the plane of their group.
 const SHARPEST: f32 = 60.0;
 
-/// What errors call the work of this module.
+/// The name of this module's work in errors.
 const WORK: &str = "finding the normals of the triangles' corners";
 
 /// The smooth groups of the triangles around one vertex.
 ///
-/// A group is a cone around its first normal, so that no normal of it is far from the plane of a triangle in it, even where
-/// many small steps add up to a large turn. There are never more than a few groups.
+/// A group is a cone around its first normal. A surfel in the plane of the group's normal is thus
+/// never far from its triangles, even if many small steps add up to a large turn. There are never
+/// more than a few groups.
 pub(super) struct Groups {
     /// Cosine of the crease angle.
     crease: f32,
@@ -34,7 +36,7 @@ impl Groups {
         self.crease
     }
 
-    /// Forgets the vertex before.
+    /// Forgets the previous vertex.
     pub fn clear(&mut self) {
         self.seeds.clear();
     }
@@ -43,7 +45,8 @@ impl Groups {
         self.seeds.len()
     }
 
-    /// The group of a triangle with this unit normal: the nearest within the crease angle, or a new one.
+    /// Returns the group of a triangle with this unit normal: the nearest within the crease angle,
+    /// or a new one.
     pub fn place(&mut self, normal: Vec3) -> usize {
         let mut nearest = (self.seeds.len(), self.crease);
         for (group, seed) in self.seeds.iter().enumerate() {
@@ -59,8 +62,9 @@ impl Groups {
     }
 }
 
-/// The normal that each triangle has at its corners: the file's at the vertex, or the mean of the corner's smooth group,
-/// weighted by angle. Triangles without area have their vertices' normals alone, or zero.
+/// Returns the normal of each triangle at its corners: the file's at the vertex, or the mean of the
+/// corner's smooth group, weighted by angle. Triangles without area only have the file's normals,
+/// or zero.
 ///
 /// # Errors
 /// [`Error::Timeout`](crate::Error::Timeout) and [`Error::Memory`](crate::Error::Memory).
@@ -110,7 +114,7 @@ pub(crate) fn corner_normals(
     Ok(normals)
 }
 
-/// A triangle's unit normal, and its angle (radians) at a corner; none where it has no area.
+/// Returns a triangle's unit normal, and its angle (radians) at a corner; `None` if it has no area.
 fn at_corner(mesh: &Mesh, at: u32) -> Option<(Vec3, f32)> {
     let indices = mesh.triangles[at as usize / 3];
     let [a, b, c] =

@@ -1,31 +1,34 @@
-//! Whether a mesh is solid: then nobody outside can see the back of it, and what faces away need not be drawn.
+//! Decides whether a mesh is solid. Then its back is never visible from outside, and faces that
+//! point away need not be drawn.
 //!
-//! A closed surface alone is not enough. Through a translucent front its back is seen; and where the normals of a part point
-//! into it, what faces away is its front. Which side of a part is out is told by the sign of the volume within.
+//! A closed surface is not enough. A translucent front reveals the back, and if the normals of a
+//! part point inward, its front faces away. The sign of the enclosed volume determines which side
+//! of a part is outside.
 
 use super::{Mesh, fan::Sums, mesh::given, parts::Joining, survey::Closing};
 use crate::memory;
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Of the area of a part: so little of it may have normals on the wrong side. And of that of all: so little may be of parts without
-/// a volume. Scans have folds of a few triangles.
+/// The tolerated fraction of a part's area with normals on the wrong side. Also the tolerated
+/// fraction of the whole area in parts without volume. Scans have folds of a few triangles.
 const FOLDS: f64 = 1e-3;
-/// A given normal is on the other side of a triangle where its cosine with the triangle's is below the negative of this:
-/// at slanting ones it may be a little beyond.
+/// A given normal is on the other side of a triangle if its cosine with the triangle's normal is
+/// below the negative of this. On slanted triangles it may be slightly beyond.
 const BEYOND: f32 = 0.25;
 
-/// What tells of a connected part where its outside is, and where its normals point. Areas of corners.
+/// Evidence on a connected part: where its outside is, and where its normals point. Areas are
+/// counted once per corner.
 #[derive(Debug, Default, Clone, Copy)]
 struct Part {
     sums: Sums,
-    /// Where given normals point to the side that the triangle runs counter-clockwise on, or to the other one.
+    /// Area where given normals agree with the winding of the triangle, and where they oppose it.
     along: f64,
     against: f64,
 }
 
 impl Part {
-    /// Adds a triangle, with those normals that are given at its corners.
+    /// Adds a triangle, with the normals that are given at its corners.
     fn add(&mut self, corners: [Vec3; 3], normals: [Option<Vec3>; 3]) {
         let cross = self.sums.add_triangle(corners);
         if normals == [None; 3] {
@@ -49,18 +52,18 @@ impl Part {
     }
 }
 
-/// What some triangles tell of the parts that they are of.
+/// The evidence of some triangles on their parts.
 #[derive(Debug, Default)]
 pub(crate) struct Told {
-    /// Those of one part that came after each other are together.
+    /// One entry for each sequence of consecutive triangles of the same part.
     runs: Vec<(u32, Part)>,
     is_translucent: bool,
-    /// Whether a corner has no normal of its own.
+    /// Whether a corner has no given normal.
     lacks_normals: bool,
 }
 
 impl Told {
-    /// Adds a triangle of a part; normals of no length are none.
+    /// Adds a triangle of a part. Normals of zero length count as missing.
     pub fn add(&mut self, part: u32, corners: [Vec3; 3], normals: [Vec3; 3], is_opaque: bool) {
         self.is_translucent |= !is_opaque;
         let normals = normals.map(given);
@@ -76,7 +79,7 @@ impl Told {
     }
 }
 
-/// The parts of a mesh, as its triangles tell of them.
+/// The parts of a mesh, with the evidence of their triangles.
 #[derive(Debug)]
 pub(crate) struct Sides {
     parts: Vec<Part>,
@@ -85,12 +88,12 @@ pub(crate) struct Sides {
 }
 
 impl Sides {
-    /// Bytes of so many parts.
+    /// Bytes for this many parts.
     pub fn memory(parts: usize) -> u64 {
         (parts * size_of::<Part>()) as u64
     }
 
-    /// So many parts, of which nothing is known.
+    /// Starts this many parts without any evidence.
     pub fn new(parts: usize) -> Self {
         Self { parts: vec![Part::default(); parts], is_translucent: false, lacks_normals: false }
     }
@@ -104,13 +107,14 @@ impl Sides {
         }
     }
 
-    /// Whether all that was added is opaque, and shows its front to whoever is outside. A hollow within a part is one that
-    /// shows its back: it cannot be told from a part beside the others that is inside out.
+    /// Returns whether everything that was added is opaque and shows its front to the outside. A
+    /// part with a cavity shows its back: the cavity cannot be told from a separate part that is
+    /// inside out.
     pub fn are_solid(&self) -> bool {
-        // Normals that the file does not give are turned as a whole.
+        // Computed normals are turned outward for the mesh as a whole.
         let all = self.parts.iter().fold(Sums::default(), |sums, part| sums.with(part.sums));
         let turned = if all.side(1.0) < 0 { -1 } else { 1 };
-        // What has no volume has no side.
+        // A part without volume has no side.
         let (flat, parts): (Vec<&Part>, Vec<&Part>) =
             self.parts.iter().partition(|part| part.sums.side_of_closed() == 0);
         !self.is_translucent
@@ -123,28 +127,31 @@ impl Sides {
     }
 }
 
-/// Triangles of one parallel task, and tasks whose sums wait for each other.
+/// Triangles of one parallel task, and tasks whose results are held before they are added.
 const CHUNK: usize = 1 << 14;
 const TOGETHER: usize = 64;
 
-/// What vertices have of which the mesh tells no normal or colour.
+/// Values for vertices for which the mesh has no normal or colour.
 const NO_DIRECTION: Vec3 = Vec3::ZERO;
 const OPAQUE: u8 = 255;
 
 impl Mesh {
-    /// Whether whoever is outside sees the front of it alone, as [`Tree::closed`](crate::hierarchy::Tree::closed) promises: it
-    /// [is closed](Self::is_closed), opaque everywhere, and the normals of its surfels point out of every connected part.
-    /// Where a part has a hollow within, or no volume, the answer is no. Parts that share an edge are one.
+    /// Returns whether only the front is visible from outside, as
+    /// [`Tree::closed`](crate::hierarchy::Tree::closed) promises. The mesh must be
+    /// [closed](Self::is_closed) and opaque everywhere, and the normals of its surfels must point
+    /// out of every connected part. A part with a cavity, or without volume, makes the result
+    /// false. Parts that share an edge count as one.
     pub fn is_solid(&self) -> bool {
         let Some(closing) = self.closing() else { return false };
         if !self.has_opaque_materials() || u32::try_from(self.triangles.len()).is_err() {
             return false;
         }
-        // The part of each triangle, and the edges at which others are to come. Where they do not fit, nothing is left out of
-        // pictures.
+        // The part of each triangle, and the unmatched edges. If they do not fit in memory, backs
+        // are drawn too, which is always correct.
         if memory::room("joining the parts of a mesh", 40 * self.triangles.len() as u64).is_err() {
             tracing::warn!(
-                "too little memory to tell whether all parts are turned outward: backs will be drawn"
+                "too little memory to tell whether all parts are turned outward: \
+                 backs will be drawn"
             );
             return false;
         }
@@ -185,7 +192,7 @@ impl Mesh {
         sides.are_solid()
     }
 
-    /// Whether the materials that triangles have let nothing through.
+    /// Returns whether all materials that triangles use are opaque.
     fn has_opaque_materials(&self) -> bool {
         let mut is_used = vec![false; self.materials.len()];
         for &material in &self.triangle_materials {
@@ -230,7 +237,7 @@ mod tests {
         mesh
     }
 
-    /// With vertices of their own for all triangles.
+    /// Gives every triangle its own vertices.
     fn split(mesh: &Mesh) -> Mesh {
         let corners = mesh.triangles.iter().flatten();
         Mesh {
@@ -242,7 +249,7 @@ mod tests {
         }
     }
 
-    /// With the normals of a sphere around a place, or the opposite.
+    /// Sets the normals of a sphere around a centre, or their opposites.
     fn with_normals(mut mesh: Mesh, center: f32, sign: f32) -> Mesh {
         mesh.normals = mesh
             .positions
@@ -266,12 +273,13 @@ mod tests {
     fn a_part_that_is_inside_out_is_not_solid() {
         assert!(!both(sphere(0.0), turned(sphere(5.0))).is_solid());
         assert!(!both(turned(sphere(5.0)), sphere(0.0)).is_solid());
-        // Of vertices of their own, too.
+        // Also if every triangle has its own vertices.
         let split = split(&both(sphere(0.0), turned(sphere(5.0))));
         assert!(split.is_closed() && !split.is_solid());
     }
 
-    /// One beside the other, with the vertex that is farthest along x of the one in the place of the other's first one.
+    /// Places one mesh beside the other so that they share a vertex: the farthest along x of `one`,
+    /// and of `other` against x.
     fn hanging(one: Mesh, mut other: Mesh) -> Mesh {
         let farthest = |mesh: &Mesh, sign: f32| {
             let along = |vertex: &u32| mesh.positions[*vertex as usize].x * sign;
@@ -289,7 +297,7 @@ mod tests {
         both
     }
 
-    /// As one part the larger would hide that the smaller is inside out.
+    /// If they were one part, the larger would hide that the smaller is inside out.
     #[test]
     fn parts_that_share_a_vertex_are_told_apart() {
         let small = || Mesh {
@@ -323,7 +331,8 @@ mod tests {
         );
     }
 
-    /// Two triangles back to back, as scanners leave them, do not make a scan open; large ones do.
+    /// Two small triangles back to back, as scanners produce them, do not make a scan open. Large
+    /// ones do.
     #[test]
     fn small_flaps_do_not_count() {
         let with_flap = |size: f32| {
@@ -341,7 +350,7 @@ mod tests {
     fn given_normals_count() {
         assert!(with_normals(sphere(0.0), 0.0, 1.0).is_solid());
         assert!(!with_normals(sphere(0.0), 0.0, -1.0).is_solid());
-        // The way that triangles run does not.
+        // The winding of triangles does not matter then.
         let other = with_normals(turned(sphere(5.0)), 5.0, 1.0);
         assert!(both(with_normals(sphere(0.0), 0.0, 1.0), other.clone()).is_solid());
         let mut some = both(with_normals(sphere(0.0), 0.0, 1.0), other);
@@ -366,7 +375,7 @@ mod tests {
             color: [1.0, 1.0, 1.0, opacity],
             texture: texture(alpha),
         };
-        // The last one is not used.
+        // The second material is not used.
         for (opacity, alpha, is_solid) in [(1.0, 255, true), (0.9, 255, false), (1.0, 99, false)] {
             mesh.materials = vec![material(opacity, alpha), material(0.0, 0)];
             assert_eq!(mesh.is_solid(), is_solid, "{opacity} {alpha}");

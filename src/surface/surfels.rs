@@ -1,10 +1,12 @@
-//! From meshes and clouds to elliptic surfels.
+//! From meshes and point clouds to elliptic surfels.
 //!
-//! Large triangles are cut first ([`refine`]). Then every vertex gives one surfel for each nearly flat group of the triangles
-//! around it ([`Maker`]), in the plane of the group's normal. A surfel has the moments of its triangles: where they lie all
-//! around the vertex, it is centred there; at a boundary or a crease it is moved inward and is narrow across, so that half of
-//! the light is gone near the edge. Then it is widened as far as it must to cover its share of each triangle, so
-//! that a surface has no holes, whatever its triangles look like.
+//! Large triangles are cut first ([`refine`]). Then every vertex gets one surfel for each nearly
+//! flat group of the triangles around it ([`Maker`]), in the plane of the group's normal.
+//!
+//! A surfel has the moments of its triangles. If they surround the vertex, it is centred there. At
+//! a boundary or a crease it is moved inward and is narrow across, so that half of the light is
+//! gone near the edge. Then it is widened until it covers its share of each triangle. A surface
+//! therefore has no holes, whatever the shapes of its triangles.
 
 use super::{
     Mesh,
@@ -24,30 +26,34 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::{borrow::Cow, ops::RangeInclusive};
 
-/// How surfels are made from a mesh or cloud.
+/// How surfels are made from a mesh or point cloud.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfelOptions {
     /// Factor on all radii. Below 1 the surface may show holes.
     pub radius_scale: f32,
-    /// Optical depth at the centre of a surfel. Triangles have most of it nearly everywhere, and nowhere inside less than 0.28.
+    /// Optical depth at the centre of a surfel. Nearly everywhere on a triangle, the total depth is
+    /// most of this. Inside a triangle it is never below 0.28 times this.
     pub optical_depth: f32,
-    /// Neighbouring triangles whose normals differ by more meet in a crease; 60 at most.
+    /// Neighbouring triangles whose normals differ by more than this angle meet in a crease; at
+    /// most 60.
     pub crease_angle_degrees: f32,
-    /// Triangles are cut until no edge is longer than this part of the bounding box's diagonal.
+    /// Triangles are cut until no edge is longer than this fraction of the bounding box's diagonal.
     pub largest_spacing: f32,
-    /// The most triangles that cutting may lead to, or an eighth more than there are already; spacing grows to keep to it.
+    /// Most triangles after cutting, unless an eighth more than the input is larger. The spacing
+    /// grows to stay within this limit.
     pub most_triangles: usize,
     /// When the surfels must be ready.
     pub deadline: Deadline,
 }
 
 impl SurfelOptions {
-    /// Factors on radii that leave squares in 32 bits.
+    /// Factors on radii whose squares fit in 32 bits.
     pub const RADIUS_SCALES: RangeInclusive<f32> = 1e-6..=1e6;
-    /// Parts of the diagonal whose edges can be cut: in finer ones its fourth power does not fit 32 bits. None is cut from 1 on.
+    /// Fractions of the diagonal down to which edges can be cut. At smaller ones the fourth power
+    /// does not fit in 32 bits. From 1 on, no edge is cut.
     pub const SPACINGS: RangeInclusive<f32> = 1e-9..=f32::MAX;
 
-    /// The most triangles that cutting so many may lead to.
+    /// Returns the most triangles that cutting `triangles` of them may produce.
     pub(crate) fn most_once_cut(&self, triangles: usize) -> usize {
         budget(self.most_triangles, triangles)
     }
@@ -69,28 +75,35 @@ impl Default for SurfelOptions {
 /// Where footprints end, in standard deviations.
 pub(crate) const EXTENT: f32 = 3.0;
 
-/// What errors call the work of this module.
+/// The name of this module's work in errors.
 const WORK: &str = "making surfels";
 
-/// Vertices of one parallel task.
+/// Vertices per parallel task.
 const CHUNK: usize = 1 << 12;
 
 impl Mesh {
-    /// Surfels that cover the triangles without holes, or, where there are none, stand for the points. World units;
-    /// centres relative to the mesh's origin; the order depends on the input only.
+    /// Makes surfels that cover the triangles without holes, or, without triangles, stand for the
+    /// points. Lengths are in world units and centres are relative to the mesh's origin. The order
+    /// depends on the input only.
     ///
-    /// Colours are vertex colour × material × texture. A surfel has the file's normal at its vertex, or the angle-weighted
-    /// normal of the triangles that are smooth with its own there (over a triangle that was cut, interpolated), and lies across
-    /// it where that is within 20° of its triangles' mean normal. Normals of a closed mesh without any are turned outward.
-    /// Triangles without area, and vertices that no triangle uses, give
-    /// nothing; nor do points that coincide with another.
+    /// Colours are vertex colour × material × texture. A surfel has the file's normal at its vertex
+    /// if there is one. Otherwise it has the angle-weighted normal of the triangles that are smooth
+    /// with its own there, interpolated over a triangle that was cut. The surfel is perpendicular
+    /// to this normal if that is within 20° of its triangles' mean normal. If a closed mesh has no
+    /// normals, they are turned outward.
+    ///
+    /// Triangles without area and vertices that no triangle uses produce nothing. Of points that
+    /// coincide, only the first produces a surfel.
     ///
     /// # Errors
-    /// [`Error::NothingToDraw`] where nothing is left; [`Error::Timeout`] after the deadline; [`Error::Memory`] where there is
-    /// too little; [`Error::Argument`] for options that are no positive numbers, or beyond
-    /// [`RADIUS_SCALES`](SurfelOptions::RADIUS_SCALES), [`SPACINGS`](SurfelOptions::SPACINGS) and
-    /// [`MOST_OPTICAL_DEPTH`](Splat::MOST_OPTICAL_DEPTH), and for a mesh whose origin, positions or texture coordinates are not
-    /// finite, or whose indices or attributes do not fit its positions.
+    /// - [`Error::NothingToDraw`] if nothing is left.
+    /// - [`Error::Timeout`] after the deadline.
+    /// - [`Error::Memory`] if there is too little.
+    /// - [`Error::Argument`] for options that are not positive numbers, or outside
+    ///   [`RADIUS_SCALES`](SurfelOptions::RADIUS_SCALES), [`SPACINGS`](SurfelOptions::SPACINGS) and
+    ///   [`MOST_OPTICAL_DEPTH`](Splat::MOST_OPTICAL_DEPTH). Also for a mesh whose origin, positions
+    ///   or texture coordinates are not finite, or whose indices or attributes do not match its
+    ///   positions.
     pub fn surfels(&self, options: &SurfelOptions) -> Result<SplatSet> {
         let _span = tracing::info_span!("surfels").entered();
         self.check(options)?;
@@ -111,13 +124,14 @@ impl Mesh {
         })
     }
 
-    /// The smallest and the largest world coordinates of what is drawn: of the corners of all triangles, or of all positions
-    /// where there are none; `None` where there is nothing.
+    /// Returns the smallest and the largest world coordinates of what is drawn: the corners of all
+    /// triangles, or all positions if there are no triangles. `None` if there is nothing.
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         Some(self.local_bounds()?.map(|corner| self.origin + corner.as_dvec3()))
     }
 
-    /// As [`bounds`](Self::bounds), relative to the origin: beside one that is far away nothing might be left of their size.
+    /// Like [`bounds`](Self::bounds), relative to the origin. Added to a distant origin, the size
+    /// could vanish by rounding.
     fn local_bounds(&self) -> Option<[Vec3; 2]> {
         let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let with = |(low, high): (Vec3, Vec3), place: &Vec3| (low.min(*place), high.max(*place));
@@ -135,7 +149,7 @@ impl Mesh {
         low.cmple(high).all().then_some([low, high])
     }
 
-    /// The area of all triangles, which must not refer beyond the positions.
+    /// Returns the area of all triangles. Their indices must be within the positions.
     fn area(&self) -> f64 {
         let area = |triangle: &[u32; 3]| {
             let [a, b, c] = triangle.map(|vertex| self.positions[vertex as usize].as_dvec3());
@@ -144,11 +158,12 @@ impl Mesh {
         self.triangles.par_iter().with_min_len(CHUNK).map(area).sum()
     }
 
-    /// How many triangles surfels are made of, once large ones are cut; about how many, where they are more than there is
-    /// `room` for, which takes no more memory to find out.
+    /// Returns the number of triangles that surfels are made of, after large ones are cut. If there
+    /// are more than `room`, the result is an estimate above `room`, which takes no more memory to
+    /// compute.
     ///
     /// # Errors
-    /// Those of [`surfels`](Self::surfels).
+    /// As [`surfels`](Self::surfels).
     pub fn triangles_once_cut(&self, options: &SurfelOptions, room: usize) -> Result<usize> {
         self.check(options)?;
         let Some(bounds) = self.local_bounds() else { return Ok(0) };
@@ -179,14 +194,15 @@ impl Mesh {
             if !range.contains(&value) {
                 let (least, most) = (range.start(), range.end());
                 return Err(Error::Argument(format!(
-                    "{name} is {value:e}; {least:e} to {most:e} can be"
+                    "{name} is {value:e}; {least:e} to {most:e} are allowed"
                 )));
             }
         }
         self.validate()
     }
 
-    /// Refuses a mesh that was put together by hand and contradicts itself, or whose places are not finite.
+    /// Refuses a mesh that was built by hand and is inconsistent, or whose positions are not
+    /// finite.
     pub(crate) fn validate(&self) -> Result<()> {
         if !self.origin.is_finite() {
             return Err(Error::Argument(format!(
@@ -227,9 +243,11 @@ impl Mesh {
             !t.texels.is_empty() && t.texels.len() == t.width as usize * t.height as usize
         };
         if !self.materials.iter().filter_map(|material| material.texture.as_deref()).all(whole) {
-            return Err(Error::Argument("a texture's size is not that of its texels".into()));
+            return Err(Error::Argument(
+                "a texture's width × height is not its number of texels".into(),
+            ));
         }
-        // Squares of these fit in 32 bits.
+        // The squares of these fit in 32 bits.
         let fits = |p: &Vec3| p.abs().max_element() <= 1e18 && p.is_finite();
         if let Some(vertex) = self.positions.par_iter().position_first(|p| !fits(p)) {
             let message = format!(
@@ -249,13 +267,14 @@ impl Mesh {
         Ok(())
     }
 
-    /// Refuses a mesh of whose triangles nothing would be left once they are measured in `unit`, the longest edge that stays.
-    /// This is known before any is cut.
+    /// Refuses a mesh if all its triangles would vanish when measured in `unit`, the longest edge
+    /// that is not cut. This is known before any triangle is cut.
     fn check_extent(&self, unit: f32) -> Result<()> {
         let unit = f64::from(unit);
         let [least_area, least_ratio] =
             [LEAST_SQUARE, LEAST_RATIO_SQUARED].map(|square| f64::from(square).sqrt());
-        // What cutting leaves of an edge, in units; for a texture it cuts into finer ones.
+        // The length that cutting leaves of an edge, in units. Textured triangles are cut into
+        // smaller ones.
         let is_textured = self.materials.iter().any(|material| material.texture.is_some());
         let finest = if is_textured { 1.0 / 32.0 } else { 0.3 };
         let is_left = |triangle: &[u32; 3]| {
@@ -266,7 +285,7 @@ impl Mesh {
                 .max((c - b).length_squared())
                 .max((a - c).length_squared())
                 .sqrt();
-            // Cutting keeps the height of a needle. Surfels ask for twice these bounds.
+            // Cutting keeps the height of a needle. Surfels require twice these bounds.
             let height = (b - a).cross(c - a).length() / longest;
             let edge = longest.min(1.0);
             height > 0.5 * least_ratio * edge.min(finest) && height * edge > 0.5 * least_area
@@ -278,7 +297,7 @@ impl Mesh {
         }
     }
 
-    /// The error of a mesh or cloud of which nothing is left to draw.
+    /// Returns the error for a mesh or point cloud that leaves nothing to draw.
     fn nothing(&self) -> Error {
         if self.positions.is_empty() {
             return Error::NothingToDraw("there are no points".into());
@@ -294,8 +313,8 @@ impl Mesh {
             Some(vertex) => {
                 let at = (self.origin + place(vertex)).as_vec3();
                 format!(
-                    "vertex {vertex} at ({:e}, {:e}, {:e}) is so far from the others that their triangles are points beside it; \
-                     remove it, or the triangles that use it",
+                    "vertex {vertex} at ({:e}, {:e}, {:e}) is so far from the others that their \
+                     triangles are points beside it; remove it, or the triangles that use it",
                     at.x, at.y, at.z
                 )
             }
@@ -305,18 +324,20 @@ impl Mesh {
     }
 }
 
-/// A mesh that is longer than so many times the root of its area counts as no longer: a triangle or two lie far from all others,
-/// which would be no more than points beside the whole.
+/// Most length of a mesh, as a multiple of the root of its area. In a longer mesh, a triangle or
+/// two lie far from all others. The rest would be no more than points beside the whole, so the
+/// extra length does not count.
 const LONGEST: f64 = 1024.0;
 
-/// The longest edge that may stay in a mesh of this area between these places, which are relative to its origin.
+/// Returns the longest edge that is not cut, for a mesh of this area between these positions
+/// relative to its origin.
 pub(super) fn largest_edge([low, high]: [Vec3; 2], area: f64, options: &SurfelOptions) -> f32 {
-    // In 64 bits squares of the smallest are not lost.
+    // In 64 bits, squares of the smallest lengths do not underflow.
     let diagonal = (high.as_dvec3() - low.as_dvec3()).length();
-    // Whoever adds up the area in another order finds the same power of two.
+    // Rounded to a power of two, so that adding up the area in another order gives the same length.
     let longest =
         if area > 0.0 { area.sqrt().log2().ceil().exp2() * LONGEST } else { f64::INFINITY };
-    // No edge is longer than the diagonal: a longer one would only be a unit that is too coarse for them.
+    // No edge is longer than the diagonal. A longer unit would only be too coarse for the edges.
     (diagonal.min(longest) as f32 * options.largest_spacing.min(1.0)).max(f32::MIN_POSITIVE)
 }
 
@@ -324,7 +345,8 @@ fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Result<Vec<Splat>> {
     let Some(bounds) = mesh.local_bounds() else { return Ok(Vec::new()) };
     let largest = largest_edge(bounds, mesh.area(), options);
     mesh.check_extent(largest)?;
-    // Most large meshes are fine enough, and right side out. One look at the triangles finds that out and makes the surfels.
+    // Most large meshes are fine enough and right side out. One pass over the triangles both checks
+    // this and makes the surfels.
     let parts = make(mesh, None, is_split(mesh), options, [largest, 1.0], |_| true)?;
     let is_coarse = parts.iter().any(|part| part.longest > 1.0) && !is_fine(mesh, largest);
     let is_textured =
@@ -342,14 +364,15 @@ fn of_triangles(mesh: &Mesh, options: &SurfelOptions) -> Result<Vec<Splat>> {
     })?)
 }
 
-/// What the triangles of a refined mesh were cut from.
+/// Returns what the triangles of a refined mesh were cut from.
 fn origin_of<'a>(mesh: &'a Mesh, sources: Vec<u32>, options: &SurfelOptions) -> Result<Origin<'a>> {
     Origin::new(mesh, sources, options.crease_angle_degrees, options.deadline)
 }
 
-/// The surfels of the wanted vertices of a part of a mesh, as they are in the whole: `largest` is the length that edges are
-/// measured in, `outward` is −1 where it is inside out. Where the whole is `coarse`, its edges are cut, and normals are
-/// interpolated everywhere; with `cut`, edges of the part longer than that are cut, and the vertices that this adds are wanted
+/// Makes the surfels of the wanted vertices of a part of a mesh, as they are in the whole.
+/// `largest` is the length that edges are measured in, and `outward` is −1 if the mesh is inside
+/// out. If `is_coarse`, edges of the whole are cut, and normals are interpolated everywhere. With
+/// `cut`, edges of the part longer than that are cut, and the vertices added by this are wanted
 /// too.
 pub(super) fn of_part(
     part: &Mesh,
@@ -372,13 +395,13 @@ pub(super) fn of_part(
             is_wanted,
         )?);
     };
-    // Whoever chose the length has kept to the budget.
+    // The caller chose a length that keeps to the budget.
     let fine = refine(part, length, usize::MAX >> 1, options.deadline)?;
     let origin = fine.sources.map(|sources| origin_of(part, sources, options)).transpose()?;
     joined(make(&fine.mesh, origin.as_ref(), is_split, options, [largest, outward], is_wanted)?)
 }
 
-/// The surfels of all wanted vertices, in parts.
+/// Makes the surfels of all wanted vertices, in chunks.
 fn make(
     mesh: &Mesh,
     origin: Option<&Origin>,
@@ -408,7 +431,7 @@ fn make(
     Ok(made)
 }
 
-/// The surfels of all parts, in order.
+/// Joins the surfels of all chunks, in order.
 fn joined(parts: Vec<Made>) -> Result<Vec<Splat>> {
     let count = parts.iter().map(|part| part.splats.len()).sum();
     memory::room(WORK, (size_of::<Splat>() * count) as u64)?;

@@ -1,44 +1,46 @@
-//! What a mesh is like: whether it is closed, and what of it is odd.
+//! Properties of a mesh: whether it is closed, and how many of its elements are irregular.
 
 use super::{Mesh, adjacency::may_be_split};
 use crate::math::weld::first_of_equals;
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// How much of a mesh is odd.
+/// Counts of irregular elements of a mesh.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Survey {
     /// Positions with a coordinate that is not finite.
     pub not_finite: usize,
-    /// Positions that are those of an earlier vertex.
+    /// Positions equal to that of an earlier vertex.
     pub duplicates: usize,
     /// Triangles that are no more than a line.
     pub without_area: usize,
-    /// Vertices of no triangle, in a mesh that has any.
+    /// Vertices that no triangle uses, in a mesh that has triangles.
     pub unused: usize,
 }
 
-/// What meets at the edges of a closed surface.
+/// What is identified along the edges of a closed surface.
 pub(super) enum Closing {
-    /// Triangles that share vertices.
+    /// Triangles share vertices.
     Vertices,
-    /// Triangles whose vertices lie at one place; each vertex's first one there.
+    /// Triangles have vertices at the same positions. Holds the first vertex at each vertex's
+    /// position.
     Places(Vec<u32>),
 }
 
 impl Mesh {
-    /// Whether the triangles bound a solid: along every edge as many run one way as the other. From outside, such a surface
-    /// hides its own back.
+    /// Returns whether the triangles bound a solid: along every edge, as many run one way as the
+    /// other. From outside, such a surface hides its own back.
     ///
-    /// Edges are not listed: each adds a number made of its ends by a hash, or takes it away, by its direction. The sum over a
-    /// closed surface is zero; over another one it is, by chance, once in 2⁶⁴.
+    /// Edges are not listed. Each one adds or subtracts a hash of its ends, by its direction. The
+    /// sum over a closed surface is zero. Over any other surface it is zero only by chance, once in
+    /// 2⁶⁴.
     ///
-    /// See [`is_solid`](Self::is_solid) for whether that back need not be drawn.
+    /// [`is_solid`](Self::is_solid) decides whether that back need not be drawn.
     pub fn is_closed(&self) -> bool {
         self.closing().is_some()
     }
 
-    /// What closes the surface; `None` where it is not closed.
+    /// Returns what closes the surface, or `None` if it is not closed.
     pub(super) fn closing(&self) -> Option<Closing> {
         let refers_beyond = |triangle: &[u32; 3]| {
             triangle.iter().any(|&vertex| vertex as usize >= self.positions.len())
@@ -57,7 +59,7 @@ impl Mesh {
         if sum(&|vertex| vertex) == 0 {
             return Some(Closing::Vertices);
         }
-        // Scans that share all vertices have fewer than files that split them.
+        // Scans that share all vertices have fewer vertices than files that split them.
         let has_seams = !self.uvs.is_empty() || !self.normals.is_empty();
         if !may_be_split(has_seams, self.positions.len(), self.triangles.len()) {
             return None;
@@ -66,7 +68,7 @@ impl Mesh {
         (sum(&|vertex| first[vertex as usize]) == 0).then_some(Closing::Places(first))
     }
 
-    /// Looks through the mesh for what gives nothing to draw.
+    /// Counts the elements of the mesh that produce nothing to draw.
     pub fn survey(&self) -> Survey {
         let first = first_of_equals(&self.positions);
         let mut is_used = vec![false; self.positions.len()];
@@ -89,7 +91,7 @@ impl Mesh {
     }
 }
 
-/// Whether a triangle is more than a line, at the precision of its coordinates.
+/// Returns whether a triangle is more than a line, at the precision of its coordinates.
 pub(super) fn has_area(mesh: &Mesh, triangle: [u32; 3]) -> bool {
     let [Some(a), Some(b), Some(c)] = triangle.map(|index| mesh.positions.get(index as usize))
     else {
@@ -101,14 +103,14 @@ pub(super) fn has_area(mesh: &Mesh, triangle: [u32; 3]) -> bool {
     (b - a).cross(c - a).length() > longest * 1e-10
 }
 
-/// A number for an edge, the negative of it for its reverse.
+/// Returns a hash of an edge, negated for the reverse edge.
 pub(super) fn edge(a: u32, b: u32) -> u64 {
     signed(a, b, mixed(u64::from(a.min(b)) << 32 | u64::from(a.max(b))))
 }
 
-/// As [`edge`], of the places of its ends; edges of one place have one number.
+/// Like [`edge`], from the positions of the ends. Edges between equal positions have equal hashes.
 pub(super) fn edge_of_places(a: Vec3, b: Vec3) -> u64 {
-    // Adding zero makes the two zeros one.
+    // Adding zero turns −0 into 0.
     let name = |p: Vec3| {
         let bits = (p + Vec3::ZERO).to_array().map(|value| u64::from(value.to_bits()));
         mixed(bits[0] << 32 | bits[1]) ^ mixed(!bits[2])
@@ -117,7 +119,7 @@ pub(super) fn edge_of_places(a: Vec3, b: Vec3) -> u64 {
     signed(a, b, mixed(a.min(b) ^ a.max(b).rotate_left(32)))
 }
 
-/// The finalizer of SplitMix64 (Steele, Lea & Flood 2014).
+/// The finaliser of SplitMix64 (Steele, Lea & Flood 2014).
 fn mixed(bits: u64) -> u64 {
     let mut z = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

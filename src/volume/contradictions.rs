@@ -1,4 +1,5 @@
-//! Volumes and kernels that were put together by hand and make no sense: whoever takes one tells why it does not.
+//! Volumes and kernels that were built by hand and are inconsistent: every function that takes one
+//! returns an error.
 
 use super::{
     Arrangement, Coefficients, Lattice, Reconstruction, Samples, TransferFunction, Volume,
@@ -37,7 +38,7 @@ fn refused<T: Debug>(name: &str, word: &str, result: Result<T>) {
     }
 }
 
-/// Gives a volume to all that take one.
+/// Passes a volume to every function that takes one.
 #[track_caller]
 fn refused_by_all(name: &str, word: &str, volume: &Volume) {
     let kernel = Kernel::default();
@@ -53,7 +54,8 @@ fn refused_by_all(name: &str, word: &str, volume: &Volume) {
     none(&path("a.splv"));
     refused(name, word, nrrd::write(volume, &path("a.nrrd")));
     none(&path("a.nrrd"));
-    // It has no errors; the function that it makes must not be looked at, but only the volume is wrong.
+    // This has no errors. Only the volume is wrong here, and the function derived from it is still
+    // valid.
     TransferFunction::automatic(volume).validate().unwrap();
 }
 
@@ -127,7 +129,7 @@ fn coefficients_are_looked_at() {
     for (word, change) in wrong {
         refused_by_all(word, word, &changed(change));
     }
-    // Those of the volume's that has been put elsewhere are of another volume, until they are put there too.
+    // After the volume is moved, the coefficients no longer fit, until their lattice is moved too.
     let shift = DVec3::new(1e6, -3e5, 0.1);
     let mut moved = sharp.clone();
     moved.lattice.origin += shift;
@@ -137,7 +139,7 @@ fn coefficients_are_looked_at() {
         ..changed(|c| c.lattice.origin += DVec3::new(1e6, -3e5, 0.1))
     };
     scene(along, kernel.clone()).validate().unwrap();
-    // It is made sharp anew.
+    // Sharpening again replaces the coefficients.
     let again = moved.sharpened(&kernel).unwrap();
     scene(again, kernel).validate().unwrap();
 }
@@ -169,7 +171,7 @@ fn kernels_are_refused_where_they_come_in() {
     }
 }
 
-/// Bricks cannot be put together by hand, but with what else an item has.
+/// Bricks cannot be built by hand, but the other parts of a scene's item can be wrong.
 #[test]
 fn bricks_in_a_scene_are_looked_at() {
     let told = |volume: Volume, kernel: Kernel, change: fn(&mut TransferFunction)| {

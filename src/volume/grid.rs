@@ -1,4 +1,5 @@
-//! The evenly spaced grid that the samples of a lattice are points of, and the frequency response of a kernel on it.
+//! The evenly spaced grid that contains the samples of a lattice, and the frequency response of a
+//! kernel on it.
 
 use super::{Arrangement, Lattice, Samples, each_type};
 use crate::{
@@ -10,8 +11,9 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// A grid that goes on mirrored on all sides. A Cartesian lattice is one; the samples of a body-centred lattice are the
-/// points of a twice finer one whose indices are all even or all odd. Mirrors at points keep the parities.
+/// A grid that continues mirrored on all sides. A Cartesian lattice is a grid itself. The samples
+/// of a body-centred lattice are the points of a grid twice as fine whose indices are all even or
+/// all odd. Mirrors at points keep the parities.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
     pub dims: [usize; 3],
@@ -19,24 +21,28 @@ pub struct Grid {
 }
 
 impl Grid {
+    /// Returns the grid that contains the samples of a lattice.
+    ///
     /// # Errors
-    /// [`Error::Argument`] for a rectilinear lattice, and for a body-centred one of a single layer, whose mirror image
-    /// would lie on itself.
+    /// [`Error::Argument`] for a rectilinear lattice, and for a body-centred lattice of a single
+    /// layer, whose mirror image would coincide with itself.
     pub fn of(lattice: &Lattice) -> Result<Self> {
         let [nx, ny, nz] = lattice.dims;
         match lattice.arrangement {
             Arrangement::Cartesian => Ok(Self { dims: lattice.dims, body_centred: false }),
-            Arrangement::BodyCentred if nz < 2 => {
-                Err(Error::Argument("a body-centred lattice needs two layers of samples or more".into()))
-            }
+            Arrangement::BodyCentred if nz < 2 => Err(Error::Argument(
+                "a body-centred lattice needs at least two layers of samples".into(),
+            )),
             Arrangement::BodyCentred => Ok(Self { dims: [2 * nx, 2 * ny, nz], body_centred: true }),
             Arrangement::Rectilinear(_) => Err(Error::Argument(
-                "samples at uneven distances (a rectilinear lattice) have no frequency response to divide by".into(),
+                "samples at uneven distances (a rectilinear lattice) have no frequency response to \
+                 divide by"
+                    .into(),
             )),
         }
     }
 
-    /// A grid of `side` points along each axis, of the arrangement of another.
+    /// Returns a grid of `side` points along each axis, with the same arrangement.
     pub fn cube(self, side: usize) -> Self {
         Self { dims: [side; 3], ..self }
     }
@@ -46,42 +52,46 @@ impl Grid {
         self.dims.iter().fold(1, |all, &n| all.saturating_mul(n))
     }
 
-    /// The distance between points, in the lattice's kernel units: half an edge, of which √½ is a unit.
+    /// The distance between points in the lattice's kernel units. On a body-centred lattice that is
+    /// half an edge, and a unit is √½ of an edge.
     pub fn step(self) -> f64 {
         if self.body_centred { std::f64::consts::FRAC_1_SQRT_2 } else { 1.0 }
     }
 
-    /// How many points from a sample the lattice's next planes of mirror symmetry lie.
+    /// The distance from a sample to the lattice's next planes of mirror symmetry, in points.
     pub fn symmetric_part(self) -> f64 {
         if self.body_centred { 1.0 } else { 0.5 }
     }
 
-    /// Whether so many points away from a sample there lies another.
+    /// Returns whether the point at this offset from a sample is a sample too.
     pub fn connects(self, [i, j, k]: [isize; 3]) -> bool {
         !self.body_centred || ((i ^ k) | (j ^ k)) & 1 == 0
     }
 
-    /// The point within the grid that is seen where a sample of an index, which may lie outside the lattice, is.
+    /// Returns the point within the grid that mirrors the sample at an index, which may lie outside
+    /// the lattice.
     pub fn point(self, [i, j, k]: [isize; 3]) -> [usize; 3] {
         let odd = k & 1;
         let place = if self.body_centred { [2 * i + odd, 2 * j + odd, k] } else { [i, j, k] };
         std::array::from_fn(|axis| mirrored(place[axis], self.dims[axis]))
     }
 
-    /// The index of the sample at a point.
+    /// Returns the index of the sample at a point.
     pub fn index(self, [i, j, k]: [usize; 3]) -> [usize; 3] {
         if self.body_centred { [i / 2, j / 2, k] } else { [i, j, k] }
     }
 
-    /// Where a point is in memory.
+    /// Returns the offset of a point in memory.
     pub fn offset(self, [i, j, k]: [usize; 3]) -> usize {
         (k * self.dims[1] + j) * self.dims[0] + i
     }
 
-    /// The samples at their points, 0 elsewhere.
+    /// Returns the samples at their points, and 0 elsewhere.
     pub fn fill(self, samples: &Samples) -> Vec<f64> {
         if !self.body_centred {
-            return each_type!(samples, values => values.par_iter().map(|&value| f64::from(value)).collect());
+            return each_type!(samples, values => {
+                values.par_iter().map(|&value| f64::from(value)).collect()
+            });
         }
         let [nx, ny, _] = self.dims;
         let mut points = vec![0.0; self.dims.iter().product()];
@@ -91,7 +101,8 @@ impl Grid {
                 let first = (k * ny + j) / 2 * (nx / 2);
                 each_type!(samples, values => {
                     let row = &values[first..][..nx / 2];
-                    out[k % 2..].iter_mut().step_by(2).zip(row).for_each(|(out, &value)| *out = f64::from(value));
+                    let points = out[k % 2..].iter_mut().step_by(2);
+                    points.zip(row).for_each(|(out, &value)| *out = f64::from(value));
                 });
             }
         });
@@ -99,8 +110,9 @@ impl Grid {
     }
 }
 
-/// The value of a kernel at a distance in kernel units. On the rim of the footprint, where a cut kernel jumps, it is the mean of
-/// both sides, so that no rounding decides.
+/// Returns the value of a kernel at a distance in kernel units. A truncated kernel jumps at the
+/// edge of its footprint. There the value is the mean of both sides, so that rounding does not
+/// decide.
 pub fn weight(kernel: &Kernel, distance: f64) -> f64 {
     if (distance - kernel.extent).abs() < 1e-9 {
         0.5 * kernel.value(kernel.extent)
@@ -109,14 +121,16 @@ pub fn weight(kernel: &Kernel, distance: f64) -> f64 {
     }
 }
 
-/// The sum over a lattice's samples of a kernel times a wave, for every wave that a grid can hold; 1 for a constant.
+/// The sum of a kernel times a wave over a lattice's samples, for every wave that a grid can
+/// represent. It is 1 for a constant.
 pub struct Response {
     grid: Grid,
-    /// Points that the kernel reaches along an axis, the centre among them.
+    /// Points that the kernel reaches along an axis, including the centre.
     reach: usize,
-    /// Weights of the points (i, j, k) ≥ 0, first axis fastest, their mirror images added to them.
+    /// Weights of the points (i, j, k) ≥ 0, first axis fastest. Each includes the weights of its
+    /// mirror images.
     weights: Vec<f64>,
-    /// For each axis and frequency the cosines at the points that the kernel reaches.
+    /// For each axis and frequency, the cosines at the points that the kernel reaches.
     cosines: [Vec<f64>; 3],
 }
 
@@ -146,7 +160,7 @@ impl Response {
         Self { grid, reach, weights, cosines }
     }
 
-    /// Calls a function with the responses at the frequencies (0 …, j, k).
+    /// Calls `take` with the responses at the frequencies (0 …, j, k).
     fn row<T>(
         &self,
         [j, k]: [usize; 2],
@@ -163,7 +177,8 @@ impl Response {
         take(&mut x.chunks(reach).map(|x| x.iter().zip(&along).map(|(x, weight)| x * weight).sum()))
     }
 
-    /// The least response: how much of some wave the kernel leaves.
+    /// Returns the smallest response: the fraction that the kernel leaves of the wave that it damps
+    /// most.
     pub fn least(&self) -> f64 {
         let [_, ny, nz] = self.grid.dims;
         let row = |row: usize| {

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-/// Hounsfield units of what a head is made of.
+/// Hounsfield units of the tissues of a head.
 const AIR: f64 = -1000.0;
 const FLESH: f64 = 40.0;
 const BRAIN: f64 = 36.0;
@@ -11,10 +11,10 @@ const BONE: f64 = 1000.0;
 const TOOTH: f64 = 1400.0;
 const CONTRAST: f64 = 330.0;
 
-/// Half the width that edges are blurred over, as by a scanner.
+/// Half the width of the blur on edges, as from a scanner.
 const BLUR: f64 = 0.016;
 
-/// The value at a position; 1 stands for 100 mm, z is up and the face towards −y.
+/// Returns the value at a position; 1 stands for 100 mm, z is up and the face is towards −y.
 pub fn head(p: DVec3) -> f64 {
     let skull = ellipsoid(p, [0.0, 0.06, 0.2], [0.64, 0.78, 0.66]);
     let jaw = ellipsoid(p, [0.0, -0.28, -0.42], [0.42, 0.42, 0.34]);
@@ -27,13 +27,13 @@ pub fn head(p: DVec3) -> f64 {
     let nasal = ellipsoid(p, [0.0, -0.62, -0.08], [0.1, 0.26, 0.2]);
 
     let mut value = fill(AIR, FLESH, skin);
-    // The skull is a shell, open at the eyes and the nose; the brain fills it.
+    // The skull is a shell, open at the eyes and the nose, and the brain fills it.
     value = fill(value, BONE, skull);
     value = fill(value, BRAIN, skull + 0.07);
     value = fill(value, WATER, ellipsoid(mirrored(p), [0.09, 0.02, 0.28], [0.06, 0.28, 0.1]));
     value = fill(value, FLESH, sockets.max(skin));
     value = fill(value, WATER, ellipsoid(mirrored(p), [0.26, -0.66, 0.12], [0.12; 3]).max(skin));
-    // The jaw: a bow of bone with teeth along it.
+    // The jaw: an arch of bone with teeth along it.
     let bow = [[0.36, 0.1, -0.2], [0.38, -0.05, -0.5], [0.26, -0.42, -0.58], [0.0, -0.58, -0.6]];
     value = fill(value, BONE, tube(mirrored(p), &bow, 0.075));
     let teeth =
@@ -75,18 +75,19 @@ fn arteries(p: DVec3, value: f64) -> f64 {
     fill(value, CONTRAST, tube(side, &back, 0.026))
 }
 
-/// Both halves as one.
+/// Maps both halves of the head onto the side of positive x.
 fn mirrored(p: DVec3) -> DVec3 {
     DVec3::new(p.x.abs(), p.y, p.z)
 }
 
-/// What is there once a part is put in whose surface is at this signed distance (negative inside).
+/// Returns the value after a part is added whose surface is at this signed distance (negative
+/// inside).
 fn fill(below: f64, part: f64, distance: f64) -> f64 {
     let t = (0.5 - 0.5 * distance / BLUR).clamp(0.0, 1.0);
     below + (part - below) * t * t * (3.0 - 2.0 * t)
 }
 
-/// Nearly the distance to an ellipsoid's surface.
+/// Returns approximately the distance to an ellipsoid's surface.
 fn ellipsoid(p: DVec3, center: [f64; 3], radii: [f64; 3]) -> f64 {
     let (q, radii) = (p - DVec3::from_array(center), DVec3::from_array(radii));
     let scaled = (q / radii).length();
@@ -94,7 +95,7 @@ fn ellipsoid(p: DVec3, center: [f64; 3], radii: [f64; 3]) -> f64 {
     if slope > 0.0 { scaled * (scaled - 1.0) / slope } else { -radii.min_element() }
 }
 
-/// The distance to a tube around a chain of points.
+/// Returns the distance to a tube around a chain of points.
 fn tube(p: DVec3, points: &[[f64; 3]], radius: f64) -> f64 {
     let segment = |ends: &[[f64; 3]]| {
         let (a, b) = (DVec3::from_array(ends[0]), DVec3::from_array(ends[1]));

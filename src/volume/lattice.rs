@@ -3,51 +3,55 @@
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
-/// How the places of samples follow from their indices.
+/// How the positions of samples follow from their indices.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Arrangement {
     /// Sample (i, j, k) is at (i, j, k) steps.
     #[default]
     Cartesian,
-    /// Body-centred cubic: two Cartesian lattices, one displaced to the middles of the other's cells. The third index
-    /// counts layers of both in turn: sample (i, j, k) is at (i + p, j + p, k / 2) steps, p = ½ where k is odd and else 0.
+    /// Body-centred cubic: two Cartesian lattices, one displaced to the centres of the other's
+    /// cells. The third index counts the layers of both alternately. Sample (i, j, k) is at (i + p,
+    /// j + p, k / 2) steps, with p = ½ for odd k and 0 else.
     BodyCentred,
-    /// Sample (i, j, k) is at the i-th, j-th and k-th of ascending coordinates along the axes, in steps.
+    /// Sample (i, j, k) is at the i-th, j-th and k-th of ascending coordinates along the axes, in
+    /// steps.
     Rectilinear(Arc<[Vec<f64>; 3]>),
 }
 
-/// Where the samples of a volume lie: sample (i, j, k) is at `origin + axes · steps(i, j, k)`, the steps as the
-/// arrangement has them; (i, j, k) itself on a Cartesian lattice.
+/// Where the samples of a volume lie. Sample (i, j, k) is at `origin + axes · steps(i, j, k)`, and
+/// the arrangement defines the steps. On a Cartesian lattice they are (i, j, k) itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lattice {
     /// Samples along each axis, first axis fastest in memory.
     pub dims: [usize; 3],
-    /// World position of sample (0, 0, 0).
+    /// World position of 0 steps. On Cartesian and body-centred lattices sample (0, 0, 0) is there.
     pub origin: DVec3,
-    /// Columns are the steps between neighbouring samples (spacing times direction), in world units. Body-centred: the
-    /// edges of the cubic cell, two layers apart along the third. Rectilinear: the directions that coordinates count along.
+    /// Columns are the steps between neighbouring samples (spacing times direction), in world
+    /// units. Body-centred: the edges of the cubic cell, which is two layers high along the third
+    /// axis. Rectilinear: one unit of the coordinates along each axis.
     pub axes: DMat3,
     pub arrangement: Arrangement,
 }
 
 impl Lattice {
-    /// Samples `spacing` world units apart along x, y and z, the first one at the world's origin.
+    /// Places samples `spacing` world units apart along x, y and z, with the first one at the
+    /// world's origin.
     pub fn with_spacing(dims: [usize; 3], spacing: DVec3) -> Self {
         Self::cartesian(dims, DVec3::ZERO, DMat3::from_diagonal(spacing))
     }
 
-    /// Samples at (i, j, k) steps from the origin.
+    /// Places samples at (i, j, k) steps from the origin.
     pub fn cartesian(dims: [usize; 3], origin: DVec3, axes: DMat3) -> Self {
         Self { dims, origin, axes, arrangement: Arrangement::Cartesian }
     }
 
-    /// Samples at the corners and the middles of cubic cells: `edges` are the columns of a cell's, `dims[2]` counts layers of
-    /// both kinds ([`Arrangement::BodyCentred`]).
+    /// Places samples at the corners and the centres of cubic cells. The columns of `edges` are the
+    /// edges of a cell; `dims[2]` counts the layers of both kinds ([`Arrangement::BodyCentred`]).
     pub fn body_centred(dims: [usize; 3], origin: DVec3, edges: DMat3) -> Self {
         Self { dims, origin, axes: edges, arrangement: Arrangement::BodyCentred }
     }
 
-    /// Number of samples; of more than can be counted, the largest number.
+    /// Number of samples. If that exceeds `usize::MAX`, returns `usize::MAX`.
     pub fn len(&self) -> usize {
         self.dims.iter().fold(1, |all, &n| all.saturating_mul(n))
     }
@@ -56,15 +60,15 @@ impl Lattice {
         self.len() == 0
     }
 
-    /// World position of a number of steps along each axis.
+    /// Returns the world position at a number of steps along each axis.
     pub fn position(&self, steps: DVec3) -> DVec3 {
         self.origin + self.axes * steps
     }
 
-    /// The steps at which a sample lies.
+    /// Returns the position of a sample, in steps.
     ///
     /// # Panics
-    /// On a rectilinear lattice, where an index is not below `dims`.
+    /// On a rectilinear lattice, if an index is not below `dims`.
     pub fn steps(&self, index: [usize; 3]) -> DVec3 {
         let [i, j, k] = index.map(|n| n as f64);
         match &self.arrangement {
@@ -79,20 +83,21 @@ impl Lattice {
         }
     }
 
-    /// The indices along the axes of a sample in memory order.
+    /// Returns the indices along the axes of a sample in memory order.
     pub fn index(&self, sample: usize) -> [usize; 3] {
         let [nx, ny, _] = self.dims;
         [sample % nx, sample / nx % ny, sample / nx / ny]
     }
 
-    /// World position of a sample in memory order.
+    /// Returns the world position of a sample in memory order.
     pub fn sample_position(&self, sample: usize) -> DVec3 {
         self.position(self.steps(self.index(sample)))
     }
 
-    /// The size of a sample's kernel unit along each axis, in steps: the distance to the neighbouring samples, the mean of
-    /// both sides on a rectilinear lattice. A body-centred lattice counts as a Cartesian one of √½ of its edge: at 29.3 %
-    /// fewer samples its spectrum repeats at the same distance.
+    /// Returns the kernel unit of a sample along each axis, in steps: the distance to the
+    /// neighbouring samples. On a rectilinear lattice it is the mean of both sides. On a
+    /// body-centred lattice it is √½ of the edge, as for a Cartesian lattice of that spacing: with
+    /// 29.3 % fewer samples, its spectrum repeats at the same distance.
     ///
     /// # Panics
     /// As [`steps`](Self::steps).
@@ -112,7 +117,7 @@ impl Lattice {
         }
     }
 
-    /// The largest [`unit`](Self::unit) along each axis, in steps.
+    /// Returns the largest [`unit`](Self::unit) along each axis, in steps.
     pub fn largest_unit(&self) -> DVec3 {
         match &self.arrangement {
             Arrangement::Rectilinear(places) => {
@@ -130,18 +135,19 @@ impl Lattice {
         }
     }
 
-    /// The typical size of a sample's kernel unit in world units: what sheets are measured by.
+    /// Returns the typical size of a sample's kernel unit in world units. The thickness of sheets
+    /// is measured in it.
     pub fn kernel_spacing(&self) -> f64 {
         let unit = self.typical_unit();
         (self.axes.determinant().abs() * unit.x * unit.y * unit.z).cbrt()
     }
 
-    /// The same along the axis on which it is least.
+    /// The same along the axis where it is smallest.
     pub fn least_kernel_spacing(&self) -> f64 {
         (self.edges() * self.typical_unit()).min_element()
     }
 
-    /// [`unit`](Self::unit), the mean on a rectilinear lattice.
+    /// Returns [`unit`](Self::unit), or the mean on a rectilinear lattice.
     fn typical_unit(&self) -> DVec3 {
         match &self.arrangement {
             Arrangement::Rectilinear(_) => self.spacing() / self.edges(),
@@ -149,7 +155,8 @@ impl Lattice {
         }
     }
 
-    /// How many samples a kernel of some extent (in units of [`unit`](Self::unit)) reaches along each axis at most.
+    /// Returns how many samples a kernel of a given extent (in units of [`unit`](Self::unit))
+    /// reaches at most, along each axis.
     pub fn reach(&self, extent: f64) -> [usize; 3] {
         match &self.arrangement {
             Arrangement::Cartesian => [extent.ceil() as usize; 3],
@@ -176,12 +183,12 @@ impl Lattice {
         }
     }
 
-    /// The smallest and the largest steps of all samples.
+    /// Returns the smallest and the largest steps of all samples.
     pub fn step_range(&self) -> [DVec3; 2] {
         let last = self.dims.map(|n| n.saturating_sub(1));
         match &self.arrangement {
             Arrangement::BodyCentred => {
-                // Samples of both kinds along x and y, unless there is one layer alone.
+                // Samples of both kinds along x and y, unless there is only one layer.
                 let displaced = if last[2] > 0 { 0.5 } else { 0.0 };
                 let [x, y, z] = last.map(|n| n as f64);
                 [DVec3::ZERO, DVec3::new(x + displaced, y + displaced, 0.5 * z)]
@@ -190,12 +197,13 @@ impl Lattice {
         }
     }
 
-    /// Lengths of the axes' columns, in world units.
+    /// Returns the lengths of the axes' columns, in world units.
     pub fn edges(&self) -> DVec3 {
         DVec3::from_array(self.axes.to_cols_array_2d().map(|axis| DVec3::from_array(axis).length()))
     }
 
-    /// Length of the step along each axis, in world units; the mean on a rectilinear lattice.
+    /// Returns the length of the step along each axis, in world units; the mean on a rectilinear
+    /// lattice.
     pub fn spacing(&self) -> DVec3 {
         let step = self.edges();
         match &self.arrangement {
@@ -210,7 +218,8 @@ impl Lattice {
         }
     }
 
-    /// Smallest and largest world coordinates of the sample positions. Kernels reach further.
+    /// Returns the smallest and largest world coordinates of the sample positions. Kernels reach
+    /// further.
     pub fn bounds(&self) -> [DVec3; 2] {
         let [first, last] = self.step_range();
         let corners = (0..8).map(|corner| {
@@ -226,14 +235,14 @@ impl Lattice {
         })
     }
 
-    /// Says in words why samples cannot lie so: no samples, more than memory could index, or steps that are not finite
-    /// or do not span space.
+    /// Checks that samples can lie on this lattice. The message names the cause: no samples, more
+    /// than memory could index, or steps that are not finite or do not span space.
     pub fn validate(&self) -> Result<(), String> {
         let [nx, ny, nz] = self.dims;
         if self.dims.contains(&0) {
             return Err(format!("a volume of {nx} × {ny} × {nz} samples holds none"));
         }
-        // What is allocated has no more bytes than that.
+        // An allocation cannot have more bytes than that.
         if self.len() > isize::MAX as usize {
             return Err(format!("{nx} × {ny} × {nz} samples are more than memory can hold"));
         }
@@ -254,7 +263,8 @@ impl Lattice {
                 }) {
                     let (a, b) = (places[at], places[at + 1]);
                     return Err(format!(
-                        "coordinates along {axis} must ascend, but number {at} is {a} and the next {b}"
+                        "coordinates along {axis} must ascend, but number {at} is {a} and \
+                         the next {b}"
                     ));
                 }
                 if !places.iter().all(|place| place.is_finite()) {
@@ -262,7 +272,8 @@ impl Lattice {
                 }
             }
         }
-        // The determinant of the directions, not of the steps: its size does not depend on the unit of length.
+        // The determinant of the directions, not of the steps: its size does not depend on the unit
+        // of length.
         let spacing = self.spacing();
         if spacing.min_element() <= 0.0 {
             return Err(format!(
@@ -281,7 +292,9 @@ impl Lattice {
         }
         let [low, high] = self.bounds();
         if !(high - low).is_finite() {
-            return Err(format!("the samples reach from {low} to {high}, farther than numbers do"));
+            return Err(format!(
+                "the samples reach from {low} to {high}, too far for 64-bit numbers"
+            ));
         }
         Ok(())
     }
@@ -305,7 +318,7 @@ mod tests {
     fn impossible_lattices_are_told() {
         let good = Lattice::with_spacing([2, 2, 2], DVec3::splat(1e-9));
         good.validate().unwrap();
-        // Coordinates far apart are no flat axes.
+        // Axes with distant coordinates do not count as flat.
         let far = std::array::from_fn(|_| vec![0.0, 1e6]);
         Lattice { arrangement: Arrangement::Rectilinear(Arc::new(far)), ..good.clone() }
             .validate()

@@ -1,4 +1,4 @@
-//! Volumes: samples on a lattice, and the transfer functions that show them.
+//! Volumes: samples on a lattice, and the transfer functions that give them colour and opacity.
 
 pub mod bricks;
 #[cfg(test)]

@@ -4,22 +4,27 @@ use super::grid::{Grid, Response, weight};
 use crate::math::{Kernel, cosine::mirrored};
 use rayon::prelude::*;
 
-/// Points along an axis of the grid that the cardinal function is looked at on: it falls by a third per sample or more, so
-/// that nothing of it is left at the border.
+/// Points along an axis of the grid on which the cardinal function is measured. The function falls
+/// by a third per sample or more, so nothing remains of it at the border.
 const SIDE: usize = 33;
-/// The share of samples beyond the outermost box at which no larger one is looked at: two and a half of 255 steps of the range,
-/// which few transfer functions show. It is accounted for, so that the choice decides tightness and not truth.
+/// Boxes grow until the samples beyond the last one contribute at most this much, relative to their
+/// range: 0.01, or two and a half of 255 steps. Few transfer functions show that. The rest is
+/// accounted for too, so this choice affects how tight the bound is, not whether it holds.
 const NEGLECTED: f64 = 0.01;
-/// The maxima are looked for at quarters of points. Between these the sums, which are flat at their maxima, rise by less.
+/// Factor on the maxima, which are searched at quarters of points. The sums are flat at their
+/// maxima and rise by less than this in between.
 const MARGIN: f64 = 1.02;
 
-/// Bounds on the cardinal function L of a kernel on a lattice: what a single sample of 1 is reconstructed to.
+/// Bounds on the cardinal function L of a kernel on a lattice: the reconstruction of a single
+/// sample of 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Overshoot {
-    /// The Lebesgue constant: the maximum over space of Σ |L|. Samples that differ from a value by at most d have a
-    /// reconstruction that differs from it by at most lebesgue · d (Powell, "Approximation theory and methods", 1981).
+    /// The Lebesgue constant: the maximum over space of Σ |L|. If samples differ from a value by at
+    /// most d, their reconstruction differs from it by at most lebesgue · d (Powell, "Approximation
+    /// theory and methods", 1981).
     pub lebesgue: f64,
-    /// Growing distances in kernel units, and the maximum over space of Σ |L| over the samples that lie further away.
+    /// Growing distances in kernel units, each with the maximum over space of Σ |L| over the
+    /// samples that lie further away.
     pub tails: Vec<(f64, f64)>,
 }
 
@@ -31,7 +36,7 @@ impl Overshoot {
         let mut impulse = vec![0.0; SIDE.pow(3)];
         impulse[grid.offset(centre)] = 1.0;
         Response::new(grid, kernel).divide(&mut impulse);
-        // Mirrors, and the axes in any order, leave the lattice as it is.
+        // Mirroring the lattice or permuting its axes does not change it.
         let quarters = || {
             (0..=4)
                 .map(|quarter| f64::from(quarter) / 4.0)
@@ -57,11 +62,13 @@ impl Overshoot {
         Self { lebesgue: sums[0].max(1.0), tails }
     }
 
-    /// The range of the reconstruction from those of the samples in boxes, one for each of the [`tails`](Self::tails),
-    /// that reach so much further than the place does. All are in steps of 1/255 of the range of all samples.
+    /// Returns the range of the reconstruction from the ranges of the samples in boxes. There is
+    /// one box for each of the [`tails`](Self::tails), extended by that distance around the place.
+    /// All are in steps of 1/255 of the range of all samples.
     ///
-    /// With d₁ ≤ d₂ ≤ … the largest differences of samples in the boxes from the middle of the first, the reconstruction
-    /// differs from it by at most lebesgue · d₁ + tail₁ · (d₂ − d₁) + tail₂ · (d₃ − d₂) + …
+    /// Let d₁ ≤ d₂ ≤ … be the largest differences of the samples in the boxes from the middle of
+    /// the first box. The reconstruction differs from it by at most lebesgue · d₁ + tail₁ · (d₂ −
+    /// d₁) + tail₂ · (d₃ − d₂) + …
     pub fn widen(&self, boxes: impl Iterator<Item = [u8; 2]>) -> [u8; 2] {
         let mut boxes = boxes.map(|ends| ends.map(f64::from)).chain([[0.0, 255.0]]);
         let Some([low, high]) = boxes.next() else { return [0, 255] };
@@ -73,12 +80,13 @@ impl Overshoot {
             most += tail * (outer - inner);
             inner = outer;
         }
-        // Casts cut to 0 … 255.
+        // Casts clamp to 0 … 255.
         [(middle - most).floor() as u8, (middle + most).ceil() as u8]
     }
 }
 
-/// For a place relative to a sample the sums of |L| over the samples at a distance of `n` or more, for each n.
+/// Returns, for a place relative to a sample, the sums of |L| over the samples at a distance of `n`
+/// or more, for each n.
 fn shells(grid: Grid, kernel: &Kernel, impulse: &[f64], place: [f64; 3]) -> [f64; SIDE] {
     let step = grid.step();
     let reach = (kernel.extent / step) as isize + 2;
@@ -90,7 +98,8 @@ fn shells(grid: Grid, kernel: &Kernel, impulse: &[f64], place: [f64; 3]) -> [f64
                 let away = [i, j, k].map(|at| at as f64);
                 let share = weight(kernel, step * distance(away, place));
                 sum += share;
-                // What rounds away is left out: wide cuts hold thousands of such samples.
+                // Weights below rounding are left out: wide truncated kernels have thousands of
+                // them.
                 if share.abs() > 1e-12 {
                     weights.push(([i, j, k], share));
                 }
@@ -110,7 +119,7 @@ fn shells(grid: Grid, kernel: &Kernel, impulse: &[f64], place: [f64; 3]) -> [f64
                     share * impulse[grid.offset(point)]
                 };
                 let value = weights.iter().map(value).sum::<f64>() / sum;
-                // L(from + place) is the share of the sample at −from in the value at `place`.
+                // L(from + place) is the weight of the sample at −from in the value at `place`.
                 let away = step * distance(from.map(|at| -at as f64), place);
                 sums[(away as usize).min(SIDE - 1)] += value.abs();
             }
@@ -134,7 +143,8 @@ mod tests {
 
     #[test]
     fn a_kernel_that_interpolates_by_itself_is_its_own_cardinal_function() {
-        // A cone of radius 1 reaches no other sample. Its normalised sum is a mean of them, which overshoots nowhere.
+        // A cone of radius 1 reaches no other sample. Its normalised sum is a weighted mean of
+        // samples and never overshoots.
         let cone = Kernel::table(vec![1.0, 0.0], 1.0).unwrap();
         let grid = Grid::of(&Lattice::cartesian([4; 3], DVec3::ZERO, DMat3::IDENTITY)).unwrap();
         let found = Overshoot::new(grid, &cone);

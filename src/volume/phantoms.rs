@@ -1,5 +1,5 @@
-//! Volumes that need no file, for tests, the demo and the documentation. Each is a function of position, most with values
-//! in 0 … 1, sampled over the cube from −1 to 1.
+//! Volumes that need no file, for tests, the demo and the documentation. Each is a function of
+//! position, sampled over the cube from −1 to 1. Most have values in 0 … 1.
 
 use super::{Lattice, Samples, Volume, head::head};
 use crate::memory;
@@ -10,19 +10,23 @@ use std::f64::consts::PI;
 /// A function of position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Phantom {
-    /// The test signal of Marschner and Lobb (“An Evaluation of Reconstruction Filters for Volume Rendering”, 1994), with
-    /// their f_M = 6 and α = 0.25: rings that 41³ samples hold just so.
+    /// The test signal of Marschner and Lobb (“An Evaluation of Reconstruction Filters for Volume
+    /// Rendering”, 1994), with their f_M = 6 and α = 0.25: rings that 41³ samples can just
+    /// represent.
     MarschnerLobb,
     /// A ball that fades from 1 at its centre to 0 at radius 0.9: (1 − (r/0.9)²)².
     Ball,
-    /// What a CT scanner would see of an invented fruit: air around (0), a rind (0.35), soft flesh (0.15), in it a hard
-    /// lattice along a gyroid (0.7 … 0.8) and a dense stone (1). A wedge is cut out to show the inside.
+    /// What a CT scanner would see of an invented fruit in air (0). It has a rind (0.35) and soft
+    /// flesh (0.15). Inside the flesh are a hard lattice along a gyroid (0.7 … 0.8) and a dense
+    /// stone (1). A wedge is cut out to show the inside.
     Specimen,
-    /// Two slabs across the z axis in air of value 0.5: the front one of value 1 (0.025 < z < 0.175), right behind it one of
-    /// value 0 (down to −0.275), so that the edge of neither passes the other's value. Both end at 0.9 from the axis.
+    /// Two slabs across the z axis, in air of value 0.5. The front slab has value 1 (0.025 < z <
+    /// 0.175). The slab directly behind it has value 0 (down to −0.275). No edge of a slab passes
+    /// through the other's value. Both end at 0.9 from the axis.
     Slabs,
-    /// A head as a CT scanner would see it, in Hounsfield units, 1 standing for 100 mm: skin and flesh, skull, jaw and neck
-    /// bones, brain, and arteries with contrast agent. The face is towards −y.
+    /// A head as a CT scanner would see it, in Hounsfield units; 1 stands for 100 mm. It has skin
+    /// and flesh, skull, jaw and neck bones, brain, and arteries with contrast agent. The face is
+    /// towards −y.
     Head,
     /// One value everywhere.
     Constant(f64),
@@ -32,13 +36,13 @@ impl Phantom {
     /// The phantoms that [`named`](Self::named) knows.
     pub const NAMES: [&'static str; 5] = ["marschner-lobb", "ball", "specimen", "slabs", "head"];
 
-    /// A phantom by its name.
+    /// Returns the phantom of a name.
     pub fn named(name: &str) -> Option<Self> {
         let at = Self::NAMES.iter().position(|known| *known == name)?;
         [Self::MarschnerLobb, Self::Ball, Self::Specimen, Self::Slabs, Self::Head].get(at).copied()
     }
 
-    /// The value at a position in the cube from −1 to 1.
+    /// Returns the value at a position in the cube from −1 to 1.
     pub fn value(self, p: DVec3) -> f64 {
         match self {
             Self::MarschnerLobb => marschner_lobb(p),
@@ -50,39 +54,42 @@ impl Phantom {
         }
     }
 
-    /// 32-bit samples at evenly spaced positions, the first and the last of each axis at −1 and 1 of world space (an axis
-    /// of one sample: at 0).
+    /// Returns 32-bit samples at evenly spaced positions. The first and the last of each axis are
+    /// at −1 and 1 in world space; the sample of an axis of one is at 0.
     ///
     /// # Errors
-    /// In words, for dimensions of 0 or more samples than memory can hold ([`memory::most`]).
+    /// A message, for a dimension of 0 or more samples than memory can hold ([`memory::most`]).
     pub fn sample(self, dims: [usize; 3]) -> Result<Volume, String> {
         self.sample_on(lattice(dims)?)
     }
 
-    /// 32-bit samples at the places of any lattice; those outside the cube have the function's value there too.
+    /// Returns 32-bit samples at the positions of any lattice. Samples outside the cube get the
+    /// function's value there.
     ///
     /// # Errors
-    /// In words, for a lattice that is none ([`Lattice::validate`]), or that has more samples than memory can hold.
+    /// A message, for an invalid lattice ([`Lattice::validate`]) or more samples than memory can
+    /// hold.
     pub fn sample_on(self, lattice: Lattice) -> Result<Volume, String> {
         lattice.validate()?;
         let values = self.fill(&lattice, |value| value as f32)?;
         Volume::new(lattice, Samples::F32(values))
     }
 
-    /// As [`sample`](Self::sample), with 8-bit samples: 0 … 1 become 0 … 255, rounded.
+    /// Like [`sample`](Self::sample), with 8-bit samples: 0 … 1 become 0 … 255, rounded.
     ///
     /// # Errors
-    /// As there.
+    /// As [`sample`](Self::sample).
     pub fn sample_bytes(self, dims: [usize; 3]) -> Result<Volume, String> {
         let lattice = lattice(dims)?;
         let values = self.fill(&lattice, byte)?;
         Volume::new(lattice, Samples::U8(values))
     }
 
-    /// The samples of [`sample_bytes`](Self::sample_bytes) slice by slice, for those who cannot hold all of them.
+    /// Returns the samples of [`sample_bytes`](Self::sample_bytes) slice by slice, for volumes that
+    /// do not fit in memory.
     ///
     /// # Errors
-    /// In words, for dimensions of 0 and slices that memory cannot hold.
+    /// A message, for a dimension of 0 or a slice that memory cannot hold.
     pub fn byte_slices(self, dims: [usize; 3]) -> Result<ByteSlices, String> {
         let [nx, ny, _] = dims;
         let lattice = lattice(dims)?;
@@ -116,7 +123,7 @@ impl ByteSlices {
         &self.lattice
     }
 
-    /// The samples of a slice.
+    /// Returns the samples of a slice.
     pub fn slice(&self, k: usize) -> Vec<u8> {
         let Lattice { dims: [nx, ny, _], .. } = self.lattice;
         let sample = |index: usize| {
@@ -150,13 +157,14 @@ fn specimen(p: DVec3) -> f64 {
     if r > 0.93 {
         return 0.0;
     }
-    // Edges are some hundredths wide, as a scanner blurs them.
+    // Edges are a few hundredths wide, like the blur of a scanner.
     let inside = |distance: f64| smooth((distance / 0.03 + 1.0) / 2.0);
     let mut value = 0.15 * inside(0.9 - r);
     value = over(value, 0.35, inside(r - 0.83) * inside(0.9 - r));
     let shell = inside(0.74 - r) * inside(r - 0.36);
     if shell > 0.0 {
-        // The lattice's value rises outwards; its walls are as thick as the gyroid is slow.
+        // The lattice's value rises outwards. The gyroid's walls are thicker where its function
+        // varies slowly.
         let (sin, cos) = (p.map(|x| (9.0 * x).sin()), p.map(|x| (9.0 * x).cos()));
         let gyroid = sin.x * cos.y + sin.y * cos.z + sin.z * cos.x;
         value = over(value, 0.7 + 0.1 * r / 0.74, shell * inside((0.45 - gyroid.abs()) / 12.0));
@@ -195,7 +203,7 @@ mod tests {
 
     #[test]
     fn values_by_hand() {
-        // At the centre: (1 + 0.25·(1 + cos 12π)) / 2.5; on top the sine takes the 1 away.
+        // At the centre: (1 + 0.25·(1 + cos 12π)) / 2.5. At the top the sine cancels the 1.
         assert!((Phantom::MarschnerLobb.value(DVec3::ZERO) - 0.6).abs() < 1e-12);
         assert!((Phantom::MarschnerLobb.value(DVec3::Z) - 0.2).abs() < 1e-12);
         assert_eq!((Phantom::Ball.value(DVec3::ZERO), Phantom::Ball.value(DVec3::X)), (1.0, 0.0));

@@ -1,9 +1,10 @@
 //! The coefficients of a cubic B-spline that passes through the samples of a Cartesian lattice.
 //!
-//! The weights of the spline at the samples are ⅙, ⅔ and ⅙ along each axis. The inverse of that filter is one recursion forward
-//! and one backward, both with the pole √3 − 2 (Unser, Aldroubi & Eden, "Fast B-spline transforms for continuous image
-//! representation and interpolation", 1991; Thévenaz, Blu & Unser, "Interpolation revisited", 2000). Samples go on mirrored
-//! at the outermost ones, and so do the coefficients.
+//! The weights of the spline at the samples are ⅙, ⅔ and ⅙ along each axis. The inverse of that
+//! filter is one forward and one backward recursion, both with the pole √3 − 2 (Unser, Aldroubi &
+//! Eden, "Fast B-spline transforms for continuous image representation and interpolation", 1991;
+//! Thévenaz, Blu & Unser, "Interpolation revisited", 2000). The samples continue mirrored at the
+//! outermost ones, and so do the coefficients.
 
 use super::{Samples, each_type};
 use crate::math::cosine::mirrored;
@@ -11,14 +12,14 @@ use rayon::prelude::*;
 
 /// The pole of the recursions.
 const POLE: f32 = -0.267_949_2;
-/// One over the product of the filter's middle weights.
+/// The gain of the inverse filter: (1 − pole) · (1 − 1/pole) = 6.
 const GAIN: f32 = 6.0;
 /// Rows that are filtered side by side.
 const LINES: usize = 8;
-/// Samples from which the first forward term is summed. Of what lies beyond, 10⁻¹⁰ would be left.
+/// Samples that the first forward term sums. The rest would contribute 10⁻¹⁰.
 const HORIZON: usize = 18;
 
-/// The coefficients of samples on a lattice of `dims`, first axis fastest.
+/// Returns the coefficients of samples on a lattice of `dims`, first axis fastest.
 pub fn cubic(samples: &Samples, dims: [usize; 3]) -> Vec<f32> {
     let [nx, ny, nz] = dims;
     let mut values: Vec<f32> =
@@ -29,7 +30,7 @@ pub fn cubic(samples: &Samples, dims: [usize; 3]) -> Vec<f32> {
         rows.into_remainder().chunks_mut(nx).for_each(|row| along_rows::<1>(row, nx));
         across_rows(&mut slice.chunks_mut(nx).collect::<Vec<_>>());
     });
-    // The rows of all slices that lie behind each other.
+    // Groups the rows of all slices that lie behind each other.
     let mut columns: Vec<Vec<&mut [f32]>> = (0..ny).map(|_| Vec::with_capacity(nz)).collect();
     for (number, row) in values.chunks_mut(nx).enumerate() {
         columns[number % ny].push(row);
@@ -38,7 +39,8 @@ pub fn cubic(samples: &Samples, dims: [usize; 3]) -> Vec<f32> {
     values
 }
 
-/// The powers of the pole by which the first forward term sums the samples of a mirrored axis, each with its sample.
+/// Returns the terms of the first forward value on a mirrored axis: a sample, and the factor (a
+/// power of the pole) on it.
 fn first_terms(count: usize) -> impl Iterator<Item = (usize, f32)> {
     let period = 2 * (count - 1);
     let (terms, whole) =
@@ -46,12 +48,13 @@ fn first_terms(count: usize) -> impl Iterator<Item = (usize, f32)> {
     (0..terms).map(move |at| (mirrored(at as isize, count), GAIN * POLE.powi(at as i32) / whole))
 }
 
-/// What the last forward term counts in the first backward one.
+/// The factor on the last forward term in the first backward one.
 fn turn() -> f32 {
     POLE / (POLE * POLE - 1.0)
 }
 
-/// Filters rows of `count` values along themselves. A term waits for the one before it; those of several rows do not.
+/// Filters rows of `count` values along themselves. Each term depends on the one before it, so
+/// several independent rows are interleaved.
 fn along_rows<const ROWS: usize>(values: &mut [f32], count: usize) {
     let mut rows: [&mut [f32]; ROWS] = std::array::from_fn(|_| Default::default());
     rows.iter_mut().zip(values.chunks_exact_mut(count)).for_each(|(own, row)| *own = row);

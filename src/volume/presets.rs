@@ -1,4 +1,5 @@
-//! Transfer functions that need no file: by name, and from a volume's histogram.
+//! Transfer functions that need no file: presets by name, and one derived from a volume's
+//! histogram.
 
 use super::{Shade, TransferFunction, Volume, each_type};
 use crate::{Error, Result, scattered::Points as ScatteredPoints};
@@ -35,7 +36,7 @@ const CT_ANGIOGRAPHY: Points = &[
     [600.0, 0.98, 0.85, 0.70, 0.4],
     [1200.0, 1.0, 0.98, 0.93, 0.7],
 ];
-/// Values as shares of the range.
+/// Values as fractions of the range.
 const MRI: Points = &[
     [0.08, 0.20, 0.18, 0.22, 0.0],
     [0.25, 0.55, 0.42, 0.38, 0.04],
@@ -49,23 +50,27 @@ const GENERIC: Points = &[
     [1.00, 1.00, 0.98, 0.92, 0.7],
 ];
 
-/// Bins of the histogram that [`TransferFunction::automatic`] looks at.
+/// Bins of the histogram that [`TransferFunction::automatic`] analyses.
 const BINS: usize = 256;
 
 impl TransferFunction {
-    /// The names that [`named`](Self::named) knows.
+    /// The names that [`named`](Self::named) accepts.
     pub const NAMES: [&'static str; 6] =
         ["ct-bone", "ct-soft-tissue", "ct-lung", "ct-angiography", "mri", "generic"];
 
-    /// A preset. The CT ones hold for Hounsfield units and millimetres; "mri" and "generic" spread over `range`, and
-    /// their opacity is per world unit: set `unit` where the volume's world is not in millimetres or voxels.
+    /// Returns a preset. The CT presets expect Hounsfield units and millimetres. "mri" and
+    /// "generic" spread over `range`, and their opacity is per world unit. For these two, set
+    /// `unit` if the world units are neither millimetres nor voxels.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a name that is none of [`NAMES`](Self::NAMES), or a range that is not finite or descends.
+    /// [`Error::Argument`] if `name` is not one of [`NAMES`](Self::NAMES), or if `range` is not
+    /// finite or descends.
     pub fn named(name: &str, range: [f64; 2]) -> Result<Self> {
         let [low, high] = range;
         if !(low.is_finite() && high.is_finite() && low <= high) {
-            return Err(Error::Argument(format!("{low} to {high} is no range of values")));
+            return Err(Error::Argument(format!(
+                "{low} to {high} is not a range of values: both ends must be finite and ascend"
+            )));
         }
         let (points, low, width) = match name {
             "ct-bone" => (CT_BONE, 0.0, 1.0),
@@ -90,13 +95,16 @@ impl TransferFunction {
         })
     }
 
-    /// A transfer function for any volume, from its histogram. The values split in two by Otsu's threshold (1979, "A
-    /// threshold selection method from gray-level histograms"); the side that nearly all of the volume's border is on
-    /// is background, the low side where the border is mixed. Opacity begins three standard deviations from the
-    /// background's mode and rises over the threshold and the quantiles above it. It is measured in hundredths of the
-    /// volume's diagonal, so that thin things show and thick ones are no fog, whatever the sampling. A constant volume
-    /// is shown as a faint haze, as is one that was put together by hand and contradicts itself: what would draw that one tells
-    /// why it cannot.
+    /// Derives a transfer function for any volume from its histogram. Otsu's threshold (1979, "A
+    /// threshold selection method from gray-level histograms") splits the values in two. The
+    /// background is the high side if at least nine tenths of the volume's border lie there, and
+    /// the low side otherwise. Opacity begins three standard deviations from the background's mode
+    /// and rises over the threshold and the quantiles above it. The opacities hold for a hundredth
+    /// of the volume's diagonal. Thin structures therefore show and thick ones do not turn into
+    /// fog, whatever the sampling.
+    ///
+    /// A constant volume is shown as a faint haze. So is a volume that was built by hand and is
+    /// inconsistent: whatever draws that volume returns the error.
     pub fn automatic(volume: &Volume) -> Self {
         if volume.validate().is_err() {
             return Self::of_histogram(Vec::new(), [0.0; 2], 1.0, false);
@@ -110,8 +118,8 @@ impl TransferFunction {
         Self::of_histogram(counts, volume.range, unit, bright)
     }
 
-    /// A transfer function for scattered samples, as [`automatic`](Self::automatic) makes one for a volume; the low values
-    /// count as background.
+    /// Derives a transfer function for scattered samples, as [`automatic`](Self::automatic) does
+    /// for a volume. The low values count as background.
     pub fn automatic_for_points(points: &ScatteredPoints) -> Self {
         let [first, last] = points.bounds();
         let diagonal = (last - first).length();
@@ -119,8 +127,8 @@ impl TransferFunction {
         Self::of_histogram(points.counts(BINS), points.range(), unit, false)
     }
 
-    /// Shows values by how many of them fall into equal parts of their range. The background's values are the low ones, or
-    /// the high ones where it is `bright`.
+    /// Builds the function from a histogram: counts of values in equal parts of their range. The
+    /// background's values are the low ones, or the high ones if `bright`.
     fn of_histogram(mut counts: Vec<u64>, range: [f64; 2], unit: f64, bright: bool) -> Self {
         let shade = Some(Shade::default());
         let [low, high] = range;
@@ -155,7 +163,8 @@ impl TransferFunction {
     }
 }
 
-/// The bin above which Otsu's method separates best: where the variance between the two classes is largest.
+/// Returns the bin above which Otsu's method separates best: the one with the largest variance
+/// between the two classes.
 fn otsu(counts: &[u64]) -> usize {
     let total: f64 = counts.iter().map(|&n| n as f64).sum();
     let sum: f64 = counts.iter().enumerate().map(|(i, &n)| i as f64 * n as f64).sum();
@@ -174,7 +183,7 @@ fn otsu(counts: &[u64]) -> usize {
     best_at
 }
 
-/// Whether at least nine tenths of the samples on the volume's faces lie above a bin.
+/// Returns whether at least nine tenths of the samples on the volume's faces lie above a bin.
 fn bright_border(volume: &Volume, threshold: usize) -> bool {
     let [nx, ny, nz] = volume.lattice.dims;
     let (mut above, mut total) = (0u64, 0u64);
@@ -196,7 +205,7 @@ fn bright_border(volume: &Volume, threshold: usize) -> bool {
     above * 10 >= total * 9
 }
 
-/// Four points (bin, opacity), ascending, for a background in the low bins.
+/// Returns four points (bin, opacity), ascending, for a background in the low bins.
 fn ramp(counts: &[u64]) -> [(f64, f64); 4] {
     let threshold = otsu(counts);
     let (background, rest) = counts.split_at(threshold + 1);
@@ -210,7 +219,8 @@ fn ramp(counts: &[u64]) -> [(f64, f64); 4] {
         .sum::<f64>()
         / total;
     let mode = background.iter().enumerate().max_by_key(|&(_, &n)| n).map_or(0, |(i, _)| i);
-    // One bin above the mode at least, so that the background itself is clear, and below the threshold's upper side.
+    // At least one bin above the mode, so that the background itself is clear, and at most the
+    // threshold's upper edge.
     let start = (mode as f64 + 1.0 + 3.0 * variance.sqrt()).min(threshold as f64 + 1.0);
     let quantile = |share: f64| {
         let wanted = share * rest.iter().sum::<u64>() as f64;
@@ -231,7 +241,7 @@ mod tests {
     use crate::volume::{Lattice, Samples};
     use glam::DVec3;
 
-    /// A ball of one value in another, with deterministic noise.
+    /// A ball of one value inside another value, with deterministic noise.
     fn ball(inside: u8, outside: u8) -> Volume {
         let n = 24usize;
         let value = |i: usize| {

@@ -1,20 +1,21 @@
-//! What a splat's neighbourhood can show: the range of the samples around each sample. A kernel mixes the samples that it
-//! reaches, so where the transfer function is clear over their whole range, the splats between them cannot be seen, and
-//! the engine leaves them out.
+//! What a splat's neighbourhood can show: the range of the samples around each sample. A kernel
+//! mixes the samples that it reaches. If the transfer function is clear over their whole range, the
+//! splats between them cannot be seen, and the engine skips them.
 
 use super::{TransferFunction, Volume, steps::Steps};
 use rayon::prelude::*;
 
-/// For each sample the smallest and the largest value in the box of ±`radius` samples along each axis around it (cut at the
-/// volume's border), in memory order. Both are steps of 1/255 of the volume's range, the smallest rounded down and the largest
-/// rounded up. [`first_visible`] tells which of them show something.
+/// Returns, for each sample in memory order, the smallest and the largest value in a box around it.
+/// The box reaches ±`radius` samples along each axis and ends at the volume's border. Both are in
+/// steps of 1/255 of the volume's range, the smallest rounded down and the largest rounded up.
+/// [`first_visible`] decides which ranges show something.
 ///
-/// The extremes of a box are those along each axis after another. Smallest values and 255 minus the largest ones lie
-/// beside each other, so that one minimum of bytes serves both, and rounding goes before it because it keeps the order.
-/// Besides the result, a thread holds 2·`radius[2]` + 3 slices.
+/// The extremes of a box are computed one axis after the other. The smallest values and 255 minus
+/// the largest are adjacent, so that one minimum of bytes serves both. Rounding preserves the order
+/// and can therefore come first. Memory beside the result: 2·`radius[2]` + 3 slices per thread.
 ///
 /// # Panics
-/// Where the samples do not fill the lattice.
+/// If the samples do not fill the lattice.
 pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]> {
     let [nx, ny, nz] = volume.lattice.dims;
     let steps = Steps::new(volume.samples.scalar(), volume.range);
@@ -22,13 +23,14 @@ pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]>
     let slice = nx * ny;
     let reach = |axis: usize| radius[axis].min(volume.lattice.dims[axis].saturating_sub(1));
     let (rx, ry, rz) = (reach(0), reach(1), reach(2));
-    // Slabs repeat the slices that reach into them, so they are thick compared to the radius.
+    // Every slab recomputes the slices that reach into it, so slabs are thick compared with the
+    // radius.
     let slab = nz.div_ceil(4 * rayon::current_num_threads()).max(8 * rz).max(1);
     let mut ranges = vec![[0u8; 2]; slice * nz];
     ranges.par_chunks_mut((slab * slice).max(1)).enumerate().for_each(|(index, slab_ranges)| {
         let mut scratch = vec![[0u8; 2]; slice];
         let mut row = vec![[0u8; 2]; nx];
-        // Slices that are done along x and y, slice k in place k modulo their number.
+        // Slices that are finished along x and y: slice k is in entry k modulo the length.
         let mut ring = vec![vec![[0u8; 2]; slice]; 2 * rz + 1];
         let first = index * slab;
         let mut next = first.saturating_sub(rz);
@@ -64,15 +66,18 @@ pub fn neighbourhood_ranges(volume: &Volume, radius: [usize; 3]) -> Vec<[u8; 2]>
     ranges
 }
 
-/// What [`first_visible`] would tell if everything showed: for pictures that mix samples farther apart than ranges hold for.
+/// What [`first_visible`] would return if everything showed. Pictures that mix samples farther
+/// apart than the ranges cover use it.
 pub const EVERYTHING: [u16; 256] = [0; 256];
 
-/// For each smallest step the least largest step with which something shows; 256 where nothing does. A sample of the
-/// neighbourhood `[low, high]` may be left out where `high < first_visible[low]`.
+/// Returns, for each smallest step, the lowest largest step at which the range shows something, or
+/// 256 if none does. A sample of the neighbourhood `[low, high]` may be skipped if `high <
+/// first_visible[low]`.
 pub fn first_visible(transfer: &TransferFunction, range: [f64; 2]) -> [u16; 256] {
     let step = (range[1] - range[0]) / 255.0;
     let value = |steps: u16| range[0] + f64::from(steps) * step;
-    // A step's value may miss the sample's by a rounding error. That matters where opacity jumps, not where it rises.
+    // A step's value may miss the sample's by a rounding error. That matters where opacity jumps,
+    // not where it rises.
     let slack = step * 1e-7;
     let jumps = |value: f64| transfer.opacity(value) > 1e-5;
     let shows = |low: u16, high: u16| {
@@ -85,7 +90,7 @@ pub fn first_visible(transfer: &TransferFunction, range: [f64; 2]) -> [u16; 256]
             _ if shows(low, low) => low,
             255 => 256,
             _ if shows(low, low + 1) => low + 1,
-            // What shows from the next step on.
+            // Otherwise what shows from the next step on.
             _ => first[usize::from(low) + 1],
         };
     }
@@ -172,12 +177,14 @@ mod tests {
 
     #[test]
     fn visible_steps_keep_what_shows() {
-        let json = r#"{"color": [[0, 1, 1, 1]], "opacity": [[30, 0], [40, 0.5], [50, 0], [200, 0], [210, 1]]}"#;
+        let json = r#"{"color": [[0, 1, 1, 1]],
+            "opacity": [[30, 0], [40, 0.5], [50, 0], [200, 0], [210, 1]]}"#;
         let transfer = TransferFunction::from_json(json).unwrap();
         let first = first_visible(&transfer, [0.0, 255.0]);
-        // From 0 on, 31 is the first value that shows; from 50 on it is 201; above, all do.
+        // From 0 on, the first value that shows is 31; from 50 on it is 201; above 200 every value
+        // shows.
         assert_eq!((first[0], first[30], first[35], first[50], first[200]), (31, 31, 35, 201, 201));
-        // A label's step, at values that 255 steps of the range miss by rounding.
+        // A step at a label, at values that 255 steps of the range miss by rounding.
         let label = TransferFunction::from_json(
             r#"{"color": [[0, 1, 1, 1]], "opacity": [[2, 0], [2, 1]]}"#,
         )

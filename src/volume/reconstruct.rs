@@ -1,4 +1,4 @@
-//! The field between the samples, as the engine's splats draw it, at single positions.
+//! The field between the samples, as the engine's splats draw it, evaluated at single positions.
 
 use super::{Arrangement, Lattice, Volume, grid::weight};
 use crate::{
@@ -7,19 +7,26 @@ use crate::{
 };
 use glam::{DMat3, DVec3};
 
-/// The normalised kernel sum Σ c·h / Σ h over what a volume draws: its samples, or where it is sharp its coefficients.
+/// The normalised kernel sum Σ c·h / Σ h over the values that a volume draws: its samples, or the
+/// coefficients of a sharp volume.
 #[derive(Debug, Clone)]
 pub struct Reconstruction<'a> {
     volume: &'a Volume,
     kernel: &'a Kernel,
-    /// World positions to steps.
+    /// Maps world positions to steps.
     inverse: DMat3,
 }
 
 impl<'a> Reconstruction<'a> {
+    /// Prepares the reconstruction of a volume by a kernel.
+    ///
     /// # Errors
-    /// [`Error::Argument`] for a rectilinear lattice, for a volume that was made sharp for another kernel, and for a volume or a
-    /// kernel that was put together by hand and contradicts itself.
+    /// [`Error::Argument`] in these cases:
+    ///
+    /// - The lattice is rectilinear, or the kernel is a tensor product and the lattice is not
+    ///   Cartesian.
+    /// - The volume was made sharp for another kernel.
+    /// - The volume or the kernel was built by hand and is inconsistent.
     pub fn new(volume: &'a Volume, kernel: &'a Kernel) -> Result<Self> {
         volume.validate().map_err(Error::Argument)?;
         kernel.validate()?;
@@ -33,13 +40,13 @@ impl<'a> Reconstruction<'a> {
         }
         if kernel.as_tensor().is_some() && volume.lattice.arrangement != Arrangement::Cartesian {
             return Err(Error::Argument(
-                "tensor products are kernels of Cartesian lattices".into(),
+                "tensor products can be used on Cartesian lattices only".into(),
             ));
         }
         Ok(Self { volume, kernel, inverse: volume.lattice.axes.inverse() })
     }
 
-    /// The value at a world position; `None` where no kernel reaches.
+    /// Returns the value at a world position, or `None` if no kernel reaches it.
     pub fn value_at(&self, position: DVec3) -> Option<f64> {
         let lattice = self.volume.drawn_lattice();
         let steps = self.inverse * (position - lattice.origin);
@@ -47,7 +54,8 @@ impl<'a> Reconstruction<'a> {
             return self.product_at(tensor, steps);
         }
         let body_centred = lattice.arrangement == Arrangement::BodyCentred;
-        // Layers to the step along the third axis; layers in turn displaced; a kernel unit in steps.
+        // Layers per step along the third axis (on a body-centred lattice every other one is
+        // displaced), and a kernel unit in steps.
         let (layers, unit) = if body_centred { (2.0, lattice.unit([0; 3]).x) } else { (1.0, 1.0) };
         let reach = self.kernel.extent * unit + 1e-9;
         let (mut sum, mut weights) = (0.0, 0.0);
@@ -67,11 +75,11 @@ impl<'a> Reconstruction<'a> {
         (weights != 0.0).then(|| sum / weights)
     }
 
-    /// The value of a tensor product at some steps, in the box of the samples.
+    /// Returns the value of a tensor product at a position in steps, inside the box of the samples.
     fn product_at(&self, tensor: Tensor, steps: DVec3) -> Option<f64> {
         let lattice = &self.volume.lattice;
         let [_, last] = lattice.step_range();
-        // An axis of one sample counts half a step to either side.
+        // An axis of one sample extends half a step to either side.
         let margin = DVec3::select(last.cmpgt(DVec3::ZERO), DVec3::splat(1e-9), DVec3::splat(0.5));
         if !(steps.cmpge(-margin).all() && steps.cmple(last + margin).all()) {
             return None;
@@ -99,8 +107,8 @@ fn offset(lattice: &Lattice, [i, j, k]: [usize; 3]) -> usize {
     (k * lattice.dims[1] + j) * lattice.dims[0] + i
 }
 
-/// The indices below `count` that lie within `reach` of a place.
+/// Returns the indices below `count` that lie within `reach` of a position.
 fn within(place: f64, reach: f64, count: usize) -> std::ops::Range<usize> {
-    // Casts cut to 0 and up.
+    // Casts clamp negative values to 0.
     (place - reach).ceil() as usize..((place + reach + 1.0).floor() as usize).min(count)
 }

@@ -1,6 +1,7 @@
-//! Resampling on body-centred cubic lattices, which hold what a Cartesian lattice does, in all directions alike, with
-//! 29.3 % fewer samples (Theußl, Möller and Gröller, "Optimal regular volume sampling", 2001): their spectra repeat on a
-//! face-centred cubic lattice, the densest packing of balls.
+//! Resampling on body-centred cubic lattices. These represent what a Cartesian lattice does,
+//! equally in all directions, with 29.3 % fewer samples (Theußl, Möller and Gröller, "Optimal
+//! regular volume sampling", 2001). The reason is that their spectra repeat on a face-centred cubic
+//! lattice, the densest packing of balls.
 
 use super::{Arrangement, Lattice, Samples, Volume};
 use crate::{
@@ -11,28 +12,32 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
 
-/// σ of the Gaussian that the samples are interpolated by, in spacings: at half the finest frequency it leaves 5e-5 of a
-/// wave's images, and of the finest wave itself so much that double precision brings it back.
+/// σ of the interpolating Gaussian, in spacings. At half the finest frequency, 5e-5 of a wave's
+/// images remain. Enough of the finest wave itself remains that double precision can restore it.
 const SIGMA: f64 = 1.0;
-/// Samples that it reaches on either side; 2e-11 of it are left there.
+/// Samples that the Gaussian reaches on either side. There it has fallen to 2e-11.
 const REACH: isize = 7;
-/// The share of the frequencies that the lattice can carry that pass whole; from there to 1 they fade.
+/// Frequencies pass unchanged up to this fraction of what the lattice can carry. From there to 1
+/// they fade.
 const PASSED: f64 = 0.95;
 
-/// Resamples a Cartesian volume on a body-centred cubic lattice whose edge is √2 spacings. Unequal spacings and directions
-/// stay: the cells are cubes in index space. The lattice is centred on the volume's; its outermost samples lie within 0.4
-/// spacings of the volume's border.
+/// Resamples a Cartesian volume on a body-centred cubic lattice whose edge is √2 spacings. Unequal
+/// spacings and directions are kept: the cells are cubes in index space. The new lattice has the
+/// same centre as the volume's. Its outermost samples lie within 0.4 spacings of the volume's
+/// border.
 ///
-/// The samples are interpolated as [`Volume::sharpened`] does, mirrored at the border, without the waves that a
-/// body-centred lattice would take for others: those beyond its Brillouin zone (a rhombic dodecahedron that touches the
-/// middles of the edges of the Cartesian lattice's cube), which fade smoothly.
+/// The samples are interpolated as in [`Volume::sharpened`], mirrored at the border. Waves that
+/// would alias on a body-centred lattice are removed, with a smooth fade. These are the waves
+/// beyond its Brillouin zone, a rhombic dodecahedron that touches the middles of the edges of the
+/// Cartesian lattice's cube.
 ///
-/// The sample type stays: integers are rounded, and all values are cut to the range of the samples, beyond which
-/// interpolation overshoots. Besides volume and result this takes 8 bytes a sample.
+/// The sample type is kept. Integers are rounded, and all values are clamped to the range of the
+/// samples, which interpolation overshoots. Memory beside the volume and the result: 8 bytes per
+/// sample.
 ///
 /// # Errors
-/// [`Error::Argument`] for another arrangement than Cartesian and for fewer than 2 samples along an axis, and for a volume that
-/// was put together by hand and contradicts itself.
+/// [`Error::Argument`] for any arrangement but Cartesian, for fewer than 2 samples along an axis,
+/// and for a volume that was built by hand and is inconsistent.
 pub fn body_centred(volume: &Volume) -> Result<Volume> {
     volume.validate().map_err(Error::Argument)?;
     let [nx, ny, nz] = volume.lattice.dims;
@@ -43,14 +48,14 @@ pub fn body_centred(volume: &Volume) -> Result<Volume> {
     }
     if nx.min(ny).min(nz) < 2 {
         return Err(Error::Argument(format!(
-            "a volume of {nx} × {ny} × {nz} samples cannot be resampled on a body-centred lattice: it takes 2 or more \
-             along each axis"
+            "a volume of {nx} × {ny} × {nz} samples cannot be resampled on a body-centred lattice: \
+             that needs 2 or more along each axis"
         )));
     }
     let (lattice, first) = resampled(&volume.lattice);
     let [width, height, _] = lattice.dims;
     let coefficients = coefficients(volume);
-    // The Gaussian is a product, so each axis is interpolated by itself.
+    // The Gaussian is separable, so each axis is interpolated by itself.
     let taps = |axis: usize, place: f64| Taps::new(first[axis] + place, volume.lattice.dims[axis]);
     let displaced = |layer: usize| FRAC_1_SQRT_2 * (layer % 2) as f64;
     let along = |axis: usize, layer: usize| -> Vec<Taps> {
@@ -91,7 +96,8 @@ pub fn body_centred(volume: &Volume) -> Result<Volume> {
     Volume::new(lattice, samples).map_err(Error::Argument)
 }
 
-/// A body-centred lattice of edge √2 in the middle of a Cartesian one, and the steps of its first sample there.
+/// Returns a body-centred lattice of edge √2 with the centre of a Cartesian one, and the position
+/// of its first sample in steps of the Cartesian one.
 fn resampled(lattice: &Lattice) -> (Lattice, DVec3) {
     let [x, y, z] = lattice.dims.map(|n| (n - 1) as f64);
     // Along the first two axes the displaced samples lie half an edge further.
@@ -106,7 +112,8 @@ fn resampled(lattice: &Lattice) -> (Lattice, DVec3) {
     (Lattice::body_centred(dims, lattice.position(first), lattice.axes * SQRT_2), first)
 }
 
-/// The samples without the waves that the other lattice cannot hold, divided by the response of the Gaussian.
+/// Returns the samples without the waves that the other lattice cannot represent, divided by the
+/// Gaussian's response.
 fn coefficients(volume: &Volume) -> Vec<f64> {
     let dims = volume.lattice.dims;
     let waves = dims.map(|count| {
@@ -124,7 +131,8 @@ fn coefficients(volume: &Volume) -> Vec<f64> {
     values
 }
 
-/// How much of a wave passes. The lattice's Brillouin zone ends where the two largest frequencies add up to √2 π.
+/// Returns the fraction of a wave that passes. The lattice's Brillouin zone ends where the two
+/// largest frequencies add up to √2 π.
 fn passed([x, y, z]: [f64; 3]) -> f64 {
     let place = (x + y + z - x.min(y).min(z)) / (SQRT_2 * PI);
     let fade = ((place - PASSED) / (1.0 - PASSED)).clamp(0.0, 1.0);
@@ -135,7 +143,7 @@ fn gaussian(distance: f64) -> f64 {
     (-0.5 * (distance / SIGMA).powi(2)).exp()
 }
 
-/// What the sum of Gaussians at all samples of an axis leaves of a wave.
+/// Returns the fraction of a wave that the sum of Gaussians at all samples of an axis leaves.
 fn response(wave: f64) -> f64 {
     let sum = |wave: f64| {
         (1..=REACH).map(|m| m as f64).map(|m| 2.0 * gaussian(m) * (wave * m).cos()).sum::<f64>()
@@ -143,7 +151,8 @@ fn response(wave: f64) -> f64 {
     (1.0 + sum(wave)) / (1.0 + sum(0.0))
 }
 
-/// The samples of an axis that make up the value at a place, and their shares, which add up to 1.
+/// The samples of an axis that make up the value at a position, and their weights, which add up to
+/// 1.
 struct Taps {
     samples: [usize; 2 * REACH as usize],
     shares: [f64; 2 * REACH as usize],
@@ -170,7 +179,7 @@ fn add(sums: &mut [f64], values: &[f64], share: f64) {
     sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += share * value);
 }
 
-/// Layers of samples that a function gives the values of.
+/// Layers of samples whose values a function computes.
 struct Layers<F> {
     count: usize,
     size: usize,
@@ -209,7 +218,8 @@ mod tests {
         )
     }
 
-    /// A wave that goes on mirrored at the borders comes out as it is, in every type, on axes of any kind.
+    /// A wave that continues mirrored at the borders keeps its values, in every type and on any
+    /// axes.
     #[test]
     fn waves_keep_their_values() {
         let dims = [14, 9, 11];
@@ -244,7 +254,8 @@ mod tests {
                 let steps = inverse * (resampled.lattice.sample_position(sample) - lattice.origin);
                 let expected = (wave(steps) * factor).clamp(volume.range[0], volume.range[1]);
                 let error = (resampled.value(sample) - expected).abs();
-                // Integers are rounded twice; at 0.4 of the finest frequency images of the waves add 7e-6.
+                // Integers are rounded twice. At 0.4 of the finest frequency, images of the waves
+                // add 7e-6.
                 assert!(
                     error < bound + 1e-5 * (volume.range[1] - volume.range[0]),
                     "{name}: sample {sample} at {steps} is off by {error}"
@@ -255,7 +266,7 @@ mod tests {
         }
     }
 
-    /// The lattice's own limit: what it would take for another wave is gone, all else passes.
+    /// The lattice's own limit: waves that would alias are removed, all others pass.
     #[test]
     fn only_what_the_lattice_holds_passes() {
         assert_eq!(passed([PI, 0.0, 0.0]), 1.0);

@@ -1,4 +1,4 @@
-//! The values of a volume, in the type of their file.
+//! The values of a volume, in the sample type of their file.
 
 use super::{Lattice, Scalar, overshoot::Overshoot, reach::neighbourhood_ranges};
 use crate::{
@@ -8,7 +8,7 @@ use crate::{
 use rayon::prelude::*;
 use std::{borrow::Cow, sync::Arc};
 
-/// The samples in the type of their file, first axis fastest.
+/// Samples in the type of their file, first axis fastest.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Samples {
     U8(Vec<u8>),
@@ -18,7 +18,7 @@ pub enum Samples {
     F32(Vec<f32>),
 }
 
-/// Runs one expression on the vector inside, whatever its type.
+/// Evaluates one expression on the vector inside, whatever its type.
 macro_rules! each_type {
     ($samples:expr, $values:ident => $body:expr) => {
         match $samples {
@@ -32,7 +32,7 @@ macro_rules! each_type {
 }
 pub(crate) use each_type;
 
-/// Samples that one task of a parallel pass looks at: some 10 µs of work.
+/// Samples per task of a parallel pass: about 10 µs of work.
 const CHUNK: usize = 1 << 16;
 
 impl Samples {
@@ -45,15 +45,15 @@ impl Samples {
         self.len() == 0
     }
 
-    /// The value of a sample; exact for every type.
+    /// Returns the value of a sample, exact for every type.
     ///
     /// # Panics
-    /// Where `index` is not below [`len`](Self::len).
+    /// If `index` is not below [`len`](Self::len).
     pub fn value(&self, index: usize) -> f64 {
         each_type!(self, values => f64::from(values[index]))
     }
 
-    /// The type of the samples.
+    /// Returns the type of the samples.
     pub fn scalar(&self) -> Scalar {
         match self {
             Self::U8(_) => Scalar::U8,
@@ -64,17 +64,17 @@ impl Samples {
         }
     }
 
-    /// The name of the type, as the command spells it.
+    /// Returns the name of the type, as the command spells it.
     pub fn type_name(&self) -> &'static str {
         self.scalar().name()
     }
 
-    /// Bytes that one sample takes.
+    /// Bytes per sample.
     pub fn sample_bytes(&self) -> usize {
         self.scalar().bytes()
     }
 
-    /// Samples from their bytes, in the order of this machine; a part of one at the end is left out.
+    /// Builds samples from bytes in native byte order. An incomplete sample at the end is dropped.
     pub(crate) fn from_bytes(scalar: Scalar, bytes: &[u8]) -> Self {
         let bytes = &bytes[..bytes.len() / scalar.bytes() * scalar.bytes()];
         match scalar {
@@ -86,12 +86,13 @@ impl Samples {
         }
     }
 
-    /// The samples' bytes, in the order of this machine.
+    /// The bytes of the samples, in native byte order.
     pub fn bytes(&self) -> &[u8] {
         each_type!(self, values => bytemuck::cast_slice(values))
     }
 
-    /// Smallest and largest value, or why there is none: no samples, or some that are not finite.
+    /// Returns the smallest and largest value. The error says why there is none: no samples, or
+    /// samples that are not finite.
     pub(crate) fn range(&self) -> Result<[f64; 2], String> {
         fn extremes<T: Copy + PartialOrd + Send + Sync + Into<f64>>(
             values: &[T],
@@ -125,39 +126,47 @@ impl Samples {
     }
 }
 
-/// A volume: a lattice and one scalar per sample. Values are finite; `range` holds their smallest and largest.
+/// A volume: a lattice and one scalar per sample. Values are finite; `range` holds the smallest and
+/// the largest.
 #[derive(Debug, Clone)]
 pub struct Volume {
     pub lattice: Lattice,
     pub samples: Samples,
     pub range: [f64; 2],
-    /// What kernels carry instead of the samples, so that they pass through them ([`Volume::sharpened`]).
+    /// If set, kernels carry these values instead of the samples, so that their sum passes through
+    /// the samples ([`Volume::sharpened`]).
     pub coefficients: Option<Arc<Coefficients>>,
 }
 
-/// Values for kernels on a lattice, such that their normalised sum passes through a volume's samples.
+/// Values for kernels on a lattice, chosen so that their normalised sum passes through a volume's
+/// samples.
 #[derive(Debug, Clone)]
 pub struct Coefficients {
-    /// The volume's lattice, continued on all sides as far as the kernel reaches; of a tensor product the volume's own.
+    /// The volume's lattice, extended on all sides as far as the kernel reaches. For a tensor
+    /// product, the volume's own lattice.
     pub lattice: Lattice,
-    /// A value per sample of that lattice; of either sign, and beyond the range of the samples.
+    /// One value per sample of that lattice, of either sign. Values may lie outside the range of
+    /// the samples.
     pub values: Vec<f32>,
-    /// For each of them the smallest and the largest value that their sum may take as far as its kernel reaches, in steps of
-    /// 1/255 of the volume's range (as [`neighbourhood_ranges`] has them), cut to that range.
+    /// For each value, bounds on the normalised sum within reach of its kernel: smallest and
+    /// largest. The unit is 1/255 of the volume's range (as in [`neighbourhood_ranges`]), and the
+    /// bounds are clamped to that range.
     pub ranges: Vec<[u8; 2]>,
-    /// The kernel that they hold for.
+    /// The kernel that these values were computed for.
     pub kernel: Kernel,
 }
 
 impl Volume {
-    /// The most bins of a [`histogram`](Self::histogram): every thread counts in bins of its own.
+    /// Most bins of a [`histogram`](Self::histogram). There is a limit because every thread counts
+    /// in bins of its own.
     pub const MAX_BINS: usize = 1 << 20;
 
     /// Puts samples on a lattice and measures their range (in parallel).
     ///
     /// # Errors
-    /// In words, for the caller to say where: a lattice that is none ([`Lattice::validate`]), another number of samples
-    /// than the lattice has, or NaN and infinite samples (how many, and the first).
+    /// A message to which the caller adds the place. The causes are an invalid lattice
+    /// ([`Lattice::validate`]), a number of samples that does not match the lattice, and NaN or
+    /// infinite samples (the message gives their number and the first).
     pub fn new(lattice: Lattice, samples: Samples) -> Result<Self, String> {
         lattice.validate()?;
         if samples.len() != lattice.len() {
@@ -171,8 +180,9 @@ impl Volume {
         Ok(Self { lattice, samples, range, coefficients: None })
     }
 
-    /// Says in words what [`new`](Self::new) would refuse, and what has been changed since then: whoever takes a volume that
-    /// may have been put together by hand asks first.
+    /// Checks what [`new`](Self::new) checks, and what may have changed since then. Call it first
+    /// in every function that takes a volume, because the volume may have been built by hand. The
+    /// error is a message.
     pub(crate) fn validate(&self) -> Result<(), String> {
         self.lattice.validate()?;
         if self.samples.len() != self.lattice.len() {
@@ -203,40 +213,44 @@ impl Volume {
         self.samples.is_empty()
     }
 
-    /// The value of the sample at an index in memory order (first axis fastest).
+    /// Returns the value of the sample at an index in memory order (first axis fastest).
     ///
     /// # Panics
-    /// Where `index` is not below [`len`](Self::len).
+    /// If `index` is not below [`len`](Self::len).
     pub fn value(&self, index: usize) -> f64 {
         self.samples.value(index)
     }
 
-    /// The lattice whose samples kernels are drawn at: the volume's, or its coefficients'.
+    /// The lattice on which kernels are drawn: that of the coefficients if there are any, else the
+    /// volume's.
     pub fn drawn_lattice(&self) -> &Lattice {
         self.coefficients.as_ref().map_or(&self.lattice, |coefficients| &coefficients.lattice)
     }
 
-    /// What the kernel at a sample of [`drawn_lattice`](Self::drawn_lattice) carries.
+    /// Returns the value that the kernel at a sample of [`drawn_lattice`](Self::drawn_lattice)
+    /// carries.
     ///
     /// # Panics
-    /// Where `index` is not below that lattice's number of samples.
+    /// If `index` is not below that lattice's number of samples.
     pub fn drawn_value(&self, index: usize) -> f64 {
         self.coefficients
             .as_ref()
             .map_or_else(|| self.value(index), |drawn| f64::from(drawn.values[index]))
     }
 
-    /// For each sample of [`drawn_lattice`](Self::drawn_lattice) the range of the values around it
-    /// ([`neighbourhood_ranges`]), as far as the kernel reaches.
+    /// Returns the range of the values around each sample of
+    /// [`drawn_lattice`](Self::drawn_lattice), as far as the kernel reaches
+    /// ([`neighbourhood_ranges`]).
     ///
     /// # Panics
-    /// Where the samples do not fill the lattice.
+    /// If the samples do not fill the lattice.
     pub fn drawn_ranges(&self, kernel: &Kernel) -> Cow<'_, [[u8; 2]]> {
         match &self.coefficients {
             Some(coefficients) => Cow::Borrowed(&coefficients.ranges),
             None if kernel.as_tensor().is_some() => {
                 let mut ranges = neighbourhood_ranges(self, self.lattice.reach(kernel.extent));
-                // Weights of both signs leave the range of the samples in reach by a known factor.
+                // Weights of both signs can leave the range of the samples in reach, by a known
+                // factor.
                 let lebesgue = kernel.as_tensor().map_or(1.0, Tensor::lebesgue);
                 if lebesgue > 1.0 {
                     let overshoot = Overshoot { lebesgue, tails: Vec::new() };
@@ -246,7 +260,8 @@ impl Volume {
                 }
                 Cow::Owned(ranges)
             }
-            // Signed kernels overshoot, and what is left out beside them must not be missed: twice their reach.
+            // Signed kernels overshoot, so a sample that is left out can still influence its
+            // surroundings: use twice the reach.
             None => {
                 let extent = if kernel.is_signed() { 2.0 * kernel.extent } else { kernel.extent };
                 Cow::Owned(neighbourhood_ranges(self, self.lattice.reach(extent)))
@@ -254,16 +269,17 @@ impl Volume {
         }
     }
 
-    /// Smallest and largest world coordinates of the sample positions.
+    /// Returns the smallest and largest world coordinates of the sample positions.
     pub fn bounds(&self) -> [glam::DVec3; 2] {
         self.lattice.bounds()
     }
 
-    /// How many samples fall into each of `bins` equal parts of the range; a value on a border counts above it, the
-    /// largest in the last bin. A constant volume fills the first bin.
+    /// Counts the samples in each of `bins` equal parts of the range. A value on a boundary counts
+    /// in the bin above it, the largest value in the last bin. A constant volume fills the first
+    /// bin.
     ///
     /// # Errors
-    /// [`Error::Argument`] for more bins than [`MAX_BINS`](Self::MAX_BINS).
+    /// [`Error::Argument`] for more than [`MAX_BINS`](Self::MAX_BINS) bins.
     pub fn histogram(&self, bins: usize) -> Result<Vec<u64>> {
         Self::check_bins(bins)?;
         Ok(self.counts(bins))
@@ -273,14 +289,14 @@ impl Volume {
     pub(crate) fn check_bins(bins: usize) -> Result<()> {
         if bins > Self::MAX_BINS {
             return Err(Error::Argument(format!(
-                "{bins} bins of values are more than {}",
+                "a histogram of {bins} bins is too large: the most is {}",
                 Self::MAX_BINS
             )));
         }
         Ok(())
     }
 
-    /// The [`histogram`](Self::histogram) of so many bins, which are known to be few enough.
+    /// The [`histogram`](Self::histogram), for a number of bins that is known to be allowed.
     pub(super) fn counts(&self, bins: usize) -> Vec<u64> {
         if bins == 0 {
             return Vec::new();
@@ -303,7 +319,7 @@ impl Volume {
             .reduce(|| vec![0; bins], add)
     }
 
-    /// The bin of [`histogram`](Self::histogram) that a value falls into.
+    /// Returns the bin of [`histogram`](Self::histogram) that a value falls into.
     pub fn bin(&self, value: f64, bins: usize) -> usize {
         let [low, high] = self.range;
         let scale = if high > low { bins as f64 / (high - low) } else { 0.0 };

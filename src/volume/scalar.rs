@@ -1,4 +1,4 @@
-//! The types that samples are kept in.
+//! The types that samples are stored in.
 
 /// The type of a volume's samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,7 +13,7 @@ pub enum Scalar {
 impl Scalar {
     pub const ALL: [Self; 5] = [Self::U8, Self::U16, Self::I16, Self::I32, Self::F32];
 
-    /// The name, as the command spells it.
+    /// Returns the name, as the command spells it.
     pub fn name(self) -> &'static str {
         match self {
             Self::U8 => "u8",
@@ -24,7 +24,7 @@ impl Scalar {
         }
     }
 
-    /// Bytes that one sample takes.
+    /// Bytes per sample.
     pub fn bytes(self) -> usize {
         match self {
             Self::U8 => 1,
@@ -33,10 +33,11 @@ impl Scalar {
         }
     }
 
-    /// The value of the first sample in bytes of this machine's order; exact.
+    /// Returns the value of the first sample in `bytes`, which are in native byte order. The value
+    /// is exact.
     ///
     /// # Panics
-    /// Where there are fewer bytes than a sample takes.
+    /// If there are fewer bytes than a sample takes.
     pub fn value(self, bytes: &[u8]) -> f64 {
         fn first<T: bytemuck::AnyBitPattern + Into<f64>>(bytes: &[u8]) -> f64 {
             bytemuck::pod_read_unaligned::<T>(&bytes[..size_of::<T>()]).into()

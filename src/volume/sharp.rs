@@ -1,8 +1,11 @@
-//! Sharp volumes: kernels that carry coefficients in place of the samples, such that their normalised sum passes through
-//! every sample. The coefficients are the samples divided, in frequency space, by the response of the sampled kernel
-//! (Unser, "Splines: a perfect fit for signal and image processing", 1999; Thévenaz, Blu and Unser, "Interpolation
-//! revisited", 2000; on body-centred lattices Condat and Van De Ville, "Three-directional box-splines", 2006, and others
-//! after Theußl, Möller and Gröller, "Optimal regular volume sampling", 2001).
+//! Sharp volumes: kernels carry coefficients instead of the samples, chosen so that their
+//! normalised sum passes through every sample. The coefficients are the samples divided, in
+//! frequency space, by the response of the sampled kernel.
+//!
+//! Sources: Unser, "Splines: a perfect fit for signal and image processing", 1999; Thévenaz, Blu
+//! and Unser, "Interpolation revisited", 2000. For body-centred lattices: Condat and Van De Ville,
+//! "Three-directional box-splines", 2006, and others after Theußl, Möller and Gröller, "Optimal
+//! regular volume sampling", 2001.
 
 use super::{
     Arrangement, Coefficients, Lattice, Samples, Volume,
@@ -20,28 +23,37 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// The least response that a kernel may leave of a wave. Coefficients are up to 1 / response as large as the samples and
-/// rounded to 24 bits; this keeps the sum within 1e-4 of their range.
+/// The smallest response that a kernel may have. Coefficients are up to 1 / response times as large
+/// as the samples, and rounded to 24 bits. This bound keeps the sum within 1e-4 of the range of the
+/// samples.
 const LEAST_RESPONSE: f64 = 6e-4;
 
 impl Volume {
-    /// Makes the volume sharp for a kernel: sets [`coefficients`](Self::coefficients), whose normalised kernel sum passes
-    /// through every sample (within 1e-4 of the range). The field goes on mirrored at the outermost samples, and the
-    /// coefficients with it as far as the kernel reaches, so that sums are whole at the border too. The kernel is radial
-    /// in index space.
+    /// Makes the volume sharp for a kernel: sets [`coefficients`](Self::coefficients). Their
+    /// normalised kernel sum passes through every sample (within 1e-4 of the range). The kernel is
+    /// radial in index space.
     ///
-    /// A tensor product that passes through the samples by itself takes none. The cubic B-spline's coefficients come of an exact
-    /// recursive filter, far faster than those of radial kernels; they lie on the volume's own lattice, mirrored with it.
+    /// The field continues mirrored at the outermost samples. The coefficients continue with it as
+    /// far as the kernel reaches, so that sums are complete at the border too.
     ///
-    /// Besides the volume and the result this takes some 16 bytes a sample, on a body-centred lattice 40.
+    /// A tensor product that interpolates needs no coefficients and gets none. For the cubic
+    /// B-spline they come from an exact recursive filter, far faster than for radial kernels. They
+    /// lie on the volume's own lattice and are mirrored with it.
+    ///
+    /// Memory beside the volume and the result: about 16 bytes per sample, on a body-centred
+    /// lattice 40.
     ///
     /// # Errors
-    /// [`Error::Argument`] where the kernel takes some wave of the samples away (a Gaussian's sigma too large), for values near
-    /// the largest of 32 bits, on rectilinear lattices, and on body-centred ones of one layer; for a volume or a kernel that was
-    /// put together by hand and contradicts itself, and where memory cannot hold the result. Of a tensor product on other lattices
-    /// than Cartesian ones.
+    /// [`Error::Argument`] in these cases:
+    ///
+    /// - The kernel removes a wave of the samples (the sigma of a Gaussian is too large).
+    /// - Values are close to the largest 32-bit float.
+    /// - The lattice is rectilinear, or body-centred with one layer, or the kernel is a tensor
+    ///   product and the lattice is not Cartesian.
+    /// - The volume or the kernel was built by hand and is inconsistent.
+    /// - Memory cannot hold the result.
     pub fn sharpened(self, kernel: &Kernel) -> Result<Self> {
-        // Those of another kernel are replaced, whatever they are.
+        // Coefficients of another kernel are replaced without being checked.
         let volume = Self { coefficients: None, ..self };
         volume.validate().map_err(Error::Argument)?;
         kernel.validate()?;
@@ -58,15 +70,16 @@ impl Volume {
         .map_err(Error::Argument)?;
         let response = Response::new(grid, kernel);
         let least = response.least();
-        // A kernel whose values at the samples sum to nothing has no response: infinity stands for it.
+        // If the kernel's values at the samples sum to zero, it has no response, which appears as
+        // infinity.
         if !(LEAST_RESPONSE..f64::INFINITY).contains(&least) {
             let remedy = match kernel.profile {
                 Profile::Gaussian(_) => "take a smaller sigma",
                 _ => "take a narrower kernel",
             };
             return Err(Error::Argument(format!(
-                "the kernel is too wide to be made sharp: it leaves {least:.1e} of the finest detail where {LEAST_RESPONSE} \
-                 are needed; {remedy}"
+                "the kernel is too wide to be made sharp: it leaves {least:.1e} of the finest \
+                 detail where {LEAST_RESPONSE} are needed; {remedy}"
             )));
         }
         let largest = volume.range[0].abs().max(volume.range[1].abs());
@@ -92,7 +105,7 @@ impl Volume {
                 let index = [column, row % height, row / height];
                 let index =
                     std::array::from_fn(|axis| index[axis] as isize - margin[axis] as isize);
-                // A mirror image has the range of what it mirrors.
+                // A mirror image has the range of the sample that it mirrors.
                 let point = grid.point(index);
                 let [i, j, k] = grid.index(point);
                 *value = points[grid.offset(point)] as f32;
@@ -104,7 +117,7 @@ impl Volume {
         Ok(Self { coefficients: Some(Arc::new(coefficients)), ..volume })
     }
 
-    /// The volume, sharp for a tensor product.
+    /// Returns the volume made sharp for a tensor product.
     fn prefiltered(self, tensor: Tensor) -> Result<Self> {
         if self.lattice.arrangement != Arrangement::Cartesian {
             let name = tensor.name();
@@ -125,7 +138,8 @@ impl Volume {
             )));
         }
         let kernel = Kernel::tensor(tensor);
-        // The spline lies within the coefficients in reach, whose range is told in steps of the samples'.
+        // The spline lies within the coefficients in reach. Their range is quantised in steps of
+        // the samples' range.
         let drawn = Self {
             samples: Samples::F32(prefilter::cubic(&self.samples, self.lattice.dims)),
             range: self.range,
@@ -140,7 +154,8 @@ impl Volume {
 }
 
 impl Coefficients {
-    /// Says in words why these are not what [`Volume::sharpened`] makes for a volume on a lattice.
+    /// Checks that these are what [`Volume::sharpened`] makes for a volume on `lattice`. The error
+    /// is a message.
     pub(super) fn validate(&self, lattice: &Lattice) -> Result<(), String> {
         const REMEDY: &str = "make the volume sharp again";
         Grid::of(lattice).map_err(|error| error.to_string())?;
@@ -148,7 +163,7 @@ impl Coefficients {
             .validate()
             .map_err(|error| format!("the kernel of the coefficients: {error}"))?;
         let (wanted, _) = continued(lattice, &self.kernel);
-        // Where both have been moved or turned, by the same, they may differ by roundings.
+        // If both lattices were moved or turned by the same amount, they may differ by rounding.
         let step = lattice.edges().max_element();
         let fits = self.lattice.dims == wanted.dims
             && self.lattice.arrangement == wanted.arrangement
@@ -156,13 +171,15 @@ impl Coefficients {
             && self.lattice.origin.abs_diff_eq(wanted.origin, 1e-3 * step);
         if !fits {
             return Err(format!(
-                "the lattice of the coefficients is not the volume's, continued as far as their kernel reaches; {REMEDY}"
+                "the lattice of the coefficients is not the volume's, continued as far as their \
+                 kernel reaches; {REMEDY}"
             ));
         }
         let (count, values, ranges) = (wanted.len(), self.values.len(), self.ranges.len());
         if [values, ranges] != [count; 2] {
             return Err(format!(
-                "{values} coefficients with {ranges} ranges do not fill their lattice of {count}; {REMEDY}"
+                "{values} coefficients with {ranges} ranges do not fill their lattice of {count}; \
+                 {REMEDY}"
             ));
         }
         match self.values.par_iter().position_first(|value| !value.is_finite()) {
@@ -172,7 +189,8 @@ impl Coefficients {
     }
 }
 
-/// A lattice continued on all sides as far as a kernel reaches, and by how many samples. Tensor products have their own mirrors.
+/// Returns a lattice extended on all sides as far as a kernel reaches, and the number of samples
+/// added per side. Tensor products mirror by themselves.
 fn continued(lattice: &Lattice, kernel: &Kernel) -> (Lattice, [usize; 3]) {
     if kernel.as_tensor().is_some() {
         return (lattice.clone(), [0; 3]);
@@ -180,7 +198,7 @@ fn continued(lattice: &Lattice, kernel: &Kernel) -> (Lattice, [usize; 3]) {
     let mut margin = lattice.reach(kernel.extent);
     let mut before = DVec3::from_array(margin.map(|n| n as f64));
     if lattice.arrangement == Arrangement::BodyCentred {
-        // Whole cells, so that the first layer is one without displacement again.
+        // Add whole cells, so that the first layer is again one without displacement.
         margin[2] = margin[2].next_multiple_of(2);
         before.z = 0.5 * margin[2] as f64;
     }
@@ -211,7 +229,7 @@ mod tests {
             let at = |index: [usize; 3]| {
                 (index[2] * drawn.dims[1] + index[1]) * drawn.dims[0] + index[0]
             };
-            // The volume's first sample lies where it did, and sees the same on both sides.
+            // The volume's first sample lies where it did, and sees the same values on both sides.
             assert!(drawn.sample_position(at(margin)).distance(lattice.origin) < 1e-12);
             let [x, y, z] = margin;
             let opposite = |a, b| {

@@ -1,21 +1,22 @@
-//! Values as steps of 1/255 of a volume's range: a pair of bytes that bounds them.
+//! Values quantised to steps of 1/255 of a volume's range: a pair of bytes that bounds them.
 
 use super::Scalar;
 use bytemuck::AnyBitPattern;
 
-/// Turns samples into how many steps fit below them, and 255 minus how many cover them: one minimum of bytes then gives the
-/// smallest and the largest of many. Types of few values look them up.
+/// Turns a sample into two bytes: the steps that fit below it, and 255 minus the steps that cover
+/// it. One minimum of bytes then gives both the smallest and the largest of many samples. Types of
+/// 8 and 16 bits use a look-up table.
 pub struct Steps {
     scalar: Scalar,
     low: f64,
-    /// Steps for each unit of value.
+    /// Steps per unit of value.
     scale: f64,
-    /// Of every value of a type of 8 or 16 bits, by its bits.
+    /// The result for every value of a type of 8 or 16 bits, indexed by its bits.
     table: Vec<[u8; 2]>,
 }
 
 impl Steps {
-    /// The steps of a range (smallest and largest value).
+    /// Steps for a range (smallest and largest value).
     pub fn new(scalar: Scalar, [low, high]: [f64; 2]) -> Self {
         let scale = if high > low { 255.0 / (high - low) } else { 0.0 };
         let mut steps = Self { scalar, low, scale, table: Vec::new() };
@@ -30,18 +31,18 @@ impl Steps {
 
     fn step(&self, value: f64) -> [u8; 2] {
         let step = (value - self.low) * self.scale;
-        // Casts cut to 0 … 255.
+        // Casts clamp to 0 … 255.
         let below = step as u8;
         let above = below.saturating_add(u8::from(f64::from(below) < step));
         [below, 255 - above]
     }
 
-    /// The bytes of samples from that of a number on.
+    /// Returns the bytes of `samples` from sample number `first` on.
     pub fn from<'a>(&self, samples: &'a [u8], first: usize) -> &'a [u8] {
         &samples[first * self.scalar.bytes()..]
     }
 
-    /// The steps of samples, given by their bytes, as many as there is room for.
+    /// Writes the steps of samples, given by their bytes, until `out` is full.
     pub fn write(&self, samples: &[u8], out: &mut [[u8; 2]]) {
         fn each<T: AnyBitPattern>(
             samples: &[u8],

@@ -1,4 +1,4 @@
-//! Transfer functions: the colour and the opacity that a value is shown with.
+//! Transfer functions: the colour and the opacity that a value is drawn with.
 
 use crate::{
     Error, Result,
@@ -7,30 +7,32 @@ use crate::{
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Colour and opacity as piecewise linear functions of the value, in the data's unit. Before the first point and after
-/// the last one the function keeps their value; two points at one value make a step.
+/// Colour and opacity as piecewise linear functions of the value, in the data's unit. Before the
+/// first point and after the last one the function is constant. Two points at one value make a
+/// step.
 ///
-/// Opacity is what `unit` of world length of that value covers, so a picture does not depend on the sampling. Colours are
-/// those displayed: they are mixed and composited as they stand, with no gamma in between.
+/// An opacity holds for a layer of that value that is `unit` of world length thick, so the picture
+/// does not depend on the sampling. Colours are display colours: they are mixed and composited as
+/// they are, without gamma conversion.
 ///
-/// As JSON: `{"color": [[value, red, green, blue], …], "opacity": [[value, opacity], …], "unit": 1.0, "shade":
-/// {"ambient": 0.2, "diffuse": 0.7, "specular": 0.3, "power": 10}}`; `unit` is 1 and `shade` is none where they are
-/// not given. Optional: `"gradient": [[magnitude, factor], …]` and `"isosurfaces": [{"value": 80, "color": [1, 1, 1],
-/// "opacity": 1}, …]`.
+/// As JSON: `{"color": [[value, red, green, blue], …], "opacity": [[value, opacity], …], "unit":
+/// 1.0, "shade": {"ambient": 0.2, "diffuse": 0.7, "specular": 0.3, "power": 10}}`. Without `unit`
+/// it is 1; without `shade` the volume is not lit. Optional: `"gradient": [[magnitude, factor], …]`
+/// and `"isosurfaces": [{"value": 80, "color": [1, 1, 1], "opacity": 1}, …]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransferFunction {
-    /// Value, and red, green, blue in 0 … 1; values ascend.
+    /// Value, and red, green, blue in 0 … 1. Values ascend.
     pub color: Vec<(f64, [f64; 3])>,
-    /// Value, and opacity in 0 … 1 per `unit`; values ascend.
+    /// Value, and opacity in 0 … 1 per `unit`. Values ascend.
     pub opacity: Vec<(f64, f64)>,
     /// The world length that the opacities hold for.
     pub unit: f64,
-    /// How gradients are lit; none for colours as they are.
+    /// How gradients are lit; `None` leaves colours as they are.
     pub shade: Option<Shade>,
-    /// Gradient magnitude (value per world length) and a factor of 0 … 1 on the extinction there (Levoy 1988); magnitudes
-    /// ascend. Empty for no such factor.
+    /// Gradient magnitude (value per world length), and a factor of 0 … 1 on the extinction there
+    /// (Levoy 1988). Magnitudes ascend. If empty, no factor applies.
     pub gradient: Vec<(f64, f64)>,
-    /// Surfaces of one value, drawn beside what the opacity shows.
+    /// Isosurfaces, drawn in addition to what the opacity shows.
     pub isosurfaces: Vec<Isosurface>,
 }
 
@@ -41,7 +43,7 @@ pub struct Isosurface {
     pub value: f64,
     /// Red, green, blue, 0 … 1.
     pub color: [f64; 3],
-    /// The share of light that the surface holds back, over 0 and up to 1.
+    /// The fraction of light that the surface absorbs, above 0 and at most 1.
     pub opacity: f64,
 }
 
@@ -75,17 +77,18 @@ impl Default for Shade {
     }
 }
 
-/// The largest opacity that still has a finite extinction worth computing with: opacity 1 would need an infinite one.
-/// The missing 1/10,000 is far below the 1/255 steps of a displayed picture.
+/// The largest opacity that is used as it is. Opacity 1 would need an infinite extinction. The
+/// missing 1/10,000 is far below the 1/255 steps of a displayed picture.
 const OPAQUE: f64 = 0.9999;
 
-/// Extinctions that can be drawn: sums of them fit in 32 bits, and over the longest ways they can be seen.
+/// Extinctions that can be drawn: their sums fit in 32 bits, and they still show over the longest
+/// paths.
 const EXTINCTIONS: std::ops::RangeInclusive<f64> = 1e-25..=1e30;
 
-/// A transfer file of a megabyte is no transfer file.
+/// The size limit of a transfer function's file. A larger file is something else.
 const MOST_BYTES: usize = 1 << 20;
 
-/// The form of the JSON.
+/// The layout of the JSON.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
@@ -106,13 +109,13 @@ fn one() -> f64 {
 }
 
 impl TransferFunction {
-    /// The most isosurfaces of one picture.
+    /// Most isosurfaces in one picture.
     pub const MAX_ISOSURFACES: usize = 8;
 
     /// Reads the JSON form.
     ///
     /// # Errors
-    /// In words: what is no such JSON (with line and column), or what [`validate`](Self::validate) finds.
+    /// A message: invalid JSON (with line and column), or what [`validate`](Self::validate) finds.
     pub fn from_json(text: &str) -> Result<Self, String> {
         let document: Document = serde_json::from_str(text).map_err(|e| e.to_string())?;
         let transfer = Self {
@@ -131,7 +134,7 @@ impl TransferFunction {
         Ok(transfer)
     }
 
-    /// The JSON form; [`from_json`](Self::from_json) reads it back.
+    /// Returns the JSON form, which [`from_json`](Self::from_json) reads back.
     pub fn to_json(&self) -> String {
         let document = Document {
             color: self.color.iter().map(|&(value, [r, g, b])| [value, r, g, b]).collect(),
@@ -151,20 +154,25 @@ impl TransferFunction {
     /// Reads a JSON file.
     ///
     /// # Errors
-    /// [`Error::File`] and [`Error::Limit`] as for every input; [`Error::Input`] for what is no transfer function.
+    /// [`Error::File`] and [`Error::Limit`] as for every input; [`Error::Input`] if the file is not
+    /// a transfer function.
     pub fn read(path: &Path, limits: &Limits) -> Result<Self> {
         let text = Source::open(path, limits)?.small_text("a transfer function", MOST_BYTES)?;
         Self::from_json(&text).map_err(|message| {
-            Error::input(path, "transfer function", message)
-                .hint("the form is {\"color\": [[value, r, g, b], …], \"opacity\": [[value, opacity], …]}, all but values in 0 … 1")
+            Error::input(path, "transfer function", message).hint(
+                "the form is {\"color\": [[value, r, g, b], …], \
+                     \"opacity\": [[value, opacity], …]}, all but values in 0 … 1",
+            )
         })
     }
 
-    /// Checks what the other functions rely on: at least one point each, values that are finite and ascend, colours and
-    /// opacities in 0 … 1, some opacity over 0, a unit over 0 and a finite, not negative shade.
+    /// Checks what the other functions rely on. Colour and opacity have at least one point each,
+    /// and their values are finite and ascend. Colours and opacities lie in 0 … 1, and at least one
+    /// opacity is over 0 unless there are isosurfaces. The unit is over 0. The coefficients of the
+    /// shade are finite and not negative.
     ///
     /// # Errors
-    /// In words, with the first point that is wrong.
+    /// A message that names the first point that is wrong.
     pub fn validate(&self) -> Result<(), String> {
         self.validate_numbers()?;
         if self.opacity.iter().all(|p| p.1 == 0.0) && self.isosurfaces.is_empty() {
@@ -175,7 +183,7 @@ impl TransferFunction {
         Ok(())
     }
 
-    /// As [`validate`](Self::validate), but for whether anything is shown.
+    /// Like [`validate`](Self::validate), but accepts a function that shows nothing.
     pub(crate) fn validate_numbers(&self) -> Result<(), String> {
         check_values("color", self.color.iter().map(|p| p.0))?;
         check_values("opacity", self.opacity.iter().map(|p| p.0))?;
@@ -200,7 +208,8 @@ impl TransferFunction {
         {
             let (magnitude, factor) = self.gradient[i];
             return Err(format!(
-                "gradient point {i} is {factor} at {magnitude}, but magnitudes are 0 or more and factors lie in 0 … 1"
+                "gradient point {i} is {factor} at {magnitude}, but magnitudes are 0 or more and \
+                 factors lie in 0 … 1"
             ));
         }
         let most = Self::MAX_ISOSURFACES;
@@ -214,13 +223,13 @@ impl TransferFunction {
             if !(value.is_finite() && color.iter().all(inside) && *opacity > 0.0 && *opacity <= 1.0)
             {
                 return Err(format!(
-                    "isosurface {i} has value {value}, colour {color:?} and opacity {opacity}, but colours lie in 0 … 1 \
-                     and opacities above 0 and up to 1"
+                    "isosurface {i} has value {value}, colour {color:?} and opacity {opacity}, but \
+                     colours lie in 0 … 1 and opacities above 0 and up to 1"
                 ));
             }
         }
         if !(self.unit.is_finite() && self.unit > 0.0) {
-            return Err(format!("the unit is {}, but it is a length over 0", self.unit));
+            return Err(format!("the unit is {}, but it must be a length over 0", self.unit));
         }
         let extinction = self.most_extinction();
         if extinction > 0.0 && !EXTINCTIONS.contains(&extinction) {
@@ -237,8 +246,8 @@ impl TransferFunction {
         Ok(())
     }
 
-    /// The same function stretched so that its points reach from one end of `range` to the other. One whose points all
-    /// lie at one value is only moved.
+    /// Returns the same function stretched so that its points reach from one end of `range` to the
+    /// other. If all points lie at one value, the function is only moved.
     #[must_use]
     pub fn spread_over(mut self, range: [f64; 2]) -> Self {
         let [low, high] = self.span();
@@ -252,8 +261,9 @@ impl TransferFunction {
         self
     }
 
-    /// The values that have opacity or an isosurface: the ends of the smallest interval that holds them, infinite where the
-    /// function keeps its opacity beyond its points; `None` for a function that shows nothing.
+    /// Returns the smallest interval that holds all values with opacity or an isosurface. An end is
+    /// infinite if the function keeps its opacity beyond its points. `None` if the function shows
+    /// nothing.
     pub fn shown_range(&self) -> Option<[f64; 2]> {
         let first = self.opacity.iter().position(|p| p.1 > 0.0);
         let last = self.opacity.iter().rposition(|p| p.1 > 0.0);
@@ -267,25 +277,25 @@ impl TransferFunction {
         seen.into_iter().chain(surfaces).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
     }
 
-    /// The smallest and the largest value of its points.
+    /// Returns the smallest and the largest value of the points.
     pub(crate) fn span(&self) -> [f64; 2] {
         let values = self.color.iter().map(|p| p.0).chain(self.opacity.iter().map(|p| p.0));
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
     }
 
-    /// Red, green, blue of a value, 0 … 1.
+    /// Returns red, green, blue of a value, 0 … 1.
     pub fn color(&self, value: f64) -> [f64; 3] {
         let (below, above, t) = segment(&self.color, value);
         std::array::from_fn(|channel| mix(below[channel], above[channel], t))
     }
 
-    /// The share of light that `unit` of world length of this value holds back, 0 … 1.
+    /// Returns the fraction of light that `unit` of world length of this value absorbs, 0 … 1.
     pub fn opacity(&self, value: f64) -> f64 {
         let (below, above, t) = segment(&self.opacity, value);
         mix(below, above, t)
     }
 
-    /// The factor on the extinction where the gradient has a magnitude (value per world length).
+    /// Returns the factor on the extinction at a gradient magnitude (value per world length).
     pub fn gradient_factor(&self, magnitude: f64) -> f64 {
         if self.gradient.is_empty() {
             return 1.0;
@@ -294,19 +304,21 @@ impl TransferFunction {
         mix(below, above, t)
     }
 
-    /// Extinction per world length: −ln(1 − opacity) / unit, so that a length s of one value lets e^(−extinction·s)
-    /// through. Opacities over 0.9999 count as 0.9999, because 1 has no finite extinction.
+    /// Returns the extinction per world length: −ln(1 − opacity) / unit. A length s of one value
+    /// then transmits e^(−extinction·s). Opacities over 0.9999 count as 0.9999, because 1 has no
+    /// finite extinction.
     pub fn extinction(&self, value: f64) -> f64 {
         -(1.0 - self.opacity(value).min(OPAQUE)).ln() / self.unit
     }
 
-    /// The largest extinction of any value.
+    /// Returns the largest extinction of any value.
     pub fn most_extinction(&self) -> f64 {
         self.opacity.iter().map(|&(value, _)| self.extinction(value)).fold(0.0, f64::max)
     }
 
-    /// Red, green, blue and extinction per world length at `entries` values evenly spaced over `range`, both ends
-    /// included; for interpolating linearly in between. What is narrower than an entry's distance blurs.
+    /// Returns red, green, blue and extinction per world length at `entries` values evenly spaced
+    /// over `range`, both ends included. The table is meant for linear interpolation. Features
+    /// narrower than the distance of two entries blur.
     pub fn table(&self, range: [f64; 2], entries: usize) -> Vec<[f32; 4]> {
         let last = entries.saturating_sub(1).max(1) as f64;
         let entry = |i: usize| {
@@ -317,10 +329,11 @@ impl TransferFunction {
         (0..entries).map(entry).collect()
     }
 
-    /// Whether any value in the closed interval `range` has opacity or an isosurface. Exact, but that both sides of a step
-    /// belong to its value.
+    /// Returns whether any value in the closed interval `range` has opacity or an isosurface. The
+    /// result is exact, except that a step's value belongs to both of its sides.
     pub fn visible(&self, range: [f64; 2]) -> bool {
-        // Between its points the function is linear, so its maximum is at a point or at an end of the interval.
+        // The function is linear between its points, so its maximum is at a point or at an end of
+        // the interval.
         let [low, high] = range;
         self.isosurfaces.iter().any(|surface| low <= surface.value && surface.value <= high)
             || self.opacity(low) > 0.0
@@ -348,8 +361,8 @@ fn check_values(what: &str, values: impl Iterator<Item = f64>) -> Result<(), Str
     previous.map(|_| ()).ok_or_else(|| format!("there are no {what} points"))
 }
 
-/// What stands at the points around a value, and how far between them it lies (0 … 1). At a step, its upper side.
-/// Defaults where there are no points.
+/// Returns the entries at the points around a value, and where it lies between them (0 … 1). At a
+/// step, the upper side is returned. Without points, defaults.
 fn segment<T: Copy + Default>(points: &[(f64, T)], value: f64) -> (T, T, f64) {
     let above = points.partition_point(|p| p.0 <= value);
     match (above.checked_sub(1).map(|below| points[below]), points.get(above)) {
@@ -359,7 +372,8 @@ fn segment<T: Copy + Default>(points: &[(f64, T)], value: f64) -> (T, T, f64) {
     }
 }
 
-/// How far between two numbers a third one lies, 0 … 1, also where they are farther apart than the largest number.
+/// Returns where `value` lies between `low` and `high`, 0 … 1. The distance of the two may exceed
+/// the largest number.
 fn share(low: f64, high: f64, value: f64) -> f64 {
     let width = high - low;
     if width.is_finite() {
@@ -442,7 +456,8 @@ mod tests {
 
     #[test]
     fn visibility_agrees_with_sampling() {
-        let json = r#"{"color": [[0, 0, 0, 0]], "opacity": [[10, 0], [20, 0], [30, 0.5], [40, 0], [60, 0], [60, 0.1], [61, 0]]}"#;
+        let json = r#"{"color": [[0, 0, 0, 0]], "opacity": [[10, 0], [20, 0], [30, 0.5], [40, 0],
+            [60, 0], [60, 0.1], [61, 0]]}"#;
         let t = TransferFunction::from_json(json).unwrap();
         for low in 0..80 {
             for high in low..80 {

@@ -1180,7 +1180,7 @@
         (
             "tail.splv",
             [bricks(), vec![0]].concat(),
-            "tail.splv: byte 477: 1 bytes stand behind the end",
+            "tail.splv: byte 477: 1 bytes follow the end",
         ),
         // Hierarchies and bricks with correct checksums.
         (
@@ -1273,7 +1273,7 @@
         (
             "foreign.splv",
             b"PK\x03\x04 and so on".to_vec(),
-            "foreign.splv: header: is no volume in bricks",
+            "foreign.splv: header: is not a volume in bricks",
         ),
         // Transfer functions.
         (

@@ -690,7 +690,7 @@ fn points_at_one_place_draw() {
     }
     folder
         .run("render one.xyz -o out.png --overwrite --camera-position 1,2,3 --focal-point 1,2,3")
-        .fails(2, &["the camera stands in its own focal point"]);
+        .fails(2, &["the camera is at its own focal point"]);
 }
 
 #[test]

@@ -83,7 +83,7 @@ fn damaged_bricks_are_found() {
     folder.put("cut.splv", &whole[..whole.len() - 7]);
     folder.run("info cut.splv").fails(3, &["cut.splv", "the file is incomplete"]);
     folder.put("not.splv", "text");
-    folder.run("info not.splv").fails(3, &["not.splv", "is no volume in bricks"]);
+    folder.run("info not.splv").fails(3, &["not.splv", "is not a volume in bricks"]);
 }
 
 #[test]

@@ -44,7 +44,7 @@ fn normals(mesh: &Mesh) -> Vec<Vec3> {
     splats.iter().map(|splat| decode_normal(splat.normal).expect("a normal")).collect()
 }
 
-/// The part of the points whose normal is on the same side as `outward`.
+/// The fraction of the points whose normal is on the same side as `outward`.
 fn agreement(mesh: &Mesh, outward: impl Fn(Vec3) -> Vec3) -> f64 {
     let right = normals(mesh)
         .iter()
@@ -60,7 +60,7 @@ fn closed_surfaces_face_outward() {
     assert!(agreement(&cloud(sphere(5000, center)), |p| p - center) >= 0.999);
     let ring = |p: Vec3| p - Vec3::new(p.x, p.y, 0.0).normalize() * 2.0;
     assert!(agreement(&cloud(torus(20_000)), ring) >= 0.999);
-    // Each of two, and one inside another.
+    // Two separate spheres, then one inside another.
     let far = Vec3::X * 5.0;
     let both = [sphere(2000, Vec3::ZERO), sphere(2000, far)].concat();
     assert!(agreement(&cloud(both), |p| if p.x < 2.5 { p } else { p - far }) >= 0.999);
@@ -89,7 +89,7 @@ fn sheets_near_each_other_each_have_one_side() {
 #[test]
 fn what_a_scanner_saw_faces_it_and_what_the_file_says_stays() {
     let mut mesh = cloud([sheet(0.0), sheet(5.0)].concat());
-    // Each sheet was seen from between them.
+    // Each sheet was seen from the gap between them.
     mesh.sensors = vec![Sensor { position: Vec3::new(25.0, 25.0, 2.5), points: 0..5000 }];
     assert!(agreement(&mesh, |p| Vec3::Z * (2.5 - p.z)) == 1.0);
     mesh.sensors[0].points = 2500..9999;
@@ -105,7 +105,7 @@ fn lone_points_are_small_and_change_no_others() {
     let options = SurfelOptions::default();
     let before = all_surfels(&plain, &options);
     let mut mesh = plain.clone();
-    // One just above the sheet, one far off, and a pair.
+    // One just above the sheet, one far away, and a pair.
     mesh.positions.extend(
         [[25.5, 25.5, 12.0], [1e5, 0.0, 0.0], [-300.0, 0.0, 7.0], [-300.0, 0.0, 8.0]]
             .map(Vec3::from),
@@ -123,7 +123,7 @@ fn lone_points_are_small_and_change_no_others() {
     );
 }
 
-/// A part that was scanned from further away is sampled more coarsely, and covered all the same.
+/// A part that was scanned from further away is sampled more coarsely, and still covered.
 #[test]
 fn coarse_parts_keep_their_width() {
     let coarse = sheet(0.0).iter().map(|&p| p * 10.0 + Vec3::X * 100.0).collect::<Vec<_>>();

@@ -6,7 +6,8 @@ use crate::{
 use glam::{Vec2, Vec3};
 use std::sync::Arc;
 
-/// The optical depth of a ray, by brute force: strength · exp(−ρ²/2), ρ its whitened distance from the centre.
+/// The optical depth of a ray, by brute force: strength · exp(−ρ²/2), with ρ its whitened distance
+/// from the centre.
 fn depth(set: &SplatSet, point: DVec3, direction: DVec3) -> f64 {
     set.splats
         .iter()
@@ -29,7 +30,8 @@ fn depth(set: &SplatSet, point: DVec3, direction: DVec3) -> f64 {
         .sum()
 }
 
-/// The least optical depth seen along the triangles' normals, over points on up to 60 of the triangles.
+/// The smallest optical depth seen along the triangles' normals, over points on up to 60 of the
+/// triangles.
 fn least_depth(mesh: &Mesh, set: &SplatSet) -> f64 {
     let step = (mesh.triangles.len() / 60).max(1);
     let points = |n: usize| {
@@ -70,7 +72,7 @@ fn needles() -> Mesh {
 
 #[test]
 fn surfaces_have_no_holes() {
-    // At a boundary half of the light is gone, and at a crease each side adds as much.
+    // At a boundary half of the light is gone. At a crease each side contributes as much.
     let bound = |name: &str| if name == "cube" || name == "needles" { 0.6 } else { 2.2 };
     let coarse = SurfelOptions { largest_spacing: 10.0, ..SurfelOptions::default() };
     for (name, mesh) in [
@@ -127,7 +129,7 @@ fn a_mesh_that_is_inside_out_is_turned() {
         assert!(a.dot(b) > 0.9999);
         assert!(Vec3::from_array(turned.center).distance(Vec3::from_array(splat.center)) < 1e-4);
     }
-    // The file's own normals are believed.
+    // Normals from the file are believed.
     mesh.normals = mesh.positions.iter().map(|p| -p.normalize()).collect();
     let inward = decode_normal(surfels(&mesh).splats[0].normal).expect("a normal");
     assert!(inward.dot(mesh.positions[0]) < 0.0);
@@ -139,7 +141,7 @@ fn a_cube_keeps_its_creases() {
     for splat in &set.splats {
         let normal = decode_normal(splat.normal).expect("a normal");
         assert!(normal.abs().max_element() > 0.9999, "{normal}");
-        // No more than by its thickness behind its side.
+        // The centre is at most its thickness behind its side.
         assert!((0.99..=1.0).contains(&normal.dot(Vec3::from_array(splat.center))), "{splat:?}");
     }
     let whole = SurfelOptions { largest_spacing: 10.0, ..SurfelOptions::default() };
@@ -148,7 +150,7 @@ fn a_cube_keeps_its_creases() {
 
 #[test]
 fn ellipses_stay_close_to_the_surface() {
-    // Of a square cut to 1/128 of its diagonal. Half of the light is gone near its rim.
+    // For a square cut to 1/128 of its diagonal: half of the light is gone near its rim.
     let mesh = Mesh {
         positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
@@ -243,7 +245,8 @@ fn clouds_of_all_sorts() {
     for splat in &set.splats {
         assert!(decode_normal(splat.normal).expect("a normal").z.abs() > 0.99);
     }
-    // Doubles change nothing; a far point stays of moderate size; the file's normals are kept.
+    // Duplicates change nothing; a distant point keeps a moderate size; normals from the file are
+    // kept.
     cloud.positions.extend((0..900).map(grid));
     assert_eq!(surfels(&cloud).splats, set.splats);
     cloud.positions.push(Vec3::new(1e6, 0.0, 0.0));
@@ -304,7 +307,7 @@ fn a_fine_texture_on_coarse_triangles_is_averaged() {
     }
 }
 
-/// Whatever the coordinates of a texture are: the budget holds.
+/// The budget holds, whatever the texture coordinates are.
 #[test]
 fn textures_keep_to_the_budget() {
     let texture =
@@ -330,7 +333,7 @@ fn textures_keep_to_the_budget() {
                 mesh.triangles_once_cut(&options, usize::MAX).unwrap(),
                 surfels_of(&mesh, &options),
             );
-            // The least that its size asks for is 35,000.
+            // The minimum that its size requires is 35,000.
             assert!(
                 made < 100_000 && 2 * told > made,
                 "{far} {across}: {made} surfels, {told} triangles told"
@@ -364,7 +367,8 @@ fn a_vertex_of_no_triangle_changes_nothing() {
     assert_eq!(surfels(&stray).splats.len(), surfels(&alone).splats.len());
 }
 
-/// What is far from the world's origin is as large as near it, even where 64 bits tell its places no more.
+/// An object far from the world's origin keeps its size, even where 64 bits cannot resolve its
+/// positions.
 #[test]
 fn a_far_origin_changes_nothing() {
     let mesh = Mesh::sphere(1);
@@ -394,7 +398,7 @@ fn a_far_origin_changes_nothing() {
     }
 }
 
-/// Normals that are none are made of what is around, as are those that the file lacks.
+/// Invalid normals are computed from the surroundings, like those that the file lacks.
 #[test]
 fn normals_that_are_not_finite_are_none() {
     let with = |normal: Vec3, triangles: bool| {
@@ -429,15 +433,15 @@ fn options_are_numbers_that_surfels_can_be_made_of() {
         let error = found.unwrap_err().to_string();
         assert!(error.contains(message), "{error}");
     };
-    // However coarse, what is there is drawn.
+    // However coarse the spacing is, everything is drawn.
     assert_eq!((spaced(1.0).unwrap(), spaced(f32::MAX).unwrap()), (24, 24));
     assert!((300..1000).contains(&spaced(1e-9).unwrap()));
     refused(spaced(1e-38), "largest_spacing is 1e-38; 1e-9 to ");
     assert!(deep(1e10).is_ok());
-    refused(deep(1.1e10), "optical_depth is 1.1e10; 0e0 to 1e10 can be");
+    refused(deep(1.1e10), "optical_depth is 1.1e10; 0e0 to 1e10 are allowed");
 }
 
-/// What is far off, such as the triangle of a broken scan, leaves all else as it is.
+/// Something far away, such as a triangle of a broken scan, leaves the rest unchanged.
 #[test]
 fn a_triangle_far_off_takes_nothing_away() {
     let mesh = Mesh::sphere(3);
@@ -452,7 +456,7 @@ fn a_triangle_far_off_takes_nothing_away() {
     }
 }
 
-/// A sheet of squares with a picture of 8 × 8 texels; vertex 7 has other coordinates in it.
+/// A sheet of squares with a texture of 8 × 8 texels. Vertex 7 has different texture coordinates.
 fn textured(uv: glam::Vec2) -> Mesh {
     const SIDE: u32 = 12;
     let texture = Some(Arc::new(Texture { width: 8, height: 8, texels: vec![[99; 4]; 64] }));
@@ -473,7 +477,7 @@ fn textured(uv: glam::Vec2) -> Mesh {
     mesh
 }
 
-/// One texture coordinate that is far off costs no more than the triangles around it.
+/// One distant texture coordinate costs no more than the triangles around it.
 #[test]
 fn a_far_texture_coordinate_is_soon_done() {
     let options = SurfelOptions { deadline: Deadline::after(60), ..SurfelOptions::default() };
@@ -491,7 +495,7 @@ fn a_far_texture_coordinate_is_soon_done() {
     }
 }
 
-/// Before anything is cut.
+/// The error comes before anything is cut.
 #[test]
 fn a_far_vertex_is_named() {
     for x in [1e13, 1e15, 1e17] {

@@ -8,28 +8,33 @@ use rayon::prelude::*;
 /// The levels and bricks of a picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
-    /// One level, or two that follow one another, finer first, each with its share in the picture. The shares sum to 1.
+    /// One level, or two consecutive ones, finer first, each with its weight in the picture. The
+    /// weights sum to 1.
     pub levels: Vec<(usize, f64)>,
-    /// Level and number of each brick, by the distance of its centre from the eye (orthographic: from its plane), nearest
-    /// first; coarse levels first among equals.
+    /// Level and number of each brick. They are sorted by the distance of the brick's centre from
+    /// the eye (orthographic: from its plane), nearest first. At equal distance, coarse levels come
+    /// first.
     pub bricks: Vec<(usize, u32)>,
-    /// How coarse the picture is, a real number of levels.
+    /// The level of detail, a real number of levels. Higher is coarser.
     pub lambda: f64,
-    /// Which ranges of values show something, as [`first_visible`](crate::volume::reach::first_visible) tells it.
+    /// Which ranges of values show something, as from
+    /// [`first_visible`](crate::volume::reach::first_visible).
     pub shown: [u16; 256],
 }
 
-/// A budget that is not kept is met by coarser pictures, in steps of this part of a level.
+/// If the bricks exceed the budget, the level rises in steps of one over this number.
 const STEPS: f64 = 16.0;
 
-/// Chooses the levels that draw no step between samples smaller than `pixels`, and of these the bricks that meet the picture
-/// and hold something that shows, as `shown` tells ([`Choice::shown`]). `extent` is the kernel's, in samples of whichever level
-/// is drawn.
+/// Chooses the levels whose step between samples covers `pixels` pixels where the volume is nearest
+/// to the eye. Of these levels it chooses the bricks that are in the picture and hold values that
+/// show according to `shown` ([`Choice::shown`]). `extent` is the kernel's, in samples of the drawn
+/// level.
 ///
-/// The level is a real number, λ = log₂(`pixels` / p), no less than 0 and no more than that of the coarsest level; p is how many
-/// pixels the longest step of level 0 covers at the point of the volume's box that is nearest to the eye. Between two levels
-/// both are drawn, with shares that follow λ, so that a zoom shows no pop. Where they have more than `most` bricks, λ is raised
-/// to the next sixteenth that has no more; the coarsest level, of one brick, is not refused.
+/// The level is a real number λ = log₂(`pixels` / p), at least 0 and at most the coarsest level.
+/// Here p is the size in pixels of the longest step of level 0 at the point of the volume's box
+/// nearest to the eye. Between two levels both are drawn, with weights that follow λ, so that
+/// zooming causes no popping. If they have more than `most` bricks, λ rises to the next sixteenth
+/// at which they do not. The coarsest level, of one brick, is always allowed.
 pub fn choice(
     bricks: &Bricks,
     view: &View,
@@ -39,7 +44,7 @@ pub fn choice(
     most: usize,
 ) -> Choice {
     let coarsest = (bricks.levels().len() - 1) as f64;
-    // A level's bricks do not depend on λ: each is looked through once, when it is asked for.
+    // A level's bricks do not depend on λ, so each level is searched once, when it is first needed.
     let mut known: Vec<Option<Vec<(f64, u32)>>> = vec![None; bricks.levels().len()];
     let mut lambda = wanted(bricks, view, pixels).min(coarsest);
     let levels = loop {
@@ -70,17 +75,17 @@ pub fn choice(
 fn wanted(bricks: &Bricks, view: &View, pixels: f64) -> f64 {
     let step = bricks.header().lattice.spacing().max_element();
     let nearest = if view.perspective { view.distances(&bricks.bounds())[0] } else { 1.0 };
-    // From within, any step is too large.
+    // From inside the volume, every step counts as too large, so λ is 0.
     (pixels * nearest / (step * view.scale)).log2().max(0.0)
 }
 
-/// The levels around λ and their shares.
+/// Returns the levels around λ and their weights.
 fn shares(lambda: f64) -> Vec<(usize, f64)> {
     let (level, part) = (lambda.floor() as usize, lambda.fract());
     if part > 0.0 { vec![(level, 1.0 - part), (level + 1, part)] } else { vec![(level, 1.0)] }
 }
 
-/// The bricks of a level that meet the picture and show something, with their distances.
+/// Returns the bricks of a level that are in the picture and show something, with their distances.
 fn visible(
     bricks: &Bricks,
     number: usize,
@@ -141,7 +146,7 @@ mod tests {
         Bricks::from_volume(Arc::new(volume)).unwrap()
     }
 
-    /// What shows where only values over `from` do.
+    /// The visible ranges if only values over `from` show.
     fn over(from: f64) -> [u16; 256] {
         let transfer = TransferFunction {
             color: vec![(0.0, [1.0; 3])],
@@ -177,7 +182,7 @@ mod tests {
     fn levels_follow_the_size_of_steps() {
         let bricks = ramp();
         let shows = over(-5.0);
-        // A step of 2 covers one pixel where 800 units fill 400 pixels.
+        // A step of 2 covers one pixel if 800 units fill 400 pixels.
         for (height, pixels, lambda) in [
             (800.0, 1.0, 0.0),
             (400.0, 1.0, 0.0),
@@ -202,7 +207,7 @@ mod tests {
         );
         let [(0, fine), (1, coarse)] = between.levels[..] else { panic!("{between:?}") };
         assert!((fine - 0.5).abs() < 1e-12 && (fine + coarse - 1.0).abs() < 1e-12);
-        // In perspective, at the nearest point of the box: twice as far, one level more.
+        // In perspective, the nearest point of the box counts: twice as far is one level more.
         let scale = at(1.0).scale;
         for (distance, lambda) in [
             (-98.0, 0.0),
@@ -241,17 +246,18 @@ mod tests {
         assert!(columns.len() == 32 && columns.iter().all(|x| *x >= 2), "{columns:?}");
         assert_eq!(choice(&bricks, &flat(400.0), 2.0, 1.0, &EVERYTHING, MANY).bricks.len(), 64);
         assert!(choice(&bricks, &flat(400.0), 2.0, 1.0, &over(250.0), MANY).bricks.is_empty());
-        // A picture of the middle alone: bricks 1 and 2 along x and y.
+        // A picture of the middle only: the four bricks along z at position 1 along x and y.
         let middle = choice(&bricks, &flat(10.0), 2.0, 1.0, &over(-5.0), MANY);
         let places = || middle.bricks.iter().map(|&(_, brick)| bricks.level(0).place(brick));
         assert!(
             middle.bricks.len() == 4 && places().all(|[x, y, _]| x == 1 && y == 1),
             "{middle:?}"
         );
-        // The sample at 99.5 steps is the last of brick 1; wider kernels of brick 2 reach it.
+        // The picture spans steps 47 to 52 along x and y. Brick 2 begins at step 64, so its kernels
+        // of extent 14 reach the picture.
         let wider = choice(&bricks, &flat(10.0), 14.0, 1.0, &over(-5.0), MANY);
         assert_eq!(wider.bricks.len(), 16);
-        // Behind the eye there is nothing.
+        // Nothing is behind the eye.
         let mut behind = at(50.0);
         behind.rotation = glam::DMat3::from_diagonal(DVec3::new(-1.0, 1.0, -1.0)) * behind.rotation;
         assert!(choice(&bricks, &behind, 2.0, 1.0, &over(-5.0), MANY).bricks.is_empty());

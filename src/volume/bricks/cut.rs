@@ -6,44 +6,45 @@ use crate::volume::{Scalar, steps::Steps};
 /// A brick as it is read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Brick {
-    /// The bytes of its 32³ samples in this machine's order, first axis fastest. Those beyond the volume's border are copies
-    /// of the border's.
+    /// The bytes of its 32³ samples in native byte order, first axis fastest. Samples beyond the
+    /// volume's border are copies of the border's.
     pub samples: Vec<u8>,
-    /// For each block of 4³ samples, first axis fastest, the smallest and the largest value among them and within
-    /// [`REACH`](super::REACH) samples around, as [`neighbourhood_ranges`](crate::volume::reach::neighbourhood_ranges) counts
-    /// them: in steps of 1/255 of the volume's range, rounded outwards. Blocks beyond the border are [`EMPTY`].
+    /// For each block of 4³ samples, first axis fastest, the smallest and the largest value among
+    /// them and within [`REACH`](super::REACH) samples around. As in
+    /// [`neighbourhood_ranges`](crate::volume::reach::neighbourhood_ranges), they are in steps of
+    /// 1/255 of the volume's range, rounded outwards. Blocks beyond the border are [`EMPTY`].
     pub blocks: Box<[[u8; 2]; BRICK_BLOCKS]>,
 }
 
 impl Brick {
-    /// The range that holds those of all blocks.
+    /// Returns the range that contains those of all blocks.
     pub fn range(&self) -> [u8; 2] {
         self.blocks.iter().fold(EMPTY, |all, &block| joined(all, block))
     }
 }
 
-/// Slices of a level that follow one another.
+/// Consecutive slices of a level.
 #[derive(Clone, Copy)]
 pub struct Slices<'a> {
     pub level: Level,
     pub scalar: Scalar,
-    /// The first slice that is there.
+    /// The first slice present.
     pub first: usize,
-    /// The bytes of the samples of all that are there.
+    /// The bytes of the samples of all slices present.
     pub samples: &'a [u8],
 }
 
-/// Samples along each axis that decide a brick's ranges.
+/// Samples along each axis that affect a brick's ranges.
 const AROUND: usize = SIDE + 2 * REACH;
 
 impl Slices<'_> {
-    /// The brick at a place among the bricks. Its slices must be there, and [`REACH`] more on both sides, as far as the level
-    /// has them.
+    /// Returns the brick at a position in the grid of bricks. Its slices must be present, and
+    /// [`REACH`] more on both sides as far as the level has them.
     pub fn brick(&self, place: [usize; 3], steps: &Steps) -> Brick {
         Brick { samples: self.samples_of(place), blocks: self.blocks(place, steps) }
     }
 
-    /// The row of samples at places along y and z, moved into the level.
+    /// Returns the row of samples at positions along y and z, clamped to the level.
     fn row(&self, j: isize, k: isize) -> &[u8] {
         let [nx, ny, nz] = self.level.dims;
         let (j, k) = (inside(j, ny), inside(k, nz));
@@ -66,11 +67,12 @@ impl Slices<'_> {
         out
     }
 
-    /// Along each axis after another, as the extremes of a box are those of extremes.
+    /// Returns the ranges of the blocks. The extremes of a box are computed one axis after the
+    /// other.
     pub fn blocks(&self, place: [usize; 3], steps: &Steps) -> Box<[[u8; 2]; BRICK_BLOCKS]> {
         let size = self.scalar.bytes();
         let [x, y, z] = place.map(|at| (at * SIDE) as isize - REACH as isize);
-        // What there is along x, and how often the first one counts before it.
+        // The samples present along x, and how many copies of the first one precede it.
         let (from, to) = (
             inside(x, self.level.dims[0]),
             inside(x + AROUND as isize - 1, self.level.dims[0]) + 1,
@@ -111,7 +113,7 @@ impl Slices<'_> {
     }
 }
 
-/// A place moved to the nearest of `count`.
+/// Clamps a position to the nearest of `count`.
 fn inside(at: isize, count: usize) -> usize {
     at.clamp(0, count as isize - 1) as usize
 }

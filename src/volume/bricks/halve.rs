@@ -1,12 +1,12 @@
-//! A level from the one below: means of 2×2×2 samples.
+//! Computes a level from the one below: means of 2×2×2 samples.
 
 use crate::volume::Scalar;
 use bytemuck::Pod;
 use rayon::prelude::*;
 
-/// A type of samples that has means.
+/// A sample type that has means.
 trait Mean: Pod + Send + Sync {
-    /// The mean, rounded to the nearest value of the type, halves away from zero.
+    /// Returns the mean, rounded to the nearest value of the type, halves away from zero.
     fn mean(of: [Self; 8]) -> Self;
 }
 
@@ -28,7 +28,8 @@ impl Mean for f32 {
     }
 }
 
-/// The bytes of the means of slices of `dims` samples. Behind odd borders the border's samples count once more.
+/// Returns the bytes of the means of slices of `dims` samples. At the end of an odd axis, the last
+/// samples count twice.
 pub fn halve(scalar: Scalar, samples: &[u8], dims: [usize; 3]) -> Vec<u8> {
     match scalar {
         Scalar::U8 => means::<u8>(samples, dims),
@@ -80,7 +81,7 @@ mod tests {
 
     #[test]
     fn borders_count_again() {
-        // 3 × 1 × 2: the mean of a pair of columns, and of the last one twice.
+        // 3 × 1 × 2: the mean of a pair of columns, then of the last column counted twice.
         assert_eq!(halve(Scalar::U8, &[0, 10, 20, 20, 30, 41], [3, 1, 2]), [15, 31]);
     }
 }

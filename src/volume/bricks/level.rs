@@ -1,10 +1,10 @@
-//! The levels of a volume: how large each is, and where its samples lie.
+//! The levels of a volume: their sizes, and where their samples lie.
 
 use super::SIDE;
 use crate::volume::{Arrangement, Lattice};
 use glam::{DMat3, DVec3};
 
-/// How large a level is.
+/// The size of a level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Level {
     /// Samples along each axis.
@@ -23,7 +23,7 @@ impl Level {
         self.brick_dims.iter().product()
     }
 
-    /// Where a brick stands among the others along each axis.
+    /// Returns the position of a brick in the grid of bricks, along each axis.
     pub fn place(&self, brick: u32) -> [usize; 3] {
         let ([nx, ny, _], brick) = (self.brick_dims, brick as usize);
         [brick % nx, brick / nx % ny, brick / nx / ny]
@@ -35,14 +35,15 @@ impl Level {
     }
 }
 
-/// The levels of a volume, finest first: the last one fits in a brick.
+/// Returns the levels of a volume, finest first. The last one fits in a brick.
 pub fn levels(dims: [usize; 3]) -> Vec<Level> {
     let halved =
         |level: &Level| (level.bricks() > 1).then(|| Level::new(level.dims.map(|n| n.div_ceil(2))));
     std::iter::successors(Some(Level::new(dims)), halved).collect()
 }
 
-/// Says in words why a lattice has no bricks: only Cartesian ones do, of no more bricks than 32 bits can count.
+/// Returns an error, as a message, if a lattice cannot have bricks. Only Cartesian lattices can,
+/// with at most as many bricks as 32 bits can count.
 pub fn refusal(lattice: &Lattice) -> Result<(), String> {
     let name = match lattice.arrangement {
         Arrangement::Cartesian if u32::try_from(Level::new(lattice.dims).bricks()).is_ok() => {
@@ -51,7 +52,7 @@ pub fn refusal(lattice: &Lattice) -> Result<(), String> {
         Arrangement::Cartesian => {
             let [nx, ny, nz] = lattice.dims;
             return Err(format!(
-                "{nx} × {ny} × {nz} samples are more bricks than 32 bits can count"
+                "{nx} × {ny} × {nz} samples need more bricks than 32 bits can count"
             ));
         }
         Arrangement::BodyCentred => "body-centred",
@@ -60,8 +61,8 @@ pub fn refusal(lattice: &Lattice) -> Result<(), String> {
     Err(format!("its lattice is {name}, but only volumes on Cartesian lattices are cut in bricks"))
 }
 
-/// The lattice of a level of a volume: every halving of an axis doubles its steps and moves its first sample to the middle of
-/// the first two. An axis of one sample has nothing to halve, and stays.
+/// Returns the lattice of a level. Every halving of an axis doubles its step and moves its first
+/// sample to the middle of the first two. An axis of one sample is not halved.
 pub fn lattice(fine: &Lattice, level: usize) -> Lattice {
     let mut dims = fine.dims;
     let (mut scale, mut shift) = (DVec3::ONE, DVec3::ZERO);

@@ -1,13 +1,17 @@
-//! Volumes beyond memory: levels of detail, each cut in bricks of 32³ samples that are read one by one.
+//! Volumes beyond memory: levels of detail, each cut into bricks of 32³ samples that are read one
+//! by one.
 //!
-//! Level 0 has the samples as they are. Every further level has half as many along each axis, rounded up, each the mean of
-//! up to 2×2×2 of the level below, until one brick holds a level. Beside its samples a brick has, for each block of 4³ of
-//! them, the range of the values that a kernel there can meet; so what shows nothing under a transfer function is known
-//! without looking at samples.
+//! Level 0 holds the original samples. Every further level has half as many along each axis,
+//! rounded up, until a level fits in one brick. Each of its samples is the mean of up to 2×2×2
+//! samples of the level below.
 //!
-//! [`Bricks`] reads from a volume in memory or from a file (`.splv`, docs/splv.md); [`write`](write()) and
-//! [`convert`](convert()) make such files, [`check`](check()) looks for damage, [`choice`](choice()) tells which bricks a
-//! picture needs.
+//! A brick also holds, for each block of 4³ samples, the range of the values that a kernel there
+//! can meet. Blocks that show nothing under a transfer function are therefore known without reading
+//! samples.
+//!
+//! [`Bricks`] reads from a volume in memory or from a file (`.splv`, docs/splv.md).
+//! [`write`](write()) and [`convert`](convert()) make these files, and [`check`](check()) looks for
+//! damage. [`choice`](choice()) selects the bricks that a picture needs.
 
 mod choice;
 mod cut;
@@ -31,23 +35,25 @@ pub const SIDE: usize = 32;
 /// Samples of a block along each axis.
 pub const BLOCK: usize = 4;
 
-/// Blocks of a brick along each axis, and in all.
+/// Blocks of a brick along each axis.
 pub const BLOCKS: usize = SIDE / BLOCK;
+/// Blocks of a brick in all.
 pub const BRICK_BLOCKS: usize = BLOCKS * BLOCKS * BLOCKS;
 
-/// How many samples of its level beyond itself a block's range holds for: kernels that reach further may meet values that
-/// it does not tell of.
+/// A block's range covers the samples up to this many samples around the block, in its level. A
+/// kernel that reaches further may meet values outside the range.
 pub const REACH: usize = 3;
 
-/// The range of no samples: what lies wholly beyond the volume's border. No transfer function shows it.
+/// The range of an empty set of samples: a block wholly beyond the volume's border. No transfer
+/// function shows it.
 pub const EMPTY: [u8; 2] = [255, 0];
 
-/// Bytes that a brick takes when it is drawn: its samples and the ranges of its blocks.
+/// Bytes of a brick that is drawn: its samples and the ranges of its blocks.
 pub(crate) fn slot_bytes(bricks: &Bricks) -> u64 {
     (bricks.brick_bytes() + 2 * BRICK_BLOCKS) as u64
 }
 
-/// The smaller range that holds two.
+/// Returns the smallest range that contains both.
 fn joined([low, high]: [u8; 2], other: [u8; 2]) -> [u8; 2] {
     [low.min(other[0]), high.max(other[1])]
 }

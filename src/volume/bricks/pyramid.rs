@@ -1,5 +1,5 @@
-//! All levels at once, from the slices of the finest as they come: no more of a level is held than what its next bricks and
-//! the next level need.
+//! Builds all levels at once, from the slices of the finest as they arrive. Of each level, memory
+//! holds only what its next bricks and the next level need.
 
 use super::{Level, REACH, SIDE, cut::Slices, halve::halve, level::levels};
 use crate::{Result, volume::Scalar};
@@ -10,13 +10,13 @@ pub struct Pyramid {
     growing: Vec<Growing>,
 }
 
-/// What is held of a level.
+/// The part of a level that is in memory.
 struct Growing {
     level: Level,
-    /// The first slice that is held.
+    /// The first slice in memory.
     first: usize,
     samples: Vec<u8>,
-    /// Slices that the next level has been made from.
+    /// Slices that the next level has been computed from.
     halved: usize,
     /// Layers of bricks that have been cut.
     layers: usize,
@@ -29,14 +29,15 @@ impl Pyramid {
         Self { scalar, growing: levels(dims).into_iter().map(growing).collect() }
     }
 
-    /// Bytes of samples that are held.
+    /// Bytes of samples in memory.
     #[cfg(test)]
     pub fn held(&self) -> usize {
         self.growing.iter().map(|growing| growing.samples.capacity()).sum()
     }
 
-    /// Adds the next slices of level 0, as the bytes of their samples. `layer` is given each layer of bricks that can be cut
-    /// now: its level, its number, and slices that hold what its bricks need. The layers of a level come in order.
+    /// Adds the next slices of level 0, as the bytes of their samples. Calls `layer` for each layer
+    /// of bricks that can be cut now, with its level, its number, and slices that hold what its
+    /// bricks need. The layers of a level come in order.
     pub fn push(
         &mut self,
         slices: &[u8],
@@ -47,7 +48,7 @@ impl Pyramid {
         for number in 0..self.growing.len() {
             let is_last = number + 1 == self.growing.len();
             let growing = &mut self.growing[number];
-            // Room for no more than comes.
+            // Reserve no more capacity than the new slices need.
             growing.samples.reserve_exact(next.len());
             growing.samples.extend_from_slice(next);
             coarse = if is_last { Vec::new() } else { growing.halve(self.scalar) };
@@ -67,13 +68,13 @@ impl Growing {
         self.level.slice() * scalar.bytes()
     }
 
-    /// Slices that have come, and whether these are all.
+    /// Returns the number of slices that have arrived, and whether that is all.
     fn arrived(&self, scalar: Scalar) -> (usize, bool) {
         let count = self.first + self.samples.len() / self.slice_bytes(scalar);
         (count, count == self.level.dims[2])
     }
 
-    /// The slices of the next level that can be made now.
+    /// Returns the slices of the next level that can be computed now.
     fn halve(&mut self, scalar: Scalar) -> Vec<u8> {
         let (arrived, is_whole) = self.arrived(scalar);
         let end = if is_whole { arrived } else { arrived & !1 };

@@ -1,4 +1,5 @@
-//! Reading bricks: from a volume in memory, or from a file of which only header and directory are in memory.
+//! Reading bricks: from a volume in memory, or from a file of which only the header and the
+//! directory are in memory.
 
 use super::{
     Brick, EMPTY, Level,
@@ -20,28 +21,31 @@ use std::{
     sync::Arc,
 };
 
-/// What a bricked volume is as a whole.
+/// The properties of a bricked volume as a whole.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Header {
-    /// Of level 0; Cartesian.
+    /// The lattice of level 0, which is Cartesian.
     pub lattice: Lattice,
     pub scalar: Scalar,
-    /// The smallest and the largest value of level 0; coarser levels lie within.
+    /// The smallest and the largest value of level 0. Coarser levels lie within.
     pub range: [f64; 2],
-    /// The name of the world's unit (`"mm"`); empty where unknown.
+    /// The name of the world's unit (`"mm"`); empty if unknown.
     pub unit: String,
-    /// The name of the file that this one was made from; empty where there is none.
+    /// The name of the file that this volume was made from; empty if there is none.
     pub source: String,
 }
 
 impl Header {
-    /// Says in words why there are no bricks of such a volume, in memory or in a file.
+    /// Checks that a volume with this header can be cut into bricks, in memory or in a file. The
+    /// error is a message.
     pub(super) fn validate(&self) -> Result<(), String> {
         self.lattice.validate()?;
         level::refusal(&self.lattice)?;
         let [low, high] = self.range;
         if !(low <= high && (high - low).is_finite()) {
-            return Err(format!("its range of values is {low} … {high}, which is none"));
+            return Err(format!(
+                "its range of values is {low} … {high}, but both ends must be finite and ascend"
+            ));
         }
         Ok(())
     }
@@ -52,7 +56,7 @@ pub struct Bricks {
     path: PathBuf,
     header: Header,
     levels: Vec<Level>,
-    /// Of each level the range of each brick.
+    /// For each level, the range of each brick.
     ranges: Vec<Vec<[u8; 2]>>,
     origin: Origin,
     limits: Limits,
@@ -61,7 +65,7 @@ pub struct Bricks {
 enum Origin {
     Memory {
         volume: Arc<Volume>,
-        /// The bytes of the samples of level 1 and on.
+        /// The bytes of the samples of level 1 and up.
         coarse: Vec<Vec<u8>>,
         steps: Steps,
     },
@@ -86,12 +90,13 @@ impl std::fmt::Debug for Bricks {
 }
 
 impl Bricks {
-    /// Takes a volume as it is: makes the coarser levels and looks through all bricks for their ranges (in parallel). Bricks
-    /// are cut when they are read. Coefficients ([`Volume::sharpened`]) are left out.
+    /// Takes a volume in memory. Computes the coarser levels, and the ranges of all bricks (in
+    /// parallel). Bricks are cut when they are read. Coefficients ([`Volume::sharpened`]) are
+    /// ignored.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a lattice that is not Cartesian, or has more bricks than 32 bits can count, and for a volume that
-    /// was put together by hand and contradicts itself.
+    /// [`Error::Argument`] for a lattice that is not Cartesian or has more bricks than 32 bits can
+    /// count, and for a volume that was built by hand and is inconsistent.
     pub fn from_volume(volume: Arc<Volume>) -> Result<Self> {
         volume.validate().map_err(Error::Argument)?;
         let scalar = volume.samples.scalar();
@@ -124,16 +129,17 @@ impl Bricks {
     /// Opens a file: reads and checks the header and the directory, and maps the rest.
     ///
     /// # Errors
-    /// [`Error::Input`] for other files, other versions, damaged headers and directories, and files that are cut off or have
-    /// something behind their end; [`Error::Limit`] and [`Error::File`] as for every input.
+    /// [`Error::Input`] for other files, other versions, damaged headers and directories, and files
+    /// that are truncated or have data after their end. [`Error::Limit`] and [`Error::File`] as for
+    /// every input.
     pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
         Self::new(path, Bytes::Mapped(Source::map(path, limits)?), limits)
     }
 
-    /// Takes the bytes of a file; `name` is what errors call it.
+    /// Takes the bytes of a file. Errors call it `name`.
     ///
     /// # Errors
-    /// [`Error::Input`] as of [`open`](Self::open).
+    /// [`Error::Input`] as for [`open`](Self::open).
     pub fn from_bytes(bytes: Vec<u8>, name: &Path) -> Result<Self> {
         Self::new(name, Bytes::Held(bytes), &Limits::default())
     }
@@ -158,12 +164,12 @@ impl Bricks {
         })
     }
 
-    /// What the volume is as a whole.
+    /// The properties of the volume as a whole.
     pub fn header(&self) -> &Header {
         &self.header
     }
 
-    /// What errors call this volume: its file, or `memory`.
+    /// The path that errors name: the volume's file, or `memory`.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -173,31 +179,33 @@ impl Bricks {
         &self.levels
     }
 
-    /// One of the levels.
+    /// Returns one of the levels.
     ///
     /// # Panics
-    /// Where there is no such level.
+    /// If there is no such level.
     pub fn level(&self, level: usize) -> &Level {
         &self.levels[level]
     }
 
-    /// Where the samples of a level lie: level l has 2^l steps of level 0 between samples, and its first one lies amid those
-    /// that it is the mean of, at (2^l − 1)/2 steps along each axis. An axis of one sample is not halved and stays as it is.
+    /// Returns where the samples of a level lie. Level l has 2^l steps of level 0 between samples.
+    /// Its first sample is in the middle of the samples that it is the mean of, at (2^l − 1)/2
+    /// steps along each axis. An axis of one sample is not halved and stays as it is.
     pub fn lattice(&self, level: usize) -> Lattice {
         level::lattice(&self.header.lattice, level)
     }
 
-    /// Smallest and largest world coordinates of the samples of level 0.
+    /// Returns the smallest and largest world coordinates of the samples of level 0.
     pub fn bounds(&self) -> Bounds {
         let [min, max] = self.header.lattice.bounds();
         Bounds { min, max }
     }
 
-    /// For each brick of a level the range of all its blocks ([`Brick::blocks`]). A brick may be left out where
-    /// `high < first_visible[low]` ([`first_visible`](crate::volume::reach::first_visible)).
+    /// Returns, for each brick of a level, the range of all its blocks ([`Brick::blocks`]). A brick
+    /// may be skipped if `high < first_visible[low]`
+    /// ([`first_visible`](crate::volume::reach::first_visible)).
     ///
     /// # Panics
-    /// Where there is no such level.
+    /// If there is no such level.
     pub fn ranges(&self, level: usize) -> &[[u8; 2]] {
         &self.ranges[level]
     }
@@ -207,10 +215,10 @@ impl Bricks {
         super::SIDE.pow(3) * self.header.scalar.bytes()
     }
 
-    /// Reads a brick, its checksum checked; any thread may.
+    /// Reads a brick and checks its checksum. Any thread may call this.
     ///
     /// # Errors
-    /// [`Error::Argument`] where there is no such brick; [`Error::Input`] for one that is damaged.
+    /// [`Error::Argument`] if there is no such brick, [`Error::Input`] if it is damaged.
     pub fn read(&self, level: usize, brick: u32) -> Result<Brick> {
         let size = self.levels.get(level).filter(|size| (brick as usize) < size.bricks());
         let size = *size.ok_or_else(|| {
@@ -226,7 +234,8 @@ impl Bricks {
             Origin::File { bytes, directory } => {
                 let entry = &directory.levels[level][brick as usize];
                 let offset = directory.offsets[level][brick as usize] as usize;
-                // A copy: what is decoded is what has the checksum, whoever writes to the file.
+                // Copied first: if another program writes to the file, the decoded bytes are still
+                // those of the checksum.
                 let stored = bytes.all()[offset..offset + entry.bytes as usize].to_vec();
                 decode(entry, &stored, self.header.scalar).map_err(|message| {
                     let place = format!("level {level}, brick {brick} (byte {offset})");
@@ -236,11 +245,11 @@ impl Bricks {
         }
     }
 
-    /// The samples of a whole level, in memory. Its range is that of level 0.
+    /// Returns the samples of a whole level, in memory. Its range is that of level 0.
     ///
     /// # Errors
-    /// [`Error::Argument`] where there is no such level; [`Error::Input`] for damaged bricks; [`Error::Limit`] for a level
-    /// larger than the limits allow.
+    /// [`Error::Argument`] if there is no such level, [`Error::Input`] for damaged bricks, and
+    /// [`Error::Limit`] for a level larger than the limits allow.
     pub fn volume(&self, level: usize) -> Result<Volume> {
         let missing =
             || Error::Argument(format!("{}: there is no level {level}", self.path.display()));
@@ -249,10 +258,11 @@ impl Bricks {
         let [nx, ny, _] = size.dims;
         let [bx, by, _] = size.brick_dims;
         let row = nx * scalar.bytes();
-        // As bytes and as samples. Bricks of one value take no bytes of the file.
+        // Twice: as bytes and as samples. Bricks of one value take no bytes in the file, so its
+        // size is no bound.
         self.check_memory(&format!("the size of level {level} in bytes"), size.dims[2], size, 2)?;
         let mut bytes = vec![0; size.slice() * size.dims[2] * scalar.bytes()];
-        // Each layer of bricks is a part of its own.
+        // Each layer of bricks is its own chunk.
         bytes.par_chunks_mut(super::SIDE * ny * row).enumerate().try_for_each(
             |(layer, slices)| {
                 for number in layer * bx * by..(layer + 1) * bx * by {
@@ -280,7 +290,7 @@ impl Bricks {
         Ok(volume)
     }
 
-    /// Refuses so many slices of a level, `times` as large as their samples, where the limits allow less.
+    /// Refuses slices of a level whose samples, times `times`, exceed the limits.
     pub(super) fn check_memory(
         &self,
         what: &str,
@@ -294,7 +304,7 @@ impl Bricks {
         self.limits.check(LimitKind::Bytes, &self.path, what, bytes.saturating_mul(times))
     }
 
-    /// All bytes of a file; none of a volume in memory.
+    /// Returns all bytes of a file, or none for a volume in memory.
     pub(super) fn bytes(&self) -> &[u8] {
         match &self.origin {
             Origin::Memory { .. } => &[],
@@ -309,7 +319,7 @@ impl Slices<'_> {
     }
 }
 
-/// What stands at the beginning of a file, checked.
+/// Reads and checks the beginning of a file: header and directory.
 fn begin(path: &Path, all: &[u8], limits: &Limits) -> Result<(Stored, Directory)> {
     let stored = Stored::decode(all).map_err(|refusal| refused(path, refusal))?;
     let present = all.len() as u64;
@@ -321,7 +331,7 @@ fn begin(path: &Path, all: &[u8], limits: &Limits) -> Result<(Stored, Directory)
         return Err(damaged(
             path,
             format!("byte {end}"),
-            format!("{} bytes stand behind the end", present - end),
+            format!("{} bytes follow the end", present - end),
         ));
     }
     let directory =
@@ -337,7 +347,8 @@ fn begin(path: &Path, all: &[u8], limits: &Limits) -> Result<(Stored, Directory)
 }
 
 impl Bytes {
-    /// Why there is an error: checksums and the like find what changed, but not that it did.
+    /// Returns the cause of an error. Checksums find damage; this reports if the file changed while
+    /// it was mapped.
     fn why(&self, path: &Path, error: Error) -> Error {
         match self {
             Self::Mapped(map) => intact(map, path).err().unwrap_or(error),
@@ -366,7 +377,7 @@ fn in_memory<'a>(
 fn refused(path: &Path, refusal: Refusal) -> Error {
     match refusal {
         Refusal::Incomplete => incomplete(path, "header"),
-        Refusal::Foreign => Error::input(path, "header", "is no volume in bricks")
+        Refusal::Foreign => Error::input(path, "header", "is not a volume in bricks")
             .hint("give a .splv file, or convert the source to one"),
         Refusal::Version(version) => Error::input(
             path,

@@ -1,4 +1,4 @@
-//! Bricks in memory, in files and by hand.
+//! Bricks in memory, in files and built by hand.
 
 use super::{
     file::{to_bytes, with_changes},
@@ -52,7 +52,7 @@ fn open(bytes: &[u8]) -> crate::Result<Bricks> {
     Bricks::from_bytes(bytes.to_vec(), Path::new("test.splv"))
 }
 
-/// The value of a sample of a level, by way of its brick.
+/// The value of a sample of a level, read from its brick.
 fn value(bricks: &[Brick], level: &Level, scalar: Scalar, at: [usize; 3]) -> f64 {
     let [nx, ny, _] = level.brick_dims;
     let [i, j, k] = at.map(|n| n / SIDE);
@@ -203,7 +203,7 @@ fn what_one_value_says_takes_no_room() {
         file.read(0, 0).unwrap().samples,
         bytemuck::cast_slice::<u16, u8>(&[7; 32 * 32 * 32])
     );
-    // Noise is kept as it is.
+    // Noise is stored unpacked.
     let noise = samples(Scalar::F32, [32; 3]);
     let mut state = 1u32;
     let noise = (0..noise.len()).map(|_| {
@@ -242,17 +242,20 @@ fn streams_become_the_same_file() {
         assert_eq!(streamed, to_bytes(&volume, &options()).unwrap());
         write(&volume, &path, &options(), &|_, _| ()).unwrap();
         assert_eq!(streamed, std::fs::read(&path).unwrap());
-        // A range that is none leaves the file as it was.
+        // An invalid range leaves the file as it was.
         for range in [[f64::NAN; 2], [1.0, 0.0], [0.0, f64::INFINITY]] {
             let result = convert(&stream, range, &path, &options(), &|_, _| ());
             assert!(
-                matches!(&result, Err(Error::Argument(message)) if message.contains("range of values")),
+                matches!(
+                    &result,
+                    Err(Error::Argument(message)) if message.contains("range of values")
+                ),
                 "{result:?}"
             );
         }
         let report = check(&path, &limits, &|_, _| ());
         assert!(report.is_sound(), "{report:?}");
-        // Nothing but the file is left.
+        // Only the input and the file are left.
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
     }
 }
@@ -286,7 +289,7 @@ fn other_lattices_and_other_bricks_are_refused() {
     assert!(bricks.read(0, 8).is_err() && bricks.read(9, 0).is_err() && bricks.read(1, 0).is_ok());
 }
 
-/// Damage that is found on opening, or when every brick is read.
+/// The message of the first damage that is found on opening, or when every brick is read.
 fn refusal(bytes: &[u8]) -> Option<String> {
     let bricks = match open(bytes) {
         Ok(bricks) => bricks,
@@ -318,7 +321,7 @@ fn damage_is_found() {
     for end in (0..300).chain((300..whole.len()).step_by(101)).chain([whole.len() - 1]) {
         assert!(refusal(&whole[..end]).is_some(), "cut at {end}");
     }
-    assert!(refusal(&[&whole[..], &[0]].concat()).unwrap().contains("behind the end"));
+    assert!(refusal(&[&whole[..], &[0]].concat()).unwrap().contains("follow the end"));
     let hash = whole.len() - 32;
     for at in (0..700).chain((700..whole.len()).step_by(97)).chain([whole.len() - 1]) {
         let mut damaged = whole.clone();
@@ -334,12 +337,12 @@ fn damage_is_found() {
         damaged[at] = to;
         refusal(&damaged).unwrap()
     };
-    assert!(message(0, 0).contains("no volume in bricks"));
+    assert!(message(0, 0).contains("not a volume in bricks"));
     assert!(message(8, 9).contains("version 9"));
     assert!(message(24, 1).contains("checksum"));
 }
 
-/// A file whose header is changed, with a checksum that fits.
+/// A file whose header is changed, with a checksum that matches.
 fn forged(whole: &[u8], at: usize, to: &[u8]) -> Vec<u8> {
     let mut bytes = whole.to_vec();
     bytes[at..at + to.len()].copy_from_slice(to);
@@ -370,7 +373,7 @@ fn lies_with_good_checksums_are_found() {
         let message = refusal(&forged(&whole, at, to)).unwrap();
         assert!(message.contains(word), "byte {at}: {message}");
     }
-    // Many bricks, and no bytes for their entries: levels are right.
+    // Many bricks, and no bytes for their entries, although the number of levels is right.
     let dims = [1u64 << 20, 1 << 20, 1].map(u64::to_le_bytes).concat();
     let many = forged(&forged(&whole, 24, &dims), 160, &[16]);
     assert!(refusal(&many).unwrap().contains("too short"));
@@ -388,7 +391,7 @@ fn wrong_contents_are_found() {
             .map(|finding| (finding.code, finding.place.clone()))
             .collect::<Vec<_>>()
     };
-    // The range of a header that its samples do not fill.
+    // The header's range is wider than that of the samples.
     let wide = Volume { range: [right.range[0] - 1.0, right.range[1]], ..right.clone() };
     assert_eq!(codes(to_bytes(&wide, &options()).unwrap()), [("range", "header".into())]);
     let bricks = Bricks::from_volume(Arc::new(right)).unwrap();
@@ -403,7 +406,8 @@ fn wrong_contents_are_found() {
     let place = || "level 1, brick 1".to_owned();
     assert_eq!(changed((1, 1), &|brick| brick.samples[20] ^= 1), [("samples", place())]);
     assert_eq!(changed((1, 1), &|brick| brick.blocks[0][1] -= 1), [("blocks", place())]);
-    // A sample of the finest level that the coarser ones and the blocks around do not know of.
+    // A changed sample of the finest level, which the coarser levels and the blocks around it
+    // contradict.
     let lie = changed((0, 1), &|brick| brick.samples[40 * 2 * 32..40 * 2 * 32 + 64].fill(99));
     assert!(
         lie.iter().any(|(code, _)| *code == "samples")

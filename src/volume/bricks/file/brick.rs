@@ -1,4 +1,5 @@
-//! A brick as it is kept: nothing that one value says, the rest packed where that is shorter.
+//! A brick as stored: parts that have a single value are omitted, and the rest is packed if that is
+//! shorter.
 
 use super::directory::{CONSTANT, Entry, PACKED, UNIFORM};
 use crate::volume::{
@@ -7,7 +8,7 @@ use crate::volume::{
 };
 use zstd::bulk::Compressor;
 
-/// The bytes of a brick, and what the directory tells of them.
+/// Returns the bytes of a brick, and its entry in the directory.
 pub fn encode(
     brick: &Brick,
     scalar: Scalar,
@@ -40,7 +41,7 @@ pub fn encode(
     Ok((entry, bytes))
 }
 
-/// The brick of its bytes in the file; what is wrong where there is none.
+/// Decodes a brick from its bytes in the file. The error is a message.
 pub fn decode(entry: &Entry, bytes: &[u8], scalar: Scalar) -> Result<Brick, String> {
     if crc32fast::hash(bytes) != entry.crc {
         return Err("its checksum does not fit".into());
@@ -81,7 +82,7 @@ pub fn decode(entry: &Entry, bytes: &[u8], scalar: Scalar) -> Result<Brick, Stri
     }
 }
 
-/// From this machine's order of bytes to the file's, and back.
+/// Converts between native byte order and the file's.
 fn turn(samples: &mut [u8], scalar: Scalar) {
     if cfg!(target_endian = "big") {
         samples.chunks_exact_mut(scalar.bytes()).for_each(<[u8]>::reverse);

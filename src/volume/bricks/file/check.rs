@@ -13,11 +13,12 @@ use crate::{
 use rayon::prelude::*;
 use std::path::Path;
 
-/// Checks a file: header, directory, the checksum of every brick and the hash; then, where all of these hold, makes all
-/// ranges and all coarser levels again from level 0 and compares. A layer of bricks of each level is in memory at a time.
-/// `watch` is told how many bricks are done, of how many.
+/// Checks a file: header, directory, the checksum of every brick, and the hash. If all of these
+/// hold, computes all ranges and all coarser levels again from level 0 and compares. One layer of
+/// bricks of each level is in memory at a time. `watch` is called with the number of bricks done
+/// and the number in all.
 ///
-/// Nothing is an error: a file that cannot be opened is a finding.
+/// Never returns an error: a file that cannot be opened is a finding.
 pub fn check(path: &Path, limits: &Limits, watch: &(dyn Fn(u64, u64) + Sync)) -> Report {
     let mut findings = Findings::default();
     match Bricks::open(path, limits) {
@@ -28,7 +29,8 @@ pub fn check(path: &Path, limits: &Limits, watch: &(dyn Fn(u64, u64) + Sync)) ->
 }
 
 impl Bricks {
-    /// As [`check`](check()), of a file that is open already, or of its bytes; a volume in memory has nothing to be checked.
+    /// Like [`check`](check()), for a file that is already open, or for its bytes. A volume in
+    /// memory has nothing to check.
     pub fn check(&self, watch: &(dyn Fn(u64, u64) + Sync)) -> Report {
         let mut findings = Findings::default();
         if !self.bytes().is_empty()
@@ -45,7 +47,7 @@ fn count(bricks: &Bricks) -> u64 {
     bricks.levels().iter().map(|level| level.bricks() as u64).sum()
 }
 
-/// Whether every brick can be read, and the hash fits.
+/// Returns whether every brick can be read and the hash matches.
 fn sums(bricks: &Bricks, watch: &(dyn Fn(u64, u64) + Sync), findings: &mut Findings) -> bool {
     let bytes = bricks.bytes();
     let (text, hash) = bytes.split_at(bytes.len() - HASH);
@@ -70,7 +72,7 @@ fn sums(bricks: &Bricks, watch: &(dyn Fn(u64, u64) + Sync), findings: &mut Findi
     is_sound
 }
 
-/// Whether the file is what would be made of its level 0.
+/// Checks that the file is what its level 0 would be converted to.
 fn contents(
     bricks: &Bricks,
     watch: &(dyn Fn(u64, u64) + Sync),
@@ -82,7 +84,7 @@ fn contents(
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];
     let mut done = count(bricks);
     let finest = *bricks.level(0);
-    // The layer, those of the coarser levels, and what is left of the one before.
+    // The layer, those of the coarser levels, and the rest of the layer before.
     bricks.check_memory("the size of a layer of bricks in bytes", 3 * SIDE, finest, 2)?;
     for layer in 0..finest.brick_dims[2] {
         let slices = slices(bricks, &finest, layer)?;
@@ -109,7 +111,7 @@ fn contents(
     }
     if range != header.range {
         let message =
-            format!("it tells of values in {:?}, and they are in {range:?}", header.range);
+            format!("the header says values are in {:?}, but they are in {range:?}", header.range);
         findings.push(Finding::error("range", "header", message));
     }
     Ok(())
@@ -131,7 +133,7 @@ fn meaning(code: &str) -> &'static str {
     }
 }
 
-/// The slices of a layer of bricks of a level.
+/// Returns the slices of a layer of bricks of level 0.
 fn slices(bricks: &Bricks, level: &Level, layer: usize) -> Result<Vec<u8>> {
     let size = bricks.header().scalar.bytes();
     let ([nx, ny, nz], [across, down, _]) = (level.dims, level.brick_dims);

@@ -1,4 +1,4 @@
-//! The directory: how each brick is kept, how large it is, and what its values range over.
+//! The directory: how each brick is stored, its size, and the range of its values.
 
 use super::{HASH, Stored};
 use crate::{
@@ -12,21 +12,22 @@ use crate::{
 /// Bytes of an entry.
 const ENTRY: usize = 16;
 
-/// Bits of [`Entry::flags`]: all samples have one value, all blocks have the brick's range, the rest is packed by zstd.
+/// Bits of [`Entry::flags`]: all samples have one value, all blocks have the brick's range, the
+/// rest is packed by zstd.
 pub const CONSTANT: u8 = 1;
 pub const UNIFORM: u8 = 2;
 pub const PACKED: u8 = 4;
 
-/// What the directory tells of a brick.
+/// The directory's entry of a brick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Entry {
     /// Bytes in the file.
     pub bytes: u32,
     /// Checksum of these bytes.
     pub crc: u32,
-    /// The value of all samples where they have one, little-endian; else 0.
+    /// The value of all samples if they have only one, little-endian; else 0.
     pub value: [u8; 4],
-    /// As of all its blocks together.
+    /// The range of all its blocks together.
     pub range: [u8; 2],
     pub flags: u8,
 }
@@ -36,7 +37,7 @@ impl Entry {
         self.flags & flag != 0
     }
 
-    /// Bytes of the samples and of the blocks that are kept, unpacked.
+    /// Bytes of the samples and of the blocks that are stored, unpacked.
     pub fn contents(&self, scalar: Scalar) -> [usize; 2] {
         let samples = if self.has(CONSTANT) { 0 } else { SIDE * SIDE * SIDE * scalar.bytes() };
         [samples, if self.has(UNIFORM) { 0 } else { 2 * BRICK_BLOCKS }]
@@ -53,21 +54,21 @@ impl Entry {
     }
 }
 
-/// The entries of all levels, finest first, and where their bricks stand.
+/// The entries of all levels, finest first, and where their bricks are.
 #[derive(Debug, Clone, Default)]
 pub struct Directory {
     pub levels: Vec<Vec<Entry>>,
-    /// The byte of the file at which each brick stands.
+    /// The byte of the file at which each brick begins.
     pub offsets: Vec<Vec<u64>>,
 }
 
 impl Directory {
-    /// Bytes of the directory of so many bricks, with its checksum.
+    /// Bytes of the directory of `bricks` bricks, with its checksum.
     pub fn length(bricks: u64) -> u64 {
         ENTRY as u64 * bricks + 4
     }
 
-    /// Puts bricks behind a header of some length and the directory; coarse levels first.
+    /// Places bricks after a header of `header` bytes and the directory, coarse levels first.
     pub fn new(levels: Vec<Vec<Entry>>, header: usize) -> Self {
         let bricks = levels.iter().map(|level| level.len() as u64).sum();
         let mut at = header as u64 + Self::length(bricks);
@@ -82,13 +83,13 @@ impl Directory {
         Self { levels, offsets }
     }
 
-    /// Bytes that it takes in memory: entries, places and ranges.
+    /// Bytes of the directory in memory: entries, offsets and ranges.
     pub fn memory(&self) -> u64 {
         let bricks = self.levels.iter().map(|level| level.len() as u64).sum::<u64>();
         bricks * (size_of::<Entry>() + size_of::<u64>() + size_of::<[u8; 2]>()) as u64
     }
 
-    /// Where the hash begins: behind the last brick of level 0.
+    /// Where the hash begins: after the last brick of level 0.
     pub fn end(&self) -> u64 {
         let last = |(entries, offsets): (&Vec<Entry>, &Vec<u64>)| {
             Some(offsets.last()? + u64::from(entries.last()?.bytes))
@@ -109,8 +110,8 @@ impl Directory {
         out
     }
 
-    /// Reads the directory behind a header, or says what is wrong with it; nothing is allocated that the file does not have
-    /// bytes for.
+    /// Reads the directory after a header. The error is a message. No memory is allocated that the
+    /// file does not have bytes for.
     pub fn decode(bytes: &[u8], stored: &Stored) -> Result<Self, String> {
         let scalar = stored.header.scalar;
         let levels = level::levels(stored.header.lattice.dims);

@@ -1,4 +1,4 @@
-//! The header: what the volume as a whole is.
+//! The header: the properties of the volume as a whole.
 
 use super::{MAGIC, VERSION};
 use crate::{
@@ -11,10 +11,10 @@ use crate::{
 };
 use glam::DMat3;
 
-/// What stands before the texts.
+/// Bytes before the texts.
 const FIXED: usize = 192;
 
-/// A header as it stands in the file, with what the reader needs to find the rest.
+/// A header as stored in the file, with what the reader needs to find the rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stored {
     pub header: Header,
@@ -22,10 +22,10 @@ pub struct Stored {
     pub file_bytes: u64,
 }
 
-/// Why a header is not taken.
+/// Why a header is refused.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Refusal {
-    /// The bytes end before it does.
+    /// The data ends before the header does.
     Incomplete,
     /// Another kind of file.
     Foreign,
@@ -35,7 +35,7 @@ pub enum Refusal {
 }
 
 impl Stored {
-    /// Bytes of the header with its checksum.
+    /// Bytes of the header, including its checksum.
     pub fn length(&self) -> usize {
         FIXED + self.header.unit.len() + self.header.source.len() + 4
     }
@@ -83,7 +83,8 @@ impl Stored {
         if version != VERSION {
             return Err(Refusal::Version(version));
         }
-        // The texts' lengths decide where the checksum stands, which decides whether they can be believed.
+        // The lengths of the texts determine where the checksum is, and the checksum then confirms
+        // the lengths.
         let mut lengths = Cursor::new(bytes.get(172..FIXED).ok_or(Refusal::Incomplete)?);
         let [unit, source] =
             [lengths.u32(), lengths.u32()].map(|length| length.unwrap_or_default() as usize);
@@ -107,7 +108,7 @@ impl Stored {
             [cursor.array().map(f64::from_le_bytes)?, cursor.array().map(f64::from_le_bytes)?];
         let [levels, side, reach] = [cursor.u32()?, cursor.u32()?, cursor.u32()?];
         let sound = || {
-            let wrong = |what: &str| format!("its {what} is none that is known");
+            let wrong = |what: &str| format!("its {what} is not valid");
             let scalar =
                 *Scalar::ALL.get(scalar as usize).ok_or_else(|| wrong("type of samples"))?;
             let [Ok(nx), Ok(ny), Ok(nz)] = dims.map(usize::try_from) else {

@@ -1,5 +1,6 @@
-//! The file of a bricked volume, `.splv`: bricks, coarse levels first, behind a directory that tells how large each is and
-//! what its values range over. docs/splv.md describes it byte by byte.
+//! The file of a bricked volume, `.splv`. A directory, with the size and the range of values of
+//! each brick, precedes the bricks, coarse levels first. docs/splv.md describes the file byte by
+//! byte.
 
 #![deny(clippy::disallowed_methods)]
 

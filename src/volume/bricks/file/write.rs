@@ -1,4 +1,5 @@
-//! Writing: slices come once, from the first to the last, and little more than a layer of bricks is held of each level.
+//! Writing: slices arrive once, in order, and little more than a layer of bricks of each level is
+//! in memory.
 
 use super::{Directory, Entry, HASH, Stored, brick::encode};
 #[cfg(test)]
@@ -17,7 +18,7 @@ use rayon::prelude::*;
 use std::{borrow::Cow, io::Write, ops::Range, path::Path};
 use zstd::bulk::Compressor;
 
-/// What the file says of where it comes from.
+/// Descriptions that are stored in the file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct WriteOptions {
     /// The name of the world's unit.
@@ -26,20 +27,21 @@ pub struct WriteOptions {
     pub source: String,
 }
 
-/// What zstd does for the size. Higher levels take much longer for a few parts in a hundred.
+/// The compression level of zstd. Higher levels take much longer and save a few percent.
 const LEVEL: i32 = 3;
 
-/// Slices that are taken at a time.
+/// Slices that are read at a time.
 const PIECE: usize = 8;
 
-/// Bricks that threads share before they are written.
+/// Bricks that are encoded in parallel before they are written.
 const BATCH: usize = 256;
 
-/// Told of how many slices are done, of how many.
+/// Called with the number of slices done and the number in all.
 type Watch<'a> = &'a dyn Fn(u64, u64);
 
-/// About how many bytes of memory [`convert`] takes: of level 0 the slices of a layer of bricks, what reaches into them and
-/// what is being read; of each further level a quarter of the one before; and room for packing.
+/// Returns approximately how many bytes of memory [`convert`] needs. For level 0, it holds the
+/// slices of a layer of bricks, those that reach into it and those being read. Each further level
+/// needs a quarter of the one before. Packing needs a little more.
 pub fn memory_of(dims: [usize; 3], scalar: Scalar) -> u64 {
     let slice =
         (dims[0] as u64).saturating_mul(dims[1] as u64).saturating_mul(scalar.bytes() as u64);
@@ -47,12 +49,12 @@ pub fn memory_of(dims: [usize; 3], scalar: Scalar) -> u64 {
     slice.saturating_mul(slices).saturating_mul(4) / 3 + (64 << 20)
 }
 
-/// Writes a volume in memory: a temporary file beside `path` that takes its name once it is complete. `watch` is told how
-/// many slices are done, of how many.
+/// Writes a volume in memory: a temporary file beside `path`, renamed when it is complete. `watch`
+/// is called with the number of slices done and the number in all.
 ///
 /// # Errors
-/// [`Error::Argument`] for a lattice that is not Cartesian, and for a volume that was put together by hand and contradicts itself;
-/// [`Error::Output`] where nothing can be written.
+/// [`Error::Argument`] for a lattice that is not Cartesian, and for a volume that was built by hand
+/// and is inconsistent; [`Error::Output`] if the file cannot be written.
 pub fn write(volume: &Volume, path: &Path, options: &WriteOptions, watch: Watch) -> Result<()> {
     volume.validate().map_err(Error::Argument)?;
     let spill = || Spill::beside(path);
@@ -67,11 +69,12 @@ pub fn write(volume: &Volume, path: &Path, options: &WriteOptions, watch: Watch)
     .map(|_| ())
 }
 
-/// As [`write`](write()), from a file that is read slice by slice: in [`memory_of`] bytes, whatever its size. The range of
-/// its values is told by the caller, who went through the file for it ([`VolumeStream::range`]).
+/// Like [`write`](write()), from a file that is read slice by slice: it needs [`memory_of`] bytes,
+/// whatever the file's size. The caller passes the range of the values, which takes a pass over the
+/// file ([`VolumeStream::range`]).
 ///
 /// # Errors
-/// As of [`write`](write()), also for a range that is none.
+/// As [`write`](write()), and also for a range that is not finite or descends.
 pub fn convert(
     stream: &VolumeStream,
     range: [f64; 2],
@@ -86,7 +89,7 @@ pub fn convert(
     all(&header, path, || Spill::beside(path), || Target::at(path), slices, watch).map(|_| ())
 }
 
-/// The bytes of the file that [`write`](write()) would write.
+/// Returns the bytes of the file that [`write`](write()) would write.
 #[cfg(test)]
 pub fn to_bytes(volume: &Volume, options: &WriteOptions) -> Result<Vec<u8>> {
     let memory = || Ok(Spill::Memory(Vec::new()));
@@ -101,7 +104,8 @@ pub fn to_bytes(volume: &Volume, options: &WriteOptions) -> Result<Vec<u8>> {
     )
 }
 
-/// The bytes of a file with bricks that a function may change, so that they are not what was promised.
+/// Returns the bytes of a file whose bricks a function has changed, so that they contradict each
+/// other.
 #[cfg(test)]
 pub fn with_changes(bricks: &Bricks, change: impl Fn(usize, u32, &mut Brick)) -> Vec<u8> {
     let header = bricks.header();
@@ -129,7 +133,7 @@ fn header(volume: &Volume, options: &WriteOptions) -> Header {
     }
 }
 
-/// The bytes of some slices.
+/// Returns the bytes of a range of slices.
 fn slices(volume: &Volume, z: Range<usize>) -> Cow<'_, [u8]> {
     let slice = volume.lattice.dims[0] * volume.lattice.dims[1] * volume.samples.sample_bytes();
     Cow::Borrowed(&volume.samples.bytes()[z.start * slice..z.end * slice])
@@ -191,7 +195,8 @@ impl Coder {
     }
 }
 
-/// Bricks on their way to the file: of each level what the directory will tell of them, and where they wait.
+/// Bricks on their way to the file: for each level the entries of the directory, and where the
+/// bricks wait in the spill file.
 struct Kept {
     spill: Spill,
     entries: Vec<Vec<Entry>>,
@@ -210,7 +215,7 @@ impl Kept {
         Ok(())
     }
 
-    /// Puts the file together.
+    /// Assembles the file.
     fn finish(self, header: &Header, mut out: Target) -> std::io::Result<Target> {
         let mut stored = Stored { header: header.clone(), file_bytes: 0 };
         let directory = Directory::new(self.entries, stored.length());
