@@ -1165,17 +1165,17 @@
         (
             "future.splk",
             at(splk(true), 8, &99u32.to_le_bytes()),
-            "future.splk: header: is of version 99; version 1 can be read",
+            "future.splk: header: has version 99; only version 1 can be read",
         ),
         (
             "future.splv",
             at(bricks(), 8, &99u32.to_le_bytes()),
-            "future.splv: header: is of version 99; version 1 can be read",
+            "future.splv: header: has version 99; only version 1 can be read",
         ),
         (
             "tail.splk",
             [splk(true), vec![0]].concat(),
-            "tail.splk: byte 560: the file has 1 bytes behind its end",
+            "tail.splk: byte 560: the file has 1 bytes after its end",
         ),
         (
             "tail.splv",
@@ -1212,23 +1212,23 @@
         (
             "cycle.splk",
             crafted::with_node_bytes(72, &0u32.to_le_bytes()),
-            "cycle.splk: page 0 (byte 229): the children of its node 0 stand at 0, not at 1",
+            "cycle.splk: page 0 (byte 229): the children of its node 0 begin at 0, not at 1",
         ),
         (
             "beyond.splk",
             crafted::with_node_bytes(72, &u32::MAX.to_le_bytes()),
-            "beyond.splk: page 0 (byte 229): the children of its node 0 stand at 4294967295, not \
+            "beyond.splk: page 0 (byte 229): the children of its node 0 begin at 4294967295, not \
              at 1",
         ),
         (
             "children.splk",
             crafted::with_node_bytes(76, &u32::MAX.to_le_bytes()),
-            "children.splk: page 0 (byte 229): its node 0 has 4294967295 children; 8 are the most",
+            "children.splk: page 0 (byte 229): its node 0 has 4294967295 children; at most 8 are allowed",
         ),
         (
             "swapped.splk",
             crafted::swapped(false),
-            "swapped.splk: page 1 (byte 130709): its checksum does not fit",
+            "swapped.splk: page 1 (byte 130709): its checksum does not match",
         ),
         (
             "swappedtold.splk",
@@ -1239,7 +1239,7 @@
         (
             "far.splk",
             crafted::far_page(),
-            "far.splk: directory: a page stands at byte 4294967525, not at 229",
+            "far.splk: directory: a page begins at byte 4294967525, not at 229",
         ),
         (
             "bomb.splv",
@@ -1268,7 +1268,7 @@
         (
             "foreign.splk",
             b"PK\x03\x04 and so on".to_vec(),
-            "foreign.splk: header: is no hierarchy of splats",
+            "foreign.splk: header: is not a hierarchy of splats",
         ),
         (
             "foreign.splv",

@@ -58,7 +58,7 @@ fn contents(hierarchy: &Hierarchy, findings: &mut Findings) {
     if let Some(start) = hash_start(bytes) {
         let found = blake3::hash(&bytes[..start]);
         if bytes[start..] != *found.as_bytes() {
-            let message = "the hash of the whole file does not fit";
+            let message = "the hash of the whole file does not match";
             findings.push(Finding::error("hash", format!("byte {start}"), message));
         }
     }

@@ -231,7 +231,7 @@ impl Directory {
         };
         let (content, stated) = all.split_at(all.len() - 4);
         if Cursor::new(stated).u32() != Some(crc32fast::hash(content)) {
-            return Err(Trouble::Damaged("its checksum does not fit".into()));
+            return Err(Trouble::Damaged("its checksum does not match".into()));
         }
         let mut directory = Self::fields(content, stored).ok_or(Trouble::Incomplete)?;
         directory.consistent(stored, start as u64 + length).map_err(Trouble::Damaged)?;
@@ -318,7 +318,7 @@ impl Directory {
         let mut at = pages_start;
         for place in places {
             if place.offset != at {
-                return Err(format!("a page stands at byte {}, not at {at}", place.offset));
+                return Err(format!("a page begins at byte {}, not at {at}", place.offset));
             }
             at = at.saturating_add(u64::from(place.bytes));
         }

@@ -118,7 +118,7 @@ impl Stored {
         let text = bytes.get(..end).ok_or(Refusal::Incomplete)?;
         let stated = Cursor::new(&bytes[end..]).u32().ok_or(Refusal::Incomplete)?;
         if stated != crc32fast::hash(text) {
-            return Err(Refusal::Damaged("its checksum does not fit"));
+            return Err(Refusal::Damaged("its checksum does not match"));
         }
         Self::fields(cursor, &text[FIXED..], unit).ok_or(Refusal::Incomplete)?
     }

@@ -199,14 +199,14 @@ pub fn decode(
         }
         if node.children as usize > MOST_CHILDREN {
             return Err(format!(
-                "its node {index} has {} children; {MOST_CHILDREN} are the most",
+                "its node {index} has {} children; at most {MOST_CHILDREN} are allowed",
                 node.children
             ));
         }
         let wanted = if node.is_leaf() { 0 } else { next };
         if node.first_child != wanted {
             return Err(format!(
-                "the children of its node {index} stand at {}, not at {wanted}",
+                "the children of its node {index} begin at {}, not at {wanted}",
                 node.first_child
             ));
         }

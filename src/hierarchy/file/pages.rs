@@ -21,14 +21,14 @@ pub fn in_order(nodes: &[Node]) -> Result<(), String> {
         }
         if node.children as usize > MOST_CHILDREN {
             return Err(format!(
-                "node {index} has {} children; {MOST_CHILDREN} are the most",
+                "node {index} has {} children; at most {MOST_CHILDREN} are allowed",
                 node.children
             ));
         }
         let wanted = if node.is_leaf() { 0 } else { next as u32 };
         if node.first_child != wanted {
             return Err(format!(
-                "the children of node {index} stand at {}, not at {wanted}",
+                "the children of node {index} begin at {}, not at {wanted}",
                 node.first_child
             ));
         }

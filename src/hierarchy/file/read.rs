@@ -399,7 +399,7 @@ impl Hierarchy {
         // the file.
         let bytes = all[offset as usize..end as usize].to_vec();
         if crc32fast::hash(&bytes) != crc {
-            return Err(broken("its checksum does not fit".into()));
+            return Err(broken("its checksum does not match".into()));
         }
         let children = self.directory.children(page);
         let nodes =
@@ -475,7 +475,7 @@ fn begin(
     let Stored { header, file_bytes, .. } = stored;
     let present = bytes.len() as u64;
     if present > file_bytes {
-        let message = format!("the file has {} bytes behind its end", present - file_bytes);
+        let message = format!("the file has {} bytes after its end", present - file_bytes);
         return Err(damaged(path, format!("byte {file_bytes}"), message));
     }
     if present < file_bytes && !may_be_cut {
@@ -574,12 +574,12 @@ impl Families {
 pub(super) fn refused(path: &Path, refusal: Refusal) -> Error {
     match refusal {
         Refusal::Incomplete => incomplete(path, "header"),
-        Refusal::Foreign => Error::input(path, "header", "is no hierarchy of splats")
+        Refusal::Foreign => Error::input(path, "header", "is not a hierarchy of splats")
             .hint("give a .splk file, or convert the source to one"),
         Refusal::Version(version) => Error::input(
             path,
             "header",
-            format!("is of version {version}; version {} can be read", super::VERSION),
+            format!("has version {version}; only version {} can be read", super::VERSION),
         )
         .hint("convert the source again, or use the release that wrote the file"),
         Refusal::Damaged(message) => damaged(path, "header", message),

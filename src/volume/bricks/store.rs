@@ -382,7 +382,7 @@ fn refused(path: &Path, refusal: Refusal) -> Error {
         Refusal::Version(version) => Error::input(
             path,
             "header",
-            format!("is of version {version}; version {VERSION} can be read"),
+            format!("has version {version}; only version {VERSION} can be read"),
         )
         .hint("convert the source again, or use the release that wrote the file"),
         Refusal::Damaged(message) => damaged(path, "header", message),

@@ -44,7 +44,7 @@ pub fn encode(
 /// Decodes a brick from its bytes in the file. The error is a message.
 pub fn decode(entry: &Entry, bytes: &[u8], scalar: Scalar) -> Result<Brick, String> {
     if crc32fast::hash(bytes) != entry.crc {
-        return Err("its checksum does not fit".into());
+        return Err("its checksum does not match".into());
     }
     let [samples, blocks] = entry.contents(scalar);
     let mut contents = if entry.has(PACKED) {

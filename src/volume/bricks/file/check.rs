@@ -53,7 +53,7 @@ fn sums(bricks: &Bricks, watch: &(dyn Fn(u64, u64) + Sync), findings: &mut Findi
     let (text, hash) = bytes.split_at(bytes.len() - HASH);
     let mut is_sound = *blake3::hash(text).as_bytes() == *hash;
     if !is_sound {
-        let message = "the hash of the whole file does not fit";
+        let message = "the hash of the whole file does not match";
         findings.push(Finding::error("hash", format!("byte {}", text.len()), message));
     }
     let mut done = 0;

@@ -121,7 +121,7 @@ impl Directory {
         let end = usize::try_from(start as u64 + Self::length(bricks)).map_err(|_| short())?;
         let (text, crc) = bytes.get(start..end).ok_or_else(short)?.split_at(end - start - 4);
         if Cursor::new(crc).u32() != Some(crc32fast::hash(text)) {
-            return Err("its checksum does not fit".into());
+            return Err("its checksum does not match".into());
         }
         let mut cursor = Cursor::new(text);
         let mut entries = vec![Vec::new(); levels.len()];

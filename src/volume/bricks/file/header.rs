@@ -91,7 +91,7 @@ impl Stored {
         let end = FIXED + unit + source;
         let text = bytes.get(..end).ok_or(Refusal::Incomplete)?;
         if Cursor::new(&bytes[end..]).u32().ok_or(Refusal::Incomplete)? != crc32fast::hash(text) {
-            return Err(Refusal::Damaged("its checksum does not fit".into()));
+            return Err(Refusal::Damaged("its checksum does not match".into()));
         }
         Self::fields(cursor, &text[FIXED..], unit)
             .ok_or(Refusal::Incomplete)?
