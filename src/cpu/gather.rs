@@ -24,8 +24,8 @@ use fearless_simd::{Simd, mask32x8, prelude::*};
 /// the ends is as good as one more sample.
 const STRAIGHT: f32 = 64.0;
 
-/// Returns why the field of a scene can't be gathered, or `None` if it can. `parts` is the number of
-/// [`parts`] of a sheet. `unsuited` returns why a volume and its kernel can't be gathered, if so.
+/// Returns why the field of a scene can't be gathered, or `None` if it can. `parts` is the result
+/// of [`parts`]. `unsuited` returns why a volume and its kernel can't be gathered, if so.
 pub fn obstacle(
     scene: &Scene,
     settings: &Settings,
