@@ -44,7 +44,7 @@ impl Way {
     /// Chooses how to gather a volume.
     ///
     /// # Errors
-    /// What can't be gathered, in words.
+    /// The reason why the volume can't be gathered, in words.
     pub fn of(volume: &Volume, kernel: &Kernel) -> Result<Self, &'static str> {
         let arrangement = &volume.lattice.arrangement;
         let plain = weighting(kernel).filter(|_| *arrangement == Arrangement::Cartesian);

@@ -237,7 +237,7 @@ impl<S: Simd> Face<S> {
 
 impl Gather<'_> {
     /// Returns the field of a sheet and the rays on which it counts, or `None` if it is invisible.
-    #[expect(clippy::too_many_arguments, reason = "the state of one packet's walk")]
+    #[expect(clippy::too_many_arguments, reason = "the state of one packet")]
     #[inline(always)]
     pub fn layer<S: Simd>(
         &self,

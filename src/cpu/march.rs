@@ -145,7 +145,7 @@ impl March<'_> {
     }
 
     /// Adds the windows that begin at a sheet. Returns their number.
-    #[expect(clippy::too_many_arguments, reason = "the state of one tile's walk")]
+    #[expect(clippy::too_many_arguments, reason = "the state of one tile")]
     #[inline(always)]
     fn add<S: Simd>(
         &self,

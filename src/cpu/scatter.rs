@@ -258,10 +258,7 @@ fn planes_of(plan: &Plan, record: &Record, window: Window) -> usize {
     if plan.is_whole() { 0 } else { ahead.min(WINDOW - 1) }
 }
 
-#[expect(
-    clippy::too_many_arguments,
-    reason = "all of them are one splat, one packet or the picture"
-)]
+#[expect(clippy::too_many_arguments, reason = "the data of one splat, one packet and the picture")]
 #[inline(always)]
 fn add_radiance<S: Simd>(
     simd: S,
@@ -372,10 +369,7 @@ fn is_kept<S: Simd>(plan: &Plan, rays: &Rays<S>, distance: Lanes<S>) -> mask32x8
     kept
 }
 
-#[expect(
-    clippy::too_many_arguments,
-    reason = "all of them are one splat, one packet or the picture"
-)]
+#[expect(clippy::too_many_arguments, reason = "the data of one splat, one packet and the picture")]
 #[inline(always)]
 fn add_scalar<S: Simd>(
     simd: S,

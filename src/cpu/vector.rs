@@ -59,7 +59,7 @@ macro_rules! lanes {
                     || $of_lanes,
                 )
             } else {
-                unreachable!("every such processor has SSE2")
+                unreachable!("every x86-64 processor has SSE2")
             }
         }
         #[cfg(not(target_arch = "x86_64"))]

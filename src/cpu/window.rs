@@ -23,7 +23,7 @@ impl<'a, T: Copy, const N: usize, const R: usize> Window<'a, T, N, R> {
             let ends = each!([0, 1, 2, 3, 4, 5, 6, 7], I => places[I] > room);
             ends == [false; 8]
         });
-        assert!(is_inside, "a window beyond the samples");
+        assert!(is_inside, "a window leaves the samples");
         Self { samples, places, row, slice }
     }
 
@@ -34,7 +34,7 @@ impl<'a, T: Copy, const N: usize, const R: usize> Window<'a, T, N, R> {
         reason = "eight checks for a window, instead of two for each of its 128 rows: twice as fast"
     )]
     fn row<const W: usize>(&self, lane: usize, [first, row, slice]: [usize; 3]) -> [T; W] {
-        assert!(first + W <= N && row < R && slice < R, "a row of no window");
+        assert!(first + W <= N && row < R && slice < R, "a row outside the window");
         let place = self.places[lane] + first + row * self.row + slice * self.slice;
         // SAFETY: `new` checked that the last row of the last slice ends inside the samples; the
         // others end before it.
