@@ -43,8 +43,11 @@ pub fn obstacle(
         return unsuited;
     }
     let is_rectilinear = |item: &Item| {
-        matches!(item, Item::Volume(volume, ..)
-        if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_)))
+        matches!(
+            item,
+            Item::Volume(volume, ..)
+                if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_))
+        )
     };
     if parts > 1 && scene.items.iter().any(is_rectilinear) {
         return Some("sheets thicker than two samples of a rectilinear lattice");
