@@ -1,5 +1,6 @@
-// The runs of each chunk of which a pass draws something: number of the run and a bit for each of its candidates. Two words a
-// run; those before a chunk's first hold how many there are.
+// The active batches of each chunk: those that a pass draws candidates of. Two words per batch: its
+// number, and a bit for each of its candidates. The words before a chunk's first batch contain the
+// number of active batches.
 
 fn active_count(first_run: u32) -> u32 {
     return 2u * (first_run - 1u);

@@ -1,15 +1,16 @@
-// Bin: the entries of a pass, one for every tile and window of every record, into bins. `count` finds the bins' sizes; after
-// a scan, `fill` writes the entries. Then `bins` holds where each bin ends, which is where the next one starts.
+// Bin: puts the entries of a pass into bins, one entry for every tile and window of every record.
+// `count` finds the bins' sizes; after a scan, `fill` writes the entries. Then `bins` holds the end
+// of each bin, which is the start of the next one.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> stage: Pass;
 @group(0) @binding(2) var<uniform> run_count: vec4<u32>;
 @group(0) @binding(3) var<storage, read> boxes: array<Box>;
-// Record words before each run; the last element is the number of record words of the pass.
+// Record words before each batch; the last element is the number of record words of the pass.
 @group(0) @binding(4) var<storage, read> runs: array<u32>;
 @group(0) @binding(5) var<storage, read_write> bins: array<atomic<u32>>;
 @group(0) @binding(6) var<storage, read_write> entries: array<u32>;
-// Records of splats that meet many bins, for large.wgsl; before them their number.
+// Records of splats that meet many bins, for large.wgsl; their number comes first.
 @group(0) @binding(7) var<storage, read_write> large: array<atomic<u32>>;
 @group(0) @binding(8) var<storage, read_write> state: array<atomic<u32>>;
 
@@ -28,7 +29,8 @@ fn prepare() {
     atomicStore(&large[0], 0u);
 }
 
-// Neighbouring invocations take neighbouring records, so that bins fill nearly in the order that `order` wants.
+// Neighbouring invocations handle neighbouring records, so that bins fill nearly in the order that
+// `order` needs.
 @compute @workgroup_size(64)
 fn count(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let words = min(runs[run_count.x], frame.record_capacity);
@@ -45,7 +47,10 @@ fn count(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) 
         for (var window = 0u; window < walk.windows; window++) {
             for (var row = walk.first_row; row < walk.end_row; row++) {
                 for (var column = walk.first_column; column <= walk.last_column; column++) {
-                    atomicAdd(&bins[bin_of(column, row, walk.first_window + 3u * window, stage)], 1u);
+                    atomicAdd(
+                        &bins[bin_of(column, row, walk.first_window + 3u * window, stage)],
+                        1u,
+                    );
                 }
             }
         }
@@ -55,8 +60,10 @@ fn count(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) 
 @compute @workgroup_size(64)
 fn fill(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     if id.x == 0u {
-        // Behind the last bin stands how many entries there are.
-        let binned = atomicLoad(&bins[(stage.end_row - stage.first_row) * frame.tiles.x * stage.groups]);
+        // The element behind the last bin is the number of entries.
+        let binned = atomicLoad(
+            &bins[(stage.end_row - stage.first_row) * frame.tiles.x * stage.groups],
+        );
         atomicAdd(&state[BINNED], binned);
         if binned > frame.entry_capacity {
             atomicStore(&state[OVERFLOW], 1u);

@@ -1,7 +1,7 @@
-// What survey counts and plan reads: the needs of runs by the sheet in which they start and that in which they end, in each
-// band of tile rows and in all together.
+// The counts that survey makes and plan reads: the needs of batches by the sheets in which they
+// start and end, for each band of tile rows and for all bands together.
 
-// Bands of tile rows, in which a sheet can be cut that is too much for one pass.
+// Bands of tile rows. A sheet that needs too much for one pass is divided into bands.
 const BANDS: u32 = 16u;
 
 fn band_start(band: u32) -> u32 {
@@ -13,13 +13,13 @@ fn band_of(row: u32) -> u32 {
 }
 
 const CENSUS_KINDS: u32 = 6u;
-// Entries, how often these have passed 32 bits, and record words of the runs that start in the sheet. Summed up by plan: in
-// those before it.
+// Entries (low and high 32 bits) and record words of the batches that start in the sheet.
+// `accumulate` in plan replaces them by the sums over the sheets before.
 const STARTING: u32 = 0u;
-// Those of the runs that end in it, or in those before it.
+// The same for the batches that end in the sheet.
 const ENDING: u32 = 3u;
 
-// Behind the bands of a sheet stands the whole picture.
+// The whole picture comes behind the bands of a sheet.
 fn census_index(sheet: u32, band: u32) -> u32 {
     return (sheet * (BANDS + 1u) + band) * CENSUS_KINDS;
 }

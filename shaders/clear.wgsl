@@ -1,4 +1,4 @@
-// Clear: empties the bins of a pass and the progress of its tiles.
+// Clear: empties the bins of a pass, and the progress of its tiles.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> bin_size: vec4<u32>;

@@ -1,19 +1,22 @@
-// Cut: the list of the nodes that are drawn, each with its share. Two entry points around a prefix sum make it, the same every
-// time: count, in which the invocations find them, then write, which lays what each found behind what those before it did.
+// Cut: lists the drawn nodes, each with its share. Two entry points around a prefix sum make the
+// list, in the same order every time. `count` finds the nodes; `write` puts each invocation's nodes
+// behind those of the invocations before.
 
-// What is known of the nodes of each run.
+// Bounds of the nodes of each batch.
 @group(1) @binding(0) var<storage, read> bounds: array<Bounds>;
-// How many nodes each invocation found, later how many those before it did; one more than invocations.
+// The number of nodes that each invocation found, later the number found before it. One element
+// more than invocations.
 @group(1) @binding(1) var<storage, read_write> counts: array<u32>;
-// What each invocation found, in as many places as it looks at.
+// The nodes that each invocation found; each has as many places as it visits nodes.
 @group(1) @binding(2) var<storage, read_write> found_nodes: array<u32>;
-// The drawn nodes: number in the chunk, share in the upper ten bits. The element behind the last possible one is how many.
+// The drawn nodes: number in the chunk, share in the upper ten bits. The element behind the last
+// possible one is their number.
 @group(1) @binding(3) var<storage, read_write> selected: array<u32>;
 // The workgroups that later passes need for them.
 @group(1) @binding(4) var<storage, read_write> arguments: array<u32, 3>;
 
-// A sphere around the parents of a run's nodes, and the largest of their sizes; negative where one is a root. Mirrors
-// engine/nodes.rs.
+// A sphere around the parents of a batch's nodes, and the largest of the parents' sizes. The size
+// is negative if a node is a root. Mirrors engine/nodes.rs.
 struct Bounds {
     center: vec3<f32>,
     radius: f32,
@@ -22,19 +25,24 @@ struct Bounds {
 
 // Ten bits of share above the number of the node.
 const SHARE_SHIFT: u32 = 22u;
-// Invocations that share a run, each with every eighth node: where no parent is refined they all end at once.
+// Number of invocations that share a batch. Each visits every eighth node: if no parent is refined,
+// all of them end at once.
 const SHARERS: u32 = 8u;
 const OWN_NODES: u32 = SELECT_RUN / SHARERS;
 
 @compute @workgroup_size(64)
-fn count(@builtin(global_invocation_id) invocation: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
+fn count(
+    @builtin(global_invocation_id) invocation: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+) {
     let id = invocation.x;
     let run = run_of(id / SHARERS);
     let parents = bounds[run.x / SELECT_RUN];
     var end = run.y;
-    // What rounding may add on the way to the eye.
+    // Allows for rounding on the way to the eye.
     let room = 1e-6 * (length(parents.center) + length(source.origin.xyz));
-    if parents.size >= 0.0 && refinement(pixels(parents.center, parents.radius + room, parents.size)) == 0u {
+    if parents.size >= 0.0
+        && refinement(pixels(parents.center, parents.radius + room, parents.size)) == 0u {
         end = 0u;
     }
     var found = 0u;
@@ -52,7 +60,10 @@ fn count(@builtin(global_invocation_id) invocation: vec3<u32>, @builtin(num_work
 }
 
 @compute @workgroup_size(64)
-fn write(@builtin(global_invocation_id) invocation: vec3<u32>, @builtin(num_workgroups) workgroups: vec3<u32>) {
+fn write(
+    @builtin(global_invocation_id) invocation: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+) {
     let id = invocation.x;
     let at = counts[id];
     let found = counts[id + 1u] - at;

@@ -1,19 +1,23 @@
-// The field of a lattice, gathered: at a place it is the weighted mean of the samples that the kernel reaches. A Gaussian on
-// a lattice is a product of Gaussians along its axes, so four weights an axis stand for the 64 kernels in reach. The gradient
-// follows from the first moments: ∂E[f]/∂p = (E[n·f] − E[n]·E[f])/σ², n the sample's index along the axis.
+// The field of a lattice, gathered: at a place it is the weighted mean of the samples within reach
+// of the kernel. A Gaussian on a lattice is a product of Gaussians along its axes, so four weights
+// an axis replace the 64 kernels in reach. The gradient follows from the first moments: ∂E[f]/∂p =
+// (E[n·f] − E[n]·E[f])/σ², with n the sample's index along the axis.
 //
-// `shown`, which whoever uses this declares, has a bit for each sample: whether something may show nearer to it than to any
-// other. Behind that it has for each entry of the transfer function's table how many entries before it show something; for each
-// tile the sheets in which it may show something, as bits; and the list of tiles that have any.
+// The shader that includes this file declares `shown`. It has a bit for each sample: whether
+// something may be visible at the places nearest to that sample. Behind these bits it has, for each
+// entry of the transfer function's table, the number of visible entries before it. Then follow, for
+// each tile, the sheets in which something may be visible, as bits, and the list of tiles with such
+// sheets.
 
-// The samples in the type of their file: each row along x is packed in 32-bit words, with some behind its end. A texture, because
-// Mesa's software Vulkan reads eight elements of a buffer one by one, and eight texels of 32 bits at once.
+// The samples in the type of their file. Each row along x is packed in 32-bit words, with padding
+// behind its end. It is a texture, because Mesa's software Vulkan reads eight elements of a buffer
+// one by one, but eight texels of 32 bits at once.
 @group(1) @binding(0) var samples: texture_3d<u32>;
 
-// How far a place may lie outside the lattice and still have a sample in reach, in steps.
+// How far outside the lattice a place may lie and still have a sample in reach, in steps.
 const BEYOND_LATTICE: f32 = 1.999;
 
-// Samples are bytes, or of 16 bits.
+// Whether samples are bytes, or have 16 bits.
 const BYTES: bool = SAMPLE_KIND == SAMPLE_U8 || SAMPLE_KIND == SAMPLE_FOUR;
 const HALVES: bool = SAMPLE_KIND == SAMPLE_U16 || SAMPLE_KIND == SAMPLE_I16;
 
@@ -21,23 +25,24 @@ fn word_at(x: i32, y: i32, z: i32) -> u32 {
     return textureLoad(samples, vec3(x, y, z), 0).x;
 }
 
-// A sample of 32 bits as a value.
+// Returns a 32-bit sample as a value.
 fn whole_at(x: i32, y: i32, z: i32) -> f32 {
     let word = word_at(x, y, z);
     if SAMPLE_KIND == SAMPLE_I32 {
-        // In two parts: 32 bits of a float do not hold the whole.
+        // In two parts, because a 32-bit float cannot hold the whole integer.
         let low = word & 0xffffu;
         return counted_sum(f32(bitcast<i32>(word - low)), f32(low));
     }
     return counted(bitcast<f32>(word));
 }
 
-// The 32 bits that begin `shift` bits behind the start of the first of two words.
+// Returns the 32 bits that begin `shift` bits after the start of the first of two words.
 fn joined(first: u32, second: u32, shift: u32) -> u32 {
     return (first >> shift) | ((second << (31u - shift)) << 1u);
 }
 
-// Four samples along x. What lies behind the last sample gets no weight, but is a number.
+// Returns four samples along x. Those behind the last sample have no weight, but must be finite
+// numbers.
 fn row_at(taps: Taps, y: i32, z: i32) -> vec4<f32> {
     let x = taps.word;
     if BYTES {
@@ -45,23 +50,35 @@ fn row_at(taps: Taps, y: i32, z: i32) -> vec4<f32> {
         if SAMPLE_KIND == SAMPLE_U8 {
             word = joined(word, word_at(x + 1, y, z), taps.shift);
         }
-        return vec4(f32(word & 0xffu), f32((word >> 8u) & 0xffu), f32((word >> 16u) & 0xffu), f32(word >> 24u));
+        return vec4(
+            f32(word & 0xffu),
+            f32((word >> 8u) & 0xffu),
+            f32((word >> 16u) & 0xffu),
+            f32(word >> 24u),
+        );
     }
     if HALVES {
         let middle = word_at(x + 1, y, z);
         let low = joined(word_at(x, y, z), middle, taps.shift);
         let high = joined(middle, word_at(x + 2, y, z), taps.shift);
         if SAMPLE_KIND == SAMPLE_U16 {
-            return vec4(f32(low & 0xffffu), f32(low >> 16u), f32(high & 0xffffu), f32(high >> 16u)) - frame.transfer.x;
+            return vec4(f32(low & 0xffffu), f32(low >> 16u), f32(high & 0xffffu), f32(high >> 16u))
+                - frame.transfer.x;
         }
         let a = bitcast<i32>(low);
         let b = bitcast<i32>(high);
-        return vec4(f32((a << 16u) >> 16u), f32(a >> 16u), f32((b << 16u) >> 16u), f32(b >> 16u)) - frame.transfer.x;
+        return vec4(f32((a << 16u) >> 16u), f32(a >> 16u), f32((b << 16u) >> 16u), f32(b >> 16u))
+            - frame.transfer.x;
     }
-    return vec4(whole_at(x, y, z), whole_at(x + 1, y, z), whole_at(x + 2, y, z), whole_at(x + 3, y, z));
+    return vec4(
+        whole_at(x, y, z),
+        whole_at(x + 1, y, z),
+        whole_at(x + 2, y, z),
+        whole_at(x + 3, y, z),
+    );
 }
 
-// A mean of what row_at gives, in entries of the transfer function's table.
+// Converts a mean of row_at's samples to entries of the transfer function's table.
 fn counted_mean(mean: f32) -> f32 {
     if BYTES {
         return (mean - frame.transfer.x) * frame.transfer.y;
@@ -72,20 +89,22 @@ fn counted_mean(mean: f32) -> f32 {
     return mean;
 }
 
-// Exponents of weights beyond this are cut: of places that lie before or behind the lattice, where no ray is drawn.
+// Larger exponents of weights are clamped. They occur only at places outside the lattice, where no
+// ray is drawn.
 const MOST_EXPONENT: f32 = 30.0;
 
-// The weights of four successive samples along an axis; they add up to 1. They are a geometric series times the weights at
-// whole steps, so that one exponential gives all.
+// Returns the weights of four successive samples along an axis, which add up to 1. They are a
+// geometric series times the weights at whole steps, so one exponential suffices.
 fn weights_at(place: f32, first: f32, last: f32) -> vec4<f32> {
-    // Counted from the second sample.
+    // Relative to the second sample.
     let q = exp(clamp((place - first - 1.0) * frame.taps.x, -MOST_EXPONENT, MOST_EXPONENT));
     let all = vec4(frame.taps.y / q, 1.0, frame.taps.y * q, frame.taps.z * q * q);
     let weights = select(vec4(0.0), all, first + vec4(0.0, 1.0, 2.0, 3.0) <= vec4(last));
     return weights * (1.0 / ((weights.x + weights.y) + (weights.z + weights.w)));
 }
 
-// What a place needs of the samples around it: the word along x that they begin in, and where; rows and slices; weights.
+// The data to load and weight the samples around a place: the first word along x and the shift in
+// it; rows and slices; weights.
 struct Taps {
     word: i32,
     shift: u32,
@@ -119,7 +138,7 @@ fn taps_at(r: u32, distance: f32) -> Taps {
     return taps;
 }
 
-// A place of a pixel's ray in steps of the lattice.
+// Returns a place on a pixel's ray, in steps of the lattice.
 fn place_at(r: u32, distance: f32) -> vec3<f32> {
     return frame.field_origin.xyz + in_steps(origin_of(r)) + in_steps(direction_of(r)) * distance;
 }
@@ -138,15 +157,15 @@ fn slice_with_moment(taps: Taps, z: i32) -> Slice {
     return Slice((a + b) + (c + d), (c - a) + 2.0 * d);
 }
 
-// Indices that moments count: from the second of four samples.
+// Sample offsets for moments, relative to the second of four samples.
 const OFFSETS: vec4<f32> = vec4(-1.0, 0.0, 1.0, 2.0);
 
-// The value and the gradient on a plane between two sheets.
+// Returns the value and the gradient on a plane between two sheets.
 fn face_at(r: u32, plane: u32) -> Face {
     return field_at(r, planes[plane]);
 }
 
-// The same at a distance.
+// Returns the same at a distance.
 fn field_at(r: u32, distance: f32) -> Face {
     let taps = taps_at(r, distance);
     let a = slice_with_moment(taps, taps.slices.x);
@@ -154,17 +173,19 @@ fn field_at(r: u32, distance: f32) -> Face {
     let c = slice_with_moment(taps, taps.slices.z);
     let d = slice_with_moment(taps, taps.slices.w);
     let sum = (taps.z.x * a.sum + taps.z.y * b.sum) + (taps.z.z * c.sum + taps.z.w * d.sum);
-    let sum_y = (taps.z.x * a.moment + taps.z.y * b.moment) + (taps.z.z * c.moment + taps.z.w * d.moment);
+    let sum_y = (taps.z.x * a.moment + taps.z.y * b.moment)
+        + (taps.z.z * c.moment + taps.z.w * d.moment);
     let sum_z = 2.0 * taps.z.w * d.sum + (taps.z.z * c.sum - taps.z.x * a.sum);
     let mean = dot(taps.x, sum);
     let moments = vec3(dot(taps.x * OFFSETS, sum), dot(taps.x, sum_y), dot(taps.x, sum_z));
     let means = vec3(dot(taps.x, OFFSETS), dot(taps.y, OFFSETS), dot(taps.z, OFFSETS));
-    // A step along each axis.
+    // Per step along each axis.
     var slopes = (moments - means * mean) * frame.taps.x;
     if BYTES || HALVES {
         slopes *= frame.transfer.y;
     }
-    let gradient = slopes.x * frame.field_axis_x.xyz + slopes.y * frame.field_axis_y.xyz + slopes.z * frame.field_axis_z.xyz;
+    let gradient = slopes.x * frame.field_axis_x.xyz + slopes.y * frame.field_axis_y.xyz
+        + slopes.z * frame.field_axis_z.xyz;
     let direction = direction_of(r);
     var face: Face;
     face.has_value = true;
@@ -174,13 +195,15 @@ fn field_at(r: u32, distance: f32) -> Face {
     return face;
 }
 
-// The mean of a sheet: that of the cubic with the values and slopes along the ray of both faces (Hermite).
-// Where the mean alone is classified, the value in the middle makes it exact to the fifth degree (Simpson's rule with slopes).
+// Returns the mean of a sheet: that of the cubic with the values and slopes along the ray of both
+// faces (Hermite). If only the mean is classified, the value in the middle makes it exact to the
+// fifth degree (Simpson's rule with slopes).
 fn mean_of(r: u32, sheet: u32, front: Face, back: Face) -> f32 {
     let bend = (front.along - back.along) * (planes[sheet + 1u] - planes[sheet]);
     if POST {
         let middle = field_at(r, 0.5 * (planes[sheet] + planes[sheet + 1u])).value;
-        return ((front.value + back.value) * 7.0 + middle * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
+        return ((front.value + back.value) * 7.0 + middle * 16.0) * (1.0 / 30.0)
+            + bend * (1.0 / 60.0);
     }
     return 0.5 * (front.value + back.value) + bend * (1.0 / 12.0);
 }
@@ -191,31 +214,39 @@ fn sample_shows(place: vec3<f32>) -> bool {
     return ((shown[number >> 5u] >> (number & 31u)) & 1u) != 0u;
 }
 
-// Whether something may show at a pixel in a sheet: around its front, its middle and its back.
+// Whether something may be visible at a pixel in a sheet: around its front, its middle and its
+// back.
 fn may_show(r: u32, sheet: u32) -> bool {
     let start = planes[sheet];
     let end = planes[sheet + 1u];
     if !(max(pixels[r].inside.x, start) < min(pixels[r].inside.y, end)) {
         return false;
     }
-    return sample_shows(place_at(r, start)) || sample_shows(place_at(r, 0.5 * (start + end))) || sample_shows(place_at(r, end));
+    return sample_shows(place_at(r, start)) || sample_shows(place_at(r, 0.5 * (start + end)))
+        || sample_shows(place_at(r, end));
 }
 
-// Whether any of the values that a sheet may have between two faces shows something.
+// Whether any value that a sheet may have between two faces is visible.
 fn range_shows(sheet: u32, front: Face, back: Face) -> bool {
-    // Hermite: the mean of the ends and an eighth of how much the slopes there differ.
+    // Hermite interpolation: the mean of the ends, plus an eighth of the difference of the slopes
+    // there.
     let bend = (front.along - back.along) * (planes[sheet + 1u] - planes[sheet]);
     let middle = 0.5 * (front.value + back.value) + 0.125 * bend;
     let low = min(middle, min(front.value, back.value));
     let high = max(middle, max(front.value, back.value));
-    // A parabola leaves the range of its values at both ends and the middle by an eighth of it at most; integrals are taken
-    // over NARROW entries.
+    // A parabola exceeds the range of its values at both ends and the middle by at most an eighth
+    // of that range. Integrals cover at least NARROW entries.
     let slack = 0.125 * (high - low) + 0.5 * NARROW + 1.0;
-    let ends = clamp(vec2(low - slack, high + slack) + frame.transfer.w, vec2(0.0), vec2(frame.transfer.z));
+    let ends = clamp(
+        vec2(low - slack, high + slack) + frame.transfer.w,
+        vec2(0.0),
+        vec2(frame.transfer.z),
+    );
     return shown[frame.shown.x + u32(ends.y) + 1u] > shown[frame.shown.x + u32(ends.x)];
 }
 
-// The next sheet from `sheet` on in which a tile may show something; `end` where there is none before that.
+// Returns the next sheet from `sheet` on in which something may be visible in a tile, or `end` if
+// there is none before it.
 fn next_marked(tile: u32, sheet: u32, end: u32) -> u32 {
     if sheet >= end {
         return end;
@@ -233,8 +264,8 @@ fn next_marked(tile: u32, sheet: u32, end: u32) -> u32 {
     return select(end, min(word * 32u + firstTrailingBit(bits), end), bits != 0u);
 }
 
-// The field of the sheet between the two planes that were looked at last. Whoever uses this says by shows_field whether it is
-// wanted there.
+// Resolves the field of the sheet between the two planes that were evaluated last. The shader that
+// includes this file defines shows_field, which says whether the field is wanted there.
 fn resolve_field(r: u32, sheet: u32, own: ptr<function, Sheet>) {
     (*own).has_value = shows_field(r, sheet);
     (*own).filling = 1.0;

@@ -1,10 +1,11 @@
-// The field of a sheet from the sums of the splats that were added to it.
+// The field of a sheet, from the sums of the splats that were added to it.
 
 fn shift_faces(sums: vec3<f32>) -> vec3<f32> {
     return vec3(sums.yz, 0.0);
 }
 
-// The field on the plane behind a sheet, from the first of the three open planes, which it shifts out.
+// Returns the field on the plane behind a sheet, from the first of the three open planes, and
+// shifts that plane out.
 fn resolve_face(r: u32, sheet: u32) -> Face {
     var face: Face;
     let weight = pixels[r].face_weight.x;
@@ -37,7 +38,7 @@ fn resolve_field(r: u32, sheet: u32, own: ptr<function, Sheet>) {
     pixels[r].value = shift(pixels[r].value);
 }
 
-// Nothing of the field is gathered.
+// No field is gathered.
 fn begin_field(tile: u32) {
 }
 

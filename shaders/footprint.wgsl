@@ -1,4 +1,5 @@
-// The footprint of an ellipsoidal Gaussian: where it lies in the picture and in the sheets. Used by measure and project.
+// The footprint of an ellipsoidal Gaussian: the pixels and sheets that it covers. Used by measure
+// and project.
 
 // A symmetric 3×3 matrix.
 struct Symmetric {
@@ -15,11 +16,11 @@ struct Candidate {
     center: vec3<f32>,
     covariance: Symmetric,
     extent: f32,
-    // Value (scalar) or optical depth at the centre (radiance).
+    // Value (scalar), or optical depth at the centre (radiance).
     strength: f32,
     color: u32,
     normal: u32,
-    // Scalars: how much it counts, and the change of its value (entries per world unit) in view space.
+    // Scalars: the weight, and the change of the value (entries per world unit) in view space.
     weight: f32,
     gradient: vec3<f32>,
 }
@@ -38,7 +39,7 @@ fn quadratic_form(m: Symmetric, v: vec3<f32>) -> f32 {
         + 2.0 * (m.xy * v.x * v.y + m.xz * v.x * v.z + m.yz * v.y * v.z);
 }
 
-// The sheet that a distance lies in; 0 before the first plane.
+// Returns the sheet that contains a distance; 0 in front of the first plane.
 fn sheet_of(distance: f32) -> u32 {
     let near = planes[1];
     if distance < near {
@@ -49,10 +50,11 @@ fn sheet_of(distance: f32) -> u32 {
     if distance < turn {
         estimate = 1.0 + floor(log2(distance / near) * frame.ratio_log2_inverse);
     } else {
-        estimate = 1.0 + f32(frame.geometric_sheets) + floor((distance - turn) * frame.step_inverse);
+        estimate = 1.0 + f32(frame.geometric_sheets)
+            + floor((distance - turn) * frame.step_inverse);
     }
     var sheet = u32(clamp(estimate, 1.0, f32(frame.sheet_count)));
-    // The closed form is off by at most one where rounding meets a plane; the list decides.
+    // The closed form may be off by one where rounding meets a plane; the list decides.
     if distance < planes[sheet] {
         sheet = sheet - 1u;
     } else if distance >= planes[sheet + 1u] && sheet < frame.sheet_count {
@@ -61,9 +63,9 @@ fn sheet_of(distance: f32) -> u32 {
     return sheet;
 }
 
-// Bounds of x/z over an ellipsoid in front of the eye: tangents of its outline (dual conic), exact in perspective.
-// The expanded discriminant has no cancellation for small, distant splats. All is counted in units of z, whose fourth power
-// may be more or less than 32 bits hold.
+// Bounds x/z over an ellipsoid in front of the eye, by the tangents to its silhouette (dual conic);
+// exact in perspective. The expanded discriminant has no cancellation for small, distant splats.
+// Everything is in units of z, whose fourth power may overflow or underflow 32 bits.
 fn tangent_bounds(x: f32, z: f32, xx: f32, xz: f32, zz: f32) -> vec2<f32> {
     let p = x / z;
     let a = xx / z / z;
@@ -76,16 +78,17 @@ fn tangent_bounds(x: f32, z: f32, xx: f32, xz: f32, zz: f32) -> vec2<f32> {
     return vec2(middle - half_width, middle + half_width);
 }
 
-// Conservative bounds of x/z over the part of a box beyond the nearest visible z.
+// Bounds x/z conservatively over the part of a box beyond the nearest visible z.
 fn box_bounds(x: f32, reach: f32, z_low: f32, z_high: f32) -> vec2<f32> {
     let low = x - reach;
     let high = x + reach;
     return vec2(low / select(z_high, z_low, low < 0.0), high / select(z_low, z_high, high < 0.0));
 }
 
-// How far beyond the ellipsoid the windows of a splat reach. What lies farther is added to its first or last sheet. With
-// 1.25 the pictures of tests/engine_equals_reference.rs agree to 69 dB or better, with 1 to 49; bunny's entries grow by 5 %.
-// An isotropic lattice kernel, wide against its sheets, does not need it.
+// Factor by which a splat's windows reach beyond the ellipsoid. Mass further away is added to the
+// splat's first or last sheet. With 1.25 the pictures of tests/engine_equals_reference.rs agree to
+// 69 dB or better, with 1 to 49 dB; bunny's entries grow by 5 %. An isotropic lattice kernel, wide
+// compared with its sheets, does not need this.
 const SECTION_OVERREACH: f32 = 1.25;
 
 fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
@@ -108,8 +111,20 @@ fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
         let across = e2 * (covariance.xx + covariance.yy + covariance.zz);
         far = sqrt((distance + reach) * (distance + reach) + across);
         if c.z - reach_z > frame.z_near {
-            bounds_x = tangent_bounds(c.x, c.z, e2 * covariance.xx, e2 * covariance.xz, e2 * covariance.zz);
-            bounds_y = tangent_bounds(c.y, c.z, e2 * covariance.yy, e2 * covariance.yz, e2 * covariance.zz);
+            bounds_x = tangent_bounds(
+                c.x,
+                c.z,
+                e2 * covariance.xx,
+                e2 * covariance.xz,
+                e2 * covariance.zz,
+            );
+            bounds_y = tangent_bounds(
+                c.y,
+                c.z,
+                e2 * covariance.yy,
+                e2 * covariance.yz,
+                e2 * covariance.zz,
+            );
         } else {
             bounds_x = box_bounds(c.x, extent * sqrt(covariance.xx), frame.z_near, c.z + reach_z);
             bounds_y = box_bounds(c.y, extent * sqrt(covariance.yy), frame.z_near, c.z + reach_z);
@@ -120,8 +135,8 @@ fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
         bounds_x = vec2(c.x - reach_x, c.x + reach_x);
         bounds_y = vec2(c.y - reach_y, c.y + reach_y);
     }
-    // A ray keeps a kernel whole, so near the rim of its footprint the sections reach beyond the ellipsoid.
-    // A kernel from a table ends.
+    // Kernels are not cut along a ray, so near the rim of a footprint the sections reach beyond the
+    // ellipsoid. A kernel from a table ends.
     let ends = (source.flags & (ISOTROPIC | ENDS)) != 0u;
     let overreach = select(SECTION_OVERREACH, 1.0, ends);
     far = distance + overreach * (far - distance);
@@ -131,7 +146,8 @@ fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
     if !WHOLE && (!(far > planes[1]) || !(near < last_plane)) {
         return span;
     }
-    // Pixels whose centres lie in the box, with a margin for rounding; clamped as floats, so that no infinity is cast.
+    // Pixels whose centres lie in the box, with a margin for rounding; clamped as floats, so that
+    // no infinity is cast.
     let limit = vec2<f32>(frame.size) + f32(APRON);
     let low = frame.center + frame.scale * vec2(bounds_x.x, bounds_y.x) - 0.51;
     let high = frame.center + frame.scale * vec2(bounds_x.y, bounds_y.y) - 0.49;
@@ -145,7 +161,7 @@ fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
     span.last_tile = vec2<u32>(clamp((last + APRON) / TILE_STEP, vec2(0), top));
     span.visible = true;
     if WHOLE {
-        // All of it belongs to the sheet of its centre.
+        // A whole splat belongs to the sheet of its centre.
         var key = distance;
         if AXIS_SHEETS {
             key = dot(frame.sheet_normal.xyz, c);
@@ -159,8 +175,13 @@ fn locate(c: vec3<f32>, covariance: Symmetric, extent: f32) -> Span {
         span.last_sheet = span.first_sheet;
         return span;
     }
-    // Beside the eye, rays leave the kernel's middle behind them: the part in front of the first plane must be cut off.
-    span.first_sheet = select(sheet_of(near), 0u, frame.perspective != 0u && distance < 2.0 * reach);
+    // Beside the eye, a kernel's middle lies behind the ray's start: the part in front of the first
+    // plane must be cut off.
+    span.first_sheet = select(
+        sheet_of(near),
+        0u,
+        frame.perspective != 0u && distance < 2.0 * reach,
+    );
     span.last_sheet = max(sheet_of(far), 1u);
     return span;
 }

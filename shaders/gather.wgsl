@@ -1,6 +1,7 @@
-// Gather: draws the field of a lattice without splats. Each pixel walks its own ray through the sheets, front to back, and
-// looks at the planes between them. It runs behind the passes that scatter the splats of other items, and draws what march
-// has left of each tile. A dispatch takes the sheets of `stage`; `stage.groups` tiles are listed in `shown`.
+// Gather: draws the field of a lattice without splats. Each pixel follows its own ray through the
+// sheets, front to back, and evaluates the field on the planes between them. It runs after the
+// passes that scatter the splats of other items, and draws the rest of each tile that march has not
+// drawn. A dispatch draws the sheets of `stage`; its `stage.groups` tiles are listed in `shown`.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> planes: array<f32>;
@@ -11,7 +12,7 @@
 // Binding 6: the tables of tables.wgsl.
 @group(0) @binding(7) var<storage, read_write> colors: array<vec4<f32>>;
 
-// The next sheet in which a pixel may show something.
+// Returns the next sheet in which something may be visible at a pixel.
 fn next_sheet(tile: u32, sheet: u32, end: u32) -> u32 {
     var next = sheet;
     loop {
@@ -24,7 +25,7 @@ fn next_sheet(tile: u32, sheet: u32, end: u32) -> u32 {
     return next;
 }
 
-// Sheets are resolved where they show something alone.
+// Only visible sheets are resolved.
 fn shows_field(r: u32, sheet: u32) -> bool {
     return true;
 }
@@ -52,10 +53,11 @@ fn gather(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id)
     }
     var sheet = max(stage.first_sheet, atomicLoad(&progress[next_of(tile)]));
     sheet = next_sheet(tile, sheet, end);
-    // The plane that was looked at last.
+    // The plane that was evaluated last.
     var plane = 0u;
-    // One plane each time, whatever becomes of the sheet before it: pixels that share a vector of the processor would wait for
-    // each other in a loop of their own that looks for the next sheet that shows something.
+    // Evaluate one plane per iteration, whatever happens to the sheet in front of it. With a
+    // separate loop that searches for the next visible sheet, pixels that share a vector of the
+    // processor would wait for each other.
     if sheet < end {
         loop {
             let next = select(sheet, sheet + 1u, plane == sheet);

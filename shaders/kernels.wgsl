@@ -1,13 +1,15 @@
-// Adds a splat to the pixels of an invocation: its sections in the four open sheets, and itself on the three planes between
-// them.
+// Adds a splat to the pixels of an invocation: its sections in the four open sheets, and its kernel
+// on the three planes between them.
 
 const SQRT_TAU: f32 = 2.5066283;
 
-// Normal distribution function, within 2e-7 (Abramowitz & Stegun 1964, 26.2.19). Its tails must be right: what they get
-// wrong is multiplied by the strength of an opaque splat and lies in front of it.
+// The normal distribution function, within 2e-7 (Abramowitz & Stegun 1964, 26.2.19). Its tails must
+// be right: their error is multiplied by the strength of an opaque splat, and lies in front of the
+// splat.
 fn normal_cdf(t: vec3<f32>) -> vec3<f32> {
     let x = min(abs(t), vec3(8.0));
-    var p = 1.0 + x * (0.049867347 + x * (0.0211410061 + x * (0.00327762632 + x * (3.8003575e-05 + x * (4.88906356e-05 + x * (5.382975e-06))))));
+    var p = 1.0 + x * (0.049867347 + x * (0.0211410061 + x * (0.00327762632
+        + x * (3.8003575e-05 + x * (4.88906356e-05 + x * (5.382975e-06))))));
     p *= p;
     p *= p;
     p *= p;
@@ -16,21 +18,23 @@ fn normal_cdf(t: vec3<f32>) -> vec3<f32> {
     return select(tail, 1.0 - tail, t >= vec3(0.0));
 }
 
-// The same within 2.3e-4, without a division: an odd polynomial that reaches 0.5 level at 3.55 (least squares, weighted to even
-// errors). For surfaces alone, where an error moves optical depth from one sheet to the next, both of the same splat's colour,
-// and takes none away.
+// The same within 2.3e-4, without a division: an odd polynomial with value 0.5 and slope 0 at 3.55
+// (least squares, weighted to even errors). Only for surfaces. There an error moves optical depth
+// from one sheet to the next, both with the same splat's colour, and removes none.
 fn near_normal_cdf(t: vec3<f32>) -> vec3<f32> {
     let x = clamp(t, vec3(-3.55), vec3(3.55));
     let y = x * x;
-    let p = 0.39808504 + y * (-0.064429414 + y * (0.0085235118 + y * (-0.00072436168 + y * (3.4515190e-05 - y * 6.9134990e-07))));
+    let p = 0.39808504 + y * (-0.064429414 + y * (0.0085235118 + y * (-0.00072436168
+        + y * (3.4515190e-05 - y * 6.9134990e-07))));
     return 0.5 + x * p;
 }
 
-// Planes farther from a kernel than this, in its standard deviations, are taken as that far: nothing of it is left there, and
-// the list of planes ends in numbers that would overflow.
+// Maximum distance of a plane from a kernel, in standard deviations. Further planes count as this
+// far: nothing of the kernel is left there, and the list of planes ends with numbers that would
+// overflow.
 const FAR: vec3<f32> = vec3(12.0);
 
-// The four sections of a window, from the distribution function at its three inner planes.
+// Returns the four sections of a window, from the distribution function at its three inner planes.
 fn sections(t: vec3<f32>, base: f32) -> vec4<f32> {
     var f: vec3<f32>;
     if SUMS || CLASSIFIED {
@@ -41,17 +45,17 @@ fn sections(t: vec3<f32>, base: f32) -> vec4<f32> {
     return vec4(f.x - base, f.y - f.x, f.z - f.y, 1.0 - f.z);
 }
 
-// An isotropic lattice sample in the picture. Far from the eye the shells of the sheets are flat across its footprint, so
-// along the ray it is a few numbers for all pixels.
+// An isotropic lattice sample in the picture. Far from the eye, the shells of the sheets are flat
+// across its footprint, so its values along the ray are the same for all pixels.
 struct Round {
-    // Its projected centre; ρ² as a quadratic form of the distance from there: xx, xy, yy.
+    // The projected centre; ρ² as a quadratic form of the offset from there: xx, xy, yy.
     at: vec2<f32>,
     form: vec3<f32>,
-    // Sections, and the kernel on the planes between them.
+    // The sections, and the kernel on the planes between them.
     along: vec4<f32>,
     on_plane: vec3<f32>,
     value: f32,
-    // Negative for a sample that is none.
+    // Negative for an unused sample.
     extent2: f32,
 }
 
@@ -88,11 +92,12 @@ fn load_isotropic(entry: u32, is_one: bool, near: vec3<f32>) -> Round {
     return sample;
 }
 
-// Isotropic samples that are added together: a pixel's sums are then read and written once for all. Two measure best on
-// software, where the sums lie in memory (docs/performance.md).
+// Number of isotropic samples that are added together: a pixel's sums are then read and written
+// once for all of them. Two measure best on software drivers, where the sums lie in memory
+// (docs/performance.md).
 const TOGETHER: u32 = 2u;
 
-// Adds the entries from `at` on, `count` of them, to all pixels.
+// Adds `count` entries from `at` on to all pixels.
 fn add_isotropic(at: u32, count: u32, front: u32, first_pixel: vec2<i32>) {
     let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
     var samples: array<Round, TOGETHER>;
@@ -112,7 +117,10 @@ fn add_isotropic(at: u32, count: u32, front: u32, first_pixel: vec2<i32>) {
         for (var i = 0u; i < TOGETHER; i++) {
             let own = samples[i];
             let d = vec2<f32>(first_pixel + vec2(0, i32(r))) + 0.5 - own.at;
-            let turned = vec2(own.form.x * d.x + own.form.y * d.y, own.form.y * d.x + own.form.z * d.y);
+            let turned = vec2(
+                own.form.x * d.x + own.form.y * d.y,
+                own.form.y * d.x + own.form.z * d.y,
+            );
             let rho2 = dot(d, turned) * cosine2;
             let e = select(0.0, exp(-0.5 * rho2), rho2 <= own.extent2);
             let v = e * own.value;
@@ -141,8 +149,9 @@ fn add_isotropic(at: u32, count: u32, front: u32, first_pixel: vec2<i32>) {
     }
 }
 
-// Within a sheet, what faces the eye hides what faces away: where a part is thinner than a sheet, its far side must not
-// mix into the colour and light of its near side. Far sides alone keep a little weight, so that they still have a colour.
+// Returns the facing weight. Within a sheet, splats that face the eye hide those that face away: if
+// an object is thinner than a sheet, its far side must not mix into the colour and light of its
+// near side. Far sides keep a small weight, so that they have a colour when alone.
 fn facing_weight(normal: vec3<f32>, center: vec3<f32>) -> f32 {
     var away = normal.z;
     if PERSPECTIVE {
@@ -156,7 +165,7 @@ struct Loaded {
     center: vec3<f32>,
     strength: f32,
     extent2: f32,
-    // Radiance, also that of samples classified before.
+    // Whether the payload is radiance. That includes samples classified before interpolation.
     is_radiance: bool,
     color: vec3<f32>,
     normal: vec3<f32>,
@@ -173,7 +182,7 @@ fn load(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
     splat.extent2 = abs(c.z);
     splat.weight = 1.0;
     splat.facing = 1.0;
-    // The sign of the squared extent tells the payloads apart.
+    // The sign of the squared extent says which payload it is.
     splat.is_radiance = RADIANCE_PAYLOAD && (!(SUMS || CLASSIFIED) || c.z > 0.0);
     if RADIANCE_PAYLOAD {
         splat.color = unpack4x8unorm(bitcast<u32>(d.x)).xyz;
@@ -199,10 +208,11 @@ fn load(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
     return splat;
 }
 
-// Any ellipsoid, with centre c and whitening M. Along a pixel's ray direction b: β = M·b; v = M·c × β, which is zero at the
-// projected centre and grows evenly from there; ρ² = |v|²/|β|²; the closest approach is where |β|²·z = L, at v × β / |β|² in
-// whitened space. All are exact in perspective, and taken from vectors, not from expanded polynomials, which cancel beside
-// the eye. See docs/engine.md.
+// Adds any ellipsoid, with centre c and whitening M. Along a pixel's ray direction b: β = M·b; v =
+// M·c × β, which is zero at the projected centre and grows linearly from there; ρ² = |v|²/|β|²; the
+// closest approach is where |β|²·z = L, at v × β / |β|² in whitened space. All of these are exact
+// in perspective. They are computed from vectors, not from expanded polynomials, which cancel
+// beside the eye. See docs/engine.md.
 fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
     let index = entry & ENTRY_RECORD;
     let a = records[index];
@@ -211,7 +221,7 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
     let splat = load(a, c, records[index + 3u]);
     let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
     let base = select(0.0, 1.0, (entry & ENTRY_CONTINUED) != 0u);
-    // Change of the whitened ray per pixel to the right and down, and its constant part.
+    // The change of the whitened ray per pixel to the right and down, and its constant part.
     let m0 = b.xyz / frame.scale;
     let m1 = vec3(0.0, b.w, c.x) / frame.scale;
     let m2 = vec3(0.0, 0.0, c.y);
@@ -220,7 +230,8 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
     var v0 = cross(m2, m0);
     var v1 = cross(m2, m1);
     if PERSPECTIVE {
-        // A centre beside the eye projects to infinity; moving it by a thousandth of its distance cannot be seen.
+        // A centre beside the eye projects to infinity. Moving it by a thousandth of its distance
+        // is invisible.
         let least = 1e-3 * length(a.xyz);
         let z = select(a.z, select(-least, least, a.z >= 0.0), abs(a.z) < least);
         at = frame.center + frame.scale * a.xy / z;
@@ -246,7 +257,8 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
         let inverse = inverseSqrt(max(size2, 1e-37));
         let rho2 = dot(v, v) * inverse * inverse;
         let t = clamp((size2 * (near * pixels[r].cosine) - l) * inverse, -FAR, FAR);
-        // The kernel at the closest approach and on the planes, −h′/r on the planes, its sections.
+        // The kernel at the closest approach and on the planes, −h′/r on the planes, and the
+        // sections.
         var e = select(0.0, exp(-0.5 * rho2), rho2 <= splat.extent2);
         var on_plane: vec3<f32>;
         var steep: vec3<f32>;
@@ -254,7 +266,11 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
         if TABLE_KERNEL && !splat.is_radiance {
             let rho = sqrt(rho2);
             let half = kernel_integral(rho, 3e38);
-            let f = vec3(kernel_integral(rho, t.x), kernel_integral(rho, t.y), kernel_integral(rho, t.z));
+            let f = vec3(
+                kernel_integral(rho, t.x),
+                kernel_integral(rho, t.y),
+                kernel_integral(rho, t.z),
+            );
             along = vec4(f.x + half - 2.0 * half * base, f.y - f.x, f.z - f.y, half - f.z);
             let k0 = kernel_at(sqrt(rho2 + t.x * t.x));
             let k1 = kernel_at(sqrt(rho2 + t.y * t.y));
@@ -276,7 +292,7 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
                 along.x = e * SQRT_TAU;
             }
             if PERSPECTIVE && l <= 0.0 {
-                // Its middle is behind the eye.
+                // The kernel's middle is behind the eye.
                 along.x = 0.0;
             }
         }
@@ -310,7 +326,7 @@ fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
             pixels[r].face_weight += on_plane;
             pixels[r].face_value += on_plane * value;
             if GRADIENTS && !CENTRAL {
-                // How x′ moves on a plane per pixel to the right and down.
+                // The change of x′ on a plane per pixel to the right and down.
                 var across = array<vec3<f32>, 2>(m0, m1);
                 var size = vec3(1.0);
                 if PERSPECTIVE {

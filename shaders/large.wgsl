@@ -1,12 +1,13 @@
-// Large: the entries of splats that meet many bins, each spread over the invocations of a workgroup. bin.wgsl lists them;
-// `count` adds them to the bins' sizes, `fill` writes their entries.
+// Large: the entries of splats that meet many bins, each spread over the invocations of a
+// workgroup. bin.wgsl lists these splats; `count` adds them to the bins' sizes, `fill` writes their
+// entries.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> stage: Pass;
 @group(0) @binding(2) var<storage, read> boxes: array<Box>;
 @group(0) @binding(3) var<storage, read_write> bins: array<atomic<u32>>;
 @group(0) @binding(4) var<storage, read_write> entries: array<u32>;
-// Their number, then their records.
+// The number of large splats, then their records.
 @group(0) @binding(5) var<storage, read> large: array<u32>;
 // The workgroups of `count` and `fill`.
 @group(1) @binding(0) var<storage, read_write> workgroups: array<u32, 3>;

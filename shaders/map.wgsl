@@ -1,5 +1,6 @@
-// The map of what is opaque so far, made by occlusion.wgsl: a summed-area table (Crow 1984) of the opaque tiles, with a row
-// and a column of zeros before the first; behind it, for each tile whether it is opaque.
+// The map of opaque tiles so far, made by occlusion.wgsl: a summed-area table (Crow 1984) of the
+// opaque tiles, with a row and a column of zeros in front. Behind it comes a flag for each tile:
+// whether it is opaque.
 
 fn map_index(column: u32, row: u32) -> u32 {
     return row * (frame.tiles.x + 1u) + column;

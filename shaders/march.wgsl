@@ -1,16 +1,18 @@
-// March: one workgroup per tile walks the tile's entries front to back. Four sheets are open at once, one in each lane of
-// a vec4; an entry adds its splat's sections to all four (kernels.wgsl). When the walk passes a sheet, the sheet is closed
-// (sheet.wgsl): its field is classified and shaded, its optical depth composited, and its lane shifted out. Nothing is sorted
+// March: one workgroup per tile processes the tile's entries front to back. Four sheets are open at
+// once, one in each lane of a vec4; an entry adds its splat's sections to all four (kernels.wgsl).
+// When the next entry lies behind a sheet, that sheet is closed (sheet.wgsl): its field is
+// classified and shaded, its optical depth composited, and its lane shifted out. Nothing is sorted
 // by depth, unless every splat is composited on its own.
 //
-// A window of four sheets from sheet k sees the planes k+1, k+2 and k+3 inside it, and gives what lies behind the last of
-// them to the fourth lane. A splat that is longer gets its next window three sheets on: there, the first lane takes back
-// what the window before gave it too much. So each entry evaluates three planes, however long its splat is.
+// A window of four sheets from sheet k contains the planes k+1, k+2 and k+3, and adds everything
+// behind the last of them to the fourth lane. A longer splat gets its next window three sheets
+// further on. There, the first lane takes back the excess of the previous window. So each entry
+// evaluates three planes, however long its splat is.
 //
-// A tile with very many entries stops among them and goes on in another dispatch, because some drivers end long loops without
-// a word (see docs/engine.md). Its sums are kept meanwhile (saved.wgsl).
+// A tile with very many entries stops among them and continues in another dispatch, because some
+// drivers silently end long loops (see docs/engine.md). Its sums are saved meanwhile (saved.wgsl).
 //
-// An invocation holds ROWS pixels, one below the other, so that they share the loads of an entry.
+// An invocation has ROWS pixels, one below the other, which share the loads of an entry.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> planes: array<f32>;
@@ -18,15 +20,16 @@
 @group(0) @binding(3) var<storage, read> records: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read> bins: array<u32>;
 @group(0) @binding(5) var<storage, read> entries: array<u32>;
-// Binding 6: the tables of tables.wgsl.
-// Premultiplied colour and opacity; distance at which half of the light is taken, or the largest value. Both carry over
-// from pass to pass. Behind the colours lie the slots of saved.wgsl.
+// Binding 6: the tables of tables.wgsl. Binding 7: premultiplied colour and opacity. Binding 8: the
+// distance at which half of the light is absorbed, or the largest value. Both carry over from pass
+// to pass. Behind the colours lie the slots of saved.wgsl.
 @group(0) @binding(7) var<storage, read_write> colors: array<vec4<f32>>;
 @group(0) @binding(8) var<storage, read_write> depths: array<f32>;
 // See progress.wgsl.
 @group(0) @binding(9) var<storage, read_write> progress: array<atomic<u32>>;
 
-// Face values of the sheet that is being closed, for differences between neighbouring pixels.
+// Values on the plane behind the sheet that is being closed, for differences between neighbouring
+// pixels.
 var<workgroup> neighbours: array<f32, 64>;
 // Whether an invocation of the tile stopped, and the tile's slot.
 var<workgroup> any_stopped: atomic<u32>;
@@ -44,7 +47,8 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     let row = tile / frame.tiles.x;
     let resumed = atomicLoad(&progress[tile]);
     begin_field(tile);
-    // All lanes have seen where the tile stands before one of them changes it, and that before another does again.
+    // All lanes must read the tile's progress before one of them changes it, and see that change
+    // before another one.
     storageBarrier();
     if resumed == FINISHED {
         return;
@@ -74,7 +78,7 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
         at = bin_end(bin - 1u);
     }
     var front = origin;
-    // Sheets from `front` on that may hold something.
+    // Number of sheets, from `front` on, that may have sums.
     var open = 0u;
     if CAN_STOP && resumed > 0u {
         let walk = restore(resumed - 1u, lane.xy);
@@ -141,7 +145,7 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
         open = 4u;
     }
     if !stopped {
-        // Sheets behind the pass's last are the next pass's.
+        // Sheets behind the pass's last one belong to the next pass.
         close(front, min(open, stage.end_sheet - front), lane.xy);
         open = 0u;
         if GATHER {
@@ -165,7 +169,7 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
             }
             workgroupBarrier();
             if own_slot == NO_SLOT {
-                // The tile begins anew, from what the picture holds.
+                // The tile starts again, from the pixels stored in the picture.
                 return;
             }
             save(own_slot, lane.xy, vec4(at, bin, front, open));
@@ -180,13 +184,14 @@ fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) 
     for (var r = 0u; r < ROWS; r++) {
         let own = vec2<i32>(lane.xy) + vec2(0, i32(lane.y * (ROWS - 1u) + r));
         let pixel = first_pixel + vec2(0, i32(r));
-        if all(own >= vec2(APRON)) && all(own < vec2(8 - APRON)) && all(pixel < vec2<i32>(frame.size)) {
+        if all(own >= vec2(APRON)) && all(own < vec2(8 - APRON))
+            && all(pixel < vec2<i32>(frame.size)) {
             store_pixel(r, u32(pixel.y) * frame.size.x + u32(pixel.x));
         }
     }
 }
 
-// Whether two entries of a group are of one sheet and one kind of record.
+// Whether two entries of a group have the same sheet and the same kind of record.
 fn is_alike(a: u32, b: u32) -> bool {
     let same = ((a ^ b) >> ENTRY_SHEET_SHIFT) == 0u;
     return same && (!GENERAL_RECORDS || ((a ^ b) & ENTRY_ISOTROPIC) == 0u);
@@ -196,7 +201,8 @@ fn bin_end(bin: u32) -> u32 {
     return min(bins[bin], frame.entry_capacity);
 }
 
-// Closes `count` sheets from `front` on. Gives the number of sheets before and between them that hold of a gathered field alone.
+// Closes `count` sheets from `front` on. Returns the number of sheets in front of and between them
+// that contain only a gathered field.
 fn close(front: u32, count: u32, lane: vec2<u32>) -> u32 {
     if SINGLE_SPLATS {
         return 0u;
@@ -205,8 +211,8 @@ fn close(front: u32, count: u32, lane: vec2<u32>) -> u32 {
         return 0u;
     }
     var others = 0u;
-    // The condition stands at the end: a driver that only masks what a condition leaves out (Mesa's software Vulkan) walks
-    // through a loop once more than its condition holds if that stands at the beginning.
+    // The condition is at the end, because a driver that only masks inactive lanes (Mesa's software
+    // Vulkan) runs a loop with its condition at the beginning once more than necessary.
     var sheet = front;
     loop {
         if CENTRAL {
@@ -234,29 +240,41 @@ fn close(front: u32, count: u32, lane: vec2<u32>) -> u32 {
     return others;
 }
 
-// Tells the neighbouring pixels of the tile the values on the plane behind the sheet that is being closed.
+// Shares the values on the plane behind the sheet being closed with the tile's neighbouring pixels.
 fn share_faces(lane: vec2<u32>) {
     for (var r = 0u; r < ROWS; r++) {
         let weight = pixels[r].face_weight.x;
         let at = (lane.y * ROWS + r) * 8u + lane.x;
-        neighbours[at] = select(NO_VALUE, pixels[r].face_value.x / max(weight, 1e-37), weight > frame.isotropic.w);
+        neighbours[at] = select(
+            NO_VALUE,
+            pixels[r].face_value.x / max(weight, 1e-37),
+            weight > frame.isotropic.w,
+        );
     }
     workgroupBarrier();
 }
 
-// Slopes of the values around a pixel: central differences, one-sided where a neighbour has no value.
+// Returns the slopes of the values around a pixel: central differences, one-sided if a neighbour
+// has no value.
 fn difference(lane: vec2<u32>, r: u32) -> vec2<f32> {
     let y = lane.y * ROWS + r;
     let own = neighbours[y * 8u + lane.x];
-    let before = vec2(neighbours[y * 8u + max(lane.x, 1u) - 1u], neighbours[(max(y, 1u) - 1u) * 8u + lane.x]);
-    let after = vec2(neighbours[y * 8u + min(lane.x + 1u, 7u)], neighbours[min(y + 1u, 7u) * 8u + lane.x]);
+    let before = vec2(
+        neighbours[y * 8u + max(lane.x, 1u) - 1u],
+        neighbours[(max(y, 1u) - 1u) * 8u + lane.x],
+    );
+    let after = vec2(
+        neighbours[y * 8u + min(lane.x + 1u, 7u)],
+        neighbours[min(y + 1u, 7u) * 8u + lane.x],
+    );
     let has_before = before > vec2(NO_VALUE);
     let has_after = after > vec2(NO_VALUE);
     let span = vec2<f32>(vec2<u32>(has_before) + vec2<u32>(has_after));
-    return (select(vec2(own), after, has_after) - select(vec2(own), before, has_before)) / max(span, vec2(1.0));
+    return (select(vec2(own), after, has_after) - select(vec2(own), before, has_before))
+        / max(span, vec2(1.0));
 }
 
-// Adds one splat, without sheets, before or behind what is there.
+// Composites one splat, without sheets, in front of or behind the pixels so far.
 fn composite_single(r: u32, depth: f32, splat: Loaded) {
     var color = splat.color;
     if SURFACE_SHADED && any(splat.normal != vec3(0.0)) {
@@ -270,7 +288,8 @@ fn composite_single(r: u32, depth: f32, splat: Loaded) {
         pixels[r].color += before * (1.0 - left) * color;
     }
     pixels[r].transmittance = before * left;
-    // From behind, what those in front will take is not known: there, the nearest that takes half of the light alone counts.
+    // Back to front, the absorption of the splats in front is not known yet. There, the nearest
+    // splat that absorbs half of the light by itself counts.
     if select(before > 0.5 && before * left <= 0.5, left <= 0.5, BACK_TO_FRONT) {
         pixels[r].hit = select(splat.center.z, length(splat.center), PERSPECTIVE);
     }

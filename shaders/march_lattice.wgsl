@@ -1,10 +1,11 @@
-// March beside a lattice that is gathered: its field is looked for in each sheet that march closes, and in those between.
+// March with a gathered lattice: its field is evaluated in each sheet that march closes, and in the
+// sheets between.
 
 @group(0) @binding(10) var<storage, read> shown: array<u32>;
 
-// Sheets before this one have their field already.
+// The field of the sheets before this one is drawn already.
 var<private> next_field: u32;
-// The plane that pixels[r].behind is about, and the sheet's tile.
+// The plane of pixels[r].behind, and the current tile.
 var<private> held_plane: u32;
 var<private> own_tile: u32;
 
@@ -14,12 +15,12 @@ fn begin_field(tile: u32) {
     next_field = max(atomicLoad(&progress[next_of(tile)]), 1u);
 }
 
-// What has its field now needs none in later dispatches.
+// Records how far the field is drawn, so that later dispatches do not draw it again.
 fn end_field(tile: u32) {
     atomicStore(&progress[next_of(tile)], next_field);
 }
 
-// Looks at the planes of a sheet.
+// Evaluates the field on the planes of a sheet.
 fn look_at(sheet: u32) {
     var plane = select(sheet, sheet + 1u, held_plane == sheet);
     loop {
@@ -35,7 +36,7 @@ fn look_at(sheet: u32) {
     held_plane = sheet + 1u;
 }
 
-// The sheets before `end` that show something of the field alone.
+// Draws the visible sheets of the field before `end`. Returns their number.
 fn pass_field_before(end: u32) -> u32 {
     var count = 0u;
     var sheet = next_marked(own_tile, next_field, end);

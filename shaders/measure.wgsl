@@ -1,16 +1,20 @@
-// Measure: what each candidate meets of the picture, and what its run meets and needs in all.
+// Measure: finds the tiles and sheets that each candidate meets, and those that its batch meets and
+// the total that it needs.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> planes: array<f32>;
 // The span of each candidate of this chunk.
 @group(0) @binding(2) var<storage, read_write> spans: array<vec2<u32>>;
-// The span of each run.
+// The span of each batch.
 @group(0) @binding(3) var<storage, read_write> run_spans: array<vec2<u32>>;
-// Per run: entries, and record words and splats (16 bits each).
+// Per batch: entries, then record words and splats (16 bits each).
 @group(0) @binding(4) var<storage, read_write> needs: array<vec2<u32>>;
 
 fn pack_span(span: Span) -> vec2<u32> {
-    return vec2(pack_corner(span.first_sheet, span.first_tile), pack_corner(span.last_sheet, span.last_tile));
+    return vec2(
+        pack_corner(span.first_sheet, span.first_tile),
+        pack_corner(span.last_sheet, span.last_tile),
+    );
 }
 
 @compute @workgroup_size(64)

@@ -1,15 +1,15 @@
-// The nodes of a hierarchy and how they decide whether they are drawn. Every node of the pages at hand decides for itself,
-// by its own bounds and its parent's (hierarchy/cut.rs says why that is enough, and does the same on the CPU). Used by cut
-// and tally.
+// The nodes of a hierarchy, and whether they are drawn. Every node of the pages in memory decides
+// for itself, from its own bounds and its parent's. hierarchy/cut.rs explains why that is enough,
+// and does the same on the CPU. Used by cut and tally.
 
 @group(0) @binding(0) var<uniform> source: Source;
 @group(0) @binding(1) var<uniform> cut: Cut;
 @group(0) @binding(2) var<storage, read> nodes: array<Node>;
 // The nodes' splats (48 bytes each, see splat.rs).
 @group(0) @binding(3) var<storage, read> splats: array<vec4<f32>>;
-// The slots that take part, and how many of their nodes.
+// The slots that take part, and the numbers of their nodes.
 @group(0) @binding(4) var<storage, read> slots: array<vec2<u32>>;
-// Which pages of the hierarchy are at hand, a bit each.
+// A bit for each page of the hierarchy: whether it is in memory.
 @group(0) @binding(5) var<storage, read> resident: array<u32>;
 
 // Mirrors engine/nodes.rs.
@@ -18,7 +18,7 @@ struct Node {
     radius: f32,
     size: f32,
     cone: f32,
-    // The page of its children; NO_PAGE for a leaf.
+    // The page of the node's children; NO_PAGE for a leaf.
     child_page: u32,
     // Negative for the root, which has no parent.
     parent_size: f32,
@@ -27,7 +27,7 @@ struct Node {
 }
 
 struct Cut {
-    // View-space sides of the picture: outside where n·c + d < −radius.
+    // View-space sides of the picture: a sphere is outside if n·c + d < −radius.
     sides: array<vec4<f32>, 4>,
     scale: f32,
     fineness: f32,
@@ -47,7 +47,8 @@ const SELECT_RUN: u32 = 64u;
 const SLOT_RUNS: u32 = SLOT_NODES / SELECT_RUN;
 
 fn to_view(place: vec3<f32>) -> vec3<f32> {
-    return source.axis_x.xyz * place.x + source.axis_y.xyz * place.y + source.axis_z.xyz * place.z + source.origin.xyz;
+    return source.axis_x.xyz * place.x + source.axis_y.xyz * place.y + source.axis_z.xyz * place.z
+        + source.origin.xyz;
 }
 
 fn pixels(center: vec3<f32>, radius: f32, size: f32) -> f32 {
@@ -64,7 +65,8 @@ fn refinement(wide: f32) -> u32 {
 }
 
 fn has_children(node: Node) -> bool {
-    return node.child_page != NO_PAGE && (resident[node.child_page / 32u] >> (node.child_page % 32u) & 1u) != 0u;
+    return node.child_page != NO_PAGE
+        && (resident[node.child_page / 32u] >> (node.child_page % 32u) & 1u) != 0u;
 }
 
 fn is_hidden(index: u32, node: Node) -> bool {
@@ -102,10 +104,11 @@ fn is_hidden(index: u32, node: Node) -> bool {
     let sin_cone = sqrt(max(1.0 - node.cone * node.cone, 0.0));
     let c = node.cone * cos_near - sin_cone * near;
     let s = sin_cone * cos_near + node.cone * near;
-    return c * cut.cos_margin - s * cut.sin_margin > 0.0 && along >= s * cut.cos_margin + c * cut.sin_margin;
+    return c * cut.cos_margin - s * cut.sin_margin > 0.0
+        && along >= s * cut.cos_margin + c * cut.sin_margin;
 }
 
-// The share of a node in the picture.
+// Returns the share of a node in the picture.
 fn share(index: u32) -> u32 {
     let node = nodes[index];
     var above = SHARE_UNIT;
@@ -125,7 +128,7 @@ fn share(index: u32) -> u32 {
     return above - own;
 }
 
-// The nodes of a run of the slots that take part: first, and behind the last.
+// Returns the nodes of a batch of the participating slots: the first, and the one behind the last.
 fn run_of(run: u32) -> vec2<u32> {
     let slot = slots[run / SLOT_RUNS];
     let first = slot.x * SLOT_NODES;

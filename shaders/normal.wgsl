@@ -1,4 +1,5 @@
-// Unit vectors in 32 bits, octahedral (Meyer et al. 2010); the twin of encode_normal and decode_normal in splat.rs.
+// Unit vectors in 32 bits, octahedral (Meyer et al. 2010). Mirrors encode_normal and decode_normal
+// in splat.rs.
 
 const NO_NORMAL: u32 = 0x80008000u;
 

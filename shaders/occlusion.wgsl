@@ -1,13 +1,13 @@
-// Occlusion: which tiles of the picture are opaque, and their summed-area table, so that whether a rectangle of tiles is
-// opaque can be told from its four corners. Runs between depth passes.
+// Occlusion: finds the opaque tiles of the picture and sums them in a summed-area table. With it,
+// four corners show whether a rectangle of tiles is opaque. Runs between depth passes.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> colors: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read> progress: array<u32>;
 @group(0) @binding(3) var<storage, read_write> map: array<u32>;
 
-// A tile is opaque where march would not look at another entry of any of its pixels. Only those that the pass has drawn in
-// may have become so.
+// A tile is opaque if march would not read another entry for any of its pixels. Only tiles that the
+// pass has drawn in may have become opaque.
 @compute @workgroup_size(64)
 fn look(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let number = id.x + id.y * groups.x * 64u;

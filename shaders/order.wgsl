@@ -1,6 +1,6 @@
-// Order: sorts each bin's entries, by sheet and then by record, or single splats by sheet and then by distance. Bins are
-// filled in whatever order invocations run; sorted, the same input adds up in the same order, and draws the same bytes, each
-// time.
+// Order: sorts each bin's entries, by sheet and then by record, or single splats by sheet and then
+// by distance. Bins are filled in the arbitrary order in which invocations run. After sorting, the
+// same input is added in the same order and gives the same bytes every time.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> stage: Pass;
@@ -8,7 +8,7 @@
 @group(0) @binding(3) var<storage, read_write> entries: array<u32>;
 // Bins too long for one invocation.
 @group(0) @binding(4) var<storage, read_write> long_bins: array<u32>;
-// Their number.
+// The number of long bins.
 @group(0) @binding(5) var<storage, read_write> long_count: atomic<u32>;
 // The workgroups of `order_long`.
 @group(1) @binding(0) var<storage, read_write> long_arguments: array<u32, 3>;
@@ -29,7 +29,7 @@ fn goes_before(a: u32, b: u32) -> bool {
     if SINGLE_SPLATS && (a >> ENTRY_SHEET_SHIFT) == (b >> ENTRY_SHEET_SHIFT) {
         let of_a = distance_of(a);
         let of_b = distance_of(b);
-        // Equally far ones keep the order of the scene, in either direction.
+        // Splats at equal distance keep the order of the scene, in either direction.
         return of_a < of_b || (of_a == of_b && (a < b) != BACK_TO_FRONT);
     }
     return a < b;
@@ -62,7 +62,8 @@ fn order(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
         long_bins[atomicAdd(&long_count, 1u)] = bin;
         return;
     }
-    // Insertion over shrinking distances (Shell 1959, with Knuth's distances), which suits what is nearly in order already.
+    // Insertion sort over shrinking distances (Shell 1959, with Knuth's distances), which suits
+    // nearly sorted bins.
     var gap = 1u;
     while 3u * gap + 1u < (end - start) / 8u {
         gap = 3u * gap + 1u;
@@ -84,7 +85,7 @@ fn order(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     }
 }
 
-// Workgroups that share the long bins at most.
+// Maximum number of workgroups that share the long bins.
 const LONG_WORKGROUPS: u32 = 4096u;
 
 @compute @workgroup_size(1)
@@ -94,8 +95,9 @@ fn count_long() {
     long_arguments[2] = 1u;
 }
 
-// A bitonic network in its form with a flipped first step, in which every comparison puts the smaller entry first, so that
-// missing entries behind the last one count as largest and need no room (Batcher 1968).
+// A bitonic network (Batcher 1968) in the form with a flipped first step. There every comparison
+// puts the smaller entry first, so missing entries behind the last one count as largest and need no
+// memory.
 @compute @workgroup_size(64)
 fn order_long(
     @builtin(workgroup_id) group: vec3<u32>,

@@ -1,6 +1,6 @@
-// What a pixel keeps of the picture from one dispatch to the next.
+// The data of a pixel that persists from one dispatch to the next.
 
-// The largest value, stored for a pixel that has none, and for one where it is 0.
+// The stored largest value of a pixel that has none, and of a pixel whose largest value is 0.
 const STORED_NONE: f32 = 0.0;
 const STORED_ZERO: f32 = 1e-37;
 
@@ -23,7 +23,7 @@ fn store_pixel(r: u32, index: u32) {
             hit = STORED_NONE;
         } else {
             let shown = classify(hit);
-            // The opacity of a unit of length, as the transfer function says it.
+            // The opacity of a unit of length, as in the transfer function.
             color = vec4(shown.xyz, 1.0) * (1.0 - exp(-shown.w * frame.kernel.w));
             hit = select(hit, STORED_ZERO, hit == 0.0);
         }
@@ -34,7 +34,7 @@ fn store_pixel(r: u32, index: u32) {
     depths[index] = hit;
 }
 
-// The distance along a pixel's ray of a place along the normal of axis-aligned sheets.
+// Converts a place along the normal of axis-aligned sheets to the distance along a pixel's ray.
 fn distance_at(r: u32, place: f32) -> f32 {
     let slope = dot(frame.sheet_normal.xyz, direction_of(r));
     let start = dot(frame.sheet_normal.xyz, origin_of(r));

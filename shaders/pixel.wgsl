@@ -1,18 +1,19 @@
-// What an invocation of march keeps for each of its pixels while it walks a tile, and the pixel's ray.
+// The state of each pixel of an invocation of march while it processes a tile, and the pixel's ray.
 
-// A value on the plane between two sheets, and its change across the picture (slope_on_plane in sheet.wgsl).
+// The value on the plane between two sheets, and its change across the picture (slope_on_plane in
+// sheet.wgsl).
 struct Face {
     has_value: bool,
     value: f32,
     slope: vec2<f32>,
-    // A lattice that is gathered: its change along the ray, in world units.
+    // A gathered lattice: the change along the ray, per world unit.
     along: f32,
 }
 
 // One sheet at one pixel.
 struct Sheet {
     has_value: bool,
-    // Mean, and how much of the sheet is filled (scattered samples).
+    // The mean, and the filled fraction of the sheet (scattered samples).
     value: f32,
     filling: f32,
     front: Face,
@@ -25,19 +26,20 @@ struct Pixel {
     // Sums of the four open sheets: weights, weighted values.
     weight: vec4<f32>,
     value: vec4<f32>,
-    // Sums at the three planes between them: kernels and values times kernels, and the negated derivatives of both per pixel
-    // to the right and down.
+    // Sums at the three planes between them: kernels and values times kernels, and the negated
+    // derivatives of both per pixel to the right and down.
     face_weight: vec3<f32>,
     face_value: vec3<f32>,
     weight_x: vec3<f32>,
     weight_y: vec3<f32>,
     value_x: vec3<f32>,
     value_y: vec3<f32>,
-    // The plane before the first open sheet.
+    // The plane in front of the first open sheet.
     front: Face,
-    // A lattice that is gathered: the plane behind the sheet that was looked at last.
+    // A gathered lattice: the plane behind the sheet that was evaluated last.
     behind: Face,
-    // Optical depth; and colour and normal, weighted by how much of it faces the eye, with that weight.
+    // Optical depth; then the sums of facing weights, colours and normals, each weighted by optical
+    // depth.
     depth: vec4<f32>,
     facing: vec4<f32>,
     red: vec4<f32>,
@@ -46,14 +48,15 @@ struct Pixel {
     normal_x: vec4<f32>,
     normal_y: vec4<f32>,
     normal_z: vec4<f32>,
-    // The picture so far. `hit`: the distance at which half of the light was taken, or the largest value.
+    // The picture so far. `hit` is the distance at which half of the light is absorbed, or the
+    // largest value.
     color: vec3<f32>,
     transmittance: f32,
     hit: f32,
     // The ray: image-plane position, cosine to the optical axis.
     ray: vec2<f32>,
     cosine: f32,
-    // The part of the ray that clips keep, and the part of that inside the sampled box.
+    // The part of the ray that clips keep, and its part inside the samples' box.
     kept: vec2<f32>,
     inside: vec2<f32>,
     // The parts that boxes cut out.
@@ -102,19 +105,30 @@ fn aim(r: u32, pixel: vec2<i32>) {
     pixels[r].inside = pixels[r].kept;
     if SCALAR && LATTICE {
         let start = frame.field_origin.xyz + in_steps(origin_of(r));
-        let part = box_part(frame.field_low.xyz, frame.field_high.xyz, start, in_steps(direction_of(r)));
+        let part = box_part(
+            frame.field_low.xyz,
+            frame.field_high.xyz,
+            start,
+            in_steps(direction_of(r)),
+        );
         pixels[r].inside = vec2(max(pixels[r].kept.x, part.x), min(pixels[r].kept.y, part.y));
     }
 }
 
-// A view-space direction in steps of the lattice.
+// Converts a view-space direction to steps of the lattice.
 fn in_steps(v: vec3<f32>) -> vec3<f32> {
-    return vec3(dot(frame.field_axis_x.xyz, v), dot(frame.field_axis_y.xyz, v), dot(frame.field_axis_z.xyz, v));
+    return vec3(
+        dot(frame.field_axis_x.xyz, v),
+        dot(frame.field_axis_y.xyz, v),
+        dot(frame.field_axis_z.xyz, v),
+    );
 }
 
-// The distances between which a ray is inside a box; the first is larger where it misses.
+// Returns the distances between which a ray is inside a box. If the ray misses, the first is
+// larger.
 fn box_part(low: vec3<f32>, high: vec3<f32>, origin: vec3<f32>, direction: vec3<f32>) -> vec2<f32> {
-    // A ray along a face would divide 0 by 0; this direction misses no box that the exact one meets visibly.
+    // A ray along a face would divide 0 by 0. This direction misses no box that the exact one
+    // visibly meets.
     let safe = select(direction, vec3(1e-20), abs(direction) < vec3(1e-20));
     let a = (low - origin) / safe;
     let b = (high - origin) / safe;
@@ -123,8 +137,13 @@ fn box_part(low: vec3<f32>, high: vec3<f32>, origin: vec3<f32>, direction: vec3<
     return vec2(max(enter.x, max(enter.y, enter.z)), min(leave.x, min(leave.y, leave.z)));
 }
 
-// The distances between which a ray is on the side of normal·x ≤ offset.
-fn half_space(normal: vec3<f32>, offset: f32, origin: vec3<f32>, direction: vec3<f32>) -> vec2<f32> {
+// Returns the distances between which a ray has normal·x ≤ offset.
+fn half_space(
+    normal: vec3<f32>,
+    offset: f32,
+    origin: vec3<f32>,
+    direction: vec3<f32>,
+) -> vec2<f32> {
     let slope = dot(normal, direction);
     let safe = select(slope, 1e-20, abs(slope) < 1e-20);
     let at = clamp((offset - dot(normal, origin)) / safe, -3e38, 3e38);
@@ -141,7 +160,8 @@ fn is_kept(r: u32, distance: f32) -> bool {
     return kept;
 }
 
-// A view-space direction turned to the world's axes, in which clips are given (from the eye).
+// Rotates a view-space direction to the world's axes, along which clips are given (relative to the
+// eye).
 fn in_world(v: vec3<f32>) -> vec3<f32> {
     return frame.world_x.xyz * v.x + frame.world_y.xyz * v.y + frame.world_z.xyz * v.z;
 }

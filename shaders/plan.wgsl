@@ -1,8 +1,10 @@
-// Plan: cuts the frame into depth passes, front to back. `total` adds up what measure found, `accumulate` prepares the
-// census of survey.wgsl, and before each pass `advance` decides how far it reaches: as many sheets as fit the buffers and
-// the share of a pass; where a single sheet is too much, bands of it. So the CPU need not wait inside a frame.
+// Plan: divides the frame into depth passes, front to back. `total` sums the results of measure,
+// and `accumulate` prepares the counts of survey.wgsl. Before each pass, `advance` decides how far
+// the pass reaches: as many sheets as fit the buffers and the share of a pass. If a single sheet
+// needs too much, it is divided into bands. So the CPU need not wait inside a frame.
 //
-// A run is counted in full by every pass that it meets, which is more than its splats need there. What fits by that count fits.
+// A batch counts in full in every pass that it meets, which is more than its splats need there. So
+// a pass that fits by these counts does fit.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> needs: array<vec2<u32>>;
@@ -17,7 +19,8 @@
 
 const SEGMENTS: u32 = 4096u;
 
-// Of the frame's entries, a pass takes this part where it may hide what lies behind it, but not fewer than LEAST_SHARE.
+// A pass that may hide what lies behind it takes one PASS_SHARE-th of the frame's entries, but at
+// least LEAST_SHARE entries.
 const PASS_SHARE: u32 = 3u;
 
 var<workgroup> sums: array<vec3<u32>, 256>;
@@ -46,11 +49,15 @@ fn total(@builtin(local_invocation_index) lane: u32) {
         state[WORDS] = sum.y;
         state[SPLATS] = sum.z;
         state[NEXT_SHEET] = 1u;
-        state[TARGET] = select(frame.entry_capacity, max(sum.x / PASS_SHARE, LEAST_SHARE), OCCLUSION);
+        state[TARGET] = select(
+            frame.entry_capacity,
+            max(sum.x / PASS_SHARE, LEAST_SHARE),
+            OCCLUSION,
+        );
     }
 }
 
-// Sums over the sheets before each, band by band.
+// Replaces the counts of each sheet by the sums over the sheets before it, band by band.
 @compute @workgroup_size(64)
 fn accumulate(@builtin(local_invocation_index) band: u32) {
     if band > BANDS {
@@ -65,7 +72,7 @@ fn accumulate(@builtin(local_invocation_index) band: u32) {
     }
 }
 
-// Puts the sum of what comes before in the place of some counts; gives the sum with them.
+// Replaces counts by the sums before them. Returns the sums including them.
 fn replace(at: u32, before: vec3<u32>) -> vec3<u32> {
     let own = vec3(census[at], census[at + 1u], census[at + 2u]);
     census[at] = before.x;
@@ -75,13 +82,17 @@ fn replace(at: u32, before: vec3<u32>) -> vec3<u32> {
     return vec3(entries, before.y + own.y + u32(entries < own.x), before.z + own.z);
 }
 
-// Entries and record words of the runs that meet a band in the sheets first … end-1; entries as many as 32 bits hold.
+// Returns the entries and record words of the batches that meet a band in the sheets first … end-1.
+// The entries saturate at 32 bits.
 fn needed(first: u32, end: u32, band: u32) -> vec2<u32> {
     let started = census_index(end, band) + STARTING;
     let ended = census_index(first, band) + ENDING;
     let entries = census[started] - census[ended];
     let passed = census[started + 1u] - census[ended + 1u] - u32(census[started] < census[ended]);
-    return vec2(select(entries, 0xffffffffu, passed > 0u), census[started + 2u] - census[ended + 2u]);
+    return vec2(
+        select(entries, 0xffffffffu, passed > 0u),
+        census[started + 2u] - census[ended + 2u],
+    );
 }
 
 fn is_room(need: vec2<u32>, target_entries: u32) -> bool {
@@ -111,7 +122,8 @@ fn advance() {
         return;
     }
     if OCCLUSION && state[PASSES] > 0u && 4u * opaque_tiles() < state[TOUCHED] {
-        // Not much becomes opaque: what the map does not hide by now is better drawn at once.
+        // Little becomes opaque, so everything that the map does not hide yet is better drawn at
+        // once.
         state[TARGET] = frame.entry_capacity;
     }
     if state[NEXT_BAND] == 0u {
@@ -125,13 +137,14 @@ fn advance() {
     begin_bands(first);
 }
 
-// The sheet before which a pass has to end.
+// Returns the sheet before which a pass must end.
 fn furthest(first: u32, end: u32, target_entries: u32) -> u32 {
     let least = needed(first, first + 1u, BANDS);
     if !is_room(least, frame.entry_capacity) {
         return first;
     }
-    // Runs that reach through much of the scene would be counted, and visited, by one thin pass after another.
+    // Otherwise batches that reach through much of the scene would be counted and visited by many
+    // thin passes.
     let most_entries = max(target_entries, 2u * min(least.x, 0x7fffffffu));
     var last = first + 1u;
     while last < end && is_room(needed(first, last + 1u, BANDS), most_entries) {
@@ -140,8 +153,8 @@ fn furthest(first: u32, end: u32, target_entries: u32) -> u32 {
     return last;
 }
 
-// Of a sheet that is too much for one pass as many bands as fit together; a single band is tried whatever it needs, if that can
-// be counted.
+// Begins a pass with as many bands as fit together, of a sheet that needs too much for one pass. A
+// single band is tried whatever it needs, if its entries can be counted.
 fn begin_bands(sheet: u32) {
     let band = state[NEXT_BAND];
     var last = band + 1u;
@@ -156,7 +169,7 @@ fn begin_bands(sheet: u32) {
         last++;
     }
     if need.x == 0xffffffffu {
-        // So many could not be counted.
+        // The number of entries exceeds 32 bits.
         state[OVERFLOW] = 1u;
         return;
     }
@@ -169,11 +182,13 @@ fn begin(first: u32, end: u32, first_band: u32, end_band: u32, entries: u32) {
     let first_row = band_start(first_band);
     let end_row = band_start(end_band);
     let tiles = (end_row - first_row) * frame.tiles.x;
-    // One group more than the sheets fill: a pass starts a sheet early, and its groups count from there. No more bins than
-    // entries are worth.
+    // One group more than the sheets fill: a pass starts one sheet early, and its groups count from
+    // there. The number of bins is limited relative to the number of entries.
     var shift = 0u;
     var groups = end - first + 2u;
-    while shift < MOST_GROUP_SHIFT && (groups * tiles > MOST_BINS || groups * tiles > 2u * min(entries, 0x7fffffffu) + tiles) {
+    while shift < MOST_GROUP_SHIFT
+        && (groups * tiles > MOST_BINS
+            || groups * tiles > 2u * min(entries, 0x7fffffffu) + tiles) {
         shift++;
         groups = ((end - first + 1u) >> shift) + 1u;
     }

@@ -1,7 +1,8 @@
-// How far the tiles of a pass have come. For each tile: 0, or one more than the slot that holds its sums (saved.wgsl), or
-// FINISHED. Behind the tiles: whether any is unfinished, how often one stopped, which slots are taken, and how many tiles have
-// entries, with the list of these. Of a lattice that is gathered: how many tiles gather.wgsl has drawn, and for each tile the first
-// sheet whose field is not drawn yet.
+// The progress of the tiles of a pass. Each tile has 0, or one more than the slot that holds its
+// sums (saved.wgsl), or FINISHED. Behind the tiles: whether any is unfinished, how often one
+// stopped, which slots are taken, how many tiles have entries, and the list of these tiles. For a
+// gathered lattice also: how many tiles gather.wgsl has drawn, and for each tile the first sheet
+// whose field is not drawn yet.
 
 // A tile that needs no more work.
 const FINISHED: u32 = 0xffffffffu;
@@ -9,7 +10,7 @@ const FINISHED: u32 = 0xffffffffu;
 const UNFINISHED: u32 = 0u;
 const STOPS: u32 = 1u;
 const SLOTS: u32 = 2u;
-// Bits for the slots; mirrors engine/frame.rs.
+// Words of bits for the slots; mirrors engine/frame.rs.
 const SLOT_WORDS: u32 = 32u;
 const LISTED: u32 = SLOTS + SLOT_WORDS;
 
@@ -17,7 +18,7 @@ fn progress_word(word: u32) -> u32 {
     return frame.tiles.x * frame.tiles.y + word;
 }
 
-// Where a listed tile stands.
+// Returns the place of a listed tile.
 fn listed_tile(number: u32) -> u32 {
     return progress_word(LISTED) + 1u + number;
 }

@@ -1,13 +1,14 @@
-// Project: writes the records of a pass's splats, all that march needs of them, and where each lies.
+// Project: writes the records of a pass's splats, which contain all data that march needs, and the
+// tiles and sheets of each.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> planes: array<f32>;
-// Record words before each run of candidates.
+// Record words before each batch of candidates.
 @group(0) @binding(2) var<storage, read> runs: array<u32>;
-// What cull.wgsl found to draw, see active.wgsl.
+// The candidates that cull.wgsl found to draw, see active.wgsl.
 @group(0) @binding(3) var<storage, read> drawn: array<u32>;
 @group(0) @binding(4) var<storage, read_write> records: array<vec4<f32>>;
-// Where each record lies, for bin.
+// The tiles and sheets of each record, for bin.
 @group(0) @binding(5) var<storage, read_write> boxes: array<Box>;
 
 fn box_of(span: Span) -> Box {
@@ -18,9 +19,10 @@ fn box_of(span: Span) -> Box {
     );
 }
 
-// Four vec4 of a general record; add_general in march.wgsl reads them.
+// Writes the four vec4 of a general record, which add_general in kernels.wgsl reads.
 fn write_general(at: u32, splat: Candidate) {
-    // Whitening M = L⁻¹ of the covariance L·Lᵀ. The floors keep discs far thinner than wide invertible in 32 bits.
+    // Whitening M = L⁻¹ of the covariance L·Lᵀ. The minimum keeps discs much thinner than wide
+    // invertible in 32 bits.
     let s = splat.covariance;
     let least = 1e-7 * max(s.xx, max(s.yy, s.zz)) + 1e-37;
     let l00 = sqrt(max(s.xx, least));
@@ -35,7 +37,7 @@ fn write_general(at: u32, splat: Candidate) {
     let i10 = -l10 * i00 * i11;
     let i21 = -l21 * i11 * i22;
     let i20 = -(l20 * i00 + l21 * i10) * i22;
-    // The sign of the squared extent tells march the payload.
+    // The sign of the squared extent tells march which payload it is.
     let extent2 = splat.extent * splat.extent * select(-1.0, 1.0, (source.flags & RADIANCE) != 0u);
     records[at] = vec4(splat.center, splat.strength);
     records[at + 1u] = vec4(i00, i10, i20, i11);
@@ -46,7 +48,7 @@ fn write_general(at: u32, splat: Candidate) {
             let size = length(splat.gradient);
             payload.y = bitcast<f32>(NO_NORMAL);
             if size > 1e-20 {
-                // What a value falls towards is outside.
+                // The normal points to smaller values: outward.
                 payload.y = bitcast<f32>(encode_normal(-splat.gradient / size));
             }
         } else if CLASSIFIED {
@@ -54,7 +56,12 @@ fn write_general(at: u32, splat: Candidate) {
         } else if SLOPES {
             // Lᵀ·g: the slope in whitened space.
             let g = splat.gradient;
-            payload = vec4(l00 * g.x + l10 * g.y + l20 * g.z, l11 * g.y + l21 * g.z, l22 * g.z, splat.weight);
+            payload = vec4(
+                l00 * g.x + l10 * g.y + l20 * g.z,
+                l11 * g.y + l21 * g.z,
+                l22 * g.z,
+                splat.weight,
+            );
         }
     }
     records[at + 3u] = payload;
@@ -75,7 +82,8 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
     while mask != 0u {
         let bit = firstTrailingBit(mask);
         mask &= mask - 1u;
-        // plan.wgsl leaves room for all but single bands, of which bin.wgsl tells that they were too much.
+        // plan.wgsl makes passes that fit, except for single bands. If a band is too much, bin.wgsl
+        // reports it.
         if at + words > frame.record_capacity {
             return;
         }

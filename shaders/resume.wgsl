@@ -1,5 +1,6 @@
-// Resume: march stops tiles that have very many entries (see march.wgsl). `again` sends it once more where some are
-// unfinished; `hold` stops the frame where even that was not enough; `resume` goes on with a pass that was held.
+// Resume: march stops tiles with very many entries (see march.wgsl). `again` dispatches march once
+// more if any tile is unfinished; `hold` stops the frame if even that was not enough; `resume`
+// continues a pass that was held.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read_write> state: array<u32>;
@@ -7,7 +8,7 @@
 @group(0) @binding(3) var<storage, read_write> arguments: array<u32>;
 @group(0) @binding(4) var<storage, read_write> progress: array<u32>;
 
-// Whether march has left a tile unfinished since the last time.
+// Whether march has left a tile unfinished since the last call.
 fn take_unfinished() -> bool {
     let unfinished = progress[progress_word(UNFINISHED)] != 0u;
     progress[progress_word(UNFINISHED)] = 0u;

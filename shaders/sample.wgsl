@@ -8,11 +8,11 @@ fn sample_value(index: u32, kind: u32) -> f32 {
         return counted(f32((samples[index >> 1u] >> (16u * (index & 1u))) & 0xffffu));
     }
     if kind == SAMPLE_I16 {
-        // Shifted up and back down as a signed number, which keeps the sign.
+        // Shifted left and back right as a signed number, to extend the sign.
         return counted(f32(i32((samples[index >> 1u] >> (16u * (index & 1u))) << 16u) >> 16u));
     }
     if kind == SAMPLE_I32 {
-        // In two parts: 32 bits of a float do not hold the whole.
+        // In two parts, because a 32-bit float cannot hold the whole integer.
         let low = samples[index] & 0xffffu;
         return counted_sum(f32(i32(samples[index] - low)), f32(low));
     }

@@ -1,8 +1,9 @@
-// What march keeps of a tile that it stops in the middle of its entries: where each invocation stands, and the sums of its
-// pixels. They lie in slots behind the colours of the picture. A tile takes a slot when it first stops and frees it when
-// it is finished. The sums are kept as they are, so a tile that stops draws what it would have drawn without a stop.
+// The saved state of tiles that march stops among their entries: the position of each invocation,
+// and the sums of its pixels. It lies in slots behind the colours of the picture. A tile takes a
+// slot when it first stops, and frees the slot when it is finished. The sums are saved exactly, so
+// a tile that stops draws the same as without a stop.
 
-// Vectors of a pixel: where its invocation stands, then 16 of sums.
+// Vectors of a pixel: the position of its invocation, then 16 of sums.
 const SAVED_VECTORS: u32 = 17u;
 const NO_SLOT: u32 = 0xffffffffu;
 
@@ -11,7 +12,7 @@ fn saved_at(slot: u32, lane: vec2<u32>, r: u32) -> u32 {
     return frame.size.x * frame.size.y + (slot * 64u + pixel) * SAVED_VECTORS;
 }
 
-// Takes a free slot. There may be none: the tile then begins anew, once other tiles are done.
+// Takes a free slot. If there is none, the tile starts again once other tiles are done.
 fn claim_slot() -> u32 {
     let slots = (arrayLength(&colors) - frame.size.x * frame.size.y) / (64u * SAVED_VECTORS);
     for (var word = 0u; word < SLOT_WORDS; word++) {

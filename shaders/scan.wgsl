@@ -1,5 +1,5 @@
-// Scan: exclusive prefix sum in place, over up to 2^24 numbers. Each invocation sums a segment, one workgroup scans the
-// sums, each invocation then spreads them over its segment.
+// Scan: exclusive prefix sum in place, over up to 2^24 numbers. Each invocation sums a segment, one
+// workgroup scans the sums, and each invocation then adds them to its segment.
 
 @group(0) @binding(0) var<uniform> size: vec4<u32>;
 @group(0) @binding(1) var<storage, read_write> numbers: array<u32>;

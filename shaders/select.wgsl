@@ -1,16 +1,20 @@
-// Select: the samples of a lattice chunk that can add to the picture under the current transfer function. Runs when the
-// transfer function changes, not when the camera moves. A sample stays unless every value in the box of samples around
-// it, as far as its kernel reaches, is transparent: then no reconstructed value near it can be seen.
+// Select: the samples of a lattice chunk that can add to the picture under the current transfer
+// function. Runs when the transfer function changes, not when the camera moves. A sample stays
+// unless every value in the box of samples around it, as far as its kernel reaches, is transparent:
+// then no reconstructed value near it is visible.
 //
-// An invocation handles a block of samples, so that neighbours in the list are neighbours in space: they meet the same tiles
-// and sheets, and hide together. Two entry points around a prefix sum keep the list in one order: count, then write.
+// An invocation handles a block of samples, so that neighbours in the list are neighbours in space:
+// they meet the same tiles and sheets, and are hidden together. Two entry points around a prefix
+// sum keep the list in one order: count, then write.
 
 @group(0) @binding(0) var<uniform> source: Source;
-// Smallest and largest value around each sample, 8 bits each over the volume's range, two samples a word.
+// Smallest and largest value around each sample, 8 bits each over the volume's range, two samples a
+// word.
 @group(0) @binding(1) var<storage, read> ranges: array<u32>;
-// For each smallest level, the largest level from which on the range between them holds a visible value.
+// For each smallest level, the smallest largest level for which the range between them has a
+// visible value.
 @group(0) @binding(2) var<storage, read> first_visible: array<u32>;
-// Selected samples of each block; then those before it.
+// The number of selected samples in each block; later the number before the block.
 @group(0) @binding(3) var<storage, read_write> blocks: array<u32>;
 // The selected samples.
 @group(0) @binding(4) var<storage, read_write> selected: array<u32>;
@@ -25,7 +29,8 @@ fn is_visible(index: u32) -> bool {
     return high >= first_visible[low];
 }
 
-// First sample of a block and the one behind its last, which is before the first where there is no such block.
+// The first sample of a block, and the one behind its last. If there is no such block, the end lies
+// before the first.
 struct Block {
     first: vec3<u32>,
     end: vec3<u32>,

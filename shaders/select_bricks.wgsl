@@ -1,27 +1,33 @@
-// Select, for bricks: the samples of the slots in use that can add to the picture under the current transfer function. Runs
-// when the bricks or the transfer function change. A block of samples stays unless every value in it and around it is
-// transparent.
+// Select, for bricks: the samples of the used slots that can add to the picture under the current
+// transfer function. Runs when the bricks or the transfer function change. A block of samples stays
+// unless every value in it and around it is transparent.
 //
-// As in select.wgsl an invocation handles a block, and the list comes in one order: count, prefix sum, write.
+// As in select.wgsl, an invocation handles a block, and the list is in one order: count, prefix
+// sum, write.
 
 @group(0) @binding(0) var<uniform> source: Source;
-// Smallest and largest value of each block and around it, 8 bits each over the volume's range, two blocks a word.
+// Smallest and largest value in and around each block, 8 bits each over the volume's range, two
+// blocks a word.
 @group(0) @binding(1) var<storage, read> ranges: array<u32>;
-// For each smallest level, the largest level from which on the range between them holds a visible value.
+// For each smallest level, the smallest largest level for which the range between them has a
+// visible value.
 @group(0) @binding(2) var<storage, read> first_visible: array<u32>;
-// Selected samples of each block; then those before it.
+// The number of selected samples in each block; later the number before the block.
 @group(0) @binding(3) var<storage, read_write> blocks: array<u32>;
 // The selected samples.
 @group(0) @binding(4) var<storage, read_write> selected: array<u32>;
-// Of each slot the place of its first sample in the level, and whether the level has a brick there.
+// For each slot, the place of its first sample in the level, and whether the level has a brick
+// there.
 @group(0) @binding(5) var<uniform> slots: array<vec4<u32>, 512>;
 
-// Samples of a block along each side; bits of a block's number in its brick, of a sample's and of a slot's part of it.
+// Samples along each side of a block; number of bits of a block in its brick, and of a sample in
+// its brick.
 const SIDE: u32 = 4u;
 const BLOCK_BITS: u32 = 9u;
 const SAMPLE_BITS: u32 = 15u;
 
-// Number of a block's first sample, and how many samples it has along the axes: none where nothing of it shows.
+// The number of a block's first sample, and its samples along the axes: zero if the block is
+// invisible.
 struct Block {
     first: u32,
     size: vec3<u32>,
@@ -35,7 +41,7 @@ fn block_of(id: u32) -> Block {
     let shows = ((range >> 8u) & 0xffu) >= first_visible[range & 0xffu];
     let at = slots[slot];
     let in_level = at.xyz + place;
-    // Beyond the level's border bricks are filled with copies.
+    // Beyond the level's border, bricks are padded with copies.
     let end = min(in_level + SIDE, source.lattice.xyz);
     return Block(first, select(vec3(0u), end - min(in_level, end), shows && at.w != 0u));
 }

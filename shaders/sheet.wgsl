@@ -1,12 +1,13 @@
 // Closes a sheet at one pixel: resolves its sums, classifies and shades it, and composites it.
 
-// A sheet with less optical depth than this has no colour: such a small sum may be what rounding left of the sections that
-// windows of one splat give each other. For fields frame.isotropic.w stands for it, with a margin for kernels of both signs.
+// A sheet with less optical depth than this has no colour: such a small sum may be a rounding
+// remainder of the sections that a splat's windows add and take back. For fields, frame.isotropic.w
+// is the limit, with a margin for kernels of both signs.
 const LEAST_DEPTH: f32 = 1e-5;
 // Optical depth that counts as opaque.
 const MOST_DEPTH: f32 = 20.0;
 
-// Blinn's light (1977) at the eye, on both sides.
+// Returns a lit colour: Blinn's model (1977) with a light at the eye, on both sides.
 fn lit(color: vec3<f32>, normal: vec3<f32>, direction: vec3<f32>, shade: vec4<f32>) -> vec3<f32> {
     let size = length(normal);
     if !(size > 1e-20) {
@@ -16,13 +17,15 @@ fn lit(color: vec3<f32>, normal: vec3<f32>, direction: vec3<f32>, shade: vec4<f3
     return min(color * (shade.x + shade.y * facing) + shade.z * pow(facing, shade.w), vec3(1.0));
 }
 
-// Slope across the picture on the plane at a distance, from that per pixel. Gradients are entries of the table per thickness of
-// a sheet, or about that (`frame.gradients`): their squares fit 32 bits in any units.
+// Converts a slope per pixel to the slope across the picture on the plane at a distance. Gradients
+// are in table entries per thickness of a sheet, approximately (`frame.gradients`), so that their
+// squares fit 32 bits in any units.
 fn slope_on_plane(r: u32, slope: vec2<f32>, distance: f32) -> vec2<f32> {
     return slope * frame.gradients.w / select(1.0, pixels[r].cosine * distance, PERSPECTIVE);
 }
 
-// Gradient in view space from the slope across the picture and the derivative along the ray.
+// Returns the gradient in view space, from the slope across the picture and the derivative along
+// the ray.
 fn gradient(r: u32, slope: vec2<f32>, along: f32) -> vec3<f32> {
     let d = direction_of(r);
     let g = slope + along * d.xy;
@@ -42,11 +45,12 @@ fn resolve(r: u32, sheet: u32) -> Sheet {
     if RADIANCE_PAYLOAD && !SINGLE_SPLATS {
         let depth = pixels[r].depth.x;
         let sum = vec3(pixels[r].red.x, pixels[r].green.x, pixels[r].blue.x);
-        // Where next to nothing faces the eye, rounding may have left a weight of any sign; its colour must stay a colour.
+        // If next to nothing faces the eye, rounding may have left a weight of any sign; the result
+        // must stay a colour.
         var color = clamp(sum / max(pixels[r].facing.x, 1e-12), vec3(0.0), vec3(1.0));
         if SURFACE_SHADED {
             let normal = vec3(pixels[r].normal_x.x, pixels[r].normal_y.x, pixels[r].normal_z.x);
-            // Colours of splats without a normal stay as they are.
+            // Splats without a normal keep their colours.
             if dot(normal, normal) > 0.0 {
                 color = lit(color, normal, direction_of(r), frame.surface_shade);
             }
@@ -64,36 +68,42 @@ fn resolve(r: u32, sheet: u32) -> Sheet {
     return own;
 }
 
-// The field of a sheet on its way to the picture, front to back.
+// The field of a sheet, composited front to back.
 struct Medium {
-    // Light that is left, and the optical depth that took the rest.
+    // Transmitted light, and the optical depth that absorbed the rest.
     through: f32,
     depth: f32,
     // Lit colour times opacity.
     color: vec3<f32>,
-    // The field along the ray: values at the front and the back and the parabola's middle; the sheet's thickness.
+    // The field along the ray: values at the front, in the parabola's middle and at the back; the
+    // sheet's thickness.
     curve: vec3<f32>,
     thickness: f32,
-    // Its slopes across the picture at both faces.
+    // The slopes across the picture at both faces.
     front: vec2<f32>,
     back: vec2<f32>,
     // The largest value.
     peak: f32,
-    // An isosurface took the half of the light.
+    // Whether an isosurface absorbed half of the light.
     has_hit: bool,
 }
 
 const NO_VALUE: f32 = -3e38;
 
-// Across the picture from the faces; along the ray the parabola's own derivative, which knows more of the inside.
+// Returns the gradient at a place: across the picture interpolated between the faces, along the ray
+// the parabola's derivative, which knows more of the inside.
 fn gradient_at(r: u32, medium: Medium, u: f32) -> vec3<f32> {
     let curve = medium.curve;
     let along = curve.x * (4.0 * u - 3.0) + curve.y * (4.0 - 8.0 * u) + curve.z * (4.0 * u - 1.0);
-    return gradient(r, mix(medium.front, medium.back, u), along * (frame.gradients.z / medium.thickness));
+    return gradient(
+        r,
+        mix(medium.front, medium.back, u),
+        along * (frame.gradients.z / medium.thickness),
+    );
 }
 
-// The part of a sheet between two distances, in which the field is a parabola with the values of the faces at the ends and
-// the sheet's mean.
+// Adds the part of a sheet between two distances. The field there is a parabola with the values of
+// the faces at the ends and the sheet's mean.
 fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<function, Medium>) {
     let start = planes[sheet];
     let thickness = (*medium).thickness;
@@ -122,7 +132,8 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
             if GRADIENT_OPACITY {
                 shown *= gradient_factor(length(normal));
             }
-            // Differences of integrals: what rounding leaves of them where nothing is shown must stay a colour.
+            // Differences of integrals: rounding remainders, where nothing is visible, must stay a
+            // colour.
             let depth = max(shown.w, 0.0) * step * select(own.filling, 1.0, LATTICE);
             var color = clamp(shown.xyz / max(shown.w, 1e-20), vec3(0.0), vec3(1.0));
             if VOLUME_SHADED {
@@ -136,7 +147,13 @@ fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<
                     let share = (level - value) / (next - value);
                     pass_part(depth * (share - done), color, medium);
                     done = share;
-                    pass_surface(r, surface, mix(place, next_place, share), near + step * share, medium);
+                    pass_surface(
+                        r,
+                        surface,
+                        mix(place, next_place, share),
+                        near + step * share,
+                        medium,
+                    );
                 }
             }
             pass_part(depth * (1.0 - done), color, medium);
@@ -150,15 +167,18 @@ fn parabola(curve: vec3<f32>, u: f32) -> f32 {
     if !PARABOLA {
         return (curve.x + 4.0 * curve.y + curve.z) / 6.0;
     }
-    return curve.x * (1.0 - u) * (1.0 - 2.0 * u) + 4.0 * curve.y * u * (1.0 - u) + curve.z * u * (2.0 * u - 1.0);
+    return curve.x * (1.0 - u) * (1.0 - 2.0 * u) + 4.0 * curve.y * u * (1.0 - u)
+        + curve.z * u * (2.0 * u - 1.0);
 }
 
-// The share of light that an optical depth takes, 1 − e^−τ. Where τ is small, the difference to 1 is lost in rounding.
+// Returns the share of light that an optical depth absorbs, 1 − e^−τ. For small τ, subtracting from
+// 1 would lose the result in rounding.
 fn taken(depth: f32) -> f32 {
     return select(1.0 - exp(-depth), depth * (1.0 - 0.5 * depth), depth < 1e-3);
 }
 
-// Optical depths from here on are divided by: far below what can be seen, far above the least number.
+// Minimum optical depth that is divided by: far below what is visible, far above the smallest
+// float.
 const LEAST_DIVISOR: f32 = 1e-20;
 
 fn pass_part(depth: f32, color: vec3<f32>, medium: ptr<function, Medium>) {
@@ -168,7 +188,13 @@ fn pass_part(depth: f32, color: vec3<f32>, medium: ptr<function, Medium>) {
     (*medium).depth += depth;
 }
 
-fn pass_surface(r: u32, surface: Isosurface, place: f32, distance: f32, medium: ptr<function, Medium>) {
+fn pass_surface(
+    r: u32,
+    surface: Isosurface,
+    place: f32,
+    distance: f32,
+    medium: ptr<function, Medium>,
+) {
     let share = (*medium).through * surface.value.y;
     let before = pixels[r].transmittance * (*medium).through;
     (*medium).through -= share;
@@ -184,7 +210,7 @@ fn pass_surface(r: u32, surface: Isosurface, place: f32, distance: f32, medium: 
     (*medium).color += share * color;
 }
 
-// All of a sheet that the box of the samples and the clips leave.
+// Returns the medium of a sheet, inside the box of the samples and what the clips leave.
 fn pass_field(r: u32, sheet: u32, own: Sheet) -> Medium {
     var medium: Medium;
     medium.through = 1.0;
@@ -206,7 +232,7 @@ fn pass_field(r: u32, sheet: u32, own: Sheet) -> Medium {
         return medium;
     }
     for (var piece = 0u; piece <= HOLES; piece++) {
-        // Out of the holes that `from` lies in; leaving one may lead into another.
+        // Skip the holes that contain `begin`; leaving one may lead into another.
         for (var i = 0u; i < HOLES * HOLES; i++) {
             let hole = pixels[r].holes[i % HOLES_OR_ONE];
             begin = select(begin, hole.y, hole.x <= begin && begin < hole.y);
@@ -227,7 +253,7 @@ fn pass_field(r: u32, sheet: u32, own: Sheet) -> Medium {
 // Adds a sheet to the picture.
 fn composite(r: u32, sheet: u32, own: Sheet) {
     let in_pass = sheet >= stage.first_sheet && sheet < stage.end_sheet;
-    // What is gathered may be left from sheets before the pass.
+    // A gathered field may remain from sheets before the pass.
     if !GATHER && !in_pass {
         return;
     }
@@ -242,9 +268,14 @@ fn composite(r: u32, sheet: u32, own: Sheet) {
             pixels[r].hit = max(pixels[r].hit, medium.peak);
             return;
         }
-        // Optical depth for opacity: τ / (1 − e^−τ), of which little is left where τ is small.
+        // Converts opacity to optical depth: τ / (1 − e^−τ). For small τ that ratio would lose its
+        // digits.
         let field_depth = min(medium.depth, MOST_DEPTH);
-        let ratio = select(field_depth / (1.0 - exp(-field_depth)), 1.0 + 0.5 * field_depth, field_depth < 1e-2);
+        let ratio = select(
+            field_depth / (1.0 - exp(-field_depth)),
+            1.0 + 0.5 * field_depth,
+            field_depth < 1e-2,
+        );
         premultiplied += ratio * medium.color;
         depth += field_depth;
         has_hit = medium.has_hit;
@@ -256,7 +287,8 @@ fn composite(r: u32, sheet: u32, own: Sheet) {
         let share = before * taken(depth);
         let left = before - share;
         pixels[r].color += share / depth * premultiplied;
-        // Inside the sheet, optical depth counts as evenly spread; an isosurface is where it is.
+        // Inside the sheet, optical depth counts as evenly spread; an isosurface counts at its
+        // exact place.
         if !has_hit && before > 0.5 && left <= 0.5 {
             pixels[r].hit = mix(planes[sheet], planes[sheet + 1u], log(2.0 * before) / depth);
         }

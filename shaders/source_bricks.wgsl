@@ -1,10 +1,10 @@
-// Candidates from a volume in bricks: the samples of one level that select_bricks.wgsl found worth drawing.
+// Candidates from a volume in bricks: the samples of one level that select_bricks.wgsl selected.
 
 @group(1) @binding(0) var<uniform> source: Source;
 @group(1) @binding(1) var<storage, read> samples: array<u32>;
 // Numbers of the selected samples: slot, then sample in its brick.
 @group(1) @binding(2) var<storage, read> selected: array<u32>;
-// Of each slot the place of its first sample in the level.
+// For each slot, the place of its first sample in the level.
 @group(1) @binding(3) var<uniform> slots: array<vec4<u32>, 512>;
 
 fn candidate_count() -> u32 {
@@ -19,7 +19,8 @@ fn candidate(order: u32) -> Candidate {
     let b = source.covariance_b;
     var splat: Candidate;
     splat.covariance = Symmetric(a.x, a.y, a.z, a.w, b.x, b.y);
-    splat.center = source.origin.xyz + steps.x * source.axis_x.xyz + steps.y * source.axis_y.xyz + steps.z * source.axis_z.xyz;
+    splat.center = source.origin.xyz + steps.x * source.axis_x.xyz + steps.y * source.axis_y.xyz
+        + steps.z * source.axis_z.xyz;
     splat.extent = source.extent;
     splat.strength = sample_value(number, source.lattice.w);
     splat.color = 0u;

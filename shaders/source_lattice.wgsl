@@ -1,18 +1,19 @@
-// Candidates from a lattice: the samples that select.wgsl found worth drawing. All of a Cartesian or body-centred one share
-// one covariance.
+// Candidates from a lattice: the samples that select.wgsl selected. On a Cartesian or body-centred
+// lattice, all share one covariance.
 
 @group(1) @binding(0) var<uniform> source: Source;
 @group(1) @binding(1) var<storage, read> samples: array<u32>;
 // Indices of the selected samples.
 @group(1) @binding(2) var<storage, read> selected: array<u32>;
-// Rectilinear: the coordinate and the unit of every sample along x, then y, then z, two samples an element.
+// Rectilinear: the coordinate and the unit of every sample along x, then y, then z, two samples an
+// element.
 @group(1) @binding(3) var<uniform> places: array<vec4<f32>, 4096>;
 
 fn candidate_count() -> u32 {
     return source.slices.w;
 }
 
-// Coordinate and unit along an axis.
+// Returns coordinate and unit along an axis.
 fn place_along(axis: u32, index: u32) -> vec2<f32> {
     var at = index;
     if axis > 0u {
@@ -32,15 +33,19 @@ fn coordinate(axis: u32, index: u32) -> f32 {
     return f32(index);
 }
 
-// The value of a sample, which the chunk's data or a neighbouring slice among them hold.
+// Returns the value of a sample, from the chunk's slices or the neighbouring slices in its data.
 fn value_at(index: vec3<u32>) -> f32 {
     let slice = index.z - source.slices.y;
-    return sample_value((slice * source.lattice.y + index.y) * source.lattice.x + index.x, source.lattice.w);
+    return sample_value(
+        (slice * source.lattice.y + index.y) * source.lattice.x + index.x,
+        source.lattice.w,
+    );
 }
 
-// Derivative along an axis per step (rectilinear: per coordinate): central where there are neighbours on both sides.
+// Returns the derivative along an axis per step (rectilinear: per coordinate): central if there are
+// neighbours on both sides.
 fn slope_along(axis: u32, index: vec3<u32>, value: f32) -> f32 {
-    // Layers of a body-centred lattice lie over each other two apart.
+    // Layers of the same cubic lattice of a body-centred lattice lie two apart.
     let stride = select(1u, 2u, BODY_CENTRED && axis == 2u);
     let first = select(0u, source.slices.y, axis == 2u);
     let last = select(source.lattice[axis] - 1u, source.slices.z, axis == 2u);
@@ -66,7 +71,11 @@ fn candidate(order: u32) -> Candidate {
     let number = selected[order];
     let row = number / source.lattice.x;
     let slice = row / source.lattice.y;
-    let index = vec3(number - row * source.lattice.x, row - slice * source.lattice.y, slice + source.slices.x);
+    let index = vec3(
+        number - row * source.lattice.x,
+        row - slice * source.lattice.y,
+        slice + source.slices.x,
+    );
     let value = value_at(index);
     var steps = vec3<f32>(index);
     if BODY_CENTRED {
@@ -84,21 +93,27 @@ fn candidate(order: u32) -> Candidate {
         steps = vec3(x.x, y.x, z.x);
         splat.covariance = covariance_of(x.y * b.w, y.y * b.w, z.y * b.w);
     }
-    splat.center = source.origin.xyz + steps.x * source.axis_x.xyz + steps.y * source.axis_y.xyz + steps.z * source.axis_z.xyz;
+    splat.center = source.origin.xyz + steps.x * source.axis_x.xyz + steps.y * source.axis_y.xyz
+        + steps.z * source.axis_z.xyz;
     splat.extent = source.extent;
     splat.strength = value;
     splat.color = 0u;
     splat.normal = NO_NORMAL;
     splat.weight = 1.0;
     if SLOPES || SAMPLE_NORMALS {
-        // The derivatives along the axes, turned to a gradient in view space.
-        let slopes = vec3(slope_along(0u, index, value), slope_along(1u, index, value), slope_along(2u, index, value));
-        splat.gradient = frame.field_axis_x.xyz * slopes.x + frame.field_axis_y.xyz * slopes.y + frame.field_axis_z.xyz * slopes.z;
+        // Convert the derivatives along the axes to a gradient in view space.
+        let slopes = vec3(
+            slope_along(0u, index, value),
+            slope_along(1u, index, value),
+            slope_along(2u, index, value),
+        );
+        splat.gradient = frame.field_axis_x.xyz * slopes.x + frame.field_axis_y.xyz * slopes.y
+            + frame.field_axis_z.xyz * slopes.z;
     }
     return splat;
 }
 
-// The covariance of a kernel of given standard deviations along the axes, in steps.
+// Returns the covariance of a kernel with given standard deviations along the axes, in steps.
 fn covariance_of(x: f32, y: f32, z: f32) -> Symmetric {
     let p = x * source.axis_x.xyz;
     let q = y * source.axis_y.xyz;

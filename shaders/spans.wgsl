@@ -1,6 +1,8 @@
-// What a candidate meets of the picture, or a run of candidates together: two corners of a box, 32 bits each.
+// Spans: the tiles and sheets that a candidate or a batch of candidates meets, as two corners of a
+// box, 32 bits each.
 
-// A corner: sheet (12 bits), column and row of a tile (10 bits each, in units of 2^tile_shift tiles).
+// Packs a corner: sheet (12 bits), column and row of a tile (10 bits each, in units of 2^tile_shift
+// tiles).
 fn pack_corner(sheet: u32, tile: vec2<u32>) -> u32 {
     let place = tile >> vec2(frame.tile_shift);
     return sheet | (place.x << 12u) | (place.y << 22u);
@@ -14,10 +16,10 @@ fn tile_of_corner(corner: u32) -> vec2<u32> {
     return vec2((corner >> 12u) & 0x3ffu, corner >> 22u);
 }
 
-// Meets nothing; joined with another span it gives that one.
+// Meets nothing; joined with another span, the result is the other span.
 const NO_SPAN: vec2<u32> = vec2(0xffffffffu, 0u);
 
-// The span around two.
+// Returns the span around two spans.
 fn join(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
     let low = min(tile_of_corner(a.x), tile_of_corner(b.x));
     let high = max(tile_of_corner(a.y), tile_of_corner(b.y));
@@ -27,7 +29,7 @@ fn join(a: vec2<u32>, b: vec2<u32>) -> vec2<u32> {
     );
 }
 
-// The tiles of a span: first column and row, and those behind the last.
+// Returns the tiles of a span: first column and row, and those behind the last.
 fn tiles_of(span: vec2<u32>) -> vec4<u32> {
     let shift = vec2(frame.tile_shift);
     let end = (tile_of_corner(span.y) + 1u) << shift;

@@ -1,11 +1,13 @@
-// Explicit splats (48 bytes each, see splat.rs), for source_splats.wgsl and source_nodes.wgsl, which bind them.
+// Explicit splats (48 bytes each, see splat.rs), for source_splats.wgsl and source_nodes.wgsl,
+// which bind them.
 
-// The picture is sampled at pixel centres: a blur of this many pixels keeps small splats from falling between them.
+// The picture is sampled at pixel centres. A blur of this many pixels keeps small splats from
+// falling between them.
 const FOOTPRINT_BLUR: f32 = 0.35;
-// Opaque things must not grow by that: see splat.rs.
+// Opaque surfaces must not grow through the blur: see splat.rs.
 const STEP_BACK: f32 = 2.4;
 
-// A splat in view space, widened.
+// Returns a splat in view space, widened.
 fn splat_at(index: u32) -> Candidate {
     let a = splats[3u * index];
     let b = splats[3u * index + 1u];
@@ -13,7 +15,7 @@ fn splat_at(index: u32) -> Candidate {
     let to_view = mat3x3<f32>(source.axis_x.xyz, source.axis_y.xyz, source.axis_z.xyz);
     var splat: Candidate;
     splat.center = to_view * a.xyz + source.origin.xyz;
-    // Columns of B turned into view space; B = (b00 0 0, b10 b11 0, b20 b21 b22) row by row.
+    // Columns of B, rotated into view space; B = (b00 0 0, b10 b11 0, b20 b21 b22) row by row.
     let c0 = to_view * vec3(b.x, b.y, b.w);
     let c1 = to_view * vec3(0.0, b.z, d.x);
     let c2 = to_view * vec3(0.0, 0.0, d.y);
@@ -34,11 +36,12 @@ fn splat_at(index: u32) -> Candidate {
     splat.color = bitcast<u32>(d.z);
     splat.normal = bitcast<u32>(d.w);
     if SAMPLES && (source.flags & RADIANCE) == 0u {
-        // The slope is in the splat's own whitened space: B⁻ᵀ takes it to the set's.
+        // The slope is in the splat's own whitened space; B⁻ᵀ maps it to the set's space.
         let low = unpack2x16float(splat.color);
         let high = unpack2x16float(splat.normal);
-        // Widened, a sample still counts as much over space: else what is far below a pixel would drown its surroundings.
-        // Both determinants in units of the splat's own size, where they fit 32 bits.
+        // A widened sample keeps its weight over space. Otherwise a sample far smaller than a pixel
+        // would drown its surroundings. Both determinants are in units of the splat's own size, so
+        // that they fit 32 bits.
         let s = splat.covariance;
         let unit = inverseSqrt(max(s.xx + s.yy + s.zz, 1e-37));
         let x = vec3(s.xx, s.xy, s.xz) * unit * unit;

@@ -1,4 +1,5 @@
-// Survey: what the runs of candidates need, by sheet and by band of the picture; plan.wgsl cuts the frame into passes by it.
+// Survey: counts the needs of batches of candidates, by sheet and by band of the picture. plan.wgsl
+// divides the frame into passes by these counts.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> run_spans: array<vec2<u32>>;

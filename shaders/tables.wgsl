@@ -1,29 +1,32 @@
-// Functions of one value, looked up: the transfer function and its integral, the gradient's factor, the kernel's sections.
-// Mirrors engine/tables.rs, which says where each lies in `tables`.
+// Functions of one value, as tables: the transfer function and its integral, the gradient factor,
+// the kernel's sections. Mirrors engine/tables.rs, which defines their places in `tables`.
 
-// Colour and extinction per value; their integrals (extinction times colour, extinction) from the first value on, counted in
-// entries; the factor on the extinction by gradient magnitude; the kernel and its sections.
+// Colour and extinction per value; their integrals (extinction times colour, extinction) from the
+// first value on, in entries; the factor on the extinction by gradient magnitude; the kernel and
+// its sections.
 @group(0) @binding(6) var<storage, read> tables: array<vec4<f32>>;
 
-// The place of a value among the entries, before and behind them too.
+// Returns the place of a value among the entries; it may lie in front of or behind them.
 fn place_of(value: f32) -> f32 {
     return value + frame.transfer.w;
 }
 
-// Colour and extinction of one value.
+// Returns colour and extinction of one value.
 fn classify(value: f32) -> vec4<f32> {
     let at = clamp(place_of(value), 0.0, frame.transfer.z);
     let low = u32(at);
     return mix(tables[low], tables[low + 1u], at - f32(low));
 }
 
-// Values nearer to each other than this many entries are taken as that far apart: their integrals' difference is lost in
-// rounding. So are those that, far from the tables, are nearer than 32 bits can tell.
+// Values closer together than this, in entries, are taken as this far apart, because the difference
+// of their integrals is lost in rounding. The same holds, far from the tables, for values closer
+// together than 32 bits can resolve.
 const NARROW: f32 = 8.0;
 const NARROW_AFAR: f32 = 1e-6;
 
-// Means over the values between two: extinction times colour, and extinction (pre-integration after Engel, Kraus & Ertl 2001,
-// without the attenuation inside, which the parts of a sheet are thin enough for).
+// Returns averages over the values between two values: extinction times colour, and extinction.
+// This is pre-integration (Engel, Kraus & Ertl 2001) without the attenuation inside, which is
+// negligible because the parts of a sheet are thin.
 fn classify_between(a: f32, b: f32) -> vec4<f32> {
     if BEYOND {
         return classify_beyond(place_of(a), place_of(b));
@@ -32,36 +35,45 @@ fn classify_between(a: f32, b: f32) -> vec4<f32> {
     let at = clamp(vec2(place_of(a), place_of(b)), vec2(0.0), vec2(end));
     let middle = 0.5 * (at.x + at.y);
     let reach = 0.5 * max(abs(at.x - at.y), NARROW);
-    // To whole entries outwards, which saves half of the look-ups; the mean moves by half an entry at most.
+    // Rounds outwards to whole entries, which saves half of the look-ups; the mean moves by at most
+    // half an entry.
     let low = max(floor(middle - reach), 0.0);
     let high = min(ceil(middle + reach), end);
-    return (tables[frame.table_starts.x + u32(high)] - tables[frame.table_starts.x + u32(low)]) / (high - low);
+    return (tables[frame.table_starts.x + u32(high)] - tables[frame.table_starts.x + u32(low)])
+        / (high - low);
 }
 
-// The same of places that may lie before and behind the tables, where the function keeps its value.
+// The same for places that may lie in front of or behind the tables, where the function keeps its
+// value.
 fn classify_beyond(a: f32, b: f32) -> vec4<f32> {
     let end = frame.transfer.z;
     let middle = 0.5 * (a + b);
     let reach = max(0.5 * max(abs(a - b), NARROW), NARROW_AFAR * abs(middle));
     let low = floor(middle - reach);
     let high = ceil(middle + reach);
-    let within = tables[frame.table_starts.x + u32(clamp(high, 0.0, end))] - tables[frame.table_starts.x + u32(clamp(low, 0.0, end))];
-    // Ratios first: what lies far beyond may be as large as numbers get.
+    let within = tables[frame.table_starts.x + u32(clamp(high, 0.0, end))]
+        - tables[frame.table_starts.x + u32(clamp(low, 0.0, end))];
+    // Ratios first: places far outside may be as large as floats get.
     let inverse = 1.0 / (high - low);
     let before = (min(high, 0.0) - min(low, 0.0)) * inverse;
     let behind = (max(high, end) - max(low, end)) * inverse;
     return within * inverse + before * frame.before + behind * frame.behind;
 }
 
-// The factor on the extinction where the gradient has a magnitude.
+// Returns the factor on the extinction for a gradient's magnitude.
 fn gradient_factor(magnitude: f32) -> f32 {
-    let at = clamp((magnitude - frame.gradients.x) * frame.gradients.y, 0.0, f32(GRADIENT_ENTRIES - 1u));
+    let at = clamp(
+        (magnitude - frame.gradients.x) * frame.gradients.y,
+        0.0,
+        f32(GRADIENT_ENTRIES - 1u),
+    );
     let low = u32(at);
     let first = frame.table_starts.y + low;
     return mix(tables[first].x, tables[first + 1u].x, at - f32(low));
 }
 
-// Kernel and −h′(r)/r at a radius, in kernel space; nothing beyond its extent, also where it ends by a step.
+// Returns the kernel and −h′(r)/r at a radius in kernel space; 0 beyond its extent, even if it ends
+// with a step.
 fn kernel_at(radius: f32) -> vec2<f32> {
     let at = min(radius * frame.kernel.y * f32(RADIAL_ENTRIES - 1u), f32(RADIAL_ENTRIES - 1u));
     let low = u32(at);
@@ -69,8 +81,8 @@ fn kernel_at(radius: f32) -> vec2<f32> {
     return select(mix(entry.xy, entry.zw, at - f32(low)), vec2(0.0), radius > frame.kernel.x);
 }
 
-// The kernel's integral along a line at distance `rho` from its centre, from the closest approach to t. An entry holds the
-// four corners of its cell.
+// Returns the kernel's integral along a line at distance `rho` from its centre, from the closest
+// approach to t. An entry holds the four corners of its cell.
 fn kernel_integral(rho: f32, t: f32) -> f32 {
     let last = f32(SECTION_CELLS);
     let at = min(vec2(rho, abs(t)) * frame.kernel.y * last, vec2(last - 1e-3));

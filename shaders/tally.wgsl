@@ -1,5 +1,6 @@
-// Tally: for every cut that might be chosen, how many nodes it would draw. A node is drawn by cuts between two sizes: below
-// its parent's, and above its own where it fades out. Counters hold differences from one cut to the next.
+// Tally: counts how many nodes each possible cut would draw. A node is drawn by cuts between two
+// sizes: below its parent's, and above its own, where it fades out. Counters hold differences from
+// one cut to the next.
 
 @group(0) @binding(6) var<storage, read_write> tally: array<atomic<i32>>;
 
@@ -9,7 +10,11 @@ const TALLY_FIRST: f32 = -8.0;
 const TALLY_COUNT: u32 = 256u;
 
 fn step_of(wide: f32) -> f32 {
-    return clamp((log2(max(wide, 1e-30)) - TALLY_FIRST) * TALLY_STEPS, -1.0, f32(TALLY_COUNT) - 1.0);
+    return clamp(
+        (log2(max(wide, 1e-30)) - TALLY_FIRST) * TALLY_STEPS,
+        -1.0,
+        f32(TALLY_COUNT) - 1.0,
+    );
 }
 
 @compute @workgroup_size(64)
@@ -22,11 +27,16 @@ fn count(@builtin(global_invocation_id) invocation: vec3<u32>) {
         }
         var first = 0u;
         if has_children(node) {
-            first = u32(floor(step_of(pixels(node.center, node.radius, node.size) / BLEND_BAND)) + 1.0);
+            first = u32(
+                floor(step_of(pixels(node.center, node.radius, node.size) / BLEND_BAND)) + 1.0,
+            );
         }
         var end = TALLY_COUNT - 1u;
         if node.parent_size >= 0.0 {
-            end = u32(max(ceil(step_of(pixels(node.parent_center, node.parent_radius, node.parent_size))), 0.0));
+            end = u32(max(
+                ceil(step_of(pixels(node.parent_center, node.parent_radius, node.parent_size))),
+                0.0,
+            ));
         }
         if first < end {
             atomicAdd(&tally[first], 1);

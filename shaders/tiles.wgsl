@@ -1,4 +1,5 @@
-// Tiles: lists the tiles that have entries in a pass, in any order: march and occlusion leave the others alone.
+// Tiles: lists the tiles that have entries in a pass, in any order. march and occlusion skip the
+// others.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> stage: Pass;

@@ -1,13 +1,13 @@
-// Values of a field. From where they are read on they are counted in entries of the transfer function's table (tables.wgsl), from
-// a value among the data's on, so that 32 bits tell apart what the function does, wherever the data's zero and whatever their unit
-// is.
+// Values of a field. Once read, they are in entries of the transfer function's table (tables.wgsl),
+// relative to a value within the data. So 32 bits resolve the function, wherever the data's zero is
+// and whatever their unit.
 
-// A value of the data in entries; finite, however far.
+// Converts a value of the data to entries; the result is clamped so that it stays finite.
 fn counted(value: f32) -> f32 {
     return counted_sum(value, 0.0);
 }
 
-// The same of the sum of two numbers.
+// The same for the sum of two numbers.
 fn counted_sum(large: f32, small: f32) -> f32 {
     return clamp(((large - frame.transfer.x) + small) * frame.transfer.y, -1e30, 1e30);
 }
@@ -18,5 +18,6 @@ const SAMPLE_U16: u32 = 1u;
 const SAMPLE_I16: u32 = 2u;
 const SAMPLE_I32: u32 = 3u;
 const SAMPLE_F32: u32 = 4u;
-// Of a gathered lattice alone: a word for each sample, of this byte and the three behind it.
+// Only for a gathered lattice: a word for each sample, with this byte and the three bytes behind
+// it.
 const SAMPLE_FOUR: u32 = 5u;
