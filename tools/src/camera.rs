@@ -38,7 +38,8 @@ pub struct CameraFlags {
     #[arg(long, value_name = "DEGREES", value_parser = parse::finite, allow_hyphen_values = true)]
     elevation: Option<f64>,
     /// Enlarge the middle of the picture. At 1, the sphere around the scene fills the picture
-    /// [default: the scene's box fills the picture; 1 for turntables and with --camera-position]
+    /// [default: the scene's box fills the picture; 1 for turntables, for bench and with
+    /// --camera-position]
     #[arg(long, value_name = "FACTOR", value_parser = parse::positive)]
     zoom: Option<f64>,
     /// Draw without perspective.

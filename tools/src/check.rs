@@ -47,7 +47,7 @@ impl Check {
                 Input::Mesh(mesh) => {
                     of_mesh(&mesh, deadline).map_err(|error| in_file(&self.file, error))?
                 }
-                // Reading reports what is wrong with other inputs.
+                // Errors in other inputs are reported when they are read.
                 _ => Vec::new(),
             },
         };
@@ -88,8 +88,8 @@ fn as_json(finding: &Finding) -> serde_json::Value {
     })
 }
 
-/// Finds what gives nothing to draw in a mesh or point cloud, or what is drawn differently than
-/// meant.
+/// Returns findings on a mesh or point cloud: parts that draw nothing, or that are drawn
+/// differently than meant.
 fn of_mesh(mesh: &Mesh, deadline: Deadline) -> splatkit::Result<Vec<Finding>> {
     let mut findings = Vec::new();
     let mut warn = |code, place: &str, message: String| {
@@ -109,7 +109,7 @@ fn of_mesh(mesh: &Mesh, deadline: Deadline) -> splatkit::Result<Vec<Finding>> {
         warn(
             "duplicates",
             "positions",
-            format!("{} are at the place of another", of(survey.duplicates, points)),
+            format!("{} lie at the position of another", of(survey.duplicates, points)),
         );
     }
     if survey.without_area > 0 {
@@ -126,7 +126,7 @@ fn of_mesh(mesh: &Mesh, deadline: Deadline) -> splatkit::Result<Vec<Finding>> {
         warn(
             "open",
             "triangles",
-            "the surface has borders; its back can be seen through them".into(),
+            "the surface has borders; its back is visible through them".into(),
         );
     }
     match mesh.surfels(&SurfelOptions { deadline, ..SurfelOptions::default() }) {

@@ -18,7 +18,7 @@ pub struct MethodFlags {
     /// always classify before interpolation.
     #[arg(long, value_enum, default_value_t = Classify::PreIntegrated)]
     classify: Classify,
-    /// Choose what a ray computes from a volume.
+    /// Choose the quantity that a ray computes from a volume.
     #[arg(long, value_enum, default_value_t = Optics::Light)]
     optics: Optics,
     /// Short for --optics maximum.

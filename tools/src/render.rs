@@ -25,12 +25,12 @@ pub struct Render {
     #[command(flatten)]
     scene: SceneFlags,
     /// Write the picture to this .png or .jpg file, or to stdout as PNG if it is `-`. Frames of a
-    /// turntable are numbered: out.png becomes out_0000.png, and out of {frame} or {frame:04} in
-    /// the name becomes the number.
+    /// turntable are numbered: out.png becomes out_0000.png, and {frame} or {frame:04} in the name
+    /// is replaced by the number.
     #[arg(short, long, value_name = "FILE", allow_hyphen_values = true)]
     output: PathBuf,
-    /// Also write the depths: a grey PNG of 16 bits, white where nearest, black where nothing is
-    /// drawn.
+    /// Also write the depths to this file: a grey PNG of 16 bits, white for the nearest, black for
+    /// nothing.
     #[arg(long, value_name = "FILE.png", conflicts_with = "turntable")]
     depth: Option<PathBuf>,
     /// Replace existing files.

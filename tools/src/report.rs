@@ -155,8 +155,8 @@ impl Block {
         Ok(inside)
     }
 
-    /// Replaces the block's text by a function of it. The file is read again, so that what was
-    /// edited in the meantime stays.
+    /// Replaces the block's text by a function of it. The file is read again, so that other edits
+    /// made in the meantime stay.
     pub fn replace(&self, text: impl FnOnce(&str) -> String) -> Result<(), Failure> {
         let Self { path, start, end, .. } = self;
         let [before, inside, after] = self.parts()?;
@@ -169,7 +169,7 @@ impl Block {
         let Self { path, name, start, end } = self;
         let text = Source::open(path, &Limits::default())?.small_text("a document", MOST_BYTES)?;
         let missing =
-            || Error::input(path, *name, format!("there are no lines “{start}” and “{end}”"));
+            || Error::input(path, *name, format!("the lines “{start}” and “{end}” are missing"));
         let (before, rest) = text.split_once(start).ok_or_else(missing)?;
         let (inside, after) = rest.split_once(end).ok_or_else(missing)?;
         Ok([before, inside.trim(), after].map(str::to_owned))

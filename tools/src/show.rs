@@ -88,7 +88,7 @@ impl ShowFlags {
         self.range.map(|[low, high]| format!("--range {},{}", plain(low), plain(high)))
     }
 
-    /// Returns the transfer function's file if no other flag changes what it says.
+    /// Returns the transfer function's file if no other flag changes its content.
     pub fn own_transfer(&self) -> Option<&Path> {
         let is_changed = self.range.is_some() || self.opacity_unit.is_some();
         let named =

@@ -24,7 +24,7 @@ pub fn start(threads: Option<u32>) -> Result<(), Failure> {
             "{name}{asked} is more than {processors} processors can use: using {count} threads"
         );
     }
-    // Building the pool cannot be retried, so the system is asked for the threads before.
+    // Building the pool cannot be retried, so first check that the system starts the threads.
     let had = available(count);
     let builder = rayon::ThreadPoolBuilder::new();
     let built = if had == count {

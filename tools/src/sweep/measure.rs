@@ -30,8 +30,7 @@ impl Frames {
     }
 }
 
-/// A step that costs this many times what is explained is a cliff on an idle machine as well as on
-/// a busy one.
+/// A step with this excess cost is a cliff on an idle machine as well as on a busy one.
 const HIGH: f64 = 2.0 * CLIFF;
 
 /// A planned step and its measurement, or why it was not drawn.

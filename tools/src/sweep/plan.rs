@@ -1,4 +1,4 @@
-//! A step of a sweep: a scene, a view, and what they ask for.
+//! A step of a sweep: a scene, a view, and the work that they ask for.
 
 use super::asked::Content;
 use splatkit::{

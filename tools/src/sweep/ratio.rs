@@ -2,7 +2,8 @@
 
 use super::asked::Asked;
 
-/// A step that costs more than this many times what its work explains is a cliff.
+/// A step with more than this excess cost is a cliff: it costs that many times what its work
+/// explains.
 pub const CLIFF: f64 = 2.0;
 
 /// The cost of a step beside that of its neighbour. The comparison is made for the more expensive
@@ -11,19 +12,20 @@ pub const CLIFF: f64 = 2.0;
 pub struct Ratio {
     /// The step's time over its neighbour's.
     pub time: f64,
-    /// How many times as much the more expensive of the two asks for; at least 1.
+    /// How many times as much work the more expensive of the two asks for; at least 1.
     pub asked: f64,
 }
 
 impl Ratio {
-    /// Compares a step with its neighbour. Each is given in milliseconds, with what it asks for.
+    /// Compares a step with its neighbour. Each is given by its milliseconds and its work.
     pub fn of(own: (f64, &Asked), neighbour: (f64, &Asked)) -> Self {
         let time = own.0 / neighbour.0;
         let asked = if time > 1.0 { own.1.times(neighbour.1) } else { neighbour.1.times(own.1) };
         Self { time, asked }
     }
 
-    /// Returns how many times what is explained the more expensive of the two costs.
+    /// Returns the excess cost of the more expensive of the two: its ratio of time over its ratio
+    /// of work.
     pub fn beyond(self) -> f64 {
         self.time.max(1.0 / self.time) / self.asked
     }

@@ -58,7 +58,7 @@ impl Chapter {
         json!({ "name": self.name, "steps": steps })
     }
 
-    /// Returns the cliffs, each with how many times what is explained it costs.
+    /// Returns the cliffs, each with its excess cost.
     pub fn cliffs(&self) -> impl Iterator<Item = (f64, String)> {
         self.outcomes.iter().filter_map(|outcome| {
             let (beside, ratio) = compared(&self.outcomes, outcome)?;
