@@ -197,7 +197,7 @@ impl fmt::Display for Failure {
                 write!(out, "{}: {findings} findings", file.display())
             }
             Self::Incomplete { failed, kept } => {
-                write!(out, "{failed} cases could not be drawn")?;
+                write!(out, "{failed} of the cases could not be drawn")?;
                 kept.iter().try_for_each(|file| write!(out, "; {} is unchanged", file.display()))
             }
             Self::Output { file, message, .. } => write!(out, "{}: {message}", file.display()),
