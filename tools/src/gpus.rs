@@ -6,7 +6,7 @@ use splatkit::{Error, engine::Gpu};
 
 #[derive(Args, Debug)]
 pub struct Gpus {
-    /// Writes JSON.
+    /// Print the list as JSON.
     #[arg(long)]
     json: bool,
 }

@@ -1,4 +1,4 @@
-//! What was measured, as Markdown and as JSON.
+//! Measurements as Markdown and as JSON.
 
 use super::{
     measure::{Measured, Outcome},
@@ -18,7 +18,8 @@ pub struct Chapter {
     pub outcomes: Vec<Outcome>,
 }
 
-/// What every case tells, and what some do: the seed's rate, and whether repeated runs agreed.
+/// The columns of all cases. Further columns are the classic table's numbers, and whether repeated
+/// runs agreed.
 const COLUMNS: [&str; 13] = [
     "case",
     "drawn",
