@@ -113,7 +113,7 @@ impl Chapter {
             let Ok(found) = result else { continue };
             table.row(name, step_cells(&names, &found.steps));
             if let Some(gathered) = &found.gathered {
-                table.row(&format!("{name}, gathered"), step_cells(&names, &gathered.steps));
+                table.row(format!("{name}, gathered"), step_cells(&names, &gathered.steps));
             }
         }
         table
