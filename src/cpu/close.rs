@@ -1,6 +1,6 @@
 //! Closes a sheet at eight pixels. The field in the sheet is a parabola along each ray. It is
 //! classified, lit, and composited front to back together with the sheet's radiance.
-//! `src/reference` has the definition; shaders/sheet.wgsl does the same.
+//! `src/reference` has the definition; shaders/shared/sheet.wgsl does the same.
 
 use super::{
     plan::Plan,

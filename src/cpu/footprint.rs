@@ -1,11 +1,10 @@
-//! The footprint of a splat: the pixels and sheets that it covers (shaders/footprint.wgsl), and the
+//! The footprint of a splat: the pixels and sheets that it covers (shaders/shared/footprint.wgsl), and the
 //! record that tiles read.
 
 use super::plan::Plan;
 use crate::{
-    engine::uniforms::{ENDS, ISOTROPIC, RADIANCE, Source},
-    scene::Mode,
-    scene::Order,
+    plan::uniforms::{ENDS, ISOTROPIC, RADIANCE, Source},
+    scene::{Mode, Order},
     splat::{FOOTPRINT_BLUR, STEP_BACK, Splat, decode_normal},
 };
 use glam::{Mat3, Vec3};
@@ -69,7 +68,7 @@ struct Place {
 }
 
 /// Returns a splat of a set or a hierarchy in view space, widened so that it cannot fall between
-/// pixels (shaders/splats.wgsl).
+/// pixels (shaders/shared/splats.wgsl).
 pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
     let to_view = to_view(source);
     let mut center = to_view * Vec3::from(splat.center) + origin(source);

@@ -11,9 +11,9 @@ use super::{
 };
 use crate::{
     Error, Result,
-    engine::uniforms::Source,
     hierarchy::{Cut, Levels},
     math::{Kernel, View},
+    plan::uniforms::Source,
     scene::{Item, Scene, Settings},
     splat::{Payload, Splat, SplatSet},
     volume::{

@@ -48,10 +48,10 @@ mod window;
 
 use crate::{
     Error, Result,
-    engine::{FrameStats, pace::Pace, uniforms::Frame},
     hierarchy::Detail,
     math::{Camera, Sheets, View},
     picture::Picture,
+    plan::{FrameStats, pace::Pace, uniforms::Frame},
     scene::{Evaluate, Item, Optics, Scene, Settings},
     volume::{
         Lattice, TransferFunction,

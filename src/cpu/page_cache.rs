@@ -10,9 +10,9 @@ use super::{
 };
 use crate::{
     Result,
-    engine::uniforms::Source,
     hierarchy::{Cut, Hierarchy, SHARE_UNIT, needed::Needed},
     math::View,
+    plan::uniforms::Source,
     scene::Settings,
 };
 use fearless_simd::{Level, Simd};

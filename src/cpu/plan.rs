@@ -2,11 +2,11 @@
 //! drawing.
 
 use crate::{
-    engine::{
+    math::{Kernel, Profile, Sheets, View},
+    plan::{
         tables::Tables,
         uniforms::{Frame, clip_counts},
     },
-    math::{Kernel, Profile, Sheets, View},
     scene::{Classification, Gradient, Item, Mode, Optics, Order, Scene, Settings},
     volume::{Arrangement, TransferFunction, bricks::Choice},
 };

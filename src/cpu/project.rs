@@ -7,7 +7,7 @@ use super::{
     vector::{Lanes, dot, each, log2, three},
 };
 use crate::{
-    engine::uniforms::Source,
+    plan::uniforms::Source,
     splat::{FOOTPRINT_BLUR, NO_NORMAL, STEP_BACK, Splat},
 };
 use fearless_simd::{Simd, i32x8, mask32x8, prelude::*};

@@ -1,5 +1,5 @@
 //! Adds splats to the pixels of a tile: their sections in a window of sheets, and their kernels on
-//! the planes between these sheets. shaders/kernels.wgsl does the same; docs/engine.md explains the
+//! the planes between these sheets. shaders/shared/kernels.wgsl does the same; docs/engine.md explains the
 //! mathematics.
 
 use super::{
@@ -22,8 +22,8 @@ const FAR: f32 = 12.0;
 const LEAST_ADDED: f32 = 1e-7;
 /// Number of table entries along the kernel's radius, and of cells along each side of the table of
 /// its sections (engine/tables.rs).
-const RADII: usize = crate::engine::tables::RADII;
-const SECTIONS: usize = crate::engine::tables::SECTIONS;
+const RADII: usize = crate::plan::tables::RADII;
+const SECTIONS: usize = crate::plan::tables::SECTIONS;
 
 /// A packet of a tile: its rays and its pixels.
 pub struct Packet<S: Simd> {

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use splatkit::{
-    engine::FrameStats,
+    FrameStats,
     math::{Kernel, Profile},
     scene::{Classification, Item, Mode, Optics, Order, Scene, Settings},
     volume::TransferFunction,

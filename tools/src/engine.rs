@@ -6,7 +6,7 @@ use crate::{
 use clap::{Args, ValueEnum};
 use splatkit::{
     Device, Error,
-    engine::{AdapterChoice, Budget, Gpu},
+    gpu::{AdapterChoice, Budget, Gpu},
     hierarchy::Detail,
     picture::Picture,
     scene::{self, Item, Scene, Settings},

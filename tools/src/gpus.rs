@@ -2,7 +2,7 @@
 
 use crate::{failure::Failure, output};
 use clap::Args;
-use splatkit::{Error, engine::Gpu};
+use splatkit::{Error, gpu::Gpu};
 
 #[derive(Args, Debug)]
 pub struct Gpus {

@@ -13,7 +13,7 @@ use crate::{
 };
 use clap::Args;
 use splatkit::{
-    Renderer, disk, engine::FrameStats, math::Camera, picture::Picture, reference, scene::Settings,
+    FrameStats, Renderer, disk, math::Camera, picture::Picture, reference, scene::Settings,
 };
 use std::{
     path::{Path, PathBuf},

@@ -19,8 +19,8 @@ use crate::{
 use clap::Args;
 use splatkit::{
     Error,
-    engine::{AdapterChoice, Gpu, PreparedScene, Renderer},
     formats::Kind,
+    gpu::{AdapterChoice, Gpu, PreparedScene, Renderer},
     math::Camera,
     picture::Picture,
     scene::{Scene, Settings},

@@ -6,8 +6,7 @@ use super::{
 };
 use crate::{bench::STEP, progress::Progress, render::milliseconds, timing::Times};
 use splatkit::{
-    Device, Error, Renderer, Result,
-    engine::FrameStats,
+    Device, Error, FrameStats, Renderer, Result,
     picture::Picture,
     scene::{Evaluate, Settings},
 };

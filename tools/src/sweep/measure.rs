@@ -11,7 +11,7 @@ use crate::{
     suite::measure::{reopen, require_content},
     timing::Times,
 };
-use splatkit::{Device, Error, Renderer, Result, engine::FrameStats, scene::Evaluate};
+use splatkit::{Device, Error, FrameStats, Renderer, Result, scene::Evaluate};
 use std::time::Instant;
 
 /// How many frames of a step are drawn: at least `least`, and more, up to `most`, until they have

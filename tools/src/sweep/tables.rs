@@ -148,7 +148,7 @@ pub fn cliffs(chapters: &[Chapter]) -> String {
 mod tests {
     use super::*;
     use crate::{sweep::asked::Asked, timing::Times};
-    use splatkit::engine::FrameStats;
+    use splatkit::FrameStats;
 
     fn outcome(name: &str, against: Option<usize>, ms: f64) -> Outcome {
         let asked = Asked { pixels: 100.0, on_rays: 1000.0, in_view: 10.0 };
