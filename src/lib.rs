@@ -4,7 +4,9 @@
 //! ([`splat`]) in a [`Scene`](scene::Scene) → a [`Renderer`], which draws with the [`gpu`] on wgpu (one pass, one Rust file, one
 //! shader) or with that for processors ([`cpu`]) → a [`Picture`](picture::Picture).
 
+pub mod bricks;
 pub mod compare;
+pub mod container;
 pub mod cpu;
 pub mod deadline;
 pub mod disk;

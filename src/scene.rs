@@ -4,12 +4,12 @@ mod numbers;
 
 use crate::{
     Error, Result,
+    bricks::{self, Bricks, Choice},
     hierarchy::{Detail, Hierarchy},
     math::{Bounds, Kernel, Profile, Sheets, Tensor, View},
     splat::{FOOTPRINT_BLUR, Payload, STEP_BACK, SplatSet},
     volume::{
         Arrangement, Lattice, Shade, TransferFunction, Volume,
-        bricks::{self, Bricks, Choice},
         reach::{EVERYTHING, first_visible},
     },
 };

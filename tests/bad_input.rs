@@ -5,10 +5,9 @@ mod inputs;
 
 use inputs::*;
 use splatkit::{
-    Error,
+    Error, bricks,
     hierarchy::{Hierarchy, file},
     input::Limits,
-    volume::bricks,
 };
 use std::{
     path::Path,

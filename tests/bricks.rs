@@ -4,6 +4,7 @@
 use glam::DVec3;
 use splatkit::{
     FrameStats,
+    bricks::{self, Bricks, WriteOptions},
     compare::compare_pictures,
     cpu::CpuRenderer,
     gpu::{AdapterChoice, Gpu, Renderer},
@@ -13,11 +14,7 @@ use splatkit::{
     picture::Picture,
     reference,
     scene::{Classification, Clip, ClipShape, Evaluate, Scene, Settings},
-    volume::{
-        Lattice, Samples, TransferFunction, Volume,
-        bricks::{self, Bricks, WriteOptions},
-        reach::EVERYTHING,
-    },
+    volume::{Lattice, Samples, TransferFunction, Volume, reach::EVERYTHING},
 };
 use std::sync::Arc;
 

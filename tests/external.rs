@@ -314,7 +314,7 @@ fn points_far_off_are_told() {
     std::fs::write(folder.path("cloud.ply"), ply(&cloud, false, false)).unwrap();
     let out = folder.path("out.splk");
     let error = in_regions(&[folder.path("cloud.ply")], &out).unwrap_err().to_string();
-    assert!(error.contains("cloud.ply: points: more than 8192 lie within"), "{error}");
+    assert!(error.contains("cloud.ply: points: more than 8192 points lie within"), "{error}");
     assert!(!out.exists());
 }
 

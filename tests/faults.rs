@@ -4,6 +4,7 @@
 use glam::DVec3;
 use splatkit::{
     Error,
+    bricks::Bricks,
     compare::compare_pictures,
     gpu::{AdapterChoice, Gpu, Renderer},
     hierarchy::{BuildOptions, Detail, Hierarchy, Tree},
@@ -11,7 +12,7 @@ use splatkit::{
     picture::Picture,
     scene::{Evaluate, Scene, Settings},
     surface::{Mesh, SurfelOptions},
-    volume::{Lattice, Samples, TransferFunction, Volume, bricks::Bricks, phantoms::Phantom},
+    volume::{Lattice, Samples, TransferFunction, Volume, phantoms::Phantom},
 };
 use std::{sync::Arc, time::Duration};
 

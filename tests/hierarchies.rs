@@ -3,10 +3,12 @@
 
 use glam::{DVec3, Vec3};
 use splatkit::{
+    bricks::Bricks,
     compare::compare_pictures,
+    container::Severity,
     gpu::{AdapterChoice, Gpu, Renderer},
     hierarchy::{
-        BuildOptions, Cut, Detail, Hierarchy, Preset, SHARE_UNIT, Severity, Tree,
+        BuildOptions, Cut, Detail, Hierarchy, Preset, SHARE_UNIT, Tree,
         file::{WriteOptions, to_bytes},
         validate,
     },
@@ -17,7 +19,7 @@ use splatkit::{
     scene::{Clip, ClipShape, Scene, Settings},
     splat::{Splat, SplatSet},
     surface::{Mesh, SurfelOptions},
-    volume::{TransferFunction, bricks::Bricks, phantoms::Phantom},
+    volume::{TransferFunction, phantoms::Phantom},
 };
 use std::{path::Path, sync::Arc};
 

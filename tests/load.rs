@@ -6,6 +6,7 @@
 
 use glam::DVec3;
 use splatkit::{
+    bricks::{self, Bricks},
     formats,
     gpu::{AdapterChoice, Gpu, Renderer},
     hierarchy::{self, BuildOptions, Detail, Hierarchy, Tree},
@@ -14,11 +15,7 @@ use splatkit::{
     scattered::SampleOptions,
     scene::{Mode, Optics, Order, Scene, Settings},
     surface::{Mesh, SurfelOptions},
-    volume::{
-        TransferFunction,
-        bricks::{self, Bricks},
-        phantoms::Phantom,
-    },
+    volume::{TransferFunction, phantoms::Phantom},
 };
 use std::{
     path::{Path, PathBuf},

@@ -3,6 +3,7 @@
 
 use glam::{DVec3, Vec3};
 use splatkit::{
+    bricks::Bricks,
     compare::compare_pictures,
     gpu::{AdapterChoice, Budget, Gpu, Renderer},
     hierarchy::{BuildOptions, Detail, Hierarchy, Tree},
@@ -13,7 +14,7 @@ use splatkit::{
     scene::{Evaluate, Scene, Settings},
     splat::SplatSet,
     surface::{Mesh, SurfelOptions},
-    volume::{TransferFunction, Volume, bricks::Bricks, phantoms::Phantom},
+    volume::{TransferFunction, Volume, phantoms::Phantom},
 };
 use std::{
     sync::Arc,

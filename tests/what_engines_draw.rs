@@ -6,6 +6,7 @@
 use glam::{DMat3, DVec3};
 use splatkit::{
     Error, Result,
+    bricks::Bricks,
     compare::compare_pictures,
     cpu::CpuRenderer,
     gpu::{AdapterChoice, Gpu, Renderer},
@@ -20,7 +21,7 @@ use splatkit::{
     splat::SplatSet,
     surface::{Mesh, SurfelOptions},
     volume::{
-        Arrangement, Isosurface, Lattice, Samples, Shade, TransferFunction, Volume, bricks::Bricks,
+        Arrangement, Isosurface, Lattice, Samples, Shade, TransferFunction, Volume,
         phantoms::Phantom,
     },
 };

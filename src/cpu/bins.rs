@@ -1,11 +1,8 @@
 //! Which splats meet which tiles. Blocks of tiles have lists of splats. The thread that draws a
 //! block sorts its list by the splats' first sheets and distributes it to the tiles.
 
-use super::{
-    footprint::Record,
-    plan::{Plan, TILE},
-};
-use crate::scene::Order;
+use super::{footprint::Record, plan::Plan};
+use crate::{plan::TILE, scene::Order};
 use rayon::prelude::*;
 use std::{
     ops::Range,

@@ -5,7 +5,6 @@
 
 use super::{
     bells,
-    field::{LEAST_DEVIATION, LEAST_WEIGHT, Weighting, weighting},
     radial::Radial,
     rectilinear::Axes,
     vector::{Lanes, each, three},
@@ -13,6 +12,7 @@ use super::{
 };
 use crate::{
     math::{Kernel, Profile},
+    plan::weighting::{LEAST_DEVIATION, LEAST_WEIGHT, Weighting, weighting},
     volume::{
         Arrangement, Lattice, Samples, Volume, overshoot::Overshoot, reach::neighbourhood_ranges,
     },

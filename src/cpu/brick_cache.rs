@@ -3,12 +3,9 @@
 
 use crate::{
     Result,
+    bricks::{BRICK_BLOCKS, Bricks, Choice, SIDE},
     math::Kernel,
-    volume::{
-        Samples,
-        bricks::{BRICK_BLOCKS, Bricks, Choice, SIDE},
-        each_type,
-    },
+    volume::{Samples, each_type},
 };
 use bytemuck::AnyBitPattern;
 use rayon::prelude::*;

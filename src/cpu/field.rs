@@ -17,42 +17,15 @@ use super::{
     window::{Sample, Weights, Window, row_of},
 };
 use crate::{
-    math::{Kernel, Profile, Tensor},
-    volume::{Samples, Volume, bricks::SIDE},
+    bricks::SIDE,
+    math::Tensor,
+    plan::weighting::Weighting,
+    volume::{Samples, Volume},
 };
 use fearless_simd::{Simd, i32x8, mask32x8, prelude::*};
 
 /// How far outside the lattice a place may lie and still have a sample in reach, in steps.
 pub const BEYOND: f32 = 1.999;
-/// Maximum weight of samples that count as out of reach, relative to 1 at the centre.
-pub const LEAST_WEIGHT: f64 = 5e-3;
-/// Minimum standard deviation of a kernel, in steps, whose weights fit 32 bits.
-pub const LEAST_DEVIATION: f64 = 0.3;
-
-/// How the samples around a place are weighted.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Weighting {
-    /// By Gaussians with this standard deviation, in steps.
-    Gaussian(f64),
-    Tensor(Tensor),
-}
-
-/// Returns the weighting of a kernel, or `None` if four weights an axis do not suffice.
-pub fn weighting(kernel: &Kernel) -> Option<Weighting> {
-    match kernel.profile {
-        Profile::Gaussian(sigma) => {
-            let at = |distance: f64| (-0.5 * (distance / sigma).powi(2)).exp();
-            (at(kernel.extent.min(2.0)) <= LEAST_WEIGHT).then_some(Weighting::Gaussian(sigma))
-        }
-        Profile::Tensor(tensor) => Some(Weighting::Tensor(tensor)),
-        Profile::BSpline | Profile::Hann | Profile::Table(_) => None,
-    }
-}
-
-/// Returns the standard deviation, in steps, of a Gaussian for which four weights an axis suffice.
-pub fn deviation(kernel: &Kernel) -> Option<f64> {
-    if let Some(Weighting::Gaussian(sigma)) = weighting(kernel) { Some(sigma) } else { None }
-}
 
 /// The field of a volume, by the type of its samples.
 pub enum Typed<'a> {

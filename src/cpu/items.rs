@@ -11,15 +11,13 @@ use super::{
 };
 use crate::{
     Error, Result,
+    bricks::{BLOCK, BLOCKS, Choice, SIDE},
     hierarchy::{Cut, Levels},
     math::{Kernel, View},
     plan::uniforms::Source,
     scene::{Item, Scene, Settings},
     splat::{Payload, Splat, SplatSet},
-    volume::{
-        Arrangement, Lattice, Samples, TransferFunction, Volume,
-        bricks::{BLOCK, BLOCKS, Choice, SIDE},
-    },
+    volume::{Arrangement, Lattice, Samples, TransferFunction, Volume},
 };
 use fearless_simd::Level;
 use glam::{Mat3, Vec3};

@@ -6,13 +6,16 @@ use super::{
     close::{OPAQUE, Pixels, Visible},
     footprint::Record,
     gather::{Gather, Last},
-    plan::{Plan, TILE},
+    plan::Plan,
     rays::{HIGH, PACKETS, Rays, WIDE},
     scatter::{Packet, Window, add},
     sums::{Sums, WINDOW, differences},
     vector::{each, three},
 };
-use crate::scene::{Mode, Optics, Order};
+use crate::{
+    plan::TILE,
+    scene::{Mode, Optics, Order},
+};
 use fearless_simd::{Simd, prelude::*};
 
 /// A tile's pixels, row by row: premultiplied colour and opacity, and the depth of the hit or the

@@ -28,9 +28,9 @@ mod bins;
 mod blend;
 mod brick_cache;
 mod close;
-pub(crate) mod field;
+mod field;
 mod footprint;
-pub(crate) mod gather;
+mod gather;
 mod items;
 mod march;
 mod nodes;
@@ -41,21 +41,27 @@ mod radial;
 mod rays;
 mod rectilinear;
 mod scatter;
-pub(crate) mod skip;
+mod skip;
 mod sums;
 mod vector;
 mod window;
 
 use crate::{
     Error, Result,
+    bricks::{Bricks, Choice},
     hierarchy::Detail,
     math::{Camera, Sheets, View},
     picture::Picture,
-    plan::{FrameStats, pace::Pace, uniforms::Frame},
+    plan::{
+        FrameStats, TILE, gathering,
+        pace::Pace,
+        shown::{self, Shown},
+        uniforms::Frame,
+        weighting::{deviation, weighting},
+    },
     scene::{Evaluate, Item, Optics, Scene, Settings},
     volume::{
         Lattice, TransferFunction,
-        bricks::{Bricks, Choice},
         reach::{EVERYTHING, first_visible},
     },
 };
@@ -69,9 +75,8 @@ use footprint::Record;
 use gather::Gather;
 use items::{Prepared, Spare};
 use march::{EMPTY, March, Tile};
-use plan::{Plan, TILE};
+use plan::Plan;
 use rayon::prelude::*;
-use skip::Shown;
 use std::{
     sync::atomic::{AtomicU64, Ordering::Relaxed},
     time::Instant,
@@ -286,8 +291,8 @@ impl CpuRenderer {
                 )))
             });
         }
-        let parts = gather::parts(&self.scene, &outline.sheets, outline.choice.as_ref());
-        match gather::obstacle(&self.scene, settings, parts, gather::unsuited) {
+        let parts = gathering::parts(&self.scene, &outline.sheets, outline.choice.as_ref());
+        match gathering::obstacle(&self.scene, settings, parts, gather::unsuited) {
             Some(what) if settings.evaluate == Evaluate::Gather => Err(Error::Argument(format!(
                 "{what} can't be gathered; scatter instead, or leave it to the engine"
             ))),
@@ -311,7 +316,7 @@ impl CpuRenderer {
                     }
                     let ranges = self.ranges.get_or_insert_with(|| match &self.blend {
                         Some(blend) => blend.ranges(volume, kernel),
-                        None => skip::field_ranges(volume, kernel),
+                        None => shown::field_ranges(volume, kernel),
                     });
                     let dims =
                         self.blend.as_ref().map_or(volume.drawn_lattice(), Blend::cells).dims;
@@ -346,7 +351,7 @@ impl CpuRenderer {
                     let (_, shown) = self.shown.as_ref()?;
                     let field = match &self.blend {
                         Some(blend) => Typed::blended(volume, blend, zero),
-                        None => Typed::new(volume, field::weighting(kernel)?, zero),
+                        None => Typed::new(volume, weighting(kernel)?, zero),
                     };
                     // Coefficients begin before the samples.
                     let drawn = volume.drawn_lattice();
@@ -375,13 +380,8 @@ impl CpuRenderer {
                     let fine = &bricks.header().lattice;
                     for ((level, share), (grid, shown)) in choice.levels.iter().zip(found) {
                         let (own, dims) = (bricks.lattice(*level), bricks.level(*level).dims);
-                        let field = Typed::of_bricks(
-                            cache.samples(),
-                            dims,
-                            grid,
-                            field::weighting(kernel)?,
-                            zero,
-                        );
+                        let field =
+                            Typed::of_bricks(cache.samples(), dims, grid, weighting(kernel)?, zero);
                         let to_own = own.axes.inverse();
                         let scale = (to_own * fine.axes).to_cols_array_2d();
                         let shift = (to_own * (fine.origin - own.origin)).as_vec3().to_array();
@@ -411,9 +411,9 @@ impl CpuRenderer {
         let steps = steps.fold(0.0, f64::max) * outline.sheets.step;
         let looks =
             if steps <= 1.0 { 0 } else { ((steps / gather::MOST_APART).ceil() as usize).max(2) };
-        let parts = gather::parts(&self.scene, &outline.sheets, outline.choice.as_ref());
+        let parts = gathering::parts(&self.scene, &outline.sheets, outline.choice.as_ref());
         let deviation = self.scene.items.iter().find_map(|item| match item {
-            Item::Volume(_, kernel, _) | Item::Bricks(_, kernel, _) => field::deviation(kernel),
+            Item::Volume(_, kernel, _) | Item::Bricks(_, kernel, _) => deviation(kernel),
             _ => None,
         });
         let ends = deviation.map(|deviation| (1.0 / deviation) as f32);

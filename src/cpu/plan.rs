@@ -2,17 +2,17 @@
 //! drawing.
 
 use crate::{
+    bricks::Choice,
     math::{Kernel, Profile, Sheets, View},
     plan::{
+        TILE,
         tables::Tables,
         uniforms::{Frame, clip_counts},
     },
     scene::{Classification, Gradient, Item, Mode, Optics, Order, Scene, Settings},
-    volume::{Arrangement, TransferFunction, bricks::Choice},
+    volume::{Arrangement, TransferFunction},
 };
 
-/// Pixels along each side of a tile.
-pub const TILE: usize = 8;
 /// The place of a plane in front of or behind all others.
 const NOWHERE: f32 = 3e38;
 

@@ -1,10 +1,10 @@
 //! The rays of eight pixels: four columns in two rows.
 
 use super::{
-    plan::{Plan, TILE},
+    plan::Plan,
     vector::{Lanes, dot_with, three},
 };
-use crate::scene::Settings;
+use crate::{plan::TILE, scene::Settings};
 use fearless_simd::{Simd, prelude::*};
 
 /// Packets of a tile.

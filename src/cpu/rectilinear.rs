@@ -5,12 +5,12 @@
 
 use super::{
     blend::{MOST_TAPS, Sums, reach},
-    field::LEAST_WEIGHT,
     vector::{Lanes, each, exp2, three},
     window::columns,
 };
 use crate::{
     math::{Kernel, Profile},
+    plan::weighting::LEAST_WEIGHT,
     volume::{Volume, overshoot::Overshoot, reach::neighbourhood_ranges},
 };
 use fearless_simd::{Simd, i32x8, prelude::*};

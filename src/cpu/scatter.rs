@@ -192,7 +192,7 @@ pub fn add<S: Simd>(
     let [first, last] = record.pixels;
     let from: [usize; 2] = [0, 1].map(|axis| (first[axis] - corner[axis]).max(0) as usize);
     let to: [usize; 2] =
-        [0, 1].map(|axis| (last[axis] - corner[axis]).min(super::plan::TILE as i32 - 1) as usize);
+        [0, 1].map(|axis| (last[axis] - corner[axis]).min(crate::plan::TILE as i32 - 1) as usize);
     for row in from[1] / HIGH..=to[1] / HIGH {
         for column in from[0] / WIDE..=to[0] / WIDE {
             let number = row * 2 + column;

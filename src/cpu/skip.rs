@@ -1,92 +1,16 @@
-//! In which sheets of which tiles a lattice may be visible: projected blocks of visible samples.
+//! Looking up what is visible: for the lanes of a packet, and for the bricks at hand.
 
 use super::{
     brick_cache::BrickCache,
-    field::deviation,
-    plan::TILE,
     vector::{Lanes, three, words},
 };
 use crate::{
-    math::{Bounds, Kernel, Sheets, View},
-    volume::{
-        Lattice, Volume,
-        bricks::{self, BLOCKS, Choice},
-        reach::neighbourhood_ranges,
-    },
+    bricks::{self, BLOCKS, Choice},
+    plan::shown::{BLOCK, Shown, bit_of},
 };
 use fearless_simd::{Simd, i32x8, prelude::*, u32x8};
-use glam::{DMat3, DVec3};
-use rayon::prelude::*;
-
-/// Samples along each side of a block.
-const BLOCK: usize = 4;
-
-/// The samples of a volume around which something is visible: two words for each block of 4 × 4 × 4
-/// samples, a bit for each sample. For a level in bricks, a bit stands for a block of samples with
-/// a known range.
-#[derive(Debug)]
-pub struct Shown {
-    /// Samples along each axis.
-    dims: [usize; 3],
-    /// Bits stand for cells of 2 to the power of this many samples along each axis.
-    coarse: u32,
-    blocks: [usize; 3],
-    words: Vec<[u32; 2]>,
-}
-
-/// The bits of 2 × 2 × 2 cells in a word.
-const QUARTER: u32 = 0x0033_0033;
-
-/// The widest Gaussian, in steps, for which `FAR_WEIGHT` holds.
-const WIDEST: f64 = 0.6;
-
-/// The share of a Gaussian's weight that samples two steps from the nearest one have in total. It
-/// allows for places up to a third of a step further away. For the usual kernel it is 0.085 at half
-/// a step.
-const FAR_WEIGHT: f64 = 0.15;
-
-/// Returns, for each sample of a volume, the range of the field at the places nearest to that
-/// sample. The samples next to it have nearly all the weight; those two steps away move the field
-/// by at most their share.
-pub fn field_ranges(volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
-    let mut ranges = volume.drawn_ranges(kernel).into_owned();
-    if deviation(kernel).is_some_and(|sigma| sigma <= WIDEST) && volume.coefficients.is_none() {
-        let near = neighbourhood_ranges(volume, [1; 3]);
-        ranges.par_iter_mut().zip(near).for_each(|([low, high], [near_low, near_high])| {
-            let share = |difference: u8| (f64::from(difference) * FAR_WEIGHT).ceil() as u8;
-            *low = near_low - share(near_low - *low);
-            *high = near_high + share(*high - near_high);
-        });
-    }
-    ranges
-}
 
 impl Shown {
-    /// `dims` is the number of samples along each axis, `ranges` the extremes around each sample.
-    /// For each minimum, `first` is the smallest maximum with which something is visible.
-    pub fn new(dims: [usize; 3], ranges: &[[u8; 2]], first: &[u16; 256]) -> Self {
-        let shows = |[low, high]: [u8; 2]| u16::from(high) >= first[usize::from(low)];
-        let blocks = dims.map(|n| n.div_ceil(BLOCK));
-        let word = |block: usize| {
-            let at =
-                [block % blocks[0], block / blocks[0] % blocks[1], block / blocks[0] / blocks[1]];
-            let along = |axis: usize| at[axis] * BLOCK..((at[axis] + 1) * BLOCK).min(dims[axis]);
-            let mut words = [0; 2];
-            for z in along(2) {
-                for y in along(1) {
-                    let row = &ranges[(z * dims[1] + y) * dims[0]..][along(0)];
-                    for (x, range) in row.iter().enumerate() {
-                        let (half, bit) = bit_of([x, y, z]);
-                        words[half] |= u32::from(shows(*range)) << bit;
-                    }
-                }
-            }
-            words
-        };
-        let words = (0..blocks.iter().product::<usize>()).into_par_iter().map(word).collect();
-        Self { dims, coarse: 0, blocks, words }
-    }
-
     /// Returns the visible blocks of a level of a volume in bricks, of those that a picture shows.
     pub fn of_bricks(cache: &BrickCache, choice: &Choice, level: usize) -> Self {
         let size = cache.bricks.level(level);
@@ -114,29 +38,6 @@ impl Shown {
         Self { dims: size.dims, coarse, blocks, words }
     }
 
-    /// Returns the bytes of memory.
-    pub fn bytes(&self) -> u64 {
-        size_of_val(self.words.as_slice()) as u64
-    }
-
-    /// Returns a bit for each sample in the order of the volume, 32 per word, the first in the
-    /// lowest bit.
-    pub fn bits(&self) -> Vec<u32> {
-        let [nx, ny, _] = self.dims;
-        let [columns, rows, _] = self.blocks;
-        let count = self.dims.iter().product::<usize>();
-        let word = |word: usize| {
-            let own = (32 * word..count.min(32 * word + 32)).map(|sample| {
-                let at = [sample % nx, sample / nx % ny, sample / (nx * ny)];
-                let block = (at[2] / BLOCK * rows + at[1] / BLOCK) * columns + at[0] / BLOCK;
-                let (half, bit) = bit_of(at);
-                self.words[block][half] >> bit & 1
-            });
-            own.enumerate().fold(0, |word, (place, bit)| word | bit << place)
-        };
-        (0..count.div_ceil(32)).into_par_iter().map(word).collect()
-    }
-
     /// Returns where something may be visible at the places nearest to the sample beside a place, a
     /// bit for each lane. Places are in steps.
     #[inline(always)]
@@ -154,142 +55,5 @@ impl Shown {
         let bit = ((z & 1) << 4) | ((y & 3) << 2) | (x & 3);
         let shows = (words >> bit.bitcast::<u32x8<S>>()) & 1;
         shows.simd_eq(1).to_bitmask()
-    }
-
-    /// Returns for each tile, row by row, the sheets in which something may be visible, as bits.
-    pub fn sheets_of_tiles(
-        &self,
-        lattice: &Lattice,
-        view: &View,
-        sheets: &Sheets,
-    ) -> Vec<Vec<u64>> {
-        let tiles = view.size.map(|side| (side as usize).div_ceil(TILE));
-        let words = sheets.count().div_ceil(64);
-        let [columns, rows, layers] = self.blocks;
-        let slice = |layer: usize| {
-            let mut own = vec![0u64; tiles[0] * tiles[1] * words];
-            for block in 0..columns * rows {
-                let words = self.words[layer * columns * rows + block];
-                let place = [block % columns, block / columns, layer].map(|at| at * BLOCK);
-                if self.coarse == 0 {
-                    if words != [0; 2] {
-                        self.mark(lattice, view, sheets, place, BLOCK, &mut own);
-                    }
-                    continue;
-                }
-                // Cells of many samples: eight cells at a time.
-                for (half, word) in words.iter().enumerate() {
-                    for quarter in 0..4 {
-                        let [x, y] = [quarter % 2 * 2, quarter / 2 * 2];
-                        if word >> (x + BLOCK * y) & QUARTER != 0 {
-                            let at = [place[0] + x, place[1] + y, place[2] + 2 * half];
-                            self.mark(
-                                lattice,
-                                view,
-                                sheets,
-                                at.map(|at| at << self.coarse),
-                                2 << self.coarse,
-                                &mut own,
-                            );
-                        }
-                    }
-                }
-            }
-            own
-        };
-        let join = |mut a: Vec<u64>, b: Vec<u64>| {
-            a.iter_mut().zip(b).for_each(|(a, b)| *a |= b);
-            a
-        };
-        let none = || vec![0u64; tiles[0] * tiles[1] * words];
-        let threads = rayon::current_num_threads();
-        let all = (0..layers)
-            .into_par_iter()
-            .with_min_len(layers.div_ceil(threads))
-            .fold(none, |sum, layer| join(sum, slice(layer)));
-        all.reduce(none, join).chunks(words.max(1)).map(<[u64]>::to_vec).collect()
-    }
-
-    /// Marks the tiles and sheets that a cube of samples may meet. The cube begins at sample
-    /// `first` and has `side` samples along each axis.
-    fn mark(
-        &self,
-        lattice: &Lattice,
-        view: &View,
-        sheets: &Sheets,
-        first: [usize; 3],
-        side: usize,
-        marks: &mut [u64],
-    ) {
-        let low = DVec3::from_array(first.map(|n| n as f64 - 0.5));
-        let end = |axis: usize| (first[axis] + side).min(self.dims[axis]) as f64 - 0.5;
-        let high = DVec3::new(end(0), end(1), end(2));
-        let half = lattice.axes * DMat3::from_diagonal(0.5 * (high - low));
-        let center = view.to_view(lattice.position(0.5 * (low + high)));
-        let half = view.rotation * half;
-        let reach = half.x_axis.abs() + half.y_axis.abs() + half.z_axis.abs();
-        let tiles = view.size.map(|side| side.div_ceil(TILE as u32) as usize);
-        let box_around = Bounds { min: center - reach, max: center + reach };
-        let (mut first, mut last) = ([0, 0], tiles.map(|n| n - 1));
-        // Blocks beside the eye may project anywhere.
-        if !view.perspective || box_around.min.z > 1e-6 * reach.max_element() {
-            for axis in 0..2 {
-                let ends = [box_around.min, box_around.max].map(|v| v[axis]);
-                let place = |along: f64, z: f64| {
-                    view.center[axis] + view.scale * along / if view.perspective { z } else { 1.0 }
-                };
-                let depths = [box_around.min.z, box_around.max.z];
-                let places = ends.iter().flat_map(|&along| depths.map(|z| place(along, z)));
-                let [from, to] = places
-                    .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
-                let side = TILE as f64;
-                if to < 0.0 || from >= f64::from(view.size[axis]) {
-                    return;
-                }
-                first[axis] = (from / side).max(0.0) as usize;
-                last[axis] = ((to / side).max(0.0) as usize).min(tiles[axis] - 1);
-            }
-        } else if box_around.max.z < 0.0 {
-            return;
-        }
-        let radius = reach.length();
-        let distance = if view.perspective { center.length() } else { center.z };
-        let (near, far) = (distance - radius, distance + radius);
-        let planes = &sheets.planes;
-        let from = planes.partition_point(|&plane| plane <= near).saturating_sub(1);
-        let to = planes.partition_point(|&plane| plane < far).min(sheets.count());
-        let words = sheets.count().div_ceil(64);
-        for row in first[1]..=last[1] {
-            for column in first[0]..=last[0] {
-                let own = &mut marks[(row * tiles[0] + column) * words..][..words];
-                for sheet in from..to {
-                    own[sheet / 64] |= 1 << (sheet % 64);
-                }
-            }
-        }
-    }
-}
-
-/// Returns the word of a sample in its block, and its bit in that word.
-fn bit_of([x, y, z]: [usize; 3]) -> (usize, usize) {
-    (z / 2 % 2, (z % 2 * BLOCK + y % BLOCK) * BLOCK + x % BLOCK)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bits_are_in_the_order_of_the_samples() {
-        let (dims, odd) = ([5, 3, 6], |sample: usize| sample * sample % 7 == 2);
-        let ranges: Vec<[u8; 2]> =
-            (0..90).map(|sample| [0, if odd(sample) { 200 } else { 10 }]).collect();
-        let shown = Shown::new(dims, &ranges, &[100; 256]);
-        for (word, bits) in shown.bits().into_iter().enumerate() {
-            for bit in 0..32 {
-                let sample = 32 * word + bit;
-                assert_eq!(bits >> bit & 1 != 0, sample < 90 && odd(sample), "{sample}");
-            }
-        }
     }
 }

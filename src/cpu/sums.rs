@@ -5,10 +5,11 @@
 
 use super::{
     close::{Face, Layer},
-    plan::{Plan, TILE},
+    plan::Plan,
     rays::{PACKETS, Rays},
     vector::{Lanes, three},
 };
+use crate::plan::TILE;
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
 /// Sheets of a window.

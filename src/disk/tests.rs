@@ -7,7 +7,7 @@ use super::{
     write,
 };
 use crate::{
-    Error, Result,
+    Error, Result, bricks,
     formats::{Endian, RawLayout, SampleType, VolumeStream, nrrd, ply},
     hierarchy::{
         self,
@@ -18,7 +18,7 @@ use crate::{
     input::{Limits, testing::Folder},
     picture::Picture,
     surface::{Mesh, SurfelOptions},
-    volume::{Lattice, Volume, bricks, phantoms::Phantom},
+    volume::{Lattice, Volume, phantoms::Phantom},
 };
 use glam::DVec3;
 use std::{io::Write, path::Path};

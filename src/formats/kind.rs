@@ -18,7 +18,7 @@ pub enum Kind {
     Samples,
     /// [`Hierarchy::open`](crate::hierarchy::Hierarchy::open)
     Hierarchy,
-    /// [`Bricks::open`](crate::volume::bricks::Bricks::open)
+    /// [`Bricks::open`](crate::bricks::Bricks::open)
     Bricks,
 }
 

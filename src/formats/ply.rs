@@ -23,7 +23,7 @@ use crate::{
 };
 use faces::Faces;
 pub(super) use gaussians::warn as warn_of_gaussians;
-pub use gaussians::{write_gaussian_leaves, write_gaussians};
+pub use gaussians::write_gaussians;
 use glam::{DVec3, Vec2, Vec3};
 use header::Element;
 pub(super) use pieces::Pieces;

@@ -5,16 +5,14 @@ use super::{
 };
 use crate::{
     Error, Result,
+    bricks::{self, Bricks},
     hierarchy::{
         Hierarchy, file,
         testing::{surface, tree},
     },
     input::{Limits, Source, testing::Folder},
     surface::Mesh,
-    volume::{
-        bricks::{self, Bricks},
-        phantoms::Phantom,
-    },
+    volume::phantoms::Phantom,
 };
 use glam::DVec3;
 use std::{fs::File, path::Path};

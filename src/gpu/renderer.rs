@@ -2,6 +2,7 @@
 
 use crate::{
     Error, Result,
+    bricks::{Choice, slot_bytes},
     gpu::{
         budget::Budget,
         device::{Gpu, buffers::buffer, timestamps::Timestamps},
@@ -30,7 +31,6 @@ use crate::{
     picture::Picture,
     plan::{FrameStats, pace::Pace},
     scene::{Evaluate, Optics, Scene, Settings},
-    volume::bricks::{Choice, slot_bytes},
 };
 use std::{collections::HashMap, time::Instant};
 

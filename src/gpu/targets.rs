@@ -2,6 +2,7 @@
 
 use crate::{
     Error, Result,
+    bricks::Choice,
     gpu::{
         budget::Budget,
         device::{
@@ -18,7 +19,6 @@ use crate::{
     math::{Sheets, View},
     plan::{tables::Tables, uniforms::Frame},
     scene::{Item, Settings},
-    volume::bricks::Choice,
 };
 use wgpu::BufferUsages as Usage;
 

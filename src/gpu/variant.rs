@@ -1,6 +1,7 @@
 //! The variant of a picture: which of the shaders' parts its scene, view and settings need.
 
 use crate::{
+    bricks::Choice,
     gpu::{budget::Budget, device::Gpu, pipeline::variant::Variant, scene::PreparedScene},
     math::{Kernel, Profile, View},
     plan::{
@@ -8,7 +9,7 @@ use crate::{
         uniforms::{self},
     },
     scene::{Gradient, Item, Optics, Settings},
-    volume::{Arrangement, Lattice, bricks::Choice},
+    volume::{Arrangement, Lattice},
 };
 
 /// Which light and which sources a picture has decides what is compiled.

@@ -25,5 +25,4 @@ pub(crate) use cut::{MOST_PIXELS, cone_margin};
 pub use file::{CutSphere, Hierarchy};
 pub(crate) use levels::Levels;
 pub use node::{Block, MOST_CHILDREN, Node, Tree};
-pub(crate) use validate::Findings;
-pub use validate::{Finding, Severity, validate};
+pub use validate::validate;

@@ -6,71 +6,11 @@ use super::{
     merge::{WIDTH, deviation},
 };
 use crate::{
+    container::{Finding, Findings},
     math::Bounds,
     splat::{Splat, SplatSet},
 };
 use glam::{DVec3, Vec3};
-
-/// The severity of a finding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Severity {
-    /// Worth knowing, but pictures are right.
-    Warning,
-    /// Pictures may be wrong, or nothing can be read.
-    Error,
-}
-
-/// A violated invariant.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Finding {
-    /// The name of this kind of finding, the same in every release: `sphere`, `cone`, `size`,
-    /// `order`, …
-    pub code: &'static str,
-    pub severity: Severity,
-    /// The place: a block and a node, a page, or the header.
-    pub place: String,
-    /// What was found and what was expected.
-    pub message: String,
-}
-
-impl Finding {
-    pub fn error(code: &'static str, place: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { code, severity: Severity::Error, place: place.into(), message: message.into() }
-    }
-}
-
-/// Findings, with at most `MOST` of each kind; the rest are counted.
-#[derive(Debug, Default)]
-pub struct Findings {
-    list: Vec<Finding>,
-    left_out: Vec<(&'static str, usize)>,
-}
-
-/// The maximum number of findings of one kind that are listed.
-const MOST: usize = 16;
-
-impl Findings {
-    pub fn push(&mut self, finding: Finding) {
-        let code = finding.code;
-        if self.list.iter().filter(|other| other.code == code).count() < MOST {
-            self.list.push(finding);
-        } else if let Some((_, count)) = self.left_out.iter_mut().find(|(other, _)| *other == code)
-        {
-            *count += 1;
-        } else {
-            self.left_out.push((code, 1));
-        }
-    }
-
-    pub fn finish(mut self) -> Vec<Finding> {
-        let more = self.left_out.iter();
-        let more = more.map(|(code, count)| {
-            Finding::error(code, "further places", format!("{count} more of these"))
-        });
-        self.list.extend(more.collect::<Vec<_>>());
-        self.list
-    }
-}
 
 /// Checks every invariant of [`Node`], [`Block`](super::Block) and [`Tree`]; a sound tree has no
 /// findings. The invariants are:

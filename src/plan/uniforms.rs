@@ -1,11 +1,12 @@
 //! The structures that Rust writes and shaders read, field by field as in shaders/shared/frame.wgsl.
 
 use crate::{
+    bricks::Choice,
     math::{Bounds, Kernel, Profile, Sheets, View},
     plan::tables::Tables,
     scene::{Clip, ClipShape, Item, Mode, Scene, Settings},
     splat::SplatSet,
-    volume::{Arrangement, Isosurface, Lattice, Shade, TransferFunction, bricks::Choice},
+    volume::{Arrangement, Isosurface, Lattice, Shade, TransferFunction},
 };
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec2, DVec3};

@@ -14,7 +14,7 @@ mod tests;
 pub(crate) use merge::merged;
 pub use splats::SampleOptions;
 
-use crate::volume::Volume;
+use crate::volume::{BINS, TransferFunction, Volume};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -137,5 +137,14 @@ impl Points {
             counts[(((f64::from(value) - low) * scale) as usize).min(bins - 1)] += 1;
         }
         counts
+    }
+
+    /// Derives a transfer function from the samples, as [`TransferFunction::automatic`] does from a
+    /// volume. The low values count as background.
+    pub fn automatic_transfer(&self) -> TransferFunction {
+        let [first, last] = self.bounds();
+        let diagonal = (last - first).length();
+        let unit = if diagonal > 0.0 { diagonal / 100.0 } else { 1.0 };
+        TransferFunction::of_histogram(self.counts(BINS), self.range(), unit, false)
     }
 }

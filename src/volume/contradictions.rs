@@ -4,8 +4,8 @@
 use super::{
     Arrangement, Coefficients, Lattice, Reconstruction, Samples, TransferFunction, Volume,
     body_centred,
-    bricks::{self, Bricks},
 };
+use crate::bricks::{self, Bricks};
 use crate::{
     Error, Result,
     formats::nrrd,

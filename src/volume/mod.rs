@@ -1,6 +1,5 @@
 //! Volumes: samples on a lattice, and the transfer functions that give them colour and opacity.
 
-pub mod bricks;
 #[cfg(test)]
 mod contradictions;
 mod grid;
@@ -16,10 +15,11 @@ mod resample;
 mod samples;
 mod scalar;
 mod sharp;
-mod steps;
+pub(crate) mod steps;
 mod transfer;
 
 pub use lattice::{Arrangement, Lattice};
+pub(crate) use presets::BINS;
 pub use reconstruct::Reconstruction;
 pub use resample::body_centred;
 pub(crate) use samples::each_type;

@@ -2,7 +2,7 @@
 //! histogram.
 
 use super::{Shade, TransferFunction, Volume, each_type};
-use crate::{Error, Result, scattered::Points as ScatteredPoints};
+use crate::{Error, Result};
 
 /// The points of a preset: value, red, green, blue, opacity.
 type Points = &'static [[f64; 5]];
@@ -51,7 +51,7 @@ const GENERIC: Points = &[
 ];
 
 /// Bins of the histogram that [`TransferFunction::automatic`] analyses.
-const BINS: usize = 256;
+pub const BINS: usize = 256;
 
 impl TransferFunction {
     /// The names that [`named`](Self::named) accepts.
@@ -118,18 +118,14 @@ impl TransferFunction {
         Self::of_histogram(counts, volume.range, unit, bright)
     }
 
-    /// Derives a transfer function for scattered samples, as [`automatic`](Self::automatic) does
-    /// for a volume. The low values count as background.
-    pub fn automatic_for_points(points: &ScatteredPoints) -> Self {
-        let [first, last] = points.bounds();
-        let diagonal = (last - first).length();
-        let unit = if diagonal > 0.0 { diagonal / 100.0 } else { 1.0 };
-        Self::of_histogram(points.counts(BINS), points.range(), unit, false)
-    }
-
     /// Builds the function from a histogram: counts of values in equal parts of their range. The
     /// background's values are the low ones, or the high ones if `bright`.
-    fn of_histogram(mut counts: Vec<u64>, range: [f64; 2], unit: f64, bright: bool) -> Self {
+    pub(crate) fn of_histogram(
+        mut counts: Vec<u64>,
+        range: [f64; 2],
+        unit: f64,
+        bright: bool,
+    ) -> Self {
         let shade = Some(Shade::default());
         let [low, high] = range;
         if low >= high {

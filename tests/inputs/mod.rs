@@ -4,12 +4,12 @@ pub mod crafted;
 
 use glam::Vec3;
 use splatkit::{
-    Error, Result,
+    Error, Result, bricks,
     formats::{self, Endian, Kind, RawLayout, SampleType},
     hierarchy::{BuildOptions, Hierarchy, Tree, file},
     input::Limits,
     surface::{Mesh, SurfelOptions},
-    volume::{TransferFunction, Volume, bricks, phantoms::Phantom},
+    volume::{TransferFunction, Volume, phantoms::Phantom},
 };
 use std::{
     io::{Cursor, Write},

@@ -12,6 +12,7 @@ use checksums::{sum_bricks, sum_hierarchy};
 use glam::{DVec3, Vec3};
 use splatkit::{
     Error, Result,
+    bricks::Bricks,
     formats::{self, Endian, Kind, RawLayout, SampleType, Stream, VolumeStream},
     hierarchy::{
         BuildOptions, Hierarchy, Preset, Tree,
@@ -25,7 +26,7 @@ use splatkit::{
     scattered::Points,
     scene::{Scene, Settings},
     surface::{Mesh, SurfelOptions},
-    volume::{TransferFunction, Volume, bricks::Bricks},
+    volume::{TransferFunction, Volume},
 };
 use std::path::{Path, PathBuf};
 

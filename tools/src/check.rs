@@ -11,11 +11,11 @@ use crate::{
 use clap::Args;
 use serde_json::json;
 use splatkit::{
-    Deadline, Error,
+    Deadline, Error, bricks,
+    container::{Finding, Severity},
     formats::Kind,
-    hierarchy::{Finding, Severity, file},
+    hierarchy::file,
     surface::{Mesh, SurfelOptions},
-    volume::bricks,
 };
 use std::path::PathBuf;
 

@@ -10,11 +10,7 @@ use crate::{
 use clap::Args;
 use serde_json::{Map, Value, json};
 use splatkit::{
-    Error,
-    hierarchy::Hierarchy,
-    scattered::Points,
-    surface::Mesh,
-    volume::{Volume, bricks::Bricks},
+    Error, bricks::Bricks, hierarchy::Hierarchy, scattered::Points, surface::Mesh, volume::Volume,
 };
 use std::path::PathBuf;
 

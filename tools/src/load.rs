@@ -5,13 +5,14 @@ use clap::Args;
 use glam::DVec3;
 use splatkit::{
     Deadline, Error,
+    bricks::Bricks,
     formats::{self, Endian, Kind, RawLayout, SampleType, VolumeStream},
     hierarchy::Hierarchy,
     input::{Limits, Source},
     memory,
     scattered::{Points, SampleOptions},
     surface::Mesh,
-    volume::{Volume, bricks::Bricks},
+    volume::Volume,
 };
 use std::{
     path::{Path, PathBuf},

@@ -11,15 +11,13 @@ use clap::Args;
 use glam::DVec3;
 use splatkit::{
     Error,
+    bricks::{Bricks, Level},
     hierarchy::file::UpAxis,
     math::Bounds,
     memory,
     scene::Scene,
     surface::SurfelOptions,
-    volume::{
-        TransferFunction,
-        bricks::{Bricks, Level},
-    },
+    volume::TransferFunction,
 };
 use std::{
     path::{Path, PathBuf},
@@ -124,7 +122,7 @@ impl SceneFlags {
                     loaded.scene = loaded.scene.with_volume(volume, show.kernel.clone(), transfer);
                 }
                 Input::Samples(points) => {
-                    let automatic = || TransferFunction::automatic_for_points(&points);
+                    let automatic = || points.automatic_transfer();
                     let transfer = show.transfer(path, points.range(), automatic)?;
                     progress.stage(format!("Making splats of {}", path.display()));
                     let splats = points

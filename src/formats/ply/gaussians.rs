@@ -5,7 +5,6 @@
 use super::header::Element;
 use crate::{
     Error, Result, disk,
-    hierarchy::Tree,
     input::Source,
     math::eigen,
     splat::{Payload, Splat, SplatSet, decode_normal},
@@ -32,30 +31,12 @@ pub fn write_gaussians(set: &SplatSet, path: &Path) -> Result<()> {
             "samples of a volume have no colours to write as Gaussians".into(),
         ));
     }
-    write_all(set.splats.len() as u64, set.splats.iter(), set.origin, path)
-}
-
-/// Writes the leaves of a hierarchy as 3D Gaussians, as [`write_gaussians`] does.
-///
-/// # Errors
-/// [`Error::Output`] where the file cannot be written.
-pub fn write_gaussian_leaves(tree: &Tree, path: &Path) -> Result<()> {
-    let leaves = tree.nodes().filter(|node| node.is_leaf()).map(|node| &node.splat);
-    write_all(tree.leaf_count(), leaves, tree.origin, path)
-}
-
-fn write_all<'a>(
-    count: u64,
-    splats: impl Iterator<Item = &'a Splat>,
-    origin: DVec3,
-    path: &Path,
-) -> Result<()> {
     disk::write_with(path, |out| {
-        writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {count}")?;
+        writeln!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {}", set.splats.len())?;
         PROPERTIES.iter().try_for_each(|name| writeln!(out, "property float {name}"))?;
         writeln!(out, "end_header")?;
-        for splat in splats {
-            let bytes = gaussian(splat, origin).map(|value| (value as f32).to_le_bytes());
+        for splat in &set.splats {
+            let bytes = gaussian(splat, set.origin).map(|value| (value as f32).to_le_bytes());
             out.write_all(bytes.as_flattened())?;
         }
         Ok(())
@@ -104,7 +85,7 @@ fn gaussian(splat: &Splat, origin: DVec3) -> [f64; PROPERTIES.len()] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{hierarchy, input::testing::Folder, surface::Mesh};
+    use crate::{input::testing::Folder, surface::Mesh};
 
     #[test]
     fn gaussians_are_the_splats() {
@@ -155,16 +136,12 @@ mod tests {
     }
 
     #[test]
-    fn leaves_are_written_and_samples_are_refused() {
+    fn samples_are_refused() {
         let folder = Folder::new();
-        let path = folder.path().join("leaves.ply");
-        let tree = hierarchy::testing::tree(&hierarchy::testing::surface(100, 1));
-        write_gaussian_leaves(&tree, &path).unwrap();
-        let bytes = std::fs::read(&path).unwrap();
-        let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
-        assert_eq!(bytes.len() - end, 100 * 68);
         let mut set = Mesh::sphere(1).surfels(&Default::default()).unwrap();
         set.payload = Payload::Scalar;
+        let path = folder.path().join("samples.ply");
         assert!(matches!(write_gaussians(&set, &path), Err(Error::Argument(_))));
+        assert!(!path.exists());
     }
 }

@@ -7,9 +7,9 @@
 
 use crate::{
     Result,
+    bricks::{BRICK_BLOCKS, Brick, Bricks, Choice, SIDE, slot_bytes},
     gpu::device::{Gpu, buffers::buffer},
     math::Kernel,
-    volume::bricks::{BRICK_BLOCKS, Brick, Bricks, Choice, SIDE, slot_bytes},
 };
 use rayon::prelude::*;
 use std::{collections::HashMap, sync::Arc};

@@ -1,6 +1,7 @@
 //! Chunks: the parts of a scene that fit a binding.
 
 use crate::{
+    bricks::Bricks,
     gpu::{
         device::{Gpu, buffers::buffer},
         scene::{
@@ -13,7 +14,7 @@ use crate::{
     math::{Kernel, View},
     plan::uniforms::{COARSE, NODES, Source},
     splat::SplatSet,
-    volume::{Scalar, Volume, bricks::Bricks},
+    volume::{Scalar, Volume},
 };
 use std::sync::Arc;
 

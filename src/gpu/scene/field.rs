@@ -1,11 +1,6 @@
 //! The field of a lattice that is gathered: its samples as a texture, and what of it may show.
 
 use crate::{
-    cpu::{
-        field::deviation,
-        gather::unsuited_kernel,
-        skip::{Shown, field_ranges},
-    },
     gpu::{
         device::{
             Gpu, MOST_BUFFERS,
@@ -14,7 +9,12 @@ use crate::{
         pipeline::variant::Variant,
     },
     math::{Kernel, Sheets, View},
-    plan::uniforms::Frame,
+    plan::{
+        gathering::unsuited_kernel,
+        shown::{Shown, field_ranges},
+        uniforms::Frame,
+        weighting::deviation,
+    },
     scene::{Item, Scene, Settings},
     volume::{Arrangement, Scalar, Volume},
 };
@@ -50,8 +50,8 @@ pub fn obstacle(
     sheets: &Sheets,
     gpu: &Gpu,
 ) -> Option<&'static str> {
-    let parts = crate::cpu::gather::parts(scene, sheets, None);
-    if let Some(what) = crate::cpu::gather::obstacle(scene, settings, parts, unsuited) {
+    let parts = crate::plan::gathering::parts(scene, sheets, None);
+    if let Some(what) = crate::plan::gathering::obstacle(scene, settings, parts, unsuited) {
         return Some(what);
     }
     if parts > 1 {

@@ -3,6 +3,7 @@
 use super::chunk::{Chunk, Origin, SPAN_BYTES, list_bytes, runs_of, spans};
 use crate::{
     Error, Result,
+    bricks::Choice,
     gpu::{
         device::{
             Gpu,
@@ -24,7 +25,6 @@ use crate::{
     splat::{Payload, Splat, SplatSet},
     volume::{
         Arrangement, Lattice, Samples, TransferFunction, Volume,
-        bricks::Choice,
         reach::{EVERYTHING, first_visible},
     },
 };

@@ -8,27 +8,16 @@ use super::{
 };
 use crate::{
     Error,
+    container::Report,
+    container::{Finding, Findings},
     hierarchy::{
-        Finding, Node,
-        validate::{Findings, Footprints, check_block, check_portals},
+        Node,
+        validate::{Footprints, check_block, check_portals},
     },
     input::Limits,
     splat::NO_NORMAL,
 };
 use std::path::Path;
-
-/// The result of [`check`](check()).
-#[derive(Debug, Clone, Default)]
-pub struct Report {
-    /// Empty for a sound file.
-    pub findings: Vec<Finding>,
-}
-
-impl Report {
-    pub fn is_sound(&self) -> bool {
-        self.findings.is_empty()
-    }
-}
 
 /// Checks a file: header, directory, every checksum and the hash, then every invariant of the tree
 /// ([`validate`](crate::hierarchy::validate())) block by block. One block is in memory at a time.

@@ -4,10 +4,10 @@
 //! bits. Classes are entropy-coded. The low bits are nearly random and are stored directly.
 
 use super::{
-    bytes::{Cursor, Put},
     entropy::{BitReader, Bits, Decoder, Encoder, SYMBOLS, Slots, Table},
     quantise::logarithm,
 };
+use crate::container::{Cursor, Put};
 
 /// Added to the number of classes if a column stores differences.
 const DIFFERENCES: u8 = 128;

@@ -3,11 +3,11 @@
 
 use super::{
     HASH, PAGE_NODES,
-    bytes::{Cursor, Put},
     header::Stored,
     pages::{Around, Run},
     write::parents,
 };
+use crate::container::{Cursor, Put};
 use crate::hierarchy::Node;
 use std::ops::Range;
 

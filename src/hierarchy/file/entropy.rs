@@ -2,7 +2,7 @@
 //! turns, so that a processor works on several symbols at once. Input and output are words of 16
 //! bits.
 
-use super::bytes::Cursor;
+use crate::container::Cursor;
 
 /// The frequencies of a column add up to 2 to the power of this.
 const SCALE: u32 = 12;

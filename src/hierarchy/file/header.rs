@@ -1,9 +1,7 @@
 //! The header: properties of the whole file.
 
-use super::{
-    MAGIC, VERSION,
-    bytes::{Cursor, Put},
-};
+use super::{MAGIC, VERSION};
+use crate::container::{Cursor, Put};
 use crate::{
     hierarchy::validate::{fault_of_box, fault_of_extent},
     input::copy,

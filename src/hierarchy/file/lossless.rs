@@ -1,6 +1,6 @@
 //! Lossless pages: the bytes of the nodes, sorted by their position in a node, then compressed.
 
-use super::bytes::Cursor;
+use crate::container::Cursor;
 use crate::{hierarchy::Node, splat::Splat};
 
 /// Bytes of a stored node: splat, centre, radius, size, cone, first child, and number of children.

@@ -2,10 +2,10 @@
 
 use super::{
     bounds,
-    bytes::{Cursor, Put},
     column::{Columns, Planes},
     quantise::{Axes, Before, Code, Shape},
 };
+use crate::container::{Cursor, Put};
 use crate::{
     hierarchy::{MOST_CHILDREN, Node},
     splat::Splat,

@@ -7,7 +7,6 @@
 #![deny(clippy::disallowed_methods)]
 
 mod bounds;
-mod bytes;
 mod check;
 mod column;
 mod direction;
@@ -21,12 +20,11 @@ mod page;
 mod pages;
 mod quantise;
 mod read;
-mod spill;
 #[cfg(test)]
 mod tests;
 mod write;
 
-pub use check::{Report, check};
+pub use check::check;
 pub use directory::PageEntry;
 pub use header::{Header, UpAxis};
 pub use read::{CutSphere, Hierarchy, NO_PAGE, Page};
@@ -48,7 +46,3 @@ const HASH: usize = 32;
 pub(in crate::hierarchy) use page::enclose;
 pub(in crate::hierarchy) use page::joint_angle;
 pub(in crate::hierarchy) use pages::{in_order, reach};
-pub(crate) use {
-    bytes::{Cursor, Put},
-    spill::{Spill, Target},
-};

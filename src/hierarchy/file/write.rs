@@ -6,8 +6,8 @@ use super::{
     header::{Header, Stored, UpAxis},
     page::{self, Coded},
     pages::{Around, Run, in_order},
-    spill::{Spill, Target},
 };
+use crate::container::{Spill, Target};
 use crate::{
     Error, Result,
     hierarchy::{

@@ -5,7 +5,7 @@ use crate::{failure::Failure, output, progress::Progress, render::milliseconds, 
 use serde_json::json;
 use splatkit::{
     Error,
-    volume::bricks::{self, WriteOptions},
+    bricks::{self, WriteOptions},
 };
 use std::time::Instant;
 

@@ -10,9 +10,10 @@ use crate::camera::Subject;
 use glam::DVec3;
 use splatkit::{
     Error, Result,
+    bricks::Bricks,
     math::{Bounds, Kernel},
     scene::{Scene, Settings},
-    volume::{TransferFunction, bricks::Bricks, phantoms::Phantom},
+    volume::{TransferFunction, phantoms::Phantom},
 };
 use std::sync::Arc;
 

@@ -10,12 +10,10 @@ use super::{
 use glam::{DMat3, DVec3};
 use splatkit::{
     Error, Result,
+    bricks::Bricks,
     math::{Bounds, Camera, Kernel, Tensor},
     scene::{Scene, Settings},
-    volume::{
-        Arrangement, Lattice, Samples, Shade, TransferFunction, Volume, bricks::Bricks,
-        phantoms::Phantom,
-    },
+    volume::{Arrangement, Lattice, Samples, Shade, TransferFunction, Volume, phantoms::Phantom},
 };
 use std::sync::Arc;
 

@@ -3,16 +3,13 @@
 
 use super::{Directory, Entry, HASH, Stored, brick::encode};
 #[cfg(test)]
-use crate::volume::bricks::{Brick, Bricks};
+use crate::bricks::{Brick, Bricks};
 use crate::{
     Error, Result,
+    bricks::{Header, REACH, SIDE, cut::Slices, level, pyramid::Pyramid},
+    container::{Spill, Target},
     formats::VolumeStream,
-    hierarchy::file::{Spill, Target},
-    volume::{
-        Scalar, Volume,
-        bricks::{Header, REACH, SIDE, cut::Slices, level, pyramid::Pyramid},
-        steps::Steps,
-    },
+    volume::{Scalar, Volume, steps::Steps},
 };
 use rayon::prelude::*;
 use std::{borrow::Cow, io::Write, ops::Range, path::Path};

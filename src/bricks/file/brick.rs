@@ -2,9 +2,9 @@
 //! shorter.
 
 use super::directory::{CONSTANT, Entry, PACKED, UNIFORM};
-use crate::volume::{
-    Scalar,
+use crate::{
     bricks::{BRICK_BLOCKS, Brick, SIDE},
+    volume::Scalar,
 };
 use zstd::bulk::Compressor;
 

@@ -3,12 +3,10 @@
 use super::HASH;
 use crate::{
     Error, Result,
-    hierarchy::{Finding, Findings, file::Report},
+    bricks::{Brick, Bricks, Level, SIDE, pyramid::Pyramid},
+    container::{Finding, Findings, Report},
     input::Limits,
-    volume::{
-        bricks::{Brick, Bricks, Level, SIDE, pyramid::Pyramid},
-        steps::Steps,
-    },
+    volume::steps::Steps,
 };
 use rayon::prelude::*;
 use std::path::Path;

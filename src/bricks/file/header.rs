@@ -2,12 +2,10 @@
 
 use super::{MAGIC, VERSION};
 use crate::{
-    hierarchy::file::{Cursor, Put},
+    bricks::{Header, REACH, SIDE, level},
+    container::{Cursor, Put},
     input::copy,
-    volume::{
-        Lattice, Scalar,
-        bricks::{Header, REACH, SIDE, level},
-    },
+    volume::{Lattice, Scalar},
 };
 use glam::DMat3;
 

@@ -2,11 +2,9 @@
 
 use super::{HASH, Stored};
 use crate::{
-    hierarchy::file::{Cursor, Put},
-    volume::{
-        Scalar,
-        bricks::{BRICK_BLOCKS, Level, SIDE, level},
-    },
+    bricks::{BRICK_BLOCKS, Level, SIDE, level},
+    container::{Cursor, Put},
+    volume::Scalar,
 };
 
 /// Bytes of an entry.

@@ -1,0 +1,11 @@
+//! What the files of hierarchies (`.splk`) and of volumes in bricks (`.splv`) share: numbers in
+//! bytes, pages that wait until the directory before them is known, and the findings of a check.
+
+mod bytes;
+mod findings;
+mod spill;
+
+pub(crate) use bytes::{Cursor, Put};
+pub(crate) use findings::Findings;
+pub use findings::{Finding, Report, Severity};
+pub(crate) use spill::{Spill, Target};

@@ -1,0 +1,76 @@
+//! Whether the field of a scene can be gathered, and in how many parts of a sheet.
+
+use super::weighting::{LEAST_DEVIATION, Weighting, weighting};
+use crate::{
+    bricks::Choice,
+    math::{Kernel, Sheets},
+    scene::{Gradient, Item, MOST_GATHERED, Mode, Scene, Settings},
+    volume::{Arrangement, Volume},
+};
+
+/// Maximum thickness of a part of a thick sheet, in sample spacings.
+const PART: f64 = 1.5;
+
+/// Returns why the field of a scene can't be gathered, or `None` if it can. `parts` is the result
+/// of [`parts`]. `unsuited` returns why a volume and its kernel can't be gathered, if so.
+pub fn obstacle(
+    scene: &Scene,
+    settings: &Settings,
+    parts: usize,
+    unsuited: impl Fn(&Volume, &Kernel) -> Option<&'static str>,
+) -> Option<&'static str> {
+    let fields =
+        scene.items.iter().filter(|item| !matches!(item, Item::Radiance(_) | Item::Hierarchy(_)));
+    let unsuited = match fields.collect::<Vec<_>>()[..] {
+        [Item::Volume(volume, kernel, _)] => unsuited(volume, kernel),
+        [Item::Bricks(_, kernel, _)] => unsuited_kernel(kernel),
+        _ => return Some("a scene without a volume on a lattice"),
+    };
+    if unsuited.is_some() {
+        return unsuited;
+    }
+    let is_rectilinear = |item: &Item| {
+        matches!(
+            item,
+            Item::Volume(volume, ..)
+                if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_))
+        )
+    };
+    if parts > 1 && scene.items.iter().any(is_rectilinear) {
+        return Some("sheets thicker than two samples of a rectilinear lattice");
+    }
+    if settings.mode != Mode::Sheets || settings.classifies_samples() {
+        return Some("samples that are classified before interpolation");
+    }
+    (settings.gradient == Gradient::Central).then_some("gradients from neighbouring pixels")
+}
+
+/// Returns the number of parts of the thickest sheet. It is one if the field at the sheet's ends
+/// and middle determines its mean. Otherwise each part is so thin that two places in it do.
+pub fn parts(scene: &Scene, sheets: &Sheets, choice: Option<&Choice>) -> usize {
+    let spacing = scene.items.iter().find_map(|item| match item {
+        Item::Volume(volume, ..) => Some(volume.lattice.least_kernel_spacing()),
+        Item::Bricks(bricks, ..) => {
+            let coarser = choice.map_or(0.0, |choice| choice.lambda).exp2();
+            Some(coarser * bricks.header().lattice.least_kernel_spacing())
+        }
+        _ => None,
+    });
+    let Some(spacing) = spacing else { return 1 };
+    // A tolerance for rounding: default sheets may be exactly that thick.
+    if sheets.step <= MOST_GATHERED * spacing * (1.0 + 1e-9) {
+        return 1;
+    }
+    (sheets.step / (PART * spacing)).ceil() as usize
+}
+
+/// Returns why a kernel can't be gathered with four weights an axis.
+pub fn unsuited_kernel(kernel: &Kernel) -> Option<&'static str> {
+    match weighting(kernel) {
+        None => Some("kernels other than tensor products and Gaussians that reach two samples"),
+        Some(Weighting::Gaussian(sigma)) if sigma < LEAST_DEVIATION => {
+            Some("kernels much narrower than a sample")
+        }
+        Some(_) => None,
+    }
+}
