@@ -1,4 +1,4 @@
-//! A wall around decoders that are not ours.
+//! Isolation of third-party decoders: their panics become errors.
 
 use super::Source;
 use crate::Result;
@@ -9,13 +9,13 @@ use std::{
 };
 
 thread_local! {
-    /// How many walls this thread is behind.
+    /// Number of nested [`isolated`] calls on this thread.
     static BEHIND: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Runs a decoder that may panic on bytes that it did not expect, and makes an input error of that. What it worked on is
-/// dropped, so nothing half changed is seen afterwards. The panic is not printed; those of other threads are, so a decoder
-/// is to be isolated on the thread that it runs on.
+/// Runs a decoder that may panic on bytes that it did not expect, and turns the panic into an input
+/// error. The decoder's state is dropped, so nobody sees it half changed. The panic is not printed.
+/// Panics of other threads still are, so isolate a decoder on the thread that it runs on.
 pub(crate) fn isolated<T>(
     source: &Source,
     place: &str,
@@ -33,13 +33,14 @@ pub(crate) fn isolated<T>(
     })
 }
 
-/// Puts a hook before the one that there is, once: it keeps quiet about panics that are told as errors.
+/// Installs a panic hook in front of the existing one, once. It silences panics that [`isolated`]
+/// returns as errors.
 fn hush() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         let before = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |info| {
-            // A thread that ends has no such count any more.
+            // A thread that is ending no longer has this thread-local.
             if BEHIND.try_with(Cell::get).unwrap_or(0) == 0 {
                 before(info);
             }
