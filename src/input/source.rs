@@ -280,9 +280,8 @@ fn map_within(path: &Path, limits: &Limits, budget: &Budget) -> Result<Mapping> 
 /// Returns an error if a file has changed since it was mapped.
 pub(crate) fn intact(mapping: &Mapping, path: &Path) -> Result<()> {
     let Some(change) = mapping.change() else { return Ok(()) };
-    Err(Error::input(path, "file", format!("changed while it was read: {change}"))
-        .hint(
-            "try again when no program writes to it; programs that write a new file and rename it \
+    Err(Error::input(path, "file", format!("changed while it was read: {change}")).hint(
+        "try again when no program writes to it; programs that write a new file and rename it \
              do no harm",
-        ))
+    ))
 }

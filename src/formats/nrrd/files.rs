@@ -1,4 +1,4 @@
-//! The files of a detached header: one, a list, or a pattern with a number.
+//! The data files of a detached header: one, a list, or a pattern with a number.
 
 use super::shown;
 use crate::{
@@ -6,18 +6,19 @@ use crate::{
     input::{Source, copy},
 };
 
-/// Whether a field tells that the names of files follow in the lines below.
+/// Returns whether a field says that file names follow on the lines below.
 pub fn is_list(field: &str) -> bool {
     field.split_ascii_whitespace().next() == Some("LIST")
 }
 
-/// Whether a field tells of several files.
+/// Returns whether a field names several files.
 pub fn are_several(field: &str) -> bool {
     is_list(field) || Pattern::of(field).is_some()
 }
 
-/// The names that a field tells of; `rest` is what stands behind the header. Files hold equal parts of the samples, in the
-/// order of the last axis. So many samples are known to fit into memory.
+/// Returns the file names of a field; `rest` is the text after the header. The files contain equal
+/// parts of the samples, in order along the last axis. The caller has checked that this number of
+/// samples fits into memory.
 pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Result<Vec<String>> {
     const PLACE: &str = "data file";
     let wrong = |message: String| source.error(PLACE, message);
@@ -40,7 +41,7 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
     } else if let Some(pattern) = Pattern::of(field) {
         let count =
             pattern.count().ok_or_else(|| wrong(format!("“{}” counts no files", shown(field))))?;
-        // Each file holds a sample at least.
+        // Each file contains at least one sample.
         if count > dims.iter().product::<usize>() as u64 {
             return Err(wrong(format!(
                 "“{}” counts {count} files, more than there are samples",
@@ -81,7 +82,8 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
     Ok(names)
 }
 
-/// Names with a number, as printf writes them: `slice%03d.raw`, the first number, the last, the step; the axes of a file.
+/// A pattern of file names with a number, as printf formats it: `slice%03d.raw`, then the first
+/// number, the last number, the step, and optionally the number of axes in a file.
 struct Pattern<'a> {
     before: &'a str,
     behind: &'a str,
@@ -94,7 +96,7 @@ struct Pattern<'a> {
 }
 
 impl<'a> Pattern<'a> {
-    /// `None` for what is the name of one file.
+    /// Returns `None` for the name of a single file.
     fn of(field: &'a str) -> Option<Self> {
         let mut words = field.split_ascii_whitespace();
         let (before, number) = words.next()?.split_once('%')?;
@@ -106,7 +108,7 @@ impl<'a> Pattern<'a> {
         }
         let digits = number.bytes().take_while(u8::is_ascii_digit).count();
         let (width, behind) = number.split_at(digits);
-        // Wider names are longer than file systems take.
+        // Wider numbers would make names longer than file systems allow.
         let wide = if width.is_empty() {
             Some(0)
         } else {
@@ -124,7 +126,8 @@ impl<'a> Pattern<'a> {
         })
     }
 
-    /// How many files; `None` where the step leads nowhere.
+    /// Returns the number of files; `None` if the step does not lead from the first number to the
+    /// last.
     fn count(&self) -> Option<u64> {
         let way = i128::from(self.last) - i128::from(self.first);
         let steps = way.checked_div(self.step.into())?;
@@ -148,7 +151,7 @@ mod tests {
     use super::*;
     use crate::{formats::nrrd::read, input::testing::*, volume::Volume};
 
-    /// Reads a header of 2×1×4 bytes beside files of two and of four samples.
+    /// Reads a header of 2×1×4 bytes next to files of two and of four samples.
     fn volume(folder: &Folder, data_file: &str) -> Result<Volume> {
         for (index, name) in
             ["slice01.raw", "slice02.raw", "slice03.raw", "slice04.raw"].iter().enumerate()
