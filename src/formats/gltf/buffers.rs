@@ -1,4 +1,4 @@
-//! The bytes behind a glTF file: GLB chunks, data URIs and files beside it.
+//! The binary data of a glTF file: GLB chunks, data URIs and files beside it.
 
 use crate::{Result, input::Source};
 use ::gltf::json;
@@ -15,7 +15,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
 
-/// Splits a file in its JSON and, for GLB, its binary chunk.
+/// Splits a file into its JSON and, for GLB, its binary chunk.
 pub(super) fn split<'a>(source: &'a Source) -> Result<(&'a [u8], Option<&'a [u8]>)> {
     let bytes = source.bytes();
     if !bytes.starts_with(b"glTF") {
@@ -78,7 +78,8 @@ impl<'a> Buffers<'a> {
             let data = match (&buffer.uri, binary) {
                 (Some(uri), _) => Cow::Owned(resolve(source, &place, uri)?),
                 (None, Some(binary)) if index == 0 => Cow::Borrowed(binary),
-                // Without bytes it may stand for a compressed one; an error where it is used.
+                // A buffer without bytes may stand for a compressed one; it is an error where it is
+                // used.
                 (None, _) => Cow::Borrowed(&[][..]),
             };
             let claimed = buffer.byte_length.0;
@@ -92,7 +93,7 @@ impl<'a> Buffers<'a> {
         Ok(Self { source, root, bytes })
     }
 
-    /// The bytes of a buffer view, and its stride where it has one.
+    /// Returns the bytes of a buffer view, and its stride if it has one.
     pub fn view(&self, index: usize, place: &str) -> Result<(&[u8], Option<usize>)> {
         let Some(view) = self.root.buffer_views.get(index) else {
             let count = self.root.buffer_views.len();
@@ -122,14 +123,14 @@ impl<'a> Buffers<'a> {
         Ok((&bytes[start as usize..end as usize], view.byte_stride.as_ref().map(|stride| stride.0)))
     }
 
-    /// All bytes that the file brought, the JSON among them.
+    /// Returns the number of bytes of the file and all its buffers, including the JSON.
     pub fn total(&self) -> u64 {
         self.source.bytes().len() as u64
             + self.bytes.iter().map(|bytes| bytes.len() as u64).sum::<u64>()
     }
 }
 
-/// The bytes that a URI stands for: data in the URI, or a file beside this one.
+/// Returns the bytes that a URI refers to: data inside the URI, or a file beside this one.
 pub(super) fn resolve(source: &Source, place: &str, uri: &str) -> Result<Vec<u8>> {
     if let Some(data) = uri.strip_prefix("data:") {
         source.room::<u8>("a data URI", data.len())?;
@@ -159,7 +160,7 @@ pub(super) fn resolve(source: &Source, place: &str, uri: &str) -> Result<Vec<u8>
     file.unless_changed(Ok(file.bytes().to_vec()))
 }
 
-/// Undoes percent codes; `None` where a % is not followed by two hexadecimal digits.
+/// Decodes percent codes; `None` if a % is not followed by two hexadecimal digits.
 fn percent_decode(text: &str) -> Option<Vec<u8>> {
     let mut out = Vec::with_capacity(text.len());
     let mut bytes = text.bytes();

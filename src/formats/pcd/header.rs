@@ -1,4 +1,4 @@
-//! The header of a PCD file: lines of text, of which `DATA` is the last.
+//! The header of a PCD file: lines of text. The last one is `DATA`.
 
 use crate::{
     Result,
@@ -6,20 +6,20 @@ use crate::{
 };
 use glam::DVec3;
 
-/// What the header says.
+/// The contents of the header.
 pub struct Header {
     pub fields: Vec<Field>,
     pub points: u64,
-    /// Rows of points, 1 where they are in no order.
+    /// Rows of points; 1 if the points are unordered.
     pub height: u64,
     pub viewpoint: Option<DVec3>,
     pub data: Data,
-    /// Where the header ends, in bytes and lines.
+    /// Where the header ends, in bytes and in lines.
     pub end: usize,
     pub lines: usize,
 }
 
-/// How the points are written.
+/// How the points are stored.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Data {
     Text,
@@ -31,9 +31,9 @@ pub enum Data {
 pub struct Field {
     pub name: String,
     pub kind: NumberKind,
-    /// Bytes of one number.
+    /// Bytes per number.
     pub size: usize,
-    /// Numbers of one point.
+    /// Numbers per point.
     pub count: usize,
     /// Where it begins in a point, in bytes and in words of text.
     pub offset: usize,
@@ -41,13 +41,13 @@ pub struct Field {
 }
 
 impl Field {
-    /// Bytes that it takes of a point.
+    /// Returns its bytes per point.
     pub fn bytes(&self) -> usize {
         self.size * self.count
     }
 }
 
-/// A type of numbers.
+/// A number type.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NumberKind {
     Signed,
@@ -60,7 +60,7 @@ impl NumberKind {
         self == Self::Float
     }
 
-    /// The number in these bytes, lowest first: 1, 2, 4 or 8 of them.
+    /// Returns the number in these bytes, lowest first. There may be 1, 2, 4 or 8 bytes.
     pub fn number(self, bytes: &[u8]) -> f64 {
         let mut wide = [0; 8];
         wide[..bytes.len()].copy_from_slice(bytes);
@@ -76,10 +76,10 @@ impl NumberKind {
     }
 }
 
-/// The fields and numbers of a point that a header may claim.
+/// Maximum number of fields, and of numbers per point, that a header may claim.
 const MOST_FIELDS: usize = 1 << 16;
 
-/// No header of a real file comes near this many bytes.
+/// Headers of real files are far shorter than this, in bytes.
 const LONGEST: usize = 1 << 20;
 
 pub fn read(source: &Source) -> Result<Header> {
