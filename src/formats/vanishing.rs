@@ -1,4 +1,4 @@
-//! Files that are cut while they are read, by every way of reading.
+//! Files that are truncated while they are read, by every way of reading.
 
 use super::{
     Endian, RawLayout, SampleType, Stream, VolumeStream, load_mesh, load_samples, ply, volume_of,
@@ -29,7 +29,7 @@ fn is_told<T>(name: &str, found: Result<T>) {
     assert!(error.to_string().contains("changed while it was read"), "{name}: {error}");
 }
 
-/// Opens a file, cuts it at several places and reads what was opened.
+/// Opens a file, truncates it at several lengths and reads the open source.
 fn cut_when_open<T>(name: &str, bytes: impl AsRef<[u8]>, read: impl Fn(&Source) -> Result<T>) {
     let (folder, limits, bytes) = (Folder::new(), Limits::default(), bytes.as_ref());
     assert!(bytes.len() > 3 << 12, "{name}: {} bytes are too few pages", bytes.len());

@@ -1,4 +1,5 @@
-//! VTK's XML rectilinear grids (`.vtr`): a volume whose samples have coordinates of their own along each axis.
+//! VTK's XML rectilinear grids (`.vtr`): a volume whose samples have their own coordinates along
+//! each axis.
 
 use super::{
     vti,
@@ -20,14 +21,15 @@ pub fn read(source: &Source) -> Result<Volume> {
     let document = Document::read(source, "RectilinearGrid")?;
     let whole = vti::whole_extent(source, &document, "RectilinearGrid")?;
     let part = vti::samples(source, &document, whole)?;
-    // The samples were there, so the extent is no lie and lists along its axes are small beside them.
+    // The samples were present, so the extent is true and the coordinates along its axes are small
+    // beside them.
     let places = coordinates(source, &document, whole)?;
     source.spend("the size of the samples in bytes", part.kind.decoded_bytes(part.bytes.len()))?;
     let samples = part.kind.decode(part.bytes, part.endian);
     volume(places, samples).map_err(|message| source.error("RectilinearGrid", message))
 }
 
-/// A volume with samples at these coordinates along x, y and z.
+/// Returns a volume with samples at these coordinates along x, y and z.
 pub(super) fn volume(
     places: [Vec<f64>; 3],
     samples: crate::volume::Samples,
@@ -37,7 +39,7 @@ pub(super) fn volume(
     Volume::new(Lattice { dims, origin: DVec3::ZERO, axes: DMat3::IDENTITY, arrangement }, samples)
 }
 
-/// The coordinates along each axis, put together from all pieces.
+/// Returns the coordinates along each axis, joined from all pieces.
 fn coordinates(source: &Source, document: &Document, whole: Extent) -> Result<[Vec<f64>; 3]> {
     let counts = dims(source, &whole)?;
     source.room::<f64>("the coordinates", counts.iter().sum())?;
@@ -56,7 +58,7 @@ fn coordinates(source: &Source, document: &Document, whole: Extent) -> Result<[V
         }
         for (axis, (array, count)) in arrays.iter().zip(counts).enumerate() {
             let part = document.part(array, count as u64)?;
-            // Pieces lie inside the whole: their samples were put together before.
+            // Pieces lie inside the whole: their samples were joined before.
             let first = (extent[axis][0] - whole[axis][0]) as usize;
             places[axis][first..first + count].copy_from_slice(&part.doubles(source)?);
         }

@@ -1,5 +1,5 @@
-//! VTK's XML unstructured grids (`.vtu`) and polygons (`.vtp`), read as scattered samples: values of points, or values of
-//! cells at their centres.
+//! VTK's XML unstructured grids (`.vtu`) and polygons (`.vtp`), read as scattered samples: values
+//! of points, or values of cells at their centres.
 
 use super::{
     shared::gather::which_scalar,
@@ -9,8 +9,8 @@ use super::{
 use crate::{Result, input::Source, scattered::Points};
 use glam::DVec3;
 
-/// The sections of a piece that hold cells, in the order in which data of cells count them, and the attributes with their
-/// numbers of cells.
+/// The sections of a piece that contain cells, each with the attribute that counts its cells. They
+/// are in the order in which cell data count them.
 const UNSTRUCTURED: &[[&str; 2]] = &[["Cells", "NumberOfCells"]];
 const POLYGONS: &[[&str; 2]] = &[
     ["Verts", "NumberOfVerts"],
@@ -19,14 +19,17 @@ const POLYGONS: &[[&str; 2]] = &[
     ["Strips", "NumberOfStrips"],
 ];
 
-/// Reads an unstructured grid or polygons. The values are the array that `scalar` names, among those of points and then of
-/// cells; else the active scalars of the points (those that `Scalars` names, or the first with one component), else of the
-/// cells. Values of cells become samples at the means of their corners, with radii from the cells' sizes. Pieces are
-/// joined; points that they share count for one together.
+/// Reads an unstructured grid or polygons. The values are the array that `scalar` names, among
+/// those of the points, then of the cells. Without `scalar`, they are the active scalars of the
+/// points (those that `Scalars` names, or the first with one component), else of the cells.
+///
+/// Values of cells become samples at the means of their corners, with radii from the cells' sizes.
+/// Pieces are joined; points that they share at the same position become one sample.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) for what is no such file, cut off, without such an array, with cells of points that
-/// there are not, or with numbers that are not finite; [`Error::Limit`](crate::Error::Limit) for counts over the limits.
+/// [`Error::Input`](crate::Error::Input) for a file that is not such a grid, is cut off, has no
+/// such array, has cells that refer to missing points, or has numbers that are not finite;
+/// [`Error::Limit`](crate::Error::Limit) for counts over the limits.
 pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
     let start = &source.bytes()[..source.bytes().len().min(1024)];
     let polygons = start.windows(8).any(|w| w == b"PolyData");
@@ -77,7 +80,8 @@ pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
     }
 }
 
-/// The array to be shown: whether it is one of cells, and its name. Pieces all have the same arrays.
+/// Returns the array to read: whether it belongs to cells, and its name. All pieces have the same
+/// arrays.
 fn choose(source: &Source, pieces: &[Piece], scalar: Option<&str>) -> Result<(bool, String)> {
     let mut names = Vec::new();
     for (of_cells, section) in [(false, "PointData"), (true, "CellData")] {
@@ -157,7 +161,7 @@ mod tests {
         format!("<DataArray format='ascii' {attributes}>{text}</DataArray>")
     }
 
-    /// A tetrahedron of edge 2 and a square beside it.
+    /// A tetrahedron with edge 2 and a square beside it.
     fn grid(point_data: &str, cell_data: &str) -> String {
         let points = array(
             "type='Float32' NumberOfComponents='3'",
