@@ -1,10 +1,9 @@
 //! Readers and writers of files, one module per format.
 //!
 //! [`load_mesh`], [`load_volume`] and [`load_samples`] look at the name and the first bytes, and
-//! return a mesh (or point cloud), a volume or scattered samples; [`Kind`] says which of them a file
-//! needs. [`read_mesh`], [`read_volume`] and [`read_samples`] do the same with bytes in memory
-//! ([`Source::from_bytes`]). All of them read through a [`Source`], within its
-//! [`Limits`].
+//! return a mesh (or point cloud), a volume or scattered samples; [`Kind`] says which of them a
+//! file needs. [`read_mesh`], [`read_volume`] and [`read_samples`] do the same with bytes in memory
+//! ([`Source::from_bytes`]). All of them read through a [`Source`], within its [`Limits`].
 
 #![deny(clippy::disallowed_methods)]
 

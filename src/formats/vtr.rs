@@ -13,7 +13,8 @@ use crate::{
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
-/// Reads the active scalars of the points, as [`vti::read`] does, on a rectilinear lattice along x, y and z.
+/// Reads the active scalars of the points, as [`vti::read`] does, on a rectilinear lattice along x,
+/// y and z.
 ///
 /// # Errors
 /// Those of [`vti::read`]; also for coordinates that are missing or do not ascend.

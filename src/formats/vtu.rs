@@ -24,7 +24,8 @@ const POLYGONS: &[[&str; 2]] = &[
 /// points (those that `Scalars` names, or the first with one component), else of the cells.
 ///
 /// Values of cells become samples at the means of their corners, with radii from the cells' sizes.
-/// Pieces are joined; points that they share at the same position become one sample.
+/// Pieces are joined; copies of a point that several pieces share have the weight of one sample
+/// together.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a file that is not such a grid, is cut off, has no

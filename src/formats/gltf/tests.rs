@@ -43,7 +43,8 @@ fn bytes(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|value| value.to_le_bytes()).collect()
 }
 
-/// A square of four vertices: positions at 0, uvs at 48, colours at 80, u16 indices at 96; 108 bytes.
+/// A square of four vertices: positions at 0, uvs at 48, colours at 80, u16 indices at 96; 108
+/// bytes.
 fn square_bytes() -> Vec<u8> {
     let mut out = bytes(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0]);
     out.extend(bytes(&[0.25, 0.5, 0.75, 0.5, 0.75, 0.5, 0.25, 0.5]));
@@ -72,7 +73,7 @@ fn square() -> Value {
     })
 }
 
-/// The square with changes at JSON pointers.
+/// The square, changed at JSON pointers.
 fn changed(changes: &[(&str, Value)]) -> Value {
     let mut value = square();
     for (pointer, new) in changes {
@@ -91,7 +92,7 @@ fn a_square_with_colours() {
     let mesh = load_json(&square()).expect("loads");
     assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y]);
     assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
-    // Linear light becomes display values: 55/255 is about half as displayed, 0.5 about 0.735.
+    // Linear light becomes display values: 55/255 is about half when displayed, 0.5 about 0.735.
     assert_eq!(
         mesh.colors,
         [[255, 0, 0, 255], [128, 128, 128, 255], [0, 0, 0, 255], [255, 255, 255, 255]]
@@ -100,7 +101,8 @@ fn a_square_with_colours() {
     assert!((color[1] - 0.735).abs() < 1e-3 && color[3] == 1.0, "{color:?}");
 }
 
-/// The square with these materials, each on a primitive of its own, and a picture of four texels with these alphas.
+/// The square with these materials, each on its own primitive, and a picture of four texels with
+/// these alphas.
 fn painted(materials: &[Value], alphas: [u8; 4]) -> Mesh {
     let picture = png(4, 1, &alphas.map(|alpha| [9, 8, 7, alpha]));
     let mut value = changed(&[
@@ -118,7 +120,7 @@ fn painted(materials: &[Value], alphas: [u8; 4]) -> Mesh {
     load_json(&value).expect("loads")
 }
 
-/// A material with the picture, of a mode and with an alpha as its factor.
+/// A material with the picture, with an alpha mode and this alpha as its factor.
 fn picture_material(mode: &str, factor: f32) -> Value {
     let base = json!({"baseColorFactor": [1, 1, 1, factor], "baseColorTexture": {"index": 0}});
     json!({"alphaMode": mode, "pbrMetallicRoughness": base})
@@ -153,7 +155,7 @@ fn opaque_materials_ignore_every_alpha() {
             [9, 8, 7]
         );
     }
-    // Without a material, the default one counts, which is opaque.
+    // Without a material, the default one applies, which is opaque.
     let mut value = square();
     value["meshes"][0]["primitives"][0].as_object_mut().expect("an object").remove("material");
     assert_eq!(vertex_alphas(&load_json(&value).expect("loads")), [255; 4]);

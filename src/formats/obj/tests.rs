@@ -38,7 +38,8 @@ fn concave_polygons_cover_themselves_only() {
     let l =
         ([[2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0], [0.0, 0.0]].as_slice(), 3.0);
     let dart = ([[0.0, 0.0], [2.0, 1.0], [0.0, 2.0], [0.5, 1.0]].as_slice(), 1.5);
-    // With a normal, vertices are split; with a triangle beside it (of no area), a model has faces of many kinds.
+    // With a normal, vertices are split. With an extra triangle (of zero area), a model has faces
+    // with different numbers of corners.
     for ((outline, area), normal, beside, far) in [
         (l, "", "", 0.0),
         (l, "//1", "", 0.0),
@@ -113,7 +114,7 @@ fn normals_split_vertices_and_partial_ones_are_left_out() {
     assert_eq!((mesh.positions.len(), mesh.normals.len()), (4, 0));
 }
 
-/// tobj ends a part of the mesh at each material, with the normals that it has read so far.
+/// tobj ends a part of the mesh at each material, with the normals it has read so far.
 #[test]
 fn faces_may_stand_before_what_they_refer_to() {
     let faces = ["f 1//1 2//1 3//1\n", "usemtl other\nf 1//2 3//2 4//2\n"];
@@ -154,7 +155,7 @@ fn materials_and_pictures() {
     ));
 }
 
-/// `d` alone is of the format; `Tr` has two meanings.
+/// Only `d` is part of the format; `Tr` has two meanings.
 #[test]
 fn opacities_of_materials() {
     let folder = Folder::new();
@@ -258,7 +259,8 @@ fn large_coordinates_keep_their_precision() {
     );
 }
 
-/// Coordinates in a picture that are none, or that 32 bits do not hold; elsewhere nobody asks for them.
+/// Texture coordinates that are not numbers, or do not fit in 32 bits, matter only if there is a
+/// picture.
 #[test]
 fn texture_coordinates_are_finite() {
     let folder = Folder::new();

@@ -7,7 +7,7 @@ use crate::{
 const HEADER: &str = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z _ rgb normal_x normal_y normal_z\n\
     SIZE 4 4 8 1 4 4 4 4\nTYPE F F F U U F F F\nCOUNT 1 1 1 3 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 1 2 9 1 0 0 0\nPOINTS 2\n";
 
-/// The two points by fields.
+/// The two points, field by field.
 fn columns() -> [Vec<Vec<u8>>; 8] {
     let floats = |values: [f32; 2]| values.map(|v| v.to_le_bytes().to_vec()).to_vec();
     [
@@ -32,7 +32,7 @@ fn binary() -> Vec<u8> {
     [format!("{HEADER}DATA binary\n").into_bytes(), rows.collect()].concat()
 }
 
-/// All in runs of bytes, as a packer may do.
+/// Everything as literal bytes, as a packer may write it.
 fn packed() -> Vec<u8> {
     let bytes: Vec<u8> = columns().into_iter().flatten().flatten().collect();
     let runs: Vec<u8> =
@@ -76,7 +76,7 @@ fn what_is_missing_and_what_is_unusual() {
 #[test]
 fn cuts_and_lies_are_errors() {
     let folder = Folder::new();
-    // A text may end without its last line break, and within its last number.
+    // A text may end without its last line break, or within its last number.
     every_cut(&folder, "a.pcd", &text()[..text().len() - 1], read);
     every_cut(&folder, "a.pcd", &binary(), read);
     every_cut(&folder, "a.pcd", &packed(), read);

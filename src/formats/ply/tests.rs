@@ -45,7 +45,7 @@ fn put(out: &mut Vec<u8>, kind: &str, value: f64, big: bool) {
     }
 }
 
-/// A square of one quad (or two triangles) with everything around it that a reader may meet.
+/// A square of one quad (or two triangles) with every extra that a reader may meet.
 fn square(format: &str, real: &str, count: &str, index: &str, quad: bool, extras: bool) -> Vec<u8> {
     let mut head = format!("ply\r\nformat {format} 1.0\r\ncomment a test\r\n");
     if extras {
@@ -130,7 +130,7 @@ fn a_cut_file_is_an_error_wherever_it_is_cut() {
     for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
         for (quad, extras) in [(false, false), (true, true)] {
             let whole = square(format, "float", "uchar", "int", quad, extras);
-            // Text may lose its line end, and the last number is of one digit.
+            // Text may lose its line end, and the last number has one digit.
             let least = if format == "ascii" { whole.trim_ascii_end().len() } else { whole.len() };
             for length in 0..least {
                 assert!(
@@ -173,7 +173,7 @@ fn normals_colors_and_uvs() {
     );
 }
 
-/// A binary file of columns behind or before the position, and its rows.
+/// A binary file with columns after or before the position, and its rows.
 fn cloud(before: &str, behind: &str, rows: &[&[(&str, f64)]]) -> Vec<u8> {
     let mut file = format!(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\n{before}property float x\nproperty float y\n\
@@ -185,7 +185,7 @@ fn cloud(before: &str, behind: &str, rows: &[&[(&str, f64)]]) -> Vec<u8> {
     file
 }
 
-/// Points at one place, which becomes the origin.
+/// Points at a single position, which becomes the origin.
 #[test]
 fn columns_around_a_list_of_three_are_read() {
     let list = [("uchar", 3.0), ("float", 7.0), ("float", 8.0), ("float", 9.0)];
@@ -220,7 +220,8 @@ fn colors_in_pieces(bytes: &[u8]) -> Vec<[u8; 4]> {
     colors
 }
 
-/// Colours of wider types than bytes are what the largest of all tells, as a whole and in pieces.
+/// The largest value decides the scale of colours in types wider than bytes, read whole and in
+/// pieces.
 #[test]
 fn colors_of_wider_types_may_be_bytes() {
     for (kind, values, expected) in [
@@ -287,7 +288,7 @@ fn texture_coordinates_of_corners() {
     }
 }
 
-/// What a concave polygon leaves out stays free.
+/// The triangles of a concave polygon stay inside it.
 #[test]
 fn concave_polygons() {
     let file = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nelement vertex 6\n\
@@ -303,7 +304,7 @@ fn concave_polygons() {
     assert_eq!(mesh.triangles.iter().map(area).sum::<f32>(), 3.0);
 }
 
-/// Polygons are read as a whole, wherever they stand.
+/// Files with polygons are read as a whole, wherever the polygons are.
 #[test]
 fn polygons_are_not_read_in_pieces() {
     let limits = Limits::default();

@@ -8,7 +8,7 @@ use std::io::Write;
 
 const VALUES: [i16; 12] = [0, 1, -2, 300, -4000, 5, 6, 7, 8, 9, 10, 32767];
 
-/// How a file of the test is written.
+/// How a test file is written.
 #[derive(Debug, Clone, Copy)]
 struct Style {
     format: &'static str,
@@ -37,7 +37,7 @@ impl Style {
         }
     }
 
-    /// The counts and the data of an array, in blocks of 10 bytes where they are packed.
+    /// The counts and the data of an array, in blocks of 10 bytes if it is compressed.
     fn array(&self, bytes: &[u8]) -> (Vec<u8>, Vec<u8>) {
         if !self.packed {
             return (self.count(bytes.len()), bytes.to_vec());
@@ -57,7 +57,7 @@ impl Style {
 
     fn base64(&self, bytes: &[u8]) -> String {
         let (head, data) = self.array(bytes);
-        // Counts of packed data are encoded apart.
+        // Counts of compressed data are encoded separately.
         if self.packed {
             STANDARD.encode(head) + &STANDARD.encode(data)
         } else {
@@ -65,7 +65,7 @@ impl Style {
         }
     }
 
-    /// Bytes of a section that two arrays are appended in, and the second one's offset.
+    /// The bytes of a section with two appended arrays, and the offset of the second one.
     fn append(&self, arrays: [&[u8]; 2]) -> (Vec<u8>, usize) {
         let [first, second] = arrays.map(|bytes| match self.appended {
             "raw" => [self.array(bytes).0, self.array(bytes).1].concat(),
@@ -93,7 +93,8 @@ impl Style {
         )
     }
 
-    /// A file of 3 × 2 × 2 points from index (1, 0, 0) on, with the values under the name “wanted”.
+    /// A file of 3 × 2 × 2 points, beginning at index (1, 0, 0), with the values in the array
+    /// “wanted”.
     fn file(&self) -> Vec<u8> {
         let bytes = self.bytes(&VALUES);
         let (section, offset) = self.append([&[1, 2, 3, 4], &bytes]);
@@ -165,7 +166,7 @@ fn every_cut_is_an_error() {
     }
 }
 
-/// Cut or changed data inside files that end as they should.
+/// Truncated or changed data inside files whose end is intact.
 #[test]
 fn no_damage_panics_or_passes_for_long() {
     let folder = Folder::new();
@@ -177,7 +178,8 @@ fn no_damage_panics_or_passes_for_long() {
             for value in [0, b'<', file[at] ^ 1] {
                 let mut damaged = file.clone();
                 damaged[at] = value;
-                // Whether it can still be read depends on the place; it must end with a volume or an error.
+                // Whether it can still be read depends on the place of the change. The result must
+                // be a volume or an error.
                 if let Ok(volume) = read_with(&folder.write("volume.vti", &damaged), read) {
                     assert_eq!(volume.len(), volume.lattice.len());
                 }
@@ -327,7 +329,7 @@ fn lying_counts_allocate_nothing() {
     ] {
         assert!(message.contains(word), "{message}");
     }
-    // A block that holds more than it says.
+    // A block that contains more than it claims.
     let style = Style { packed: true, wide: true, ..PLAIN };
     let (head, data) = style.array(&[5; 10]);
     let long = [wide(&[1, 8, 0]), head[24..].to_vec(), data].concat();

@@ -4,7 +4,8 @@ use super::*;
 use crate::{input::testing::*, volume::Samples};
 use glam::Vec3;
 
-/// A file of text, or binary with the numbers of every line that begins with one turned into bytes of its type.
+/// A file in text or binary. Each entry of the body is a line, the type of the numbers after it,
+/// and the numbers.
 fn file(binary: bool, body: &[(&str, &str, &str)]) -> Vec<u8> {
     let encoding = if binary { "BINARY" } else { "ASCII" };
     let mut file =
@@ -58,7 +59,8 @@ fn structured_points() {
         let found = volume(&whole).unwrap();
         assert_eq!(found.samples, Samples::U8(vec![0, 1, 2, 30, 4, 255]));
         assert_eq!(found.bounds(), [DVec3::new(10.0, 20.0, 30.0), DVec3::new(11.0, 21.0, 30.0)]);
-        // Without the line's end behind the last number the file is whole, and a text without its last digits is a shorter one.
+        // Without the line end after the last number, the file is still whole. A text without its
+        // last digits has a shorter number.
         for end in 0..whole.len() - if binary { 1 } else { 3 } {
             assert!(volume(&whole[..end]).is_err(), "cut at {end}");
         }
@@ -135,7 +137,8 @@ fn unstructured_grids_of_both_versions() {
             );
             assert!(volume(&content).unwrap_err().to_string().contains("no volume"));
             for end in 0..content.len() {
-                // Whole parts may be missing at the end; nothing panics, and what is read is sound.
+                // Whole parts may be missing at the end. Nothing panics, and data that are read are
+                // valid.
                 if let Ok(points) = samples(&content[..end], None) {
                     points.validate().unwrap();
                 }
