@@ -74,7 +74,7 @@ impl Layout {
         let place = format!("line {line}");
         let at = |name: &str| names.iter().position(|other| other.eq_ignore_ascii_case(name));
         let need = |name: &str| {
-            at(name).ok_or_else(|| source.error(&place, format!("names no column “{name}”")))
+            at(name).ok_or_else(|| source.error(&place, format!("has no column “{name}”")))
         };
         let position = [need("x")?, need("y")?, need("z")?];
         let radius = at("radius");
@@ -153,8 +153,8 @@ mod tests {
     #[test]
     fn what_is_wrong_is_told_with_its_line() {
         for (text, scalar, word) in [
-            ("", None, "no lines"),
-            ("# nothing\n", None, "no lines"),
+            ("", None, "no rows"),
+            ("# nothing\n", None, "no rows"),
             ("hello", None, "no column “x”"),
             ("1 2 3", None, "3 columns without names"),
             ("x,y,z\n1,2,3", None, "line 1: has no scalar"),
@@ -167,7 +167,7 @@ mod tests {
             ("1 2 3 4\n5 6 7 8 9", None, "line 2: has 5 columns"),
             ("1 2 3 4\n5 6 seven 8", None, "line 2: “seven” is not a number"),
             ("1;2;3;4\n5;6;7;8,5", None, "“8,5” is not a number"),
-            ("\"1,5\",\"2,5\",\"3,5\",\"4\"\n", None, "neither numbers nor names"),
+            ("\"1,5\",\"2,5\",\"3,5\",\"4\"\n", None, "neither numbers nor column names"),
             ("1,2,3,4\n\"1,5\",\"2,5\",\"3,5\",\"4\"\n", None, "“1,5” is not a number"),
             ("1 2 3 4 0", None, "radius of sample 0 is 0"),
             ("1 2 3 1e39", None, "line 1: the value"),

@@ -34,9 +34,8 @@ const POINTS: u64 = 1 << 16;
 pub fn read(source: &Source) -> Result<Mesh> {
     // The crate asserts on numbers of the file and clamps by them, which may panic.
     let cloud = isolated(source, "scans", || {
-        let unreadable = |error: ::e57::Error| {
-            source.error("file", format!("is no E57 file that can be read: {error}"))
-        };
+        let unreadable =
+            |error: ::e57::Error| source.error("file", format!("cannot be read as E57: {error}"));
         let xml = E57Reader::raw_xml(Cursor::new(source.bytes())).map_err(unreadable)?;
         description::check(source, &xml)?;
         let mut file = E57Reader::new(Cursor::new(source.bytes())).map_err(unreadable)?;
@@ -119,7 +118,7 @@ fn check(scan: &PointCloud) -> Result<(), &'static str> {
         }
         _ => true,
     });
-    if !takes_bits { Err("has points of no bits") } else { Ok(()) }
+    if !takes_bits { Err("has points that take zero bits") } else { Ok(()) }
 }
 
 /// Returns where the scanner of a scan stood.

@@ -147,7 +147,7 @@ impl Builder<'_> {
         let Some(mesh) = root.meshes.get(index) else {
             return Err(self.source.error(
                 format!("mesh {index}"),
-                format!("there are {} meshes", root.meshes.len()),
+                format!("does not exist; there are {} meshes", root.meshes.len()),
             ));
         };
         for (number, primitive) in mesh.primitives.iter().enumerate() {
@@ -264,7 +264,7 @@ impl Builder<'_> {
     fn finish(mut self) -> Result<Mesh> {
         let count = self.positions.len();
         if count == 0 {
-            return Err(self.source.error("scene", "holds no meshes with positions"));
+            return Err(self.source.error("scene", "contains no meshes with positions"));
         }
         let positions = &self.positions;
         (self.mesh.origin, self.mesh.positions) = positions::settle(

@@ -140,7 +140,10 @@ impl Header {
             )));
         }
         if !scale.is_finite() || !offset.is_finite() || scale.min_element() <= 0.0 {
-            return Err(wrong(format!("has the scale {scale} and the offset {offset}")));
+            return Err(wrong(format!(
+                "has the scale {scale} and the offset {offset}; both must be \
+                                      finite, and the scale above 0"
+            )));
         }
         if start < header_size || start > bytes.len() {
             let message =
@@ -193,7 +196,13 @@ impl Fields<'_> {
     fn at<const N: usize>(&self, at: usize) -> Result<[u8; N], String> {
         let found = self.bytes.get(at..).and_then(|rest| rest.first_chunk()).copied();
         found.ok_or_else(|| {
-            format!("{} reaches to byte {}, but there are {}", self.place, at + N, self.bytes.len())
+            format!(
+                "{} extends to byte {}, but only {} bytes are \
+                     present",
+                self.place,
+                at + N,
+                self.bytes.len()
+            )
         })
     }
 }

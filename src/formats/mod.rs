@@ -88,8 +88,8 @@ fn volume_of(source: &Source, raw: Option<&RawLayout>) -> Result<Volume> {
         _ if beginning.windows(15).any(|w| w == b"RectilinearGrid") => vtr::read(source),
         _ if beginning.windows(8).any(|w| w == b"<VTKFile") => vti::read(source),
         _ => Err(source
-            .error("file", "is not a volume that can be read: neither VTI, VTR, VTK nor NRRD")
-            .hint("a raw file needs its dimensions and its sample type")),
+            .error("file", "is not a volume that can be read (VTI, VTR, VTK or NRRD)")
+            .hint("to read a raw file, give its dimensions and its sample type")),
     }
 }
 

@@ -22,7 +22,7 @@ use glam::DVec3;
 pub fn read(source: &Source) -> Result<Points> {
     let bytes = source.bytes();
     let (header, start) = header(bytes).ok_or_else(|| {
-        source.error("header", "is cut off, is longer than 1 MiB, or is none of NumPy's")
+        source.error("header", "is cut off, is longer than 1 MiB, or is not a NumPy header")
     })?;
     let wrong = |message: String| source.error("header", message);
     let field = |name: &str| field(&header, name).ok_or_else(|| wrong(format!("has no “{name}”")));
@@ -37,7 +37,7 @@ pub fn read(source: &Source) -> Result<Points> {
         }
     };
     if field("fortran_order")? != "False" {
-        return Err(wrong("is in Fortran's order".into()).hint("write the array in C's order"));
+        return Err(wrong("is in Fortran order".into()).hint("write the array in C order"));
     }
     let shape = field("shape")?;
     let sizes = || -> Option<Vec<u64>> {
@@ -186,7 +186,7 @@ mod tests {
             (file(1, "'<f4'", "False", "(-1, 4)", &data), "shape"),
             (file(1, "'<f4'", "False", "(2, 4)", &data), "16 bytes where 32"),
             (file(1, "'<f4'", "False", "(0, 4)", &[]), "no samples"),
-            (file(4, "'<f4'", "False", "(1, 4)", &data), "none of NumPy's"),
+            (file(4, "'<f4'", "False", "(1, 4)", &data), "not a NumPy header"),
             (
                 file(1, "'<f4'", "False", "(1, 4)", &[0, 0, 192, 127].repeat(4)),
                 "row 0: the value NaN",

@@ -119,8 +119,15 @@ fn refuse_more(path: &Path, there: u64, expected: u64) -> Result<()> {
     if there <= expected {
         return Ok(());
     }
-    Err(Error::input(path, "data", format!("there are {there} bytes where {expected} were expected"))
-        .hint("“sizes” or “type” of the header are wrong, or “byte skip” is missing (-1 takes the last bytes)"))
+    Err(Error::input(
+        path,
+        "data",
+        format!("there are {there} bytes where {expected} were expected"),
+    )
+    .hint(
+        "“sizes” or “type” in the header is wrong, or “byte skip” is missing (-1 takes the \
+               last bytes)",
+    ))
 }
 
 /// Maximum size of a header in bytes; headers of real files are far smaller.
@@ -177,7 +184,7 @@ impl<'a> Header<'a> {
                         && is_read
                     {
                         let message =
-                            format!("the key “{}” is given twice; it must stand once", shown(key));
+                            format!("the key “{}” is given twice; give it once", shown(key));
                         return Err(source.error(format!("line {}", number + 1), message));
                     }
                 }
@@ -190,7 +197,7 @@ impl<'a> Header<'a> {
                     let is_list = spelling == "datafile" && files::is_list(value);
                     if let Some(before) = lines.insert(spelling, number + 1) {
                         let message = format!(
-                            "the field “{}” is given twice, in line {before} too; it must stand once",
+                            "the field “{}” is given twice, in line {before} too; give it once",
                             shown(&name)
                         );
                         return Err(source.error(format!("line {}", number + 1), message));
@@ -301,9 +308,8 @@ impl<'a> Header<'a> {
                 DMat3::from_cols(axes.x_axis, axes.y_axis, 2.0 * axes.z_axis),
             ),
             Some(other) => {
-                let error = self
-                    .source
-                    .error("lattice", format!("“{other}” is not a lattice that is known"));
+                let error =
+                    self.source.error("lattice", format!("“{other}” is not a known lattice"));
                 return Err(
                     error.hint("lattice:=bcc marks body-centred cubic lattices; Cartesian ones have no such key")
                 );
@@ -411,7 +417,7 @@ impl<'a> Header<'a> {
             _ => {
                 return Err(self
                     .source
-                    .error("type", format!("“{}” is not a type of scalars", shown(&name))));
+                    .error("type", format!("“{}” is not a scalar type", shown(&name))));
             }
         })
     }
@@ -460,12 +466,19 @@ impl<'a> Header<'a> {
         if from_end && encoding != "raw" {
             return Err(self
                 .source
-                .error("byte skip", "-1 counts from the end, which only raw data can"));
+                .error("byte skip", "-1 counts from the end, which works only for raw data"));
         }
         let skip = skip.max(0) as usize;
         let after_skip = || {
-            data.get(skip..)
-                .ok_or_else(|| file.error(place, format!("end before the {skip} bytes to skip do")))
+            data.get(skip..).ok_or_else(|| {
+                file.error(
+                    place,
+                    format!(
+                        "have fewer than the {skip} bytes to \
+                                                          skip"
+                    ),
+                )
+            })
         };
         let text = || {
             let bytes = after_skip()?;
@@ -529,7 +542,12 @@ fn shown(text: &str) -> String {
 fn from_hex(text: &str, size: usize) -> Result<Vec<u8>, String> {
     let mut digits = Vec::new();
     for c in text.chars().filter(|c| !c.is_ascii_whitespace()) {
-        digits.push(c.to_digit(16).ok_or_else(|| format!("“{c}” is no hexadecimal digit"))? as u8);
+        digits.push(c.to_digit(16).ok_or_else(|| {
+            format!(
+                "“{c}” is not a hexadecimal \
+                                                          digit"
+            )
+        })? as u8);
     }
     if digits.len() % 2 != 0 || digits.len() / 2 != size {
         return Err(format!(

@@ -85,7 +85,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
     source.check_points("the number of vertices", corners.positions.len() as u64)?;
     source.check_points("the number of triangles", corners.triangles.len() as u64)?;
     if corners.triangles.is_empty() {
-        return Err(source.error("file", "has faces, but none of three corners or more"));
+        return Err(source.error("file", "has faces, but none with three or more corners"));
     }
     let positions = &corners.positions;
     (mesh.origin, mesh.positions) = positions::settle(

@@ -92,7 +92,8 @@ pub fn read(source: &Source) -> Result<Mesh> {
     if mesh.uvs.is_empty() {
         let file = source.path.display();
         tracing::warn!(
-            "{file}: names a picture, but neither vertices nor faces have coordinates in it; drawn without it"
+            "{file}: names a picture, but neither vertices nor faces have texture coordinates; \
+             drawn without it"
         );
         return Ok(mesh);
     }

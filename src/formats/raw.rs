@@ -42,7 +42,7 @@ pub fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
     if unpacked.len() != wanted {
         let [nx, ny, nz] = layout.dims;
         let message = format!(
-            "holds {} bytes after the header, but {nx} × {ny} × {nz} samples of type {} need {}",
+            "has {} bytes after the header, but {nx} × {ny} × {nz} samples of type {} need {}",
             (bytes.len() as u64).saturating_sub(layout.header),
             layout.sample_type.name(),
             wanted as u64 - layout.header
@@ -202,7 +202,7 @@ mod tests {
         let message = error(layout([4, 4, 4], SampleType::U8)).to_string();
         assert!(
             message.contains(
-                "holds 128 bytes after the header, but 4 × 4 × 4 samples of type u8 need 64"
+                "has 128 bytes after the header, but 4 × 4 × 4 samples of type u8 need 64"
             ),
             "{message}"
         );

@@ -47,13 +47,16 @@ pub fn read(source: &Source) -> Result<Mesh> {
                 "counts {count} facets, which need {size} bytes, but the file has {}",
                 bytes.len()
             );
-            return Err(source.error("header", message).hint("the file is cut, or another format"));
+            return Err(source.error("header", message).hint(
+                "the file is cut off or in another \
+                                                             format",
+            ));
         }
         source.room::<[DVec3; 3]>("the corners", count as usize)?;
         (of_bytes(&bytes[HEADER + 4..], count as usize), Vec::new())
     };
     if corners.is_empty() {
-        return Err(source.error("file", "holds no facets"));
+        return Err(source.error("file", "contains no facets"));
     }
     let place = |corner: usize| match lines.get(corner) {
         Some(line) => format!("line {line}"),

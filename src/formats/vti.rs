@@ -71,8 +71,8 @@ pub(super) fn samples<'a>(
         let extent = extent(source, "Piece", text)?;
         let array = piece.section("PointData").scalars().ok_or_else(|| {
             source
-                .error("PointData", "holds no array with one number for each point")
-                .hint("values of cells are not read; turn them into values of points")
+                .error("PointData", "contains no array with one number for each point")
+                .hint("cell values are not read; convert them to point values")
         })?;
         if array.components() != "1" {
             let message =
@@ -106,10 +106,10 @@ fn assemble<'a>(
             .zip(&whole)
             .all(|(piece, whole)| whole[0] <= piece[0] && piece[1] <= whole[1]);
         if !inside {
-            return Err(wrong(&format!("{i} reaches out of the whole extent")));
+            return Err(wrong(&format!("piece {i} extends beyond the whole extent")));
         }
         if i > 0 && (part.kind, part.endian) != (kind, endian) {
-            return Err(wrong(&format!("{i} is written in another type or format than the first")));
+            return Err(wrong(&format!("piece {i} has another type or format than the first")));
         }
         (kind, endian) = (part.kind, part.endian);
         held += (part.bytes.len() / kind.bytes()) as u64;
@@ -117,12 +117,12 @@ fn assemble<'a>(
     // Checked before anything is allocated: the pieces must have enough points to fill the whole.
     if held < count {
         return Err(wrong(&format!(
-            "holds {held} points with all others, but the whole extent has {count}"
+            "all pieces together have {held} points, but the whole extent has {count}"
         )));
     }
     if held / MOST_TIMES > count {
         return Err(wrong(&format!(
-            "holds {held} points with all others, too many for an extent of {count}"
+            "all pieces together have {held} points, too many for an extent of {count}"
         )));
     }
     if parts.len() == 1 {
@@ -147,7 +147,7 @@ fn assemble<'a>(
         }
     }
     match filled.iter().position(|filled| !filled) {
-        Some(index) => Err(wrong(&format!("is missing: no piece holds point {index}"))),
+        Some(index) => Err(wrong(&format!("no piece contains point {index}"))),
         None => Ok(Part { kind, endian, bytes: bytes.into() }),
     }
 }

@@ -63,12 +63,12 @@ fn is_volume(kind: &str) -> bool {
 pub fn read_volume(source: &Source) -> Result<Volume> {
     let mut data = DataSet::read(source)?;
     if !is_volume(&data.kind) {
-        return Err(source.error("DATASET", format!("is {}, which is no volume", data.kind)));
+        return Err(source.error("DATASET", format!("is {}, which is not a volume", data.kind)));
     }
     if data.points.arrays.is_empty() {
         return Err(source
-            .error("POINT_DATA", "holds no scalars")
-            .hint("values of cells are not read; turn them into values of points"));
+            .error("POINT_DATA", "contains no scalars")
+            .hint("cell values are not read; convert them to point values"));
     }
     let (_, part) = data.points.arrays.swap_remove(0);
     source.spend("the size of the samples in bytes", part.kind.decoded_bytes(part.bytes.len()))?;
@@ -98,9 +98,14 @@ pub fn read_volume(source: &Source) -> Result<Volume> {
 pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
     let data = DataSet::read(source)?;
     if is_volume(&data.kind) {
-        return Err(
-            source.error("DATASET", format!("is {}, a volume and no scattered samples", data.kind))
-        );
+        return Err(source.error(
+            "DATASET",
+            format!(
+                "is {}, which is a volume, not scattered \
+                                             samples",
+                data.kind
+            ),
+        ));
     }
     let wanted = |attributes: &Attributes| {
         let is = |name: &String| scalar.is_none_or(|scalar| scalar == name);
@@ -111,7 +116,7 @@ pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
         if there == claim {
             Ok(())
         } else {
-            Err(source.error(place, format!("claims {claim} of {there}")))
+            Err(source.error(place, format!("claims {claim} values, but there are {there}")))
         }
     };
     if let Some(index) = wanted(&data.points) {
@@ -159,7 +164,7 @@ impl<'a> DataSet<'a> {
                 ("POINTS", _)
                     if !(data.cells.points.is_empty() && data.cells.corners.is_empty()) =>
                 {
-                    return Err(wrong("POINTS are given twice, or behind the cells".into()));
+                    return Err(wrong("POINTS are given twice, or after the cells".into()));
                 }
                 ("POINTS", [count, kind]) => {
                     let count = parser.count(&place, count)?;

@@ -95,7 +95,7 @@ impl ArrayEncoding {
         let present: u64 = packed.iter().map(|block| block.len() as u64).sum();
         if present.saturating_mul(DEFLATE_RATIO) < size as u64 {
             return Err(wrong(format!(
-                "claims {size} bytes, which {present} packed ones cannot hold"
+                "claims {size} bytes, more than {present} compressed bytes can hold"
             )));
         }
         source.spend("the unpacked size in bytes", size as u64)?;
@@ -150,7 +150,7 @@ pub fn from_base64(source: &Source, place: &str, text: &[u8]) -> Result<Vec<u8>>
         let end = padded.map_or(rest.len(), |at| rest.len().min((at / 4 + 1) * 4));
         let (part, after) = rest.split_at(end);
         STANDARD.decode_vec(part, &mut bytes).map_err(|e| {
-            source.error(place, format!("is no base64 (after {} bytes): {e}", bytes.len()))
+            source.error(place, format!("is not valid base64 (after {} bytes): {e}", bytes.len()))
         })?;
         rest = after;
     }

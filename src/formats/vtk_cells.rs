@@ -37,7 +37,8 @@ impl Cells {
             let before = self.ends.last().map_or(start, |&end| end.max(start)) - start;
             if !(end >= before as f64 && end <= corners.len() as f64 && end.fract() == 0.0) {
                 return Err(format!(
-                    "cell {cell} ends at corner {end}, of {} and after {before}",
+                    "cell {cell} ends at corner {end}, but must end after {before} and at most at \
+                     {}",
                     corners.len()
                 ));
             }
@@ -47,7 +48,7 @@ impl Cells {
             let count = self.points.len() - first_point;
             if !(corner >= 0.0 && corner < count as f64 && corner.fract() == 0.0) {
                 return Err(format!(
-                    "a cell has the corner {corner}, but there are {count} points"
+                    "a cell refers to point {corner}, but there are {count} points"
                 ));
             }
             self.corners.push(first_point + corner as usize);
@@ -77,7 +78,7 @@ impl Cells {
             if start == end {
                 return Err(source.error(
                     format!("cell {cell}"),
-                    "has no corners, so a value of it has no place",
+                    "has no corners, so its value has no position",
                 ));
             }
             let count = (end - start) as f64;

@@ -103,7 +103,7 @@ impl<'a> Document<'a> {
         document.walk(xml, kind)?;
         document.offsets.sort_unstable();
         if document.pieces.is_empty() {
-            return Err(source.error("XML", format!("holds no piece of {kind}")));
+            return Err(source.error("XML", format!("contains no piece of {kind}")));
         }
         Ok(document)
     }
@@ -131,7 +131,7 @@ impl<'a> Document<'a> {
                 _ => {}
             }
             match event
-                .map_err(|e| source.error(format!("byte {at}"), format!("is no XML: {e}")))?
+                .map_err(|e| source.error(format!("byte {at}"), format!("is not valid XML: {e}")))?
             {
                 Event::Start(tag) => match (&mut array, &section) {
                     (Some((_, depth)), _) => *depth += 1,
@@ -218,8 +218,13 @@ impl<'a> Document<'a> {
             "binary" => from_base64(source, &place, array.text.as_bytes())?.into(),
             "appended" => {
                 let appended = self.appended.as_ref();
-                let appended =
-                    appended.ok_or_else(|| source.error(&place, "is appended, but nothing is"))?;
+                let appended = appended.ok_or_else(|| {
+                    source.error(
+                        &place,
+                        "is appended, but the file has no \
+                                                                 appended data",
+                    )
+                })?;
                 let offset =
                     array.get("offset").ok_or_else(|| source.error(&place, "has no offset"))?;
                 appended.array(source, &place, number(source, &place, offset)?, &self.offsets)?
@@ -393,7 +398,7 @@ const MOST_ATTRIBUTES: usize = 64;
 
 fn attributes(source: &Source, at: u64, tag: &BytesStart) -> Result<Attributes> {
     let wrong =
-        |e: String| source.error(format!("byte {at}"), format!("has a wrong attribute: {e}"));
+        |e: String| source.error(format!("byte {at}"), format!("has an invalid attribute: {e}"));
     let mut attributes = Attributes::new();
     for attribute in tag.attributes() {
         // Each attribute is compared with all before it.
@@ -412,7 +417,7 @@ fn attributes(source: &Source, at: u64, tag: &BytesStart) -> Result<Attributes> 
 pub fn number<T: std::str::FromStr>(source: &Source, place: &str, text: &str) -> Result<T> {
     text.trim()
         .parse()
-        .map_err(|_| source.error(place, format!("“{text}” is not a number that fits here")))
+        .map_err(|_| source.error(place, format!("“{text}” is not a valid number here")))
 }
 
 pub fn numbers<const N: usize, T: std::str::FromStr>(
@@ -443,7 +448,7 @@ pub fn dims(source: &Source, extent: &Extent) -> Result<[usize; 3]> {
             .and_then(|n| n.checked_add(1))
             .and_then(|n| u64::try_from(n).ok());
         let length = length.filter(|&n| n > 0).ok_or_else(|| -> Error {
-            source.error("extent", format!("{first} to {last} holds no points"))
+            source.error("extent", format!("{first} to {last} is not a valid range of indices"))
         })?;
         points = points.saturating_mul(length);
         *dim = source.check_bytes("the number of points", points).map(|_| length as usize)?;

@@ -69,7 +69,7 @@ pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
         let array = piece.section(section).array(&name);
         if count > 0 {
             let array = array.ok_or_else(|| {
-                source.error(section, format!("has no array “{name}” in every piece"))
+                source.error(section, format!("lacks the array “{name}” in a piece"))
             })?;
             values.extend(document.part(array, count)?.doubles(source)?);
         }
@@ -120,7 +120,7 @@ fn add_points(
         return Ok(());
     }
     let Some(array) = piece.section("Points").arrays.first() else {
-        return Err(source.error("Points", "holds no array of positions"));
+        return Err(source.error("Points", "contains no array of positions"));
     };
     if array.components() != "3" {
         let message = format!("has {} components, but positions have 3", array.components());
@@ -141,7 +141,7 @@ fn add_cells(
     cells: &mut Cells,
 ) -> Result<()> {
     let need = |name: &str| {
-        section.array(name).ok_or_else(|| source.error("Cells", format!("hold no array “{name}”")))
+        section.array(name).ok_or_else(|| source.error("Cells", format!("have no array “{name}”")))
     };
     let ends = document.part(need("offsets")?, count)?.doubles(source)?;
     // The last offset is the number of corners; the cast saturates.
@@ -211,7 +211,7 @@ mod tests {
             (&whole.replace("4 8", "9 8"), None, "ends at corner 9"),
             (&whole.replace("4 8", "-4 8"), None, "ends at corner -4"),
             (&whole.replace("4 8", "0 8"), None, "cell 0: has no corners"),
-            (&whole.replace("6 7<", "6 8<"), None, "corner 8, but there are 8 points"),
+            (&whole.replace("6 7<", "6 8<"), None, "point 8, but there are 8 points"),
             (&whole.replace("10 -20", "10"), None, "1 numbers where 2"),
             (&whole.replace("5 2 0<", "5 2 nan<"), None, "not finite"),
             (&whole.replace("Name='offsets'", ""), None, "no array “offsets”"),

@@ -83,7 +83,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
             return Err(source
                 .error(
                     format!("line {}", text.first),
-                    "has two colours or two normals behind the position",
+                    "has two colours or two normals after the position",
                 )
                 .hint("name the columns in the first line"));
         }
@@ -141,9 +141,7 @@ impl Layout {
         let Some(position) = triple(names, POSITION) else {
             let missing =
                 POSITION.iter().find(|name| find(names, name).is_none()).map_or("", |name| name[0]);
-            return Err(
-                source.error(format!("line {line}"), format!("names no column “{missing}”"))
-            );
+            return Err(source.error(format!("line {line}"), format!("has no column “{missing}”")));
         };
         Ok(Self {
             position,
@@ -244,7 +242,7 @@ mod tests {
     #[test]
     fn what_is_wrong_is_told_with_its_line() {
         for (text, word) in [
-            ("", "no lines"),
+            ("", "no rows"),
             ("hello", "no column “x”"),
             ("x y\n1 2", "no column “z”"),
             ("1 2\n", "line 1: has 2 columns without names"),

@@ -64,12 +64,7 @@ impl Budget {
         if taken <= Duration::from_secs(limits.seconds) {
             return Ok(());
         }
-        limits.check(
-            LimitKind::Seconds,
-            file,
-            "the time for reading, in seconds,",
-            taken.as_secs() + 1,
-        )
+        limits.check(LimitKind::Seconds, file, "the reading time in seconds", taken.as_secs() + 1)
     }
 
     /// Restarts the clock of the time limit.

@@ -29,7 +29,7 @@ pub(crate) fn isolated<T>(
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text =
             text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("the decoder gave up");
-        Err(source.error(place, format!("holds what cannot be decoded: {text}")))
+        Err(source.error(place, format!("cannot be decoded: {text}")))
     })
 }
 
@@ -61,10 +61,7 @@ mod tests {
             isolated(source, "chunk 3", || -> Result<()> { panic!("index {} of 2", 5) })
         };
         let message = read_with(&path, decode).unwrap_err().to_string();
-        assert!(
-            message.contains("chunk 3: holds what cannot be decoded: index 5 of 2"),
-            "{message}"
-        );
+        assert!(message.contains("chunk 3: cannot be decoded: index 5 of 2"), "{message}");
     }
 
     #[test]

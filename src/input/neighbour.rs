@@ -60,7 +60,7 @@ fn refusal(reference: &str) -> Option<&'static str> {
         return Some("which names no file");
     }
     if reference.contains('\0') {
-        return Some("which is no path");
+        return Some("which is not a valid path");
     }
     // “C:” is a drive, “file:” and “http:” are schemes; no portable name has a colon.
     if reference.contains(':') {
@@ -116,7 +116,7 @@ mod tests {
             ("b.bin:stream", "an address or a drive"),
             ("", "names no file"),
             ("  ", "names no file"),
-            ("b\0.bin", "is no path"),
+            ("b\0.bin", "is not a valid path"),
             ("below", "not a regular file"),
             (".", "not a regular file"),
             ("a.gltf", "the file itself"),

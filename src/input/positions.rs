@@ -44,7 +44,7 @@ pub(crate) fn origin(source: &Source, low: DVec3, high: DVec3) -> Result<DVec3> 
         return Err(source.error(
             "positions",
             format!(
-                "spread from {:?} to {:?}, more than 32 bits can hold",
+                "range from {:?} to {:?}, too wide for 32-bit coordinates",
                 low.to_array(),
                 high.to_array()
             ),

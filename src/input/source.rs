@@ -249,7 +249,7 @@ impl<'a> Source<'a> {
         }
         if out.len() != expected {
             let found =
-                if out.len() > expected { "more".to_owned() } else { out.len().to_string() };
+                if out.len() > expected { "too many".to_owned() } else { out.len().to_string() };
             return Err(self
                 .error(place, format!("unpacks to {found} bytes where {expected} were expected")));
         }

@@ -42,7 +42,7 @@ impl<'a> Text<'a> {
         }
         source.check_points("the number of lines", lines.len() as u64)?;
         let Some(&(first, line)) = lines.first() else {
-            return Err(source.error("file", "holds no lines of numbers"));
+            return Err(source.error("file", "contains no rows of numbers"));
         };
         let mut lines = lines.into_inner();
         let (separator, words) = split(line);
@@ -55,9 +55,9 @@ impl<'a> Text<'a> {
             return Err(source
                 .error(
                     format!("line {first}"),
-                    format!("{:?} is neither numbers nor names of columns", copy::excerpt(line)),
+                    format!("{:?} contains neither numbers nor column names", copy::excerpt(line)),
                 )
-                .hint("numbers have points, no decimal commas"));
+                .hint("write numbers with a decimal point, not a comma"));
         }
         if names.is_some() {
             lines.remove(0);
@@ -105,7 +105,7 @@ impl<'a> Text<'a> {
                             let shown = copy::excerpt(word);
                             let error = source.error(place(), format!("“{shown}” is not a number"));
                             if shown.contains(',') {
-                                error.hint("numbers have points, no decimal commas")
+                                error.hint("write numbers with a decimal point, not a comma")
                             } else {
                                 error
                             }

@@ -34,8 +34,10 @@ pub fn check(source: &Source, scan: &PointCloud, number: usize, most: u64) -> Re
         let ahead: u64 = items().map(|items| items - before).sum();
         let waiting = ahead.saturating_add((complete - before).saturating_mul(constants));
         if waiting > most {
-            let message =
-                format!("{waiting} values wait for others of their points, more than {most}");
+            let message = format!(
+                "{waiting} values wait for other values of their points; at most {most} \
+                         may wait"
+            );
             return Err(source.error(format!("scan {number}"), message));
         }
     }

@@ -157,7 +157,7 @@ fn cuts_and_lies_are_errors() {
     for (content, word) in [
         (replaced("recordCount=\"2\"", "recordCount=\"3\""), "scan 1: ends after 2 points"),
         (replaced("fileOffset=\"48\"", "fileOffset=\"99999999\""), "scan 0"),
-        (replaced("<e57Root", "<root"), "is no E57 file"),
+        (replaced("<e57Root", "<root"), "cannot be read as E57"),
         (file(&[], |xml| xml), "no points"),
         (file(&[(cartesian(), vec![doubles([f64::NAN; 3])], None)], |xml| xml), "no points"),
     ] {
@@ -180,7 +180,7 @@ fn scans_of_no_bits_are_refused() {
     let scan = (records.collect(), vec![vec![RecordValue::ScaledInteger(3); 3]; 2], None);
     let content = file(&[scan], |xml| xml.replace("maximum=\"4\"", "maximum=\"3\""));
     let message = load(&content).unwrap_err().to_string();
-    assert!(message.contains("scan 0: has points of no bits"), "{message}");
+    assert!(message.contains("scan 0: has points that take zero bits"), "{message}");
 }
 
 /// Whatever byte of the description is changed, the file is either read or refused.

@@ -109,7 +109,11 @@ impl Buffers<'_> {
         let place = format!("{place}, accessor {index}");
         let error = |message: String| self.source.error(place.as_str(), message);
         let Some(accessor) = self.root.accessors.get(index) else {
-            return Err(error(format!("there are {} accessors", self.root.accessors.len())));
+            return Err(error(format!(
+                "does not exist; there are {} \
+                                      accessors",
+                self.root.accessors.len()
+            )));
         };
         let (Checked::Valid(component), Checked::Valid(kind)) =
             (accessor.component_type, accessor.type_)

@@ -140,19 +140,23 @@ pub(super) fn resolve(source: &Source, place: &str, uri: &str) -> Result<Vec<u8>
         if kind.ends_with(";base64") {
             return BASE64
                 .decode(data.trim())
-                .map_err(|e| source.error(place, format!("is no base64: {e}")));
+                .map_err(|e| source.error(place, format!("is not valid base64: {e}")));
         }
         return percent_decode(data)
-            .ok_or_else(|| source.error(place, "has a malformed % in its data URI"));
+            .ok_or_else(|| source.error(place, "has a malformed percent code in its data URI"));
     }
     let path = percent_decode(uri)
         .and_then(|bytes| String::from_utf8(bytes).ok())
         .filter(|path| !path.contains('\0'));
     let Some(path) = path else {
         let uri: String = uri.chars().take(80).collect();
-        return Err(
-            source.error(place, format!("refers to “{uri}”, whose % codes are no UTF-8 text"))
-        );
+        return Err(source.error(
+            place,
+            format!(
+                "refers to “{uri}”, whose percent codes do not decode to \
+                                         UTF-8 text"
+            ),
+        ));
     };
     let path = source.neighbour(place, &path)?;
     let file = source.open_beside(&path)?;

@@ -72,7 +72,7 @@ impl<'a> Builder<'a> {
         let Some(material) = root.materials.get(index) else {
             return Err(self
                 .source
-                .error(place, format!("refers to material {index}, which is not there")));
+                .error(place, format!("refers to material {index}, which does not exist")));
         };
         // If a file has both, the extension takes precedence over the core material, which is a
         // fallback for programs that do not know the extension.
@@ -111,9 +111,13 @@ impl<'a> Builder<'a> {
     fn texture(&mut self, index: usize, alpha: Alpha) -> Result<Arc<Texture>> {
         let Some(texture) = self.root.textures.get(index) else {
             let count = self.root.textures.len();
-            return Err(self
-                .source
-                .error(format!("texture {index}"), format!("there are {count} textures")));
+            return Err(self.source.error(
+                format!("texture {index}"),
+                format!(
+                    "does not exist; there are {count} \
+                                                            textures"
+                ),
+            ));
         };
         self.picture(texture.source.value(), alpha)
     }
@@ -141,9 +145,14 @@ impl<'a> Builder<'a> {
     fn decode(&self, image: usize) -> Result<Arc<Texture>> {
         let place = format!("image {image}");
         let Some(entry) = self.root.images.get(image) else {
-            return Err(self
-                .source
-                .error(place, format!("there are {} images", self.root.images.len())));
+            return Err(self.source.error(
+                place,
+                format!(
+                    "does not exist; there are {} \
+                                       images",
+                    self.root.images.len()
+                ),
+            ));
         };
         match (&entry.uri, entry.buffer_view) {
             (Some(uri), _) => {

@@ -48,7 +48,7 @@ pub(super) fn meshes(source: &Source, root: &json::Root) -> Result<Vec<(DMat4, u
         source.check_time()?;
         let place = format!("node {index}");
         let Some(node) = root.nodes.get(index) else {
-            return Err(source.error(place, format!("there are {count} nodes")));
+            return Err(source.error(place, format!("does not exist; there are {count} nodes")));
         };
         if std::mem::replace(&mut met[index], true) {
             return Err(source.error(place, "is its own ancestor, or has two parents"));

@@ -41,12 +41,12 @@ pub fn read(source: &Source, header: &Header) -> Result<Vec<Point>> {
 /// Returns how the points are packed. Isolated, because the decoder trusts what it reads and panics
 /// on impossible values.
 pub(super) fn layout(source: &Source, header: &Header) -> Result<LazVlr> {
-    isolated(source, "record of LASzip", || find_layout(source, header))
+    isolated(source, "LASzip record", || find_layout(source, header))
 }
 
 /// Returns how the points are packed, from one of the file's variable length records.
 fn find_layout(source: &Source, header: &Header) -> Result<LazVlr> {
-    let place = "record of LASzip";
+    let place = "LASzip record";
     let bytes = source.bytes();
     let (mut at, count) = header.records;
     for _ in 0..count {
@@ -58,9 +58,7 @@ fn find_layout(source: &Source, header: &Header) -> Result<LazVlr> {
             id == LazVlr::RECORD_ID && bytes[at + 2..].starts_with(LazVlr::USER_ID.as_bytes());
         at += 54;
         let Some(data) = bytes[..header.start].get(at..at + length) else {
-            return Err(
-                source.error("header", "a record before the points ends behind their beginning")
-            );
+            return Err(source.error("header", "a record before the points overlaps them"));
         };
         at += length;
         if is_wanted {
@@ -70,7 +68,7 @@ fn find_layout(source: &Source, header: &Header) -> Result<LazVlr> {
             return Ok(layout);
         }
     }
-    Err(source.error("header", "says that the points are packed, but has no record that says how"))
+    Err(source.error("header", "marks the points as compressed, but has no LASzip record"))
 }
 
 /// Checks that the items that a point is packed as are those of its format.
@@ -78,36 +76,35 @@ fn check(header: &Header, items: &[LazItem]) -> Result<(), String> {
     let size: usize = items.iter().map(|item| usize::from(item.size())).sum();
     if size != header.size {
         return Err(format!(
-            "packs points of {size} bytes, but the header has them of {}",
+            "packs points of {size} bytes, but the header claims points of {} bytes",
             header.size
         ));
     }
     let layered = header.format >= 6;
     let first = if layered { LazItemType::Point14 } else { LazItemType::Point10 };
     if items.first().map(LazItem::item_type) != Some(first) {
-        return Err(format!(
-            "does not begin with what a point of format {} begins with",
-            header.format
-        ));
+        return Err(format!("does not begin with the item of point format {}", header.format));
     }
     let versions = if layered { 3..=4 } else { 1..=2 };
     match items.iter().find(|item| !versions.contains(&item.version())) {
-        Some(item) => {
-            Err(format!("packs by version {}, which is not known for this format", item.version()))
-        }
+        Some(item) => Err(format!(
+            "uses version {} of an item, which is not known for this \
+                         format",
+            item.version()
+        )),
         None => Ok(()),
     }
 }
 
 /// Returns the chunks from the file's chunk table. Isolated, as [`layout`].
 pub(super) fn chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<Chunk>> {
-    isolated(source, "table of chunks", || find_chunks(source, header, layout))
+    isolated(source, "chunk table", || find_chunks(source, header, layout))
 }
 
 fn find_chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<Chunk>> {
     let bytes = source.bytes();
-    let wrong = |message: String| source.error("table of chunks", message);
-    let field = Fields { bytes, place: "the table of chunks" };
+    let wrong = |message: String| source.error("chunk table", message);
+    let field = Fields { bytes, place: "the chunk table" };
     // Writers that cannot seek back put the table's offset at the end of the file instead of the
     // start.
     let mut table = i64::from_le_bytes(field.at(header.start).map_err(wrong)?);
@@ -124,7 +121,7 @@ fn find_chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<
     if claimed > table - header.start {
         return Err(wrong(format!("claims {claimed} chunks in {} bytes", table - header.start)));
     }
-    source.room::<[Chunk; 2]>("the table of chunks", claimed)?;
+    source.room::<[Chunk; 2]>("the chunk table", claimed)?;
     let mut cursor = Cursor::new(bytes);
     cursor.set_position(header.start as u64);
     let entries =
@@ -136,7 +133,7 @@ fn find_chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<
         let points = usize::try_from(entry.point_count).unwrap_or(usize::MAX).min(left);
         let end = usize::try_from(entry.byte_count).ok().and_then(|size| at.checked_add(size));
         let Some(end) = end.filter(|&end| end <= table) else {
-            return Err(wrong(format!("chunk {number} ends behind the packed points")));
+            return Err(wrong(format!("chunk {number} ends after the packed points")));
         };
         chunks.push(Chunk { number, bytes: at..end, points });
         at = end;

@@ -145,7 +145,7 @@ impl Pieces {
             return Err(positions::not_finite(source, format!("point {point}"), position));
         }
         if seen.points == 0 {
-            return Err::<_, Error>(source.error("file", "holds no points"));
+            return Err::<_, Error>(source.error("file", "contains no points"));
         }
         self.paint = seen.paint(&self.header);
         Ok((seen.points, [seen.low, seen.high]))

@@ -189,7 +189,7 @@ fn lies_are_errors() {
         (change(&plain, 96, &[255; 4]), "at byte 4294967295"),
         (change(&plain, 131, &f64::NAN.to_le_bytes()), "the scale"),
         (change(&plain, 24, &[2]), "version 2.4"),
-        (change(&plain, 104, &[0x87]), "no record that says how"),
+        (change(&plain, 104, &[0x87]), "no LASzip record"),
         (laz(7, &records, 31), "has 30 points, but the header counts 31"),
         (change(&packed, start, &[255, 255, 255, 127]), "outside of the file"),
         (change(&packed, table + 4, &[255; 4]), "claims 4294967295 chunks"),

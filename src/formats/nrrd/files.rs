@@ -25,7 +25,11 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
     let (names, parts) = if is_list(field) {
         let mut words = field.split_ascii_whitespace().skip(1);
         let (parts, None) = (words.next(), words.next()) else {
-            return Err(wrong(format!("“{}” is not “LIST” with the axes of a file", shown(field))));
+            return Err(wrong(format!(
+                "“{}” is not “LIST” followed by the number of axes in a \
+                                      file",
+                shown(field)
+            )));
         };
         if rest.len() > super::LONGEST {
             return Err(wrong(format!(
@@ -39,8 +43,14 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
         let names = text.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned);
         (names.collect(), parts)
     } else if let Some(pattern) = Pattern::of(field) {
-        let count =
-            pattern.count().ok_or_else(|| wrong(format!("“{}” counts no files", shown(field))))?;
+        let count = pattern.count().ok_or_else(|| {
+            wrong(format!(
+                "“{}” names no files: its step does not \
+                                                         lead from the first number to the \
+                                                         last",
+                shown(field)
+            ))
+        })?;
         // Each file contains at least one sample.
         if count > dims.iter().product::<usize>() as u64 {
             return Err(wrong(format!(
@@ -61,7 +71,7 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
         Some(Ok(axes @ 1..=3)) => axes,
         Some(_) => {
             return Err(wrong(format!(
-                "“{}” does not tell 1, 2 or 3 axes of a file",
+                "“{}” must end with 1, 2 or 3, the number of axes in a file",
                 shown(field)
             )));
         }
@@ -199,13 +209,13 @@ mod tests {
         for (data_file, message) in [
             ("slice%02d.raw 1 3 1", "there are 3 files, but their number must be 4"),
             ("slab%2d.raw 0 2 1 3", "there are 3 files, but their number must divide 4"),
-            ("slice%02d.raw 1 4 0", "counts no files"),
-            ("slice%02d.raw 1 4 -1", "counts no files"),
+            ("slice%02d.raw 1 4 0", "names no files"),
+            ("slice%02d.raw 1 4 -1", "names no files"),
             ("slice%02d.raw 1 4 9", "there are 1 files"),
             ("slice%02d.raw 0 9223372036854775807 1", "more than there are samples"),
-            ("slice%02d.raw -9223372036854775808 9223372036854775807 1", "counts no files"),
-            ("slice%02d.raw 1 4 1 4", "does not tell 1, 2 or 3 axes"),
-            ("LIST 2 2\n", "is not “LIST” with the axes"),
+            ("slice%02d.raw -9223372036854775808 9223372036854775807 1", "names no files"),
+            ("slice%02d.raw 1 4 1 4", "must end with 1, 2 or 3"),
+            ("LIST 2 2\n", "is not “LIST” followed by the number of axes"),
             ("LIST", "there are 0 files"),
             ("LIST 3", "there are 0 files"),
             ("LIST\nslice01.raw", "there are 1 files"),

@@ -71,7 +71,7 @@ impl Survey {
                             let shown: String = word.chars().take(40).collect();
                             return Err(source
                                 .error(place(), format!("“{shown}” is not a number"))
-                                .hint("numbers have points, no decimal commas"));
+                                .hint("write numbers with a decimal point, not a comma"));
                         }
                     }
                     survey.colors &= values >= 6;
@@ -86,8 +86,9 @@ impl Survey {
                         let mut has_normal = false;
                         for (kind, part) in word.split('/').enumerate() {
                             if kind > 2 || (part.is_empty() && kind == 0) {
-                                return Err(source
-                                    .error(place(), format!("“{word}” is no corner of a face")));
+                                return Err(
+                                    source.error(place(), format!("“{word}” is not a face corner"))
+                                );
                             }
                             if part.is_empty() {
                                 continue;
@@ -96,8 +97,7 @@ impl Survey {
                             let index: i64 = part
                                 .parse::<i32>()
                                 .map_err(|_| {
-                                    source
-                                        .error(place(), format!("“{word}” is no corner of a face"))
+                                    source.error(place(), format!("“{word}” is not a face corner"))
                                 })?
                                 .into();
                             if index == 0 || -index > counts[kind] {
@@ -129,12 +129,13 @@ impl Survey {
         }
         if let (Some((line, index, kind)), Some(back)) = (ahead, back) {
             let message = format!(
-                "a face refers to {} {index}, which stands behind it, while that of line {back} counts back from where it stands",
+                "a face refers to {} {index}, which comes after it, but a face in line {back} uses \
+                 negative indices; one file cannot have both",
                 WHAT[kind]
             );
             return Err(source
                 .error(format!("line {line}"), message)
-                .hint("put the faces behind all that they refer to"));
+                .hint("move the faces after everything that they refer to"));
         }
         survey.ahead = ahead.is_some();
         survey.vertices = counts[0] as u64;

@@ -125,7 +125,7 @@ fn faces_may_stand_before_what_they_refer_to() {
     assert_eq!((ahead.triangles, ahead.normals.len()), (behind.triangles, 6));
     let error =
         load(format!("{}{positions}vn 0 0 1\nf -4 -3 -1\n", faces[0])).unwrap_err().to_string();
-    assert!(error.contains("line 1: a face refers to vertex 1, which stands behind it"), "{error}");
+    assert!(error.contains("line 1: a face refers to vertex 1, which comes after it"), "{error}");
 }
 
 #[test]
@@ -228,7 +228,7 @@ fn broken_statements_are_errors_with_their_line() {
         (SQUARE.replace("3 4", "3 9223372036854775807"), "line 5"),
         (SQUARE.replace("3 4", "3 4/1"), "texture coordinate 1"),
         (SQUARE.replace("3 4", "3 4//1"), "normal 1"),
-        (SQUARE.replace("3 4", "3 4/a"), "no corner"),
+        (SQUARE.replace("3 4", "3 4/a"), "not a face corner"),
         (SQUARE.replace("3 4", "3 4/1/1/1"), "line 5"),
         (String::new(), "no vertices"),
         ("{}".into(), "no vertices"),

@@ -106,7 +106,7 @@ pub fn read(source: &Source) -> Result<Header> {
         let Some(name) = parts.next().filter(|name| !name.starts_with('#')) else { continue };
         let Some(entry) = ENTRIES.iter().position(|entry| *entry == name) else {
             let shown: String = name.chars().take(40).collect();
-            return Err(source.error(place(), format!("“{shown}” is no entry of a PCD header")));
+            return Err(source.error(place(), format!("“{shown}” is not an entry of a PCD header")));
         };
         words[entry] = parts.map(str::to_owned).collect();
         if entry == DATA {
@@ -156,7 +156,7 @@ fn finish(
         ["ascii"] => Data::Text,
         ["binary"] => Data::Binary,
         ["binary_compressed"] => Data::Packed,
-        _ => return Err(wrong(DATA, "is none of ascii, binary and binary_compressed")),
+        _ => return Err(wrong(DATA, "is not ascii, binary or binary_compressed")),
     };
     let (width, height) = (number(WIDTH)?, number(HEIGHT)?);
     let product = width.map(|width| width.saturating_mul(height.unwrap_or(1)));
@@ -164,7 +164,7 @@ fn finish(
         (Some(points), Some(product)) if points != product => {
             return Err(source.error(
                 "header",
-                format!("claims {points} points, but {product} in rows and columns"),
+                format!("“POINTS” claims {points} points, but “WIDTH” × “HEIGHT” is {product}"),
             ));
         }
         (points, product) => points.or(product).ok_or_else(|| wrong(POINTS, "is missing"))?,
@@ -182,7 +182,7 @@ fn finish(
             "F" => NumberKind::Float,
             "U" => NumberKind::Unsigned,
             "I" => NumberKind::Signed,
-            _ => return Err(wrong(TYPE, "has a type that is none of F, U and I")),
+            _ => return Err(wrong(TYPE, "has a type other than F, U and I")),
         };
         let size = match (words[SIZE][index].as_str(), kind) {
             ("4", _) => 4,
@@ -195,7 +195,7 @@ fn finish(
         let fits =
             |count: &usize| word.checked_add(*count).is_some_and(|words| words <= MOST_FIELDS);
         let count = count.filter(|count| fits(count) && index < MOST_FIELDS);
-        let count = count.ok_or_else(|| wrong(COUNT, "has what is no count of numbers"))?;
+        let count = count.ok_or_else(|| wrong(COUNT, "has an invalid count"))?;
         if count > 0 {
             fields.push(Field { name: name.clone(), kind, size, count, offset, word });
         }

@@ -28,7 +28,7 @@ pub fn unpack(packed: &[u8], size: usize) -> Result<Vec<u8>, (usize, String)> {
             let from = out
                 .len()
                 .checked_sub(distance)
-                .ok_or((start, "refer to before their start".to_owned()))?;
+                .ok_or((start, "refer to bytes before their start".to_owned()))?;
             // A copy may overlap its own output.
             (from..from + length).for_each(|index| out.push(out[index]));
         }

@@ -82,7 +82,7 @@ fn cuts_and_lies_are_errors() {
     every_cut(&folder, "a.pcd", &packed(), read);
     let header = |from: &str, to: &str| String::from_utf8(text()).unwrap().replace(from, to);
     for (content, word) in [
-        (header("POINTS 2", "POINTS 3"), "claims 3 points, but 2 in rows and columns"),
+        (header("POINTS 2", "POINTS 3"), "claims 3 points, but “WIDTH” × “HEIGHT” is 2"),
         (
             header("WIDTH 2\nHEIGHT 1\nVIEWPOINT 1 2 9 1 0 0 0\nPOINTS 2", "POINTS 3"),
             "holds 2 points where the header claims 3",
@@ -90,13 +90,13 @@ fn cuts_and_lies_are_errors() {
         (header("FIELDS x", "FIELDS w"), "no fields “x”"),
         (header("SIZE 4", "SIZE 3"), "“SIZE 3 4 8 1 4 4 4 4” has a size"),
         (header("SIZE 4 4", "SIZE 4"), "does not fit the 8 fields"),
-        (header("TYPE F F", "TYPE F G"), "none of F, U and I"),
-        (header("COUNT 1 1 1 3", "COUNT 1 1 1 99999999999"), "no count of numbers"),
+        (header("TYPE F F", "TYPE F G"), "other than F, U and I"),
+        (header("COUNT 1 1 1 3", "COUNT 1 1 1 99999999999"), "an invalid count"),
         (
             header("COUNT 1 1 1 3", "COUNT 1 1 1 4"),
             "line 12: has 10 numbers where the fields need 11",
         ),
-        (header("DATA ascii", "DATA zipped"), "none of ascii"),
+        (header("DATA ascii", "DATA zipped"), "is not ascii"),
         (header("VERSION", "VERSIONS"), "line 2: “VERSIONS” is no entry"),
         (header("4.0 5", "4.0 five"), "line 14: “five” is not a number"),
         (header("1 2 3 7", "inf 2 3 7").replace("4.0", "nan"), "no points"),

@@ -71,7 +71,8 @@ pub(super) fn are_gaussians(element: &Element) -> bool {
 /// Warns that a file contains 3D Gaussians: read as points, they do not look like the scene.
 pub(in super::super) fn warn(source: &Source) {
     tracing::warn!(
-        "{}: holds trained 3D Gaussians, whose shapes and colours are not read yet; their centres are drawn as points",
+        "{}: contains trained 3D Gaussians, whose shapes and colours are not read yet; their \
+         centres are drawn as points",
         source.path.display()
     );
 }

@@ -92,13 +92,13 @@ pub(super) fn read(source: &Source) -> Result<Header> {
         let Some(end) = window.iter().position(|b| matches!(b, b'\n' | b'\r')) else {
             if window.len() < rest.len() {
                 let message = format!(
-                    "the header is longer than {LONGEST} bytes, with no line “end_header” in them"
+                    "the header is longer than {LONGEST} bytes and has no “end_header” line"
                 );
                 return Err(source.error(place(), message));
             }
             return Err(source.error(
                 place(),
-                "the header has no “end_header” line; the file is cut or is no PLY",
+                "the header has no “end_header” line; the file is cut off or is not PLY",
             ));
         };
         let line = copy::lossy(&rest[..end]);
@@ -116,7 +116,7 @@ pub(super) fn read(source: &Source) -> Result<Header> {
             ["element", name, count] => {
                 if count.parse::<usize>().is_err() {
                     let shown: String = count.chars().take(40).collect();
-                    return Err(source.error(place(), format!("“{shown}” is no count of rows")));
+                    return Err(source.error(place(), format!("“{shown}” is not a row count")));
                 }
                 clean.push_str(&format!("element e{} {count}\n", names.len()));
                 names.push(((*name).to_owned(), Vec::new()));
@@ -126,7 +126,7 @@ pub(super) fn read(source: &Source) -> Result<Header> {
                 let Some((_, properties)) = names.last_mut() else {
                     return Err(source.error(
                         place(),
-                        format!("the property “{name}” stands before any element"),
+                        format!("the property “{name}” comes before any element"),
                     ));
                 };
                 clean.push_str(&format!("property {} p{}\n", kind.join(" "), properties.len()));

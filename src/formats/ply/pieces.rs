@@ -208,7 +208,7 @@ impl Pieces {
             let corners = number(&bytes[faces.length.0..], &faces.length.1, big);
             if corners != 3.0 {
                 return wrong(format!(
-                    "has {corners} corners; in pieces only triangles can be read"
+                    "has {corners} corners; only triangles can be read in pieces"
                 ));
             }
             let corners = [0, 4, 8].map(|corner| {

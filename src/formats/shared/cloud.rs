@@ -25,7 +25,7 @@ impl Cloud {
     /// Chooses the origin and makes the mesh. `place` names a point in an error.
     pub fn into_mesh(self, source: &Source, place: impl Fn(usize) -> String) -> Result<Mesh> {
         if self.positions.is_empty() {
-            return Err(source.error("file", "holds no points"));
+            return Err(source.error("file", "contains no points"));
         }
         source.room::<Vec3>("the normals", self.normals.len())?;
         let (origin, positions) =

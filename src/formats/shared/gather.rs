@@ -30,7 +30,7 @@ pub(crate) fn gather(
     columns: Columns,
 ) -> Result<Points> {
     if count == 0 {
-        return Err(source.error("file", "holds no samples"));
+        return Err(source.error("file", "contains no samples"));
     }
     let wrong = |&value: &f64| !(value as f32).is_finite();
     if let Some(row) = columns.values.par_iter().position_first(wrong) {

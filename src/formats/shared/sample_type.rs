@@ -201,7 +201,7 @@ fn parse<const N: usize, T: std::str::FromStr>(
         }
         let number = word.parse().map_err(|_| {
             let shown: String = word.chars().take(40).collect();
-            format!("number {i} is “{shown}”, which is no {}", std::any::type_name::<T>())
+            format!("number {i} is “{shown}”, which is not a valid {}", std::any::type_name::<T>())
         })?;
         bytes.extend_from_slice(&write(number));
     }
@@ -269,7 +269,7 @@ mod tests {
     #[test]
     fn wrong_texts_are_told() {
         assert!(SampleType::U8.parse("1 256", 2).unwrap_err().contains("number 1 is “256”"));
-        assert!(SampleType::I16.parse("1.5", 1).unwrap_err().contains("no i16"));
+        assert!(SampleType::I16.parse("1.5", 1).unwrap_err().contains("not a valid i16"));
         assert!(SampleType::U8.parse("1 2 3", 2).unwrap_err().contains("more than the 2"));
         assert!(SampleType::U8.parse("1 2", 1 << 50).unwrap_err().contains("2 numbers"));
     }

@@ -238,7 +238,7 @@ fn types_and_the_choice_of_the_array() {
         ),
         (
             format!("<PointData>{}</PointData>", scalar.replace("ascii", "appended' offset='0")),
-            "nothing is",
+            "no appended data",
         ),
         (
             format!(
@@ -247,7 +247,7 @@ fn types_and_the_choice_of_the_array() {
             ),
             "not finite",
         ),
-        (format!("<PointData>{scalar}</CellData>"), "is no XML"),
+        (format!("<PointData>{scalar}</CellData>"), "is not valid XML"),
     ] {
         let message = load(&points).unwrap_err().to_string();
         assert!(message.contains(word), "{message}");
@@ -271,8 +271,8 @@ fn wrong_heads_are_told() {
         (head, "", "WholeExtent"),
         (head, "WholeExtent='0 1 0 0 0'", "6 numbers"),
         (head, "WholeExtent='0 1 0 0 0 2'", "4 points"),
-        (head, "WholeExtent='0 0 0 0 0 1'", "out of the whole"),
-        (head, "WholeExtent='0 1 0 -1 0 1'", "no points"),
+        (head, "WholeExtent='0 0 0 0 0 1'", "beyond the whole"),
+        (head, "WholeExtent='0 1 0 -1 0 1'", "not a valid range"),
         (head, "WholeExtent='0 1 0 0 0 1' Spacing='1 0 1'", "spacing"),
         (head, "WholeExtent='0 1 0 0 0 1' Spacing='1 nan 1'", "finite"),
         (head, "WholeExtent='0 1 0 0 0 1' Direction='1 1 0 0 0 0 0 0 1'", "plane"),
@@ -320,7 +320,7 @@ fn lying_counts_allocate_nothing() {
         (error("0 4294967294 0 0 0 0", false, &narrow(&[u32::MAX, 1, 0])), "sizes of its blocks"),
         (
             error("0 4294967294 0 0 0 0", false, &narrow(&[1, u32::MAX, 0, 4, 0])),
-            "packed ones cannot hold",
+            "compressed bytes can hold",
         ),
         (error("0 7 0 0 0 0", true, &wide(&[1, 8, 0, u64::MAX])), "block 0 claims"),
         (error("0 7 0 0 0 0", true, &wide(&[1, 0, 8, 9])), "last of 8"),
@@ -360,5 +360,5 @@ fn pieces_are_put_together() {
     assert_eq!(volume.samples, Samples::I32((0..12).collect()));
     assert_eq!(volume.lattice.origin, DVec3::new(0.0, -1.0, 5.0));
     assert!(load(&[left]).unwrap_err().to_string().contains("8 points"));
-    assert!(load(&[left, left]).unwrap_err().to_string().contains("no piece holds point 2"));
+    assert!(load(&[left, left]).unwrap_err().to_string().contains("no piece contains point 2"));
 }

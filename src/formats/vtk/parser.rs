@@ -72,9 +72,7 @@ impl<'a> Parser<'a> {
                     parser.skip_to_blank()?
                 }
                 _ => {
-                    return Err(
-                        source.error(place, "is not the line “DATASET …” that was expected")
-                    );
+                    return Err(source.error(place, "the line “DATASET …” was expected here"));
                 }
             }
         }
@@ -134,8 +132,9 @@ impl<'a> Parser<'a> {
 
     /// Returns a count from a keyword's line, checked against the limit of points.
     pub fn count(&self, place: &str, word: &str) -> Result<usize> {
-        let count =
-            word.parse().map_err(|_| self.source.error(place, format!("“{word}” is no count")))?;
+        let count = word
+            .parse()
+            .map_err(|_| self.source.error(place, format!("“{word}” is not a count")))?;
         self.source.check_points("a count of points or cells", count)
     }
 
@@ -181,7 +180,7 @@ impl<'a> Parser<'a> {
             })?;
             self.source.room::<u8>("the text", length)?;
             let text = copy::text(&rest[..length])
-                .map_err(|_| wrong("is followed by what is not text".into()))?;
+                .map_err(|_| wrong("is followed by bytes that are not text".into()))?;
             self.source.spend("the size of the numbers in bytes", (count * kind.bytes()) as u64)?;
             (kind.parse(&text, count).map_err(wrong)?.into(), Endian::Little, length)
         };
@@ -208,7 +207,7 @@ impl<'a> Parser<'a> {
                 .as_ref()
                 .and_then(|(place, line)| Some((place, line.strip_prefix("CONNECTIVITY")?.trim())));
             let (place, kind) =
-                next.ok_or_else(|| self.source.error(place, "offsets without their CONNECTIVITY"))?;
+                next.ok_or_else(|| self.source.error(place, "has OFFSETS without CONNECTIVITY"))?;
             let corners = self.array(place, size, kind)?.doubles(self.source)?;
             if ends.first().is_some_and(|&first| first != 0.0) {
                 return Err(self

@@ -135,7 +135,7 @@ fn unstructured_grids_of_both_versions() {
                     .to_string()
                     .contains("no scalar “none”")
             );
-            assert!(volume(&content).unwrap_err().to_string().contains("no volume"));
+            assert!(volume(&content).unwrap_err().to_string().contains("not a volume"));
             for end in 0..content.len() {
                 // Whole parts may be missing at the end. Nothing panics, and data that are read are
                 // valid.
@@ -186,7 +186,7 @@ fn what_is_wrong_is_told() {
         ("SCALARS", "SCALES", "“SCALES” is not known"),
         ("30 4", "300 4", "300"),
         ("4 255", "4", "5 numbers where 6"),
-        ("POINT_DATA 6", "POINT_DATA six", "“six” is no count"),
+        ("POINT_DATA 6", "POINT_DATA six", "“six” is not a count"),
         ("POINT_DATA 6", "", "before POINT_DATA"),
     ] {
         let message = image(from, to).to_string();
@@ -206,6 +206,6 @@ fn what_is_wrong_is_told() {
         .to_string()
     };
     assert!(cells("4 0 1 2").contains("more corners than are listed"));
-    assert!(cells("3 0 1 8").contains("corner 8"));
+    assert!(cells("3 0 1 8").contains("point 8"));
     assert!(cells("3 0 1 2").contains("has no scalar"));
 }

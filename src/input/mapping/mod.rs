@@ -59,7 +59,7 @@ impl Mapping {
     /// Describes in words how the file has changed since it was opened; `None` if it has not.
     pub fn change(&self) -> Option<String> {
         if self.bytes.as_ref().is_some_and(|(guard, _)| guard.is_hit()) {
-            return Some("a part of it is not there any more, or its disk failed".into());
+            return Some("a part of it is gone, or its disk failed".into());
         }
         // If the file can no longer be queried, what was read from it may still be right.
         self.opened.change(&Stamp::of(&self.file).ok()?)
@@ -122,7 +122,7 @@ mod tests {
         assert_eq!((hit[99_999], hit[4999], hit[5001], hit[70_000]), (0, 7, 0, 0));
         hit.release();
         assert_eq!((hit[99_999], hit[4999]), (0, 7));
-        assert!(hit.change().unwrap().contains("not there any more"));
+        assert!(hit.change().unwrap().contains("a part of it is gone"));
         // The other mappings have not been read yet; only the length shows the change.
         assert_eq!((other.change(), other[99_999]), (None, 7));
         assert!(away.change().unwrap().contains("5000 bytes"));
@@ -141,7 +141,7 @@ mod tests {
                     });
                 }
             });
-            assert!(mapping.change().unwrap().contains("not there any more"));
+            assert!(mapping.change().unwrap().contains("a part of it is gone"));
         }
         assert_eq!((other.change(), other[50_000]), (None, 7));
     }

@@ -21,7 +21,7 @@ impl Stamp {
     /// Describes in words what has changed, or returns `None`.
     pub fn change(&self, now: &Self) -> Option<String> {
         if now.length != self.length {
-            return Some(format!("it has {} bytes where it had {}", now.length, self.length));
+            return Some(format!("it has {} bytes now and had {} before", now.length, self.length));
         }
         let [before, after] = [self.written?, now.written?];
         (!is_same(before, after)).then(|| "it was written to".into())
