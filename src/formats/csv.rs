@@ -64,9 +64,10 @@ impl Layout {
             4 => Ok(plain),
             5 => Ok(Self { radius: Some(4), ..plain }),
             10 => Ok(Self { covariance: Some([4, 5, 6, 7, 8, 9]), ..plain }),
-            _ => Err(source
-                .error("line 1", format!("has {count} columns without names"))
-                .hint("write x, y, z, value and then nothing, a radius, or xx, xy, xz, yy, yz, zz; or name the columns in the first line")),
+            _ => Err(source.error("line 1", format!("has {count} columns without names")).hint(
+                "write x, y, z, value and then nothing, a radius, or xx, xy, xz, yy, yz, zz; \
+                       or name the columns in the first line",
+            )),
         }
     }
 

@@ -52,7 +52,10 @@ pub fn read(source: &Source) -> Result<Mesh> {
         if !KNOWN.iter().any(|known| extension.starts_with(known)) {
             return Err(source
                 .error("extensionsRequired", format!("the extension {extension} is not supported"))
-                .hint("convert the file without compression, for example with gltf-transform or gltfpack"));
+                .hint(
+                    "convert the file without compression, for example with gltf-transform or \
+                       gltfpack",
+                ));
         }
     }
     let buffers = Buffers::open(source, &root, binary)?;

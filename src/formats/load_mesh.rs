@@ -52,9 +52,8 @@ pub(super) fn read(source: &Source) -> Result<Mesh> {
         _ => Err(source
             .error("path", format!("“.{extension}” is not a mesh format that can be read"))
             .hint(
-                "meshes and point clouds are read from .ply, .obj, .gltf, .glb, .stl, .las, .laz, .e57, \
-                 .pcd, .xyz, .pts, .asc, .csv \
-                 and .txt",
+                "meshes and point clouds are read from .ply, .obj, .gltf, .glb, .stl, .las, .laz, \
+                 .e57, .pcd, .xyz, .pts, .asc, .csv and .txt",
             )),
     }
 }

@@ -50,7 +50,8 @@ pub(super) fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
                 format!("“.{extension}” is not a format of scattered samples that can be read"),
             )
             .hint(
-                "scattered samples are read from .ply, .vtu, .vtp, .vtk, .npy, .csv, .txt and .xyzv",
+                "scattered samples are read from .ply, .vtu, .vtp, .vtk, .npy, .csv, .txt and \
+                 .xyzv",
             )),
     }
 }

@@ -49,8 +49,10 @@ pub fn read(source: &Source) -> Result<Points> {
             (source.check_points("the number of rows", rows)?, width as usize)
         }
         _ => {
-            return Err(wrong(format!("has the shape {shape}"))
-                .hint("a sample is a row of x, y, z, value and then nothing, a radius, or xx, xy, xz, yy, yz, zz"));
+            return Err(wrong(format!("has the shape {shape}")).hint(
+                "a sample is a row of x, y, z, value and then nothing, a radius, or xx, xy, \
+                       xz, yy, yz, zz",
+            ));
         }
     };
     let size = kind.bytes_of([rows, width, 1]).unwrap_or(u64::MAX);

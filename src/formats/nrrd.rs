@@ -209,7 +209,8 @@ impl<'a> Header<'a> {
                     }
                 }
                 None => {
-                    let message = "is neither a field, a key and value, a comment, nor the empty line before the data";
+                    let message = "is neither a field, a key and value, a comment, nor the empty \
+                                   line before the data";
                     return Err(source.error(format!("line {}", number + 1), message));
                 }
             }
@@ -273,7 +274,8 @@ impl<'a> Header<'a> {
             .find(|kind| several.iter().any(|name| kind.contains(name)))
         {
             let message = format!(
-                "one axis holds values of the kind “{kind}”, but a volume has one scalar for each sample"
+                "one axis holds values of the kind “{kind}”, but a volume has one scalar for each \
+                 sample"
             );
             return Err(self
                 .source
@@ -310,9 +312,10 @@ impl<'a> Header<'a> {
             Some(other) => {
                 let error =
                     self.source.error("lattice", format!("“{other}” is not a known lattice"));
-                return Err(
-                    error.hint("lattice:=bcc marks body-centred cubic lattices; Cartesian ones have no such key")
-                );
+                return Err(error.hint(
+                    "lattice:=bcc marks body-centred cubic lattices; Cartesian ones \
+                                have no such key",
+                ));
             }
         };
         lattice.validate().map_err(|message| self.source.error("header", message))?;

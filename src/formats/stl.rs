@@ -157,9 +157,10 @@ mod tests {
 
     const FACETS: [[f32; 9]; 2] =
         [[0., 0., 0., 1., 0., 0., 0., 1., 0.], [1., 0., 0., 1., 1., 0., 0., 1., 0.]];
-    const TEXT: &str = "solid two of them\n facet normal 0 0 1\n outer loop\n vertex 0 0 0\n vertex 1 0 0\n vertex 0 1 0\n\
-        endloop\n endfacet\n\nFACET NORMAL 0 0 1\r\nOUTER LOOP\r\nVERTEX 1e0 0 0\r\nVERTEX 1 1 0\r\nVERTEX 0 1 -0\r\n\
-        ENDLOOP\r\nENDFACET\r\nendsolid";
+    const TEXT: &str = "solid two of them\n facet normal 0 0 1\n outer loop\n vertex 0 0 0\n \
+                        vertex 1 0 0\n vertex 0 1 0\nendloop\n endfacet\n\nFACET NORMAL 0 0 1\r\n\
+                        OUTER LOOP\r\nVERTEX 1e0 0 0\r\nVERTEX 1 1 0\r\nVERTEX 0 1 -0\r\n\
+                        ENDLOOP\r\nENDFACET\r\nendsolid";
 
     fn load(content: impl AsRef<[u8]>) -> Result<Mesh> {
         let folder = Folder::new();

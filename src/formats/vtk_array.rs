@@ -69,7 +69,8 @@ impl ArrayEncoding {
         let claim = whole.checked_mul(block).and_then(|n| n.checked_add(last));
         if claim != Some(size as u64) || last > block {
             return Err(wrong(format!(
-                "claims {blocks} blocks of {block} bytes, the last of {last}, where {size} bytes were expected"
+                "claims {blocks} blocks of {block} bytes, the last of {last}, where {size} bytes \
+                 were expected"
             )));
         }
         let sizes_end =

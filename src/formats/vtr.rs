@@ -76,15 +76,19 @@ mod tests {
         let pieces: String = pieces
             .iter()
             .map(|(extent, places, values)| {
-                let places = places.map(|p| format!("<DataArray type='Float64' format='ascii'>{p}</DataArray>")).concat();
+                let places = places
+                    .map(|p| format!("<DataArray type='Float64' format='ascii'>{p}</DataArray>"))
+                    .concat();
                 format!(
-                    "<Piece Extent='{extent}'><PointData Scalars='s'><DataArray type='UInt8' Name='s' format='ascii'>{values}\
-                     </DataArray></PointData><Coordinates>{places}</Coordinates></Piece>"
+                    "<Piece Extent='{extent}'><PointData Scalars='s'><DataArray type='UInt8' \
+                     Name='s' format='ascii'>{values}</DataArray></PointData>\
+                     <Coordinates>{places}</Coordinates></Piece>"
                 )
             })
             .collect();
         format!(
-            "<VTKFile type='RectilinearGrid'><RectilinearGrid WholeExtent='{whole}'>{pieces}</RectilinearGrid></VTKFile>"
+            "<VTKFile type='RectilinearGrid'><RectilinearGrid \
+             WholeExtent='{whole}'>{pieces}</RectilinearGrid></VTKFile>"
         )
     }
 

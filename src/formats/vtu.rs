@@ -172,9 +172,10 @@ mod tests {
         let ends = array("type='Int64' Name='offsets'", "4 8");
         let kinds = array("type='UInt8' Name='types'", "10 9");
         format!(
-            "<VTKFile type='UnstructuredGrid'><UnstructuredGrid><Piece NumberOfPoints='8' NumberOfCells='2'>\
-             <PointData>{point_data}</PointData><CellData>{cell_data}</CellData><Points>{points}</Points>\
-             <Cells>{corners}{ends}{kinds}</Cells></Piece></UnstructuredGrid></VTKFile>"
+            "<VTKFile type='UnstructuredGrid'><UnstructuredGrid><Piece NumberOfPoints='8' \
+             NumberOfCells='2'><PointData>{point_data}</PointData><CellData>{cell_data}</CellData>\
+             <Points>{points}</Points><Cells>{corners}{ends}{kinds}</Cells></Piece>\
+             </UnstructuredGrid></VTKFile>"
         )
     }
 
@@ -240,8 +241,8 @@ mod tests {
             };
             format!(
                 "<Piece NumberOfPoints='4' NumberOfVerts='1' NumberOfLines='0' NumberOfPolys='2'>\
-                 <CellData Scalars='c'>{}</CellData><Points>{points}</Points><Verts>{}</Verts><Lines>{}</Lines>\
-                 <Polys>{}</Polys></Piece>",
+                 <CellData Scalars='c'>{}</CellData><Points>{points}</Points><Verts>{}</Verts>\
+                 <Lines>{}</Lines><Polys>{}</Polys></Piece>",
                 array("type='Float32' Name='c'", values),
                 cells("3", "1"),
                 cells("", ""),

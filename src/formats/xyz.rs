@@ -160,11 +160,24 @@ impl Layout {
             6 => Ok(Self { untold: vec![[3, 4, 5]], ..plain }),
             7 => Ok(Self { intensity: Some(3), color: Some([4, 5, 6]), ..plain }),
             9 => Ok(Self { untold: vec![[3, 4, 5], [6, 7, 8]], ..plain }),
-            10 => Ok(Self { intensity: Some(3), color: Some([4, 5, 6]), normal: Some([7, 8, 9]), ..plain }),
-            _ => Err(source.error(format!("line {line}"), format!("has {width} columns without names")).hint(
-                "a point is x, y, z and then a colour, a normal, both, or an intensity and a colour; or name the columns in the \
-                 first line",
-            )),
+            10 => Ok(Self {
+                intensity: Some(3),
+                color: Some([4, 5, 6]),
+                normal: Some([7, 8, 9]),
+                ..plain
+            }),
+            _ => Err(source
+                .error(
+                    format!("line {line}"),
+                    format!(
+                        "has {width} columns without \
+                                                                   names"
+                    ),
+                )
+                .hint(
+                    "a point is x, y, z and then a colour, a normal, both, or an intensity and a \
+                 colour; or name the columns in the first line",
+                )),
         }
     }
 

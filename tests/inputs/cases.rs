@@ -539,10 +539,16 @@
             scene(r#"{"children":[1,1]},{"mesh":0}"#),
             "twice.gltf: node 1: is its own ancestor, or has two parents",
         ),
-        ("node.gltf", scene(r#"{"children":[9]}"#), "node.gltf: node 9: does not exist; there are \
-                                                     1 nodes"),
-        ("mesh.gltf", scene(r#"{"mesh":9}"#), "mesh.gltf: mesh 9: does not exist; there are 1 \
-                                               meshes"),
+        (
+            "node.gltf",
+            scene(r#"{"children":[9]}"#),
+            "node.gltf: node 9: does not exist; there are 1 nodes",
+        ),
+        (
+            "mesh.gltf",
+            scene(r#"{"mesh":9}"#),
+            "mesh.gltf: mesh 9: does not exist; there are 1 meshes",
+        ),
         (
             "deep.gltf",
             chain(65),
@@ -801,8 +807,9 @@
         (
             "zeros.csv",
             vec![0; 1000],
-            "zeros.csv: line 1: \
-             \"\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\" contains neither numbers nor column names",
+            "zeros.csv: line 1: \"\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\
+             \\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\" contains neither numbers \
+             nor column names",
         ),
         // PCD.
         (
@@ -1232,7 +1239,8 @@
         (
             "children.splk",
             crafted::with_node_bytes(76, &u32::MAX.to_le_bytes()),
-            "children.splk: page 0 (byte 229): its node 0 has 4294967295 children; at most 8 are allowed",
+            "children.splk: page 0 (byte 229): its node 0 has 4294967295 children; at most 8 are \
+             allowed",
         ),
         (
             "swapped.splk",

@@ -60,12 +60,14 @@ fn square() -> Value {
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0}],
         "meshes": [{"primitives": [{
-            "attributes": {"POSITION": 0, "TEXCOORD_0": 1, "COLOR_0": 2}, "indices": 3, "material": 0}]}],
+            "attributes": {"POSITION": 0, "TEXCOORD_0": 1, "COLOR_0": 2},
+            "indices": 3, "material": 0}]}],
         "materials": [{"pbrMetallicRoughness": {"baseColorFactor": [1, 0.5, 0, 0.25]}}],
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
             {"bufferView": 0, "byteOffset": 48, "componentType": 5126, "count": 4, "type": "VEC2"},
-            {"bufferView": 0, "byteOffset": 80, "componentType": 5121, "normalized": true, "count": 4, "type": "VEC4"},
+            {"bufferView": 0, "byteOffset": 80, "componentType": 5121, "normalized": true,
+                "count": 4, "type": "VEC4"},
             {"bufferView": 0, "byteOffset": 96, "componentType": 5123, "count": 6, "type": "SCALAR"}
         ],
         "bufferViews": [{"buffer": 0, "byteLength": 108}],
@@ -211,7 +213,8 @@ fn specular_glossiness_replaces_the_base_colour() {
             "extensions": {"KHR_materials_pbrSpecularGlossiness": {
                 "diffuseFactor": [1, 0.5, 0, 0.25],
                 "diffuseTexture": {"index": 0,
-                    "extensions": {"KHR_texture_transform": {"offset": [0.5, 0.0], "scale": [2.0, 1.0]}}}
+                    "extensions": {"KHR_texture_transform":
+                        {"offset": [0.5, 0.0], "scale": [2.0, 1.0]}}}
             }}
         })],
         [255, 0, 255, 0],
@@ -269,7 +272,8 @@ fn a_text_file_cut_anywhere() {
 #[test]
 fn transforms_and_mirrors() {
     let nodes = json!([
-        {"children": [1], "translation": [10, 0, 0], "rotation": [0, 0, 0.5f64.sqrt(), 0.5f64.sqrt()]},
+        {"children": [1], "translation": [10, 0, 0],
+            "rotation": [0, 0, 0.5f64.sqrt(), 0.5f64.sqrt()]},
         {"mesh": 0, "matrix": [-1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0, 0, 0, 3, 1]}
     ]);
     let mesh = load_json(&changed(&[("/nodes", nodes)])).expect("loads");
@@ -285,10 +289,9 @@ fn normals_agree_with_triangles_under_mirrors() {
     let mut value = square();
     value["buffers"] = json!([{"byteLength": binary.len(), "uri": data_uri(&binary)}]);
     value["bufferViews"] = json!([{"buffer": 0, "byteLength": binary.len()}]);
-    value["accessors"]
-        .as_array_mut()
-        .expect("a list")
-        .push(json!({"bufferView": 0, "byteOffset": 108, "componentType": 5126, "count": 4, "type": "VEC3"}));
+    value["accessors"].as_array_mut().expect("a list").push(json!({
+        "bufferView": 0, "byteOffset": 108, "componentType": 5126, "count": 4, "type": "VEC3"
+    }));
     value["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = json!(4);
     for (scale, normal) in [
         ([1, 1, 1], Vec3::Z),
@@ -311,7 +314,9 @@ fn normals_agree_with_triangles_under_mirrors() {
 fn strips_fans_and_points() {
     let primitive = "/meshes/0/primitives/0";
     let with = |mode: u32| {
-        let indices = json!({"bufferView": 0, "byteOffset": 96, "componentType": 5123, "count": 4, "type": "SCALAR"});
+        let indices = json!({
+            "bufferView": 0, "byteOffset": 96, "componentType": 5123, "count": 4, "type": "SCALAR"
+        });
         changed(&[(&format!("{primitive}/mode"), json!(mode)), ("/accessors/3", indices)])
     };
     assert_eq!(load_json(&with(5)).expect("loads").triangles, [[0, 1, 2], [2, 1, 0]]);
@@ -331,7 +336,8 @@ fn quantised_positions() {
         let mesh = load_json(&json!({
             "asset": {"version": "2.0"}, "extensionsRequired": ["KHR_mesh_quantization"],
             "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
-            "accessors": [{"bufferView": 0, "componentType": 5122, "normalized": normalized, "count": 3, "type": "VEC3"}],
+            "accessors": [{"bufferView": 0, "componentType": 5122, "normalized": normalized,
+                "count": 3, "type": "VEC3"}],
             "bufferViews": [{"buffer": 0, "byteLength": 24, "byteStride": 8}],
             "buffers": [{"byteLength": 24, "uri": data_uri(&values)}]
         }))
@@ -345,11 +351,14 @@ fn quantised_positions() {
 #[test]
 fn sparse_accessors() {
     let sparse = |count: u64, index: u64, view: Value| {
-        let base = json!({"componentType": 5126, "count": 4, "type": "VEC3", "bufferView": view, "sparse": {
-            "count": count,
-            "indices": {"bufferView": 1, "componentType": 5121},
-            "values": {"bufferView": 0, "byteOffset": 12}
-        }});
+        let base = json!({
+            "componentType": 5126, "count": 4, "type": "VEC3", "bufferView": view,
+            "sparse": {
+                "count": count,
+                "indices": {"bufferView": 1, "componentType": 5121},
+                "values": {"bufferView": 0, "byteOffset": 12}
+            }
+        });
         let mut base = base;
         if view.is_null() {
             base.as_object_mut().expect("an object").remove("bufferView");
@@ -363,7 +372,10 @@ fn sparse_accessors() {
             ),
             (
                 "/buffers",
-                json!([{"byteLength": 108, "uri": data_uri(&square_bytes())}, {"byteLength": 1, "uri": indices}]),
+                json!([
+                    {"byteLength": 108, "uri": data_uri(&square_bytes())},
+                    {"byteLength": 1, "uri": indices}
+                ]),
             ),
         ])
     };

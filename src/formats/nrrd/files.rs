@@ -171,7 +171,8 @@ mod tests {
         folder.write("slab 0.raw", [0, 1, 2, 3]);
         folder.write("slab 1.raw", [4, 5, 6, 7]);
         let text = format!(
-            "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 1 4\nencoding: raw\ndata file: {data_file}\n"
+            "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 1 4\nencoding: raw\ndata file: \
+             {data_file}\n"
         );
         read_with(&folder.write("volume.nhdr", text), read)
     }

@@ -132,8 +132,11 @@ fn faces_may_stand_before_what_they_refer_to() {
 fn materials_and_pictures() {
     let folder = Folder::new();
     folder.write("t.png", png(2, 1, &[[255, 0, 0, 255], [0, 255, 0, 255]]));
-    folder
-        .write("a b.mtl", "newmtl red\nKd 1 0 0\nd 0.5\n\nnewmtl tex\n\tKd 1 1 1\n\tmap_Kd -s 1 1 1 -clamp on t.png\n");
+    folder.write(
+        "a b.mtl",
+        "newmtl red\nKd 1 0 0\nd 0.5\n\nnewmtl tex\n\tKd 1 1 1\n\tmap_Kd -s 1 1 \
+                           1 -clamp on t.png\n",
+    );
     let obj = "mtllib a b.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n\
         usemtl red\nf 1 2 3\nusemtl tex\nf 1/1 3/3 4/2\nusemtl unknown\nf 1 2 4\n";
     let mesh = load_mesh(&folder.write("a.obj", obj), &Limits::default()).expect("loads");
@@ -250,7 +253,8 @@ fn a_cut_file_never_panics() {
 #[test]
 fn large_coordinates_keep_their_precision() {
     let mesh = load(
-        "v 4500000.125 5600000.25 1\nv 4500001.125 5600000.25 1\nv 4500000.125 5600001.5 1\nf 1 2 3\n",
+        "v 4500000.125 5600000.25 1\nv 4500001.125 5600000.25 1\nv 4500000.125 5600001.5 1\nf 1 2 \
+         3\n",
     );
     let mesh = mesh.expect("loads");
     assert_eq!(
@@ -268,7 +272,8 @@ fn texture_coordinates_are_finite() {
     folder.write("m.mtl", "newmtl a\nmap_Kd t.png\nnewmtl b\n");
     let obj = |uv: &str, material: &str| {
         let text = format!(
-            "mtllib m.mtl\nusemtl {material}\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt {uv}\nvt 1 1\nf 1/1 2/2 3/3\n"
+            "mtllib m.mtl\nusemtl {material}\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt {uv}\nvt 1 1\n\
+             f 1/1 2/2 3/3\n"
         );
         load_mesh(&folder.write("a.obj", text), &Limits::default())
     };

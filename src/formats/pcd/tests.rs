@@ -4,8 +4,10 @@ use crate::{
     input::{Limits, testing::*},
 };
 
-const HEADER: &str = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z _ rgb normal_x normal_y normal_z\n\
-    SIZE 4 4 8 1 4 4 4 4\nTYPE F F F U U F F F\nCOUNT 1 1 1 3 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 1 2 9 1 0 0 0\nPOINTS 2\n";
+const HEADER: &str = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z _ rgb \
+                      normal_x normal_y normal_z\nSIZE 4 4 8 1 4 4 4 4\nTYPE F F F U U F F F\n\
+                      COUNT 1 1 1 3 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 1 2 9 1 0 0 0\nPOINTS 2\n\
+                      ";
 
 /// The two points, field by field.
 fn columns() -> [Vec<Vec<u8>>; 8] {
@@ -62,7 +64,8 @@ fn all_three_encodings_say_the_same() {
 
 #[test]
 fn what_is_missing_and_what_is_unusual() {
-    let plain = "FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\nWIDTH 2\nHEIGHT 2\nVIEWPOINT 0 0 0 1 0 0 0\nDATA ascii\n";
+    let plain = "FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\nWIDTH 2\nHEIGHT 2\nVIEWPOINT 0 0 0 \
+                 1 0 0 0\nDATA ascii\n";
     let color = f32::from_bits(0x00ff_8001);
     let mesh =
         load(format!("{plain}nan nan nan 0\n1 2 3 {color:e}\n4 5 6 0\nnan 1 2 0\n")).unwrap();

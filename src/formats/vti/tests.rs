@@ -89,7 +89,8 @@ impl Style {
         let compressor = if self.packed { " compressor=\"vtkZLibDataCompressor\"" } else { "" };
         let counts = if self.wide { "UInt64" } else { "UInt32" };
         format!(
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" byte_order=\"{order}\" header_type=\"{counts}\"{compressor}>"
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" byte_order=\"{order}\" \
+             header_type=\"{counts}\"{compressor}>"
         )
     }
 
@@ -103,16 +104,17 @@ impl Style {
             "binary" => format!("\n   {}\n  ", self.base64(&bytes)),
             _ => String::new(),
         };
-        let statistics = "<InformationKey name=\"RANGE\" location=\"here\"><Value index=\"0\">77</Value></InformationKey>";
+        let statistics = "<InformationKey name=\"RANGE\" location=\"here\"><Value \
+                          index=\"0\">77</Value></InformationKey>";
         let format = self.format;
         let mut file = format!(
             "{}<ImageData WholeExtent=\"1 3 0 1 0 1\" Origin=\"10 20 30\" Spacing=\"0.5 1 2\" \
-             Direction=\"0 -1 0 1 0 0 0 0 1\"><Piece Extent=\"1 3 0 1 0 1\"><CellData Scalars=\"cell\">\
-             <DataArray type=\"UInt8\" Name=\"cell\" format=\"appended\" offset=\"0\"/></CellData>\
-             <PointData Scalars=\"wanted\">\
-             <DataArray type=\"Float32\" Name=\"other\" format=\"ascii\">1 2</DataArray>\
-             <DataArray type=\"Int16\" Name=\"wanted\" format=\"{format}\" offset=\"{offset}\">{text}{statistics}</DataArray>\
-             </PointData></Piece></ImageData>",
+             Direction=\"0 -1 0 1 0 0 0 0 1\"><Piece Extent=\"1 3 0 1 0 1\"><CellData \
+             Scalars=\"cell\"><DataArray type=\"UInt8\" Name=\"cell\" format=\"appended\" \
+             offset=\"0\"/></CellData><PointData Scalars=\"wanted\"><DataArray type=\"Float32\" \
+             Name=\"other\" format=\"ascii\">1 2</DataArray><DataArray type=\"Int16\" \
+             Name=\"wanted\" format=\"{format}\" \
+             offset=\"{offset}\">{text}{statistics}</DataArray></PointData></Piece></ImageData>",
             self.head(),
         )
         .into_bytes();
@@ -192,8 +194,11 @@ fn no_damage_panics_or_passes_for_long() {
 
 /// A file with one ascii piece, written by hand.
 fn ascii(head: &str, image: &str, points: &str) -> Vec<u8> {
-    format!("<VTKFile {head}><ImageData {image}><Piece Extent=\"0 1 0 0 0 1\">{points}</Piece></ImageData></VTKFile>")
-        .into_bytes()
+    format!(
+        "<VTKFile {head}><ImageData {image}><Piece Extent=\"0 1 0 0 0 \
+             1\">{points}</Piece></ImageData></VTKFile>"
+    )
+    .into_bytes()
 }
 
 #[test]
@@ -344,13 +349,14 @@ fn pieces_are_put_together() {
             .iter()
             .map(|(extent, values)| {
                 format!(
-                    "<Piece Extent='{extent}'><PointData Scalars='s'>\
-                     <DataArray type='Int32' Name='s' format='ascii'>{values}</DataArray></PointData></Piece>"
+                    "<Piece Extent='{extent}'><PointData Scalars='s'><DataArray type='Int32' \
+                     Name='s' format='ascii'>{values}</DataArray></PointData></Piece>"
                 )
             })
             .collect();
         let file = format!(
-            "<VTKFile type='ImageData'><ImageData WholeExtent='0 2 -1 0 5 6'>{pieces}</ImageData></VTKFile>"
+            "<VTKFile type='ImageData'><ImageData WholeExtent='0 2 -1 0 5 \
+             6'>{pieces}</ImageData></VTKFile>"
         );
         read_with(&folder.write("volume.vti", file.as_bytes()), read)
     };

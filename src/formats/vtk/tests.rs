@@ -44,7 +44,8 @@ fn samples(content: &[u8], scalar: Option<&str>) -> Result<Points> {
 
 const IMAGE: &[(&str, &str, &str)] = &[
     (
-        "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 1\nORIGIN 10 20 30\nSPACING 0.5 1 2\nPOINT_DATA 6",
+        "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 1\nORIGIN 10 20 30\nSPACING 0.5 1 2\nPOINT_DATA \
+         6",
         "",
         "",
     ),
