@@ -182,7 +182,11 @@ impl Builder<'_> {
         let total =
             self.source.check_points("the number of vertices", (base + points.len()) as u64)?;
         if u32::try_from(total).is_err() {
-            return Err(self.source.error(place, "more vertices than 32-bit indices can name"));
+            return Err(self.source.error(
+                place,
+                "has more vertices than 32-bit indices can \
+                                                 address",
+            ));
         }
         self.positions.extend(
             points.iter().map(|p| transform.transform_point3(Vec3::from_array(*p).as_dvec3())),

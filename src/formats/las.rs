@@ -119,7 +119,7 @@ impl Header {
         let [major, minor] = field.at(24).map_err(wrong)?;
         if major != 1 {
             return Err(wrong(format!(
-                "is of version {major}.{minor}, but only 1.0 to 1.4 are known"
+                "has version {major}.{minor}, but only 1.0 to 1.4 can be read"
             )));
         }
         // Version 1.4 has a wider count. Writers still fill in the older one if it suffices.
@@ -131,7 +131,7 @@ impl Header {
         let format = format & 0x3f;
         let Some(&least) = SIZES.get(usize::from(format)) else {
             return Err(wrong(format!(
-                "has points of format {format}, but only 0 to 10 are known"
+                "has points of format {format}, but only 0 to 10 can be read"
             )));
         };
         if size < least {
@@ -147,7 +147,7 @@ impl Header {
         }
         if start < header_size || start > bytes.len() {
             let message =
-                format!("puts the points at byte {start}, but the file has {}", bytes.len());
+                format!("puts the points at byte {start}, but the file has {} bytes", bytes.len());
             return Err(wrong(message));
         }
         Ok(Self {

@@ -49,7 +49,11 @@ pub fn read(source: &Source) -> Result<Points> {
             (source.check_points("the number of rows", rows)?, width as usize)
         }
         _ => {
-            return Err(wrong(format!("has the shape {shape}")).hint(
+            return Err(wrong(format!(
+                "has the shape {shape}, but (n, 4), (n, 5) or (n, 10) was \
+                                      expected"
+            ))
+            .hint(
                 "a sample is a row of x, y, z, value and then nothing, a radius, or xx, xy, \
                        xz, yy, yz, zz",
             ));

@@ -154,8 +154,9 @@ impl<'a> Rows<'a> {
             }
         }
         if found < count {
-            return Err(source
-                .error("data", format!("holds {found} points where the header claims {count}")));
+            return Err(
+                source.error("data", format!("has {found} points, but the header claims {count}"))
+            );
         }
         Ok(Self::Text { numbers: numbers.into_inner(), width })
     }

@@ -85,7 +85,7 @@ fn of_bytes(facets: &[u8], count: usize) -> Vec<DVec3> {
 /// the ends of facets and solids matter. Any name may follow `solid`.
 fn of_text(source: &Source) -> Result<(Vec<DVec3>, Vec<usize>)> {
     let mut corners = Growing::new(source, "the corners");
-    let mut lines = Growing::new(source, "the places of the corners");
+    let mut lines = Growing::new(source, "the line numbers of the corners");
     let mut in_solid = false;
     let mut start = None;
     let mut last = 1;

@@ -119,7 +119,7 @@ impl<'a> Stream<'a> {
         let counted = self.counts().points;
         if counted > u64::from(u32::MAX) {
             let message = format!(
-                "counts {counted} points, but a file that is read in pieces has {} at most",
+                "counts {counted} points, but a file read in pieces may have at most {}",
                 u32::MAX
             );
             return Err(self

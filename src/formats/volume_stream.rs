@@ -13,7 +13,7 @@ use std::{
 
 /// Location and layout of the samples in a file: contiguous and not compressed.
 pub(super) struct Plain {
-    /// The file that holds them.
+    /// The file that contains the samples.
     pub path: PathBuf,
     /// The byte offset of the first sample.
     pub start: usize,

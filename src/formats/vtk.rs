@@ -211,7 +211,7 @@ impl<'a> DataSet<'a> {
                 (_, [name, rest @ ..]) => {
                     let Some(attributes) = data.attributes(attributes) else {
                         return Err(wrong(format!(
-                            "“{keyword}” is not known before POINT_DATA or CELL_DATA"
+                            "“{keyword}” is not a known keyword before POINT_DATA or CELL_DATA"
                         )));
                     };
                     let count = attributes.count;
@@ -231,7 +231,7 @@ impl<'a> DataSet<'a> {
                             parser.skip_colors(&place, count, parser.count(&place, components)?)?;
                             continue;
                         }
-                        _ => return Err(wrong(format!("“{keyword}” is not known"))),
+                        _ => return Err(wrong(format!("“{keyword}” is not a known keyword"))),
                     };
                     if keyword == "SCALARS" {
                         parser.expect("LOOKUP_TABLE")?;
@@ -243,7 +243,7 @@ impl<'a> DataSet<'a> {
                 }
                 _ => {
                     return Err(wrong(format!(
-                        "“{}” is not known",
+                        "“{}” is not a known keyword",
                         line.chars().take(40).collect::<String>()
                     )));
                 }

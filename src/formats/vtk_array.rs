@@ -78,7 +78,7 @@ impl ArrayEncoding {
         let sizes_end =
             sizes_end.filter(|&end| end <= bytes.len() as u64).ok_or_else(cut)? as usize;
         let mut rest = &bytes[sizes_end..];
-        source.room::<&[u8]>("the places of the blocks", blocks as usize)?;
+        source.room::<&[u8]>("the list of blocks", blocks as usize)?;
         let mut packed = Vec::with_capacity(blocks as usize);
         for i in 0..blocks as usize {
             let length = head(3 + i)?;

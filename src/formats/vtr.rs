@@ -53,8 +53,11 @@ fn coordinates(source: &Source, document: &Document, whole: Extent) -> Result<[V
         let counts = dims(source, &extent)?;
         let arrays = &piece.section("Coordinates").arrays;
         if arrays.len() != 3 {
-            let message =
-                format!("holds {} arrays where one for each of 3 axes was expected", arrays.len());
+            let message = format!(
+                "contains {} arrays, but one for each of 3 axes was \
+                         expected",
+                arrays.len()
+            );
             return Err(source.error("Coordinates", message));
         }
         for (axis, (array, count)) in arrays.iter().zip(counts).enumerate() {

@@ -123,7 +123,7 @@ impl<'a> Source<'a> {
         let size = self.bytes().len();
         if size > most {
             return Err(
-                self.error("file", format!("has {size} bytes, but {what} has {most} at most"))
+                self.error("file", format!("has {size} bytes, but {what} may have at most {most}"))
             );
         }
         let text = copy::text(self.bytes());
@@ -182,7 +182,7 @@ impl<'a> Source<'a> {
         self.limits.check(
             LimitKind::Depth,
             self.path,
-            format!("{place}: the depth of nesting"),
+            format!("{place}: the nesting depth"),
             depth as u64,
         )
     }

@@ -33,7 +33,7 @@ impl<'a> Text<'a> {
         source: &'a Source,
         mut skip: impl FnMut(usize, &[u8]) -> Result<bool>,
     ) -> Result<Self> {
-        let mut lines: Growing<(usize, &[u8])> = Growing::new(source, "the places of the lines");
+        let mut lines: Growing<(usize, &[u8])> = Growing::new(source, "the list of lines");
         for (number, line) in (1..).zip(lines_of(without_mark(source.bytes()))) {
             let line = line.trim_ascii();
             if is_row(line, lines.is_empty()) && !skip(number, line)? {
@@ -111,9 +111,14 @@ impl<'a> Text<'a> {
                             }
                         })?;
                         if !slot.is_finite() {
-                            return Err(
-                                source.error(place(), format!("number {} is {slot}", count + 1))
-                            );
+                            return Err(source.error(
+                                place(),
+                                format!(
+                                    "number {} is {slot}, but numbers \
+                                                               must be finite",
+                                    count + 1
+                                ),
+                            ));
                         }
                     }
                     count += 1;

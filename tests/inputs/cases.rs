@@ -552,7 +552,7 @@
         (
             "deep.gltf",
             chain(65),
-            "deep.gltf: node 64: the depth of nesting is 65, over the limit of 64",
+            "deep.gltf: node 64: the nesting depth is 65, over the limit of 64",
         ),
         ("deepest.gltf", chain(64), "mesh 3 1 0"),
         (
@@ -719,7 +719,7 @@
         (
             "start.las",
             at(las(), 96, &u32::MAX.to_le_bytes()),
-            "start.las: header: puts the points at byte 4294967295, but the file has 327",
+            "start.las: header: puts the points at byte 4294967295, but the file has 327 bytes",
         ),
         (
             "size.las",
@@ -729,7 +729,7 @@
         (
             "format.las",
             at(las(), 104, &[63]),
-            "format.las: header: has points of format 63, but only 0 to 10 are known",
+            "format.las: header: has points of format 63, but only 0 to 10 can be read",
         ),
         (
             "count.laz",
@@ -770,8 +770,16 @@
             "x;y;z;value\n1,5;2,5;3,5;4,5\n".into(),
             "comma.csv: line 2: “1,5” is not a number",
         ),
-        ("nan.xyz", "1 2 3\n1 nan 3\n".into(), "nan.xyz: line 2: number 2 is NaN"),
-        ("inf.xyz", "1 2 -inf\n".into(), "inf.xyz: line 1: number 3 is -inf"),
+        (
+            "nan.xyz",
+            "1 2 3\n1 nan 3\n".into(),
+            "nan.xyz: line 2: number 2 is NaN, but numbers must be finite",
+        ),
+        (
+            "inf.xyz",
+            "1 2 -inf\n".into(),
+            "inf.xyz: line 1: number 3 is -inf, but numbers must be finite",
+        ),
         ("one.xyz", "1 2 3\n".into(), "mesh 1 0 0"),
         ("same.xyz", "1 2 3\n1 2 3\n".into(), "mesh 2 0 0"),
         (
@@ -1093,7 +1101,7 @@
             "deep.vti",
             vtk_xml("ImageData", "", &format!("{}{}", "<a>".repeat(100), "</a>".repeat(100)))
                 .into(),
-            "deep.vti: byte 296: the depth of nesting is 65, over the limit of 64",
+            "deep.vti: byte 296: the nesting depth is 65, over the limit of 64",
         ),
         (
             "lz4.vti",
@@ -1330,7 +1338,7 @@
         (
             "long.json",
             vec![b' '; 2 << 20],
-            "long.json: file: has 2097152 bytes, but a transfer function has 1048576 at most",
+            "long.json: file: has 2097152 bytes, but a transfer function may have at most 1048576",
         ),
         // Files of no format.
         ("nothing.bin", Vec::new(), "nothing.bin: file: is of no kind"),

@@ -346,7 +346,7 @@ const OVER: &[(&str, &str, &str)] = &[
     ),
     (
         "info deep.gltf --limit-depth 2",
-        "deep.gltf: node 2: the depth of nesting is 3, over the limit of 2",
+        "deep.gltf: node 2: the nesting depth is 3, over the limit of 2",
         "--limit-depth",
     ),
     (

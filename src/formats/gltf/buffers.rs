@@ -36,7 +36,11 @@ pub(super) fn split<'a>(source: &'a Source) -> Result<(&'a [u8], Option<&'a [u8]
         );
     }
     if length > bytes.len() || length < 12 {
-        let message = format!("the GLB header claims {length} bytes, the file has {}", bytes.len());
+        let message = format!(
+            "the GLB header claims {length} bytes, but the file has \
+                               {}",
+            bytes.len()
+        );
         return Err(source.error("byte 8", message).hint("the file is cut"));
     }
     let mut at = 12;

@@ -405,7 +405,7 @@ fn hostile_files_are_refused_with_a_reason() {
     for (pointer, value, reason) in [
         ("/nodes/0", json!({"mesh": 0, "children": [0]}), "own ancestor"),
         ("/nodes", json!([{"children": [1]}, {"children": [0]}]), "own ancestor"),
-        ("/nodes", json!(deep), "the depth of nesting is 65, over the limit of 64"),
+        ("/nodes", json!(deep), "the nesting depth is 65, over the limit of 64"),
         ("/nodes/0", json!({"children": [7]}), "node 7"),
         ("/nodes/0/mesh", json!(7), "mesh 7"),
         ("/scene", json!(7), "scene"),

@@ -91,7 +91,7 @@ impl Pieces {
         !matches!(self.paint, Paint::None)
     }
 
-    /// Returns the points of a piece with their indices. Withheld points are left out; within a
+    /// Returns the points of a piece with their indices. Withheld points are left out. Within a
     /// piece, the points are numbered without them.
     fn piece(&self, source: &Source, piece: usize) -> Result<impl Iterator<Item = (usize, Point)>> {
         let first = self.firsts[piece];

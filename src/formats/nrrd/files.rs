@@ -37,7 +37,7 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
                 super::LONGEST
             )));
         }
-        source.spend("the size of the names of files in bytes", 5 * rest.len() as u64)?;
+        source.spend("the size of the file names in bytes", 5 * rest.len() as u64)?;
         let text = copy::text(rest)
             .map_err(|at| wrong(format!("byte {at} of the list of files is not text")))?;
         let names = text.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned);
@@ -59,7 +59,7 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
             )));
         }
         source.spend(
-            "the size of the names of files in bytes",
+            "the size of the file names in bytes",
             count.saturating_mul(256 + field.len() as u64),
         )?;
         ((0..count).map(|index| pattern.name(index)).collect::<Vec<_>>(), pattern.parts)

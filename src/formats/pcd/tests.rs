@@ -88,7 +88,7 @@ fn cuts_and_lies_are_errors() {
         (header("POINTS 2", "POINTS 3"), "claims 3 points, but “WIDTH” × “HEIGHT” is 2"),
         (
             header("WIDTH 2\nHEIGHT 1\nVIEWPOINT 1 2 9 1 0 0 0\nPOINTS 2", "POINTS 3"),
-            "holds 2 points where the header claims 3",
+            "has 2 points, but the header claims 3",
         ),
         (header("FIELDS x", "FIELDS w"), "no fields “x”"),
         (header("SIZE 4", "SIZE 3"), "“SIZE 3 4 8 1 4 4 4 4” has a size"),

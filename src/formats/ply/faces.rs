@@ -262,11 +262,11 @@ impl Faces {
                     let count = own.len() as u32;
                     let other = *others.entry((*index, bits)).or_insert(count);
                     if other == count {
-                        source.spend("the vertices of seams in bytes", 128)?;
+                        source.spend("the size of the vertices at seams in bytes", 128)?;
                         own.push(Some(uv));
                         copy(mesh, *index as usize);
                         source.check_points(
-                            "the number of vertices with those of seams",
+                            "the number of vertices including those at seams",
                             own.len() as u64,
                         )?;
                     }

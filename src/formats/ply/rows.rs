@@ -88,7 +88,7 @@ impl<'a> Rows<'a> {
             }
         }
         let most = element.count.min(rest.len() / element.least_bytes());
-        source.room::<usize>("the places of the rows", most)?;
+        source.room::<usize>("the row offsets", most)?;
         let mut starts = Vec::with_capacity(most);
         let mut next = 0;
         for row in 0..element.count {
@@ -114,7 +114,7 @@ impl<'a> Rows<'a> {
         let bytes = source.bytes();
         // The last line may end with the file instead of a line end.
         let most = element.count.min((bytes.len() - *at) / (2 * element.columns.len()) + 1);
-        source.room::<&[u8]>("the places of the lines", most)?;
+        source.room::<&[u8]>("the list of lines", most)?;
         let mut lines = Vec::with_capacity(most);
         let mut longest = 0;
         while lines.len() < element.count {
@@ -133,7 +133,7 @@ impl<'a> Rows<'a> {
                 lines.push(line);
                 // A list may be as long as its line, and every thread may read one.
                 if lines.len() == lines.capacity() && lines.len() < element.count {
-                    source.room::<&[u8]>("the places of the lines", lines.len())?;
+                    source.room::<&[u8]>("the list of lines", lines.len())?;
                 }
             }
         }

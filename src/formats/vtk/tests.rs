@@ -184,7 +184,7 @@ fn what_is_wrong_is_told() {
         ("DIMENSIONS 3 2 1", "DIMENSIONS 3 2 2", "claims 6 points, but the data set has 12"),
         ("SPACING 0.5", "SPACING 0", "spacing"),
         ("unsigned_char", "bit", "type bit"),
-        ("SCALARS", "SCALES", "“SCALES” is not known"),
+        ("SCALARS", "SCALES", "“SCALES” is not a known keyword"),
         ("30 4", "300 4", "300"),
         ("4 255", "4", "5 numbers where 6"),
         ("POINT_DATA 6", "POINT_DATA six", "“six” is not a count"),
