@@ -49,7 +49,7 @@ pub enum Error {
     Gpu(String),
 
     /// The device is lost, with all its resources
-    /// ([`Gpu::reopened`](crate::engine::Gpu::reopened)).
+    /// ([`Gpu::reopened`](crate::gpu::Gpu::reopened)).
     #[error("GPU: {0}")]
     DeviceLost(String),
 }

@@ -1,21 +1,22 @@
 //! splatkit draws volumes and surfaces as elliptic splats, on a GPU or on the processor.
 //!
 //! The way of the data: a file → [`input`] (opened, guarded) → [`formats`] (what it says) → [`volume`] / [`scattered`] / [`surface`] (what it means) → splats
-//! ([`splat`]) in a [`Scene`](scene::Scene) → a [`Renderer`], which draws with the [`engine`] on wgpu (one pass, one Rust file, one
+//! ([`splat`]) in a [`Scene`](scene::Scene) → a [`Renderer`], which draws with the [`gpu`] on wgpu (one pass, one Rust file, one
 //! shader) or with that for processors ([`cpu`]) → a [`Picture`](picture::Picture).
 
 pub mod compare;
 pub mod cpu;
 pub mod deadline;
 pub mod disk;
-pub mod engine;
 pub mod error;
 pub mod formats;
+pub mod gpu;
 pub mod hierarchy;
 pub mod input;
 pub mod math;
 pub mod memory;
 pub mod picture;
+pub(crate) mod plan;
 pub mod reference;
 mod renderer;
 pub mod scattered;
@@ -26,4 +27,5 @@ pub mod volume;
 
 pub use deadline::Deadline;
 pub use error::{Error, Result};
+pub use plan::FrameStats;
 pub use renderer::{Device, Renderer};

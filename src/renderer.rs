@@ -3,9 +3,10 @@
 use crate::{
     Error, Result,
     cpu::CpuRenderer,
-    engine::{self, Budget, FrameStats, Gpu, PreparedScene},
+    gpu::{self, Budget, Gpu, PreparedScene},
     math::Camera,
     picture::Picture,
+    plan::FrameStats,
     scene::{Scene, Settings},
     volume::TransferFunction,
 };
@@ -44,7 +45,7 @@ pub struct Renderer {
 
 #[derive(Debug)]
 enum Drawer {
-    Gpu(Box<engine::Renderer>, Box<PreparedScene>),
+    Gpu(Box<gpu::Renderer>, Box<PreparedScene>),
     Cpu(Box<CpuRenderer>),
 }
 
@@ -52,7 +53,7 @@ impl Drawer {
     fn new(device: &Device, scene: &Scene) -> Result<Self> {
         Ok(match device {
             Device::Gpu(gpu, budget) => {
-                let renderer = engine::Renderer::with_budget(gpu, *budget);
+                let renderer = gpu::Renderer::with_budget(gpu, *budget);
                 let prepared = renderer.prepare(scene)?;
                 gpu.wait()?;
                 Self::Gpu(Box::new(renderer), Box::new(prepared))
@@ -83,7 +84,7 @@ impl Renderer {
     /// Draws a picture. Where the device is lost, it is opened anew, once.
     ///
     /// # Errors
-    /// Those of [`engine::Renderer::render`] and [`CpuRenderer::render`].
+    /// Those of [`gpu::Renderer::render`] and [`CpuRenderer::render`].
     pub fn render(
         &mut self,
         camera: &Camera,

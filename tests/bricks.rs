@@ -3,9 +3,10 @@
 
 use glam::DVec3;
 use splatkit::{
+    FrameStats,
     compare::compare_pictures,
     cpu::CpuRenderer,
-    engine::{AdapterChoice, FrameStats, Gpu, Renderer},
+    gpu::{AdapterChoice, Gpu, Renderer},
     hierarchy::Detail,
     input::Limits,
     math::{Bounds, Camera, Kernel, Projection},

@@ -11,7 +11,7 @@ mod scenes;
 use glam::DVec3;
 use scenes::{Case, methods};
 use splatkit::{
-    engine::{AdapterChoice, Budget, Gpu, Renderer},
+    gpu::{AdapterChoice, Budget, Gpu, Renderer},
     math::{Kernel, Tensor},
     picture::Picture,
     reference,

@@ -5,7 +5,7 @@ use glam::DVec3;
 use splatkit::{
     Error,
     compare::compare_pictures,
-    engine::{AdapterChoice, Gpu, Renderer},
+    gpu::{AdapterChoice, Gpu, Renderer},
     hierarchy::{BuildOptions, Detail, Hierarchy, Tree},
     math::{Camera, Kernel},
     picture::Picture,

@@ -4,7 +4,7 @@
 use glam::{DVec3, Vec3};
 use splatkit::{
     compare::compare_pictures,
-    engine::{AdapterChoice, Gpu, Renderer},
+    gpu::{AdapterChoice, Gpu, Renderer},
     hierarchy::{
         BuildOptions, Cut, Detail, Hierarchy, Preset, SHARE_UNIT, Severity, Tree,
         file::{WriteOptions, to_bytes},

@@ -6,8 +6,8 @@
 
 use glam::DVec3;
 use splatkit::{
-    engine::{AdapterChoice, Gpu, Renderer},
     formats,
+    gpu::{AdapterChoice, Gpu, Renderer},
     hierarchy::{self, BuildOptions, Detail, Hierarchy, Tree},
     input::{Limits, Source},
     math::{Camera, Kernel},

@@ -7,7 +7,8 @@ mod scenes;
 use glam::{DQuat, DVec3};
 use scenes::{Case, methods};
 use splatkit::{
-    engine::{AdapterChoice, Budget, FrameStats, Gpu, Renderer},
+    FrameStats,
+    gpu::{AdapterChoice, Budget, Gpu, Renderer},
     math::{Camera, Kernel, Projection},
     picture::Picture,
     scene::{Evaluate, Order, Scene, Settings},

@@ -5,7 +5,7 @@
 use glam::{DMat3, DVec3, Vec3};
 use splatkit::{
     Error, Result,
-    engine::{AdapterChoice, Gpu, Renderer},
+    gpu::{AdapterChoice, Gpu, Renderer},
     hierarchy::Detail,
     math::{Bounds, Camera, Kernel, Profile, Projection},
     picture::Picture,

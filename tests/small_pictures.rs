@@ -4,7 +4,7 @@
 use glam::{DVec3, Vec3};
 use splatkit::{
     compare::compare_pictures,
-    engine::{AdapterChoice, Budget, Gpu, Renderer},
+    gpu::{AdapterChoice, Budget, Gpu, Renderer},
     hierarchy::{BuildOptions, Detail, Hierarchy, Tree},
     math::{Camera, Kernel},
     picture::Picture,

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 use splatkit::{
-    engine::{AdapterChoice, Gpu, PreparedScene, Renderer},
+    gpu::{AdapterChoice, Gpu, PreparedScene, Renderer},
     math::{Camera, Kernel, Projection},
     picture::Picture,
     reference,

@@ -8,7 +8,7 @@ use splatkit::{
     Error, Result,
     compare::compare_pictures,
     cpu::CpuRenderer,
-    engine::{AdapterChoice, Gpu, Renderer},
+    gpu::{AdapterChoice, Gpu, Renderer},
     hierarchy::{BuildOptions, Hierarchy, Tree},
     math::{Bounds, Camera, Kernel, Projection, Tensor},
     picture::Picture,

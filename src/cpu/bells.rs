@@ -1,4 +1,5 @@
-//! Sums of Gaussians over the samples in reach: products along the axes, or cut at a distance from the ray.
+//! Sums of Gaussians over the samples in reach, as products along the axes or cut at a distance
+//! from the ray.
 
 use super::{
     blend::{MOST_TAPS, Sums},
@@ -6,8 +7,9 @@ use super::{
 };
 use fearless_simd::{Simd, prelude::*};
 
-/// The sums over samples that are so far from a place along the axes; values of a row lie beside each other. `log` is log₂ of the
-/// weight of a sample 1 away. Samples further than `radius` from the ray, which goes a `way`, have no weight.
+/// Returns the sums over samples at the distances `away` along the axes from a place. The values of
+/// a row are adjacent. `log` is log₂ of the weight of a sample at distance 1. Samples further than
+/// `radius` from the ray, whose direction is `way`, have no weight.
 pub fn sums<S: Simd>(
     simd: S,
     log: f32,
@@ -31,7 +33,7 @@ pub fn sums<S: Simd>(
                 None => products(simd, weights, away, values),
                 Some(radius) => cut(simd, radius, way, weights, away, values),
             };
-            // Of moments: the derivative of a Gaussian.
+            // The derivative of a Gaussian, from its first moment.
             let scale = 2.0 * std::f32::consts::LN_2 * log;
             sums.weight_slopes = three!(I => sums.weight_slopes[I] * scale);
             sums.value_slopes = three!(I => sums.value_slopes[I] * scale);
@@ -40,7 +42,7 @@ pub fn sums<S: Simd>(
     )
 }
 
-/// Sums whose slopes are the first moments.
+/// Returns the sums with the first moments in place of the slopes.
 #[inline(always)]
 fn products<S: Simd>(
     simd: S,
@@ -85,7 +87,7 @@ fn products<S: Simd>(
     Sums { weight: all[0] * all[1] * all[2], value, weight_slopes, value_slopes }
 }
 
-/// The same of samples no further than a radius from the ray.
+/// Returns the same for samples no further than `radius` from the ray.
 #[inline(always)]
 fn cut<S: Simd>(
     simd: S,

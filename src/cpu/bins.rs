@@ -1,5 +1,5 @@
-//! Which splats meet which tiles. Blocks of tiles have lists of splats; a thread that draws a block sorts its list by the
-//! splats' first sheets and hands it out to the tiles.
+//! Which splats meet which tiles. Blocks of tiles have lists of splats. The thread that draws a
+//! block sorts its list by the splats' first sheets and distributes it to the tiles.
 
 use super::{
     footprint::Record,
@@ -14,17 +14,19 @@ use std::{
 
 /// Tiles along each side of a block.
 pub const BLOCK: usize = 4;
-/// Candidates of a batch of records at most, as a power of two.
+/// Maximum number of candidates in a batch of records, as a power of two.
 const BATCH_BITS: u32 = 13;
 pub const BATCH: usize = 1 << BATCH_BITS;
-/// Entries of all blocks that are held at the same time (8 bytes each), where a row of blocks has no more.
+/// Maximum number of entries held at a time, 8 bytes each, over all blocks. A single row of blocks
+/// may exceed it.
 const MOST_ENTRIES: u64 = 1 << 26;
-/// Groups of batches, which are counted and listed by a thread each: at most so many, and so many counts of all of them.
+/// Maximum number of groups of batches, and of counts in all groups together. A thread counts and
+/// lists one group at a time.
 const MOST_GROUPS: usize = 64;
 const MOST_COUNTS: usize = 1 << 20;
 
-/// A splat that meets a tile or a block: the first sheet of its first window, its record, and in a block the first and the last
-/// tile that it meets.
+/// A splat that meets a tile or a block: the first sheet of its first window and its record. In a
+/// block also the first and the last tile that it meets.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Entry {
     pub record: u32,
@@ -35,19 +37,19 @@ pub struct Entry {
 /// Columns and rows of tiles in a block, two bits each: first and last column, first and last row.
 type Within = u8;
 
-/// The batch of a record, and its place there.
+/// Returns the batch of a record, and its place in the batch.
 pub fn place_of(number: u32) -> (usize, usize) {
     ((number >> BATCH_BITS) as usize, number as usize % BATCH)
 }
 
-/// The tiles that a record meets, and what it is sorted by.
+/// The tiles that a record meets, and its sort key.
 #[derive(Debug, Clone, Copy)]
 struct Span {
     tiles: [[u16; 2]; 2],
     order: u32,
 }
 
-/// Successive batches: the spans of their records, and how many of these meet each block.
+/// Successive batches: the spans of their records, and the number of records that meet each block.
 #[derive(Debug, Default)]
 struct Group {
     batches: Range<usize>,
@@ -55,15 +57,16 @@ struct Group {
     counts: Vec<u32>,
 }
 
-/// Memory of the bins of the picture before, which is used again: asking for it anew takes as long as filling it.
+/// Memory of the last picture's bins, kept for reuse: allocating it anew takes as long as filling
+/// it.
 #[derive(Debug, Default)]
 pub struct Spare {
     groups: Vec<Group>,
-    /// First sheet or order above, record below.
+    /// First sheet or distance key in the upper bits, record in the lower ones.
     entries: Vec<AtomicU64>,
 }
 
-/// How many splats meet each block of tiles.
+/// The number of splats that meet each block of tiles.
 pub struct Bins<'a> {
     plan: &'a Plan<'a>,
     records: &'a [Vec<Record>],
@@ -72,17 +75,17 @@ pub struct Bins<'a> {
     entries: &'a mut Vec<AtomicU64>,
 }
 
-/// The lists of some blocks, one behind the other.
+/// The lists of several blocks, one after another.
 pub struct Lists<'a> {
     plan: &'a Plan<'a>,
     records: &'a [Vec<Record>],
     first: usize,
-    /// Where the list of each begins, and where the last one ends.
+    /// Where each list begins, and where the last one ends.
     starts: Vec<usize>,
     entries: &'a [AtomicU64],
 }
 
-/// The lists of a block's tiles, one behind the other.
+/// The lists of a block's tiles, one after another.
 pub struct TileLists {
     starts: [usize; BLOCK * BLOCK + 1],
     entries: Vec<Entry>,
@@ -117,7 +120,7 @@ impl<'a> Bins<'a> {
         Self { plan, records, blocks, groups: &mut spare.groups, entries: &mut spare.entries }
     }
 
-    /// Blocks beside each other.
+    /// The number of columns of blocks.
     pub fn columns(&self) -> usize {
         self.blocks[0]
     }
@@ -126,7 +129,8 @@ impl<'a> Bins<'a> {
         self.groups.iter().map(|group| group.counts[block] as usize).sum()
     }
 
-    /// Successive rows of blocks whose lists are held together, so that memory is bounded.
+    /// Divides the rows of blocks into ranges whose lists are held together, so that memory stays
+    /// bounded.
     pub fn parts(&self) -> Vec<Range<usize>> {
         let mut parts = Vec::new();
         let (mut start, mut sum) = (0, 0);
@@ -144,7 +148,7 @@ impl<'a> Bins<'a> {
         parts
     }
 
-    /// The lists of successive rows of blocks.
+    /// Builds the lists of successive rows of blocks.
     pub fn lists(&mut self, rows: &Range<usize>) -> Lists<'_> {
         let (plan, columns) = (self.plan, self.blocks[0]);
         let blocks = rows.start * columns..rows.end * columns;
@@ -152,7 +156,7 @@ impl<'a> Bins<'a> {
         let mut sum = 0;
         for block in blocks.clone() {
             starts.push(sum);
-            // From here on, counts tell where a group's part of a list begins.
+            // From here on, a count is the position at which a group's part of a list begins.
             for group in self.groups.iter_mut() {
                 let count = group.counts[block] as usize;
                 group.counts[block] = sum as u32;
@@ -199,12 +203,12 @@ impl<'a> Bins<'a> {
 }
 
 impl Span {
-    /// The first and the last block.
+    /// Returns the first and the last block.
     fn blocks(&self) -> [[usize; 2]; 2] {
         self.tiles.map(|tile| tile.map(|at| usize::from(at) / BLOCK))
     }
 
-    /// The tiles in a block.
+    /// Returns the tiles inside a block.
     fn within(&self, block: [usize; 2]) -> Within {
         let [first, last] = self.tiles;
         let [x, y] = [0, 1].map(|axis| {
@@ -218,7 +222,7 @@ impl Span {
 }
 
 impl Lists<'_> {
-    /// The lists of a block's tiles: the splats in the order in which they are added.
+    /// Returns the lists of a block's tiles, with the splats in drawing order.
     pub fn of_tiles(&self, column: usize, row: usize, columns: usize) -> TileLists {
         let own = row * columns + column - self.first;
         let entries = &self.entries[self.starts[own]..self.starts[own + 1]];
@@ -249,7 +253,7 @@ impl Lists<'_> {
     }
 }
 
-/// The entries of a block by their first sheets; what begins in the same one stays in its order.
+/// Sorts a block's entries by first sheet. Entries with the same first sheet keep their order.
 fn by_sheet(entries: &[AtomicU64]) -> Vec<Entry> {
     let sheet = |key: u64| (key >> 40) as u16;
     let mut ends = Vec::new();
@@ -297,14 +301,14 @@ impl TileLists {
         Self { starts, entries }
     }
 
-    /// The splats of a tile of the block.
+    /// Returns the splats of a tile of the block.
     pub fn of(&self, tile: usize) -> &[Entry] {
         &self.entries[self.starts[tile]..self.starts[tile + 1]]
     }
 }
 
 impl Entry {
-    /// Names the tiles of the block that it meets.
+    /// Calls `name` for each tile of the block that the entry meets.
     fn tiles(&self, mut name: impl FnMut(usize)) {
         let [left, right, top, bottom] =
             [0, 2, 4, 6].map(|shift| usize::from(self.within >> shift & 3));
@@ -316,17 +320,19 @@ impl Entry {
     }
 }
 
-/// Bits of a record's number that are turned in keys: back to front, what is equally far comes in the reverse of its order.
+/// Returns a mask that inverts a record's number in sort keys. Back to front, splats at equal
+/// distance come in reverse order.
 fn turn_of(plan: &Plan) -> u32 {
     if plan.single() == Some(Order::BackToFront) { u32::MAX } else { 0 }
 }
 
-/// What records are sorted by: their first sheets; splats that are composited one by one by the distances of their centres.
+/// Returns the sort key of a record: its first sheet, or the distance of its centre if splats are
+/// composited one by one.
 fn order(plan: &Plan, record: &Record) -> u32 {
     let Some(order) = plan.single() else { return record.sheets[0].into() };
     let [x, y, z] = record.center;
     let distance = if plan.view.perspective { (x * x + y * y + z * z).sqrt() } else { z };
-    // Bits that are in the order of the numbers.
+    // Map the float's bits to an integer of the same order.
     let bits = distance.to_bits();
     let rising = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
     match order {
@@ -335,12 +341,12 @@ fn order(plan: &Plan, record: &Record) -> u32 {
     }
 }
 
-/// The first and the last tile that a record meets.
+/// Returns the first and the last tile that a record meets.
 fn tiles_of(plan: &Plan, record: &Record) -> [[usize; 2]; 2] {
     let (step, apron) = (plan.tile_step() as i32, plan.apron());
     let tiles = plan.tiles();
     let [first, last] = record.pixels;
-    // Most pictures are spared a division.
+    // Avoids a division in most pictures.
     let over = |place: i32| if step == TILE as i32 { place >> TILE.ilog2() } else { place / step };
     let at = |place: i32, axis: usize| (place.max(0) as usize).min(tiles[axis] - 1);
     [

@@ -1,6 +1,7 @@
-//! The field of lattices and kernels for which four weights an axis of a Cartesian lattice do not hold all: sums of weights and of
-//! weighted values over the samples in reach, and their quotient. So the field is what splats add up to: samples outside the
-//! lattice have no weight, and where next to no kernel reaches there is no field.
+//! The field of lattices and kernels for which four weights an axis of a Cartesian lattice do not
+//! suffice. It is the quotient of two sums over the samples in reach: weighted values and weights.
+//! So the field equals that of splats: samples outside the lattice have no weight, and where next
+//! to no kernel reaches there is no field.
 
 use super::{
     bells,
@@ -19,29 +20,31 @@ use crate::{
 use fearless_simd::{Simd, i32x8, prelude::*};
 use glam::{DMat3, DVec3};
 
-/// The most samples along an axis that a place looks at.
+/// Maximum number of samples along an axis that a place reads.
 pub const MOST_TAPS: usize = 12;
-/// The same of kernels that are no products, of which each sample takes a weight of its own.
+/// The same for kernels that are no products, whose samples need a weight each.
 const MOST_RADIAL_TAPS: usize = 8;
-/// The least extent of a kernel, in samples: fields of narrower ones change like steps.
+/// Minimum extent of a kernel, in samples: the fields of narrower kernels change in steps.
 const LEAST_EXTENT: f64 = 1.2;
-/// So far away no kernel reaches: where samples would be that the lattice lacks.
+/// A distance that no kernel reaches, for samples that the lattice lacks.
 const FAR: f32 = 16.0;
-/// Places beyond the lattice by more steps than that have no sample in reach.
+/// Places further outside the lattice than this, in steps, have no sample in reach.
 const BEYOND: f32 = 32.0;
 
 /// How a volume is gathered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Way {
-    /// By four weights an axis.
+    /// With four weights an axis.
     Plain(Weighting),
-    /// By sums over so many samples along each axis of each Cartesian lattice.
+    /// By sums over this many samples along each axis of each Cartesian lattice.
     Blend(usize),
 }
 
 impl Way {
+    /// Chooses how to gather a volume.
+    ///
     /// # Errors
-    /// What can't be gathered, in words.
+    /// The reason why the volume can't be gathered, in words.
     pub fn of(volume: &Volume, kernel: &Kernel) -> Result<Self, &'static str> {
         let arrangement = &volume.lattice.arrangement;
         let plain = weighting(kernel).filter(|_| *arrangement == Arrangement::Cartesian);
@@ -66,12 +69,11 @@ impl Way {
             }
             return match Axes::taps(places, kernel) {
                 Some(taps) => Ok(Self::Blend(rounded(taps))),
-                None => Err(
-                    "a rectilinear lattice whose kernels reach far more samples in some places than in others",
-                ),
+                None => Err("a rectilinear lattice whose kernels reach far more samples \
+                             in some places than in others"),
             };
         }
-        // Around the sample before a place, or around the nearest one where that takes fewer.
+        // Centred on the cell before a place, or on the nearest sample if that takes fewer samples.
         let reach = reach(kernel) * volume.lattice.unit([0; 3]).x;
         let taps = (2 * reach.ceil() as usize).min(2 * (reach + 0.5).floor() as usize + 1);
         let most = if is_whole(kernel) { MOST_TAPS } else { MOST_RADIAL_TAPS };
@@ -83,7 +85,7 @@ impl Way {
     }
 }
 
-/// The next larger number of samples along an axis for which there is a function.
+/// Rounds a number of samples along an axis up to one for which a specialised function exists.
 fn rounded(taps: usize) -> usize {
     match taps {
         0..=3 => 3,
@@ -93,7 +95,8 @@ fn rounded(taps: usize) -> usize {
     }
 }
 
-/// How far a kernel reaches, in samples: a Gaussian, which does not end along the rays, as far as it has weight.
+/// Returns how far a kernel reaches, in samples. A Gaussian does not end along the rays; it reaches
+/// as far as it has weight.
 pub fn reach(kernel: &Kernel) -> f64 {
     match kernel.profile {
         Profile::Gaussian(sigma) => sigma * (-2.0 * LEAST_WEIGHT.ln()).sqrt(),
@@ -101,12 +104,13 @@ pub fn reach(kernel: &Kernel) -> f64 {
     }
 }
 
-/// Whether a kernel is a Gaussian that ends where it has no weight: a product along the axes.
+/// Whether a kernel is a Gaussian that has no weight left where it ends: a product along the axes.
 fn is_whole(kernel: &Kernel) -> bool {
     matches!(kernel.profile, Profile::Gaussian(_)) && reach(kernel) <= kernel.extent
 }
 
-/// What is summed of the kernels at a place: their weights and weighted values, and how both change a step along the axes.
+/// Sums of the kernels at a place: weights and weighted values, and their changes per step along
+/// the axes.
 #[derive(Clone, Copy)]
 pub struct Sums<S: Simd> {
     pub weight: Lanes<S>,
@@ -115,8 +119,8 @@ pub struct Sums<S: Simd> {
     pub value_slopes: [Lanes<S>; 3],
 }
 
-/// The field at a place: its value and its change a step along each axis. Weights count from what kernels must add up to; where
-/// they are not above 0 there is no field.
+/// The field at a place: its value and its change per step along each axis. `weight` is the excess
+/// over the minimum sum of kernels; if it is not above 0, there is no field.
 #[derive(Clone, Copy)]
 pub struct Point<S: Simd> {
     pub value: Lanes<S>,
@@ -124,11 +128,11 @@ pub struct Point<S: Simd> {
     pub weight: Lanes<S>,
 }
 
-/// What samples carry.
+/// The values of a volume's samples.
 #[derive(Clone, Copy)]
 enum Source<'a> {
     Samples(&'a Samples),
-    /// Of a sharp volume.
+    /// The coefficients of a sharp volume.
     Coefficients(&'a [f32]),
 }
 
@@ -140,7 +144,7 @@ pub struct Blended<'a> {
 }
 
 impl<'a> Blended<'a> {
-    /// Values count from `zero`.
+    /// Values are relative to `zero`.
     pub fn new(volume: &'a Volume, blend: &'a Blend, zero: f64) -> Self {
         let samples = match &volume.coefficients {
             Some(coefficients) => Source::Coefficients(&coefficients.values),
@@ -149,7 +153,8 @@ impl<'a> Blended<'a> {
         Self { blend, samples, zero: zero as f32 }
     }
 
-    /// The field at places in steps, on rays along which a world unit is so many steps.
+    /// Returns the field at places in steps. `way` is the direction of the rays, in steps per world
+    /// unit.
     #[inline(always)]
     pub fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3], way: [Lanes<S>; 3]) -> Point<S> {
         self.blend.at(simd, self.samples, self.zero, place, way)
@@ -167,10 +172,10 @@ impl<S: Simd> Sums<S> {
         }
     }
 
-    /// The field, whose slopes are so many times as large as those of the sums.
+    /// Returns the field. `scale` is the factor from the slopes of the sums to those of the field.
     #[inline(always)]
     fn quotient(&self, simd: S, scale: f32) -> Point<S> {
-        // Where kernels of both signs all but cancel, and far outside, any number will do.
+        // Where kernels of both signs nearly cancel, and far outside, the result does not matter.
         let inverse = Lanes::splat(simd, 1.0) / self.weight.max(Lanes::splat(simd, 1e-20));
         let value = self.value * inverse;
         let inverse = inverse * scale;
@@ -179,15 +184,16 @@ impl<S: Simd> Sums<S> {
     }
 }
 
-/// A Cartesian lattice among those that a lattice consists of.
+/// One of the Cartesian lattices that make up a lattice.
 #[derive(Debug)]
 struct Part {
-    /// Its first sample, and the samples from one row to the next and from one slice to the next.
+    /// Index of the first sample, and the samples from one row to the next and from one slice to
+    /// the next.
     first: usize,
     row: usize,
     slice: usize,
     dims: [usize; 3],
-    /// Where its first sample is and how far from that the last one is, in steps.
+    /// The place of the first sample, and the offset from there to the last one, in steps.
     shift: [f32; 3],
     size: [f32; 3],
 }
@@ -196,7 +202,8 @@ struct Part {
 #[derive(Debug)]
 enum Form {
     Radial(Radial),
-    /// Gaussians, by log₂ of the weight of a sample 1 away; cut at a distance from the ray, or not.
+    /// Gaussians: log₂ of the weight of a sample at distance 1, and the distance from the ray at
+    /// which they are cut, if any.
     Bells {
         log: f32,
         radius: Option<f32>,
@@ -209,19 +216,19 @@ enum Form {
 pub struct Blend {
     parts: Vec<Part>,
     form: Form,
-    /// Samples along each axis of each part that a place looks at.
+    /// Number of samples along each axis of each part that a place reads.
     taps: usize,
-    /// Samples' spacings to the step.
+    /// The number of sample spacings per step.
     per_step: f32,
     extent: f32,
-    /// What kernels must add up to.
+    /// The minimum sum of kernels.
     least: f32,
-    /// The cells that are looked up for what they may show.
+    /// The cells for which visibility is looked up.
     cells: Lattice,
 }
 
 impl Blend {
-    /// What takes so many samples along each axis.
+    /// Prepares sums over `taps` samples along each axis.
     pub fn new(volume: &Volume, kernel: &Kernel, taps: usize) -> Self {
         let lattice = volume.drawn_lattice();
         let [nx, ny, nz] = lattice.dims;
@@ -246,7 +253,7 @@ impl Blend {
         let (parts, cells) = match &lattice.arrangement {
             Arrangement::Cartesian => (vec![whole(steps(lattice.dims))], cartesian(lattice.dims)),
             Arrangement::BodyCentred => {
-                // Every second layer, from the first one and from the second one on.
+                // Every second layer, starting with the first and with the second one.
                 let dims = |layer: usize| [nx, ny, (nz + 1 - layer) / 2];
                 let part = |layer: usize| {
                     let shift = [0.5 * layer as f32; 3];
@@ -286,13 +293,14 @@ impl Blend {
         }
     }
 
-    /// A Cartesian lattice of cells, for each of which [`ranges`](Self::ranges) tells what the field may be.
+    /// Returns the Cartesian lattice of cells for which [`ranges`](Self::ranges) bounds the field.
     pub fn cells(&self) -> &Lattice {
         &self.cells
     }
 
-    /// Cells to the step along each axis, and where the lattice's first sample is among them; `drawn_from` is where the
-    /// volume's first sample is on the lattice drawn, in steps.
+    /// Returns the number of cells per step along each axis, and the position of the lattice's
+    /// first sample in cells. `drawn_from` is the place of the volume's first sample on the drawn
+    /// lattice, in steps.
     pub fn to_cells(&self, drawn_from: [f32; 3]) -> [[f32; 3]; 2] {
         match &self.form {
             Form::Rectilinear(axes) => {
@@ -302,7 +310,8 @@ impl Blend {
         }
     }
 
-    /// For each cell the range of the field in it and half a cell around it, in steps of 1/255 of the volume's range.
+    /// Returns the range of the field in each cell and half a cell around it, in steps of 1/255 of
+    /// the volume's range.
     pub fn ranges(&self, volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
         if let Form::Rectilinear(axes) = &self.form {
             return axes.ranges(volume);
@@ -313,7 +322,7 @@ impl Blend {
             None => {
                 let mut radius = lattice.reach(reach(kernel));
                 if lattice.arrangement == Arrangement::BodyCentred {
-                    // A place may be nearer to a layer that is not looked up.
+                    // A place may be nearer to a layer whose ranges are not looked up.
                     radius[2] += 1;
                 }
                 let mut ranges = neighbourhood_ranges(volume, radius);
@@ -328,8 +337,9 @@ impl Blend {
         ranges
     }
 
-    /// Makes room for the overshoot of kernels that have values of both signs: the sum of the weights' magnitudes where they add
-    /// up to 1. At the border they add up to the least sum at worst.
+    /// Widens the ranges by the overshoot of kernels with values of both signs. The overshoot
+    /// follows from the sum of the weights' magnitudes relative to the sum of the weights. At the
+    /// border, the weights add up to the minimum sum in the worst case.
     fn widen(&self, ranges: &mut [[u8; 2]], lattice: &Lattice, kernel: &Kernel) {
         if !kernel.is_signed() {
             return;
@@ -367,7 +377,8 @@ impl Blend {
         }
     }
 
-    /// The field at places in steps, on rays along which a world unit is so many steps.
+    /// Returns the field at places in steps. `way` is the direction of the rays, in steps per world
+    /// unit.
     #[inline(always)]
     fn at<S: Simd>(
         &self,
@@ -377,7 +388,7 @@ impl Blend {
         place: [Lanes<S>; 3],
         way: [Lanes<S>; 3],
     ) -> Point<S> {
-        // A function of its own for each number of samples.
+        // A separate function for each number of samples.
         let sums = match self.taps {
             ..=3 => self.sums::<S, 3, 4, 27>(simd, samples, zero, place, way),
             4 => self.sums::<S, 4, 4, 64>(simd, samples, zero, place, way),
@@ -393,7 +404,8 @@ impl Blend {
         point
     }
 
-    /// Sums over `N` samples along each axis, `ALL` together; rows are loaded `WIDE` samples long.
+    /// Sums over `N` samples along each axis, `ALL` in total. Rows are loaded `WIDE` samples at a
+    /// time.
     fn sums<S: Simd, const N: usize, const WIDE: usize, const ALL: usize>(
         &self,
         simd: S,
@@ -411,20 +423,30 @@ impl Blend {
                 for part in &self.parts {
                     let place = three!(I => {
                         let beyond = part.size[I].mul_add(2.0, BEYOND);
-                        (place[I] - part.shift[I]).max(Lanes::splat(simd, -beyond)).min(Lanes::splat(simd, beyond))
+                        (place[I] - part.shift[I])
+                            .max(Lanes::splat(simd, -beyond))
+                            .min(Lanes::splat(simd, beyond))
                     });
                     let own = match &self.form {
                         Form::Rectilinear(axes) => {
                             let taps = three!(I => axes.along::<S, N>(simd, I, place[I]));
                             let counted = [taps[1].counted, taps[2].counted];
                             let starts = three!(I => taps[I].start);
-                            part.load::<S, N, WIDE, ALL>(simd, samples, zero, starts, counted, &mut values);
+                            part.load::<S, N, WIDE, ALL>(
+                                simd,
+                                samples,
+                                zero,
+                                starts,
+                                counted,
+                                &mut values,
+                            );
                             Axes::sums(simd, &taps, &values)
                         }
                         form => {
                             let starts = three!(I => {
                                 let last = part.dims[I] as f32 - N as f32;
-                                // The first of an even number around the cell, or of an odd one around the nearest sample.
+                                // The first sample of an even number around the cell, or of an odd
+                                // number around the nearest sample.
                                 let start = (place[I] - (N as f32 * 0.5 - 1.0)).floor();
                                 start.min(Lanes::splat(simd, last)).max(none)
                             });
@@ -435,11 +457,22 @@ impl Blend {
                                 }
                                 away
                             });
-                            part.load::<S, N, WIDE, ALL>(simd, samples, zero, starts, [u32::MAX; 2], &mut values);
+                            part.load::<S, N, WIDE, ALL>(
+                                simd,
+                                samples,
+                                zero,
+                                starts,
+                                [u32::MAX; 2],
+                                &mut values,
+                            );
                             let away = [&away[0][..], &away[1][..], &away[2][..]];
                             match form {
-                                Form::Radial(radial) => radial.sums(simd, away, &values, self.extent),
-                                Form::Bells { log, radius } => bells::sums(simd, *log, *radius, way, away, &values),
+                                Form::Radial(radial) => {
+                                    radial.sums(simd, away, &values, self.extent)
+                                }
+                                Form::Bells { log, radius } => {
+                                    bells::sums(simd, *log, *radius, way, away, &values)
+                                }
                                 Form::Rectilinear(_) => continue,
                             }
                         }
@@ -450,15 +483,21 @@ impl Blend {
                         |all| all.plus(&own),
                     ));
                 }
-                all.unwrap_or(Sums { weight: none, value: none, weight_slopes: [none; 3], value_slopes: [none; 3] })
+                all.unwrap_or(Sums {
+                    weight: none,
+                    value: none,
+                    weight_slopes: [none; 3],
+                    value_slopes: [none; 3],
+                })
             },
         )
     }
 }
 
 impl Part {
-    /// The values of samples, counted from zero, `N` along each axis; of those that the lattice lacks, any. Of the rows of slices
-    /// and of the slices, those that have a bit.
+    /// Loads the values of samples, relative to `zero`, `N` along each axis. Samples that the
+    /// lattice lacks get arbitrary values. Only the rows of slices and the slices whose bit is set
+    /// in `bits` are loaded.
     #[inline(always)]
     fn load<S: Simd, const N: usize, const WIDE: usize, const ALL: usize>(
         &self,
@@ -469,7 +508,7 @@ impl Part {
         bits: [u32; 2],
         values: &mut [Lanes<S>; ALL],
     ) {
-        // A function of its own for each type of samples. Sums are the same for all.
+        // A separate function for each type of samples; the code that sums is the same for all.
         simd.vectorize(
             #[inline(always)]
             || match samples {
@@ -521,7 +560,7 @@ impl Part {
             return;
         }
         let mut places = [0; 8];
-        // Rows that would go on beyond the lattice's last sample begin one earlier.
+        // Rows that would extend beyond the lattice's last sample begin one sample earlier.
         let mut is_moved = [0.0; 8];
         for lane in 0..8 {
             let last = (dims[0] - WIDE) as i32;
@@ -606,7 +645,7 @@ mod tests {
         Lattice { arrangement, ..cartesian(dims) }
     }
 
-    /// All that is gathered by sums.
+    /// All combinations that are gathered by sums.
     fn kinds() -> Vec<(Volume, Kernel)> {
         let gaussian = |sigma, extent| Kernel::gaussian(sigma, extent).unwrap();
         let table =
@@ -659,7 +698,7 @@ mod tests {
         found
     }
 
-    /// h and h′(r)/r.
+    /// Returns h and h′(r)/r.
     fn weight_of(kernel: &Kernel, r: f64) -> [f64; 2] {
         if let Profile::Gaussian(sigma) = kernel.profile {
             let h = (-0.5 * (r / sigma).powi(2)).exp();
@@ -669,7 +708,7 @@ mod tests {
         [kernel.value(r), (kernel.value(r + 1e-6) - kernel.value(r - 1e-6)) / 2e-6 / r]
     }
 
-    /// The gradient at a sample of a rectilinear lattice, by its neighbours.
+    /// Returns the gradient at a sample of a rectilinear lattice, from its neighbours.
     fn slope_at(volume: &Volume, at: usize) -> DVec3 {
         let lattice = &volume.lattice;
         let index = lattice.index(at);
@@ -693,7 +732,8 @@ mod tests {
         }))
     }
 
-    /// The sum of the weights, the value and its changes a step, over all samples in double precision.
+    /// Returns the sum of the weights, the value and its changes per step, over all samples in
+    /// double precision.
     fn truth(volume: &Volume, kernel: &Kernel, place: DVec3, way: DVec3) -> [f64; 5] {
         let lattice = volume.drawn_lattice();
         let (mut weight, mut value) = (0.0, 0.0);
@@ -706,7 +746,7 @@ mod tests {
             let away = place - steps;
             let [h, s] = weight_of(kernel, (away / unit).length());
             let beside = (away / unit - way * (away / unit).dot(way)).length();
-            // What lies further is no part of the kernel; of Gaussians on rectilinear lattices it is left out.
+            // Beyond the extent there is no kernel. On rectilinear lattices, Gaussians are not cut.
             if beside > kernel.extent && !is_sloped {
                 continue;
             }
@@ -740,7 +780,8 @@ mod tests {
         dispatch!(Level::new(), simd => at(simd, blended, places, way))
     }
 
-    /// Places in the box of a lattice, and some beyond it, in steps from its first sample.
+    /// Returns places in the box of a lattice, or up to `beyond` steps outside it, in steps from
+    /// its first sample.
     fn places(lattice: &Lattice, round: usize, beyond: f64) -> [[f32; 8]; 3] {
         let [low, high] = lattice.step_range();
         [0, 1, 2].map(|axis| {
@@ -760,7 +801,8 @@ mod tests {
             let lattice = volume.drawn_lattice();
             let name =
                 format!("{:?} on {:?} of {:?}", kernel.profile, lattice.arrangement, lattice.dims);
-            // Of Gaussians weights below a two-hundredth are left out, or counted where they should not be.
+            // For Gaussians, weights below a two-hundredth may be left out, or counted beyond the
+            // extent.
             let is_cut = matches!(kernel.profile, Profile::Gaussian(_));
             let (mut compared, mut error, mut slope_error) = (0, 0.0f64, 0.0f64);
             for zero in [0.0, 100.0] {
@@ -792,7 +834,7 @@ mod tests {
             assert!(compared > 20, "{name}: {compared}");
             let [error, slope_error] =
                 [error, slope_error].map(|sum| (sum / f64::from(compared)).sqrt());
-            // Of bytes.
+            // Errors of values in bytes.
             let most = if is_cut { [1.5, 8.0] } else { [2e-3, 0.1] };
             assert!(
                 error < most[0] && slope_error < most[1],
@@ -801,7 +843,8 @@ mod tests {
         }
     }
 
-    /// A step from 100 to 150 on the same lattice, in a range of 0 to 255: beside it fields overshoot.
+    /// A step from 100 to 150 on the same lattice, in a range of 0 to 255. Fields overshoot beside
+    /// the step.
     fn stepped(volume: &Volume) -> Volume {
         let last = volume.lattice.len() - 1;
         let value = |at: usize| match at {
@@ -838,7 +881,7 @@ mod tests {
                     let [low, high] = ranges[(cell[2] * dims[1] + cell[1]) * dims[0] + cell[0]];
                     let [first, last] = volume.range;
                     let step = (f64::from(value[lane]) - first) * 255.0 / (last - first);
-                    // Ranges are cut to that of the samples.
+                    // Ranges are clamped to that of the samples.
                     let step = step.clamp(0.0, 255.0);
                     assert!(
                         step >= f64::from(low) - 0.5 && step <= f64::from(high) + 0.5,

@@ -1,5 +1,5 @@
-//! The bricks of a volume that are at hand: in slots, each with the samples two steps around it, so that a kernel finds all
-//! that it reaches in one slot.
+//! The cache of a volume's bricks. Each brick has a slot, which also holds the samples up to two
+//! steps around it. So one slot contains all samples that a kernel in the brick reaches.
 
 use crate::{
     Result,
@@ -14,18 +14,18 @@ use bytemuck::AnyBitPattern;
 use rayon::prelude::*;
 use std::{collections::HashMap, sync::Arc};
 
-/// Samples beside a brick on each side.
+/// Extra samples on each side of a brick.
 pub const BESIDE: usize = 2;
-/// Samples of a slot along each axis, and in all.
+/// Samples of a slot along each axis, and in total.
 pub const SLOT_SIDE: usize = SIDE + 2 * BESIDE;
 pub const SLOT: usize = SLOT_SIDE * SLOT_SIDE * SLOT_SIDE;
-/// Bricks read at once.
+/// Number of bricks read together.
 const BATCH: usize = 64;
 
 /// A brick's level and number.
 type Key = (usize, u32);
 
-/// Where a brick is held, and the last update that asked for it.
+/// The slot of a brick, and the last update that needed the brick.
 #[derive(Debug, Clone, Copy)]
 struct Held {
     slot: usize,
@@ -42,11 +42,11 @@ pub struct BrickCache {
     blocks: Vec<[[u8; 2]; BRICK_BLOCKS]>,
     free: Vec<usize>,
     update: u64,
-    /// Bricks read so far.
+    /// Number of bricks read so far.
     pub reads: u64,
 }
 
-/// Bytes that a slot takes.
+/// Returns the bytes of memory of a slot.
 pub fn slot_bytes(bricks: &Bricks) -> u64 {
     (SLOT * bricks.header().scalar.bytes() + 2 * BRICK_BLOCKS) as u64
 }
@@ -65,17 +65,17 @@ impl BrickCache {
         }
     }
 
-    /// The samples of all slots.
+    /// Returns the samples of all slots.
     pub fn samples(&self) -> &Samples {
         &self.samples
     }
 
-    /// The slot of a brick.
+    /// Returns the slot of a brick.
     pub fn slot(&self, level: usize, brick: u32) -> Option<usize> {
         self.held.get(&(level, brick)).map(|held| held.slot)
     }
 
-    /// The ranges of the blocks of a slot's brick.
+    /// Returns the ranges of the blocks of a slot's brick.
     pub fn blocks(&self, slot: usize) -> &[[u8; 2]; BRICK_BLOCKS] {
         &self.blocks[slot]
     }
@@ -84,7 +84,8 @@ impl BrickCache {
         self.blocks.len() as u64 * slot_bytes(&self.bricks)
     }
 
-    /// Reads the bricks of a choice. Of the others those stay that were needed last, `most` bricks in all.
+    /// Reads the bricks of a choice. Of the other bricks, the most recently needed ones stay, up to
+    /// `most` bricks in total.
     pub fn update(&mut self, choice: &Choice, most: usize) -> Result<()> {
         self.update += 1;
         let absent: Vec<Key> =
@@ -105,11 +106,14 @@ impl BrickCache {
                 let slot = self.free.pop().unwrap_or(self.blocks.len());
                 if slot == self.blocks.len() {
                     self.blocks.push(*brick.blocks);
-                    each_type!(&mut self.samples, samples => samples.resize((slot + 1) * SLOT, Default::default()));
+                    each_type!(&mut self.samples, samples => samples
+                        .resize((slot + 1) * SLOT, Default::default()));
                 } else {
                     self.blocks[slot] = *brick.blocks;
                 }
-                each_type!(&mut self.samples, samples => fill(&mut samples[slot * SLOT..], &brick.samples));
+                each_type!(&mut self.samples, samples => fill(
+                    &mut samples[slot * SLOT..], &brick.samples,
+                ));
                 self.held.insert(*key, Held { slot, last: self.update });
             }
         }
@@ -117,7 +121,7 @@ impl BrickCache {
         Ok(())
     }
 
-    /// Lets go of up to so many bricks that this update does not need, those first that no view needed for longest.
+    /// Evicts up to `count` bricks that this update does not need, least recently needed first.
     fn make_room(&mut self, count: usize) {
         let mut others: Vec<(u64, Key)> = self
             .held
@@ -131,8 +135,9 @@ impl BrickCache {
         }
     }
 
-    /// Copies samples beside the bricks that were read, and theirs beside their neighbours. Where there is no neighbour, the
-    /// nearest sample of the brick stands in: the neighbour shows nothing, so nothing shows that its samples reach.
+    /// Fills the extra samples around the new bricks and their neighbours. If there is no
+    /// neighbour, the nearest sample of the brick takes its place. That changes nothing: an absent
+    /// neighbour is invisible, and so is everything that its samples reach.
     fn surround(&mut self, read: &[Key]) {
         let mut touched: Vec<Key> = Vec::new();
         for &(level, brick) in read {
@@ -153,7 +158,7 @@ impl BrickCache {
         }
     }
 
-    /// The brick so many bricks further along each axis, and its slot, where it is held.
+    /// Returns the number and the slot of the brick at an offset in bricks, if it is held.
     fn neighbour(&self, level: usize, brick: u32, step: [isize; 3]) -> Option<(u32, usize)> {
         let size = self.bricks.level(level);
         let place = size.place(brick);
@@ -169,18 +174,19 @@ impl BrickCache {
     }
 }
 
-/// Steps to a brick's neighbours and to itself.
+/// Returns the offsets to a brick's neighbours and to the brick itself.
 fn around() -> impl Iterator<Item = [isize; 3]> {
     (0..27).map(|number| [number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1])
 }
 
-/// Where a sample of a brick is in its slot; from −2 to 33 along each axis.
+/// Returns the index of a brick's sample in its slot; coordinates run from −2 to 33 along each
+/// axis.
 fn place_of([x, y, z]: [isize; 3]) -> usize {
     let [x, y, z] = [x, y, z].map(|at| (at + BESIDE as isize) as usize);
     (z * SLOT_SIDE + y) * SLOT_SIDE + x
 }
 
-/// Puts the samples of a brick into its slot.
+/// Copies the samples of a brick into its slot.
 fn fill<T: AnyBitPattern>(slot: &mut [T], bytes: &[u8]) {
     for (row, bytes) in bytes.chunks_exact(SIDE * size_of::<T>()).enumerate() {
         let start = place_of([0, (row % SIDE) as isize, (row / SIDE) as isize]);
@@ -192,7 +198,8 @@ fn fill<T: AnyBitPattern>(slot: &mut [T], bytes: &[u8]) {
     }
 }
 
-/// Copies the samples on one side of a brick from its neighbour there, or else from its own border.
+/// Fills the extra samples on one side of a brick from its neighbour there, or else from its own
+/// border.
 fn copy_beside<T: Copy>(samples: &mut [T], own: usize, from: Option<usize>, step: [isize; 3]) {
     let side = SIDE as isize;
     let along = |axis: usize| match step[axis] {
@@ -200,7 +207,7 @@ fn copy_beside<T: Copy>(samples: &mut [T], own: usize, from: Option<usize>, step
         0 => 0..side,
         _ => side..side + BESIDE as isize,
     };
-    // The place of what stands at a place beside the brick.
+    // The source of a sample beside the brick.
     let source = |at: [isize; 3]| match from {
         Some(slot) => slot * SLOT + place_of([0, 1, 2].map(|axis| at[axis] - side * step[axis])),
         None => own * SLOT + place_of(at.map(|at| at.clamp(0, side - 1))),
@@ -214,14 +221,14 @@ fn copy_beside<T: Copy>(samples: &mut [T], own: usize, from: Option<usize>, step
     }
 }
 
-/// Where the bricks of a level that a picture shows are held.
+/// The slots of a level's bricks that a picture shows.
 #[derive(Debug)]
 pub struct Grid {
     /// Bricks along each axis.
     pub counts: [usize; 3],
-    /// The slot of each; [`Grid::ABSENT`] of those that the picture does not show.
+    /// The slot of each brick; [`Grid::ABSENT`] for bricks that the picture does not show.
     pub slots: Vec<u32>,
-    /// A value of each, one that does not show where the brick is left out.
+    /// A value of each brick. It is an invisible one if the brick is left out.
     pub values: Vec<f32>,
 }
 

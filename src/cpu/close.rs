@@ -1,5 +1,6 @@
-//! Closes a sheet at eight pixels: the field in it, a parabola along each ray, is classified and lit, and composited front to
-//! back together with the radiance in it. The definition is that of `src/reference`; shaders/sheet.wgsl does the same.
+//! Closes a sheet at eight pixels. The field in the sheet is a parabola along each ray. It is
+//! classified, lit, and composited front to back together with the sheet's radiance.
+//! `src/reference` has the definition; shaders/shared/sheet.wgsl does the same.
 
 use super::{
     plan::Plan,
@@ -9,29 +10,29 @@ use super::{
 use crate::scene::Optics;
 use fearless_simd::{Simd, f32x4, i32x8, mask32x8, prelude::*};
 
-/// Parts of a sheet in which the transfer function is integrated.
+/// Number of parts of a sheet in which the transfer function is integrated.
 const PARTS: usize = 3;
-/// Values nearer to each other than this many entries of the table are taken as that far apart.
+/// Values closer together than this, in entries of the table, are taken as this far apart.
 const NARROW: f32 = 8.0;
-/// The same for values far beyond the table, as a part of them.
+/// The same for values far beyond the table, as a fraction of the value.
 const NARROW_AFAR: f32 = 1e-6;
-/// Optical depth that counts as opaque.
+/// An optical depth that counts as opaque.
 const MOST_DEPTH: f32 = 20.0;
-/// Optical depths are divided by from here on.
+/// Minimum divisor where optical depths are divided by.
 const LEAST_DIVISOR: f32 = 1e-20;
-/// A gradient shorter than this has no direction.
+/// A shorter gradient has no direction.
 const LEAST_GRADIENT: f32 = 1e-20;
-/// A pixel that lets less light through is finished.
+/// A pixel that transmits less light is finished.
 pub const OPAQUE: f32 = 0.0005;
-/// No value yet.
+/// A pixel without a value.
 pub const NO_VALUE: f32 = -3e38;
 
-/// Eight pixels of the picture so far.
+/// Eight pixels of the picture, composited so far.
 #[derive(Clone, Copy)]
 pub struct Pixels<S: Simd> {
     pub color: [Lanes<S>; 3],
     pub through: Lanes<S>,
-    /// The distance at which half of the light is taken, or the largest value.
+    /// The distance at which half of the light is absorbed, or the largest value.
     pub hit: Lanes<S>,
 }
 
@@ -44,7 +45,8 @@ impl<S: Simd> Pixels<S> {
     }
 }
 
-/// The field on a plane between two sheets: its value, in entries of the table, and its change across the ray.
+/// The field on a plane between two sheets: its value, in entries of the table, and its gradient
+/// across the ray.
 #[derive(Clone, Copy)]
 pub struct Face<S: Simd> {
     pub value: Lanes<S>,
@@ -57,29 +59,29 @@ pub struct Layer<S: Simd> {
     pub back: Face<S>,
     /// The value in the middle.
     pub middle: Lanes<S>,
-    /// Where the sheet begins, how thick it is, and the part of the rays that counts.
+    /// The sheet's start and thickness, and the part of the rays that counts.
     pub start: f32,
     pub thickness: f32,
     pub begin: Lanes<S>,
     pub end: Lanes<S>,
-    /// How much of the sheet is filled.
+    /// The filled fraction of the sheet.
     pub filling: Lanes<S>,
     pub direction: [Lanes<S>; 3],
 }
 
-/// What a sheet does to the light.
+/// The effect of a sheet on light.
 struct Medium<S: Simd> {
     through: Lanes<S>,
     depth: Lanes<S>,
     color: [Lanes<S>; 3],
-    /// The distance at which an isosurface took the half of the light.
+    /// The distance at which an isosurface absorbed half of the light.
     hit: Lanes<S>,
     has_hit: mask32x8<S>,
     /// The largest value.
     peak: Lanes<S>,
 }
 
-/// How many entries of the transfer function's table up to each show something.
+/// For each entry of the transfer function's table, the number of visible entries before it.
 pub struct Visible(Vec<u32>);
 
 impl Visible {
@@ -104,13 +106,13 @@ impl Visible {
         Self(before)
     }
 
-    /// Whether any of the values that a sheet may have show something.
+    /// Whether any value that a sheet may have is visible.
     #[inline(always)]
     pub fn may_show<S: Simd>(&self, simd: S, plan: &Plan, layer: &Layer<S>) -> bool {
         let (a, b, c) = (layer.front.value, layer.middle, layer.back.value);
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        // A parabola leaves the range of its values at both ends and the middle by an eighth of it at most; integrals are taken
-        // over NARROW entries.
+        // A parabola exceeds the range of its values at both ends and the middle by at most an
+        // eighth of that range. Integrals cover at least NARROW entries.
         let slack = (high - low) * 0.125 + (0.5 * NARROW + 1.0);
         let [_, _, last, place] = plan.frame.transfer;
         let (none, last) = (Lanes::splat(simd, 0.0), Lanes::splat(simd, last));
@@ -124,7 +126,8 @@ impl Visible {
 }
 
 impl Plan<'_> {
-    /// Means over the values between two: extinction times colour, and extinction.
+    /// Returns extinction times colour, and extinction, averaged over the values between two
+    /// values.
     #[inline(always)]
     fn between<S: Simd>(&self, simd: S, a: Lanes<S>, b: Lanes<S>) -> [Lanes<S>; 4] {
         let [_, _, end, place] = self.frame.transfer;
@@ -146,14 +149,14 @@ impl Plan<'_> {
                 to - from
             }),
         );
-        // Values before and behind the table are those of its ends.
+        // Values before and behind the table count as those of its ends.
         let before = (high.min(none) - low.min(none)) * inverse;
         let behind = (high.max(all) - low.max(all)) * inverse;
         let [first, last] = self.frame.beyond;
         four!(I => within[I] * inverse + before * first[I] + behind * last[I])
     }
 
-    /// Extinction times colour, and extinction, of one value.
+    /// Returns extinction times colour, and extinction, for one value.
     #[inline(always)]
     fn one<S: Simd>(&self, simd: S, value: Lanes<S>) -> [Lanes<S>; 4] {
         let [_, _, end, place] = self.frame.transfer;
@@ -171,7 +174,7 @@ impl Plan<'_> {
         [red * extinction, green * extinction, blue * extinction, extinction]
     }
 
-    /// The factor on the extinction where the gradient has a magnitude.
+    /// Returns the factor on the extinction for a gradient's magnitude.
     #[inline(always)]
     fn gradient_factor<S: Simd>(&self, simd: S, magnitude: Lanes<S>) -> Lanes<S> {
         let [first, per_magnitude, ..] = self.frame.gradients;
@@ -187,7 +190,8 @@ impl Plan<'_> {
         at.map(factor).simd_into(simd)
     }
 
-    /// Light at the eye, on both sides (Blinn 1977). A normal may have any length.
+    /// Returns a lit colour, with a light at the eye, on both sides (Blinn 1977). A normal may have
+    /// any length.
     #[inline(always)]
     pub fn lit<S: Simd>(
         &self,
@@ -209,8 +213,8 @@ impl Plan<'_> {
         three!(I => color[I].mul_add(share, highlight).min(one))
     }
 
-    /// Adds a sheet to the picture: the field in it at the pixels of a mask, and radiance (colour times optical depth, and
-    /// optical depth).
+    /// Adds a sheet to the picture: the field in it, at the pixels of a mask, and its radiance
+    /// (colour times optical depth, and optical depth).
     #[inline(always)]
     pub fn close<S: Simd>(
         &self,
@@ -236,14 +240,16 @@ impl Plan<'_> {
             has_hit = medium.has_hit;
             pixels.hit = has_hit.select(medium.hit, pixels.hit);
             if radiance.is_none() && self.optics != Optics::XRay {
-                // What has been composited in the sheet is composited as it is.
+                // The field's colour is already composited within the sheet, so it is added as it
+                // is.
                 pixels.color = three!(I => before.mul_add(medium.color[I], pixels.color[I]));
                 pixels.through = before * medium.through;
                 self.note_half(simd, sheet, before, medium.depth, has_hit, pixels);
                 return;
             }
             let own = medium.depth.min(Lanes::splat(simd, MOST_DEPTH));
-            // Optical depth for opacity, τ / (1 − e^−τ), of which little is left where τ is small.
+            // Converts opacity to optical depth: τ / (1 − e^−τ). For small τ that ratio would lose
+            // its digits.
             let ratio = own.simd_lt(1e-2).select(own * 0.5 + 1.0, own / (one - exp(simd, -own)));
             premultiplied = three!(I => ratio.mul_add(medium.color[I], premultiplied[I]));
             depth += own;
@@ -262,7 +268,8 @@ impl Plan<'_> {
         self.note_half(simd, sheet, before, depth, has_hit, pixels);
     }
 
-    /// Notes where half of the light is taken, if that is in a sheet of some optical depth and not on a surface in it.
+    /// Records where half of the light is absorbed, if that is in a sheet with optical depth and
+    /// not on an isosurface in it.
     #[inline(always)]
     fn note_half<S: Simd>(
         &self,
@@ -283,7 +290,8 @@ impl Plan<'_> {
         }
     }
 
-    /// What the field of a sheet does to light, in all of it that the lattice's box and the clips leave.
+    /// Returns the effect of a sheet's field on light, inside the lattice's box and what the clips
+    /// leave.
     #[inline(always)]
     fn pass<S: Simd>(
         &self,
@@ -310,7 +318,7 @@ impl Plan<'_> {
         let holes = &rays.holes[..self.holes];
         let mut begin = layer.begin;
         for _ in 0..=self.holes {
-            // Out of the holes that `begin` lies in; leaving one may lead into another.
+            // Skip the holes that contain `begin`; leaving one may lead into another.
             for _ in 0..self.holes {
                 for [from, to] in holes {
                     let is_inside = from.simd_le(begin) & begin.simd_lt(*to);
@@ -331,7 +339,7 @@ impl Plan<'_> {
         medium
     }
 
-    /// The part of a sheet between two distances.
+    /// Adds the part of a sheet between two distances.
     #[inline(always)]
     fn pass_piece<S: Simd>(
         &self,
@@ -390,7 +398,7 @@ impl Plan<'_> {
             }
             let mut done = none;
             for number in 0..self.isosurfaces {
-                // From the value at the front to that at the back.
+                // In the order from the front value to the back value.
                 let rises = next.simd_gt(value);
                 let [up, down] =
                     [number, self.isosurfaces - 1 - number].map(|i| self.frame.isosurfaces[i]);
@@ -432,7 +440,7 @@ impl Plan<'_> {
         }
     }
 
-    /// The gradient in view space, in entries per thickness of a sheet.
+    /// Returns the gradient in view space, in entries per thickness of a sheet.
     #[inline(always)]
     fn gradient<S: Simd>(&self, layer: &Layer<S>, u: Lanes<S>) -> [Lanes<S>; 3] {
         let (a, b, c) = (layer.front.value, layer.middle, layer.back.value);
@@ -469,7 +477,7 @@ impl<S: Simd> Medium<S> {
     }
 }
 
-/// Four channels of eight pixels from eight pixels of four channels.
+/// Transposes eight pixels with four channels into four channels with eight pixels.
 #[inline(always)]
 fn columns<S: Simd>(simd: S, rows: [f32x4<S>; 8]) -> [Lanes<S>; 4] {
     let [low, high] = each!([0, 4], I => {
@@ -480,7 +488,8 @@ fn columns<S: Simd>(simd: S, rows: [f32x4<S>; 8]) -> [Lanes<S>; 4] {
     four!(I => simd.combine_f32x4(low[I], high[I]))
 }
 
-/// The share of light that an optical depth takes; where it is small, the difference to 1 is lost in rounding.
+/// Returns the share of light that an optical depth absorbs. For small depths, subtracting from 1
+/// would lose the result in rounding.
 #[inline(always)]
 fn taken<S: Simd>(simd: S, depth: Lanes<S>) -> Lanes<S> {
     let one = Lanes::splat(simd, 1.0);

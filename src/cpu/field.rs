@@ -1,11 +1,14 @@
-//! The field of a lattice at a place: the weighted mean of the samples that the kernel reaches there, and its gradient.
+//! The field of a lattice at a place: the weighted mean of the samples within reach of the kernel,
+//! and its gradient.
 //!
-//! A Gaussian on a lattice is a product of Gaussians along its axes. So the mean over 64 samples takes four weights an axis,
-//! and the gradient follows from the first moments: ∂/∂p E[f] = (E[n·f] − E[n]·E[f])/σ², n the sample's index along the axis.
-//! Samples outside the lattice have no weight.
+//! A Gaussian on a lattice is a product of Gaussians along the axes. So the mean over 64 samples
+//! takes four weights an axis. The gradient follows from the first moments: ∂/∂p E[f] = (E[n·f] −
+//! E[n]·E[f])/σ², with n the sample's index along the axis. Samples outside the lattice have no
+//! weight.
 //!
-//! Tensor products have weights that are polynomials of the place between two samples. Their derivatives give the gradient. The
-//! samples go on mirrored at the outermost ones, so the weights always add up to 1.
+//! The weights of tensor products are polynomials of the place between two samples. Their
+//! derivatives give the gradient. The samples are mirrored at the outermost ones, so the weights
+//! always add up to 1.
 
 use super::{
     blend::{Blend, Blended},
@@ -19,22 +22,22 @@ use crate::{
 };
 use fearless_simd::{Simd, i32x8, mask32x8, prelude::*};
 
-/// How far a place may lie outside the lattice and still have a sample in reach, in steps.
+/// How far outside the lattice a place may lie and still have a sample in reach, in steps.
 pub const BEYOND: f32 = 1.999;
-/// Weights that samples out of reach may have, beside 1 at the centre.
+/// Maximum weight of samples that count as out of reach, relative to 1 at the centre.
 pub const LEAST_WEIGHT: f64 = 5e-3;
-/// The least standard deviation of a kernel, in steps, whose weights 32 bits hold.
+/// Minimum standard deviation of a kernel, in steps, whose weights fit 32 bits.
 pub const LEAST_DEVIATION: f64 = 0.3;
 
-/// How the samples around a place are weighed.
+/// How the samples around a place are weighted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Weighting {
-    /// By Gaussians of this standard deviation, in steps.
+    /// By Gaussians with this standard deviation, in steps.
     Gaussian(f64),
     Tensor(Tensor),
 }
 
-/// How a kernel weighs samples; none where four weights an axis do not hold it.
+/// Returns the weighting of a kernel, or `None` if four weights an axis do not suffice.
 pub fn weighting(kernel: &Kernel) -> Option<Weighting> {
     match kernel.profile {
         Profile::Gaussian(sigma) => {
@@ -46,29 +49,30 @@ pub fn weighting(kernel: &Kernel) -> Option<Weighting> {
     }
 }
 
-/// The standard deviation, in steps, of a Gaussian of which four weights an axis hold all.
+/// Returns the standard deviation, in steps, of a Gaussian for which four weights an axis suffice.
 pub fn deviation(kernel: &Kernel) -> Option<f64> {
     if let Some(Weighting::Gaussian(sigma)) = weighting(kernel) { Some(sigma) } else { None }
 }
 
-/// The samples of a volume by their type.
+/// The field of a volume, by the type of its samples.
 pub enum Typed<'a> {
     U8(Field<'a, u8>),
     U16(Field<'a, u16>),
     I16(Field<'a, i16>),
     I32(Field<'a, i32>),
     F32(Field<'a, f32>),
-    /// By sums, of any type.
+    /// By sums, for any type.
     Blend(Blended<'a>),
 }
 
 impl<'a> Typed<'a> {
-    /// The field of a volume, whose values count from `zero`. A sharp one has coefficients in the samples' place.
+    /// Returns the field of a volume, with values relative to `zero`. A sharp volume's coefficients
+    /// take the samples' place.
     pub fn new(volume: &'a Volume, weighting: Weighting, zero: f64) -> Self {
         Self::of_volume(volume, Shape::new(weighting), zero)
     }
 
-    /// The same by sums over samples.
+    /// Returns the same by sums over samples.
     pub fn blended(volume: &'a Volume, blend: &'a Blend, zero: f64) -> Self {
         Self::Blend(Blended::new(volume, blend, zero))
     }
@@ -83,7 +87,8 @@ impl<'a> Typed<'a> {
         }
     }
 
-    /// The field of a level of a volume in bricks; `samples` are those of all slots, at least of one.
+    /// Returns the field of a level of a volume in bricks. `samples` are those of all slots; there
+    /// is at least one slot.
     pub fn of_bricks(
         samples: &'a Samples,
         dims: [usize; 3],
@@ -111,7 +116,7 @@ impl<'a> Typed<'a> {
     }
 }
 
-/// Samples on a Cartesian lattice and the kernel between them.
+/// Samples on a Cartesian lattice, and the kernel that interpolates them.
 pub struct Field<'a, T> {
     samples: &'a [T],
     dims: [usize; 3],
@@ -120,7 +125,7 @@ pub struct Field<'a, T> {
     zero: f32,
 }
 
-/// How samples lie in memory.
+/// The layout of samples in memory.
 #[derive(Clone, Copy)]
 enum Memory<'a> {
     /// Row by row.
@@ -129,12 +134,12 @@ enum Memory<'a> {
     Slots(&'a Grid),
 }
 
-/// The kernel between samples.
+/// The kernel that interpolates samples.
 #[derive(Clone, Copy)]
 enum Shape {
     Gaussian(Bell),
     Linear,
-    /// Four weights an axis, of the factors of 1, t, t² and t³.
+    /// Four weights an axis, each given by its coefficients of 1, t, t² and t³.
     Cubic([[f32; 4]; 4]),
 }
 
@@ -153,7 +158,7 @@ impl Shape {
 struct Bell {
     /// One over the kernel's variance in squared steps.
     per_variance: f32,
-    /// Weights one and two steps from the centre.
+    /// Weights at one and two steps from the centre.
     near: f32,
     far: f32,
 }
@@ -175,13 +180,14 @@ impl<'a, T: Sample> Field<'a, T> {
         Self { samples, dims, memory, shape, zero: zero as f32 }
     }
 
-    /// Values, counted from zero, and their changes a step along each axis, at places in steps.
+    /// Returns values relative to zero, and their changes per step along each axis, at places in
+    /// steps.
     #[inline(always)]
     pub fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> (Lanes<S>, [Lanes<S>; 3]) {
         match &self.shape {
             Shape::Gaussian(bell) => self.gaussian(simd, bell, place),
             Shape::Linear => self.linear(simd, place),
-            // A function of its own: large, and asked for at three places.
+            // A separate function, because it is large and called from three places.
             Shape::Cubic(factors) => simd.vectorize(
                 #[inline(always)]
                 || self.cubic(simd, factors, place),
@@ -191,7 +197,7 @@ impl<'a, T: Sample> Field<'a, T> {
 }
 
 impl Grid {
-    /// The bricks that hold the second samples of windows, from the indices of the first ones.
+    /// Returns the bricks of the windows' second samples, from the indices of the first samples.
     #[inline(always)]
     fn bricks<S: Simd>(&self, [x, y, z]: [i32x8<S>; 3]) -> ([i32x8<S>; 3], [usize; 8]) {
         let [x, y, z] = [(x + 1) >> 5, (y + 1) >> 5, (z + 1) >> 5];
@@ -200,7 +206,7 @@ impl Grid {
         ([x, y, z], each!([0, 1, 2, 3, 4, 5, 6, 7], L => numbers[L] as usize))
     }
 
-    /// Where windows are in the slots. Windows of bricks that are not there are any.
+    /// Returns the places of windows in the slots. For absent bricks the places are arbitrary.
     #[inline(always)]
     fn places<S: Simd>(&self, first: [i32x8<S>; 3]) -> [usize; 8] {
         let (bricks, numbers) = self.bricks(first);
@@ -214,7 +220,8 @@ impl Grid {
         })
     }
 
-    /// Where there are bricks around places in steps of their level, of so many samples, and a value of each brick.
+    /// Returns where there are bricks around places, and a value of each brick. Places are in steps
+    /// of the level, whose size is `dims`.
     #[inline(always)]
     pub fn held<S: Simd>(
         &self,
@@ -262,7 +269,7 @@ impl<T: Sample> Field<'_, T> {
                 );
             }
             for axis in 0..3 {
-                // Four samples of the lattice; those outside have no weight.
+                // Use four samples of the lattice; samples outside have no weight.
                 let end = Lanes::splat(simd, self.dims[axis] as f32 - 4.0);
                 let start = starts[axis].max(Lanes::splat(simd, 0.0)).min(end);
                 weights[axis] = moved(simd, weights[axis].weights, start - starts[axis]);
@@ -281,7 +288,7 @@ impl<T: Sample> Field<'_, T> {
         (T::ZERO.map_or(sum, |zero| sum + (zero - self.zero)), gradient)
     }
 
-    /// Samples in the lattice, four along each axis, from the first one of each lane.
+    /// Returns the windows of samples in the lattice that begin at the first sample of each lane.
     #[inline(always)]
     fn window<S: Simd, const N: usize>(&self, starts: [Lanes<S>; 3]) -> Window<'_, T, N> {
         let first: [i32x8<S>; 3] = three!(I => i32x8::truncate_from(starts[I]));
@@ -295,14 +302,15 @@ impl<T: Sample> Field<'_, T> {
             }
             Memory::Rows => {
                 let [x, y, z]: [[i32; 8]; 3] = three!(I => first[I].into());
-                let own = each!([0, 1, 2, 3, 4, 5, 6, 7], I => (z[I] as usize * ny + y[I] as usize) * nx + x[I] as usize);
+                let own = each!([0, 1, 2, 3, 4, 5, 6, 7], I => (z[I] as usize * ny
+                    + y[I] as usize) * nx + x[I] as usize);
                 (own, nx, nx * ny)
             }
         };
         Window::new(self.samples, places, row, slice)
     }
 
-    /// In lattices of less than four samples along an axis: sample by sample.
+    /// Evaluates lattices with fewer than four samples along an axis, sample by sample.
     #[inline(always)]
     fn beside<S: Simd>(
         &self,
@@ -339,8 +347,8 @@ impl<T: Sample> Field<'_, T> {
         )
     }
 
-    /// The mean of the samples in reach and its gradient. `row` gives the sum of a row of a slice and its first moment, to be
-    /// multiplied by `unit`.
+    /// Returns the mean of the samples in reach, and its gradient. `row` returns the sum of a row
+    /// of a slice and its first moment, both to be multiplied by `unit`.
     #[inline(always)]
     fn sums<S: Simd>(
         &self,
@@ -350,7 +358,7 @@ impl<T: Sample> Field<'_, T> {
         row: impl Fn(usize, usize) -> [Lanes<S>; 2],
     ) -> (Lanes<S>, [Lanes<S>; 3]) {
         let weights = four!(K => z.weights[K] * unit);
-        // Of each slice: its sum and the moments along x and y.
+        // For each slice: the sum, and the moments along x and y.
         let slices = four!(K => {
             let rows = four!(J => row(J, K));
             let sums = four!(J => y.weights[J] * rows[J][0]);
@@ -369,7 +377,8 @@ impl<T: Sample> Field<'_, T> {
     }
 }
 
-/// The weights of four samples that lie some further on than those of `weights`; others have none.
+/// Returns the weights of the four samples that lie `by` samples after those of `weights`. Samples
+/// without a weight get 0.
 #[inline(always)]
 fn moved<S: Simd>(simd: S, weights: [Lanes<S>; 4], by: Lanes<S>) -> Weights<S> {
     let none = Lanes::splat(simd, 0.0);
@@ -382,7 +391,7 @@ fn moved<S: Simd>(simd: S, weights: [Lanes<S>; 4], by: Lanes<S>) -> Weights<S> {
     normalised(simd, found)
 }
 
-/// Weights that add up to 1.
+/// Scales weights so that they add up to 1.
 #[inline(always)]
 fn normalised<S: Simd>(simd: S, weights: [Lanes<S>; 4]) -> Weights<S> {
     let inverse = Lanes::splat(simd, 1.0) / ((weights[0] + weights[1]) + (weights[2] + weights[3]));
@@ -398,7 +407,8 @@ impl Bell {
 
     #[inline(always)]
     fn weights<S: Simd>(&self, simd: S, t: Lanes<S>) -> Weights<S> {
-        // All by the factor from the sample before the place to the place itself.
+        // All weights follow from one factor: that from the sample before the place to the place
+        // itself.
         let q = exp2_within(simd, t * (self.per_variance * std::f32::consts::LOG2_E));
         let after = q * q * self.near;
         let second = q * (q * q * self.far);
@@ -427,7 +437,7 @@ impl<T: Sample> Field<'_, T> {
             sides = Some(three!(I => seen[I].side));
         }
         let [x, y, z]: [Lanes<S>; 3] = three!(I => place[I] - first[I]);
-        // The rows of the near slice, then those of the far one, with their changes along x.
+        // The rows of the near slice, then those of the far slice, with their changes along x.
         let window: Window<T, 2> = self.window(first);
         let pairs = four!(I => T::two(simd, &window, [0, I % 2, I / 2]));
         let rises = four!(I => pairs[I][1] - pairs[I][0]);
@@ -462,7 +472,7 @@ impl<T: Sample> Field<'_, T> {
         if self.dims.iter().any(|&count| count < 4) {
             return self.mirrored(simd, factors, place);
         }
-        // Four samples of the lattice, on which the mirror images beside them count too.
+        // Use four samples of the lattice. The mirror images beside them count too.
         let seen = three!(I => Seen::new(simd, place[I], self.dims[I]));
         let mut taps: [Taps<S>; 3] =
             three!(I => Taps::new(simd, factors, seen[I].place - seen[I].first));
@@ -478,7 +488,8 @@ impl<T: Sample> Field<'_, T> {
         (value, three!(I => slopes[I] * seen[I].side))
     }
 
-    /// Whether the samples from one offset to another lie in the lattice, along all axes and in all lanes.
+    /// Whether the samples from one offset to another lie in the lattice, along all axes and in all
+    /// lanes.
     #[inline(always)]
     fn hold<S: Simd>(&self, first: [Lanes<S>; 3], [from, to]: [f32; 2]) -> bool {
         let within = three!(I => {
@@ -487,7 +498,7 @@ impl<T: Sample> Field<'_, T> {
         (within[0] & within[1] & within[2]).all_true()
     }
 
-    /// At the border of any lattice, sample by sample.
+    /// Evaluates the border of any lattice, sample by sample.
     #[inline(always)]
     fn mirrored<S: Simd>(
         &self,
@@ -516,7 +527,7 @@ impl<T: Sample> Field<'_, T> {
         (value, three!(I => slopes[I] * sides[I]))
     }
 
-    /// The sum of the samples in reach and its gradient.
+    /// Returns the sum of the samples in reach, and its gradient.
     #[inline(always)]
     fn tap_sums<S: Simd>(
         &self,
@@ -548,7 +559,7 @@ impl<T: Sample> Field<'_, T> {
 }
 
 impl<S: Simd> Taps<S> {
-    /// The weights at t of the way between two samples.
+    /// Returns the weights at the fraction t between two samples.
     #[inline(always)]
     fn new(simd: S, factors: &[[f32; 4]; 4], t: Lanes<S>) -> Self {
         let weights = four!(I => {
@@ -565,15 +576,16 @@ impl<S: Simd> Taps<S> {
     }
 }
 
-/// The sum of four samples with weights.
+/// Returns the weighted sum of four samples.
 #[inline(always)]
 fn of_four<S: Simd>(weights: &[Lanes<S>; 4], samples: &[Lanes<S>; 4]) -> Lanes<S> {
     let pairs = [weights[0] * samples[0], weights[1] * samples[1]];
     weights[2].mul_add(samples[2], pairs[0]) + weights[3].mul_add(samples[3], pairs[1])
 }
 
-/// Weights of four samples in the lattice, of those of the four around a place. Of these the first lies outside the lattice where
-/// the place is in the lowest cell, and the last where it is in the highest: a mirror image has the weight of what it shows too.
+/// Moves the weights of the four samples around a place to four samples in the lattice. In the
+/// lowest cell the first sample lies outside the lattice, in the highest cell the last one. The
+/// weight of a mirror image goes to the sample that it mirrors.
 #[inline(always)]
 fn within_lattice<S: Simd>(
     simd: S,
@@ -590,11 +602,11 @@ fn within_lattice<S: Simd>(
     ]
 }
 
-/// A place as it is seen in a mirrored axis.
+/// A place on a mirrored axis.
 struct Seen<S: Simd> {
-    /// Where it is seen in the lattice.
+    /// Its mirror image in the lattice.
     place: Lanes<S>,
-    /// The sample before it; the last sample lies at the end of the cell before it.
+    /// The sample before it. The last sample lies at the end of the last cell.
     first: Lanes<S>,
     /// The sign of slopes; 0 along an axis of one sample.
     side: Lanes<S>,
@@ -626,7 +638,7 @@ fn polynomials(tensor: Tensor) -> [[f32; 4]; 4] {
     tensor.polynomials().map(|row| row.map(|factor| factor as f32))
 }
 
-/// The rows of four samples around eight places, in the four rows of four slices.
+/// Rows of four samples around eight places, in four rows of four slices.
 trait Rows<S: Simd> {
     fn four(&self, simd: S, row: usize, slice: usize) -> [Lanes<S>; 4];
 }
@@ -638,19 +650,20 @@ impl<S: Simd, T: Sample> Rows<S> for Window<'_, T, 4> {
     }
 }
 
-/// Samples at any indices: those at the lattice's border stand for those outside.
+/// Samples at arbitrary indices: samples at the lattice's border replace those outside.
 struct Border<'a, T> {
     samples: &'a [T],
-    /// Where each lane's samples count from.
+    /// The index at which each lane's samples begin.
     starts: [usize; 8],
-    /// Along each axis, for each lane, the places of four samples.
+    /// For each axis and lane, the indices of four samples.
     taps: [[[usize; 4]; 8]; 3],
     row: usize,
     slice: usize,
 }
 
 impl<T> Field<'_, T> {
-    /// The samples of four indices along each axis for each lane, the second one no further than two from the others.
+    /// Returns the samples at four indices along each axis for each lane. The second index is at
+    /// most two from the others.
     fn border(&self, mut taps: [[[usize; 4]; 8]; 3]) -> Border<'_, T> {
         let [nx, ny, _] = self.dims;
         let mut starts = [0; 8];
@@ -692,7 +705,8 @@ mod tests {
     use fearless_simd::{Level, dispatch};
     use glam::DVec3;
 
-    /// The value and its changes a step along each axis, sample by sample in double precision.
+    /// Returns the value and its changes per step along each axis, sample by sample in double
+    /// precision.
     fn truth(volume: &Volume, tensor: Tensor, place: [f64; 3]) -> [f64; 4] {
         let [nx, ny, _] = volume.lattice.dims;
         let mut sums = [0.0; 4];
@@ -759,7 +773,8 @@ mod tests {
             let volume = Volume::new(Lattice::with_spacing(dims, DVec3::ONE), samples).unwrap();
             for tensor in Tensor::ALL {
                 for round in 0..60 {
-                    // The first rounds lie in the lattice, the others also up to three steps beyond it.
+                    // The first rounds lie in the lattice, the others also up to three steps
+                    // outside it.
                     let beyond = if round < 20 { 0.0 } else { 3.0 };
                     let place = |axis: usize, lane: usize| {
                         let part = ((round * 8 + lane) as f64 * [0.61, 0.77, 0.37][axis]).fract();
@@ -774,7 +789,8 @@ mod tests {
                             let place = places.map(|lanes| f64::from(lanes[lane]));
                             let mut expected = truth(&volume, tensor, place);
                             expected[0] -= zero;
-                            // At a sample a linear field has a kink: its slope is that of either side.
+                            // At a sample, a linear field has a kink: its slope is that of either
+                            // side.
                             let is_kink = tensor == Tensor::Linear
                                 && place.iter().any(|at| at.fract() == 0.0);
                             let compared = if is_kink { 1 } else { 4 };
@@ -792,7 +808,8 @@ mod tests {
         }
     }
 
-    /// The mean of the samples of a Gaussian that four weights an axis hold, and its changes a step along each axis.
+    /// Returns the mean of the samples under a Gaussian that four weights an axis cover, and its
+    /// changes per step along each axis.
     fn mean(volume: &Volume, sigma: f64, place: [f64; 3]) -> [f64; 4] {
         let dims = volume.lattice.dims;
         let at = |place: [f64; 3]| {
@@ -836,7 +853,8 @@ mod tests {
                 for lane in 0..8 {
                     let place = places.map(|lanes| f64::from(lanes[lane]));
                     for (found, expected) in found.iter().zip(mean(&volume, 0.5, place)) {
-                        // Of 251, by the weights that are left out and, of integers, are rounded.
+                        // Relative to 251. The errors come from omitted weights, and for integers
+                        // from rounded weights.
                         let found = f64::from(found[lane]);
                         assert!((found - expected).abs() < 2.0, "{place:?}: {found} {expected}");
                     }

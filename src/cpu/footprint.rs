@@ -1,26 +1,25 @@
-//! The footprint of a splat: where it lies in the picture and in the sheets (shaders/footprint.wgsl), and the record of it that
-//! tiles read.
+//! The footprint of a splat: the pixels and sheets that it covers (shaders/shared/footprint.wgsl), and the
+//! record that tiles read.
 
 use super::plan::Plan;
 use crate::{
-    engine::uniforms::{ENDS, ISOTROPIC, RADIANCE, Source},
-    scene::Mode,
-    scene::Order,
+    plan::uniforms::{ENDS, ISOTROPIC, RADIANCE, Source},
+    scene::{Mode, Order},
     splat::{FOOTPRINT_BLUR, STEP_BACK, Splat, decode_normal},
 };
 use glam::{Mat3, Vec3};
 
-/// How far beyond the ellipsoid the windows of a splat reach, as of the shader.
+/// Factor by which a splat's windows reach beyond the ellipsoid, as in the shader.
 pub const SECTION_OVERREACH: f32 = 1.25;
 /// Shorter gradients have no direction.
 const LEAST_GRADIENT: f32 = 1e-20;
 
-/// What a splat adds to a picture.
+/// The payload of a splat.
 #[derive(Debug, Clone, Copy)]
 pub enum Carried {
-    /// Colour and a normal, or a length of 0 for none; `strength` is an optical depth.
+    /// Colour and a normal, or a zero vector for none. `strength` is an optical depth.
     Radiance { color: [f32; 3], normal: Vec3 },
-    /// A value of the field; how much it counts, and the change of its value a world unit.
+    /// A value of the field: its weight, and the change of the value per world unit.
     Scalar { weight: f32, gradient: Vec3 },
 }
 
@@ -34,18 +33,19 @@ pub struct Candidate {
     pub carried: Carried,
 }
 
-/// What a splat's strength and payload stand for.
+/// The meaning of a record's strength and payload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Optical depth through the centre; payload: 1, what faces the eye, and times that colour and normal.
+    /// Optical depth through the centre. Payload: 1, the facing weight, and colour and normal times
+    /// that weight.
     Radiance,
-    /// The same of a classified sample, whose strength is an extinction.
+    /// The same for a classified sample, whose strength is an extinction.
     Classified,
-    /// A value; payload: weight and slope in whitened space.
+    /// A value. Payload: weight, and slope in whitened space.
     Scalar,
 }
 
-/// All that tiles need to know of a splat.
+/// The data of a splat that tiles need.
 #[derive(Debug, Clone, Copy)]
 pub struct Record {
     pub center: [f32; 3],
@@ -56,18 +56,19 @@ pub struct Record {
     pub extent2: f32,
     pub kind: Kind,
     pub payload: [f32; 8],
-    /// The first and the last pixel that it covers, and the same of the sheets.
+    /// The first and the last pixel that the splat covers, and the first and the last sheet.
     pub pixels: [[i32; 2]; 2],
     pub sheets: [u16; 2],
 }
 
-/// Where a footprint lies.
+/// The pixels and sheets of a footprint.
 struct Place {
     pixels: [[i32; 2]; 2],
     sheets: [usize; 2],
 }
 
-/// A splat of a set or a hierarchy in view space, widened so that it does not fall between pixels (shaders/splats.wgsl).
+/// Returns a splat of a set or a hierarchy in view space, widened so that it cannot fall between
+/// pixels (shaders/shared/splats.wgsl).
 pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
     let to_view = to_view(source);
     let mut center = to_view * Vec3::from(splat.center) + origin(source);
@@ -88,19 +89,20 @@ pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
         strength *= opacity;
         let normal = decode_normal(splat.normal).map_or(Vec3::ZERO, |normal| to_view * normal);
         if normal != Vec3::ZERO {
-            // Opaque splats must not grow by the widening: they step back.
+            // Opaque splats must not grow through widening, so they step back.
             let own2 = (turned.transpose() * normal).length_squared();
             center -= normal * (STEP_BACK as f32 * ((own2 + blur2).sqrt() - own2.sqrt()));
         }
         Carried::Radiance { color: [red, green, blue], normal }
     } else {
         let (weight, slope) = splat.weight_and_slope();
-        // Widened, a sample still counts as much over space. Both determinants are in units of its size, where they fit 32 bits.
+        // A widened sample keeps its weight over space. Both determinants are in units of the
+        // sample's size, so that they fit 32 bits.
         let trace = covariance.x_axis.x + covariance.y_axis.y + covariance.z_axis.z;
         let unit = 1.0 / trace.max(1e-37).sqrt();
         let before = (b00 * unit * b11 * unit * b22 * unit).abs();
         let after = (covariance * (unit * unit)).determinant().max(1e-37).sqrt();
-        // The slope is in the splat's whitened space: B⁻ᵀ takes it to the set's.
+        // The slope is in the splat's whitened space; B⁻ᵀ maps it to the set's space.
         let slope_z = slope.z / b22;
         let slope_y = (slope.y - b21 * slope_z) / b11;
         let slope_x = (slope.x - b10 * slope_y - b20 * slope_z) / b00;
@@ -111,7 +113,7 @@ pub fn widened(plan: &Plan, source: &Source, splat: &Splat) -> Candidate {
     Candidate { center, covariance, extent: source.extent, strength, carried }
 }
 
-/// A value in entries of the transfer function's table; finite, however far.
+/// Returns a value in entries of the transfer function's table, clamped so that it stays finite.
 pub fn counted(plan: &Plan, value: f32) -> f32 {
     ((value - plan.frame.transfer[0]) * plan.frame.transfer[1]).clamp(-1e30, 1e30)
 }
@@ -125,12 +127,12 @@ pub fn origin(source: &Source) -> Vec3 {
     Vec3::new(source.origin[0], source.origin[1], source.origin[2])
 }
 
-/// The record of a splat; none where it meets no pixel or no sheet.
+/// Returns the record of a splat, or `None` if the splat meets no pixel or no sheet.
 pub fn record(plan: &Plan, source: &Source, splat: &Candidate) -> Option<Record> {
     let ends = source.flags & (ISOTROPIC | ENDS) != 0;
     let Place { pixels, sheets } = locate(plan, splat, ends)?;
     let s = &splat.covariance;
-    // The floors keep discs far thinner than wide invertible in 32 bits.
+    // The minimum keeps discs much thinner than wide invertible in 32 bits.
     let least = 1e-7 * s.x_axis.x.max(s.y_axis.y.max(s.z_axis.z)) + 1e-37;
     let l00 = s.x_axis.x.max(least).sqrt();
     let (l10, l20) = (s.x_axis.y / l00, s.x_axis.z / l00);
@@ -153,7 +155,7 @@ pub fn record(plan: &Plan, source: &Source, splat: &Candidate) -> Option<Record>
             let [red, green, blue, extinction] = classify(plan, splat.strength);
             strength = extinction * weight * plan.frame.kernel[2];
             let size = gradient.length();
-            // What a value falls towards is outside.
+            // The normal points to smaller values: outward.
             let has_direction = plan.lit_surfaces && size > LEAST_GRADIENT;
             let normal = if has_direction { -gradient / size } else { Vec3::ZERO };
             (Kind::Classified, radiance([red, green, blue], normal))
@@ -179,7 +181,7 @@ pub fn record(plan: &Plan, source: &Source, splat: &Candidate) -> Option<Record>
     })
 }
 
-/// Colour and extinction of one value, looked up.
+/// Looks up the colour and extinction of a value.
 fn classify(plan: &Plan, value: f32) -> [f32; 4] {
     let [_, _, end, place] = plan.frame.transfer;
     let at = (value + place).clamp(0.0, end);
@@ -188,7 +190,8 @@ fn classify(plan: &Plan, value: f32) -> [f32; 4] {
     std::array::from_fn(|channel| a[channel] + (b[channel] - a[channel]) * part)
 }
 
-/// Within a sheet, what faces the eye hides what faces away. Far sides alone keep a little weight, so that they have a colour.
+/// Returns the facing weight: within a sheet, splats that face the eye hide those that face away.
+/// Far sides keep a small weight, so that they have a colour when alone.
 fn facing_weight(plan: &Plan, normal: Vec3, center: Vec3) -> f32 {
     if normal == Vec3::ZERO {
         return 1.0;
@@ -201,7 +204,8 @@ fn facing_weight(plan: &Plan, normal: Vec3, center: Vec3) -> f32 {
     (0.5 - 4.0 * away).clamp(1.0 / 255.0, 1.0)
 }
 
-/// Bounds of x/z over an ellipsoid in front of the eye: tangents of its outline, exact in perspective.
+/// Bounds x/z over an ellipsoid in front of the eye, by the tangents to its silhouette; exact in
+/// perspective.
 fn tangent_bounds(x: f32, z: f32, xx: f32, xz: f32, zz: f32) -> [f32; 2] {
     let p = x / z;
     let (a, b, c) = (xx / z / z, xz / z / z, zz / z / z);
@@ -212,7 +216,7 @@ fn tangent_bounds(x: f32, z: f32, xx: f32, xz: f32, zz: f32) -> [f32; 2] {
     [middle - half, middle + half]
 }
 
-/// Bounds of x/z over the part of a box beyond the nearest visible z.
+/// Bounds x/z over the part of a box beyond the nearest visible z.
 fn box_bounds(x: f32, reach: f32, z_low: f32, z_high: f32) -> [f32; 2] {
     let (low, high) = (x - reach, x + reach);
     [low / if low < 0.0 { z_low } else { z_high }, high / if high < 0.0 { z_high } else { z_low }]
@@ -250,7 +254,8 @@ fn locate(plan: &Plan, splat: &Candidate, ends: bool) -> Option<Place> {
     } else {
         bounds = [[c.x - reaches.x, c.x + reaches.x], [c.y - reaches.y, c.y + reaches.y]];
     }
-    // Near the rim of a footprint the sections reach beyond the ellipsoid, because a ray keeps a kernel whole.
+    // Near the rim of a footprint, sections reach beyond the ellipsoid, because kernels are not cut
+    // along a ray.
     let overreach = if ends { 1.0 } else { SECTION_OVERREACH };
     far = distance + overreach * (far - distance);
     let near = distance - overreach * reach;
@@ -275,7 +280,7 @@ fn locate(plan: &Plan, splat: &Candidate, ends: bool) -> Option<Place> {
         (pixels[0][axis], pixels[1][axis]) = (first as i32, last as i32);
     }
     if plan.is_whole() {
-        // All of it belongs to the sheet of its centre.
+        // A whole splat belongs to the sheet of its centre.
         let mut key = distance;
         if plan.mode == Mode::AxisSheets {
             let [x, y, z, _] = frame.sheet_normal;
@@ -289,7 +294,8 @@ fn locate(plan: &Plan, splat: &Candidate, ends: bool) -> Option<Place> {
         }
         return is_within.then_some(Place { pixels, sheets: [sheet; 2] });
     }
-    // Beside the eye, rays leave the kernel's middle behind them: the part in front of the first plane must be cut off.
+    // Beside the eye, a kernel's middle lies behind the ray's start: the part in front of the first
+    // plane must be cut off.
     let is_beside = plan.view.perspective && distance < 2.0 * reach;
     let first = if is_beside { 0 } else { plan.sheet_of(near) };
     Some(Place { pixels, sheets: [first, plan.sheet_of(far).max(1)] })

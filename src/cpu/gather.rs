@@ -1,4 +1,5 @@
-//! The field of a lattice in a sheet, gathered: each ray asks which kernels reach the planes of the sheet.
+//! The field of a lattice in a sheet, gathered: each ray evaluates the kernels on the sheet's
+//! planes.
 
 use super::{
     blend::{MOST_TAPS, Point, Way},
@@ -19,12 +20,12 @@ use crate::{
 };
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
-/// Where slopes at the ends of a sheet differ by fewer entries of the table a sheet, a cubic between them is as good as one more
-/// sample.
+/// If the slopes at a sheet's ends differ by fewer entries of the table per sheet, a cubic between
+/// the ends is as good as one more sample.
 const STRAIGHT: f32 = 64.0;
 
-/// Why the field of a scene can't be gathered in sheets of so many [`parts`]; none where it can. `unsuited` tells what is wrong
-/// with a volume and its kernel.
+/// Returns why the field of a scene can't be gathered, or `None` if it can. `parts` is the result
+/// of [`parts`]. `unsuited` returns why a volume and its kernel can't be gathered, if so.
 pub fn obstacle(
     scene: &Scene,
     settings: &Settings,
@@ -41,7 +42,13 @@ pub fn obstacle(
     if unsuited.is_some() {
         return unsuited;
     }
-    let is_rectilinear = |item: &Item| matches!(item, Item::Volume(volume, ..) if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_)));
+    let is_rectilinear = |item: &Item| {
+        matches!(
+            item,
+            Item::Volume(volume, ..)
+                if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_))
+        )
+    };
     if parts > 1 && scene.items.iter().any(is_rectilinear) {
         return Some("sheets thicker than two samples of a rectilinear lattice");
     }
@@ -51,8 +58,8 @@ pub fn obstacle(
     (settings.gradient == Gradient::Central).then_some("gradients from neighbouring pixels")
 }
 
-/// Parts of the thickest sheet: one where what is known of its ends and its middle suffices, else each so thin that two places
-/// in it tell its mean.
+/// Returns the number of parts of the thickest sheet. It is one if the field at the sheet's ends
+/// and middle determines its mean. Otherwise each part is so thin that two places in it do.
 pub fn parts(scene: &Scene, sheets: &Sheets, choice: Option<&Choice>) -> usize {
     let spacing = scene.items.iter().find_map(|item| match item {
         Item::Volume(volume, ..) => Some(volume.lattice.least_kernel_spacing()),
@@ -63,19 +70,19 @@ pub fn parts(scene: &Scene, sheets: &Sheets, choice: Option<&Choice>) -> usize {
         _ => None,
     });
     let Some(spacing) = spacing else { return 1 };
-    // With room for rounding: default sheets may be as thick as that.
+    // A tolerance for rounding: default sheets may be exactly that thick.
     if sheets.step <= MOST_GATHERED * spacing * (1.0 + 1e-9) {
         return 1;
     }
     (sheets.step / (PART * spacing)).ceil() as usize
 }
 
-/// Why a volume can't be gathered, whatever the settings.
+/// Returns why a volume can't be gathered, whatever the settings.
 pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
     Way::of(volume, kernel).err()
 }
 
-/// Why a kernel can't be gathered by four weights an axis.
+/// Returns why a kernel can't be gathered with four weights an axis.
 pub fn unsuited_kernel(kernel: &Kernel) -> Option<&'static str> {
     match field::weighting(kernel) {
         None => Some("kernels other than tensor products and Gaussians that reach two samples"),
@@ -88,19 +95,21 @@ pub fn unsuited_kernel(kernel: &Kernel) -> Option<&'static str> {
 
 /// A lattice whose field is gathered.
 pub struct Gather<'a> {
-    /// One level; of volumes in bricks also two, finer first.
+    /// One level, or up to two for volumes in bricks, the finer first.
     pub levels: Vec<Level<'a>>,
-    /// Parts of a sheet: one, but of sheets thicker than two samples.
+    /// Parts of a sheet: one, except in sheets thicker than two samples.
     pub parts: usize,
-    /// One over the kernel's standard deviation, in steps, where the field ends with the lattice. Tensor products go on.
+    /// One over the kernel's standard deviation, in steps, if the field ends with the lattice.
+    /// Tensor products do not end.
     pub ends: Option<f32>,
-    /// Parts of a sheet at whose ends what shows is looked up. None where sheets are no thicker than the lattice's steps: all
-    /// of one lies within half a step of its middle.
+    /// Number of parts of a sheet at whose ends visibility is looked up. It is 0 if sheets are no
+    /// thicker than the lattice's steps: then a whole sheet lies within half a step of its middle.
     pub looks: usize,
-    /// There may be places without a field, and places where kernels add up to more than elsewhere.
+    /// There may be places without a field, and places where the kernels' sum is larger than
+    /// elsewhere.
     pub is_blended: bool,
     pub visible: &'a Visible,
-    /// What values count from.
+    /// The value that values are relative to.
     pub zero: f32,
 }
 
@@ -108,36 +117,38 @@ pub struct Gather<'a> {
 pub struct Level<'a> {
     pub field: Typed<'a>,
     pub dims: [usize; 3],
-    /// Where its bricks are; none of a volume in memory.
+    /// The slots of its bricks; `None` for a volume in memory.
     pub grid: Option<&'a Grid>,
     pub shown: &'a Shown,
-    /// Its share in the picture.
+    /// The level's share in the picture.
     pub share: f32,
-    /// Steps of the level to each step of the lattice along each axis, and where the lattice's first sample is in it.
+    /// Steps of the level per step of the lattice along each axis, and the place of the lattice's
+    /// first sample in the level.
     pub scale: [f32; 3],
     pub shift: [f32; 3],
-    /// The same of the cells that are looked up for what they show.
+    /// The same for the cells in which visibility is looked up.
     pub cells: [[f32; 3]; 2],
 }
 
 impl Level<'_> {
-    /// A place in steps of the level.
+    /// Converts a place to steps of the level.
     #[inline(always)]
     fn place<S: Simd>(&self, place: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
         three!(I => place[I] * self.scale[I] + self.shift[I])
     }
 
-    /// A place in cells that are looked up.
+    /// Converts a place to cells for the visibility lookup.
     #[inline(always)]
     fn cell<S: Simd>(&self, place: [Lanes<S>; 3]) -> [Lanes<S>; 3] {
         let [scale, shift] = &self.cells;
         three!(I => place[I] * scale[I] + shift[I])
     }
 
-    /// The field at places in steps of the level, and its change a step along each axis.
+    /// Returns the field at places in steps of the level, and its change per step along each axis.
     #[inline(always)]
     fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3], way: [Lanes<S>; 3]) -> Point<S> {
-        // A function of its own for each type of samples, else each would be compiled wherever this one is called.
+        // A separate function for each type of samples; otherwise each would be compiled wherever
+        // this one is called.
         simd.vectorize(
             #[inline(always)]
             || {
@@ -155,27 +166,29 @@ impl Level<'_> {
     }
 }
 
-/// The most samples' spacings in a part of a thick sheet, and the places in a part whose mean is that of the part: exact for
-/// fields of the third degree (Gauss).
+/// Maximum thickness of a part of a thick sheet, in sample spacings, and two places whose average
+/// is the part's mean: exact for fields of the third degree (Gauss).
 const PART: f64 = 1.5;
 const GAUSS: [f32; 2] = [0.211_324_87, 0.788_675_1];
-/// Standard deviations from a sample beyond which a Gaussian, 1 at the sample, is too little for a value: 10⁻⁴.
+/// Distance from a sample, in standard deviations, beyond which a Gaussian is too small for a
+/// value: 10⁻⁴ of its peak.
 const LAST_VALUE: f32 = 4.29;
 
-/// Places at which what shows is looked up lie no further apart than this, in steps.
+/// Maximum distance of the places at which visibility is looked up, in steps.
 pub const MOST_APART: f64 = 1.1;
 
-/// Sheets that are looked up at once.
+/// Number of sheets looked up at once.
 const LOOKED_UP: usize = 8;
 
-/// The last plane that a packet asked for, and what may show in the sheets ahead.
+/// The last plane that a packet evaluated, and the visibility of the sheets ahead.
 #[derive(Clone, Copy)]
 pub struct Last<S: Simd> {
     plane: usize,
     face: Face<S>,
     along: Lanes<S>,
     weight: Lanes<S>,
-    /// The first sheet of those looked up, and a bit for each ray on which something may show in a sheet.
+    /// The first of the looked-up sheets, and for each sheet a bit for each ray on which something
+    /// may be visible.
     first: usize,
     shows: [u8; LOOKED_UP],
 }
@@ -196,7 +209,7 @@ impl<S: Simd> Last<S> {
     }
 }
 
-/// The square of how far places lie outside the box of the samples, in steps.
+/// Returns the squared distance of places from the box of the samples, in steps.
 #[inline(always)]
 fn outside2<S: Simd>(simd: S, plan: &Plan, place: [Lanes<S>; 3]) -> Lanes<S> {
     let none = Lanes::splat(simd, 0.0);
@@ -207,7 +220,8 @@ fn outside2<S: Simd>(simd: S, plan: &Plan, place: [Lanes<S>; 3]) -> Lanes<S> {
 }
 
 impl<S: Simd> Face<S> {
-    /// This where it has a value, else the mean of its sheet and what the other end, if that has a value, changes by.
+    /// Returns this face if it has a value. Otherwise returns the mean of the sheet, with the
+    /// gradient of the other face if that one has a value.
     #[inline(always)]
     fn or(
         self,
@@ -225,8 +239,8 @@ impl<S: Simd> Face<S> {
 }
 
 impl Gather<'_> {
-    /// The field of a sheet and the rays on which it counts; nothing where it cannot be seen.
-    #[expect(clippy::too_many_arguments, reason = "the state of one packet's walk")]
+    /// Returns the field of a sheet and the rays on which it counts, or `None` if it is invisible.
+    #[expect(clippy::too_many_arguments, reason = "the state of one packet")]
     #[inline(always)]
     pub fn layer<S: Simd>(
         &self,
@@ -261,7 +275,8 @@ impl Gather<'_> {
         let (back, back_along) = (last.face, last.along);
         let thickness = stop - start;
         let sum = front.value + back.value;
-        // Hermite: the mean of the ends and an eighth of how much the slopes there differ.
+        // Hermite interpolation: the mean of the ends, plus an eighth of the difference of the
+        // slopes there.
         let bend = (front_along - back_along) * thickness;
         let middle = sum * 0.5 + bend * 0.125;
         let filling = Lanes::splat(simd, 1.0);
@@ -298,15 +313,17 @@ impl Gather<'_> {
         if !bend.abs().simd_gt(STRAIGHT).any_true() {
             return Some((layer, mask));
         }
-        // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with slopes).
+        // The mean of the sheet is exact for fields of the fifth degree (Simpson's rule with
+        // slopes).
         let inside = self.at(simd, rays, 0.5 * (start + stop)).value * plan.frame.transfer[1];
         let mean = (sum * 7.0 + inside * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);
         layer.middle = mean * 1.5 - sum * 0.25;
         Some((layer, mask))
     }
 
-    /// Gives a sheet of some parts its mean, and tells where it has one. A place counts by what kernels add up to there; an end
-    /// without a value takes the mean. `weights`: at the ends.
+    /// Sets the mean of a sheet with several parts, and returns where it has one. A place is
+    /// weighted by the sum of the kernels there; an end without a value takes the mean. `weights`
+    /// are those at the ends.
     fn fill_thick<S: Simd>(
         &self,
         simd: S,
@@ -368,7 +385,8 @@ impl Gather<'_> {
         )
     }
 
-    /// What the kernels of a lattice add up to at a place, of what they do far from its borders.
+    /// Returns the sum of a lattice's kernels at a place, relative to their sum far from the
+    /// borders.
     #[inline(always)]
     fn kernels_at<S: Simd>(&self, simd: S, plan: &Plan, place: [Lanes<S>; 3]) -> Lanes<S> {
         let mut all = Lanes::splat(simd, 1.0);
@@ -379,7 +397,8 @@ impl Gather<'_> {
             let before = high - place;
             let near = after.min(before);
             if near.simd_lt(BEYOND).any_true() {
-                // As if kernels were as dense as numbers, beyond half a step from the last sample none.
+                // Treats the sum of kernels as an integral that ends half a step beyond the last
+                // sample.
                 all *= normal_cdf(simd, (after + 0.5) * per_deviation)
                     * normal_cdf(simd, (before + 0.5) * per_deviation);
             }
@@ -387,7 +406,8 @@ impl Gather<'_> {
         all
     }
 
-    /// Looks up what may show in a sheet and the ones behind it: many at once, because looking takes longer than adding.
+    /// Looks up the visibility of a sheet and of those behind it. Many are looked up at once,
+    /// because a lookup takes longer than adding one more.
     #[inline(always)]
     fn look_up<S: Simd>(
         &self,
@@ -400,7 +420,7 @@ impl Gather<'_> {
     ) {
         last.first = first;
         last.shows = [0; LOOKED_UP];
-        // What is found on the plane behind the sheet before.
+        // The result for the plane behind the previous sheet.
         let mut behind = None;
         for (sheet, shows) in (first..=plan.sheets).zip(&mut last.shows) {
             if !is_marked(marks, sheet) {
@@ -428,7 +448,8 @@ impl Gather<'_> {
         }
     }
 
-    /// Where something may show around places in steps of the lattice, a bit for each lane.
+    /// Returns where something may be visible around places in steps of the lattice, a bit for each
+    /// lane.
     #[inline(always)]
     fn shows<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> u64 {
         let mut shows = 0;
@@ -438,13 +459,14 @@ impl Gather<'_> {
         shows
     }
 
-    /// The field at a distance along rays, and its change a step of the lattice along each axis.
+    /// Returns the field at a distance along rays, and its change per step of the lattice along
+    /// each axis.
     #[inline(always)]
     fn at<S: Simd>(&self, simd: S, rays: &Rays<S>, distance: f32) -> Point<S> {
         self.at_place(simd, rays, rays.place(distance))
     }
 
-    /// The same at places on rays, in steps of the lattice.
+    /// Returns the same at places on rays, in steps of the lattice.
     #[inline(always)]
     fn at_place<S: Simd>(&self, simd: S, rays: &Rays<S>, place: [Lanes<S>; 3]) -> Point<S> {
         match &self.levels[..] {
@@ -456,8 +478,8 @@ impl Gather<'_> {
         }
     }
 
-    /// The mean of levels in bricks by their shares. A level has none where it has no brick; where no level has one, nothing
-    /// shows.
+    /// Returns the average of the levels of a volume in bricks, weighted by their shares. A level
+    /// without a brick at a place has no share there. If no level has a brick, nothing is visible.
     #[inline(always)]
     fn mean<S: Simd>(
         &self,
@@ -487,7 +509,7 @@ impl Gather<'_> {
         Point { value, slopes: three!(I => slopes[I] * inverse), weight: Lanes::splat(simd, 1.0) }
     }
 
-    /// Finds the field on a plane, and its change along the rays a world unit.
+    /// Evaluates the field on a plane, and its change along the rays per world unit.
     #[inline(always)]
     fn face<S: Simd>(
         &self,
@@ -514,8 +536,10 @@ impl Gather<'_> {
 }
 
 impl<S: Simd> Layer<S> {
-    /// Counts the field where kernels add up to more the more, takes the other values where one is missing, and tells where there
-    /// is a field. `weights`: at the faces; `inside`: in the middle; `bend`: how much slopes at the faces differ.
+    /// Sets the mean of the sheet, weighting the field by the sum of the kernels. Missing values
+    /// are replaced by the others. Returns where there is a field. `weights` are those at the
+    /// faces, `inside` is the field in the middle, `bend` the difference of the slopes at the
+    /// faces.
     #[inline(always)]
     fn blend(
         &mut self,
@@ -532,7 +556,8 @@ impl<S: Simd> Layer<S> {
             |weight| weight.simd_gt(0.0),
         );
         let values = [self.front.value, inside.value * plan.frame.transfer[1], self.back.value];
-        // Simpson's rule for the sums of weights and of values. Of fields without a value at a place nothing counts there.
+        // Simpson's rule for the sums of weights and of values. A place without a value does not
+        // count.
         let shares = [
             has_front.select(front + least, none) * (1.0 / 6.0),
             has_inside.select(inside.weight + least, none) * (4.0 / 6.0),
@@ -541,7 +566,7 @@ impl<S: Simd> Layer<S> {
         let weight = shares[0] + shares[1] + shares[2];
         let value = shares[0] * values[0] + shares[1] * values[1] + shares[2] * values[2];
         let weighted = value / weight.max(Lanes::splat(simd, 1e-20));
-        // The rule with slopes is better, where there are all values.
+        // Where there are all values, the rule with slopes is better.
         let sum = values[0] + values[2];
         let plain = (sum + values[1] * 4.0) * (1.0 / 6.0);
         let smooth = (sum * 7.0 + values[1] * 16.0) * (1.0 / 30.0) + bend * (1.0 / 60.0);

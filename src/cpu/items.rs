@@ -1,4 +1,4 @@
-//! The splats of a scene's items in a view: which of them a picture takes, and the records of these.
+//! The splats of a scene's items: which ones a view needs, and their records.
 
 use super::{
     bins::BATCH,
@@ -11,9 +11,9 @@ use super::{
 };
 use crate::{
     Error, Result,
-    engine::uniforms::Source,
     hierarchy::{Cut, Levels},
     math::{Kernel, View},
+    plan::uniforms::Source,
     scene::{Item, Scene, Settings},
     splat::{Payload, Splat, SplatSet},
     volume::{
@@ -26,19 +26,21 @@ use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Samples along each side of a block, which are listed together: neighbours in the list are neighbours in space.
+/// Samples along each side of a block. A block's samples are listed together, so that neighbours in
+/// the list are neighbours in space.
 const LIST_BLOCK: usize = 4;
 
-/// What is kept of an item between pictures.
+/// The data of an item that is kept between pictures.
 #[derive(Debug)]
 pub enum Prepared {
-    /// The levels of detail of a set of splats, and what stands for it in the last view.
+    /// A set of splats: its levels of detail, and the set that replaces it in the last view.
     Set {
         levels: Option<Box<Levels>>,
         drawn: Arc<SplatSet>,
     },
     Hierarchy(Box<PageCache>),
-    /// A volume; where its samples are scattered, the extremes around each and those that show under a transfer function.
+    /// A volume. If it is scattered, also the extremes around each sample, and the list of visible
+    /// samples for a transfer function.
     Volume {
         volume: Arc<Volume>,
         kernel: Kernel,
@@ -67,7 +69,8 @@ impl Prepared {
         }
     }
 
-    /// The levels of detail of a set for a view; `pixels` as of [`crate::hierarchy::Detail::Pixels`].
+    /// Updates the levels of detail of a set for a view; `pixels` is as in
+    /// [`crate::hierarchy::Detail::Pixels`].
     pub fn update_levels(&mut self, view: &View, pixels: f64) -> Result<()> {
         if let Self::Set { levels: Some(levels), drawn } = self {
             *drawn = levels.drawn(&Cut::new(view, levels.origin(), pixels, false))?;
@@ -75,7 +78,7 @@ impl Prepared {
         Ok(())
     }
 
-    /// Bytes of memory that are held for pictures, besides the scene's own.
+    /// Returns the bytes of memory held for drawing, besides the scene's own.
     pub fn bytes(&self) -> u64 {
         match self {
             Self::Set { .. } => 0,
@@ -88,7 +91,7 @@ impl Prepared {
         }
     }
 
-    /// The records of all splats that meet the picture, in batches of [`BATCH`] candidates.
+    /// Returns the records of all splats that meet the picture, in batches of [`BATCH`] candidates.
     pub fn records(
         &mut self,
         plan: &Plan,
@@ -103,7 +106,11 @@ impl Prepared {
             Self::Set { drawn, .. } if drawn.payload == Payload::Radiance => {
                 let projector = Projector::new(plan, Source::of_splats(view, drawn, true));
                 Ok(batches(&drawn.splats, spare, |batch: &[Splat], records| {
-                    lanes!(Level::new(), simd => projector.add(simd, batch.iter().map(|splat| (splat, 1.0)), records));
+                    lanes!(Level::new(), simd => projector.add(
+                        simd,
+                        batch.iter().map(|splat| (splat, 1.0)),
+                        records,
+                    ));
                 }))
             }
             Self::Set { drawn, .. } => {
@@ -137,7 +144,7 @@ impl Prepared {
     }
 }
 
-/// The records of some candidates; `add` adds those of a batch.
+/// Returns the records of candidates; `add` appends those of a batch.
 fn batches<T: Sync>(
     candidates: &[T],
     spare: &mut Spare,
@@ -151,10 +158,11 @@ fn batches<T: Sync>(
     records
 }
 
-/// Records of the picture before, whose memory is used again: asking for it anew takes as long as filling it.
+/// Records of the last picture, whose memory is reused: allocating it anew takes as long as filling
+/// it.
 pub type Spare = Vec<Vec<Record>>;
 
-/// Memory for some batches of records.
+/// Takes memory for a number of batches of records.
 pub fn spare_for(spare: &mut Spare, batches: usize) -> Vec<Vec<Record>> {
     let mut own = spare.split_off(spare.len().saturating_sub(batches));
     for records in &mut own {
@@ -167,7 +175,7 @@ pub fn spare_for(spare: &mut Spare, batches: usize) -> Vec<Vec<Record>> {
     own
 }
 
-/// The samples that show something, block by block.
+/// Returns the visible samples, block by block.
 fn list(dims: [usize; 3], ranges: &[[u8; 2]], shown: &[u16; 256]) -> Vec<u32> {
     let shows = |[low, high]: [u8; 2]| u16::from(high) >= shown[usize::from(low)];
     let layer = |layer: usize| {
@@ -202,7 +210,7 @@ struct LatticeSource<'a> {
     source: Source,
     to_view: Mat3,
     origin: Vec3,
-    /// From steps of the lattice to gradients in view space.
+    /// The map from steps of the lattice to gradients in view space.
     field_axes: Mat3,
 }
 
@@ -264,10 +272,11 @@ impl<'a> LatticeSource<'a> {
         record(plan, &self.source, &candidate)
     }
 
-    /// The derivative along an axis, per step or per coordinate: central where there are neighbours on both sides.
+    /// Returns the derivative along an axis, per step or per coordinate: central if there are
+    /// neighbours on both sides.
     fn slope(&self, plan: &Plan, axis: usize, index: [usize; 3], value: f32) -> f32 {
         let dims = self.lattice.dims;
-        // Layers of one kind of a body-centred lattice lie two apart.
+        // Layers of the same cubic lattice of a body-centred lattice lie two apart.
         let stride =
             if axis == 2 && self.lattice.arrangement == Arrangement::BodyCentred { 2 } else { 1 };
         let place = |at: usize| match &self.lattice.arrangement {
@@ -305,7 +314,7 @@ fn symmetric([[xx, xy, xz, yy], [yz, zz, ..]]: &[[f32; 4]; 2]) -> Mat3 {
     Mat3::from_cols(Vec3::new(*xx, *xy, *xz), Vec3::new(*xy, *yy, *yz), Vec3::new(*xz, *yz, *zz))
 }
 
-/// The records of the samples in bricks.
+/// Returns the records of the samples in bricks.
 fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Record>> {
     let sources: Vec<Source> = choice
         .levels
@@ -369,10 +378,10 @@ fn brick_records(plan: &Plan, cache: &BrickCache, choice: &Choice) -> Vec<Vec<Re
     batches.par_iter().map(batch).collect()
 }
 
-/// A sample in entries of the transfer function's table.
+/// Returns a sample in entries of the transfer function's table.
 fn sample(plan: &Plan, samples: &Samples, index: usize) -> f32 {
     match samples {
-        // 32 bits of a float do not hold the whole.
+        // A 32-bit float cannot hold the whole integer.
         Samples::I32(values) => {
             let low = values[index] & 0xffff;
             let [zero, per_value, ..] = plan.frame.transfer;
@@ -382,7 +391,7 @@ fn sample(plan: &Plan, samples: &Samples, index: usize) -> f32 {
     }
 }
 
-/// The transfer function of a scene's field, and the range of its values; none without a field.
+/// Returns the transfer function of a scene's field, or `None` without a field.
 pub fn transfer_of(scene: &Scene) -> Option<&TransferFunction> {
     scene.items.iter().find_map(|item| match item {
         Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => {
@@ -392,12 +401,12 @@ pub fn transfer_of(scene: &Scene) -> Option<&TransferFunction> {
     })
 }
 
-/// Refuses more records than their numbers tell apart.
+/// Returns an error if there are more records than record numbers.
 pub fn check_count(records: &[Vec<Record>]) -> Result<()> {
     if records.len() <= u32::MAX as usize / BATCH {
         return Ok(());
     }
     Err(Error::Argument(
-        "the picture takes more splats than 4,294,967,295; take a coarser cut".into(),
+        "the picture needs more than 4,294,967,295 splats; choose a coarser cut".into(),
     ))
 }

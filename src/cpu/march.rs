@@ -1,4 +1,5 @@
-//! Walks the sheets of a tile front to back: splats and the lattice add to a sheet, then it is closed.
+//! Draws the sheets of a tile front to back: splats and the lattice are added to a sheet, then it
+//! is closed.
 
 use super::{
     bins::Entry,
@@ -14,13 +15,14 @@ use super::{
 use crate::scene::{Mode, Optics, Order};
 use fearless_simd::{Simd, prelude::*};
 
-/// A tile's pixels, row by row: premultiplied colour and opacity, and the depth of the hit or the largest value.
+/// A tile's pixels, row by row: premultiplied colour and opacity, and the depth of the hit or the
+/// largest value.
 pub type Tile = [([f32; 4], f32); TILE * TILE];
 
-/// A tile without anything in it.
+/// An empty tile.
 pub const EMPTY: Tile = [([0.0; 4], 0.0); TILE * TILE];
 
-/// What tiles are drawn from.
+/// The input of all tiles.
 pub struct March<'a> {
     pub plan: &'a Plan<'a>,
     pub gather: Option<Gather<'a>>,
@@ -32,8 +34,8 @@ pub struct March<'a> {
 type Ahead = [Vec<u32>; WINDOW];
 
 impl March<'_> {
-    /// Draws a tile. `entries` are its splats by their first sheets; `marks` the sheets in which the lattice may show
-    /// something, a bit each.
+    /// Draws a tile. `entries` are its splats, sorted by first sheet. `marks` has a bit for each
+    /// sheet in which the lattice may be visible.
     #[inline(always)]
     pub fn tile<S: Simd>(
         &self,
@@ -50,7 +52,11 @@ impl March<'_> {
         let corner = plan.corner(at);
         let mut packets: [Packet<S>; PACKETS] = each!([0, 1, 2, 3, 4, 5, 6, 7], I => {
             let first = [corner[0] + (I % 2 * WIDE) as i32, corner[1] + (I / 2 * HIGH) as i32];
-            Packet { rays: Rays::new(simd, plan, first), pixels: Pixels::new(simd, plan), is_done: false }
+            Packet {
+                rays: Rays::new(simd, plan, first),
+                pixels: Pixels::new(simd, plan),
+                is_done: false,
+            }
         });
         match plan.single() {
             Some(order) => self.one_by_one(simd, corner, entries, order, &mut packets, drawn),
@@ -59,7 +65,7 @@ impl March<'_> {
         self.finished(simd, &packets)
     }
 
-    /// Adds each splat by itself.
+    /// Adds the splats one by one.
     #[inline(always)]
     fn one_by_one<S: Simd>(
         &self,
@@ -109,7 +115,7 @@ impl March<'_> {
         let mut last = [Last::new(simd); PACKETS];
         let mut next = 0;
         let mut sheet = 0;
-        // Sheets from `sheet` on that hold sums.
+        // Number of sheets with sums, from `sheet` on.
         let mut open = 0;
         while sheet <= self.plan.sheets {
             if open == 0 {
@@ -138,8 +144,8 @@ impl March<'_> {
         }
     }
 
-    /// Adds the windows that begin at a sheet; returns how many.
-    #[expect(clippy::too_many_arguments, reason = "the state of one tile's walk")]
+    /// Adds the windows that begin at a sheet. Returns their number.
+    #[expect(clippy::too_many_arguments, reason = "the state of one tile")]
     #[inline(always)]
     fn add<S: Simd>(
         &self,
@@ -175,7 +181,7 @@ impl March<'_> {
                 ahead[(sheet + WINDOW - 1) % WINDOW].push(number);
             }
         }
-        // The slot of this sheet is that of the one four further on: its memory is used again.
+        // This sheet's slot is next used by the sheet four further on, which reuses the memory.
         continued.clear();
         if ahead[sheet % WINDOW].is_empty() {
             ahead[sheet % WINDOW] = continued;
@@ -244,7 +250,7 @@ impl March<'_> {
             let [red, green, blue]: [[f32; 8]; 3] = three!(I => pixels.color[I].into());
             let mut hit = pixels.hit;
             if self.plan.mode == Mode::AxisSheets {
-                // From the place along the sheets' normal to the distance along the ray.
+                // Convert the place along the sheets' normal to the distance along the ray.
                 let normal = self.plan.frame.sheet_normal;
                 let slope = super::vector::dot_with(normal, rays.direction);
                 hit = if self.plan.view.perspective {
@@ -254,7 +260,7 @@ impl March<'_> {
                 };
             }
             if self.plan.optics != Optics::Maximum {
-                // From the distance to the view's z.
+                // Convert the distance to the view's z.
                 hit *= rays.cosine;
             }
             let hit: [f32; 8] = hit.into();
@@ -268,7 +274,7 @@ impl March<'_> {
     }
 }
 
-/// The record of a number that [`super::bins`] gave it.
+/// Returns the record with a number that [`super::bins`] assigned.
 fn record_of(records: &[Vec<Record>], number: u32) -> &Record {
     let (batch, own) = super::bins::place_of(number);
     &records[batch][own]
@@ -279,7 +285,7 @@ pub fn is_marked(marks: &[u64], sheet: usize) -> bool {
     marks.get(bit / 64).is_some_and(|word| word >> (bit % 64) & 1 != 0)
 }
 
-/// The first marked sheet from one on.
+/// Returns the first marked sheet at or after `sheet`.
 fn next_mark(marks: &[u64], sheet: usize) -> usize {
     let bit = sheet.max(1) - 1;
     let mut word = bit / 64;

@@ -1,22 +1,23 @@
-//! The engine for processors: draws scenes without a GPU, by the same sheets.
+//! The CPU engine: draws scenes without a GPU, in the same sheets.
 //!
-//! A tile of 8 × 8 pixels is walked front to back. *Splats* scatter: each adds its sections to the sheets that it meets
-//! (`scatter`). The field of a lattice is *gathered*: each pixel asks which kernels reach the planes between its sheets
-//! (`gather`). Then the sheet is classified, lit and composited (`close`). The GPU engine does the same in shaders;
-//! tests/cpu_equals_reference.rs compares both with the reference.
+//! A tile of 8 × 8 pixels is drawn sheet by sheet, front to back. *Splats* scatter: each adds its
+//! sections to the sheets it meets (`scatter`). The field of a lattice is *gathered*: each pixel
+//! evaluates it on the planes between its sheets (`gather`). Then the sheet is classified, lit and
+//! composited (`close`). The GPU engine does the same in shaders; tests/cpu_equals_reference.rs
+//! compares both with the reference.
 //!
-//! | module | does |
+//! | module | purpose |
 //! |---|---|
-//! | `plan` | what all tiles of a picture share |
-//! | `items`, `page_cache`, `nodes`, `brick_cache` | which splats of the scene a view takes |
-//! | `footprint`, `project` | where a splat lies in the picture and in the sheets, one or eight at a time |
+//! | `plan` | data that all tiles of a picture share |
+//! | `items`, `page_cache`, `nodes`, `brick_cache` | which splats of the scene a view needs |
+//! | `footprint`, `project` | the pixels and sheets that splats cover, one or eight at a time |
 //! | `bins` | which splats meet which tiles |
-//! | `skip` | in which tiles and sheets a lattice may show something |
-//! | `march` | walks the sheets of a tile |
+//! | `skip` | in which tiles and sheets a lattice may be visible |
+//! | `march` | draws the sheets of a tile in order |
 //! | `rays` | the rays of eight pixels |
 //! | `scatter`, `sums` | adds splats to the open sheets |
 //! | `gather`, `field` | the field of a lattice at a place, and its gradient |
-//! | `blend` | the same by sums over samples, of other kernels and lattices |
+//! | `blend` | the same by sums over samples, for other kernels and lattices |
 //! | `radial`, `bells`, `rectilinear` | the weights of these sums |
 //! | `window` | loads the samples around eight places |
 //! | `close` | classifies, lights and composites a sheet |
@@ -47,10 +48,10 @@ mod window;
 
 use crate::{
     Error, Result,
-    engine::{FrameStats, pace::Pace, uniforms::Frame},
     hierarchy::Detail,
     math::{Camera, Sheets, View},
     picture::Picture,
+    plan::{FrameStats, pace::Pace, uniforms::Frame},
     scene::{Evaluate, Item, Optics, Scene, Settings},
     volume::{
         Lattice, TransferFunction,
@@ -77,33 +78,35 @@ use std::{
 };
 use vector::lanes;
 
-/// A scene and what was made of it to draw it. Cameras and settings may change from picture to picture.
+/// A scene, prepared for drawing on the CPU. Cameras and settings may change from picture to
+/// picture.
 #[derive(Debug)]
 pub struct CpuRenderer {
     scene: Scene,
     prepared: Vec<Prepared>,
-    /// The ranges of the field around the samples of a lattice that is gathered.
+    /// The ranges of the field around the samples of a gathered lattice.
     ranges: Option<Vec<[u8; 2]>>,
-    /// How it is summed, where that takes more than four weights an axis.
+    /// The kernel sums of a gathered lattice, if four weights an axis do not suffice.
     blend: Option<Blend>,
-    /// What shows of it, for the transfer function's table of that.
+    /// The visible samples of a gathered lattice, and the transfer function's visibility table for
+    /// which they were found.
     shown: Option<([u16; 256], Shown)>,
-    /// The levels of a volume in bricks that is gathered, for the bricks of the last picture.
+    /// The levels of a gathered volume in bricks, for the bricks of the last picture.
     levels: Option<(Choice, Vec<(Grid, Shown)>)>,
     pace: Pace,
     level: Level,
-    /// Memory that is used again.
+    /// Memory to reuse.
     spare: Spare,
     spare_bins: bins::Spare,
 }
 
-/// What is drawn of a scene in a picture, found before it is drawn.
+/// What a picture draws of the scene, decided before drawing.
 struct Outline {
     /// The cut of hierarchies, in pixels.
     cut_pixels: f64,
     choice: Option<Choice>,
     sheets: Sheets,
-    /// The ranges of values that show something.
+    /// The ranges of values that are visible.
     shown: [u16; 256],
 }
 
@@ -146,20 +149,21 @@ impl CpuRenderer {
         })
     }
 
-    /// Shows the scene's volume or sample set by another transfer function.
+    /// Replaces the transfer function of the scene's volume or sample set.
     ///
     /// # Errors
-    /// [`Error::Argument`] for one that [`CpuRenderer::new`] would refuse; the scene is then shown as before.
+    /// [`Error::Argument`] for a transfer function that [`CpuRenderer::new`] would refuse. The
+    /// scene then keeps the old one.
     pub fn set_transfer(&mut self, transfer: &TransferFunction) -> Result<()> {
         self.scene = self.scene.shown_by(transfer)?;
         Ok(())
     }
 
-    /// Draws a picture. The statistics hold the milliseconds of each step.
+    /// Draws a picture. The statistics contain the time of each step in milliseconds.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a camera or settings that make no picture of this scene; those of reading,
-    /// for scenes that are read as they are drawn.
+    /// [`Error::Argument`] if the camera or the settings cannot draw this scene. Errors of reading,
+    /// for scenes that are read while they are drawn.
     pub fn render(
         &mut self,
         camera: &Camera,
@@ -219,7 +223,7 @@ impl CpuRenderer {
         Ok((picture, stats))
     }
 
-    /// Bytes of memory that are held for pictures, besides the scene's own.
+    /// Bytes of memory held for drawing, besides the scene's own.
     fn bytes(&self) -> u64 {
         let shown = self.shown.as_ref().map_or(0, |(_, shown)| shown.bytes());
         let ranges = self.ranges.as_ref().map_or(0, |ranges| size_of_val(ranges.as_slice()) as u64);
@@ -273,11 +277,12 @@ impl CpuRenderer {
     /// Whether the field of the scene's volume is gathered.
     fn gathers(&self, settings: &Settings, outline: &Outline) -> Result<bool> {
         if settings.evaluate == Evaluate::Scatter {
-            // Sections of tensor products are not known.
+            // The sections of tensor products have no known form.
             return self.scene.tensor().map_or(Ok(false), |tensor| {
                 let name = tensor.name();
                 Err(Error::Argument(format!(
-                    "the kernel {name} can't be scattered; gather instead, or leave it to the engine"
+                    "the kernel {name} can't be scattered; gather instead, \
+                     or leave it to the engine"
                 )))
             });
         }
@@ -293,7 +298,6 @@ impl CpuRenderer {
         }
     }
 
-    /// What shows of the field that is gathered.
     fn prepare_gather(&mut self, plan: &Plan, outline: &Outline) {
         for (item, prepared) in self.scene.items.iter().zip(&self.prepared) {
             match (item, prepared, &outline.choice) {
@@ -327,7 +331,7 @@ impl CpuRenderer {
         }
     }
 
-    /// The field that is gathered; none where none of its bricks shows.
+    /// Returns the gathered field, or `None` if none of its bricks is visible.
     fn gather<'a>(
         &'a self,
         plan: &Plan,
@@ -417,7 +421,7 @@ impl CpuRenderer {
         Some(Gather { levels, parts, ends, looks, is_blended, visible, zero: zero as f32 })
     }
 
-    /// The lattices of the levels that are gathered.
+    /// Returns the lattices of the gathered levels.
     fn lattices(&self, outline: &Outline) -> Vec<Lattice> {
         let own = |item: &Item| match (item, &outline.choice) {
             (Item::Volume(volume, ..), _) => {
@@ -506,14 +510,14 @@ fn record_bytes(records: &[Vec<Record>]) -> u64 {
     records.iter().map(|batch| size_of_val(batch.as_slice()) as u64).sum()
 }
 
-/// Bricks that the settings' memory holds; one at least.
+/// Returns the number of bricks that fit into the settings' memory, at least one.
 fn most_bricks(bricks: &Bricks, settings: &Settings) -> usize {
     usize::try_from(settings.page_memory / brick_cache::slot_bytes(bricks))
         .unwrap_or(usize::MAX)
         .max(1)
 }
 
-/// The tiles of a block, row by row.
+/// Draws the tiles of a block, row by row.
 fn draw_block(
     level: Level,
     march: &March,
@@ -568,7 +572,8 @@ fn write_band(
     }
 }
 
-/// The colour of a pixel by the largest value on its ray: its opacity is that of a unit of length.
+/// Returns the colour of a pixel from the largest value on its ray. Its opacity is that of a unit
+/// of length.
 fn of_largest(value: f32, transfer: &TransferFunction, frame: &Frame) -> [f32; 4] {
     if value <= NO_VALUE {
         return [0.0; 4];

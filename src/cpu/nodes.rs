@@ -1,4 +1,5 @@
-//! The nodes of a page, and which of them a cut draws: as [`Cut::share`] tells for one, eight at a time.
+//! The nodes of a page, and which of them a cut draws: the result of [`Cut::share`], for eight
+//! nodes at a time.
 
 use super::{
     project::normals,
@@ -13,11 +14,11 @@ use crate::{
 };
 use fearless_simd::{Simd, mask32x8, prelude::*};
 
-/// Nodes whose parents are looked at together.
+/// Number of nodes whose parents are tested together.
 const RUN: usize = 64;
 
-/// Spheres with sizes, part by part: the centres' three coordinates, radii, sizes. Up to a multiple of eight they are filled
-/// with others of size 0.
+/// Spheres with sizes, as a structure of arrays: the centres' three coordinates, radii, sizes. The
+/// arrays are padded to a multiple of eight with spheres of size 0.
 #[derive(Debug)]
 struct Spheres([Vec<f32>; 5]);
 
@@ -35,7 +36,7 @@ impl Spheres {
         Self(parts)
     }
 
-    /// How far eight of them are refined, in parts of [`SHARE_UNIT`].
+    /// Returns how far eight spheres are refined, in parts of [`SHARE_UNIT`].
     #[inline(always)]
     fn refinement<S: Simd>(&self, simd: S, cut: &Cut, first: usize) -> Lanes<S> {
         let [x, y, z, radius, size]: [Lanes<S>; 5] =
@@ -52,28 +53,29 @@ impl Spheres {
     }
 }
 
-/// The nodes of a page, part by part.
+/// The nodes of a page, as a structure of arrays.
 #[derive(Debug)]
 pub struct Nodes {
     pub splats: Vec<Splat>,
     spheres: Spheres,
     cones: Vec<f32>,
-    /// Which of the parents is a node's; behind the last eight of them, the root of the tree has none.
+    /// The index of each node's parent. The root of the tree has no parent; its index lies after
+    /// the padding.
     parent: Vec<u32>,
-    /// The page that holds a node's children.
+    /// The page of each node's children.
     child_pages: Vec<u32>,
     parents: Spheres,
-    /// For runs of nodes, the first and the last of their parents.
+    /// The first and the last parent of each batch of nodes.
     runs: Vec<[u32; 2]>,
 }
 
-/// A node that is drawn, and its share in parts of [`SHARE_UNIT`].
+/// A drawn node, and its share in parts of [`SHARE_UNIT`].
 pub type Drawn = (u32, f32);
 
 impl Nodes {
     pub fn new(page: &Page) -> Self {
         let spheres = page.nodes.iter().enumerate().map(|(index, node)| CutSphere {
-            // A portal gives way to its block wherever that is at hand.
+            // A portal is replaced by its block as soon as the block is in memory.
             size: if page.is_portal(index) { f32::MAX } else { node.size },
             ..CutSphere::of(node)
         });
@@ -95,7 +97,7 @@ impl Nodes {
         }
     }
 
-    /// Bytes of memory that so many nodes take, without their parents.
+    /// Returns the bytes of memory of a number of nodes, without their parents.
     pub fn bytes_of(nodes: usize) -> u64 {
         (nodes * (size_of::<Splat>() + size_of::<CutSphere>() + 12)) as u64
     }
@@ -105,7 +107,7 @@ impl Nodes {
             + (self.parents.0[0].len() * size_of::<CutSphere>()) as u64
     }
 
-    /// The nodes that a cut draws, in order. `is_active`: whether a page takes part.
+    /// Returns the nodes that a cut draws, in order. `is_active` returns whether a page takes part.
     #[inline(always)]
     pub fn drawn<S: Simd>(
         &self,
@@ -157,7 +159,7 @@ impl Nodes {
         found
     }
 
-    /// Drops those of which nothing can be seen.
+    /// Removes invisible nodes.
     #[inline(always)]
     fn keep_seen<S: Simd>(&self, simd: S, cut: &Cut, found: &mut Vec<Drawn>) {
         let mut kept = 0;
@@ -177,7 +179,8 @@ impl Nodes {
         found.truncate(kept);
     }
 
-    /// Whether nothing of eight nodes' splats can be seen: they are beside the picture, or face away.
+    /// Returns which of eight nodes' splats are invisible, because they lie beside the picture or
+    /// face away.
     #[inline(always)]
     fn are_hidden<S: Simd>(&self, simd: S, cut: &Cut, nodes: [usize; 8]) -> mask32x8<S> {
         let (mut centers, mut ends) = ([[0.0f32; 8]; 3], [[0.0f32; 8]; 2]);
@@ -187,7 +190,7 @@ impl Nodes {
             (ends[0][lane], ends[1][lane]) = (self.spheres.0[3][node], self.spheres.0[4][node]);
         }
         let [radius, size]: [Lanes<S>; 2] = each!([0, 1], I => ends[I].simd_into(simd));
-        // A merged footprint may reach beyond what it stands for.
+        // A merged footprint may reach beyond the splats that it replaces.
         let reach = radius + size * 1.3;
         let center = to_view(simd, cut, three!(I => centers[I].simd_into(simd)));
         let mut hidden = mask32x8::splat(simd, false);
@@ -201,7 +204,7 @@ impl Nodes {
         if cut.culls { hidden | self.face_away(simd, cut, nodes, radius) } else { hidden }
     }
 
-    /// Whether all normals of eight nodes' cones face away.
+    /// Returns for which of eight nodes all normals of their cones face away.
     #[inline(always)]
     fn face_away<S: Simd>(
         &self,

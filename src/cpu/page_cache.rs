@@ -1,4 +1,4 @@
-//! The pages of a hierarchy that are at hand, and the nodes of them that a view draws.
+//! The cache of a hierarchy's pages, and the nodes of these pages that a view draws.
 
 use super::{
     footprint::Record,
@@ -10,16 +10,17 @@ use super::{
 };
 use crate::{
     Result,
-    engine::uniforms::Source,
     hierarchy::{Cut, Hierarchy, SHARE_UNIT, needed::Needed},
     math::View,
+    plan::uniforms::Source,
     scene::Settings,
 };
 use fearless_simd::{Level, Simd};
 use rayon::prelude::*;
 use std::{collections::HashMap, sync::Arc};
 
-/// Cuts a factor of two apart are tried in so many steps where a number of splats is asked for.
+/// Number of steps between cuts a factor of two apart, in the search for a cut with a given number
+/// of splats.
 const STEPS: f64 = 8.0;
 
 /// The nodes of a page, and the last picture that needed them.
@@ -37,7 +38,7 @@ pub struct PageCache {
     /// The pages that take part in the last view, in order.
     active: Vec<u32>,
     frame: u64,
-    /// Pages that the last view needed and that found no room.
+    /// Number of pages that the last view needed but that did not fit.
     pub missing: usize,
 }
 
@@ -62,7 +63,8 @@ impl PageCache {
         self.held.values().map(|held| held.nodes.bytes()).sum()
     }
 
-    /// Reads the pages that a cut needs, as many as the settings' memory holds; the coarse ones first.
+    /// Reads the pages that a cut needs, coarse ones first, as many as fit into the settings'
+    /// memory.
     pub fn update(&mut self, view: &View, settings: &Settings, pixels: f64) -> Result<()> {
         self.frame += 1;
         let cut = self.cut(view, settings, pixels);
@@ -109,7 +111,7 @@ impl PageCache {
         Ok(())
     }
 
-    /// Drops the pages that no view needed for longest, so that more fit.
+    /// Evicts the least recently needed pages, so that `more` bytes fit.
     fn make_room(&mut self, needed: &[u32], more: u64, most: u64) {
         let mut held = self.bytes();
         if held + more <= most {
@@ -132,7 +134,8 @@ impl PageCache {
         }
     }
 
-    /// The records of the splats that a cut draws, each with its share of its optical depth, page by page.
+    /// Returns the records of the splats that a cut draws, page by page. Each splat has its share
+    /// of its optical depth.
     pub fn records(
         &self,
         plan: &Plan,
@@ -148,7 +151,8 @@ impl PageCache {
         records.par_iter_mut().zip(&self.active).for_each(|(records, page)| {
             let Some(Held { nodes, .. }) = self.held.get(page) else { return };
             lanes!(level, simd => {
-                let splat = |(node, share): &Drawn| (&nodes.splats[*node as usize], *share * (1.0 / SHARE_UNIT as f32));
+                let splat = |(node, share): &Drawn|
+                    (&nodes.splats[*node as usize], *share * (1.0 / SHARE_UNIT as f32));
                 projector.add(simd, self.drawn_of(simd, &cut, nodes).iter().map(splat), records);
             });
         });
@@ -160,7 +164,7 @@ impl PageCache {
         nodes.drawn(simd, cut, |page| self.active.binary_search(&page).is_ok())
     }
 
-    /// How many splats a cut of what is at hand draws.
+    /// Returns the number of splats that a cut of the cached pages draws.
     pub fn count(&self, view: &View, settings: &Settings, pixels: f64) -> u64 {
         let (level, cut) = (Level::new(), self.cut(view, settings, pixels));
         let of = |page: &u32| {
@@ -170,20 +174,21 @@ impl PageCache {
         self.active.par_iter().map(of).sum()
     }
 
-    /// The finest cut, in pixels, whose pages hold no more than `most` nodes.
+    /// Returns the finest cut, in pixels, whose pages contain no more than `most` nodes.
     pub fn finest_pages(&self, view: &View, settings: &Settings, most: u64) -> f64 {
         self.needed.finest_within(&self.hierarchy, most, |pixels| self.cut(view, settings, pixels))
     }
 }
 
-/// The finest cut of some hierarchies that draws no more than `most` splats of them together; pages are at hand for it.
+/// Returns the finest cut of several hierarchies that draws no more than `most` splats in total.
+/// The pages for the cut are then cached.
 pub fn finest_within(
     caches: &mut [&mut PageCache],
     view: &View,
     settings: &Settings,
     most: u64,
 ) -> Result<f64> {
-    // The pages of a cut hold several times what it draws.
+    // The pages of a cut contain several times the nodes that it draws.
     let nodes = most.saturating_mul(8).max(1 << 16);
     let pages =
         caches.iter().map(|cache| cache.finest_pages(view, settings, nodes)).fold(0.0, f64::max);

@@ -1,22 +1,23 @@
-//! What all tiles of a picture share: the view, the sheets, the tables, and which methods draw.
+//! The data that all tiles of a picture share: the view, the sheets, the tables, and the methods of
+//! drawing.
 
 use crate::{
-    engine::{
+    math::{Kernel, Profile, Sheets, View},
+    plan::{
         tables::Tables,
         uniforms::{Frame, clip_counts},
     },
-    math::{Kernel, Profile, Sheets, View},
     scene::{Classification, Gradient, Item, Mode, Optics, Order, Scene, Settings},
     volume::{Arrangement, TransferFunction, bricks::Choice},
 };
 
 /// Pixels along each side of a tile.
 pub const TILE: usize = 8;
-/// The place of a plane that is before or behind all others.
+/// The place of a plane in front of or behind all others.
 const NOWHERE: f32 = 3e38;
 
-/// The plan of a picture. Sheets count from 1 and lie between the planes of their number and the next one; sheet 0 is all
-/// that lies before the first plane and is not drawn.
+/// The plan of a picture. Sheets are numbered from 1; sheet n lies between planes n and n + 1.
+/// Sheet 0 is everything in front of the first plane and is not drawn.
 pub struct Plan<'a> {
     pub view: &'a View,
     pub frame: Frame,
@@ -26,13 +27,13 @@ pub struct Plan<'a> {
     pub sheets: usize,
     pub mode: Mode,
     pub optics: Optics,
-    /// The scene holds a field that is classified after interpolation.
+    /// The scene has a field that is classified after interpolation.
     pub has_field: bool,
-    /// It holds one whose samples are classified before.
+    /// The scene has a field whose samples are classified before interpolation.
     pub is_classified: bool,
     /// The field's samples lie on a lattice and fill its box.
     pub on_lattice: bool,
-    /// The samples of the field carry slopes.
+    /// The samples of the field have slopes.
     pub has_slopes: bool,
     /// The field's kernel is looked up in tables.
     pub table_kernel: bool,
@@ -40,13 +41,13 @@ pub struct Plan<'a> {
     pub has_gradient_opacity: bool,
     /// Gradients across the picture are differences of neighbouring pixels.
     pub central: bool,
-    /// The transfer function is integrated between values, instead of looked up at the mean of a sheet.
+    /// The transfer function is integrated between values, not looked up at the mean of a sheet.
     pub is_integrated: bool,
     pub isosurfaces: usize,
-    /// The scene holds splats that carry colour.
+    /// The scene has splats of radiance.
     pub has_radiance: bool,
     pub lit_surfaces: bool,
-    /// Convex parts that are kept, and boxes that are cut out.
+    /// The number of convex regions that are kept, and of boxes that are cut out.
     pub clips: usize,
     pub holes: usize,
 }
@@ -93,7 +94,7 @@ impl<'a> Plan<'a> {
             clips,
             holes,
         };
-        // Light is seen in emission alone.
+        // Only emission and absorption is lit.
         let emits = settings.optics == Optics::EmissionAbsorption;
         for item in &scene.items {
             match item {
@@ -148,7 +149,7 @@ impl<'a> Plan<'a> {
         self.central = self.has_gradients() && settings.gradient == Gradient::Central;
     }
 
-    /// Whether the field's gradient is looked at.
+    /// Whether the field's gradient is used.
     pub fn has_gradients(&self) -> bool {
         self.has_field && (self.is_lit || self.has_gradient_opacity)
     }
@@ -158,32 +159,32 @@ impl<'a> Plan<'a> {
         self.mode != Mode::Sheets
     }
 
-    /// Whether splats are composited one by one.
+    /// Returns the order of splats if they are composited one by one.
     pub fn single(&self) -> Option<Order> {
         if let Mode::Splats(order) = self.mode { Some(order) } else { None }
     }
 
-    /// Pixels that tiles share with each neighbour.
+    /// Returns the number of pixels that tiles share with each neighbour.
     pub fn apron(&self) -> i32 {
         i32::from(self.central)
     }
 
-    /// Pixels from a tile to the next one.
+    /// Returns the number of pixels from a tile to the next one.
     pub fn tile_step(&self) -> usize {
         TILE - 2 * usize::from(self.central)
     }
 
-    /// Tiles beside and below each other.
+    /// Returns the number of columns and rows of tiles.
     pub fn tiles(&self) -> [usize; 2] {
         self.view.size.map(|side| (side as usize).div_ceil(self.tile_step()))
     }
 
-    /// The first pixel of a tile, which may lie beside the picture.
+    /// Returns the first pixel of a tile, which may lie outside the picture.
     pub fn corner(&self, tile: [usize; 2]) -> [i32; 2] {
         tile.map(|at| (at * self.tile_step()) as i32 - self.apron())
     }
 
-    /// The sheet that a distance lies in.
+    /// Returns the sheet that contains a distance.
     pub fn sheet_of(&self, distance: f32) -> usize {
         let frame = &self.frame;
         let near = self.planes[1];
@@ -198,7 +199,7 @@ impl<'a> Plan<'a> {
             1.0 + geometric as f32 + ((distance - turn) * frame.step_inverse).floor()
         };
         let mut sheet = estimate.clamp(1.0, self.sheets as f32) as usize;
-        // The closed form is off by one at most, where rounding meets a plane. The list decides.
+        // The closed form may be off by one where rounding meets a plane. The list decides.
         if distance < self.planes[sheet] {
             sheet -= 1;
         } else if distance >= self.planes[sheet + 1] && sheet < self.sheets {

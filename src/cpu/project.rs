@@ -1,4 +1,5 @@
-//! Where splats that carry colour lie in the picture and in the sheets: as `footprint` tells for one, eight at a time.
+//! The pixels and sheets that splats of radiance cover: the result of `footprint`, for eight splats
+//! at a time.
 
 use super::{
     footprint::{Kind, Record, SECTION_OVERREACH, origin, record, to_view, widened},
@@ -6,21 +7,21 @@ use super::{
     vector::{Lanes, dot, each, log2, three},
 };
 use crate::{
-    engine::uniforms::Source,
+    plan::uniforms::Source,
     splat::{FOOTPRINT_BLUR, NO_NORMAL, STEP_BACK, Splat},
 };
 use fearless_simd::{Simd, i32x8, mask32x8, prelude::*};
 
-/// Splats that carry colour, around one origin.
+/// Splats of radiance that share an origin.
 pub struct Projector<'a> {
     plan: &'a Plan<'a>,
     source: Source,
-    /// Columns of the turn to view space.
+    /// Columns of the rotation to view space.
     axes: [[f32; 3]; 3],
     origin: [f32; 3],
 }
 
-/// Eight splats, part by part.
+/// Eight splats, as a structure of arrays.
 struct Eight {
     center: [[f32; 8]; 3],
     factor: [[f32; 8]; 6],
@@ -29,7 +30,8 @@ struct Eight {
     normal: [i32; 8],
 }
 
-/// Where footprints lie: the first and the last of their pixels and sheets, and which of them meet the picture.
+/// The places of footprints: the first and the last pixel, the range of distances, and which
+/// footprints meet the picture.
 struct Places<S: Simd> {
     pixels: [[Lanes<S>; 2]; 2],
     near: Lanes<S>,
@@ -48,7 +50,7 @@ impl<'a> Projector<'a> {
         Self { plan, source, axes, origin }
     }
 
-    /// Adds the records of some splats, each with a share of its strength.
+    /// Adds the records of splats, each with a share of its strength.
     #[inline(always)]
     pub fn add<'s, S: Simd>(
         &self,
@@ -96,7 +98,7 @@ impl<'a> Projector<'a> {
         }
     }
 
-    /// Adds the records of those of eight splats that a mask names.
+    /// Adds the records of those of eight splats whose bit in a mask is set.
     #[inline(always)]
     fn add_eight<S: Simd>(&self, simd: S, eight: &Eight, mask: u64, records: &mut Vec<Record>) {
         let plan = self.plan;
@@ -127,7 +129,7 @@ impl<'a> Projector<'a> {
         let (normal, has_normal) = normals(simd, eight.normal.simd_into(simd));
         let normal = self.turned(normal);
         let normal = three!(I => has_normal.select(normal[I], none));
-        // Opaque splats must not grow by the widening: they step back.
+        // Opaque splats must not grow through widening, so they step back.
         let along = three!(I => dot(columns[I], normal));
         let own2 = dot(along, along);
         let back = ((own2 + blur2).sqrt() - own2.sqrt()) * STEP_BACK as f32;
@@ -138,7 +140,7 @@ impl<'a> Projector<'a> {
             return;
         }
         let whitening = whitening(simd, &covariance);
-        // Within a sheet, what faces the eye hides what faces away.
+        // Within a sheet, splats that face the eye hide those that face away.
         let mut away = normal[2];
         if plan.view.perspective {
             away = dot(normal, center) / dot(center, center).sqrt().max(Lanes::splat(simd, 1e-30));
@@ -146,7 +148,8 @@ impl<'a> Projector<'a> {
         let facing = (away * -4.0 + 0.5).max(Lanes::splat(simd, 1.0 / 255.0)).min(one);
         let facing = has_normal.select(facing, one);
         let packed: i32x8<S> = eight.color.simd_into(simd);
-        let [red, green, blue, opacity] = each!([0, 8, 16, 24], SHIFT => Lanes::<S>::float_from((packed >> SHIFT as u32) & 0xff) * (1.0 / 255.0));
+        let [red, green, blue, opacity] = each!([0, 8, 16, 24], SHIFT =>
+            Lanes::<S>::float_from((packed >> SHIFT as u32) & 0xff) * (1.0 / 255.0));
         let strength: Lanes<S> = eight.strength.simd_into(simd);
         let [strength, facing, red, green, blue, nx, ny, nz]: [[f32; 8]; 8] = [
             (strength * opacity).into(),
@@ -234,12 +237,15 @@ impl<'a> Projector<'a> {
             } else {
                 let low = Lanes::splat(simd, frame.z_near);
                 let boxes = each!([0, 1], I => box_bounds(simd, bounds[I], low, high));
-                bounds = each!([0, 1], I => each!([0, 1], J => is_front.select(tangents[I][J], boxes[I][J])));
+                bounds = each!([0, 1], I => each!([0, 1], J =>
+                    is_front.select(tangents[I][J], boxes[I][J])));
             }
-            // Beside the eye, rays leave the kernel's middle behind them: the part in front of the first plane must be cut off.
+            // Beside the eye, a kernel's middle lies behind the ray's start: the part in front of
+            // the first plane must be cut off.
             is_beside = distance.simd_lt(reach * 2.0);
         }
-        // Near the rim of a footprint the sections reach beyond the ellipsoid, because a ray keeps a kernel whole.
+        // Near the rim of a footprint, sections reach beyond the ellipsoid, because kernels are not
+        // cut along a ray.
         far = (far - distance) * SECTION_OVERREACH + distance;
         let near = distance - reach * SECTION_OVERREACH;
         meets &= far.simd_gt(plan.planes[1]) & near.simd_lt(plan.planes[plan.sheets + 1]);
@@ -265,7 +271,7 @@ impl<'a> Projector<'a> {
         Places { pixels, near, far, meets }
     }
 
-    /// The sheets that distances lie in.
+    /// Returns the sheets that contain distances.
     #[inline(always)]
     fn sheets_of<S: Simd>(&self, simd: S, distance: Lanes<S>) -> [u16; 8] {
         let plan = self.plan;
@@ -282,7 +288,8 @@ impl<'a> Projector<'a> {
         let mut sheets = [0; 8];
         for ((sheet, estimate), distance) in sheets.iter_mut().zip(estimates).zip(distances) {
             let mut own = (estimate as usize).min(plan.sheets);
-            // The closed form is off by one or two, where rounding meets a plane. The list decides.
+            // The closed form may be off by one or two where rounding meets a plane. The list
+            // decides.
             for _ in 0..2 {
                 if distance < plan.planes[own] {
                     own -= 1;
@@ -300,7 +307,7 @@ impl<'a> Projector<'a> {
 #[inline(always)]
 fn whitening<S: Simd>(simd: S, [xx, xy, xz, yy, yz, zz]: &Symmetric<S>) -> [Lanes<S>; 6] {
     let one = Lanes::splat(simd, 1.0);
-    // The floors keep discs far thinner than wide invertible in 32 bits.
+    // The minimum keeps discs much thinner than wide invertible in 32 bits.
     let least = xx.max(yy.max(*zz)) * 1e-7 + 1e-37;
     let m00 = one / xx.max(least).sqrt();
     let (l10, l20) = (*xy * m00, *xz * m00);
@@ -313,7 +320,7 @@ fn whitening<S: Simd>(simd: S, [xx, xy, xz, yy, yz, zz]: &Symmetric<S>) -> [Lane
     [m00, m10, m20, m11, m21, m22]
 }
 
-/// Unit vectors from their octahedral codes (`decode_normal`), and which codes are normals.
+/// Returns unit vectors from their octahedral codes (`decode_normal`), and which codes are normals.
 #[inline(always)]
 pub fn normals<S: Simd>(simd: S, packed: i32x8<S>) -> ([Lanes<S>; 3], mask32x8<S>) {
     let none = Lanes::splat(simd, 0.0);
@@ -327,7 +334,8 @@ pub fn normals<S: Simd>(simd: S, packed: i32x8<S>) -> ([Lanes<S>; 3], mask32x8<S
     ([x * inverse, y * inverse, z * inverse], !packed.simd_eq(NO_NORMAL as i32))
 }
 
-/// Bounds of x/z over an ellipsoid in front of the eye: tangents of its outline, exact in perspective.
+/// Bounds x/z over an ellipsoid in front of the eye, by the tangents to its silhouette; exact in
+/// perspective.
 #[inline(always)]
 fn tangent_bounds<S: Simd>(
     simd: S,
@@ -348,7 +356,7 @@ fn tangent_bounds<S: Simd>(
     [middle - half, middle + half]
 }
 
-/// Bounds of x/z over the part of a box beyond the nearest visible z.
+/// Bounds x/z over the part of a box beyond the nearest visible z.
 #[inline(always)]
 fn box_bounds<S: Simd>(
     simd: S,

@@ -1,4 +1,5 @@
-//! Radial kernels by the squared distance from their sample, eight at a time, and their sums over the samples in reach.
+//! Radial kernels as functions of the squared distance from their sample, eight at a time, and
+//! their sums over the samples in reach.
 
 use super::{
     blend::Sums,
@@ -9,12 +10,12 @@ use crate::math::{Kernel, Profile};
 use fearless_simd::{Simd, i32x8, prelude::*};
 use std::f64::consts::PI;
 
-/// How far a polynomial may be from its kernel, and how far its slope, where the largest value is 1.
+/// Maximum error of a polynomial and of its slope, relative to a kernel whose largest value is 1.
 const LEAST_ERRORS: [f64; 2] = [2e-6, 3e-5];
-/// Pieces of a table in the place of a kernel that polynomials do not follow.
+/// Number of pieces of the table for a kernel that no polynomial fits.
 const PIECES: u32 = 4096;
 
-/// A radial kernel in samples.
+/// A radial kernel, in units of samples.
 #[derive(Debug)]
 pub enum Radial {
     Spline(Spline),
@@ -24,29 +25,31 @@ pub enum Radial {
     Table(Table),
 }
 
-/// The cubic B-spline: how often its half extent is in a distance.
+/// The cubic B-spline: the inverse of its half extent.
 #[derive(Debug)]
 pub struct Spline {
     per_knot: f32,
 }
 
-/// A polynomial in the squared distance, up to an extent: its factors of 1, v, v², …, v from −1 at the sample to 1 at the extent.
+/// A polynomial in the squared distance, up to an extent: its coefficients of 1, v, v², …, where v
+/// runs from −1 at the sample to 1 at the extent.
 #[derive(Debug)]
 pub struct Even<const N: usize> {
     factors: [f32; N],
-    /// The square of the extent, and 2 over it.
+    /// The square of the extent, and 2 over that square.
     last: f32,
     scale: f32,
 }
 
-/// Values at even distances, and how much the next one is larger.
+/// Values at equal distances, and their differences to the next value.
 #[derive(Debug)]
 pub struct Table {
     pairs: Vec<[f32; 2]>,
     per_step: f32,
 }
 
-/// Values of kernels and h′(r)/r, which times the way from the sample is the gradient, at squared distances.
+/// Returns kernel values and h′(r)/r at squared distances. h′(r)/r times the offset from the sample
+/// is the gradient.
 trait Weigh {
     fn weigh<S: Simd>(&self, simd: S, squared: Lanes<S>) -> [Lanes<S>; 2];
 }
@@ -73,7 +76,8 @@ impl Radial {
         }
     }
 
-    /// The sums over samples that are so far from a place along the axes, in samples; values of a row lie beside each other.
+    /// Returns the sums over samples at the distances `away` along the axes from a place, in
+    /// samples. The values of a row are adjacent.
     pub fn sums<S: Simd>(
         &self,
         simd: S,
@@ -82,7 +86,7 @@ impl Radial {
         extent: f32,
     ) -> Sums<S> {
         let squared = extent * extent;
-        // A function of its own for each form.
+        // A separate function for each form.
         match self {
             Self::Spline(own) => simd.vectorize(
                 #[inline(always)]
@@ -159,7 +163,7 @@ impl Weigh for Spline {
     #[inline(always)]
     fn weigh<S: Simd>(&self, simd: S, squared: Lanes<S>) -> [Lanes<S>; 2] {
         let none = Lanes::splat(simd, 0.0);
-        // In half extents: ¼(2 − t)³ − (1 − t)³, each where it is more than nothing.
+        // In half extents: ¼(2 − t)³ − (1 − t)³, each clamped at 0.
         let t = (squared.sqrt() * self.per_knot).max(Lanes::splat(simd, 1e-4));
         let outer = (Lanes::splat(simd, 2.0) - t).max(none);
         let inner = (Lanes::splat(simd, 1.0) - t).max(none);
@@ -171,11 +175,12 @@ impl Weigh for Spline {
 }
 
 impl<const N: usize> Even<N> {
-    /// The polynomial for a kernel; none where it is too far from it.
+    /// Returns the polynomial for a kernel, or `None` if its error is too large.
     fn new(kernel: &Kernel) -> Option<Self> {
         let last = kernel.extent * kernel.extent;
         let radius = |v: f64| (0.5 * (v + 1.0) * last).max(0.0).sqrt();
-        // Chebyshev's polynomials by their values at the zeros of a later one.
+        // The Chebyshev coefficients, from the values at the zeros of a polynomial of higher
+        // degree.
         const NODES: usize = 64;
         let angle = |node: usize| PI * (node as f64 + 0.5) / NODES as f64;
         let values: Vec<f64> =
@@ -242,7 +247,7 @@ impl Table {
         let next = |at: usize| values.get(at + 1).map_or(0.0, |next| next - values[at]) as f32;
         let mut pairs: Vec<_> =
             (0..values.len() - 1).map(|at| [values[at] as f32, next(at)]).collect();
-        // Nothing beyond the extent.
+        // Zero beyond the extent.
         pairs.push([0.0; 2]);
         Self { pairs, per_step: ((values.len() - 1) as f64 / extent) as f32 }
     }

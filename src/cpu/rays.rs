@@ -1,4 +1,4 @@
-//! The rays of eight pixels: four beside each other in two rows.
+//! The rays of eight pixels: four columns in two rows.
 
 use super::{
     plan::{Plan, TILE},
@@ -9,38 +9,38 @@ use fearless_simd::{Simd, prelude::*};
 
 /// Packets of a tile.
 pub const PACKETS: usize = TILE * TILE / 8;
-/// Pixels that a packet is wide and high.
+/// Width and height of a packet, in pixels.
 pub const WIDE: usize = 4;
 pub const HIGH: usize = 2;
 
-/// A place before or behind all others.
+/// A place in front of or behind all others.
 const BEFORE: f32 = -3e38;
 const BEHIND: f32 = 3e38;
 
-/// A part of each ray, from one distance to another; empty where the first is the larger one.
+/// A part of each ray, from one distance to another; empty if the first is the larger.
 pub type Part<S> = [Lanes<S>; 2];
 
 /// Eight rays in view space.
 pub struct Rays<S: Simd> {
-    /// Pixel coordinates of their centres.
+    /// Pixel coordinates of the pixels' centres.
     pub pixel: [Lanes<S>; 2],
-    /// Place in the picture plane, at distance 1 in perspective.
+    /// Place in the image plane, at distance 1 in perspective.
     pub aside: [Lanes<S>; 2],
     pub direction: [Lanes<S>; 3],
     /// The cosine to the optical axis; 1 in orthographic views.
     pub cosine: Lanes<S>,
-    /// In steps of the lattice: where they start, and their way a world unit.
+    /// In steps of the lattice: the rays' starts, and their directions per world unit.
     pub start: [Lanes<S>; 3],
     pub way: [Lanes<S>; 3],
-    /// What clips keep, and what of that lies in the lattice's box.
+    /// The part that the clips keep, and its part inside the lattice's box.
     pub kept: Part<S>,
     pub inside: Part<S>,
-    /// What boxes cut out.
+    /// The parts that boxes cut out.
     pub holes: [Part<S>; Settings::MAX_CLIPS],
 }
 
 impl<S: Simd> Rays<S> {
-    /// The rays of the packet whose first pixel is at a place.
+    /// Returns the rays of the packet whose first pixel is at a place.
     #[inline(always)]
     pub fn new(simd: S, plan: &Plan, [x, y]: [i32; 2]) -> Self {
         let frame = &plan.frame;
@@ -93,7 +93,7 @@ impl<S: Simd> Rays<S> {
         }
     }
 
-    /// The part of each ray in the box of the samples, widened by so many steps.
+    /// Returns the part of each ray in the box of the samples, widened by `wider` steps.
     #[inline(always)]
     pub fn in_lattice(&self, simd: S, plan: &Plan, wider: f32) -> Part<S> {
         let (low, high) = (
@@ -103,20 +103,20 @@ impl<S: Simd> Rays<S> {
         part_in_box(simd, low, high, self.start, self.way)
     }
 
-    /// The places at some distances, in steps of the lattice.
+    /// Returns the places at distances, in steps of the lattice.
     #[inline(always)]
     pub fn places(&self, distances: Lanes<S>) -> [Lanes<S>; 3] {
         three!(I => self.way[I].mul_add(distances, self.start[I]))
     }
 
-    /// The place at a distance, in steps of the lattice.
+    /// Returns the place at a distance, in steps of the lattice.
     #[inline(always)]
     pub fn place(&self, distance: f32) -> [Lanes<S>; 3] {
         three!(I => self.way[I] * distance + self.start[I])
     }
 }
 
-/// The distances between which rays are in a box.
+/// Returns the distances between which rays are inside a box.
 #[inline(always)]
 fn part_in_box<S: Simd>(
     simd: S,
@@ -137,7 +137,7 @@ fn part_in_box<S: Simd>(
     [enter, leave]
 }
 
-/// The distances between which rays are where normal·x ≤ offset.
+/// Returns the distances between which rays have normal·x ≤ offset.
 #[inline(always)]
 fn part_in_half_space<S: Simd>(
     simd: S,

@@ -1,6 +1,7 @@
-//! Gaussians on rectilinear lattices: each sample's is as wide as its distance to its neighbours along each axis, and its value
-//! goes on along its slope. Both are products along the axes, so a place takes two weights for each sample along each axis: one
-//! of the value, and one of what the slopes of the samples around add.
+//! Gaussians on rectilinear lattices. Along each axis, a sample's Gaussian is as wide as the
+//! distance to the sample's neighbours. The sample's value continues along its slope. Both are
+//! products along the axes, so a place takes two weights for each sample and axis. One weights the
+//! value; the other adds the slopes of the samples around.
 
 use super::{
     blend::{MOST_TAPS, Sums, reach},
@@ -14,13 +15,13 @@ use crate::{
 };
 use fearless_simd::{Simd, i32x8, prelude::*};
 
-/// Samples with less weight than this at all eight places are left out.
+/// Samples with less weight than this at all eight places are skipped.
 const LEAST_COUNTED: f32 = 1e-4;
-/// Cells are looked up by at most so many even bins along an axis.
+/// Maximum number of equal bins along an axis, through which cells are looked up.
 const MOST_BINS: f64 = 1048576.0;
-/// Samples that a lattice lacks count as so many times its size away.
+/// Distance of missing samples, relative to the lattice's size.
 const FAR: f32 = 1e4;
-/// Places in a cell at which the sum of the weights' magnitudes is measured.
+/// Number of places in a cell at which the sum of the weights' magnitudes is measured.
 const PLACES: usize = 8;
 
 /// The samples along the axes of a lattice.
@@ -30,26 +31,27 @@ pub struct Axes([Axis; 3]);
 #[derive(Debug)]
 struct Axis {
     count: usize,
-    /// Of each sample its place from the first one, one over the standard deviation of its kernel, and what its slope takes of
-    /// the differences to the samples before and after it.
+    /// For each sample: its place relative to the first one, the inverse of its kernel's standard
+    /// deviation, and its slope's factors for the differences to the samples before and after.
     samples: Vec<[f32; 4]>,
-    /// The first sample that a place in the cell after each sample looks at.
+    /// For each cell after a sample: the first sample that places in the cell read.
     starts: Vec<u32>,
-    /// Those that have weight there, and those beside them: the first and the last.
+    /// For each cell: the first and the last sample with weight there, extended by one on each
+    /// side.
     reached: Vec<[u32; 2]>,
-    /// The cells in which even bins begin, and bins to the step.
+    /// The cell in which each bin begins, and the number of bins per step.
     bins: Vec<u32>,
     per_step: f32,
-    /// The width of even cells, and how many there are.
+    /// The width of the equal cells, and their number.
     width: f64,
     cells: usize,
 }
 
-/// Samples along an axis around eight places: the first one; weights of their values and what slopes add to these, and how both
-/// change a step.
+/// Samples along an axis around eight places: the first sample, the weights of the values, the
+/// weights that slopes add, and the changes of both per step.
 pub struct Along<S: Simd, const N: usize> {
     pub start: Lanes<S>,
-    /// Which of them count, a bit for each.
+    /// A bit for each sample that counts.
     pub counted: u32,
     weights: [Lanes<S>; N],
     added: [Lanes<S>; N],
@@ -57,7 +59,7 @@ pub struct Along<S: Simd, const N: usize> {
     added_slopes: [Lanes<S>; N],
 }
 
-/// The standard deviation of each sample's kernel along an axis, in steps.
+/// Returns the standard deviation of each sample's kernel along an axis, in steps.
 fn deviations(places: &[f64], kernel: &Kernel) -> Vec<f64> {
     let sigma = if let Profile::Gaussian(sigma) = kernel.profile { sigma } else { 1.0 };
     let last = places.len() - 1;
@@ -72,7 +74,8 @@ fn deviations(places: &[f64], kernel: &Kernel) -> Vec<f64> {
     (0..=last).map(|at| sigma * unit(at)).collect()
 }
 
-/// For each cell between samples the first and the last sample with weight in it, and one more on each side.
+/// Returns the first and the last sample with weight in each cell between samples, extended by one
+/// on each side.
 fn reached(places: &[f64], kernel: &Kernel) -> Vec<[u32; 2]> {
     let sigma = if let Profile::Gaussian(sigma) = kernel.profile { sigma } else { 1.0 };
     let reach = reach(kernel) / sigma;
@@ -92,14 +95,15 @@ fn reached(places: &[f64], kernel: &Kernel) -> Vec<[u32; 2]> {
     found.iter().map(|[low, high]| [low.saturating_sub(1), (high + 1).min(last as u32)]).collect()
 }
 
-/// The least distance of neighbours along an axis, and that of the ends.
+/// Returns the minimum distance of neighbours along an axis, and the distance of its ends.
 fn distances(places: &[f64]) -> [f64; 2] {
     let all = places[places.len() - 1] - places[0];
     [places.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min), all]
 }
 
 impl Axes {
-    /// How many samples along an axis a place looks at; none where these would be too many.
+    /// Returns the number of samples along an axis that a place reads, or `None` if that is too
+    /// many.
     pub fn taps(places: &[Vec<f64>; 3], kernel: &Kernel) -> Option<usize> {
         let most = |places: &Vec<f64>| {
             let [least, all] = distances(places);
@@ -119,12 +123,12 @@ impl Axes {
         Self([0, 1, 2].map(|axis| Axis::new(&places[axis], kernel, taps)))
     }
 
-    /// Even cells along each axis, and their widths in steps.
+    /// Returns the number of equal cells along each axis, and their widths in steps.
     pub fn cells(&self) -> ([usize; 3], [f64; 3]) {
         ([0, 1, 2].map(|axis| self.0[axis].cells), [0, 1, 2].map(|axis| self.0[axis].width))
     }
 
-    /// The weights along an axis.
+    /// Returns the weights along an axis.
     #[inline(always)]
     pub fn along<S: Simd, const N: usize>(
         &self,
@@ -135,11 +139,12 @@ impl Axes {
         self.0[axis].along(simd, place)
     }
 
-    /// For each cell the range of the field in it and half a cell around it, in steps of 1/255 of the volume's range.
+    /// Returns the range of the field in each cell and half a cell around it, in steps of 1/255 of
+    /// the volume's range.
     pub fn ranges(&self, volume: &Volume) -> Vec<[u8; 2]> {
         let mut ranges = neighbourhood_ranges(volume, [0; 3]);
         let mut dims = volume.lattice.dims;
-        // Along one axis after another, from samples to cells.
+        // From samples to cells, one axis after another.
         for (axis, own) in self.0.iter().enumerate() {
             let reached = own.reached_of_cells();
             let inner: usize = dims[..axis].iter().product();
@@ -163,7 +168,7 @@ impl Axes {
         ranges
     }
 
-    /// The sums over the samples in reach; values of a row lie beside each other.
+    /// Returns the sums over the samples in reach. The values of a row are adjacent.
     #[inline(always)]
     pub fn sums<S: Simd, const N: usize>(
         simd: S,
@@ -182,7 +187,7 @@ impl Axes {
             if z.counted >> k & 1 == 0 {
                 continue;
             }
-            // Of whole values, and of those to which the slopes along z are still to be added.
+            // Sums of complete values, and of values that still lack the slopes along z.
             let (mut sum, mut plain) = (none, none);
             let (mut sum_x, mut plain_x) = (none, none);
             let (mut sum_y, mut plain_y) = (none, none);
@@ -258,7 +263,7 @@ impl Axis {
         let deviations = deviations(places, kernel);
         let mut samples: Vec<_> =
             deviations.iter().enumerate().map(|(at, deviation)| own(at, *deviation)).collect();
-        // Windows of lattices that are smaller go on beyond them.
+        // Windows may extend beyond smaller lattices.
         samples
             .resize(count.max(taps), [FAR * (samples[last][0] + 1.0), samples[last][1], 0.0, 0.0]);
         let reached = reached(places, kernel);
@@ -289,7 +294,8 @@ impl Axis {
         }
     }
 
-    /// For each even cell the first and the last sample that count in it and half a cell around it.
+    /// Returns the first and the last sample that count in each equal cell and half a cell around
+    /// it.
     fn reached_of_cells(&self) -> Vec<[usize; 2]> {
         let end = self.reached.len() - 1;
         let of = |place: f64| {
@@ -298,7 +304,7 @@ impl Axis {
         };
         let cell = |cell: usize| {
             let places = [cell as f64 - 0.5, cell as f64 + 1.5].map(|at| at * self.width);
-            // Bins tell the cell that they begin in; places may be in the next one.
+            // A bin maps to the cell in which it begins; a place may lie in the next cell.
             let [first, last] = [of(places[0]), (of(places[1]) + 1).min(end)];
             let own = self.reached[first..=last].iter();
             own.fold([usize::MAX, 0], |[a, b], [low, high]| {
@@ -308,7 +314,8 @@ impl Axis {
         (0..self.cells).map(cell).collect()
     }
 
-    /// How large the weights are together that slopes add, beside the values' own, where that is most.
+    /// Returns the largest sum of the magnitudes of the weights that slopes add, relative to the
+    /// values' own weights.
     fn added(&self) -> f64 {
         let mut most = 0.0f64;
         for (cell, start) in self.starts.iter().enumerate() {
@@ -344,7 +351,7 @@ impl Axis {
         let last = self.starts.len() - 1;
         let starts = each!([0, 1, 2, 3, 4, 5, 6, 7], L => {
             let cell = self.bins[bins[L] as usize] as usize;
-            // At most one sample lies in a bin.
+            // A bin contains at most one sample.
             let next = (cell + 1).min(last);
             let cell = if next > cell && places[L] >= self.samples[next][0] { next } else { cell };
             self.starts[cell] as usize
@@ -360,7 +367,7 @@ impl Axis {
         for tap in 0..N {
             let rows = each!([0, 1, 2, 3, 4, 5, 6, 7], L => self.samples[starts[L] + tap]);
             let [at, inverse, mut before, mut after] = columns(simd, rows);
-            // Samples at the ends of the window have no weight to speak of, or no neighbour.
+            // Samples at the ends of the window have negligible weight, or no neighbour.
             if tap == 0 {
                 (before, after) = (none, own.start.simd_gt(0.0).select(none, after));
             }
@@ -375,7 +382,7 @@ impl Axis {
                 continue;
             }
             own.counted |= 1 << tap;
-            // What slopes add takes the neighbours, so it ends where weights do.
+            // Slopes use the neighbours, so the weights that they add end where the weights end.
             let has_weight = weight.simd_gt(LEAST_WEIGHT as f32);
             if has_weight.any_true() {
                 own.counted |= (2 << tap) | ((1 << tap) >> 1);

@@ -1,5 +1,6 @@
-//! Adds splats to the pixels of a tile: their sections in a window of sheets, and their kernels on the planes between these.
-//! shaders/kernels.wgsl does the same; docs/engine.md tells the mathematics.
+//! Adds splats to the pixels of a tile: their sections in a window of sheets, and their kernels on
+//! the planes between these sheets. shaders/shared/kernels.wgsl does the same; docs/engine.md explains the
+//! mathematics.
 
 use super::{
     close::Pixels,
@@ -14,15 +15,17 @@ use fearless_simd::{Simd, mask32x8, prelude::*};
 
 /// The integral of exp(−x²/2).
 const SQRT_TAU: f32 = 2.506_628_3;
-/// Planes farther from a kernel than this, in its standard deviations, count as that far: nothing of it is left there.
+/// Maximum distance of a plane from a kernel, in standard deviations. Further planes count as this
+/// far: nothing of the kernel is left there.
 const FAR: f32 = 12.0;
-/// Less optical depth than this is not added: thousands of such sums cannot be seen.
+/// Smaller optical depths are not added: even thousands of them are invisible.
 const LEAST_ADDED: f32 = 1e-7;
-/// Entries of the kernel along its radius, and cells of its sections' table along each side (engine/tables.rs).
-const RADII: usize = crate::engine::tables::RADII;
-const SECTIONS: usize = crate::engine::tables::SECTIONS;
+/// Number of table entries along the kernel's radius, and of cells along each side of the table of
+/// its sections (engine/tables.rs).
+const RADII: usize = crate::plan::tables::RADII;
+const SECTIONS: usize = crate::plan::tables::SECTIONS;
 
-/// A packet of a tile: its rays, and its pixels of the picture.
+/// A packet of a tile: its rays and its pixels.
 pub struct Packet<S: Simd> {
     pub rays: Rays<S>,
     pub pixels: Pixels<S>,
@@ -35,16 +38,18 @@ pub struct Packet<S: Simd> {
 pub struct Window {
     /// The first sheet.
     pub front: usize,
-    /// It follows another window of the same splat.
+    /// Whether the window follows another window of the same splat.
     pub is_continued: bool,
 }
 
-/// Where a kernel lies on the rays of a packet.
+/// The position of a kernel on the rays of a packet.
 struct Along<S: Simd> {
-    /// The squared distance of the closest approach, in whitened space, and where the kernel counts.
+    /// The squared distance of the closest approach, in whitened space, and the mask of the rays
+    /// that meet the kernel.
     rho2: Lanes<S>,
     inside: mask32x8<S>,
-    /// Planes, in whitened lengths from the closest approach; β = M·b, its length's inverse, and L (docs/engine.md).
+    /// The planes, in whitened lengths from the closest approach; v = M·c × β, β = M·b, the inverse
+    /// of |β|, and L = β·M·(c − a) (docs/engine.md).
     t: [Lanes<S>; 3],
     v: [Lanes<S>; 3],
     beta: [Lanes<S>; 3],
@@ -52,7 +57,7 @@ struct Along<S: Simd> {
     l: Lanes<S>,
 }
 
-/// What of a record is the same for all pixels.
+/// The values of a record that are the same for all pixels.
 struct Projected {
     at: [f32; 2],
     whitened: [f32; 3],
@@ -76,7 +81,8 @@ impl Projected {
         let mut whitened = [0.0, 0.0, m22 * z];
         let mut v = [cross(m[2], m[0]), cross(m[2], m[1])];
         if plan.view.perspective {
-            // A centre beside the eye projects to infinity. It is moved by a thousandth of its distance.
+            // A centre beside the eye projects to infinity, so it is moved by a thousandth of its
+            // distance.
             let least2 = 1e-6 * (x * x + y * y + z * z);
             let z = if z * z < least2 { least2.sqrt().copysign(z) } else { z };
             let per_z = scale / z;
@@ -87,7 +93,8 @@ impl Projected {
         Self { at, whitened, m, v }
     }
 
-    /// Where the kernel lies on the rays of a packet, and `count` planes from one on; none where it misses all rays.
+    /// Returns the kernel's position on the rays of a packet and relative to `count` planes, or
+    /// `None` if it misses all rays.
     #[inline(always)]
     fn along<S: Simd>(
         &self,
@@ -136,8 +143,9 @@ fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// The normal distribution function, within 2·10⁻⁷ (Abramowitz & Stegun 1964, 26.2.19). Its tails must be right: what they
-/// get wrong is multiplied by the strength of an opaque splat and lies in front of it.
+/// The normal distribution function, within 2·10⁻⁷ (Abramowitz & Stegun 1964, 26.2.19). Its tails
+/// must be right: their error is multiplied by the strength of an opaque splat, and lies in front
+/// of the splat.
 #[inline(always)]
 pub fn normal_cdf<S: Simd>(simd: S, t: Lanes<S>) -> Lanes<S> {
     let x = t.abs().min(Lanes::splat(simd, 8.0));
@@ -155,8 +163,9 @@ pub fn normal_cdf<S: Simd>(simd: S, t: Lanes<S>) -> Lanes<S> {
     t.simd_ge(0.0).select(one - tail, tail)
 }
 
-/// The same within 2.3·10⁻⁴, without a division: an odd polynomial that is level at 3.55. For surfaces alone, where an error
-/// moves optical depth from one sheet to the next, both of the same splat's colour, and takes none away.
+/// The same within 2.3·10⁻⁴, without a division: an odd polynomial with slope 0 at 3.55. Only for
+/// surfaces. There an error moves optical depth from one sheet to the next, both with the same
+/// splat's colour, and removes none.
 #[inline(always)]
 fn near_normal_cdf<S: Simd>(simd: S, t: Lanes<S>) -> Lanes<S> {
     let x = t.max(Lanes::splat(simd, -3.55)).min(Lanes::splat(simd, 3.55));
@@ -188,7 +197,7 @@ pub fn add<S: Simd>(
         for column in from[0] / WIDE..=to[0] / WIDE {
             let number = row * 2 + column;
             let packet = &mut packets[number];
-            // Neighbours of a pixel need its value, however opaque it is.
+            // Neighbouring pixels need a pixel's value, however opaque it is.
             if packet.is_done && !plan.central {
                 continue;
             }
@@ -201,8 +210,8 @@ pub fn add<S: Simd>(
     }
 }
 
-/// The part of a kernel between planes: `count` of them lie in the window, and what is behind the last one belongs to the last
-/// sheet.
+/// Returns the sections of a kernel between planes. The window contains `count` planes; everything
+/// behind the last one belongs to the last sheet.
 #[inline(always)]
 fn sections<S: Simd>(
     simd: S,
@@ -241,18 +250,15 @@ fn sections<S: Simd>(
     sections
 }
 
-/// Planes of a window that its splat reaches. One more is looked at than its last sheet needs: near the rim of a footprint,
-/// sections reach further.
+/// Returns the number of a window's planes that its splat reaches. That is one more than its last
+/// sheet needs: near the rim of a footprint, sections reach further.
 #[inline(always)]
 fn planes_of(plan: &Plan, record: &Record, window: Window) -> usize {
     let ahead = (usize::from(record.sheets[1]) + 1).saturating_sub(window.front);
     if plan.is_whole() { 0 } else { ahead.min(WINDOW - 1) }
 }
 
-#[expect(
-    clippy::too_many_arguments,
-    reason = "all of them are one splat, one packet or the picture"
-)]
+#[expect(clippy::too_many_arguments, reason = "the data of one splat, one packet and the picture")]
 #[inline(always)]
 fn add_radiance<S: Simd>(
     simd: S,
@@ -286,7 +292,7 @@ fn add_radiance<S: Simd>(
         counts &= is_kept(plan, rays, along.l * along.inverse * along.inverse / rays.cosine);
     }
     if plan.is_whole() && plan.view.perspective {
-        // Its middle is in front of the eye.
+        // The kernel's middle must be in front of the eye.
         counts &= along.l.simd_gt(0.0);
     }
     let strength = counts.select(strength, none);
@@ -314,7 +320,7 @@ fn add_radiance<S: Simd>(
     }
 }
 
-/// Composites a splat by itself, before or behind what is there.
+/// Composites a splat alone, in front of or behind the pixels so far.
 #[inline(always)]
 fn single<S: Simd>(
     simd: S,
@@ -353,7 +359,7 @@ fn single<S: Simd>(
     pixels.hit = takes_half.select(Lanes::splat(simd, distance), pixels.hit);
 }
 
-/// Whether the clips keep a place of each ray.
+/// Whether the clips keep a place on each ray.
 #[inline(always)]
 fn is_kept<S: Simd>(plan: &Plan, rays: &Rays<S>, distance: Lanes<S>) -> mask32x8<S> {
     let mut kept = distance.simd_ge(rays.kept[0]) & distance.simd_le(rays.kept[1]);
@@ -363,10 +369,7 @@ fn is_kept<S: Simd>(plan: &Plan, rays: &Rays<S>, distance: Lanes<S>) -> mask32x8
     kept
 }
 
-#[expect(
-    clippy::too_many_arguments,
-    reason = "all of them are one splat, one packet or the picture"
-)]
+#[expect(clippy::too_many_arguments, reason = "the data of one splat, one packet and the picture")]
 #[inline(always)]
 fn add_scalar<S: Simd>(
     simd: S,
@@ -402,7 +405,8 @@ fn add_scalar<S: Simd>(
         slope_along = unit[0] * slope[0] + unit[1] * slope[1] + unit[2] * slope[2];
     }
     let section_kernel = kernel * closest * length_of;
-    // The kernel on the planes before and behind a sheet: what the slope carries from one to the other.
+    // The kernel on the planes in front of and behind a sheet: the slope's contribution to the
+    // sheet.
     let mut before = none;
     for own in 0..=count {
         let slot = (window.front + own) % WINDOW;
@@ -436,7 +440,7 @@ fn add_scalar<S: Simd>(
         if plan.has_gradients() && !plan.central {
             let size = if plan.view.perspective { rays.cosine * planes[own] } else { one };
             for axis in 0..2 {
-                // How the whitened place moves on the plane per pixel to the right or down.
+                // The change of the whitened place on the plane per pixel to the right or down.
                 let mut across = three!(I => Lanes::splat(simd, projected.m[axis][I]));
                 if plan.view.perspective {
                     let k = rays.cosine * rays.cosine * rays.aside[axis] * (1.0 / plan.frame.scale);
@@ -455,7 +459,7 @@ fn add_scalar<S: Simd>(
     debug_assert!(plan.optics != Optics::Maximum || plan.has_field);
 }
 
-/// The kernel, and −h′(r)/r, at radii in kernel space; nothing beyond its extent.
+/// Returns the kernel and −h′(r)/r at radii in kernel space; 0 beyond its extent.
 #[inline(always)]
 fn kernel_at<S: Simd>(simd: S, plan: &Plan, radius: Lanes<S>) -> [Lanes<S>; 2] {
     let [length, per_length, ..] = plan.frame.kernel;
@@ -474,7 +478,8 @@ fn kernel_at<S: Simd>(simd: S, plan: &Plan, radius: Lanes<S>) -> [Lanes<S>; 2] {
     [found[0].simd_into(simd), found[1].simd_into(simd)]
 }
 
-/// The kernel's integral along lines at distances `rho` from its centre, from the closest approach to t.
+/// Returns the kernel's integral along lines at distances `rho` from its centre, from the closest
+/// approach to t.
 #[inline(always)]
 fn kernel_integral<S: Simd>(simd: S, plan: &Plan, rho: Lanes<S>, t: Lanes<S>) -> Lanes<S> {
     let per_length = plan.frame.kernel[1];

@@ -1,4 +1,4 @@
-//! Which sheets may show something in which tiles: blocks of samples that show something, projected.
+//! In which sheets of which tiles a lattice may be visible: projected blocks of visible samples.
 
 use super::{
     brick_cache::BrickCache,
@@ -21,13 +21,14 @@ use rayon::prelude::*;
 /// Samples along each side of a block.
 const BLOCK: usize = 4;
 
-/// The samples of a volume around which something shows: for each block of 4 × 4 × 4 samples two words with a bit for each. Of
-/// a level in bricks, bits stand for the blocks of samples whose ranges are known.
+/// The samples of a volume around which something is visible: two words for each block of 4 × 4 × 4
+/// samples, a bit for each sample. For a level in bricks, a bit stands for a block of samples with
+/// a known range.
 #[derive(Debug)]
 pub struct Shown {
     /// Samples along each axis.
     dims: [usize; 3],
-    /// Bits stand for cells of so many samples along each axis, 2 to the power of this.
+    /// Bits stand for cells of 2 to the power of this many samples along each axis.
     coarse: u32,
     blocks: [usize; 3],
     words: Vec<[u32; 2]>,
@@ -36,15 +37,17 @@ pub struct Shown {
 /// The bits of 2 × 2 × 2 cells in a word.
 const QUARTER: u32 = 0x0033_0033;
 
-/// The widest Gaussian, in steps, of which that holds.
+/// The widest Gaussian, in steps, for which `FAR_WEIGHT` holds.
 const WIDEST: f64 = 0.6;
 
-/// The part of a Gaussian's weight that samples two steps from the nearest one have together, with room for places that lie up
-/// to a third of a step beyond it: 0.085 at half a step for the usual kernel.
+/// The share of a Gaussian's weight that samples two steps from the nearest one have in total. It
+/// allows for places up to a third of a step further away. For the usual kernel it is 0.085 at half
+/// a step.
 const FAR_WEIGHT: f64 = 0.15;
 
-/// For each sample of a volume, the range of the field nearer to it than to any other. The samples around it weigh nearly all;
-/// those two steps away move the field by their share at most.
+/// Returns, for each sample of a volume, the range of the field at the places nearest to that
+/// sample. The samples next to it have nearly all the weight; those two steps away move the field
+/// by at most their share.
 pub fn field_ranges(volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
     let mut ranges = volume.drawn_ranges(kernel).into_owned();
     if deviation(kernel).is_some_and(|sigma| sigma <= WIDEST) && volume.coefficients.is_none() {
@@ -59,8 +62,8 @@ pub fn field_ranges(volume: &Volume, kernel: &Kernel) -> Vec<[u8; 2]> {
 }
 
 impl Shown {
-    /// `dims`: samples along each axis; `ranges`: the extremes around each; `first`: the least largest one that shows, for each
-    /// smallest one.
+    /// `dims` is the number of samples along each axis, `ranges` the extremes around each sample.
+    /// For each minimum, `first` is the smallest maximum with which something is visible.
     pub fn new(dims: [usize; 3], ranges: &[[u8; 2]], first: &[u16; 256]) -> Self {
         let shows = |[low, high]: [u8; 2]| u16::from(high) >= first[usize::from(low)];
         let blocks = dims.map(|n| n.div_ceil(BLOCK));
@@ -84,7 +87,7 @@ impl Shown {
         Self { dims, coarse: 0, blocks, words }
     }
 
-    /// The blocks of a level of a volume in bricks, of those that a picture shows.
+    /// Returns the visible blocks of a level of a volume in bricks, of those that a picture shows.
     pub fn of_bricks(cache: &BrickCache, choice: &Choice, level: usize) -> Self {
         let size = cache.bricks.level(level);
         let coarse = bricks::BLOCK.ilog2();
@@ -100,7 +103,7 @@ impl Shown {
                 let own = [number % BLOCKS, number / BLOCKS % BLOCKS, number / (BLOCKS * BLOCKS)];
                 let cell = [0, 1, 2].map(|axis| first[axis] + own[axis]);
                 let [x, y, z] = cell.map(|at| at / BLOCK);
-                // Blocks wholly beyond the border show nothing.
+                // Blocks entirely outside the border show nothing.
                 let Some(words) = words.get_mut((z * blocks[1] + y) * blocks[0] + x) else {
                     continue;
                 };
@@ -111,12 +114,13 @@ impl Shown {
         Self { dims: size.dims, coarse, blocks, words }
     }
 
-    /// Bytes of memory.
+    /// Returns the bytes of memory.
     pub fn bytes(&self) -> u64 {
         size_of_val(self.words.as_slice()) as u64
     }
 
-    /// A bit for each sample in the order of the volume, 32 a word, the first in the lowest bit.
+    /// Returns a bit for each sample in the order of the volume, 32 per word, the first in the
+    /// lowest bit.
     pub fn bits(&self) -> Vec<u32> {
         let [nx, ny, _] = self.dims;
         let [columns, rows, _] = self.blocks;
@@ -133,12 +137,14 @@ impl Shown {
         (0..count.div_ceil(32)).into_par_iter().map(word).collect()
     }
 
-    /// Where something may show nearer to the sample beside a place than to any other, a bit for each lane; places in steps.
+    /// Returns where something may be visible at the places nearest to the sample beside a place, a
+    /// bit for each lane. Places are in steps.
     #[inline(always)]
     pub fn at<S: Simd>(&self, simd: S, place: [Lanes<S>; 3]) -> u64 {
         let [x, y, z]: [i32x8<S>; 3] = three!(I => {
             let last = Lanes::splat(simd, self.dims[I] as f32 - 1.0);
-            i32x8::truncate_from((place[I] + 0.5).max(Lanes::splat(simd, 0.0)).min(last)) >> self.coarse
+            i32x8::truncate_from((place[I] + 0.5).max(Lanes::splat(simd, 0.0)).min(last))
+                >> self.coarse
         });
         let [columns, rows, _] = self.blocks.map(|n| n as i32);
         let block = ((z >> 2) * rows + (y >> 2)) * columns + (x >> 2);
@@ -150,7 +156,7 @@ impl Shown {
         shows.simd_eq(1).to_bitmask()
     }
 
-    /// For each tile, row by row, the sheets in which it may show something, as bits.
+    /// Returns for each tile, row by row, the sheets in which something may be visible, as bits.
     pub fn sheets_of_tiles(
         &self,
         lattice: &Lattice,
@@ -171,7 +177,7 @@ impl Shown {
                     }
                     continue;
                 }
-                // Cells of many samples: eight at a time.
+                // Cells of many samples: eight cells at a time.
                 for (half, word) in words.iter().enumerate() {
                     for quarter in 0..4 {
                         let [x, y] = [quarter % 2 * 2, quarter / 2 * 2];
@@ -204,7 +210,8 @@ impl Shown {
         all.reduce(none, join).chunks(words.max(1)).map(<[u64]>::to_vec).collect()
     }
 
-    /// Marks the tiles and sheets that a cube of samples may lie in, from one on and so many along each axis.
+    /// Marks the tiles and sheets that a cube of samples may meet. The cube begins at sample
+    /// `first` and has `side` samples along each axis.
     fn mark(
         &self,
         lattice: &Lattice,
@@ -224,7 +231,7 @@ impl Shown {
         let tiles = view.size.map(|side| side.div_ceil(TILE as u32) as usize);
         let box_around = Bounds { min: center - reach, max: center + reach };
         let (mut first, mut last) = ([0, 0], tiles.map(|n| n - 1));
-        // Blocks beside the eye may lie anywhere.
+        // Blocks beside the eye may project anywhere.
         if !view.perspective || box_around.min.z > 1e-6 * reach.max_element() {
             for axis in 0..2 {
                 let ends = [box_around.min, box_around.max].map(|v| v[axis]);
@@ -263,7 +270,7 @@ impl Shown {
     }
 }
 
-/// Which word of its block a sample is in, and its bit there.
+/// Returns the word of a sample in its block, and its bit in that word.
 fn bit_of([x, y, z]: [usize; 3]) -> (usize, usize) {
     (z / 2 % 2, (z % 2 * BLOCK + y % BLOCK) * BLOCK + x % BLOCK)
 }

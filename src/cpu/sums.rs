@@ -1,6 +1,7 @@
-//! The sums of the sheets that are open in a tile: what splats have added to them so far.
+//! The sums of the open sheets of a tile: everything that splats have added to them so far.
 //!
-//! A splat adds to a window of four sheets, and to the three planes between them. Sheet and plane n lie in the slot n mod 4.
+//! A splat adds to a window of four sheets, and to the three planes between them. Sheet and plane n
+//! use slot n mod 4.
 
 use super::{
     close::{Face, Layer},
@@ -12,10 +13,11 @@ use fearless_simd::{Simd, mask32x8, prelude::*};
 
 /// Sheets of a window.
 pub const WINDOW: usize = 4;
-/// A sheet with less optical depth than this has no colour: the sum may be what rounding left.
+/// A sheet with less optical depth than this has no colour: the sum may be a rounding remainder.
 const LEAST_DEPTH: f32 = 1e-5;
 
-/// What eight pixels sum up of colour: optical depth; what faces the eye of it, and times that colour and normal.
+/// The radiance sums of eight pixels: optical depth; then the facing weights, colours and normals,
+/// each weighted by optical depth.
 pub type Radiance<S> = [Lanes<S>; 8];
 
 /// Sums of a field in a sheet at eight pixels: weights and weighted values.
@@ -36,7 +38,7 @@ pub struct FaceSums<S: Simd> {
 
 pub struct Sums<S: Simd> {
     pub radiance: [[Radiance<S>; PACKETS]; WINDOW],
-    /// The packets that radiance was added to, as bits.
+    /// The packets that have radiance, as bits.
     pub has_radiance: [u8; WINDOW],
     pub field: [[FieldSums<S>; PACKETS]; WINDOW],
     pub faces: [[FaceSums<S>; PACKETS]; WINDOW],
@@ -44,7 +46,7 @@ pub struct Sums<S: Simd> {
     none: Lanes<S>,
 }
 
-/// A value on a plane, and where there is one.
+/// A value on a plane, and where it exists.
 struct Resolved<S: Simd> {
     face: Face<S>,
     has_value: mask32x8<S>,
@@ -69,7 +71,8 @@ impl<S: Simd> Sums<S> {
         }
     }
 
-    /// Radiance of a sheet at a packet: colour times optical depth, and optical depth. Nothing where none was added.
+    /// Takes the radiance of a sheet at a packet: colour times optical depth, and optical depth.
+    /// Returns `None` if none was added.
     #[inline(always)]
     pub fn take_radiance(
         &mut self,
@@ -87,7 +90,7 @@ impl<S: Simd> Sums<S> {
         let [depth, facing, red, green, blue, x, y, z] =
             std::mem::replace(&mut self.radiance[slot][packet], [self.none; 8]);
         let one = Lanes::splat(simd, 1.0);
-        // Where next to nothing faces the eye, rounding may have left a weight of any sign.
+        // If next to nothing faces the eye, rounding may have left a weight of any sign.
         let inverse = one / facing.max(Lanes::splat(simd, 1e-12));
         let sum = [red, green, blue];
         let mut color = three!(I => (sum[I] * inverse).max(self.none).min(one));
@@ -102,8 +105,9 @@ impl<S: Simd> Sums<S> {
         Some([color[0] * depth, color[1] * depth, color[2] * depth, depth])
     }
 
-    /// The field of a sheet at a packet. Nothing where none was added. `slopes`: those a pixel to the right and down on the
-    /// planes before and behind the sheet, where they are differences of neighbouring pixels.
+    /// Returns the field of a sheet at a packet, or `None` if none was added. `slopes` are those
+    /// per pixel to the right and down, on the planes in front of and behind the sheet, if they are
+    /// differences of neighbouring pixels.
     #[inline(always)]
     pub fn resolve(
         &self,
@@ -128,7 +132,9 @@ impl<S: Simd> Sums<S> {
         let front = self.face(simd, plan, rays, sheet, packet, slopes.map(|[front, _]| front));
         let back = self.face(simd, plan, rays, sheet + 1, packet, slopes.map(|[_, back]| back));
         let either = |a: &Resolved<S>, b: &Resolved<S>| {
-            let across = three!(I => a.has_value.select(a.face.across[I], b.has_value.select(b.face.across[I], self.none)));
+            let across = three!(I => a
+                .has_value
+                .select(a.face.across[I], b.has_value.select(b.face.across[I], self.none)));
             Face { value: a.has_value.select(a.face.value, value), across }
         };
         let (front, back) = (either(&front, &back), either(&back, &front));
@@ -173,7 +179,8 @@ impl<S: Simd> Sums<S> {
         Resolved { face: Face { value, across }, has_value }
     }
 
-    /// Values on a plane for differences between neighbouring pixels: those of a tile row by row, NaN where there is none.
+    /// Returns the values of a tile on a plane, row by row, for differences between neighbouring
+    /// pixels; NaN where there is none.
     #[inline(always)]
     pub fn values_on(&self, simd: S, plan: &Plan, plane: usize) -> [[f32; TILE]; TILE] {
         let mut values = [[f32::NAN; TILE]; TILE];
@@ -188,12 +195,13 @@ impl<S: Simd> Sums<S> {
         values
     }
 
-    /// Frees the slots of a sheet and of the plane before it, for those four further on.
+    /// Clears the slots of a sheet and of the plane in front of it, for the sheet and plane four
+    /// further on.
     #[inline(always)]
     pub fn clear(&mut self, sheet: usize) {
         let slot = sheet % WINDOW;
         if self.has_radiance[slot] != 0 {
-            // What was not taken: the sheet is not drawn, or a packet is done.
+            // Not taken yet: the sheet is not drawn, or a packet is done.
             for (packet, own) in self.radiance[slot].iter_mut().enumerate() {
                 if self.has_radiance[slot] & (1 << packet) != 0 {
                     *own = [self.none; 8];
@@ -215,7 +223,8 @@ impl<S: Simd> Sums<S> {
     }
 }
 
-/// The part of the gradient across the ray from the slopes a pixel to the right and down, on the plane at a distance.
+/// Returns the gradient's component across the ray, from the slopes per pixel to the right and down
+/// on the plane at a distance.
 #[inline(always)]
 fn across_of<S: Simd>(
     simd: S,
@@ -235,7 +244,8 @@ fn across_of<S: Simd>(
     [x, y, -(x * along_x + y * along_y) / along_z]
 }
 
-/// Slopes of the values around the pixels of a packet: central differences, one-sided where a neighbour has no value.
+/// Returns the slopes of the values around the pixels of a packet: central differences, one-sided
+/// where a neighbour has no value.
 #[inline(always)]
 pub fn differences<S: Simd>(simd: S, values: &[[f32; TILE]; TILE], packet: usize) -> [Lanes<S>; 2] {
     let mut slopes = [[0.0f32; 8]; 2];

@@ -2,8 +2,9 @@
 
 use fearless_simd::{Simd, f32x8, i32x8, prelude::*};
 
-/// An array of an expression for each index. A closure would do, but the compiler may leave it a function of its own, in which
-/// every operation on vectors is a call: functions know only the processor's instructions that the caller's attributes name.
+/// An array with an expression for each index. A closure would do the same, but the compiler may
+/// not inline it. Then every vector operation becomes a call, because a function uses only the
+/// processor instructions that its caller's attributes name.
 macro_rules! each {
     ([$($number:literal),+], $index:ident => $value:expr) => {
         [$({
@@ -24,7 +25,7 @@ macro_rules! four {
         $crate::cpu::vector::each!([0, 1, 2, 3], $index => $value)
     };
 }
-/// A vector of 32-bit words, an expression for each lane.
+/// A vector of 32-bit words, with an expression for each lane.
 macro_rules! words {
     ($simd:expr, $lane:ident => $word:expr) => {{
         let words: [u32; 8] = $crate::cpu::vector::each!([0, 1, 2, 3, 4, 5, 6, 7], $lane => $word);
@@ -32,8 +33,8 @@ macro_rules! words {
         words
     }};
 }
-/// What a processor's vectors compute, as `fearless_simd::dispatch` does it, with one copy of the code less: processors of before
-/// 2013, which have SSE4.2 but no AVX2, take that of SSE2.
+/// Runs code with the processor's vectors, like `fearless_simd::dispatch`, but with one copy of the
+/// code fewer. Processors from before 2013, with SSE4.2 but no AVX2, use the SSE2 copy.
 macro_rules! lanes {
     ($level:expr, $simd:ident => $of_lanes:expr) => {{
         #[cfg(target_arch = "x86_64")]
@@ -58,7 +59,7 @@ macro_rules! lanes {
                     || $of_lanes,
                 )
             } else {
-                unreachable!("every such processor has SSE2")
+                unreachable!("every x86-64 processor has SSE2")
             }
         }
         #[cfg(not(target_arch = "x86_64"))]
@@ -72,13 +73,14 @@ pub(super) use {each, four, lanes, three, words};
 /// Eight numbers.
 pub type Lanes<S> = f32x8<S>;
 
-/// 2 to the power x, within 4·10⁻⁷ of it, for x from −126 to 126; beyond as at these ends.
+/// Returns 2 to the power x, within a relative error of 4·10⁻⁷, for x from −126 to 126; beyond
+/// that, the value at these ends.
 #[inline(always)]
 pub fn exp2<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
     exp2_within(simd, x.max(Lanes::splat(simd, -126.0)).min(Lanes::splat(simd, 126.0)))
 }
 
-/// 2 to the power x, for x from −126 to 126 alone.
+/// Returns 2 to the power x, for x from −126 to 126 only.
 #[inline(always)]
 pub fn exp2_within<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
     let whole = (x + 0.5).floor();
@@ -92,13 +94,13 @@ pub fn exp2_within<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
     sum * exponent.bitcast::<Lanes<S>>()
 }
 
-/// e to the power x.
+/// Returns e to the power x.
 #[inline(always)]
 pub fn exp<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
     exp2(simd, x * std::f32::consts::LOG2_E)
 }
 
-/// The logarithm of x > 0 to the base 2, within 10⁻⁵.
+/// Returns the logarithm of x > 0 to the base 2, within 10⁻⁵.
 #[inline(always)]
 pub fn log2<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
     let bits = x.bitcast::<i32x8<S>>();
@@ -114,14 +116,14 @@ pub fn log2<S: Simd>(simd: S, x: Lanes<S>) -> Lanes<S> {
     exponent + z * sum * std::f32::consts::LOG2_E
 }
 
-/// x to a power, x from 10⁻⁶ to 1 and the power no less than 0.
+/// Returns x to a power, for x from 10⁻⁶ to 1 and a power of at least 0.
 #[inline(always)]
 pub fn power<S: Simd>(simd: S, x: Lanes<S>, power: f32) -> Lanes<S> {
     const MOST: f32 = 255.0;
     if power.fract() != 0.0 || power > MOST {
         return exp2(simd, log2(simd, x) * power);
     }
-    // The product of x to the powers of 2 that the power is the sum of.
+    // Multiply the powers x^(2^i) for the bits i of the exponent.
     let (mut rest, mut square, mut product) = (power as u32, x, Lanes::splat(simd, 1.0));
     while rest > 0 {
         if rest & 1 != 0 {
@@ -133,7 +135,7 @@ pub fn power<S: Simd>(simd: S, x: Lanes<S>, power: f32) -> Lanes<S> {
     product
 }
 
-/// The product of the parts of two vectors, summed.
+/// Returns the dot product of two vectors.
 #[inline(always)]
 pub fn dot<S: Simd>(a: [Lanes<S>; 3], b: [Lanes<S>; 3]) -> Lanes<S> {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -1,9 +1,9 @@
-//! The samples around eight places, four along each axis, loaded as vectors; or two along each axis.
+//! The samples around eight places, four or two along each axis, loaded as vectors.
 
 use super::vector::{Lanes, each, four, words};
 use fearless_simd::{Simd, f32x4, i16x16, i32x8, prelude::*, u32x8};
 
-/// Where `N` samples of each of `R` rows of `R` slices around eight places lie in memory.
+/// The memory layout of `N` samples in each of `R` rows of `R` slices around eight places.
 pub struct Window<'a, T, const N: usize, const R: usize = N> {
     samples: &'a [T],
     /// The first sample of each lane.
@@ -15,7 +15,7 @@ pub struct Window<'a, T, const N: usize, const R: usize = N> {
 
 impl<'a, T: Copy, const N: usize, const R: usize> Window<'a, T, N, R> {
     /// # Panics
-    /// Where a window leaves the samples.
+    /// If a window leaves the samples.
     #[inline(always)]
     pub fn new(samples: &'a [T], places: [usize; 8], row: usize, slice: usize) -> Self {
         let room = samples.len().checked_sub((R - 1) * (row + slice) + N);
@@ -23,20 +23,21 @@ impl<'a, T: Copy, const N: usize, const R: usize> Window<'a, T, N, R> {
             let ends = each!([0, 1, 2, 3, 4, 5, 6, 7], I => places[I] > room);
             ends == [false; 8]
         });
-        assert!(is_inside, "a window beyond the samples");
+        assert!(is_inside, "a window leaves the samples");
         Self { samples, places, row, slice }
     }
 
-    /// Samples of a row of a slice of a lane, from one on.
+    /// Returns samples of a row of a slice of a lane, starting at `first`.
     #[inline(always)]
     #[expect(
         unsafe_code,
         reason = "eight checks for a window, instead of two for each of its 128 rows: twice as fast"
     )]
     fn row<const W: usize>(&self, lane: usize, [first, row, slice]: [usize; 3]) -> [T; W] {
-        assert!(first + W <= N && row < R && slice < R, "a row of no window");
+        assert!(first + W <= N && row < R && slice < R, "a row outside the window");
         let place = self.places[lane] + first + row * self.row + slice * self.slice;
-        // SAFETY: `new` found that the last row of the last slice ends in the samples; others end before it.
+        // SAFETY: `new` checked that the last row of the last slice ends inside the samples; the
+        // others end before it.
         unsafe { self.samples.as_ptr().add(place).cast::<[T; W]>().read_unaligned() }
     }
 }
@@ -48,28 +49,29 @@ pub struct Weights<S: Simd> {
 }
 
 impl<S: Simd> Weights<S> {
-    /// The moment of weights: the samples count −1, 0, 1 and 2.
+    /// The first moment uses the sample indices −1, 0, 1 and 2.
     #[inline(always)]
     pub fn new(weights: [Lanes<S>; 4]) -> Self {
         Self { weights, moment: weights[2] - weights[0] + weights[3] * 2.0 }
     }
 }
 
-/// What samples are, as vectors of them are loaded.
+/// A sample type, and how to load vectors of it.
 pub trait Sample: Copy + Send + Sync {
-    /// The weights of four samples in a row and those of its first moment, as [`Sample::row`] takes them.
+    /// The weights of four samples in a row, and those of the first moment, as [`Sample::row`]
+    /// takes them.
     type Row<S: Simd>: Copy;
-    /// What the sums of rows are to be multiplied by.
+    /// The factor that the sums of rows must be multiplied by.
     const UNIT: f32;
-    /// Where small integers count from, whose sums are so exact that any other zero may be taken off afterwards. Of other
-    /// samples it is taken off each.
+    /// The zero of small integers. Their sums are exact, so that any other zero can be subtracted
+    /// afterwards. For other types (`None`), the zero is subtracted from each sample.
     const ZERO: Option<f32>;
 
-    /// Weights for rows. Rounds them where rows take rounded ones.
+    /// Prepares weights for rows. Rounds them if rows take rounded weights.
     fn weigh<S: Simd>(simd: S, weights: &mut Weights<S>) -> Self::Row<S>;
 
-    /// The weighted sum of a row of a slice and its first moment, to be multiplied by [`Sample::UNIT`]. Values count from
-    /// [`Sample::ZERO`], else from `zero`.
+    /// Returns the weighted sum of a row of a slice and its first moment, to be multiplied by
+    /// [`Sample::UNIT`]. Values are relative to [`Sample::ZERO`], or else to `zero`.
     fn row<S: Simd>(
         simd: S,
         window: &Window<Self, 4>,
@@ -79,14 +81,14 @@ pub trait Sample: Copy + Send + Sync {
         zero: f32,
     ) -> [Lanes<S>; 2];
 
-    /// Four samples of a window, from one of a row of a slice on.
+    /// Returns four samples of a window, in a row of a slice from `first` on.
     fn four<S: Simd, const N: usize, const R: usize>(
         simd: S,
         window: &Window<Self, N, R>,
         first: [usize; 3],
     ) -> [Lanes<S>; 4];
 
-    /// Two samples of a window.
+    /// Returns two samples of a window.
     fn two<S: Simd, const N: usize, const R: usize>(
         simd: S,
         window: &Window<Self, N, R>,
@@ -96,7 +98,7 @@ pub trait Sample: Copy + Send + Sync {
     fn value(self) -> f32;
 }
 
-/// The weighted sum of four samples and its first moment.
+/// Returns the weighted sum of four samples and its first moment.
 #[inline(always)]
 pub fn row_of<S: Simd>(
     weights: &[Lanes<S>; 4],
@@ -112,7 +114,8 @@ pub fn row_of<S: Simd>(
     [weights[1].mul_add(four[1], before) + (after + second), after - before + second * 2.0]
 }
 
-/// Weights of small integers are multiples of 1/16384: two products of 16 bits fit 32.
+/// Weights of small integers are multiples of 1/16384: the sum of two products of 16-bit numbers
+/// fits 32 bits.
 const PARTS: f32 = 16384.0;
 
 /// Weights of two pairs of samples for each lane, and those of the first moment.
@@ -123,12 +126,13 @@ pub struct Pairs<S: Simd> {
 }
 
 impl<S: Simd> Pairs<S> {
-    /// Rounds weights so that they still add up to 1. `order` tells which samples are the pairs.
+    /// Rounds weights so that they still add up to 1. `order` says which samples form the pairs.
     #[inline(always)]
     fn new(simd: S, weights: &mut Weights<S>, order: [usize; 4]) -> Self {
         let [before, _, after, second] =
             four!(I => i32x8::<S>::truncate_from(weights.weights[I] * PARTS + 0.5));
-        // Twice that must fit 16 bits: beside the lattice, all weight may be that of the last sample.
+        // Twice this weight must fit 16 bits: beside the lattice, the last sample may have all the
+        // weight.
         let second = second.min(PARTS as i32 - 1);
         let none = i32x8::splat(simd, 0);
         let values = [before, none + PARTS as i32 - before - after - second, after, second];
@@ -137,12 +141,13 @@ impl<S: Simd> Pairs<S> {
         let pair = each!([0, 1], I => [values, moments][I]);
         let [value, moment] = each!([0, 1], I => {
             let own = pair[I];
-            each!([0, 2], K => ((own[order[K]] & 0xffff) | (own[order[K + 1]] << 16)).bitcast::<i16x16<S>>())
+            each!([0, 2], K => ((own[order[K]] & 0xffff) | (own[order[K + 1]] << 16))
+                .bitcast::<i16x16<S>>())
         });
         Self { value, moment }
     }
 
-    /// The sums of two pairs of samples for each lane.
+    /// Returns the sums of two pairs of samples for each lane.
     #[inline(always)]
     fn sums(&self, pairs: [u32x8<S>; 2]) -> [Lanes<S>; 2] {
         let [a, b] = each!([0, 1], I => pairs[I].bitcast::<i16x16<S>>());
@@ -205,8 +210,9 @@ impl Sample for u8 {
     }
 }
 
-/// Samples of two bytes, two in a word. Bits are turned so that they count as signed numbers from
-/// `$zero`; then is told how the first and the second of a word become 32-bit integers.
+/// Implements [`Sample`] for a type of two bytes, with two samples in a word. XOR with `$turned`
+/// turns samples into signed numbers relative to `$zero`. `$first` and `$second` extract the first
+/// and the second sample of a word as 32-bit integers.
 macro_rules! two_bytes {
     ($sample:ty, $turned:expr, $zero:expr, $word:ident => $first:expr, $second:expr) => {
         impl Sample for $sample {
@@ -235,7 +241,11 @@ macro_rules! two_bytes {
             }
 
             #[inline(always)]
-            fn four<S: Simd, const N: usize, const R: usize>(simd: S, window: &Window<Self, N, R>, first: [usize; 3]) -> [Lanes<S>; 4] {
+            fn four<S: Simd, const N: usize, const R: usize>(
+                simd: S,
+                window: &Window<Self, N, R>,
+                first: [usize; 3],
+            ) -> [Lanes<S>; 4] {
                 let [a, b] = each!([0, 2], I => {
                     let [at, row, slice] = first;
                     let $word = words!(simd, L => in_word(window.row(L, [at + I, row, slice])));
@@ -245,7 +255,11 @@ macro_rules! two_bytes {
             }
 
             #[inline(always)]
-            fn two<S: Simd, const N: usize, const R: usize>(simd: S, window: &Window<Self, N, R>, first: [usize; 3]) -> [Lanes<S>; 2] {
+            fn two<S: Simd, const N: usize, const R: usize>(
+                simd: S,
+                window: &Window<Self, N, R>,
+                first: [usize; 3],
+            ) -> [Lanes<S>; 2] {
                 let $word = words!(simd, L => in_word(window.row(L, first)));
                 [Lanes::float_from($first), Lanes::float_from($second)]
             }
@@ -257,17 +271,19 @@ macro_rules! two_bytes {
         }
     };
 }
-two_bytes!(u16, 0x8000_8000, 32768.0, word => (word & 0xffff).bitcast::<i32x8<S>>(), (word >> 16).bitcast::<i32x8<S>>());
-two_bytes!(i16, 0, 0.0, word => (word << 16).bitcast::<i32x8<S>>() >> 16, word.bitcast::<i32x8<S>>() >> 16);
+two_bytes!(u16, 0x8000_8000, 32768.0, word => (word & 0xffff).bitcast::<i32x8<S>>(),
+    (word >> 16).bitcast::<i32x8<S>>());
+two_bytes!(i16, 0, 0.0, word => (word << 16).bitcast::<i32x8<S>>() >> 16,
+    word.bitcast::<i32x8<S>>() >> 16);
 
-/// Two successive samples in a word.
+/// Packs two successive samples into a word.
 #[inline(always)]
 fn in_word<T: Into<i32> + Copy>(samples: [T; 2]) -> u32 {
     let (low, high): (i32, i32) = (samples[0].into(), samples[1].into());
     low as u32 & 0xffff | (high as u32) << 16
 }
 
-/// Rows of samples that become 32-bit floats one by one.
+/// Rows of samples that are converted to 32-bit floats one by one.
 macro_rules! rows_of_floats {
     () => {
         type Row<S: Simd> = [Lanes<S>; 4];
@@ -359,7 +375,7 @@ impl Sample for f32 {
     }
 }
 
-/// Four numbers of each lane: rows become columns.
+/// Transposes rows of four numbers, one for each lane, into columns.
 #[inline(always)]
 pub fn columns<S: Simd>(simd: S, rows: [[f32; 4]; 8]) -> [Lanes<S>; 4] {
     let [low, high] = each!([0, 4], I => {
@@ -371,7 +387,7 @@ pub fn columns<S: Simd>(simd: S, rows: [[f32; 4]; 8]) -> [Lanes<S>; 4] {
     four!(I => simd.combine_f32x4(low[I], high[I]))
 }
 
-/// Two numbers of each lane.
+/// The same for two numbers of each lane.
 #[inline(always)]
 pub fn pairs<S: Simd>(simd: S, pairs: [[f32; 2]; 8]) -> [Lanes<S>; 2] {
     each!([0, 1], I => {

@@ -61,7 +61,7 @@ pub(crate) const MOST_PIXELS: f32 = 1e9;
 const CONE_MARGIN_DEGREES: f64 = 25.0;
 
 /// A cut of one hierarchy in one view. Everything is in 32 bits, as on the GPU, which computes the
-/// same (shaders/cut.wgsl).
+/// same (shaders/passes/cut.wgsl).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cut {
     /// Columns of the rotation from the hierarchy's frame to view space, and the view-space

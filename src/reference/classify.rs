@@ -1,13 +1,13 @@
-//! A transfer function over stretches of value.
+//! A transfer function, averaged over ranges of values.
 
 use super::quadrature::quadrature;
 use crate::volume::TransferFunction;
 use glam::DVec3;
 
-/// Opacities over this count as this ([`TransferFunction::extinction`]).
+/// Larger opacities count as this one ([`TransferFunction::extinction`]).
 const OPAQUE: f64 = 0.9999;
 
-/// A transfer function and the values between which its extinction and colour are smooth.
+/// A transfer function, and the values between which its extinction and colour are smooth.
 #[derive(Debug)]
 pub(super) struct Classifier<'a> {
     pub transfer: &'a TransferFunction,
@@ -18,7 +18,8 @@ impl<'a> Classifier<'a> {
     pub fn new(transfer: &'a TransferFunction) -> Self {
         let points = transfer.color.iter().map(|p| p.0).chain(transfer.opacity.iter().map(|p| p.0));
         let mut cuts: Vec<f64> = points.collect();
-        // The logarithm of a transmittance is smooth where that does not fall by a large factor: cut where it halves.
+        // The logarithm of a transmittance is smooth where the transmittance does not fall by a
+        // large factor: cut wherever it halves.
         let levels = (1..14).map(|halvings| 1.0 - 0.5_f64.powi(halvings)).chain([OPAQUE]);
         for level in levels {
             for pair in transfer.opacity.windows(2) {
@@ -34,12 +35,13 @@ impl<'a> Classifier<'a> {
         Self { transfer, cuts }
     }
 
-    /// Extinction and colour of a value.
+    /// Returns the extinction and colour of a value.
     pub fn at(&self, value: f64) -> (f64, DVec3) {
         (self.transfer.extinction(value), DVec3::from(self.transfer.color(value)))
     }
 
-    /// The mean extinction of all values between two, and their mean colour by extinction (Engel et al. 2001).
+    /// Returns the mean extinction over all values between two values, and their mean colour,
+    /// weighted by extinction (Engel et al. 2001).
     pub fn between(&self, a: f64, b: f64) -> (f64, DVec3) {
         let (low, high) = (a.min(b), a.max(b));
         if low == high {
@@ -77,7 +79,7 @@ mod tests {
             ..TransferFunction::default()
         };
         let classifier = Classifier::new(&transfer);
-        // Extinction 4 from 2 to 4.
+        // The extinction is 4 from 2 to 4.
         for (a, b, extinction, blue) in
             [(1.0, 2.5, 4.0 / 3.0, 0.0), (3.5, 1.5, 3.0, 1.0 / 3.0), (0.0, 5.0, 1.6, 0.5)]
         {

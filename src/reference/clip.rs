@@ -1,4 +1,4 @@
-//! Which parts of a ray are drawn: ascending intervals of distances, cut by boxes and planes.
+//! The visible parts of a ray: ascending intervals of distances, cut by boxes and planes.
 
 use super::ray::Ray;
 use crate::{
@@ -8,7 +8,7 @@ use crate::{
 };
 use glam::DVec3;
 
-/// The parts of a ray that all clips leave.
+/// Returns the parts of a ray that all clips leave.
 pub(super) fn allowed(ray: &Ray, view: &View, clips: &[Clip]) -> Vec<[f64; 2]> {
     let (origin, direction) = in_world(ray, view);
     clips.iter().fold(vec![[f64::NEG_INFINITY, f64::INFINITY]], |parts, clip| {
@@ -22,8 +22,8 @@ pub(super) fn allowed(ray: &Ray, view: &View, clips: &[Clip]) -> Vec<[f64; 2]> {
     })
 }
 
-/// Where a ray is in the box of a lattice's samples. An axis on which all samples lie at one place counts half a kernel unit
-/// to either side.
+/// Returns the part of a ray inside the box of a lattice's samples. An axis on which all samples
+/// lie at one place extends half a kernel unit to either side.
 pub(super) fn sample_box(ray: &Ray, view: &View, lattice: &Lattice) -> Option<[f64; 2]> {
     let (origin, direction) = in_world(ray, view);
     let to_steps = lattice.axes.inverse();
@@ -38,19 +38,19 @@ pub(super) fn sample_box(ray: &Ray, view: &View, lattice: &Lattice) -> Option<[f
     within(to_steps * (origin - lattice.origin), to_steps * direction, [low, high])
 }
 
-/// What is in some parts of a ray and in an interval.
+/// Intersects the parts of a ray with an interval.
 pub(super) fn intersection(parts: &[[f64; 2]], interval: Option<[f64; 2]>) -> Vec<[f64; 2]> {
     let Some([low, high]) = interval else { return Vec::new() };
     let cut = parts.iter().map(|[from, to]| [from.max(low), to.min(high)]);
     cut.filter(|[from, to]| from < to).collect()
 }
 
-/// Whether a place on a ray lies in one of some parts of it.
+/// Whether a place on a ray lies in one of its parts.
 pub(super) fn contains(parts: &[[f64; 2]], place: f64) -> bool {
     parts.iter().any(|[from, to]| (*from..=*to).contains(&place))
 }
 
-/// What is in some parts of a ray and not in an interval.
+/// Returns the parts of a ray without an interval.
 fn difference(parts: &[[f64; 2]], interval: Option<[f64; 2]>) -> Vec<[f64; 2]> {
     let Some([low, high]) = interval else { return parts.to_vec() };
     let rest = parts.iter().flat_map(|&[from, to]| [[from, to.min(low)], [from.max(high), to]]);
@@ -62,7 +62,7 @@ fn in_world(ray: &Ray, view: &View) -> (DVec3, DVec3) {
     (to_world * ray.origin + view.position, to_world * ray.direction)
 }
 
-/// Where s·slope ≤ rest.
+/// Returns the s with s·slope ≤ rest.
 fn half_space(rest: f64, slope: f64) -> Option<[f64; 2]> {
     if slope == 0.0 {
         return (rest >= 0.0).then_some([f64::NEG_INFINITY, f64::INFINITY]);
@@ -71,7 +71,7 @@ fn half_space(rest: f64, slope: f64) -> Option<[f64; 2]> {
     Some(if slope > 0.0 { [f64::NEG_INFINITY, bound] } else { [bound, f64::INFINITY] })
 }
 
-/// Where a line is in a box along the axes.
+/// Returns the part of a line inside an axis-aligned box.
 fn within(origin: DVec3, direction: DVec3, [low, high]: [DVec3; 2]) -> Option<[f64; 2]> {
     let mut interval = Some([f64::NEG_INFINITY, f64::INFINITY]);
     for axis in 0..3 {

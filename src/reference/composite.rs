@@ -1,18 +1,19 @@
-//! Light on its way through the sheets.
+//! Compositing along a ray, front to back.
 
 use glam::DVec3;
 
-/// What one sheet puts on a ray.
+/// The optical depth and colour that one sheet adds to a ray.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Medium {
     /// Optical depth.
     pub depth: f64,
-    /// Red, green, blue, 0 … 1.
+    /// Red, green and blue, each 0 … 1.
     pub color: DVec3,
 }
 
 impl Medium {
-    /// Two media in one sheet: optical depths add, colours mix by them.
+    /// Adds another medium in the same sheet. Optical depths add; colours mix in proportion to
+    /// them.
     pub fn with(self, other: Self) -> Self {
         let depth = self.depth + other.depth;
         if depth > 0.0 {
@@ -23,24 +24,24 @@ impl Medium {
     }
 }
 
-/// A part of a sheet that grows evenly by optical depth.
+/// A part of a sheet in which optical depth grows evenly.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
     /// Infinite at an opaque surface.
     pub depth: f64,
-    /// The distances along the ray between which it lies.
+    /// The distances along the ray at which the part begins and ends.
     pub span: [f64; 2],
 }
 
-/// What a ray has passed so far, front to back.
+/// The light gathered along a ray so far, front to back.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Composite {
     /// Colour multiplied by opacity.
     pub color: DVec3,
     pub opacity: f64,
-    /// Optical depth passed.
+    /// Accumulated optical depth.
     pub depth: f64,
-    /// Distance along the ray at which half of the light is taken; infinite until then.
+    /// Distance along the ray at which half of the light is absorbed; infinite until then.
     pub half: f64,
 }
 
@@ -48,12 +49,12 @@ impl Composite {
     pub const EMPTY: Self =
         Self { color: DVec3::ZERO, opacity: 0.0, depth: 0.0, half: f64::INFINITY };
 
-    /// Passes a medium that grows evenly between two distances.
+    /// Adds a medium whose optical depth grows evenly between two distances.
     pub fn pass(&mut self, medium: Medium, span: [f64; 2]) {
         self.pass_in_steps(medium, &[Step { depth: medium.depth, span }]);
     }
 
-    /// Passes a medium that grows by these steps.
+    /// Adds a medium whose optical depth grows by these steps.
     pub fn pass_in_steps(&mut self, medium: Medium, steps: &[Step]) {
         let alpha = -(-medium.depth).exp_m1();
         let light = 1.0 - self.opacity;

@@ -1,4 +1,4 @@
-//! The field at a point: at the faces of sheets.
+//! The field at a point, on the faces of sheets.
 
 use super::{
     kernel::{Crossing, Sample},
@@ -6,7 +6,7 @@ use super::{
 };
 use glam::{DVec2, DVec3};
 
-/// The sums over all kernels at one point of a ray, and their derivatives in view space.
+/// The sums over all kernels at one point of a ray, and the derivatives of the sums in view space.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Face {
     /// P
@@ -18,12 +18,12 @@ pub(super) struct Face {
 }
 
 impl Face {
-    /// A field that is known there.
+    /// A face at which the field is already known.
     pub fn new(value: f64, gradient: DVec3) -> Self {
         Self { weight: 1.0, value, weight_gradient: DVec3::ZERO, value_gradient: gradient }
     }
 
-    /// Adds a kernel at a distance along the ray.
+    /// Adds a kernel's contribution at distance s along the ray.
     pub fn add(&mut self, sample: &Sample, center: DVec3, crossing: &Crossing, ray: &Ray, s: f64) {
         let (h, gradient) = crossing.at(s);
         let carried = sample.value + sample.slope.dot(ray.point(s) - center);
@@ -33,19 +33,19 @@ impl Face {
         self.value_gradient += sample.weight * (carried * gradient + h * sample.slope);
     }
 
-    /// Q/P; none where kernels add up to no more than `least`.
+    /// Returns Q/P, or `None` if the kernels add up to no more than `least`.
     pub fn value(&self, least: f64) -> Option<f64> {
         (self.weight > least).then(|| self.value / self.weight)
     }
 
-    /// The gradient of the value.
+    /// Returns the gradient of the value.
     pub fn gradient(&self, least: f64) -> Option<DVec3> {
         let value = self.value(least)?;
         Some((self.value_gradient - value * self.weight_gradient) / self.weight)
     }
 
-    /// The gradient of the value at distance s, its part across the picture from the values in the pixels to the left, right,
-    /// above and below.
+    /// Returns the gradient of the value at distance s. Its components across the picture come from
+    /// the values in the pixels to the left, right, above and below.
     pub fn central_gradient(
         &self,
         least: f64,
@@ -63,8 +63,9 @@ impl Face {
     }
 }
 
-/// The slope, at the middle one of three neighbours, of what may have a value at each: from neighbour to neighbour, from the
-/// middle to the only neighbour, or 0 without neighbours.
+/// Returns the slope at the middle one of three neighbours, any of which may lack a value: the
+/// difference across both neighbours, the one-sided difference if there is only one, or 0 without
+/// neighbours.
 fn slope([before, here, after]: [Option<f64>; 3]) -> f64 {
     match (before, here, after) {
         (Some(before), _, Some(after)) => 0.5 * (after - before),

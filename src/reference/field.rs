@@ -1,4 +1,4 @@
-//! How a field shows in one sheet of a ray.
+//! The colour and optical depth of a field in one sheet of a ray.
 
 use super::{
     classify::Classifier,
@@ -11,19 +11,19 @@ use glam::DVec3;
 /// The scalar field of a scene, classified after interpolation.
 pub(super) struct Field<'a> {
     pub classifier: Classifier<'a>,
-    /// Where the samples lie; none for scattered ones.
+    /// The samples' lattice; `None` for scattered samples.
     pub lattice: Option<&'a Lattice>,
     pub shade: Option<Shade>,
-    /// Surfaces of one value.
+    /// Isosurfaces.
     pub surfaces: &'a [Isosurface],
-    /// Whether values inside a sheet are classified, or their mean.
+    /// Whether the values inside a sheet are classified, rather than their mean.
     pub inside: bool,
 }
 
-/// The field in one sheet of a ray. Places in it are counted from 0 at the front to 1 at the back.
+/// The field in one sheet of a ray. Places in the sheet run from 0 at the front to 1 at the back.
 #[derive(Clone, Copy)]
 pub(super) struct Layer {
-    /// The distances of its faces.
+    /// The distances of the sheet's faces.
     pub span: [f64; 2],
     pub mean: f64,
     /// The values at the faces.
@@ -33,25 +33,26 @@ pub(super) struct Layer {
     pub filling: f64,
 }
 
-/// A part of a sheet: places, and the values there.
+/// A part of a sheet: the places of its ends, and the values there.
 struct Part {
     places: [f64; 2],
     values: [f64; 2],
 }
 
-/// Parts of a piece over which values count as linear.
+/// Number of parts of a piece; values are taken as linear within a part.
 const PARTS: u32 = 3;
 
-/// Light that is less than this counts as none, so that optical depths stay finite.
+/// Less light than this counts as this much, so that optical depths stay finite.
 const LEAST_LIGHT: f64 = 1e-9;
 
 impl Field<'_> {
-    /// Whether gradients show.
+    /// Whether gradients affect the picture.
     pub fn needs_gradients(&self) -> bool {
         self.shade.is_some() || !self.classifier.transfer.gradient.is_empty()
     }
 
-    /// The surfaces that a part passes, each with its share of the part, in the order met.
+    /// Returns the surfaces that a part crosses, each with its share of the part, in the order of
+    /// crossing.
     fn met(&self, [a, b]: [f64; 2]) -> Vec<(f64, &Isosurface)> {
         let crossed =
             self.surfaces.iter().filter(|surface| (a < surface.value) != (b < surface.value));
@@ -68,7 +69,7 @@ impl Field<'_> {
 }
 
 impl Layer {
-    /// The value at a place: of the parabola that has the faces' values and the mean.
+    /// Returns the value at a place, from the parabola that has the faces' values and the mean.
     pub fn value(&self, u: f64) -> f64 {
         let [front, back] = self.faces.map(|face| face.unwrap_or(self.mean));
         let middle = 1.5 * self.mean - 0.25 * (front + back);
@@ -77,7 +78,8 @@ impl Layer {
             + back * u * (2.0 * u - 1.0)
     }
 
-    /// The gradient at a place: across the ray between those of the faces, along it the parabola's own.
+    /// Returns the gradient at a place: interpolated between the faces' gradients across the ray,
+    /// and the parabola's derivative along it.
     fn gradient(&self, u: f64, direction: DVec3) -> DVec3 {
         let mixed = match self.gradients {
             [Some(front), Some(back)] => (1.0 - u) * front + u * back,
@@ -95,7 +97,7 @@ impl Layer {
         self.span[0] + u * (self.span[1] - self.span[0])
     }
 
-    /// Pieces of the ray, cut in parts.
+    /// Divides pieces of the ray into parts.
     fn parts(&self, field: &Field, pieces: &[[f64; 2]]) -> Vec<Part> {
         let count = if field.inside || !field.surfaces.is_empty() { PARTS } else { 1 };
         let [front, back] = self.span;
@@ -112,7 +114,8 @@ impl Layer {
         parts.collect()
     }
 
-    /// The largest value at the ends of all parts, or the mean.
+    /// Returns the largest value at the ends of all parts, or the mean if only the mean is
+    /// classified.
     pub fn largest(&self, field: &Field, pieces: &[[f64; 2]]) -> Option<f64> {
         if !field.inside {
             return (!pieces.is_empty()).then_some(self.mean);
@@ -120,7 +123,8 @@ impl Layer {
         self.parts(field, pieces).iter().flat_map(|part| part.values).reduce(f64::max)
     }
 
-    /// What the pieces of the ray put on it: all together, and one after another.
+    /// Returns the medium of all pieces of the ray together, and the steps of optical depth one
+    /// after another.
     pub fn shine(
         &self,
         field: &Field,
@@ -209,7 +213,8 @@ mod tests {
 
     #[test]
     fn surfaces_and_medium_by_hand() {
-        // Extinction 1 everywhere; a value from 0 to 8 passes two surfaces, listed the other way round.
+        // The extinction is 1 everywhere. A value from 0 to 8 crosses two surfaces, listed in the
+        // opposite order.
         let surface =
             |value: f64, color: [f64; 3], opacity: f64| Isosurface { value, color, opacity };
         let transfer = TransferFunction {
@@ -247,7 +252,7 @@ mod tests {
                 .map(|s| s.span[0])
                 .collect();
             assert_eq!(places, [3.5, 4.5]);
-            // Backwards, and cut to its second half.
+            // Backwards, and cut to the second half.
             let (back, _) = Layer { faces: [Some(8.0), Some(0.0)], ..layer }.shine(
                 &field(inside),
                 DVec3::Z,
@@ -271,7 +276,8 @@ mod tests {
         };
         assert_eq!(met([1.0, 5.0]), [(0.25, 0.2), (0.25, 0.3), (0.5, 0.1), (1.0, 0.4)]);
         assert_eq!(met([5.0, 1.0]), [(0.0, 0.4), (0.5, 0.1), (0.75, 0.2), (0.75, 0.3)]);
-        // An end that has a surface's value is met by one of the two parts that share it.
+        // If the value of an end equals a surface's value, only one of the two parts that share the
+        // end crosses the surface.
         assert_eq!(met([2.0, 2.5]), []);
     }
 }

@@ -12,21 +12,22 @@ use crate::{
 };
 use glam::{DMat3, DVec3};
 
-/// How samples are classified before they are added.
+/// How samples are classified before interpolation.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Before {
-    /// Whether they need normals.
+    /// Whether the samples need normals.
     pub lit: bool,
 }
 
-/// All kernels of a scene, in its order. `before`: samples become radiance.
+/// Returns all kernels of a scene, in the scene's order. If `before` is set, samples become
+/// radiance.
 pub(super) fn gather<'a>(scene: &'a Scene, view: &View, before: Option<Before>) -> Vec<Kernel<'a>> {
     let mut kernels = Vec::new();
     for item in &scene.items {
         match item {
             Item::Radiance(set) => kernels
                 .extend(set.splats.iter().filter_map(|splat| from_splat(set, splat, None, view))),
-            // Its cut is a set of its own by now.
+            // A hierarchy's cut has become a set by now, and bricks a volume.
             Item::Hierarchy(_) | Item::Bricks(..) => {}
             Item::Scalar(set, transfer) => {
                 let before = before.map(|before| (before, transfer));
@@ -34,7 +35,8 @@ pub(super) fn gather<'a>(scene: &'a Scene, view: &View, before: Option<Before>) 
                     set.splats.iter().filter_map(|splat| from_splat(set, splat, before, view)),
                 );
             }
-            // No radial functions: its field is asked for point by point.
+            // Tensor products are not radial functions: their field is evaluated point by point
+            // (product.rs).
             Item::Volume(_, kernel, _) if kernel.as_tensor().is_some() => {}
             Item::Volume(volume, kernel, transfer) => {
                 let before = before.map(|before| (before, transfer));
@@ -45,15 +47,16 @@ pub(super) fn gather<'a>(scene: &'a Scene, view: &View, before: Option<Before>) 
     kernels
 }
 
-/// How much the colour and normal of a splat count within a sheet: what faces the eye hides what faces away. The change
-/// from one to the other is spread over a quarter of the cosine, and far sides keep enough to have a colour when alone.
+/// Returns the weight of a splat's colour and normal within a sheet: splats that face the eye hide
+/// those that face away. The transition spans a quarter of the cosine's range. Far sides keep
+/// enough weight to have a colour when they are alone.
 fn facing(normal: DVec3, center: DVec3, view: &View) -> f64 {
     let ray = if view.perspective { center.normalize_or_zero() } else { DVec3::Z };
     (0.5 - 4.0 * normal.dot(ray)).clamp(1.0 / 255.0, 1.0)
 }
 
-/// A sample as radiance: `density` times as dense as its transfer function says. Its normal points to smaller values,
-/// because fields are mostly dense inside, and surfaces face outward.
+/// Returns a sample as radiance, `density` times as dense as its transfer function says. The normal
+/// points to smaller values, because fields are mostly dense inside, and surfaces face outward.
 fn classified(
     value: f64,
     density: f64,
@@ -71,7 +74,8 @@ fn classified(
     })
 }
 
-/// A splat, widened so that it does not fall between pixels; `None` where it has no volume or is not finite.
+/// Returns a splat's kernel, widened so that it cannot fall between pixels; `None` if the splat has
+/// no volume or is not finite.
 fn from_splat<'a>(
     set: &SplatSet,
     splat: &Splat,
@@ -89,7 +93,8 @@ fn from_splat<'a>(
     let load = match set.payload {
         Payload::Scalar => {
             let (weight, slope) = splat.weight_and_slope();
-            // Widened, a sample still counts as much over space: else what is far below a pixel would drown its surroundings.
+            // A widened sample keeps its weight over space. Otherwise a sample far smaller than a
+            // pixel would drown its surroundings.
             let thinner = (sharp.determinant() / factor.determinant()).abs();
             let (value, weight) = (f64::from(splat.strength), f64::from(weight) * thinner);
             // A slope across a flat kernel has no meaning in space.
@@ -123,7 +128,7 @@ fn from_splat<'a>(
     Some(Kernel::new(center, factor, set.extent.into(), Profile::Gaussian, load))
 }
 
-/// The kernels of a volume's samples.
+/// Appends the kernels of a volume's samples.
 fn from_volume<'a>(
     kernels: &mut Vec<Kernel<'a>>,
     volume: &Volume,
@@ -154,10 +159,10 @@ fn from_volume<'a>(
     }));
 }
 
-/// What the kernels at all samples of a lattice sum to on average.
+/// Returns the average sum of the kernels at all samples of a lattice.
 fn overlap(shape: &math::Kernel, lattice: &Lattice) -> f64 {
     match lattice.arrangement {
-        // Two samples in each cubic cell, and kernels in units of √½ of its edge.
+        // Each cubic cell has two samples, and kernels are in units of √½ of its edge.
         Arrangement::BodyCentred => {
             shape.integral() * std::f64::consts::FRAC_1_SQRT_2.powi(3) / 0.5
         }
@@ -165,9 +170,10 @@ fn overlap(shape: &math::Kernel, lattice: &Lattice) -> f64 {
     }
 }
 
-/// The gradient at a sample of a lattice, in world space: along each axis the slope of the parabola through the sample and its
-/// two neighbours, one-sided at the border, 0 along an axis of one sample. Neighbours on a body-centred lattice are those of
-/// the same cubic lattice.
+/// Returns the gradient at a sample of a lattice, in world space. Along each axis it is the slope
+/// of the parabola through the sample and its two neighbours, one-sided at the border, and 0 along
+/// an axis with one sample. On a body-centred lattice, the neighbours are those of the same cubic
+/// lattice.
 fn slope(lattice: &Lattice, at: usize, value: impl Fn(usize) -> f64) -> DVec3 {
     let index = lattice.index(at);
     let [nx, ny, _] = lattice.dims;
@@ -196,7 +202,8 @@ fn slope(lattice: &Lattice, at: usize, value: impl Fn(usize) -> f64) -> DVec3 {
     lattice.axes.inverse().transpose() * along
 }
 
-/// The lower triangular L with L·Lᵀ = `matrix`; `None` where the matrix is not positive definite.
+/// Returns the lower triangular L with L·Lᵀ = `matrix`; `None` if the matrix is not positive
+/// definite.
 fn cholesky(matrix: DMat3) -> Option<DMat3> {
     let row = |r: usize, c: usize| matrix.col(c)[r];
     let pivot = |squared: f64| (squared > 0.0 && squared.is_finite()).then(|| squared.sqrt());
@@ -247,7 +254,7 @@ mod tests {
             let view = camera.view([40, 30]).unwrap();
             let kernel = from_splat(&set, &set.splats[0], None, &view).unwrap();
             let pixel = if view.perspective { kernel.center.length() } else { 1.0 } / view.scale;
-            // Rows of B give Σ along the world's axes: x has 0.5², x and y share −0.1.
+            // The rows of B give Σ along the world's axes: Σ_xx is 0.5² and Σ_xy is −0.1.
             let covariance =
                 |a: DVec3, b: DVec3| kernel.covariance(view.rotation * a, view.rotation * b);
             assert!((covariance(DVec3::X, DVec3::X) - 0.25 - (0.35 * pixel).powi(2)).abs() < 1e-9);
@@ -281,7 +288,7 @@ mod tests {
                 assert!((found - gradient).length() < 1e-5, "{found} at {at}");
             }
         }
-        // Of a parabola too, between unequal neighbours.
+        // The slope of a parabola is exact too, between unequal neighbours.
         let places = Arc::new([vec![0.0, 1.0, 4.0], vec![0.0], vec![0.0]]);
         let arrangement = Arrangement::Rectilinear(places);
         let lattice =

@@ -12,7 +12,7 @@ use super::{
 use crate::scene::{Gradient, Optics};
 use glam::DVec3;
 
-/// The values of a pixel's faces in the pixels to the left, right, above and below.
+/// The values at a pixel's faces in the pixels to the left, right, above and below.
 type Around = [Vec<Option<f64>>; 4];
 
 impl Frame<'_> {
@@ -174,7 +174,7 @@ impl Frame<'_> {
         composite
     }
 
-    /// The colour of the largest value on a ray.
+    /// Returns the colour of the largest value on a ray.
     fn largest(&self, field: &Field, value: f64) -> Composite {
         let transfer = field.classifier.transfer;
         let opacity = transfer.opacity(value);
@@ -185,7 +185,7 @@ impl Frame<'_> {
         }
     }
 
-    /// The radiance of a sheet, lit once.
+    /// Returns the radiance of a sheet, lit once.
     pub(super) fn surface(&self, sheet: &Sheet, ray: &Ray) -> Medium {
         if sheet.light.depth < LEAST_DEPTH {
             Medium::default()

@@ -1,37 +1,37 @@
-//! A kernel in view space, and what a ray meets of it.
+//! A kernel in view space, and its intersection with a ray.
 
 use super::{profile::Profile, ray::Ray};
 use glam::{DMat3, DVec3};
 use std::f64::consts::PI;
 
-/// What a kernel carries.
+/// The payload of a kernel.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Load {
     Radiance(Radiance),
     Sample(Sample),
 }
 
-/// What is classified before it is added.
+/// The payload of a kernel that was classified before interpolation.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Radiance {
     pub amount: Amount,
     pub color: DVec3,
     /// In view space.
     pub normal: Option<DVec3>,
-    /// How much of it faces the eye.
+    /// The weight by how much it faces the eye.
     pub facing: f64,
 }
 
-/// How much a kernel holds back.
+/// How much light a kernel absorbs.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Amount {
-    /// This optical depth through the centre, whatever the direction.
+    /// This optical depth through the centre, in every direction.
     Depth(f64),
-    /// Optical depth per length of kernel.
+    /// Optical depth per length of the kernel's line integral.
     Extinction(f64),
 }
 
-/// A sample of a field: it carries value + slope·(x − centre) and counts `weight` times.
+/// A sample of a field: it carries value + slope·(x − centre) and has a weight.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sample {
     pub value: f64,
@@ -44,9 +44,9 @@ pub(super) struct Sample {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Kernel<'a> {
     pub center: DVec3,
-    /// View space from kernel space.
+    /// Maps kernel space to view space.
     factor: DMat3,
-    /// Kernel space from view space: the inverse.
+    /// Maps view space to kernel space: the inverse.
     whitening: DMat3,
     /// Radius of the footprint in kernel space.
     radius: f64,
@@ -59,15 +59,15 @@ pub(super) struct Kernel<'a> {
 pub(super) struct Crossing<'a> {
     whitening: DMat3,
     profile: Profile<'a>,
-    /// q: the place in kernel space where the ray is closest to the centre.
+    /// q: the point of the ray closest to the centre, in kernel space.
     offset: DVec3,
-    /// β: what one world unit along the ray adds to it.
+    /// β: the change of the kernel-space point per world unit along the ray.
     direction: DVec3,
     /// |β|
     density: f64,
     /// ρ = |q|
     rho: f64,
-    /// s*: where on the ray that is.
+    /// s*: the distance of that point along the ray.
     pub closest: f64,
 }
 
@@ -82,7 +82,7 @@ impl<'a> Kernel<'a> {
         Self { center, factor, whitening: factor.inverse(), radius, profile, load }
     }
 
-    /// Σ between two directions.
+    /// Returns the covariance between two directions.
     #[cfg(test)]
     pub fn covariance(&self, a: DVec3, b: DVec3) -> f64 {
         (self.factor.transpose() * a).dot(self.factor.transpose() * b)
@@ -91,11 +91,13 @@ impl<'a> Kernel<'a> {
     /// Whether the plane of the points p with p·normal = offset meets the footprint's ellipsoid.
     pub fn meets_plane(&self, normal: DVec3, offset: f64) -> bool {
         let reach = self.radius * (self.factor.transpose() * normal).length();
-        // A hair more than the reach, so that rounding leaves out no kernel that a ray in the plane meets.
+        // Slightly more than the reach, so that rounding leaves out no kernel that a ray in the
+        // plane meets.
         (self.center.dot(normal) - offset).abs() <= reach * (1.0 + 1e-9)
     }
 
-    /// What a ray meets of the kernel; `None` where it passes outside the footprint.
+    /// Returns the crossing of a ray with the kernel; `None` if the ray passes outside the
+    /// footprint.
     pub fn cross(&self, ray: &Ray) -> Option<Crossing<'a>> {
         let alpha = self.whitening * (ray.origin - self.center);
         let direction = self.whitening * ray.direction;
@@ -113,27 +115,28 @@ impl<'a> Kernel<'a> {
 }
 
 impl Crossing<'_> {
-    /// The distances along the ray between which the kernel is more than nothing.
+    /// Returns the distances along the ray between which the kernel is not negligible.
     pub fn span(&self) -> [f64; 2] {
         let reach = self.profile.reach(self.rho) / self.density;
         [self.closest - reach, self.closest + reach]
     }
 
-    /// ∫ h ds and ∫ (s − s*)·h ds over a part of the ray, in world units.
+    /// Returns ∫ h ds and ∫ (s − s*)·h ds over a part of the ray, in world units.
     pub fn moments(&self, [from, to]: [f64; 2]) -> [f64; 2] {
         let place = |s: f64| self.density * (s - self.closest);
         let [length, first] = self.profile.moments(self.rho, [place(from), place(to)]);
         [length / self.density, first / (self.density * self.density)]
     }
 
-    /// h at a distance along the ray, and its gradient in view space. Gradients ignore the footprint's rim.
+    /// Returns h at a distance along the ray, and its gradient in view space. Gradients ignore the
+    /// footprint's rim.
     pub fn at(&self, s: f64) -> (f64, DVec3) {
         let place = self.offset + (s - self.closest) * self.direction;
         let r = place.length();
         (self.profile.value(r), self.whitening.transpose() * (self.profile.slope(r) * place))
     }
 
-    /// The optical depth that a part of the ray takes from the kernel.
+    /// Returns the optical depth of the kernel over a part of the ray.
     pub fn optical_depth(&self, amount: Amount, part: [f64; 2]) -> f64 {
         let [length, _] = self.moments(part);
         match amount {
@@ -233,7 +236,8 @@ mod tests {
                 });
                 let rays = rays.count();
                 assert!(plane || rays == 0);
-                // The ellipsoid is met by the plane in more than a point, unless only just.
+                // A plane that meets the ellipsoid does so in more than a point, unless it only
+                // grazes it.
                 met += usize::from(plane != (rays > 0));
             }
             assert!(met <= 2, "{met} rows were kept for nothing");

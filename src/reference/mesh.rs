@@ -1,4 +1,4 @@
-//! A mesh without splats: rays that meet its triangles, as truth for surfels.
+//! A mesh without splats: rays that intersect its triangles, as ground truth for surfels.
 
 use super::{composite::Composite, composite::Medium, picture, ray::Ray, shade};
 use crate::{
@@ -18,18 +18,22 @@ use obvhs::{
 use rayon::prelude::*;
 use std::time::Duration;
 
-/// Draws the triangles of a mesh by rays, `side`² of them evenly over each pixel. Colours (vertex colour × material × texture)
-/// and normals are interpolated over each triangle (Phong 1975); normals are the file's, or those that meet at a vertex without
-/// a crease of more than `crease_angle_degrees` between them, as for [surfels](Mesh::surfels). Light is that on surfaces, on
-/// both sides. A triangle holds back its opacity. The depth is that of the first ray of a pixel at which half of its light is
-/// taken.
+/// Draws the triangles of a mesh by ray tracing, with `side`² rays spread evenly over each pixel.
 ///
-/// Triangles are met in double precision; boxes around them are found in single precision (Bvh: Meister & Bittner 2018).
+/// Colours (vertex colour × material × texture) and normals are interpolated over each triangle
+/// (Phong 1975). The normals are the file's. Otherwise they are averaged over the triangles that
+/// meet at a vertex without a crease of more than `crease_angle_degrees` between them, as for
+/// [surfels](Mesh::surfels). The shading is that of surfaces, on both sides. A triangle blocks the
+/// share of the light that its opacity gives. A pixel's depth is that of its nearest ray: the
+/// distance at which half of the ray's light is absorbed.
+///
+/// Triangles are intersected in double precision, the boxes around them in single precision (BVH:
+/// Meister & Bittner 2018).
 ///
 /// # Errors
-/// What [`Camera::view`] and [`Scene::validate_settings`] find; [`Error::NothingToDraw`] for a mesh without triangles;
-/// [`Error::Argument`] for no rays and for more than 256² a pixel, and for a mesh that was put together by hand and contradicts
-/// itself.
+/// The errors of [`Camera::view`] and [`Scene::validate_settings`]; [`Error::NothingToDraw`] for a
+/// mesh without triangles. [`Error::Argument`] if a pixel has no rays or more than 256², and for a
+/// hand-made mesh that contradicts itself.
 pub fn trace(
     mesh: &Mesh,
     crease_angle_degrees: f32,
@@ -39,7 +43,7 @@ pub fn trace(
 ) -> Result<Picture> {
     let view = camera.view(settings.size)?;
     if mesh.triangles.is_empty() {
-        return Err(Error::NothingToDraw("there are no triangles".into()));
+        return Err(Error::NothingToDraw("the mesh has no triangles".into()));
     }
     if !(1..=MOST_SIDE).contains(&side) {
         return Err(Error::Argument(format!("a pixel takes 1² to {MOST_SIDE}² rays, not {side}²")));
@@ -72,10 +76,10 @@ pub fn trace(
     Ok(picture(&view, (0..height).into_par_iter().map(row).collect()))
 }
 
-/// Rays of a pixel along each side at most.
+/// Maximum number of rays along each side of a pixel.
 const MOST_SIDE: u32 = 256;
 
-/// Light of less than this is not followed further.
+/// A ray with less light than this is not followed further.
 const LEAST_LIGHT: f64 = 1e-3;
 
 struct Traced<'a> {
@@ -83,10 +87,10 @@ struct Traced<'a> {
     normals: Vec<[Vec3; 3]>,
     boxes: Bvh2,
     settings: &'a Settings,
-    /// View space from the mesh's, and the eye in the mesh's.
+    /// The rotation from the mesh's space to view space, and the eye in the mesh's space.
     rotation: DMat3,
     eye: DVec3,
-    /// The largest coordinate: what rounding is measured by.
+    /// The largest coordinate, which sets the scale of rounding errors.
     size: f64,
 }
 
@@ -108,7 +112,7 @@ impl<'a> Traced<'a> {
     ) -> Result<Self> {
         let eye = view.position - mesh.origin;
         let size = mesh.positions.iter().fold(0.0f32, |size, p| size.max(p.abs().max_element()));
-        // Boxes are met in 32 bits: a margin for what that rounds.
+        // Boxes are intersected in 32 bits; the margin covers the rounding.
         let margin = Vec3A::splat((size + eye.abs().max_element() as f32) * 4e-7);
         let around = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|vertex| Vec3A::from(mesh.positions[vertex as usize]));
@@ -126,7 +130,7 @@ impl<'a> Traced<'a> {
         })
     }
 
-    /// All that a ray meets.
+    /// Composites all triangles that a ray meets.
     fn follow(&self, ray: &Ray) -> Composite {
         let back = self.rotation.transpose();
         let (origin, direction) = (self.eye + back * ray.origin, back * ray.direction);
@@ -152,7 +156,7 @@ impl<'a> Traced<'a> {
         composite
     }
 
-    /// The nearest triangle beyond a distance.
+    /// Returns the nearest triangle beyond a distance.
     fn nearest(&self, origin: DVec3, direction: DVec3, from: f64) -> Option<(usize, Met)> {
         let line = Line::new_inf(origin.as_vec3a(), direction.as_vec3a());
         let mut nearest: Option<(usize, Met)> = None;
@@ -167,14 +171,14 @@ impl<'a> Traced<'a> {
             if nearest.is_none_or(|(_, before)| met.distance < before.distance) {
                 nearest = Some((triangle, met));
             }
-            // What lies beyond is not looked for; a little farther, for the rounding.
+            // Boxes beyond this distance are skipped. It is slightly larger, to allow for rounding.
             met.distance as f32 * 1.000_001
         });
         nearest
     }
 }
 
-/// Where a ray meets a triangle.
+/// The intersection of a ray with a triangle.
 #[derive(Debug, Clone, Copy)]
 struct Met {
     distance: f64,
@@ -182,7 +186,7 @@ struct Met {
     weights: [f64; 3],
 }
 
-/// Meets a triangle from either side (Möller & Trumbore 1997).
+/// Intersects a ray with a triangle, from either side (Möller & Trumbore 1997).
 fn meet(origin: DVec3, direction: DVec3, [a, b, c]: [DVec3; 3]) -> Option<Met> {
     let (ab, ac, to) = (b - a, c - a, origin - a);
     let across = direction.cross(ac);
@@ -190,7 +194,7 @@ fn meet(origin: DVec3, direction: DVec3, [a, b, c]: [DVec3; 3]) -> Option<Met> {
     let v = to.dot(across) / determinant;
     let turned = to.cross(ab);
     let w = direction.dot(turned) / determinant;
-    // A flat determinant gives no numbers, which no comparison lets through.
+    // A zero determinant gives NaN or infinity, which fails these comparisons.
     let inside = v >= 0.0 && w >= 0.0 && v + w <= 1.0;
     inside.then(|| Met { distance: ac.dot(turned) / determinant, weights: [1.0 - v - w, v, w] })
 }
@@ -239,7 +243,8 @@ mod tests {
 
     #[test]
     fn rays_are_spread_over_pixels_and_pass_what_is_thin() {
-        // A square from 0 to 1 whose edge cuts pixels in half, half opaque, with another behind it.
+        // A half-opaque square from 0 to 1 whose edge cuts pixels in half, with another square
+        // behind it.
         let square = |z: f32| {
             [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| Vec3::new(x, y, z))
         };
@@ -289,7 +294,7 @@ mod tests {
         }
     }
 
-    /// One whose triangles face inward.
+    /// A knot whose triangles face inward.
     fn knot() -> Mesh {
         let mut mesh = Mesh::knot(160, 20);
         mesh.positions.iter_mut().for_each(|place| *place *= 0.3);

@@ -8,27 +8,28 @@ use crate::{
 };
 use glam::{DMat3, DVec3};
 
-/// Such a field, in view space.
+/// A field of tensor products, in view space.
 pub(super) struct Product<'a> {
     volume: &'a Volume,
     tensor: Tensor,
-    /// Steps from view space, and the place of the first sample there.
+    /// The map from view space to steps, and the place of the first sample in view space.
     to_steps: DMat3,
     origin: DVec3,
 }
 
-/// What the samples along one axis count: their indices, weights and derivatives.
+/// The samples around a place along one axis: their indices, weights and derivatives of the
+/// weights.
 type Taps = [(usize, f64, f64); 4];
 
 impl<'a> Product<'a> {
-    /// The field of a volume; none of another kernel.
+    /// Returns the field of a volume, or `None` if its kernel is not a tensor product.
     pub fn new(volume: &'a Volume, kernel: &Kernel, view: &View) -> Option<Self> {
         let Lattice { axes, origin, .. } = volume.lattice;
         let to_steps = (view.rotation * axes).inverse();
         Some(Self { volume, tensor: kernel.as_tensor()?, to_steps, origin: view.to_view(origin) })
     }
 
-    /// The field of a scene.
+    /// Returns the field of a scene.
     pub fn of(scene: &'a Scene, view: &View) -> Option<Self> {
         scene.items.iter().find_map(|item| match item {
             Item::Volume(volume, kernel, _) => Self::new(volume, kernel, view),
@@ -36,13 +37,13 @@ impl<'a> Product<'a> {
         })
     }
 
-    /// The value at a point of view space, and the gradient there.
+    /// Returns the value and the gradient at a point of view space.
     pub fn at(&self, point: DVec3) -> (f64, DVec3) {
         let (value, slopes) = self.at_steps(self.to_steps * (point - self.origin));
         (value, self.to_steps.transpose() * slopes)
     }
 
-    /// The value at a place in steps, and its change a step along each axis.
+    /// Returns the value at a place in steps, and its change per step along each axis.
     pub fn at_steps(&self, steps: DVec3) -> (f64, DVec3) {
         let [nx, ny, _] = self.volume.lattice.dims;
         let [x, y, z] = [0, 1, 2].map(|axis| self.taps(steps[axis], axis));
@@ -59,7 +60,8 @@ impl<'a> Product<'a> {
         (value, slopes)
     }
 
-    /// The samples around a place along an axis, beyond the lattice's ends their mirror images.
+    /// Returns the samples around a place along an axis. Beyond the lattice's ends, they are
+    /// mirrored.
     fn taps(&self, place: f64, axis: usize) -> Taps {
         let count = self.volume.lattice.dims[axis];
         let first = place.floor() - 1.0;
@@ -70,13 +72,14 @@ impl<'a> Product<'a> {
         })
     }
 
-    /// The field at a distance along a ray.
+    /// Returns the field at a distance along a ray.
     pub fn face(&self, ray: &Ray, s: f64) -> Face {
         let (value, gradient) = self.at(ray.point(s));
         Face::new(value, gradient)
     }
 
-    /// ∫ of the field over a part of a ray. The field is a polynomial between planes of samples, of the ninth degree at most.
+    /// Returns the integral of the field over a part of a ray. The field is a polynomial between
+    /// planes of samples, of the ninth degree at most.
     pub fn mean(&self, ray: &Ray, [from, to]: [f64; 2]) -> Mean {
         let (start, way) =
             (self.to_steps * (ray.origin - self.origin), self.to_steps * ray.direction);
@@ -105,7 +108,7 @@ mod tests {
     use crate::volume::Samples;
     use glam::DVec2;
 
-    /// Three lattices: sheared, of two samples along an axis, and of one.
+    /// Three lattices: sheared, with two samples along an axis, and with one sample along an axis.
     fn volumes() -> [Volume; 3] {
         [[5, 4, 6], [2, 5, 3], [4, 1, 3]].map(|dims| {
             let axes = DMat3::from_cols(
@@ -133,7 +136,7 @@ mod tests {
             for view in views() {
                 fields(&volume, &view, |tensor, field| {
                     for at in 0..volume.len() {
-                        // Not quite at the sample, where rounding would choose a cell.
+                        // Not exactly at the sample, where rounding would choose the cell.
                         let place = view.to_view(volume.lattice.sample_position(at));
                         let (found, _) = field.at(place + DVec3::splat(1e-9));
                         assert!(
@@ -153,7 +156,7 @@ mod tests {
                 fields(&volume, &view, |tensor, field| {
                     for at in 0..20 {
                         let place = |shift: f64| (f64::from(at) + shift).sin() * 0.4 + 0.5;
-                        // Also beyond the samples.
+                        // Points beyond the samples too.
                         let point =
                             view.to_view(DVec3::new(place(0.3), place(1.7), place(4.0)) * 1.4);
                         let (_, gradient) = field.at(point);

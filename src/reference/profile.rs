@@ -1,18 +1,18 @@
-//! The profile h(r) of a kernel over the radius in kernel space, and what a line cuts out of it.
+//! The profile h(r) of a kernel over the radius in kernel space, and its integrals along lines.
 
 use super::quadrature::quadrature;
 use crate::math;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-/// Beyond this many standard deviations less than 10⁻¹⁸ of a Gaussian is left: nothing that double precision could add
-/// to the rest.
+/// Beyond this many standard deviations, less than 10⁻¹⁸ of a Gaussian is left: too little to
+/// change a sum in double precision.
 const TAIL: f64 = 9.0;
 
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Profile<'a> {
-    /// exp(−r²/2). Lines that pass too far miss it; along a line it is whole.
+    /// exp(−r²/2). Lines that pass beyond the radius miss it; along a line it is not cut.
     Gaussian,
-    /// Any other; 0 beyond its extent, in all directions.
+    /// Any other profile; 0 beyond its extent, in all directions.
     Compact(&'a math::Kernel),
 }
 
@@ -32,7 +32,8 @@ impl<'a> Profile<'a> {
         }
     }
 
-    /// h′(r)/r, which times the place in kernel space is the gradient there; 0 at the centre of a kernel that has a peak.
+    /// Returns h′(r)/r. Times the place in kernel space, this is the gradient there. It is 0 at the
+    /// centre of a kernel with a peak.
     pub fn slope(self, r: f64) -> f64 {
         let Self::Compact(kernel) = self else { return -self.value(r) };
         let extent = kernel.extent;
@@ -42,7 +43,7 @@ impl<'a> Profile<'a> {
         match &kernel.profile {
             math::Profile::Gaussian(_) => -self.value(r),
             math::Profile::BSpline => {
-                // Of 1 − 1.5t² + 0.75t³ and 0.25(2 − t)³ with t = 2r/extent.
+                // From 1 − 1.5t² + 0.75t³ and 0.25(2 − t)³ with t = 2r/extent.
                 let t = 2.0 * r / extent;
                 let over_t = if t < 1.0 { -3.0 + 2.25 * t } else { -0.75 * (2.0 - t).powi(2) / t };
                 over_t * (2.0 / extent).powi(2)
@@ -51,7 +52,7 @@ impl<'a> Profile<'a> {
                 let w = 0.5 * PI / extent;
                 let x = PI * r;
                 if x < 1e-2 {
-                    // The first terms of both factors.
+                    // The first terms of the series of both factors.
                     return -PI * PI / 5.0 - 2.0 * w * w;
                 }
                 let (sin, cos) = x.sin_cos();
@@ -66,12 +67,13 @@ impl<'a> Profile<'a> {
                 let low = ((r * scale) as usize).min(values.len() - 2);
                 if r > 0.0 { (values[low + 1] - values[low]) * scale / r } else { 0.0 }
             }
-            // No radial function (product.rs).
+            // Not a radial function (product.rs).
             math::Profile::Tensor(_) => 0.0,
         }
     }
 
-    /// How far a line that passes at `rho` is in the kernel, to either side of its closest approach.
+    /// Returns how far a line that passes at `rho` stays inside the kernel, to either side of its
+    /// closest approach.
     pub fn reach(self, rho: f64) -> f64 {
         match self {
             Self::Gaussian => TAIL,
@@ -79,7 +81,8 @@ impl<'a> Profile<'a> {
         }
     }
 
-    /// ∫ h dt and ∫ t·h dt over a part of a line that passes at `rho`, t = 0 at its closest approach.
+    /// Returns ∫ h dt and ∫ t·h dt over a part of a line that passes at `rho`, with t = 0 at its
+    /// closest approach.
     pub fn moments(self, rho: f64, [from, to]: [f64; 2]) -> [f64; 2] {
         let Self::Compact(kernel) = self else {
             let peak = (-0.5 * rho * rho).exp();
@@ -91,7 +94,7 @@ impl<'a> Profile<'a> {
         if from >= to {
             return [0.0; 2];
         }
-        // Smooth pieces at most one unit long.
+        // Cut into smooth pieces of at most one unit.
         let mut cuts = vec![from, to];
         let kinks = kinks(kernel)
             .into_iter()
@@ -100,7 +103,7 @@ impl<'a> Profile<'a> {
         let inner = kinks.flat_map(|t| [-t, t]).chain([0.0]).filter(|t| from < *t && *t < to);
         cuts.extend(inner);
         if let math::Profile::Table(_) = kernel.profile {
-            // Tables may have a peak, near which r turns within ρ.
+            // Tables may have a peak. Near it, r bends within a distance of ρ.
             let around = std::iter::successors(Some(rho.max(1e-3)), |t| Some(4.0 * t))
                 .take_while(|t| *t < reach);
             cuts.extend(around.flat_map(|t| [-t, t]).filter(|t| from < *t && *t < to));
@@ -119,7 +122,7 @@ impl<'a> Profile<'a> {
     }
 }
 
-/// The radii inside a kernel's extent at which it is not smooth.
+/// Returns the radii inside a kernel's extent at which the kernel is not smooth.
 fn kinks(kernel: &math::Kernel) -> Vec<f64> {
     match &kernel.profile {
         math::Profile::Gaussian(_) | math::Profile::Hann | math::Profile::Tensor(_) => Vec::new(),
@@ -131,9 +134,11 @@ fn kinks(kernel: &math::Kernel) -> Vec<f64> {
     }
 }
 
-/// The share of the unit Gaussian between `from` and `to` (in standard deviations, ascending): Φ(to) − Φ(from).
+/// Returns the share of the unit Gaussian between `from` and `to` (in standard deviations,
+/// ascending): Φ(to) − Φ(from).
 fn share(from: f64, to: f64) -> f64 {
-    // Two numbers close to 1 would cancel, so each share is taken from the tail that it lies in.
+    // Two numbers close to 1 would cancel, so each share is computed from the tail in which it
+    // lies.
     let tail = |t: f64| 0.5 * libm::erfc(t * FRAC_1_SQRT_2);
     if from > 0.0 { tail(from) - tail(to) } else { tail(-to) - tail(-from) }
 }

@@ -1,7 +1,8 @@
 //! Numerical integration of smooth functions.
 
-/// Places in −1 … 1 and weights of the Gauss–Legendre rule of eight points (Abramowitz & Stegun 1964, table 25.4); each
-/// place counts on both sides of 0. Exact for polynomials of the 15th degree.
+/// Places in −1 … 1 and weights of the Gauss–Legendre rule with eight points (Abramowitz & Stegun
+/// 1964, table 25.4). Each place is used on both sides of 0. Exact for polynomials of the 15th
+/// degree.
 const RULE: [(f64, f64); 4] = [
     (0.183_434_642_495_649_8, 0.362_683_783_378_362),
     (0.525_532_409_916_329, 0.313_706_645_877_887_3),
@@ -9,7 +10,8 @@ const RULE: [(f64, f64); 4] = [
     (0.960_289_856_497_536_3, 0.101_228_536_290_376_3),
 ];
 
-/// ∫ of some functions at once between `from` and `to`, none of which is asked for its value at the ends.
+/// Integrates several functions at once between `from` and `to`. They are not evaluated at the
+/// ends.
 pub(super) fn quadrature<const N: usize>(
     [from, to]: [f64; 2],
     values: impl Fn(f64) -> [f64; N],

@@ -1,9 +1,10 @@
-//! The ray of a pixel, and how it moves from pixel to pixel.
+//! The ray of a pixel, and its derivatives from pixel to pixel.
 
 use crate::math::View;
 use glam::{DMat3, DVec2, DVec3};
 
-/// A ray in view space: the points `origin + s·direction`, and what one pixel to the right and one downward add to it.
+/// A ray in view space: the points `origin + s·direction`, and their derivatives per pixel to the
+/// right and per pixel downward.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ray {
     pub origin: DVec3,
@@ -16,7 +17,7 @@ pub(super) struct Ray {
 }
 
 impl Ray {
-    /// The ray through a point of the picture, in pixels.
+    /// Returns the ray through a point of the picture, in pixels.
     pub fn new(view: &View, pixel: DVec2) -> Self {
         let (origin, direction) = view.ray(pixel);
         let steps = [DVec3::X, DVec3::Y].map(|axis| axis / view.scale);
@@ -28,7 +29,8 @@ impl Ray {
                 direction_across: [DVec3::ZERO; 2],
             };
         }
-        // The direction is b/|b| with b = (x, y, 1): its derivative is what is across it in the derivative of b.
+        // The direction is b/|b| with b = (x, y, 1). Its derivative is the component of b's
+        // derivative that is perpendicular to it.
         let inverse_length = direction.z;
         let direction_across =
             steps.map(|step| inverse_length * (step - direction * direction.dot(step)));
@@ -39,17 +41,19 @@ impl Ray {
         self.origin + s * self.direction
     }
 
-    /// Derivative of the point at distance s, in world units per pixel to the right and per pixel downward.
+    /// Returns the derivative of the point at distance s, in world units per pixel to the right and
+    /// per pixel downward.
     pub fn across(&self, s: f64) -> [DVec3; 2] {
         [0, 1].map(|i| self.origin_across[i] + s * self.direction_across[i])
     }
 
-    /// The gradient (view space, per world unit) of which the derivatives per pixel to the right, per pixel downward and
-    /// per world unit along the ray are known at distance s.
+    /// Returns the gradient (view space, per world unit) from its derivatives at distance s: per
+    /// pixel to the right, per pixel downward, and per world unit along the ray.
     pub fn gradient(&self, s: f64, across: DVec2, along: f64) -> Option<DVec3> {
         let [right, down] = self.across(s);
         let slopes = across.extend(along);
-        // A derivative is the gradient's product with its step; three of them are a system of equations.
+        // A derivative is the dot product of the gradient and a step; three of them form a linear
+        // system.
         let steps = DMat3::from_cols(right, down, self.direction).transpose();
         Some(steps.inverse() * slopes).filter(|gradient| gradient.is_finite())
     }
@@ -60,7 +64,7 @@ pub(super) mod tests {
     use super::*;
     use crate::math::{Camera, Projection};
 
-    /// Both projections, from a slant.
+    /// Both projections, seen from an oblique angle.
     pub fn views() -> [View; 2] {
         let projections = [
             Projection::Perspective { view_angle: 70.0 },

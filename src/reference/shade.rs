@@ -1,15 +1,16 @@
-//! Light from the viewer's place.
+//! Light from the eye.
 
 use crate::volume::Shade;
 use glam::DVec3;
 
-/// Blinn and Phong's reflection (Blinn 1977) of a light at the eye, on both sides of a surface. `normal` may have any
-/// length; where it has none, the colour gets its ambient and diffuse parts whole.
+/// Returns a lit colour by Blinn and Phong's reflection (Blinn 1977) with a light at the eye, on
+/// both sides of a surface. `normal` may have any length. If it has none, the ambient and diffuse
+/// parts of the colour count in full.
 pub(super) fn lit(color: DVec3, normal: DVec3, ray: DVec3, shade: &Shade) -> DVec3 {
     let Shade { ambient, diffuse, specular, power } = *shade;
     let lit = match normal.try_normalize() {
-        // The light comes from where the ray comes from, so the half vector is the light's own direction; and the normal
-        // that is turned towards it makes the cosine's magnitude.
+        // The light comes from the eye, so the half vector is the light's own direction. Turning
+        // the normal towards the light gives the cosine's magnitude.
         Some(normal) => {
             let cosine = normal.dot(ray).abs().min(1.0);
             color * (ambient + diffuse * cosine) + DVec3::splat(specular * cosine.powf(power))

@@ -1,4 +1,4 @@
-//! What the kernels add up to in one sheet of one ray.
+//! The sums of the kernels in one sheet of one ray.
 
 use super::{
     kernel::{Crossing, Radiance, Sample},
@@ -16,7 +16,8 @@ pub(super) struct Sheet {
 /// Radiance in a sheet.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Light {
-    /// Optical depth; the part of it that faces the eye, and colour and normal weighted by that part.
+    /// Optical depth; then the sums of facing weights, colours and normals, each weighted by
+    /// optical depth.
     pub depth: f64,
     pub facing: f64,
     pub color: DVec3,
@@ -35,7 +36,7 @@ impl Light {
         self.has_normal |= normal.is_some();
     }
 
-    /// Two kinds of radiance in one sheet.
+    /// Adds other radiance in the same sheet.
     pub fn join(&mut self, other: &Self) {
         self.depth += other.depth;
         self.facing += other.facing;
@@ -55,7 +56,7 @@ pub(super) struct Mean {
 }
 
 impl Mean {
-    /// A field of which the integral over a length is known.
+    /// The mean of a field whose integral over a length is known.
     pub fn new(length: f64, integral: f64) -> Self {
         Self { weight: length, value: integral }
     }
@@ -76,7 +77,7 @@ impl Mean {
             sample.weight * (at_closest * length + sample.slope.dot(ray.direction) * first);
     }
 
-    /// f̄; none where next to no kernel reaches into the sheet.
+    /// Returns f̄, or `None` if next to no kernel reaches into the sheet.
     pub fn value(&self, least: f64, thickness: f64) -> Option<f64> {
         (self.weight > least * thickness).then(|| self.value / self.weight)
     }

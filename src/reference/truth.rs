@@ -1,4 +1,4 @@
-//! A field without sheets: rays that are looked at in many points, as truth for them.
+//! A field without sheets: rays sampled at many points, as ground truth for sheets.
 
 use super::{
     classify::Classifier,
@@ -20,16 +20,20 @@ use crate::{
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
-/// Draws a volume without sheets. The field is Q/P of the [definition](self::super), point by point in the middles of steps of
-/// `step` (world units; at most, so that each piece of a ray holds a whole number of them), each classified and lit alone.
-/// Isosurfaces are met between two points. Emission and absorption, in the box of the samples and the clips.
+/// Draws a volume without sheets. The field is Q/P of the [definition](self::super), evaluated at
+/// the middles of steps along each ray. Each point is classified and lit alone. `step` is the
+/// largest length of a step, in world units: each piece of a ray has a whole number of equal steps.
+/// An isosurface is crossed between two points. The optical model is emission and absorption, in
+/// the box of the samples and the clips.
 ///
-/// As far as the definition goes this is the picture that sheets tend to when they become thin. It does without the sums over
-/// sheets, looks up only the samples around each ray, leaves out where no value shows, and stops where a ray is opaque.
+/// By the definition, this is the picture to which sheets converge as they become thin. This
+/// function needs no sums over sheets and visits only the samples around each ray. It skips regions
+/// where no value is visible, and stops once a ray is opaque.
 ///
 /// # Errors
-/// As [`render`](super::render); [`Error::Argument`] for a scene that is not one volume on a Cartesian or body-centred
-/// lattice, for other optics, and for a step that is no length, or of which a ray would hold more than 2²⁰.
+/// Those of [`render`](super::render). [`Error::Argument`] for a scene that is not a single volume
+/// on a Cartesian or body-centred lattice, for other optics, for a step that is not a positive
+/// length, and for a step so short that a ray would take more than 2²⁰ of them.
 pub fn integrate(
     scene: &Scene,
     camera: &Camera,
@@ -39,27 +43,31 @@ pub fn integrate(
     scene.validate()?;
     scene.validate_settings(settings)?;
     let [Item::Volume(volume, kernel, transfer)] = &scene.items[..] else {
-        return Err(Error::Argument("rays are integrated through one volume alone".into()));
+        return Err(Error::Argument(
+            "integration along rays takes a scene with a single volume and nothing else".into(),
+        ));
     };
     if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_)) {
         return Err(Error::Argument(
-            "rays are integrated on lattices of equal cells, not on rectilinear ones".into(),
+            "integration along rays takes Cartesian and body-centred lattices, not rectilinear ones"
+                .into(),
         ));
     }
     if settings.optics != Optics::EmissionAbsorption {
         return Err(Error::Argument(
-            "rays are integrated for emission and absorption alone".into(),
+            "integration along rays takes the optics emission and absorption only".into(),
         ));
     }
     if !(step > 0.0 && step.is_finite()) {
         return Err(Error::Argument(format!(
-            "rays are integrated in steps of a length, found {step}"
+            "the step must be a positive, finite length in world units, found {step}"
         )));
     }
     let points = scene.bounds().diagonal() / step;
     if points > MOST_POINTS {
         return Err(Error::Argument(format!(
-            "rays through the volume take up to {points:.1e} steps of {step:e}; {MOST_POINTS} are the most: take longer ones"
+            "a step of {step:e} divides a ray into up to {points:.1e} steps, more than \
+             {MOST_POINTS}: take a longer step"
         )));
     }
     let view = camera.view(settings.size)?;
@@ -85,36 +93,36 @@ pub fn integrate(
     Ok(picture(&view, (0..height).into_par_iter().map(row).collect()))
 }
 
-/// Steps of a ray at most: finer ones would change no picture, and take hours.
+/// Maximum number of steps of a ray: more would change no picture, and take hours.
 const MOST_POINTS: f64 = 1_048_576.0;
 
-/// Light of less than this is not followed further.
+/// A ray with less light than this is not followed further.
 const LEAST_LIGHT: f64 = 1e-6;
 
-/// Where a Gaussian is cut along the ray, in standard deviations: 10⁻⁸ of its height is left there.
+/// Where a Gaussian is cut along the ray, in standard deviations: 10⁻⁸ of its height remains there.
 const TAIL: f64 = 6.0;
 
-/// A field that can be asked for its value anywhere.
+/// A field that can be evaluated anywhere.
 struct Pointwise<'a> {
     volume: &'a Volume,
     lattice: &'a Lattice,
     profile: Profile<'a>,
-    /// The field where kernels are tensor products; kernel space then counts in steps.
+    /// The field of a volume whose kernels are tensor products. Kernel space then is in steps.
     product: Option<Product<'a>>,
     /// Radius of the footprint in kernel space.
     radius: f64,
-    /// How far kernels reach along a ray at most, in kernel space.
+    /// The maximum reach of kernels along a ray, in kernel space.
     tail: f64,
-    /// Kernel space in steps of the lattice.
+    /// The unit of kernel space, in steps of the lattice.
     unit: f64,
-    /// Kernel space from view space, and the first sample's place in view space.
+    /// The map from view space to kernel space. `origin` is the first sample's place in view space.
     whitening: DMat3,
-    /// What kernels must add up to for a value.
+    /// The minimum sum of kernels for which a value exists.
     least_sum: f64,
     origin: DVec3,
     classifier: Classifier<'a>,
     shade: Option<Shade>,
-    /// The cells between the samples in which some value shows.
+    /// The cells between the samples in which some value is visible.
     visible: Cells,
 }
 
@@ -127,9 +135,9 @@ struct Cells {
 /// The field at evenly spaced points of a ray.
 #[derive(Default)]
 struct Points {
-    /// P and Q
+    /// P and Q.
     sums: Vec<[f64; 2]>,
-    /// Σ h′/r·x′ and Σ f·h′/r·x′
+    /// Σ h′/r·x′ and Σ f·h′/r·x′.
     slopes: Vec<[DVec3; 2]>,
     shown: Vec<bool>,
 }
@@ -167,7 +175,7 @@ impl<'a> Pointwise<'a> {
         self.shade.is_some() || !self.classifier.transfer.gradient.is_empty()
     }
 
-    /// Follows a ray through pieces of it.
+    /// Composites a ray over its pieces.
     fn pixel(&self, ray: &Ray, pieces: &[[f64; 2]], step: f64, points: &mut Points) -> Composite {
         let mut composite = Composite::EMPTY;
         let origin = self.whitening * (ray.origin - self.origin);
@@ -178,7 +186,8 @@ impl<'a> Pointwise<'a> {
             let step = (to - from) / count;
             let count = count as usize;
             let place = |i: usize| from + (i as f64 + 0.5) * step;
-            // Blocks of points share the samples around them, which reach over their ends.
+            // Points are handled in blocks, which share the samples around them. These samples
+            // reach beyond the block's ends.
             let block = (4.0 * tail / step).ceil().max(1.0) as usize;
             let mut last = None;
             for first in (0..count).step_by(block) {
@@ -229,7 +238,7 @@ impl<'a> Pointwise<'a> {
         composite
     }
 
-    /// Passes the surfaces between two points' values.
+    /// Composites the surfaces between the values of two points.
     fn meet_surfaces(
         &self,
         composite: &mut Composite,
@@ -253,7 +262,8 @@ impl<'a> Pointwise<'a> {
         self.shade.as_ref().map_or(color, |shade| shade::lit(color, gradient, ray.direction, shade))
     }
 
-    /// The value and the view-space gradient at a point; none where next to no kernel reaches.
+    /// Returns the value and the view-space gradient at a point, or `None` where next to no kernel
+    /// reaches.
     fn at(&self, points: &Points, i: usize) -> Option<(f64, DVec3)> {
         let [weight, sum] = points.sums[i];
         let value = (weight > self.least_sum).then(|| sum / weight)?;
@@ -261,8 +271,8 @@ impl<'a> Pointwise<'a> {
         Some((value, self.whitening.transpose() * (value_slope - value * slope) / weight))
     }
 
-    /// Adds all samples around the points from `start` to `end`. Point i is at the distance `at` + i·`step`; the ray, in
-    /// kernel space, is `origin` + s·`direction`.
+    /// Adds all samples around the points from `start` to `end`. Point i is at the distance `at` +
+    /// i·`step`. In kernel space the ray is `origin` + s·`direction`.
     fn sum(
         &self,
         origin: DVec3,
@@ -280,7 +290,7 @@ impl<'a> Pointwise<'a> {
         }
         let density = direction.length();
         let along = direction / density;
-        // Counted in kernel space from the ray's origin.
+        // Distances in kernel space from the ray's origin.
         let (first, stride) = ((at + start as f64 * step) * density, step * density);
         let last = first + (end - start) as f64 * stride;
         let gradients = self.needs_gradients();
@@ -299,7 +309,8 @@ impl<'a> Pointwise<'a> {
                 }
                 let value = self.volume.drawn_value(sample);
                 let mut t = first + begin as f64 * stride - closest;
-                // A Gaussian's next value is its last one times a factor, which itself changes by a factor.
+                // A Gaussian's next value is its last value times a factor, which itself changes by
+                // a constant factor.
                 let mut bell = (-0.5 * (rho * rho + t * t)).exp();
                 let mut factor = (-stride * (t + 0.5 * stride)).exp();
                 let change = (-stride * stride).exp();
@@ -331,8 +342,9 @@ impl<'a> Pointwise<'a> {
         );
     }
 
-    /// Calls `add` with every sample whose footprint a ray meets, closest between two distances in kernel space: its index,
-    /// its place as seen from the ray's closest point, and the distance of that.
+    /// Calls `add` for every sample whose footprint the ray meets and whose closest point lies
+    /// between two distances in kernel space. It passes the sample's index, its offset from the
+    /// ray's closest point, and that point's distance.
     fn each_sample_around(
         &self,
         origin: DVec3,
@@ -340,7 +352,8 @@ impl<'a> Pointwise<'a> {
         [from, to]: [f64; 2],
         mut add: impl FnMut(usize, DVec3, f64),
     ) {
-        // The slices of samples that the ray crosses most steeply; in each, an ellipse around the crossing.
+        // Visit the slices of samples that the ray crosses most steeply. In each slice, visit the
+        // ellipse around the crossing.
         let steep = if along.abs().max_element() == along.abs().x {
             0
         } else {
@@ -353,12 +366,12 @@ impl<'a> Pointwise<'a> {
         let (half_b, half_c) = (half_width(c), half_width(b));
         let lean = self.radius * (1.0 - along[steep] * along[steep]).max(0.0).sqrt();
         let [nx, ny, nz] = self.lattice.dims;
-        // A body-centred lattice is two cubic ones.
+        // A body-centred lattice consists of two cubic ones.
         let kinds = if self.lattice.arrangement == Arrangement::BodyCentred { 2 } else { 1 };
         for kind in 0..kinds {
             let shift = 0.5 * kind as f64;
             let dims = [nx, ny, (nz + kinds - 1 - kind) / kinds];
-            // The indices along an axis whose places are around a coordinate of kernel space.
+            // The indices along an axis whose places lie between two coordinates of kernel space.
             let indices = |axis: usize, low: f64, high: f64| {
                 let first = (low * self.unit - shift).ceil().max(0.0) as usize;
                 let past = (high * self.unit - shift).floor() + 1.0;
@@ -391,7 +404,8 @@ impl<'a> Pointwise<'a> {
 }
 
 impl Points {
-    /// Makes room for points; also those beside what shows count, because surfaces lie between two points.
+    /// Prepares the buffers for `count` points. The neighbours of visible points count as visible
+    /// too, because isosurfaces lie between two points.
     fn reset(&mut self, count: usize, shown: impl Fn(f64) -> bool) {
         self.shown.clear();
         let (mut before, mut here) = (shown(-1.0), shown(0.0));
@@ -407,7 +421,7 @@ impl Points {
         self.slopes.resize(count, [DVec3::ZERO; 2]);
     }
 
-    /// The first and the last point that show something.
+    /// Returns the first and the last visible point.
     fn ends(&self) -> Option<[usize; 2]> {
         Some([
             self.shown.iter().position(|shown| *shown)?,
@@ -417,8 +431,9 @@ impl Points {
 }
 
 impl Cells {
-    /// The cells with a sample at their corners or middle whose neighbourhood shows something. Kernels reach as far as these
-    /// neighbourhoods, but for the tails of Gaussians along the ray, of which less than 10⁻⁵ is left there.
+    /// Marks the cells around samples whose neighbourhoods have visible values: the cells with such
+    /// a sample at a corner or in the middle. Kernels reach as far as these neighbourhoods. Only
+    /// the tails of Gaussians along the ray reach further, where less than 10⁻⁵ of them is left.
     fn visible(volume: &Volume, kernel: &Kernel, transfer: &TransferFunction) -> Self {
         let lattice = volume.drawn_lattice();
         let ranges = volume.drawn_ranges(kernel);
@@ -444,9 +459,9 @@ impl Cells {
         Self { dims, marked }
     }
 
-    /// Whether the cell at some steps is marked; those outside count as the nearest ones.
+    /// Whether the cell at a place in steps is marked. Places outside use the nearest cell.
     fn at(&self, steps: DVec3) -> bool {
-        // Casts cut to 0.
+        // Casts saturate at 0.
         let [x, y, z] = [0, 1, 2].map(|axis| (steps[axis] as usize).min(self.dims[axis] - 1));
         self.marked[x + self.dims[0] * (y + self.dims[1] * z)]
     }

@@ -1,5 +1,6 @@
 //! Kernels that are not cut: axis-aligned sheets and single splats
-//! ([`Mode::AxisSheets`](crate::scene::Mode::AxisSheets), [`Mode::Splats`](crate::scene::Mode::Splats)).
+//! ([`Mode::AxisSheets`](crate::scene::Mode::AxisSheets),
+//! [`Mode::Splats`](crate::scene::Mode::Splats)).
 
 use super::{
     Frame, clip,
@@ -11,8 +12,9 @@ use super::{
 use crate::{math::View, scene::Order, volume::Lattice};
 use glam::{DMat3, DVec3};
 
-/// The direction that axis-aligned sheets are counted along, in view space: at right angles to those two axes of the data
-/// which make it point into the picture most; the world's axes without a lattice.
+/// Returns the direction along which axis-aligned sheets are counted, in view space. It is
+/// perpendicular to two axes of the data, chosen so that it points into the picture most. Without a
+/// lattice the world's axes are used.
 pub(super) fn sheet_axis(view: &View, lattice: Option<&Lattice>) -> DVec3 {
     let axes = lattice.map_or(DMat3::IDENTITY, |lattice| lattice.axes);
     let normals = axes
@@ -27,7 +29,8 @@ pub(super) fn sheet_axis(view: &View, lattice: Option<&Lattice>) -> DVec3 {
 }
 
 impl Frame<'_> {
-    /// The radiance that a whole kernel puts on a ray, and where; none where it is missed, cut away or behind the eye.
+    /// Returns the radiance of a whole kernel on a ray, and the distance of the closest approach.
+    /// Returns `None` if the ray misses the kernel, or the kernel is clipped or behind the eye.
     fn whole(&self, kernel: &Kernel, ray: &Ray, allowed: &[[f64; 2]]) -> Option<(Light, f64)> {
         let Load::Radiance(radiance) = &kernel.load else { return None };
         let crossing = kernel.cross(ray)?;
@@ -43,7 +46,7 @@ impl Frame<'_> {
         Some((light, crossing.closest))
     }
 
-    /// A pixel of axis-aligned sheets.
+    /// Draws a pixel in axis-aligned sheets.
     pub(super) fn pixel_of_axis_sheets(
         &self,
         ray: &Ray,
@@ -82,7 +85,7 @@ impl Frame<'_> {
         composite
     }
 
-    /// A pixel of single splats.
+    /// Draws a pixel of single splats.
     pub(super) fn pixel_of_splats(
         &self,
         ray: &Ray,

@@ -18,20 +18,27 @@ use clap::Args;
 use splatkit::{Error, Renderer};
 use std::time::Instant;
 
-/// Degrees between frames, as VTK's benchmark in the same view has.
+/// Degrees between frames, as in VTK's benchmark of the same view.
 pub const STEP: f64 = 5.0;
 
-/// Frames that are measured of one scene.
+/// Number of frames measured for one scene.
 const FRAMES: u32 = 10;
 
 #[derive(Args, Debug)]
-// The suite and the sweep bring their own scenes.
-#[command(mut_arg("inputs", |inputs| inputs.required(false).required_unless_present_any(["suite", "sweep"])))]
+// The suite and the sweep have their own scenes.
+#[command(mut_arg("inputs", |inputs| {
+    inputs.required(false).required_unless_present_any(["suite", "sweep"])
+}))]
 pub struct Bench {
     #[command(flatten)]
     scene: SceneFlags,
-    /// Frames that are measured, after a first one that is not [default: 10; 5 of each case of the suite, as many of each step of the sweep as --effort says]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    /// Measure this many frames, after a first one that does not count [default: 10; 5 for each
+    /// case of the suite; for each step of the sweep, a number that follows from --effort]
+    #[arg(
+        long,
+        value_name = "N",
+        value_parser = clap::value_parser!(u32).range(1..=1_000_000)
+    )]
     frames: Option<u32>,
     #[command(flatten)]
     suite: SuiteFlags,
@@ -43,7 +50,7 @@ pub struct Bench {
     camera: CameraFlags,
     #[command(flatten)]
     engine: EngineFlags,
-    /// Writes JSON.
+    /// Print the results as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -93,7 +100,7 @@ impl Bench {
         let Times { min, median, max } = Times::of(times);
         let [width, height] = self.engine.size;
         let is_gathered = stats.gathered > 0;
-        // Samples that are gathered are neither drawn as splats nor culled.
+        // Gathered samples are neither drawn as splats nor culled.
         let culled = if is_gathered { 0 } else { loaded.count.saturating_sub(stats.splats) };
         if self.json {
             return output::json(&serde_json::json!({

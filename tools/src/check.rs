@@ -21,11 +21,12 @@ use std::path::PathBuf;
 
 #[derive(Args, Debug)]
 pub struct Check {
-    /// A hierarchy or a volume in bricks, whose every checksum and promise is checked; or another input, which is read and looked through.
+    /// A hierarchy or a volume in bricks, of which every checksum and guarantee is checked, or
+    /// another input, which is read and searched for oddities.
     file: PathBuf,
     #[command(flatten)]
     load: LoadFlags,
-    /// Writes JSON.
+    /// Print the findings as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -46,7 +47,7 @@ impl Check {
                 Input::Mesh(mesh) => {
                     of_mesh(&mesh, deadline).map_err(|error| in_file(&self.file, error))?
                 }
-                // What is wrong with others is an error on reading.
+                // Errors in other inputs are reported when they are read.
                 _ => Vec::new(),
             },
         };
@@ -87,7 +88,8 @@ fn as_json(finding: &Finding) -> serde_json::Value {
     })
 }
 
-/// What a mesh or cloud has that gives nothing to draw, or draws otherwise than meant.
+/// Returns findings on a mesh or point cloud: parts that draw nothing, or that are drawn
+/// differently than meant.
 fn of_mesh(mesh: &Mesh, deadline: Deadline) -> splatkit::Result<Vec<Finding>> {
     let mut findings = Vec::new();
     let mut warn = |code, place: &str, message: String| {
@@ -107,7 +109,7 @@ fn of_mesh(mesh: &Mesh, deadline: Deadline) -> splatkit::Result<Vec<Finding>> {
         warn(
             "duplicates",
             "positions",
-            format!("{} are at the place of another", of(survey.duplicates, points)),
+            format!("{} lie at the position of another", of(survey.duplicates, points)),
         );
     }
     if survey.without_area > 0 {
@@ -124,11 +126,11 @@ fn of_mesh(mesh: &Mesh, deadline: Deadline) -> splatkit::Result<Vec<Finding>> {
         warn(
             "open",
             "triangles",
-            "the surface has borders; its back can be seen through them".into(),
+            "the surface has borders; its back is visible through them".into(),
         );
     }
     match mesh.surfels(&SurfelOptions { deadline, ..SurfelOptions::default() }) {
-        // These say nothing about the file.
+        // These errors say nothing about the file.
         Err(error @ (Error::Timeout { .. } | Error::Memory { .. })) => return Err(error),
         Err(error) => {
             let message = error.to_string();

@@ -1,4 +1,4 @@
-//! The flags that cut a scene by planes and boxes.
+//! The flags that clip a scene with planes and boxes.
 
 use crate::{failure::Failure, parse};
 use clap::Args;
@@ -9,20 +9,21 @@ use splatkit::{
     scene::{Clip, ClipShape, Scene, Settings},
 };
 
-/// Which part of space is drawn. Several flags cut together, at most eight.
+/// Which part of space is drawn. Up to eight flags work together.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Clipping")]
 pub struct ClipFlags {
-    /// Keeps what is inside: plane:NX,NY,NZ,OFFSET (where NX·x + NY·y + NZ·z is at most OFFSET), box:X0,Y0,Z0:X1,Y1,Z1,
-    /// or 'x<AT', 'x>AT' and the like. World coordinates; as 50%, shares of the scene's box (not for planes).
+    /// Keep only what is inside this shape: plane:NX,NY,NZ,OFFSET (NX·x + NY·y + NZ·z at most
+    /// OFFSET), box:X0,Y0,Z0:X1,Y1,Z1, or 'x<AT' or 'x>AT' (also y, z). Coordinates are in world
+    /// units, or, except for planes, shares of the scene's box such as 50%.
     #[arg(long, value_name = "SHAPE", value_parser = Shape::parse)]
     clip: Vec<Shape>,
-    /// Removes what is inside: the same shapes.
+    /// Remove what is inside this shape. The shapes are those of --clip.
     #[arg(long, value_name = "SHAPE", value_parser = Shape::parse)]
     cut_out: Vec<Shape>,
 }
 
-/// A shape as it was given.
+/// A shape and its text as given.
 #[derive(Debug, Clone, PartialEq)]
 struct Shape {
     text: String,
@@ -36,7 +37,7 @@ enum Form {
     Box([[Place; 3]; 2]),
 }
 
-/// A coordinate, of the world or as a share of the scene's box.
+/// A coordinate in world units, or as a share of the scene's box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Place {
     World(f64),
@@ -44,20 +45,21 @@ enum Place {
 }
 
 impl ClipFlags {
-    /// What is wrong whatever the scene.
+    /// Checks what does not depend on the scene.
     pub fn check(&self) -> Result<(), Failure> {
         let (count, most) = (self.clip.len() + self.cut_out.len(), Settings::MAX_CLIPS);
         if count > most {
             return Err(Failure::Usage(format!(
-                "{count} shapes of --clip and --cut-out are more than {most}"
+                "--clip and --cut-out give {count} shapes; at most {most} are allowed"
             )));
         }
         Ok(())
     }
 
-    /// The clips of a scene whose samples and vertices lie in `bounds`. One that leaves nothing of it is an error.
+    /// Returns the clips of a scene whose samples and vertices lie in `bounds`. A clip that leaves
+    /// nothing of the scene is an error.
     pub fn clips(&self, scene: &Scene, bounds: &Bounds) -> Result<Vec<Clip>, Error> {
-        // Footprints reach beyond the samples, so that something may be left there.
+        // Footprints reach beyond the samples, so something may be left out there.
         let whole = scene.bounds();
         let mut clips = Vec::new();
         for (flag, inside, shape) in self.shapes() {
@@ -74,7 +76,7 @@ impl ClipFlags {
         Ok(clips)
     }
 
-    /// The flags as they were given, for messages; `None` without any.
+    /// Returns the flags as given, for messages; `None` if there are none.
     pub fn text(&self) -> Option<String> {
         let texts: Vec<_> =
             self.shapes().map(|(flag, _, shape)| format!("{flag} '{}'", shape.text)).collect();
@@ -109,10 +111,10 @@ fn plane(text: &str) -> Result<Form, String> {
     if normal == DVec3::ZERO {
         return Err("a plane needs a direction that is not 0,0,0".into());
     }
-    // What is beyond has a length of 0 or ∞ once squared.
+    // The square of any other length is 0 or ∞.
     if !(1e-150..=1e150).contains(&normal.length()) {
         return Err(
-            "a plane's direction needs a length from 1e-150 to 1e150; only where it points counts"
+            "a plane's direction needs a length from 1e-150 to 1e150, but only its direction counts"
                 .into(),
         );
     }
@@ -164,7 +166,7 @@ impl Place {
             Some(share) => parse::finite(share).map(|share| Self::Share(share / 100.0)),
             None => parse::finite(text).map(Self::World),
         }
-        .map_err(|_| format!("“{text}” is no coordinate, such as 12.5 or 50%"))
+        .map_err(|_| format!("“{text}” is not a coordinate, such as 12.5 or 50%"))
     }
 
     fn in_world(self, axis: usize, bounds: &Bounds) -> f64 {
@@ -195,7 +197,7 @@ impl Form {
     }
 }
 
-/// Whether one clip alone takes all of a box.
+/// Whether one clip alone removes all of a box.
 fn leaves_nothing(clip: &Clip, whole: &Bounds) -> bool {
     match clip.shape {
         ClipShape::HalfSpace { normal, offset } => {
@@ -251,7 +253,7 @@ mod tests {
         for text in ["", "w<3", "x=3", "<3", "sphere:1"] {
             assert!(message(text).contains("the forms are"), "{text}");
         }
-        assert!(message("x<").contains("no coordinate"));
+        assert!(message("x<").contains("not a coordinate"));
     }
 
     #[test]

@@ -7,16 +7,16 @@ use std::path::PathBuf;
 
 #[derive(Args, Debug)]
 pub struct Compare {
-    /// A PNG or JPEG.
+    /// A PNG or JPEG picture.
     a: PathBuf,
-    /// Another of the same size.
+    /// Another picture of the same size.
     b: PathBuf,
-    /// Fails with exit code 5 where the PSNR, in dB, is lower.
+    /// Fail with exit code 5 if the PSNR is lower than this, in dB.
     #[arg(long, value_name = "DECIBELS", value_parser = parse::finite, allow_hyphen_values = true)]
     threshold: Option<f64>,
     #[command(flatten)]
     limits: LimitFlags,
-    /// Writes JSON.
+    /// Print the result as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -26,7 +26,7 @@ impl Compare {
         let found =
             compare_files(&self.a, &self.b, &self.limits.limits()).map_err(
                 |error| match error {
-                    // Of all that can be wrong with arguments, here it can only be the sizes: the pictures differ.
+                    // The only argument that can be wrong here is the sizes: the pictures differ.
                     Error::Argument(message) => Failure::Comparison(message),
                     other => other.into(),
                 },

@@ -1,4 +1,5 @@
-//! `splatkit demo`: pictures with no download. The inputs are made, written, and read again as any other file.
+//! `splatkit demo`: pictures without a download. The inputs are made, written, and read again like
+//! any other file.
 
 use crate::{
     camera::CameraFlags,
@@ -22,13 +23,13 @@ use std::{ffi::OsString, path::PathBuf, time::Instant};
 
 #[derive(Args, Debug)]
 pub struct Demo {
-    /// The folder for inputs and pictures; it is made if need be.
+    /// The folder for inputs and pictures; it is created if it does not exist.
     #[arg(default_value = "out")]
     folder: PathBuf,
-    /// Replaces files that are there already.
+    /// Replace existing files.
     #[arg(long)]
     overwrite: bool,
-    /// The adapter, as for render.
+    /// Choose the adapter, as for render.
     #[arg(long, value_name = "N|NAME|software")]
     gpu: Option<String>,
 }
@@ -42,11 +43,14 @@ const KNOT_SCALE: f32 = 0.42;
 /// #10141c.
 const BACKGROUND: Option<[f32; 3]> = Some([16.0 / 255.0, 20.0 / 255.0, 28.0 / 255.0]);
 
-/// The specimen's parts: the rind and the flesh faint, the lattice golden, the stone pale.
+/// How the specimen's parts are shown: the rind and the flesh faint, the lattice golden, the stone
+/// pale.
 const SHOWN: &str = r#"{
-  "color": [[0.08, 0.55, 0.20, 0.10], [0.24, 0.75, 0.30, 0.16], [0.41, 0.80, 0.36, 0.16], [0.62, 0.90, 0.50, 0.18],
-            [0.75, 0.96, 0.72, 0.36], [0.88, 0.80, 0.86, 0.92], [1.0, 0.90, 0.95, 1.0]],
-  "opacity": [[0.08, 0], [0.15, 0.004], [0.24, 0.010], [0.36, 0.03], [0.45, 0.03], [0.65, 0.35], [0.8, 0.6], [1.0, 0.8]],
+  "color": [[0.08, 0.55, 0.20, 0.10], [0.24, 0.75, 0.30, 0.16], [0.41, 0.80, 0.36, 0.16],
+            [0.62, 0.90, 0.50, 0.18], [0.75, 0.96, 0.72, 0.36], [0.88, 0.80, 0.86, 0.92],
+            [1.0, 0.90, 0.95, 1.0]],
+  "opacity": [[0.08, 0], [0.15, 0.004], [0.24, 0.010], [0.36, 0.03], [0.45, 0.03], [0.65, 0.35],
+              [0.8, 0.6], [1.0, 0.8]],
   "unit": 0.02,
   "shade": {"ambient": 0.3, "diffuse": 0.7, "specular": 0.3, "power": 24}
 }
@@ -112,7 +116,7 @@ impl Demo {
         }
         progress.stage("Making a mesh and a volume");
         let mut mesh = Mesh::knot(1200, 72);
-        // So large that the knot winds through the specimen.
+        // Scaled so that the knot winds through the specimen.
         mesh.positions.iter_mut().for_each(|p| *p *= KNOT_SCALE);
         let specimen = Phantom::Specimen.sample([128; 3]).map_err(Error::Argument)?;
         formats::ply::write(&mesh, &self.folder.join(MESH))?;
@@ -161,7 +165,8 @@ impl Demo {
             output::line(format_args!("Drawn on {}", drawer.adapter()))?;
         }
         output::line(format_args!(
-            "{}: {} splats, load {:.0} ms, first frame {first_ms:.0} ms, later frames {later_ms:.0} ms",
+            "{}: {} splats, load {:.0} ms, first frame {first_ms:.0} ms, later frames \
+             {later_ms:.0} ms",
             path.display(),
             stats.splats,
             loaded.load_ms

@@ -1,24 +1,29 @@
-//! What decided a picture, as JSON.
+//! The settings and statistics that explain a picture, as JSON.
 
 use serde_json::{Value, json};
 use splatkit::{
-    engine::FrameStats,
+    FrameStats,
     math::{Kernel, Profile},
     scene::{Classification, Item, Mode, Optics, Order, Scene, Settings},
     volume::TransferFunction,
 };
 
-/// The bricks of a volume that a frame drew; null where it has none.
+/// Returns statistics of the bricks that a frame drew; null if it drew none.
 pub fn bricks(stats: &FrameStats) -> Value {
     match stats.bricks {
         0 => Value::Null,
         drawn => {
-            json!({ "drawn": drawn, "read": stats.read_bricks, "level": stats.lambda, "bytes": stats.brick_bytes })
+            json!({
+                "drawn": drawn,
+                "read": stats.read_bricks,
+                "level": stats.lambda,
+                "bytes": stats.brick_bytes,
+            })
         }
     }
 }
 
-/// The settings of a picture and, where the scene has a field, how it is shown.
+/// Returns the settings of a picture and, if the scene has a field, how the field is shown.
 pub fn settings(scene: &Scene, settings: &Settings) -> Value {
     let (mode, order) = match settings.mode {
         Mode::Sheets => ("sheets", None),

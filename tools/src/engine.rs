@@ -1,4 +1,4 @@
-//! The engine's flags: the adapter, and the settings of a picture.
+//! The engine's flags: the device, and the settings of a picture.
 
 use crate::{
     clip::ClipFlags, failure::Failure, method::MethodFlags, parse, samples::Samples, scene::Loaded,
@@ -6,77 +6,93 @@ use crate::{
 use clap::{Args, ValueEnum};
 use splatkit::{
     Device, Error,
-    engine::{AdapterChoice, Budget, Gpu},
+    gpu::{AdapterChoice, Budget, Gpu},
     hierarchy::Detail,
     picture::Picture,
     scene::{self, Item, Scene, Settings},
 };
 use std::time::Duration;
 
-/// Seconds that no one waits for, and that every clock can count.
+/// Longest timeout in seconds: nobody waits that long, and every clock can count it.
 const LONGEST: f64 = 1e9;
 
 /// How pictures are drawn.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Engine")]
 pub struct EngineFlags {
-    /// Width and height in pixels.
+    /// Set the width and height of the picture, in pixels.
     #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "1280x720")]
     pub size: [u32; 2],
-    /// What draws: the engine for GPUs, or the one for processors, which needs no driver. auto takes the first where
-    /// there is a GPU or one of the --gpu options is set.
+    /// Choose the engine: gpu for GPUs, or cpu for processors, which needs no driver. auto uses the
+    /// GPU if there is one, or if --pass-entries or one of the --gpu options is set.
     #[arg(long, value_enum, default_value_t = Engine::Auto)]
     engine: Engine,
-    /// The adapter: its number in `splatkit gpus`, a part of its name, or `software`. By default the fastest.
+    /// Choose the adapter: its number in `splatkit gpus`, part of its name, or `software` [default:
+    /// the fastest]
     #[arg(long, value_name = "N|NAME|software")]
     gpu: Option<String>,
-    /// The most seconds that drawing a picture may take [default: 600]
+    /// Limit the seconds for drawing one picture [default: 600]
     #[arg(long, value_name = "SECONDS", value_parser = parse::positive)]
     gpu_timeout: Option<f64>,
-    /// Memory that a scene's splats, samples, pages, bricks and lists may take on the adapter; in bytes or with KiB, MiB or GiB
-    /// [default: on the processor three quarters of the memory that there is]
+    /// Limit the adapter's memory for a scene's splats, samples, pages, bricks and lists, in bytes
+    /// or with KiB, MiB or GiB [default: for adapters that run on the processor, three quarters of
+    /// the machine's memory]
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     gpu_memory: Option<u64>,
-    /// How a volume's gradient across the picture is found.
+    /// Choose how the gradient of a volume across the picture is computed.
     #[arg(long, value_enum, default_value_t = Gradient::Analytic)]
     gradient: Gradient,
-    /// How a volume's field is summed up; the picture is the same.
+    /// Choose how the samples of a volume are summed; the picture is the same.
     #[arg(long, value_enum, default_value_t = Evaluate::Auto)]
     evaluate: Evaluate,
-    /// Lights volumes, also where the transfer function has no light.
+    /// Light volumes even if the transfer function has no light.
     #[arg(long, overrides_with = "no_shade")]
     shade: bool,
-    /// Draws volumes and surfaces in their own colours, without light.
+    /// Draw volumes and surfaces in their own colours, without light.
     #[arg(long, overrides_with = "shade")]
     no_shade: bool,
-    /// Largest thickness of a sheet, in world units; by default 4/3 of a volume's sample spacing, half of that where it is
-    /// sharp or its kernel catmull-rom, half a spacing where the kernel is linear.
+    /// Set the largest thickness of a sheet, in world units [default: 4/3 of a volume's sample
+    /// spacing; half of that if the volume is sharp or its kernel is catmull-rom; half a spacing if
+    /// the kernel is linear]
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     sheet_thickness: Option<f64>,
-    /// Hierarchies, volumes in bricks: the most pixels that a splat may be wide at half its height, but for those of the
-    /// finest level; a sample counts as two steps wide. 0 draws the finest level
-    /// [default: 2]
+    /// Hierarchies and volumes in bricks: limit the width of a splat at half its height, in pixels.
+    /// Splats of the finest level may be wider. A sample counts as two sample spacings wide. 0
+    /// draws the finest level [default: 2]
     #[arg(long, value_name = "PIXELS", value_parser = parse::not_negative)]
     cut: Option<f64>,
-    /// Hierarchies, volumes in bricks: about the most splats of a picture, instead of --cut.
-    #[arg(long, value_name = "SPLATS", conflicts_with = "cut", value_parser = clap::value_parser!(u64).range(1..))]
+    /// Hierarchies and volumes in bricks: limit a picture to about this many splats, instead of
+    /// --cut.
+    #[arg(
+        long,
+        value_name = "SPLATS",
+        conflicts_with = "cut",
+        value_parser = clap::value_parser!(u64).range(1..)
+    )]
     budget: Option<u64>,
-    /// Hierarchies, volumes in bricks: about the milliseconds that a frame may take, instead of --cut; frames after a view that rests are finer
-    /// and finer.
-    #[arg(long, value_name = "MS", conflicts_with_all = ["cut", "budget"], value_parser = parse::positive)]
+    /// Hierarchies and volumes in bricks: limit a frame to about this many milliseconds, instead of
+    /// --cut. While the view stays the same, each frame is finer than the one before.
+    #[arg(
+        long,
+        value_name = "MS",
+        conflicts_with_all = ["cut", "budget"],
+        value_parser = parse::positive
+    )]
     frame_time: Option<f64>,
-    /// Hierarchies: GPU memory for each one's pages; volumes in bricks: for the bricks, of coarser levels where it is too
-    /// little; in bytes or with KiB, MiB or GiB [default: 1GiB]
+    /// Limit the GPU memory for the pages of each hierarchy, or for the bricks of a volume, in
+    /// bytes or with KiB, MiB or GiB. If it is too small for the bricks, coarser levels are drawn
+    /// [default: 1GiB]
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     memory: Option<u64>,
-    /// Hierarchies: whether splats that face away are left out [default: where the surface is solid, seen from outside
-    /// its bounds, and nothing is cut away]
+    /// Hierarchies: choose whether splats that face away are left out [default: true if the surface
+    /// is solid, seen from outside its bounds, and not clipped]
     #[arg(long, value_name = "BOOL")]
     cull_backfaces: Option<bool>,
-    /// Draws what lies behind opaque parts too: the same picture, for comparing times.
+    /// Also draw what opaque parts hide: the same picture, for comparing times.
     #[arg(long)]
     no_occlusion: bool,
-    /// Room of a depth pass: pairs of a splat and a tile. Pictures that need more take more passes.
+    /// Set the capacity of a depth pass, in pairs of a splat and a tile. Pictures that need more
+    /// take more passes.
     #[arg(long, value_name = "ENTRIES", value_parser = clap::value_parser!(u32).range(1..))]
     pass_entries: Option<u32>,
     #[command(flatten)]
@@ -85,7 +101,7 @@ pub struct EngineFlags {
     clip: ClipFlags,
 }
 
-/// The engines, and the choice of one by what there is.
+/// The engines; `Auto` chooses one of the available engines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Engine {
     Auto,
@@ -103,20 +119,22 @@ enum Gradient {
 /// [`scene::Evaluate`] as a flag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Evaluate {
-    /// Gather what can be gathered, scatter the rest.
+    /// Gather where possible, scatter the rest.
     Auto,
-    /// Sum up, for each pixel, the samples around its ray: for a volume, also among surfaces (the engine for GPUs takes Cartesian lattices alone).
+    /// For each pixel, sum the samples around its ray. For volumes, also among surfaces; the engine
+    /// for GPUs gathers from Cartesian lattices only.
     Gather,
     /// Add each sample to the pixels that its splat covers.
     Scatter,
 }
 
 impl EngineFlags {
-    /// Opens what draws.
+    /// Opens the device that draws the scene.
     pub fn device(&self, scene: &Scene) -> splatkit::Result<Device> {
         match self.engine {
             Engine::Cpu => Ok(Device::Cpu),
-            // The GPU engine draws no tensor products; where an adapter is named, it says so.
+            // The GPU engine draws no tensor products. If an adapter is named, that engine reports
+            // so.
             Engine::Auto if !self.asks_gpu() && scene.tensor().is_some() => Ok(Device::Cpu),
             Engine::Auto if !self.asks_gpu() => Ok(match Device::automatic() {
                 Device::Gpu(gpu, _) => Device::Gpu(gpu, self.passes()),
@@ -126,9 +144,9 @@ impl EngineFlags {
         }
     }
 
-    /// Opens the adapter.
+    /// Opens the adapter that the flags choose.
     fn gpu(&self) -> splatkit::Result<Gpu> {
-        // Any text is a choice: the conversion cannot fail.
+        // Every text is a valid choice, so the conversion cannot fail.
         let choice = self
             .gpu
             .as_deref()
@@ -143,7 +161,7 @@ impl EngineFlags {
         Ok(gpu)
     }
 
-    /// The room of depth passes.
+    /// Returns the capacity of depth passes.
     fn passes(&self) -> Budget {
         let mut budget = Budget::default();
         if let Some(entries) = self.pass_entries {
@@ -152,7 +170,7 @@ impl EngineFlags {
         budget
     }
 
-    /// Whether an option of the GPU engine alone is set.
+    /// Whether an option that only the GPU engine has is set.
     fn asks_gpu(&self) -> bool {
         self.gpu.is_some()
             || self.gpu_timeout.is_some()
@@ -160,18 +178,18 @@ impl EngineFlags {
             || self.pass_entries.is_some()
     }
 
-    /// What is wrong whatever the scene.
+    /// Checks what does not depend on the scene.
     pub fn check(&self) -> Result<(), Failure> {
         if self.engine == Engine::Cpu && self.asks_gpu() {
-            let message =
-                "--engine cpu takes none of --gpu, --gpu-timeout, --gpu-memory and --pass-entries";
+            let message = "--engine cpu cannot be used with --gpu, --gpu-timeout, --gpu-memory or \
+                 --pass-entries";
             return Err(Failure::Usage(message.into()));
         }
         self.method.check()?;
         self.clip.check()
     }
 
-    /// How a volume's field is summed up.
+    /// Returns how a volume's samples are summed.
     pub fn evaluate(&self) -> scene::Evaluate {
         match self.evaluate {
             Evaluate::Auto => scene::Evaluate::Auto,
@@ -180,13 +198,14 @@ impl EngineFlags {
         }
     }
 
-    /// The settings of a picture before it is averaged down; those that do not go with the scene are an error.
+    /// Returns the settings of a picture before it is averaged down. Settings that the scene cannot
+    /// be drawn with are an error.
     pub fn settings(&self, loaded: &Loaded, samples: Samples) -> splatkit::Result<Settings> {
         let factor = samples.factor(self.size, loaded.scene.has_splats());
         let mut settings = Settings::new(self.size.map(|side| side.saturating_mul(factor)));
         settings.sheet_thickness = self.sheet_thickness;
-        // Sheets and cuts stay as they are without the extra pixels: thinner sheets would part what overlaps on a surface. But a
-        // small picture is drawn as a larger one is.
+        // Explicit extra pixels do not change sheets and cuts: thinner sheets would separate splats
+        // that overlap on a surface. With `auto`, a small picture is drawn like a larger one.
         let wider = if let Samples::Factor(factor) = samples { f64::from(factor) } else { 1.0 };
         settings.sheet_pixels *= wider;
         settings.occlusion = !self.no_occlusion;
@@ -223,14 +242,14 @@ impl EngineFlags {
         Ok(settings)
     }
 
-    /// Turns a picture that shows nothing into an error.
+    /// Returns an error if a picture shows nothing.
     pub fn require_content(&self, picture: &Picture) -> Result<(), Failure> {
-        // What would round to nothing in a file of 8 bits is nothing.
+        // An opacity that rounds to 0 in a file of 8 bits counts as none.
         if picture.color.iter().any(|pixel| pixel[3] >= 0.5 / 255.0) {
             return Ok(());
         }
         let left =
-            self.clip.text().map_or(String::new(), |clips| format!(" in what {clips} leaves"));
+            self.clip.text().map_or(String::new(), |clips| format!(" after clipping by {clips}"));
         Err(Error::NothingToDraw(format!(
             "the picture is empty: the camera sees no splat that has opacity{left}"
         ))

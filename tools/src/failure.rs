@@ -1,4 +1,4 @@
-//! What can go wrong, the exit code of each, and how it is told.
+//! The errors of the command, their exit codes, and how they are printed.
 
 use crate::{
     limits,
@@ -16,24 +16,25 @@ use std::{
 /// Why the command ends without success.
 #[derive(Debug)]
 pub enum Failure {
-    /// What the library found.
+    /// An error of the library.
     Library(Error),
-    /// Arguments that do not go together.
+    /// Arguments that are wrong or cannot be combined.
     Usage(String),
     /// A result that could not be written.
     Output { file: PathBuf, message: String, hint: Option<&'static str> },
-    /// Threads that the system does not give.
+    /// Threads that the system could not start.
     Threads(String),
-    /// A file that `check` found damaged; what is wrong has been told.
+    /// A file that `check` found damaged. The findings are printed already.
     Damaged { file: PathBuf, findings: usize },
-    /// Cases of a suite or a sweep that were not measured, each told with its reason, and the file that therefore was not written.
+    /// Cases of a suite or a sweep that could not be measured. The tables give the reason for each.
+    /// `kept` is the file that was not written for that reason.
     Incomplete { failed: usize, kept: Option<PathBuf> },
     /// Pictures that differ by more than the user allows.
     Comparison(String),
 }
 
 impl Failure {
-    /// A result that the operating system would not take.
+    /// Returns the failure of a result that the operating system could not write.
     pub fn output(file: &Path, error: impl fmt::Display) -> Self {
         Self::Output {
             file: file.to_owned(),
@@ -73,62 +74,68 @@ impl Failure {
             }
             Self::Library(Error::Timeout { .. }) => Some("raise --limit-seconds"),
             Self::Library(Error::Memory { .. }) => Some(
-                "close other programs, raise the process's limits (`ulimit -v`), or convert the file to .splk with less --memory",
+                "close other programs, raise the process's limits (`ulimit -v`), or convert the \
+                 file to .splk with less --memory",
             ),
             Self::Library(Error::NoAdapter(_)) => {
-                Some("`splatkit gpus` lists what there is; `--reference` needs no GPU")
+                Some("`splatkit gpus` lists the adapters; --engine cpu and --reference need no GPU")
             }
-            // What the user calls it.
+            // The flag that sets this budget.
             Self::Library(Error::Gpu(message)) if message.ends_with("raise the budget") => {
                 Some("raise --pass-entries, or draw a smaller --size")
             }
             Self::Library(Error::Gpu(message)) if message.ends_with("may be taken") => Some(
-                "--gpu-memory allows more; `splatkit convert` makes .splk and .splv files, of which --cut and --budget draw less",
+                "raise --gpu-memory, or convert the input to .splk or .splv (`splatkit convert`) \
+                 and draw less of it with --cut or --budget",
             ),
             Self::Library(Error::Gpu(_)) => Some(
-                "try a smaller --size, or another --gpu (`software` is one); --gpu-timeout waits longer",
+                "try a smaller --size, another --gpu (such as `software`), or a longer \
+                 --gpu-timeout",
             ),
             Self::Library(Error::DeviceLost(_)) => Some(
-                "the driver was reset, or its memory ran out: try again, a smaller --size, or another --gpu (`software` is one)",
+                "the driver was reset, or its memory ran out: try again, a smaller --size, or \
+                 another --gpu (such as `software`)",
             ),
             Self::Library(Error::NothingToDraw(_)) => Some(
-                "`splatkit info` tells what a file holds; --transfer, --range, --clip and the camera decide what is seen",
+                "`splatkit info` prints what a file contains; --transfer, --range, --clip and the \
+                 camera decide what is visible",
             ),
             Self::Library(Error::Argument(_)) | Self::Usage(_) => {
                 Some("`splatkit help` lists the options")
             }
             Self::Library(Error::File { .. }) | Self::Comparison(_) => None,
-            Self::Damaged { .. } => Some("make it again from its source, or fetch it again"),
+            Self::Damaged { .. } => Some("make it again from its source, or download it again"),
             Self::Threads(_) => {
                 Some("end other programs, raise `ulimit -u`, or set RAYON_NUM_THREADS=1")
             }
-            Self::Incomplete { .. } => Some("the tables tell the reason of each"),
+            Self::Incomplete { .. } => Some("the tables give the reason for each"),
             Self::Output { hint, .. } => *hint,
         };
         hint.map(Cow::Borrowed)
     }
 
-    /// Prints the failure on stderr. Lines are broken where the terminal ends; other readers, such as logs, get whole ones.
+    /// Prints the failure to stderr. A terminal gets lines that are wrapped at its width; other
+    /// readers, such as logs, get whole lines.
     pub fn report(self) -> ExitCode {
         let is_terminal = io::stderr().is_terminal();
-        // An error only where there is a hook already.
+        // This fails only if a hook is set already.
         miette::set_hook(Box::new(move |_| {
             Box::new(miette::MietteHandlerOpts::new().wrap_lines(is_terminal).build())
         }))
         .ok();
-        // Who reads stderr may be gone already.
+        // The reader of stderr may be gone already.
         writeln!(io::stderr(), "{:?}", miette::Report::new(Printed::of(&self))).ok();
         ExitCode::from(self.code())
     }
 
-    /// Whether the message is of the GPU's driver or library, which write several lines. Others are of one line, and a line
-    /// break in them is of a file's text.
+    /// Whether the message comes from the GPU's driver or library, whose messages have several
+    /// lines. Other messages have one line, and a line break in them comes from a file's text.
     fn has_lines(&self) -> bool {
         matches!(self, Self::Library(Error::NoAdapter(_) | Error::Gpu(_) | Error::DeviceLost(_)))
     }
 }
 
-/// A failure as it is printed: no text in it commands the terminal.
+/// A failure that is safe to print: a terminal obeys no text in it.
 #[derive(Debug)]
 struct Printed {
     message: String,
@@ -160,14 +167,14 @@ impl miette::Diagnostic for Printed {
     }
 }
 
-/// What to do where the operating system does not take a result.
+/// Returns what the user can do if the operating system could not write a result.
 fn room(error: &io::Error) -> Option<&'static str> {
     match error.kind() {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
-            Some("make room there, or write to another disk; what was there before is as it was")
+            Some("make room there, or write to another disk; the old file is unchanged")
         }
         ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
-            Some("write to another folder, or change what the folder allows")
+            Some("write to another folder, or change the folder's permissions")
         }
         ErrorKind::NotFound => Some("make the folder first"),
         _ => None,
@@ -191,7 +198,7 @@ impl fmt::Display for Failure {
             }
             Self::Incomplete { failed, kept } => {
                 write!(out, "{failed} of the cases could not be drawn")?;
-                kept.iter().try_for_each(|file| write!(out, "; {} is as it was", file.display()))
+                kept.iter().try_for_each(|file| write!(out, "; {} is unchanged", file.display()))
             }
             Self::Output { file, message, .. } => write!(out, "{}: {message}", file.display()),
         }

@@ -13,30 +13,38 @@ use std::{io::Write, path::PathBuf};
 
 #[derive(Args, Debug)]
 pub struct Generate {
-    /// marschner-lobb, ball, specimen, slabs or head (in Hounsfield units, 1 standing for 100 mm); scan for a mesh.
+    /// Choose the content: the phantom marschner-lobb, ball, specimen, slabs or head (in Hounsfield
+    /// units; a length of 1 stands for 100 mm), or scan for a mesh.
     #[arg(value_parser = what)]
     what: What,
-    /// A volume as .nrrd, one on a rectilinear lattice that is densest in the middle as .vtr, or scattered samples as .csv; a
-    /// scan as .ply.
+    /// Write to this file: a volume as .nrrd, or as .vtr on a rectilinear lattice that is densest
+    /// in the middle; scattered samples as .csv; a scan as .ply.
     #[arg(short, long, value_name = "FILE", value_parser = target)]
     output: PathBuf,
-    /// Samples along each axis of the cube from −1 to 1.
+    /// Set the number of samples along each axis of the cube from −1 to 1.
     #[arg(long, value_name = "XxYxZ", value_parser = parse::dims, default_value = "64x64x64")]
     dims: [usize; 3],
-    /// How they lie in a .nrrd. Body-centred cubic: 29.3 % fewer for as many as --dims says along x.
+    /// Choose the lattice of a .nrrd. bcc has 29.3 % fewer samples than a Cartesian cube with as
+    /// many along each axis as --dims has along x.
     #[arg(long, value_enum, default_value_t = Places::Cartesian)]
     lattice: Places,
-    /// Samples of a .nrrd: f32, or u8, which turns the values 0 to 1 into 0 to 255, is not packed and is written slice by
-    /// slice, so that it may be larger than memory.
+    /// Choose the type of the samples of a .nrrd. u8 maps the values 0 to 1 to 0 to 255 and is
+    /// written uncompressed, slice by slice, so that the volume may be larger than memory.
     #[arg(long = "type", value_enum, default_value_t = Type::F32)]
     sample_type: Type,
-    /// The mesh that a scan is made from: its triangles are cut in four again and again, its surface set in waves.
+    /// Make a scan from this mesh: subdivide its triangles into four again and again, and displace
+    /// its surface by waves.
     #[arg(long, value_name = "MESH", required_if_eq("what", "scan"))]
     from: Option<PathBuf>,
-    /// Scattered samples in a .csv; the most vertices of a scan.
-    #[arg(long, value_name = "COUNT", default_value_t = 20_000, value_parser = clap::value_parser!(u32).range(1..=50_000_000))]
+    /// Set the number of scattered samples in a .csv, or the largest number of vertices of a scan.
+    #[arg(
+        long,
+        value_name = "COUNT",
+        default_value_t = 20_000,
+        value_parser = clap::value_parser!(u32).range(1..=50_000_000)
+    )]
     points: u32,
-    /// Replaces a file that is there already.
+    /// Replace an existing file.
     #[arg(long)]
     overwrite: bool,
 }
@@ -44,7 +52,7 @@ pub struct Generate {
 /// [`Arrangement`] as a flag.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Places {
-    /// Evenly along each axis.
+    /// Even steps along each axis.
     Cartesian,
     /// Body-centred cubic.
     Bcc,
@@ -75,7 +83,7 @@ fn target(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match path.extension().and_then(|extension| extension.to_str()) {
         Some("nrrd" | "vtr" | "csv" | "ply") => Ok(path),
-        _ => Err("the file's name ends in .nrrd, .vtr, .csv or .ply".into()),
+        _ => Err("the file's name must end in .nrrd, .vtr, .csv or .ply".into()),
     }
 }
 
@@ -93,15 +101,14 @@ impl Generate {
                 let mesh = formats::read_mesh(&source)?;
                 output::check_unneeded(&self.output, &source.files())?;
                 if mesh.triangles.is_empty() {
-                    let message =
-                        format!("{} has no triangles that could be cut in more", from.display());
+                    let message = format!("{} has no triangles to subdivide", from.display());
                     return Err(Error::Argument(message).into());
                 }
                 disk::write(&self.output, &scan::ply(&scan::scan(&mesh, self.points as usize)))?;
             }
             (What::Scan, ..) => {
                 return Err(Failure::Usage(
-                    "a scan is made --from a mesh and written as .ply".into(),
+                    "a scan is made from a mesh (--from) and written as .ply".into(),
                 ));
             }
             (_, _, "ply") => {
@@ -130,13 +137,14 @@ impl Generate {
         Ok(())
     }
 
-    /// Writes bytes slice by slice.
+    /// Writes 8-bit samples slice by slice.
     fn bytes(&self, phantom: Phantom, progress: &Progress) -> Result<(), Failure> {
         if matches!(self.lattice, Places::Bcc) || phantom == Phantom::Head {
-            let message = "--type u8 is for Cartesian lattices and for phantoms with values in 0 to 1: not for bcc and head";
+            let message = "--type u8 needs a Cartesian lattice and a phantom with values from 0 \
+                 to 1; bcc and head need f32";
             return Err(Failure::Usage(message.into()));
         }
-        // A slice at a time.
+        // Only one slice is in memory at a time.
         let [x, y, z] = self.dims;
         check_dims([x, y, z.min(1)], AS_BYTES)?;
         let slices = phantom.byte_slices(self.dims).map_err(Error::Argument)?;
@@ -156,13 +164,13 @@ impl Generate {
     }
 }
 
-/// Bytes that a sample takes while it is made: with its neighbours in a slice, as a number and packed, and as text, which is
-/// written as it is made but read as a whole.
+/// Bytes of memory for each sample that is made: in slices; as numbers and compressed; and as text,
+/// which is written while it is made but read as a whole.
 const AS_BYTES: u64 = 2;
 const AS_NUMBERS: u64 = 16;
 const AS_TEXT: u64 = 64;
 
-/// Refuses samples of which there are none, or more than memory may hold.
+/// Refuses dimensions without samples, or with more than memory may hold.
 fn check_dims(dims: [usize; 3], bytes: u64) -> Result<(), Failure> {
     if dims.contains(&0) {
         let [x, y, z] = dims;
@@ -180,8 +188,8 @@ fn check_dims(dims: [usize; 3], bytes: u64) -> Result<(), Failure> {
     }
 }
 
-/// A body-centred lattice over the cube from −1 to 1 that stands for a Cartesian one of `side`³ samples: the same distance
-/// between the copies of its spectrum.
+/// Returns a body-centred lattice over the cube from −1 to 1 that corresponds to a Cartesian one of
+/// `side`³ samples: the copies of their spectra are the same distance apart.
 pub fn body_centred(side: usize) -> Lattice {
     let edge = 2.0 * std::f64::consts::SQRT_2 / side.saturating_sub(1).max(1) as f64;
     let cells = (2.0 / edge).ceil();
@@ -194,7 +202,8 @@ pub fn body_centred(side: usize) -> Lattice {
     }
 }
 
-/// A grid as VTK writes it, with coordinates along each axis that are four times as dense in the middle as at the ends.
+/// Writes a grid as VTK does, with coordinates along each axis that are four times as dense in the
+/// middle as at the ends.
 fn rectilinear(phantom: Phantom, dims: [usize; 3], out: &mut impl Write) -> std::io::Result<()> {
     let place = |i: usize, count: usize| {
         let t = 2.0 * i as f64 / count.saturating_sub(1).max(1) as f64 - 1.0;
@@ -204,8 +213,10 @@ fn rectilinear(phantom: Phantom, dims: [usize; 3], out: &mut impl Write) -> std:
     let extent = dims.map(|count| format!("0 {}", count.saturating_sub(1))).join(" ");
     writeln!(
         out,
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"RectilinearGrid\" version=\"0.1\" byte_order=\"LittleEndian\">\n\
-         <RectilinearGrid WholeExtent=\"{extent}\">\n<Piece Extent=\"{extent}\">\n<PointData Scalars=\"value\">"
+        "<?xml version=\"1.0\"?>\n\
+         <VTKFile type=\"RectilinearGrid\" version=\"0.1\" byte_order=\"LittleEndian\">\n\
+         <RectilinearGrid WholeExtent=\"{extent}\">\n<Piece Extent=\"{extent}\">\n\
+         <PointData Scalars=\"value\">"
     )?;
     let [x, y, z] = &places;
     let points = z
@@ -232,7 +243,7 @@ fn array(
     writeln!(out, "</DataArray>")
 }
 
-/// Samples at random places of the cube, as a table; the same ones every time.
+/// Writes a table of samples at random places in the cube, which are the same every time.
 fn scattered(phantom: Phantom, count: u32, out: &mut impl Write) -> std::io::Result<()> {
     let mut state = 0u64;
     // SplitMix64 (Steele, Lea & Flood 2014).

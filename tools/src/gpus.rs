@@ -2,11 +2,11 @@
 
 use crate::{failure::Failure, output};
 use clap::Args;
-use splatkit::{Error, engine::Gpu};
+use splatkit::{Error, gpu::Gpu};
 
 #[derive(Args, Debug)]
 pub struct Gpus {
-    /// Writes JSON.
+    /// Print the list as JSON.
     #[arg(long)]
     json: bool,
 }

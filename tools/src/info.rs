@@ -20,11 +20,11 @@ use std::path::PathBuf;
 
 #[derive(Args, Debug)]
 pub struct Info {
-    /// A mesh, cloud, volume, hierarchy or volume in bricks, or scattered samples.
+    /// A mesh, point cloud, hierarchy, volume, volume in bricks, or a set of scattered samples.
     file: PathBuf,
     #[command(flatten)]
     load: LoadFlags,
-    /// Writes JSON.
+    /// Print the facts as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -48,7 +48,7 @@ impl Info {
         facts.insert("count".into(), json!(count));
         facts.insert("bytes".into(), json!(bytes));
         facts.insert("bytes_per_point".into(), json!(bytes as f64 / count.max(1) as f64));
-        // Bricks tell their own; those of a hierarchy lie at different depths.
+        // Bricks state their own levels. The leaves of a hierarchy lie at different depths.
         if !matches!(input, Input::Hierarchy(_)) {
             facts.entry("levels").or_insert(json!(1));
         }
@@ -197,7 +197,7 @@ fn bounds(bounds: Option<[glam::DVec3; 2]>) -> Value {
     bounds.map_or(Value::Null, |[min, max]| json!({ "min": min.to_array(), "max": max.to_array() }))
 }
 
-/// A value for people.
+/// Returns a value as readable text.
 fn plain(value: &Value) -> String {
     match value {
         Value::String(text) => safe(text).into_owned(),

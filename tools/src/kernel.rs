@@ -1,4 +1,4 @@
-//! The flags of the kernel that stands for a sample of a lattice.
+//! The flags of the kernel that reconstructs the field from the samples of a lattice.
 
 use crate::{failure::Failure, parse, scene::in_file};
 use clap::Args;
@@ -8,22 +8,24 @@ use splatkit::{
 };
 use std::path::{Path, PathBuf};
 
-/// The kernel of a volume's samples. Lengths are counted in samples.
+/// The kernel of a volume's samples. Lengths are in samples.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Kernel")]
 pub struct KernelFlags {
-    /// gaussian, b-spline, hann; linear, catmull-rom, cubic-b-spline (products along the axes of a Cartesian lattice); or a file of
-    /// values at even distances from 0 to --extent: a JSON array, or one number in a line [default: gaussian]
+    /// Choose the kernel: gaussian, b-spline or hann; linear, catmull-rom or cubic-b-spline
+    /// (products along the axes of a Cartesian lattice); or a file of values at even distances from
+    /// 0 to --extent, as a JSON array or with one number per line [default: gaussian]
     #[arg(long, value_name = "NAME|FILE")]
     kernel: Option<String>,
-    /// Standard deviation of the Gaussian [default: 0.6]
+    /// Set the standard deviation of the Gaussian [default: 0.6]
     #[arg(long, value_name = "SAMPLES", value_parser = parse::positive)]
     sigma: Option<f64>,
-    /// Radius of a footprint [default: 2 for gaussian and b-spline, 3 for hann]
+    /// Set the radius of a footprint [default: 2 for gaussian and b-spline, 3 for hann; a gaussian
+    /// grows with a --sigma above 0.6]
     #[arg(long, value_name = "SAMPLES", value_parser = parse::positive)]
     extent: Option<f64>,
-    /// Makes kernels pass through the samples, which they smooth otherwise. Fast with --kernel cubic-b-spline; linear and
-    /// catmull-rom do so by themselves.
+    /// Make the reconstruction pass through the samples instead of smoothing them. This is fast
+    /// with --kernel cubic-b-spline. linear and catmull-rom pass through the samples without it.
     #[arg(long)]
     sharp: bool,
 }
@@ -31,7 +33,7 @@ pub struct KernelFlags {
 const NAMES: [&str; 6] =
     ["gaussian", "b-spline", "hann", "linear", "catmull-rom", "cubic-b-spline"];
 
-/// A table of this many bytes is no kernel.
+/// Largest size of a kernel's table, in bytes.
 const MOST_BYTES: usize = 4 << 20;
 
 impl KernelFlags {
@@ -39,13 +41,13 @@ impl KernelFlags {
         let name = self.kernel.as_deref().unwrap_or("gaussian");
         if self.sigma.is_some() && name != "gaussian" {
             return Err(Failure::Usage(format!(
-                "--sigma is the Gaussian's; the kernel {name} has none"
+                "--sigma applies to the gaussian kernel only, not to {name}"
             )));
         }
         if let Some(tensor) = Tensor::ALL.into_iter().find(|tensor| tensor.name() == name) {
             return match self.extent {
                 Some(_) => Err(Failure::Usage(format!(
-                    "the kernel {name} has an extent of its own; leave out --extent"
+                    "the kernel {name} has a fixed extent; leave out --extent"
                 ))),
                 None => Ok(Kernel::tensor(tensor)),
             };
@@ -57,20 +59,21 @@ impl KernelFlags {
             file if Path::new(file).extension().is_some() || Path::new(file).exists() => {
                 let extent = self.extent.ok_or_else(|| {
                     Failure::Usage(format!(
-                        "{file}: a kernel of one's own needs --extent, where its last value lies"
+                        "{file}: a kernel from a file needs --extent, the distance of its last \
+                         value"
                     ))
                 })?;
-                // An extent that is wrong is not the file's fault.
+                // A wrong extent is not the file's fault.
                 Kernel::table(vec![1.0, 0.0], extent)?;
                 let file = Path::new(file);
                 Kernel::table(read_table(file, limits)?, extent).map_err(|error| {
-                    in_file(file, error).hint("the form is a JSON array, or one number in a line")
+                    in_file(file, error).hint("the form is a JSON array, or one number per line")
                 })?
             }
             _ => {
                 let names = NAMES.join(", ");
                 return Err(Failure::Usage(format!(
-                    "there is no kernel “{name}”; there are {names}, and files"
+                    "there is no kernel “{name}”; the kernels are {names}, or a file"
                 )));
             }
         })
@@ -79,37 +82,38 @@ impl KernelFlags {
     fn gaussian(&self) -> splatkit::Result<Kernel> {
         let default = Kernel::default();
         let sigma = self.sigma.unwrap_or(default.unit());
-        // A wider kernel keeps its shape unless the user cuts it.
+        // A wider kernel keeps its shape unless the user sets the extent.
         let extent = self.extent.unwrap_or(default.extent.max(default.radius() * sigma));
         Kernel::gaussian(sigma, extent)
     }
 
-    /// The file of a kernel of one's own.
+    /// Returns the file of the user's own kernel.
     pub fn file(&self) -> Option<PathBuf> {
         self.kernel.as_ref().filter(|name| !NAMES.contains(&name.as_str())).map(PathBuf::from)
     }
 
-    /// Whether kernels are to pass through the samples.
+    /// Whether the reconstruction must pass through the samples.
     pub fn is_sharp(&self) -> bool {
         self.sharp
     }
 }
 
-/// The numbers of a JSON array, or of lines.
+/// Reads the numbers of a JSON array, or one number per line.
 fn read_table(path: &Path, limits: &Limits) -> splatkit::Result<Vec<f64>> {
     let source = Source::open(path, limits)?;
     let text = source.small_text("the table of a kernel", MOST_BYTES)?;
     if text.trim_start().starts_with('[') {
         return serde_json::from_str(&text).map_err(|e| source.error("kernel", e.to_string()));
     }
-    // Old editors end lines with a carriage return alone.
+    // Old editors end lines with a carriage return only.
     let text = text.replace("\r\n", "\n").replace('\r', "\n");
     let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let number = |(at, line): (usize, &str)| {
-        let error =
-            || source.error(format!("line {}", at + 1), format!("“{}” is no number", line.trim()));
+        let error = || {
+            source.error(format!("line {}", at + 1), format!("“{}” is not a number", line.trim()))
+        };
         parse::finite(line.trim())
-            .map_err(|_| error().hint("the form is a JSON array, or one number in a line"))
+            .map_err(|_| error().hint("the form is a JSON array, or one number per line"))
     };
     lines.map(number).collect()
 }

@@ -1,28 +1,29 @@
-//! The flags of what reading an input may take.
+//! The flags that limit what reading an input may take.
 
 use clap::Args;
 use splatkit::{error::LimitKind, input::Limits};
 use std::path::Path;
 
-/// How much any file may claim, occupy and take.
+/// Limits for what a file claims, and for the memory and time that reading it takes.
 #[derive(Args, Debug, Clone, Default)]
 #[command(next_help_heading = "Limits")]
 pub struct LimitFlags {
-    /// Vertices, points or faces that a file may claim [default: 2147483648]
+    /// Limit the vertices, points or faces that a file may claim [default: 2147483648]
     #[arg(long, value_name = "COUNT")]
     limit_points: Option<u64>,
-    /// Bytes that an input may occupy: its files, and all that is made of them until it is read. Where none is told, an input that
-    /// is read as a whole also has to fit the machine's memory [default: 34359738368]
+    /// Limit the bytes of an input: its files, and everything made from them until it is read. If
+    /// unset, inputs that are read whole must also fit in memory [default: 34359738368]
     #[arg(long, value_name = "BYTES")]
     limit_bytes: Option<u64>,
-    /// Depth to which nodes and elements may be nested [default: 64]
+    /// Limit the nesting of nodes and elements [default: 64]
     #[arg(long, value_name = "COUNT")]
     limit_depth: Option<usize>,
-    /// Pixels that a picture may have [default: 268435456]
+    /// Limit the pixels of an image that is read [default: 268435456]
     #[arg(long, value_name = "COUNT")]
     limit_texels: Option<u64>,
-    /// Seconds that reading an input and making its splats may take together; building a hierarchy of them may take as many
-    /// again. In regions, this limits each region [default: 600]
+    /// Limit the seconds for reading an input and making its splats. Building a hierarchy from them
+    /// may take as long again. Conversion in regions applies the limit to each region [default:
+    /// 600]
     #[arg(long, value_name = "SECONDS")]
     limit_seconds: Option<u64>,
 }
@@ -39,22 +40,25 @@ impl LimitFlags {
         }
     }
 
-    /// The limits of an input that is read as a whole, for which there are `memory` bytes.
+    /// Returns the limits of an input that is read as a whole, if `memory` bytes are available.
     pub fn whole(&self, memory: Option<u64>) -> Limits {
         let limits = self.limits();
         let memory = memory.filter(|_| self.limit_bytes.is_none()).unwrap_or(u64::MAX);
-        // A limit counts what is dropped on the way, too: the file, and what is unpacked.
+        // The limit also counts data that is dropped on the way, such as the file and its unpacked
+        // bytes.
         Limits { bytes: limits.bytes.min(memory.saturating_mul(2)), ..limits }
     }
 }
 
-/// What the user can do about a limit that was met. No limit helps a file that claims more than its bytes can hold.
+/// Returns what the user can do about an exceeded limit. No limit helps a file that claims more
+/// than its bytes can hold.
 pub fn hint(file: &Path, kind: LimitKind, found: u64) -> String {
     let flag = match kind {
         LimitKind::Points | LimitKind::Bytes => {
             if let Some(bytes) = too_few_bytes(file, kind, found) {
                 return format!(
-                    "the file has {bytes} bytes, which cannot hold that: it is cut or damaged; make it again"
+                    "the file has {bytes} bytes, which cannot hold that: it is cut or damaged; \
+                     make it again"
                 );
             }
             if found == u64::MAX {
@@ -68,19 +72,21 @@ pub fn hint(file: &Path, kind: LimitKind, found: u64) -> String {
     };
     if kind == LimitKind::Bytes {
         return format!(
-            "raise --limit-bytes to more than {found} if the file can be trusted and memory suffices; of a conversion also --memory"
+            "raise --limit-bytes to more than {found} if the file can be trusted and memory \
+             suffices; for a conversion, also raise --memory"
         );
     }
     format!("raise --limit-{flag} to {found} or more if the file can be trusted")
 }
 
-/// The bytes of a file that are far too few for what it claims.
+/// Returns the file's size if that is far too small for what the file claims.
 fn too_few_bytes(file: &Path, kind: LimitKind, found: u64) -> Option<u64> {
-    // The data of these may be in other files.
+    // The data of these formats may be in other files.
     let refers = file
         .extension()
         .is_some_and(|e| ["gltf", "nrrd", "nhdr", "obj"].iter().any(|o| e.eq_ignore_ascii_case(o)));
-    // A packed point takes a part of a byte at least. A byte unpacks to a thousand, which may take several hundred each.
+    // A packed point takes a fraction of a byte or more. A byte unpacks to at most a thousand
+    // bytes, each of which may take several hundred bytes of memory.
     let most = if kind == LimitKind::Points { 64 } else { 1 << 20 };
     let bytes = file.metadata().ok()?.len();
     (!refers && bytes.saturating_mul(most) < found).then_some(bytes)
@@ -91,7 +97,7 @@ mod tests {
     use super::*;
     use clap::{Args, FromArgMatches};
 
-    /// The help tells the defaults of the library, and the hints tell flags that there are.
+    /// The help contains the library's defaults, and the hints name existing flags.
     #[test]
     fn flags_are_those_of_the_library() {
         let command = LimitFlags::augment_args(clap::Command::new("test"));

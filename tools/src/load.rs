@@ -1,4 +1,4 @@
-//! Opening an input of any kind: by its extension, then by its first bytes.
+//! Opening an input of any kind, which its extension decides, then its first bytes.
 
 use crate::{failure::Failure, limits::LimitFlags, parse};
 use clap::Args;
@@ -18,7 +18,7 @@ use std::{
     sync::Arc,
 };
 
-/// What an input holds.
+/// The content of an input.
 pub enum Input {
     Mesh(Mesh),
     Volume(Volume),
@@ -27,37 +27,45 @@ pub enum Input {
     Bricks(Arc<Bricks>),
 }
 
-/// How raw files are read, and how much any file may claim.
+/// How raw files and scattered samples are read, and the limits for any file.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Input")]
 pub struct LoadFlags {
-    /// Raw volumes: samples along each axis, the fastest first. Needs --type.
+    /// Raw volumes: set the number of samples along each axis, the fastest axis first. Needs
+    /// --type.
     #[arg(long, value_name = "XxYxZ", value_parser = parse::dims, requires = "sample_type")]
     dims: Option<[usize; 3]>,
-    /// Raw volumes: the type of a sample: u8, i8, u16, i16, u32, i32, u64, i64, f32 or f64.
-    #[arg(long = "type", id = "sample_type", value_name = "TYPE", value_parser = parse::sample_type, requires = "dims")]
+    /// Raw volumes: set the type of a sample: u8, i8, u16, i16, u32, i32, u64, i64, f32 or f64.
+    #[arg(
+        long = "type",
+        id = "sample_type",
+        value_name = "TYPE",
+        value_parser = parse::sample_type,
+        requires = "dims"
+    )]
     sample_type: Option<SampleType>,
-    /// Raw volumes: world units between samples [default: 1]
+    /// Raw volumes: set the distance between samples, in world units [default: 1]
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::spacing, requires = "dims")]
     spacing: Option<DVec3>,
-    /// Raw volumes: the order of bytes, little or big.
+    /// Raw volumes: set the byte order, little or big [default: little]
     #[arg(long, value_name = "ORDER", value_parser = parse::endian, requires = "dims")]
     endian: Option<Endian>,
-    /// Raw volumes: bytes before the first sample.
+    /// Raw volumes: skip this many bytes before the first sample [default: 0]
     #[arg(long, value_name = "BYTES", requires = "dims")]
     header: Option<u64>,
-    /// Scattered samples: the property, column or array that holds the values. A PLY file without faces
-    /// and a table of points are read as samples with it, as clouds without.
+    /// Scattered samples: read the values from this property, column or array. With it, a PLY file
+    /// without faces and a table of points are read as samples; without it, as point clouds.
     #[arg(long, value_name = "NAME")]
     scalar: Option<String>,
-    /// Scattered samples: one radius for all, in world units, of two standard deviations [default: the file's, or from the
-    /// neighbours]
+    /// Scattered samples: use one radius for all samples, in world units. A radius is two standard
+    /// deviations [default: the file's radii, or estimated from the neighbours]
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     radius: Option<f64>,
-    /// Scattered samples: the nearest neighbours, 4 to 64, that kernels and slopes are made from [default: 16]
+    /// Scattered samples: estimate kernels and slopes from this many nearest neighbours, 4 to 64
+    /// [default: 16]
     #[arg(long, value_name = "COUNT", value_parser = parse::neighbours)]
     neighbours: Option<usize>,
-    /// Scattered samples: mean values alone, without slopes fitted to the neighbours.
+    /// Scattered samples: use mean values only, without slopes fitted to the neighbours.
     #[arg(long)]
     no_slopes: bool,
     #[command(flatten)]
@@ -74,8 +82,8 @@ impl LoadFlags {
         self.open_within(path, memory::most(), &mut Vec::new())
     }
 
-    /// Reads a file; where it is read as a whole it may take so many bytes of memory, unless a flag allows more. Adds the file
-    /// and those that it refers to to those that were `read`.
+    /// Reads a file and adds its path, and those of the files it refers to, to `read`. An input
+    /// that is read as a whole may take `memory` bytes, unless a flag allows more.
     pub fn open_within(
         &self,
         path: &Path,
@@ -84,7 +92,7 @@ impl LoadFlags {
     ) -> Result<Input, Failure> {
         let (limits, whole) = (self.limits(), self.limits.whole(memory));
         let (input, files) = match self.kind(path)? {
-            // These refer to no others.
+            // Bricks and hierarchies refer to no other files.
             Kind::Bricks => {
                 (Input::Bricks(Arc::new(Bricks::open(path, &limits)?)), vec![path.to_owned()])
             }
@@ -114,7 +122,7 @@ impl LoadFlags {
         Ok(input)
     }
 
-    /// What a file holds, sound or not.
+    /// Returns the kind of a file, even if the file is damaged.
     pub fn kind(&self, path: &Path) -> Result<Kind, Failure> {
         let raw = self.layout().map(|_| Kind::Volume);
         Ok(Kind::of(path, &self.limits(), self.scalar.is_some())?
@@ -122,7 +130,8 @@ impl LoadFlags {
             .ok_or_else(|| unknown(path))?)
     }
 
-    /// Opens a volume that can be read slice by slice; none where it is read as a whole.
+    /// Opens a volume that can be read slice by slice. Returns `None` for volumes that are read as
+    /// a whole.
     pub fn stream(&self, path: &Path) -> Result<Option<VolumeStream>, Failure> {
         Ok(VolumeStream::open(path, &self.limits(), self.layout().as_ref())?)
     }
@@ -137,7 +146,7 @@ impl LoadFlags {
         })
     }
 
-    /// How scattered samples become splats.
+    /// Returns how scattered samples become splats.
     pub fn sample_options(&self, deadline: Deadline) -> SampleOptions {
         let default = SampleOptions::default();
         SampleOptions {
@@ -151,10 +160,11 @@ impl LoadFlags {
 }
 
 fn unknown(path: &Path) -> Error {
-    Error::input(path, "file", "is of no kind that can be read").hint(
-        "hierarchies: .splk; volumes in bricks: .splv; meshes: .ply, .obj, .gltf, .glb, .stl; clouds: .ply, .las, .laz, .e57, .pcd, .xyz, .pts, .asc, and .csv and .txt whose \
-         columns are a position, a colour or a normal; volumes: .vti, .vtr, .vtk, .nrrd, .nhdr, and raw samples (also packed \
-         by gzip) with --dims and --type; scattered samples: .vtu, .vtp, .vtk, .npy, .csv, .txt, .xyzv, and .ply and tables of \
-         points with --scalar",
+    Error::input(path, "file", "is in no format that can be read").hint(
+        "hierarchies: .splk; volumes in bricks: .splv; meshes: .ply, .obj, .gltf, .glb, .stl; \
+         point clouds: .ply, .las, .laz, .e57, .pcd, .xyz, .pts, .asc, and .csv and .txt whose \
+         columns are a position, a colour or a normal; volumes: .vti, .vtr, .vtk, .nrrd, .nhdr, \
+         and raw samples (also packed by gzip) with --dims and --type; scattered samples: .vtu, \
+         .vtp, .vtk, .npy, .csv, .txt, .xyzv, and .ply and tables of points with --scalar",
     )
 }

@@ -1,5 +1,5 @@
-//! The `splatkit` command: one file per subcommand, the flags that they share in modules of their own. All drawing is the
-//! library's.
+//! The `splatkit` command: one file per subcommand; flags that subcommands share are in modules of
+//! their own. The library does all drawing.
 
 #![deny(unsafe_code)]
 
@@ -46,50 +46,57 @@ use std::{
     process::ExitCode,
 };
 
-/// Draws volumes and surfaces as elliptic splats.
+/// Draw volumes and surfaces as elliptic splats.
 ///
-/// Exit codes: 0 done, 1 runtime or output, 2 usage, 3 bad input or nothing to draw, 4 no adapter or out of memory,
-/// 5 comparison failed, 130 interrupted.
+/// Exit codes: 0 done, 1 runtime or output error, 2 wrong usage, 3 bad input or nothing to draw, 4
+/// no adapter, device failure or out of memory, 5 comparison failed, 130 interrupted.
 #[derive(Parser)]
 #[command(name = "splatkit", version, max_term_width = 110)]
 struct Command {
     #[command(subcommand)]
     task: Task,
 
-    /// Tells more on stderr; twice for every frame.
+    /// Log more to stderr; give it twice (-vv) to log every frame.
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     verbose: u8,
 
-    /// Tells nothing but errors.
+    /// Print errors only.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
 
-    /// Compute on this many threads [default: RAYON_NUM_THREADS, or as many as there are processors]
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    /// Compute on this many threads [default: RAYON_NUM_THREADS, or one per processor]
+    #[arg(
+        long,
+        global = true,
+        value_name = "N",
+        value_parser = clap::value_parser!(u32).range(1..=1024)
+    )]
     threads: Option<u32>,
 }
 
 #[derive(Subcommand)]
 enum Task {
-    /// Draws meshes, clouds and volumes in one picture.
+    /// Draw meshes, point clouds and volumes in one picture.
     Render(Box<render::Render>),
-    /// Tells what is in a file.
+    /// Print what a file contains.
     Info(info::Info),
-    /// Makes a hierarchy of splats from meshes and clouds; writes 3D Gaussians; writes volumes on other lattices or in bricks.
+    /// Build a hierarchy of splats from meshes and point clouds, or write 3D Gaussians; write a
+    /// volume on another lattice or in bricks.
     Convert(Box<convert::Convert>),
-    /// Looks for damage in a hierarchy or a volume in bricks, or for what is odd in another input.
+    /// Check a hierarchy or a volume in bricks for damage, or another input for oddities.
     Check(check::Check),
-    /// Compares two pictures.
+    /// Compare two pictures.
     Compare(compare::Compare),
-    /// Measures frame times: the camera turns by 5 degrees between frames.
+    /// Measure frame times; the camera turns by 5 degrees between frames.
     Bench(Box<bench::Bench>),
-    /// Makes a mesh and a volume and draws them: pictures and timings with no download.
+    /// Generate a mesh and a volume, draw them and print timings; needs no download.
     Demo(demo::Demo),
-    /// Writes a phantom: a volume or scattered samples to try the other commands on; or a large scan.
+    /// Write a phantom (a volume or scattered samples) to try the other commands on, or a large
+    /// scan.
     Generate(generate::Generate),
-    /// Measures the quality of what is drawn: the tables of docs/volumes.md.
+    /// Measure the quality of pictures: the tables of docs/volumes.md.
     Figures(figures::Figures),
-    /// Lists the adapters that can draw, and their limits.
+    /// List the adapters that can draw, and their limits.
     Gpus(gpus::Gpus),
 }
 
@@ -124,21 +131,23 @@ fn main() -> ExitCode {
     }
 }
 
-/// Mesa's drivers complain on stderr where the folder for a user's sockets is not set, as on servers. They need none.
+/// Sets `XDG_RUNTIME_DIR`, the folder for a user's sockets, if it is unset, as on servers. Mesa's
+/// drivers complain on stderr if it is missing, although they do not need it.
 #[cfg_attr(
     unix,
-    expect(unsafe_code, reason = "the environment may be changed while there is one thread")
+    expect(unsafe_code, reason = "changing the environment is sound while there is one thread")
 )]
 fn quiet_drivers() {
     #[cfg(unix)]
     if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
         let folder = std::env::temp_dir();
-        // SAFETY: this is the first thing that the process does; no other thread reads the environment.
+        // SAFETY: the process does this first, so no other thread reads the environment.
         unsafe { std::env::set_var("XDG_RUNTIME_DIR", folder) };
     }
 }
 
-/// Prints what clap answers instead of a command: a help text, the version, or what is wrong with the arguments.
+/// Prints what clap returns instead of a command: a help text, the version, or an error in the
+/// arguments.
 fn tell(answer: &clap::Error) -> ExitCode {
     if answer.use_stderr() {
         let is_plain =
@@ -146,7 +155,7 @@ fn tell(answer: &clap::Error) -> ExitCode {
         if std::env::args_os().all(is_plain) {
             answer.print().ok();
         } else {
-            // Without colours, since those cannot be told from what arguments hold.
+            // Without colours: their escape sequences look like those in the arguments.
             write!(std::io::stderr(), "{}", terminal::safe_lines(&answer.render().to_string()))
                 .ok();
         }
@@ -160,7 +169,7 @@ fn tell(answer: &clap::Error) -> ExitCode {
     }
 }
 
-/// Sends the library's events to stderr; `RUST_LOG` decides where it is set.
+/// Logs the library's events to stderr. `RUST_LOG` sets the filter if it is present.
 fn start_log(command: &Command) {
     let default = match (command.quiet, command.verbose) {
         (true, _) => "off",
@@ -176,11 +185,11 @@ fn start_log(command: &Command) {
         .with_env_filter(filter)
         .fmt_fields(terminal::SafeFields)
         .with_writer(std::io::stderr)
-        // Where stderr is closed, telling of that on stderr would panic.
+        // If stderr is closed, reporting that on stderr would panic.
         .log_internal_errors(false)
         .with_ansi(colored)
         .with_target(false)
-        // A span that closes tells its time.
+        // A span logs its duration when it closes.
         .with_span_events(tracing_subscriber::fmt::format::FmtSpan::CLOSE)
         .init();
 }
@@ -190,7 +199,7 @@ mod tests {
     use super::Command;
     use clap::CommandFactory;
 
-    /// Flags of a name that two groups share, and the like, are found by clap alone, and only here.
+    /// Only clap finds errors such as two groups that share a flag's name, and only in this test.
     #[test]
     fn the_flags_go_together() {
         Command::command().debug_assert();

@@ -1,23 +1,24 @@
-//! The flags of how splats become a picture.
+//! The flags that choose how splats are composited into a picture.
 
 use crate::failure::Failure;
 use clap::{Args, ValueEnum};
 use splatkit::scene::{self, Order, Settings};
 
-/// How splats become a picture.
+/// How splats are composited into a picture.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Method")]
 pub struct MethodFlags {
-    /// What is composited.
+    /// Choose the elements that are composited.
     #[arg(long, value_enum, default_value_t = Mode::Sheets)]
     mode: Mode,
-    /// Composites single splats from the far end; the picture is the same. For --mode splats.
+    /// Composite single splats from back to front; the picture is the same. Needs --mode splats.
     #[arg(long)]
     back_to_front: bool,
-    /// When a volume's values become colour and opacity; --mode axis-sheets and splats always do it before.
+    /// Choose when a volume's values become colour and opacity. --mode axis-sheets and splats
+    /// always classify before interpolation.
     #[arg(long, value_enum, default_value_t = Classify::PreIntegrated)]
     classify: Classify,
-    /// What a ray makes of a volume.
+    /// Choose the quantity that a ray computes from a volume.
     #[arg(long, value_enum, default_value_t = Optics::Light)]
     optics: Optics,
     /// Short for --optics maximum.
@@ -31,18 +32,18 @@ pub struct MethodFlags {
 /// [`scene::Mode`] as a flag.
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
 enum Mode {
-    /// Sheets parallel to the picture cut every kernel into sections.
+    /// Sheets parallel to the picture; each takes one section of every kernel.
     Sheets,
-    /// Slices of the data, along its axis nearest to the view, take whole kernels.
+    /// Slices of the data along the axis nearest to the view direction; each takes whole kernels.
     AxisSheets,
-    /// Every splat on its own, in the order of distances.
+    /// Single splats, in the order of their distances.
     Splats,
 }
 
 /// [`scene::Classification`] as a flag.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Classify {
-    /// Everywhere along the ray, between the two faces of a sheet.
+    /// Continuously along the ray, between the two faces of a sheet.
     PreIntegrated,
     /// Once per sheet, after interpolation.
     Post,
@@ -57,16 +58,16 @@ enum Optics {
     Light,
     /// The largest value on the ray.
     Maximum,
-    /// What the volume absorbs, in white.
+    /// The absorption by the volume, shown in white.
     XRay,
 }
 
 impl MethodFlags {
-    /// What is wrong whatever the scene.
+    /// Checks what does not depend on the scene.
     pub fn check(&self) -> Result<(), Failure> {
         if self.back_to_front && self.mode != Mode::Splats {
             return Err(Failure::Usage(
-                "--back-to-front is an order of single splats: it needs --mode splats".into(),
+                "--back-to-front needs --mode splats: it sets the order of single splats".into(),
             ));
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! Where results go: files that appear whole or not at all, and stdout.
+//! Where results go: stdout, and files that appear whole or not at all.
 
 use crate::{
     failure::Failure,
@@ -10,7 +10,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Where a picture goes.
+/// The destination of a picture.
 #[derive(Debug, Clone)]
 pub enum Target {
     /// A PNG on stdout.
@@ -19,7 +19,7 @@ pub enum Target {
 }
 
 impl Target {
-    /// The target that `-o` names; a file that is there already must be allowed to go.
+    /// Returns the target that `-o` names. An existing file is an error unless `overwrite` is set.
     pub fn new(path: &Path, overwrite: bool) -> Result<Self, Failure> {
         if path.as_os_str() == "-" {
             return Ok(Self::Stdout);
@@ -29,7 +29,7 @@ impl Target {
         Ok(Self::File(path.to_owned(), format))
     }
 
-    /// The format and the name of the target.
+    /// Returns the format of the picture.
     pub fn format(&self) -> PictureFormat {
         match self {
             Self::Stdout => PictureFormat::Png,
@@ -44,7 +44,7 @@ impl Target {
         }
     }
 
-    /// The file, where it is one.
+    /// Returns the file, or `None` for stdout.
     pub fn file(&self) -> Option<&Path> {
         match self {
             Self::Stdout => None,
@@ -60,7 +60,8 @@ impl Target {
     }
 }
 
-/// Refuses a file that is there already, and a folder that is not, before the work is done.
+/// Refuses, before the work is done, an existing file without `overwrite` and a folder that does
+/// not exist.
 pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
     let refuse = |message: &str, hint| {
         Err(Failure::Output { file: path.to_owned(), message: message.into(), hint: Some(hint) })
@@ -69,7 +70,7 @@ pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
         return refuse("is a folder", "give the name of a file");
     }
     if path.metadata().is_ok_and(|found| !found.is_file()) {
-        return refuse("is no file that could be replaced", "give the name of a file");
+        return refuse("is not a regular file", "give the name of a file");
     }
     if !overwrite && path.symlink_metadata().is_ok() {
         return refuse("exists already", "give --overwrite, or another name");
@@ -80,19 +81,19 @@ pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Finds out whether a file can be written before the work is done, and that it is none of the inputs.
+/// Checks, before the work is done, that a file can be written and is not one of the inputs.
 pub fn try_writing(path: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
     check_unread(path, inputs, "is an input too")?;
     drop(disk::AtomicFile::create(path)?);
     Ok(())
 }
 
-/// Refuses a file that is one of those that inputs and flags refer to, which loading them tells.
+/// Refuses a file that inputs and flags refer to. Loading the inputs lists these files in `read`.
 pub fn check_unneeded(path: &Path, read: &[PathBuf]) -> Result<(), Failure> {
     check_unread(path, read, "is read too: an input or a flag refers to it")
 }
 
-/// Refuses a file that is one of those that were read, with this message.
+/// Refuses a file that was read, with this message.
 fn check_unread(path: &Path, read: &[PathBuf], message: &str) -> Result<(), Failure> {
     let Ok(real) = path.canonicalize() else { return Ok(()) };
     if read.iter().any(|file| file.canonicalize().is_ok_and(|file| file == real)) {
@@ -109,7 +110,7 @@ fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Writes to stdout. A reader that has seen enough and closed it is no error.
+/// Writes to stdout. It is no error if the reader has closed it.
 pub fn stdout(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {
@@ -120,7 +121,7 @@ pub fn stdout(bytes: &[u8]) -> Result<(), Failure> {
     }
 }
 
-/// Writes a line, or several, to stdout.
+/// Writes one or more lines to stdout.
 pub fn line(text: impl std::fmt::Display) -> Result<(), Failure> {
     stdout(format!("{}\n", safe_lines(&text.to_string())).as_bytes())
 }

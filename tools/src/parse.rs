@@ -7,7 +7,7 @@ use splatkit::{
 };
 use std::str::FromStr;
 
-/// Numbers with a separator, exactly as many as asked for.
+/// Parses exactly `N` numbers with a separator between them.
 pub fn numbers<T: FromStr, const N: usize>(
     text: &str,
     separator: char,
@@ -39,7 +39,7 @@ pub fn vector(text: &str) -> Result<DVec3, String> {
     if vector.is_finite() { Ok(vector) } else { Err("the numbers must be finite".into()) }
 }
 
-/// A length above 0 per axis, or one for all.
+/// A length above 0 for each axis, or one for all axes.
 pub fn spacing(text: &str) -> Result<DVec3, String> {
     let spacing = match text.parse::<f64>() {
         Ok(all) => DVec3::splat(all),
@@ -55,7 +55,7 @@ pub fn range(text: &str) -> Result<[f64; 2], String> {
     if !(low.is_finite() && high.is_finite() && low <= high) {
         return Err("a range is LOW,HIGH with LOW not above HIGH".into());
     }
-    // Places in the range are shares of its width.
+    // Positions in the range are shares of its width.
     if (high - low).is_finite() {
         Ok([low, high])
     } else {
@@ -63,7 +63,7 @@ pub fn range(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-/// `#rrggbb`, with or without `#`; `none` keeps the picture's opacity.
+/// `#rrggbb`, with or without `#`. `none` keeps the picture's opacity.
 pub fn background(text: &str) -> Result<Background, String> {
     if text.eq_ignore_ascii_case("none") {
         return Ok(Background(None));
@@ -81,7 +81,7 @@ pub fn color(text: &str) -> Result<[f32; 3], String> {
     Ok([red, green, blue].map(|channel| f32::from(channel) / 255.0))
 }
 
-/// What stands behind the picture.
+/// The colour behind the picture; `None` for transparency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Background(pub Option<[f32; 3]>);
 
@@ -108,7 +108,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "a number above 0 is needed".into())
 }
 
-/// A factor on radii.
+/// A factor for radii.
 pub fn radius_scale(text: &str) -> Result<f32, String> {
     let scales = SurfelOptions::RADIUS_SCALES;
     let fits = text.parse().ok().filter(|scale| scales.contains(scale));
@@ -117,7 +117,7 @@ pub fn radius_scale(text: &str) -> Result<f32, String> {
     })
 }
 
-/// Neighbours of a sample.
+/// A number of neighbours of a sample.
 pub fn neighbours(text: &str) -> Result<usize, String> {
     text.parse()
         .ok()
@@ -125,12 +125,12 @@ pub fn neighbours(text: &str) -> Result<usize, String> {
         .ok_or_else(|| "a number from 4 to 64 is needed".into())
 }
 
-/// A number that is not below 0.
+/// A number of at least 0.
 pub fn not_negative(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()
         .filter(|v: &f64| *v >= 0.0 && v.is_finite())
-        .ok_or_else(|| "a number from 0 on is needed".into())
+        .ok_or_else(|| "a number of at least 0 is needed".into())
 }
 
 /// `1000000`, `512MiB`, `1.5GiB`, …

@@ -1,10 +1,10 @@
-//! What the command is doing, on a terminal's stderr; nothing anywhere else.
+//! The stage that the command is at, shown on stderr if it is a terminal.
 
 use crate::{terminal::safe, threads};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{io::IsTerminal, sync::Mutex, time::Duration};
 
-/// One line that names the stage at work.
+/// One line that names the current stage.
 pub struct Progress(ProgressBar);
 
 impl Progress {
@@ -13,7 +13,8 @@ impl Progress {
             return Self(ProgressBar::hidden());
         }
         let bar = ProgressBar::new_spinner();
-        // The line turns on a thread of its own, which cannot be asked for without a panic.
+        // The spinner turns on its own thread, and starting that panics if the system gives no
+        // thread.
         if threads::is_available() {
             bar.enable_steady_tick(Duration::from_millis(100));
         }
@@ -28,13 +29,13 @@ impl Progress {
         }
     }
 
-    /// Names what begins now.
+    /// Names the stage that begins now.
     pub fn stage(&self, name: impl Into<String>) {
         self.0.reset_elapsed();
         self.0.set_message(safe(&name.into()).into_owned());
     }
 
-    /// Names what begins now, of which there is so much.
+    /// Names the stage that begins now, and its total amount of work.
     pub fn bar(&self, name: impl Into<String>, total: u64) -> Bar<'_> {
         self.stage(name);
         self.0.set_length(total);
@@ -46,22 +47,22 @@ impl Progress {
         Bar(self)
     }
 
-    /// Stages that name themselves as they come.
+    /// Returns a handle for stages that name themselves as they begin.
     pub fn stages(&self) -> Stages<'_> {
         Stages { progress: self, now: Mutex::new(None) }
     }
 
-    /// Takes the line away.
+    /// Removes the line.
     pub fn clear(&self) {
         self.0.finish_and_clear();
     }
 }
 
-/// A stage whose end is known: a bar with its rate and the time that is left.
+/// A stage with a known end: a bar with its rate and the remaining time.
 pub struct Bar<'a>(&'a Progress);
 
 impl Bar<'_> {
-    /// Tells how much is done.
+    /// Sets how much is done.
     pub fn set(&self, done: u64) {
         self.0.0.set_position(done);
     }
@@ -73,20 +74,20 @@ impl Drop for Bar<'_> {
     }
 }
 
-/// Stages one after the other, each with its bar where its end is known.
+/// Stages one after the other, each with a bar if its end is known.
 pub struct Stages<'a> {
     progress: &'a Progress,
-    /// The stage at work and its end.
+    /// The current stage, its end, and its bar.
     now: Mutex<Option<(&'static str, u64, Option<Bar<'a>>)>>,
 }
 
 impl Stages<'_> {
-    /// Tells how much of a stage is done, of how much; 0 where that is not known. What comes under another name, or with
-    /// another end, is another stage.
+    /// Sets how much of a stage is done, and its total; 0 if the total is not known. Another name
+    /// or another total begins another stage.
     pub fn set(&self, name: &'static str, done: u64, total: u64) {
         let Ok(mut now) = self.now.lock() else { return };
         if now.as_ref().is_none_or(|(at, end, _)| (*at, *end) != (name, total)) {
-            // The last bar goes before the next comes.
+            // The last bar is dropped before the next one begins.
             *now = None;
             let bar = if total > 0 { Some(self.progress.bar(name, total)) } else { None };
             if bar.is_none() {

@@ -13,7 +13,7 @@ use crate::{
 };
 use clap::Args;
 use splatkit::{
-    Renderer, disk, engine::FrameStats, math::Camera, picture::Picture, reference, scene::Settings,
+    FrameStats, Renderer, disk, math::Camera, picture::Picture, reference, scene::Settings,
 };
 use std::{
     path::{Path, PathBuf},
@@ -24,46 +24,48 @@ use std::{
 pub struct Render {
     #[command(flatten)]
     scene: SceneFlags,
-    /// The picture, .png or .jpg; `-` writes a PNG to stdout. Frames of a turntable are numbered: out.png gives
-    /// out_0000.png, and {frame} or {frame:04} in the name is replaced.
+    /// Write the picture to this .png or .jpg file, or to stdout as PNG if it is `-`. Frames of a
+    /// turntable are numbered: out.png becomes out_0000.png, and {frame} or {frame:04} in the name
+    /// is replaced by the number.
     #[arg(short, long, value_name = "FILE", allow_hyphen_values = true)]
     output: PathBuf,
-    /// Also writes depths: a grey PNG of 16 bits, the nearest white, nothing black.
+    /// Also write the depths to this file: a grey PNG of 16 bits, white for the nearest, black for
+    /// nothing.
     #[arg(long, value_name = "FILE.png", conflicts_with = "turntable")]
     depth: Option<PathBuf>,
-    /// Replaces files that are there already.
+    /// Replace existing files.
     #[arg(long)]
     overwrite: bool,
-    /// '#rrggbb', or none for a transparent PNG.
+    /// Set the background colour, '#rrggbb', or none for a transparent PNG.
     #[arg(long, value_name = "COLOR", value_parser = parse::background, default_value = "#000000")]
     background: Background,
-    /// Pixels drawn for one of the picture: 1, 4, 9, 16 or 64; auto takes as many as 512x512 pixels
-    /// allow, of volumes 16 at most.
+    /// Draw this many pixels for each pixel of the picture and average them: 1, 4, 9, 16 or 64.
+    /// auto draws as many as fit into 512x512 pixels in all, at most 16 for volumes.
     #[arg(long, value_name = "N|auto", default_value = "auto")]
     samples: Samples,
-    /// Draws this many frames around the up axis.
+    /// Draw this many frames while the camera turns once around the up axis.
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     turntable: Option<u32>,
     #[command(flatten)]
     camera: CameraFlags,
     #[command(flatten)]
     engine: EngineFlags,
-    /// Draws by the reference on the CPU: exact, and slow beyond small scenes.
+    /// Draw with the reference on the CPU, which is exact, but slow for all but small scenes.
     #[arg(long, help_heading = "Engine", conflicts_with_all = ["gpu", "budget", "engine"])]
     reference: bool,
-    /// Writes what was done to stdout, as JSON.
+    /// Print statistics to stdout, as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// What draws.
+/// The renderer of the pictures.
 pub enum Drawer {
     Engine(Box<Renderer>),
     Reference,
 }
 
 impl Drawer {
-    /// An engine with a scene prepared.
+    /// Opens the device and prepares the scene on it.
     pub fn engine(
         flags: &EngineFlags,
         loaded: &Loaded,
@@ -82,7 +84,7 @@ impl Drawer {
         }
     }
 
-    /// Draws a picture; the reference has no statistics.
+    /// Draws a picture. The statistics of the reference are all 0.
     pub fn draw(
         &mut self,
         loaded: &Loaded,
@@ -173,7 +175,8 @@ impl Render {
         Ok(())
     }
 
-    /// One target a frame; none of them may be in the way.
+    /// Returns one target per frame. Fails if one of the files exists and may not be replaced, or
+    /// if the first file cannot be written.
     fn targets(&self, frames: u32) -> Result<Vec<Target>, Failure> {
         let stdout = self.output.as_os_str() == "-";
         if stdout && self.json {
@@ -207,7 +210,7 @@ impl Render {
         }
         let targets: Vec<Target> =
             names.iter().map(|name| Target::new(name, self.overwrite)).collect::<Result<_, _>>()?;
-        // The frames of a turntable go where the first one goes.
+        // All frames of a turntable go to the same folder, so the first one is enough.
         for file in names.first().filter(|_| !stdout).into_iter().chain(&self.depth) {
             output::try_writing(file, &self.scene.inputs)?;
         }
@@ -215,7 +218,8 @@ impl Render {
     }
 }
 
-/// Whether two paths, of which the files may not be there yet, are one: by their folders and their names.
+/// Whether two paths name the same file. The files may not exist yet, so folders and names are
+/// compared.
 fn is_same(a: &Path, b: &Path) -> bool {
     let folder = |path: &Path| {
         let folder =
@@ -225,14 +229,14 @@ fn is_same(a: &Path, b: &Path) -> bool {
     a.file_name() == b.file_name() && folder(a) == folder(b)
 }
 
-/// Milliseconds since an instant.
+/// Returns the milliseconds since an instant.
 pub fn milliseconds(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }
 
-/// The name of a turntable's frame.
+/// Returns the name of a turntable's frame.
 fn numbered(path: &Path, frame: u32) -> Result<PathBuf, Failure> {
-    // A name that is no text has nothing to replace, but can be numbered.
+    // A name that is not valid Unicode has no placeholder, but can be numbered.
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let Some(start) = name.find("{frame") else {
         let mut name = path.file_stem().unwrap_or_default().to_owned();
@@ -250,7 +254,10 @@ fn numbered(path: &Path, frame: u32) -> Result<PathBuf, Failure> {
         (Some((_, after)), Some(width)) => {
             Ok(path.with_file_name(format!("{before}{frame:0width$}{after}")))
         }
-        _ => Err(Failure::Usage(format!("{}: write {{frame}} or {{frame:04}}", path.display()))),
+        _ => Err(Failure::Usage(format!(
+            "{}: the placeholder must be {{frame}} or {{frame:04}}",
+            path.display()
+        ))),
     }
 }
 

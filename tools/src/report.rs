@@ -1,4 +1,4 @@
-//! Tables of figures, as Markdown and as JSON, and the block of a document that holds them.
+//! Tables of figures, as Markdown and as JSON, and the block of a document that contains them.
 
 use crate::{failure::Failure, output};
 use serde_json::{Map, Value, json};
@@ -17,7 +17,7 @@ pub struct Table {
     pub title: &'static str,
     /// What was measured, in a sentence or two.
     pub note: String,
-    /// The first names the rows.
+    /// The first column names the rows.
     pub columns: Vec<String>,
     pub rows: Vec<(String, Vec<Cell>)>,
 }
@@ -25,7 +25,7 @@ pub struct Table {
 /// A figure.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cell {
-    /// With so many digits behind the point.
+    /// A number, and how many digits to show behind the point.
     Number(f64, usize),
     Text(String),
     /// Not measured.
@@ -36,7 +36,7 @@ impl Cell {
     fn text(&self) -> String {
         match self {
             Self::Number(value, digits) => format!("{value:.digits$}"),
-            // A bar would begin another cell.
+            // A vertical bar would begin another cell.
             Self::Text(text) => text.replace('|', "/"),
             Self::None => "–".into(),
         }
@@ -94,7 +94,8 @@ impl Report {
         tables.join("\n")
     }
 
-    /// A page of tables with these in place of those of the same titles, or behind them all; the others stay.
+    /// Returns a page of tables in which these tables replace those of the same titles, or follow
+    /// at the end. The other tables stay.
     pub fn among(&self, page: &str) -> String {
         let title = |text: &str| {
             text.strip_prefix("**").and_then(|text| Some(text.split_once("**")?.0.to_owned()))
@@ -126,10 +127,10 @@ impl Report {
     }
 }
 
-/// A file of this many bytes is no document.
+/// Largest size of a document, in bytes.
 const MOST_BYTES: usize = 64 << 20;
 
-/// The part of a document between two marks. They name the block, and the command that writes it.
+/// The part of a document between two marks, which name the block and the command that writes it.
 pub struct Block {
     path: PathBuf,
     name: &'static str,
@@ -138,7 +139,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// Finds the marks, and whether the file can be written, before anything is measured.
+    /// Finds the marks and checks that the file can be written, before anything is measured.
     pub fn open(path: &Path, name: &'static str, command: &str) -> Result<Self, Failure> {
         let start = format!("<!-- {name}: written by `splatkit {command} --write` -->");
         let end = format!("<!-- end of {name} -->");
@@ -148,13 +149,14 @@ impl Block {
         Ok(block)
     }
 
-    /// What stands between the marks now.
+    /// Returns the text between the marks.
     pub fn inside(&self) -> Result<String, Failure> {
         let [_, inside, _] = self.parts()?;
         Ok(inside)
     }
 
-    /// Gives the block another text, made of its own. The file is read again: what was edited meanwhile stays.
+    /// Replaces the block's text by a function of it. The file is read again, so that other edits
+    /// made in the meantime stay.
     pub fn replace(&self, text: impl FnOnce(&str) -> String) -> Result<(), Failure> {
         let Self { path, start, end, .. } = self;
         let [before, inside, after] = self.parts()?;
@@ -162,12 +164,12 @@ impl Block {
         Ok(disk::write(path, format!("{before}{start}\n\n{text}\n{end}{after}").as_bytes())?)
     }
 
-    /// What stands before, between and after the marks.
+    /// Returns the text before, between and after the marks.
     fn parts(&self) -> Result<[String; 3], Failure> {
         let Self { path, name, start, end } = self;
         let text = Source::open(path, &Limits::default())?.small_text("a document", MOST_BYTES)?;
         let missing =
-            || Error::input(path, *name, format!("there are no lines “{start}” and “{end}”"));
+            || Error::input(path, *name, format!("the lines “{start}” and “{end}” are missing"));
         let (before, rest) = text.split_once(start).ok_or_else(missing)?;
         let (inside, after) = rest.split_once(end).ok_or_else(missing)?;
         Ok([before, inside.trim(), after].map(str::to_owned))
@@ -214,7 +216,8 @@ mod tests {
         let path = std::env::temp_dir().join(format!("splatkit-report-{}.md", std::process::id()));
         let page = |before: &str, inside: &str| {
             format!(
-                "{before}\n<!-- a: written by `splatkit b --write` -->\n\n{inside}\n<!-- end of a -->\nafter\n"
+                "{before}\n<!-- a: written by `splatkit b --write` -->\n\n{inside}\n\
+                 <!-- end of a -->\nafter\n"
             )
         };
         std::fs::write(&path, page("before", "old")).unwrap();

@@ -1,21 +1,22 @@
-//! How many pixels are drawn for one of the picture.
+//! How many pixels are drawn for each pixel of the picture.
 
 use std::str::FromStr;
 
-/// Pixels drawn for one of the picture, and averaged to it.
+/// Pixels drawn for each pixel of the picture and averaged to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Samples {
-    /// The smaller the picture, the more.
+    /// More for smaller pictures.
     Auto,
     /// This many along each side.
     Factor(u32),
 }
 
 impl Samples {
-    /// Pixels drawn at most where the picture's size decides.
+    /// Most pixels drawn if the picture's size decides.
     const MOST_PIXELS: u64 = 1 << 18;
 
-    /// Pixels drawn along each side of one of the picture. Explicit splats have edges and are widened, which takes more of them than a volume does.
+    /// Returns how many pixels are drawn along each side of a pixel. Explicit splats have edges and
+    /// are widened, which takes more pixels than a volume does.
     pub fn factor(self, [width, height]: [u32; 2], has_splats: bool) -> u32 {
         let drawn = |factor: u32| u64::from(factor * factor) * u64::from(width) * u64::from(height);
         let most = if has_splats { 8 } else { 4 };

@@ -1,15 +1,16 @@
-//! Scans of any size, made from a small one: its triangles cut in four again and again, its surface set in waves.
+//! Scans of any size, made from a small mesh: its triangles are subdivided into four repeatedly,
+//! and its surface is displaced by waves.
 
 use glam::Vec3;
 use splatkit::surface::Mesh;
 use std::collections::HashMap;
 
-/// Height of the waves, and their lengths, in edges of the mesh that they are made from.
+/// Height and lengths of the waves, in mean edge lengths of the original mesh.
 const HEIGHT: f32 = 0.06;
 const LENGTHS: [f32; 3] = [1.3, 2.1, 3.7];
 
-/// Cuts each triangle in four as often as the mesh keeps to `most` vertices, and moves the vertices along their normals by
-/// smooth waves. Positions and triangles alone.
+/// Subdivides each triangle into four while the mesh has at most `most` vertices, and displaces the
+/// vertices along their normals by smooth waves. Keeps positions and triangles only.
 pub fn scan(mesh: &Mesh, most: usize) -> Mesh {
     let edge = mean_edge(mesh);
     let mut fine = Mesh {
@@ -57,7 +58,7 @@ fn cut_in_four(mesh: &mut Mesh) {
     mesh.triangles = triangles;
 }
 
-/// Unit normals of the vertices, weighted by area.
+/// Returns the unit normals of the vertices, weighted by area.
 fn normals(mesh: &Mesh) -> Vec<Vec3> {
     let mut normals = vec![Vec3::ZERO; mesh.positions.len()];
     for t in &mesh.triangles {
@@ -68,12 +69,13 @@ fn normals(mesh: &Mesh) -> Vec<Vec3> {
     normals.iter().map(|normal| normal.normalize_or_zero()).collect()
 }
 
-/// A binary PLY file of a mesh's positions and triangles.
+/// Returns a binary PLY file of a mesh's positions and triangles.
 pub fn ply(mesh: &Mesh) -> Vec<u8> {
     let (vertices, faces) = (mesh.positions.len(), mesh.triangles.len());
     let mut bytes = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\n\
-         property float z\nelement face {faces}\nproperty list uchar int vertex_indices\nend_header\n"
+        "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\nproperty float x\n\
+         property float y\nproperty float z\nelement face {faces}\n\
+         property list uchar int vertex_indices\nend_header\n"
     )
     .into_bytes();
     bytes.reserve(12 * vertices + 13 * faces);

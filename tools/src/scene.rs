@@ -1,4 +1,4 @@
-//! The scene's flags, and the scene that they make of the inputs.
+//! The flags of a scene, and loading the scene that they describe.
 
 use crate::{
     camera::Subject,
@@ -26,11 +26,12 @@ use std::{
     time::Instant,
 };
 
-/// What is drawn, and how its values and surfaces are shown.
+/// The inputs, and how their values and surfaces are shown.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Scene")]
 pub struct SceneFlags {
-    /// Meshes, clouds and at most one volume or set of scattered samples; all are drawn in one picture.
+    /// Meshes, point clouds, hierarchies, and at most one volume or set of scattered samples; all
+    /// are drawn in one picture.
     #[arg(value_name = "SCENE", required = true)]
     pub inputs: Vec<PathBuf>,
     #[command(flatten)]
@@ -39,14 +40,15 @@ pub struct SceneFlags {
     show: ShowFlags,
 }
 
-/// A scene that was read.
+/// A loaded scene.
 pub struct Loaded {
     pub scene: Scene,
     pub subject: Subject,
-    /// Splats and samples.
+    /// Number of splats and samples.
     pub count: u64,
     pub load_ms: f64,
-    /// The files that were read: the inputs, those that they refer to, and those of flags.
+    /// The files that were read: the inputs, the files that they refer to, and the files that flags
+    /// name.
     pub read: Vec<PathBuf>,
 }
 
@@ -65,7 +67,7 @@ impl SceneFlags {
         let (mut is_scaled, mut unscaled) = (false, None);
         for path in &self.inputs {
             progress.stage(format!("Reading {}", path.display()));
-            // Reading and what follows share the time.
+            // One deadline covers reading the input and making its splats.
             let deadline = self.load.limits().deadline();
             match self.load.open_within(path, memory::most(), &mut loaded.read)? {
                 Input::Mesh(mesh) => {
@@ -98,7 +100,7 @@ impl SceneFlags {
                         let error =
                             Error::input(path, "content", "a volume in bricks cannot be sharpened");
                         return Err(error
-                            .hint("leave out --sharp, or draw the volume that it was made from")
+                            .hint("leave out --sharp, or draw the original volume")
                             .into());
                     }
                     let overview = bricks.volume(overview(&bricks))?;
@@ -136,12 +138,13 @@ impl SceneFlags {
         }
         if let (Some(_), Some(path), false) = (self.show.radius_scale, unscaled, is_scaled) {
             return Err(Failure::Usage(format!(
-                "--radius-scale does not change {}: a hierarchy has the radii that it was converted with; convert it with \
-                 --radius-scale",
+                "--radius-scale does not apply to {}: a hierarchy keeps the radii that it was \
+                 converted with; convert it with --radius-scale",
                 path.display()
             )));
         }
-        // What cannot be drawn by itself is the fault of its file, or of the flags that say how it is shown.
+        // If an item cannot be drawn by itself, its file is at fault, or the flags that say how it
+        // is shown.
         let at_fault = |error: Error| -> Failure {
             let items = self.inputs.iter().zip(&loaded.scene.items);
             let found =
@@ -164,7 +167,7 @@ impl SceneFlags {
             }
         };
         loaded.scene.validate().map_err(at_fault)?;
-        // Points that all lie at one place have no extent, but what is drawn of them has one.
+        // Points that all lie at one place have no extent, but their splats have one.
         if is_one_place(&loaded.subject.bounds) {
             loaded.subject.bounds = loaded.scene.bounds();
         }
@@ -172,7 +175,7 @@ impl SceneFlags {
         Ok(loaded)
     }
 
-    /// The inputs as a line of text.
+    /// Returns the inputs as a line of text.
     pub fn name(&self) -> String {
         self.inputs.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
     }
@@ -185,19 +188,19 @@ impl Loaded {
     }
 }
 
-/// Whether a box is no larger than the rounding of its coordinates.
+/// Whether a box is no larger than the rounding error of its coordinates.
 fn is_one_place(bounds: &Bounds) -> bool {
     bounds.diagonal() <= 1e-13 * bounds.center().abs().max_element()
 }
 
-/// The finest level of a volume that is quickly looked through as a whole.
+/// Returns the finest level of a volume that can be read quickly as a whole, or the coarsest level.
 fn overview(bricks: &Bricks) -> usize {
     const QUICK: usize = 1 << 24;
     let is_quick = |level: &Level| level.dims.iter().product::<usize>() <= QUICK;
     bricks.levels().iter().position(is_quick).unwrap_or(bricks.levels().len() - 1)
 }
 
-/// Names the file in errors that do not know it.
+/// Adds the file's name to errors that lack it.
 pub fn in_file(path: &Path, error: Error) -> Error {
     match error {
         Error::Argument(what) => Error::input(path, "content", what),

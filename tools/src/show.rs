@@ -1,4 +1,4 @@
-//! The flags of how values and surfaces are shown.
+//! The flags that set how values and surfaces are shown.
 
 use crate::{failure::Failure, kernel::KernelFlags, parse};
 use clap::Args;
@@ -12,33 +12,42 @@ use std::path::{Path, PathBuf};
 
 /// How a scene's values and surfaces are shown.
 #[derive(Args, Debug, Clone)]
-#[command(next_help_heading = "Look")]
+#[command(next_help_heading = "Appearance")]
 pub struct ShowFlags {
-    /// How the values of a volume or of samples are shown: ct-bone, ct-soft-tissue, ct-lung, ct-angiography, mri, generic, or a JSON file. By
-    /// default made from their histogram.
+    /// Choose how the values of a volume or of samples are shown: ct-bone, ct-soft-tissue, ct-lung,
+    /// ct-angiography, mri, generic, or a JSON file [default: made from their histogram]
     #[arg(long, value_name = "NAME|FILE.json")]
     transfer: Option<String>,
-    /// The values that the transfer function spreads over, instead of its own.
+    /// Spread the transfer function over these values instead of its own.
     #[arg(long, value_name = "LOW,HIGH", value_parser = parse::range, allow_hyphen_values = true)]
     range: Option<[f64; 2]>,
-    /// The world length that the transfer function's opacities hold for.
+    /// Set the length that the transfer function's opacities hold for, in world units.
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive)]
     opacity_unit: Option<f64>,
-    /// Surfaces of one value each, as VALUE, VALUE:#rrggbb, VALUE:OPACITY or VALUE:#rrggbb:OPACITY. Without --transfer they
-    /// are all that is shown. By default opaque, in the transfer function's colour of the value.
-    #[arg(long, value_name = "VALUE,…", value_parser = Surface::parse, value_delimiter = ',', allow_hyphen_values = true)]
+    /// Draw isosurfaces of these values, each as VALUE, VALUE:#rrggbb, VALUE:OPACITY or
+    /// VALUE:#rrggbb:OPACITY. Without --transfer, nothing else of the volume is drawn [default:
+    /// opaque, in the transfer function's colour of the value]
+    #[arg(
+        long,
+        value_name = "VALUE,…",
+        value_parser = Surface::parse,
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
     iso: Vec<Surface>,
-    /// Factors of 0 … 1 on the opacity by the gradient's magnitude (value per world length), linear in between.
+    /// Multiply the opacity by factors of 0 to 1, given by the gradient's magnitude (value per
+    /// world length) and linear in between.
     #[arg(long, value_name = "MAGNITUDE,FACTOR:…", value_parser = Factors::parse)]
     gradient_opacity: Option<Factors>,
-    /// Factor on the radii of the surfels of meshes and clouds. Hierarchies have those that they were converted with.
+    /// Scale the radii of the surfels of meshes and point clouds. Hierarchies keep the radii that
+    /// they were converted with.
     #[arg(long, value_name = "FACTOR", value_parser = parse::radius_scale)]
     pub radius_scale: Option<f32>,
     #[command(flatten)]
     kernel: KernelFlags,
 }
 
-/// An isosurface whose colour may be left to the transfer function.
+/// An isosurface. Without a colour, it has the transfer function's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Surface {
     value: f64,
@@ -50,7 +59,8 @@ struct Surface {
 #[derive(Debug, Clone, PartialEq)]
 struct Factors(Vec<(f64, f64)>);
 
-/// [`ShowFlags`] with their files read: what is wrong whatever the scene is known before its files are.
+/// [`ShowFlags`] with their files read, so that errors that do not depend on the scene show before
+/// its files are read.
 pub struct Show<'a> {
     flags: &'a ShowFlags,
     pub kernel: Kernel,
@@ -65,7 +75,8 @@ enum Transfer<'a> {
 }
 
 impl ShowFlags {
-    /// The flags that change the transfer function as they were given, for messages; `None` without any.
+    /// Returns the flags that change the transfer function as given, for messages; `None` if there
+    /// are none.
     pub fn transfer_text(&self) -> Option<String> {
         let transfer = self.transfer.as_ref().map(|transfer| format!("--transfer {transfer}"));
         let unit = self.opacity_unit.map(|unit| format!("--opacity-unit {}", plain(unit)));
@@ -77,7 +88,7 @@ impl ShowFlags {
         self.range.map(|[low, high]| format!("--range {},{}", plain(low), plain(high)))
     }
 
-    /// The file of the transfer function, where no other flag changes what it says.
+    /// Returns the transfer function's file if no other flag changes its content.
     pub fn own_transfer(&self) -> Option<&Path> {
         let is_changed = self.range.is_some() || self.opacity_unit.is_some();
         let named =
@@ -85,7 +96,7 @@ impl ShowFlags {
         self.transfer.as_ref().filter(named).filter(|_| !is_changed).map(Path::new)
     }
 
-    /// The files that flags name.
+    /// Returns the files that flags name.
     pub fn files(&self) -> Vec<PathBuf> {
         let transfer =
             self.transfer.as_ref().filter(|transfer| is_file(transfer)).map(PathBuf::from);
@@ -99,7 +110,7 @@ impl ShowFlags {
                 Transfer::Read(TransferFunction::read(Path::new(file), limits)?)
             }
             Some(name) => {
-                // What is no name is told here; the range comes with the volume.
+                // An unknown name fails here. The range comes later, with the volume.
                 TransferFunction::named(name, [0.0, 1.0])?;
                 Transfer::Named(name)
             }
@@ -110,7 +121,9 @@ impl ShowFlags {
         };
         let (count, most) = (self.iso.len() + more, TransferFunction::MAX_ISOSURFACES);
         if count > most {
-            return Err(Failure::Usage(format!("{count} isosurfaces are more than {most}")));
+            return Err(Failure::Usage(format!(
+                "{count} isosurfaces are given; at most {most} are allowed"
+            )));
         }
         Ok(Show {
             flags: self,
@@ -121,7 +134,7 @@ impl ShowFlags {
     }
 }
 
-/// A number as one types it.
+/// Formats a number as people type it.
 fn plain(value: f64) -> String {
     if value == 0.0 || (1e-4..1e16).contains(&value.abs()) {
         format!("{value}")
@@ -135,7 +148,8 @@ fn is_file(text: &str) -> bool {
 }
 
 impl Show<'_> {
-    /// The transfer function that shows values of a range; one that shows nothing of them is an error.
+    /// Returns the transfer function for values of a range. If it shows none of the values, that is
+    /// an error.
     pub fn transfer(
         &self,
         path: &Path,
@@ -161,7 +175,7 @@ impl Show<'_> {
         if !transfer.visible(values) {
             let [low, high] = values;
             let shown = match transfer.shown_range() {
-                Some([from, to]) if from == to => format!("shows the value {from} alone"),
+                Some([from, to]) if from == to => format!("shows only the value {from}"),
                 Some([from, to]) => format!("shows values between {from} and {to}"),
                 None => "shows no value".to_owned(),
             };
@@ -170,7 +184,8 @@ impl Show<'_> {
                 .range_text()
                 .map_or(String::new(), |range| format!("spread over {range}, "));
             return Err(Error::NothingToDraw(format!(
-                "{spread}the transfer function {shown}, but those of {} lie between {low} and {high}",
+                "{spread}the transfer function {shown}, but the values of {} lie between {low} and \
+                 {high}",
                 path.display()
             ))
             .into());
@@ -207,7 +222,7 @@ impl Surface {
             None => 1.0,
         };
         if !(opacity > 0.0 && opacity <= 1.0) {
-            return Err("the opacity of a surface lies above 0 and up to 1".into());
+            return Err("the opacity of a surface must be above 0 and at most 1".into());
         }
         if parts.next().is_some() { Err(form.into()) } else { Ok(Self { value, color, opacity }) }
     }
@@ -221,7 +236,7 @@ impl Factors {
             .split(':')
             .map(|point| parse::numbers(point, ',', form).map(|[m, factor]| (m, factor)));
         let gradient = points.collect::<Result<Vec<(f64, f64)>, String>>()?;
-        // The library knows what a right one is.
+        // The library checks the points.
         let whole =
             TransferFunction { opacity: vec![(0.0, 1.0)], gradient, ..TransferFunction::default() };
         whole.validate()?;

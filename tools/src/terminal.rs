@@ -1,9 +1,10 @@
-//! Text for people: the one place that everything printed goes through.
+//! Text for people: everything that the command prints goes through here.
 //!
-//! Names of files, comments, columns and materials come from outside. A terminal obeys control characters in them: they can
-//! set its title, hide a part of a message, or turn its direction round. All output of the command is escaped here: messages
-//! of errors (`failure`), log lines (`main`), progress (`progress`) and results on stdout (`output`). Colours of our own are
-//! added afterwards.
+//! Names of files, comments, columns and materials come from outside. A terminal obeys control
+//! characters in them: they can set its title, hide a part of a message, or reverse its direction.
+//! All output of the command is escaped here: messages of errors (`failure`), log lines (`main`),
+//! progress (`progress`) and results on stdout (`output`). The command adds its own colours
+//! afterwards.
 
 use std::{borrow::Cow, fmt, fmt::Write};
 use tracing::field::{Field, Visit};
@@ -12,16 +13,20 @@ use tracing_subscriber::{
     fmt::{FormatFields, format::Writer},
 };
 
-/// Characters of a text from outside that are shown; of a longer one the middle is left out.
+/// Most characters shown of a text from outside. The middle of a longer text is left out.
 const MOST: usize = 2000;
-/// Characters at the end of such a text. Our own words mostly stand there.
+/// Characters shown from the end of such a text, where the command's own words mostly stand.
 const END: usize = 500;
 
-/// Whether a terminal may obey a character instead of showing it: control characters (C0, DEL, C1), those that change the
-/// direction of what follows, and those that end a line or a paragraph.
+/// Whether a terminal may obey a character instead of showing it: control characters (C0, DEL, C1),
+/// characters that change the direction of the text after them, and characters that end a line or a
+/// paragraph.
 fn is_unsafe(letter: char) -> bool {
     letter.is_control()
-        || matches!(letter, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+        || matches!(
+            letter,
+            '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}'
+        )
 }
 
 /// Whether a text has no character that a terminal may obey.
@@ -29,7 +34,8 @@ pub fn is_safe(text: &str) -> bool {
     !text.contains(is_unsafe)
 }
 
-/// A text on one line, such as `\u{1b}[31m` for an escape sequence; what is very long is shortened.
+/// Returns a text on one line, with an escape sequence shown as `\u{1b}[31m`. A very long text is
+/// shortened.
 pub fn safe(text: &str) -> Cow<'_, str> {
     let text = shortened(text);
     if !text.contains(is_unsafe) {
@@ -48,7 +54,7 @@ pub fn safe(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// As [`safe`], but of text whose line breaks are our own, and of any length.
+/// Like [`safe`], for text of any length whose line breaks are the command's own.
 pub fn safe_lines(text: &str) -> Cow<'_, str> {
     if !text.contains(|letter| is_unsafe(letter) && letter != '\n') {
         return Cow::Borrowed(text);
@@ -64,7 +70,8 @@ pub fn safe_lines(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// JSON on one line. Its writer escapes C0 alone; outside of strings there are no such characters.
+/// Returns JSON on one line. `serde_json` escapes C0 only. Outside of strings there are no such
+/// characters.
 pub fn safe_json(value: &serde_json::Value) -> String {
     let text = value.to_string();
     if !text.contains(is_unsafe) {
@@ -73,7 +80,7 @@ pub fn safe_json(value: &serde_json::Value) -> String {
     let mut out = String::with_capacity(2 * text.len());
     for letter in text.chars() {
         if is_unsafe(letter) {
-            // All of them have four digits.
+            // All of them have four hexadecimal digits.
             let _ = write!(out, "\\u{:04x}", u32::from(letter));
         } else {
             out.push(letter);
@@ -83,7 +90,7 @@ pub fn safe_json(value: &serde_json::Value) -> String {
 }
 
 fn shortened(text: &str) -> Cow<'_, str> {
-    // Bytes are never fewer than characters.
+    // A text never has fewer bytes than characters.
     if text.len() <= MOST || text.chars().nth(MOST).is_none() {
         return Cow::Borrowed(text);
     }
@@ -105,7 +112,7 @@ impl<'writer> FormatFields<'writer> for SafeFields {
     }
 }
 
-/// Fields that are being written.
+/// A line whose fields are being written.
 struct Line<'writer> {
     writer: Writer<'writer>,
     is_empty: bool,

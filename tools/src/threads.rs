@@ -3,15 +3,15 @@
 use crate::failure::Failure;
 use std::{num::NonZero, sync::mpsc, thread};
 
-/// More threads than this many for each processor only take memory.
+/// Most threads per processor, and in all. More would only take memory.
 const OF_PROCESSOR: usize = 4;
 const MOST: usize = 1024;
 
-/// Starts as many threads as are asked for, as `RAYON_NUM_THREADS` says, or as there are processors. Where the system does not give them,
-/// everything runs on the calling thread.
+/// Starts as many threads as `threads` or `RAYON_NUM_THREADS` says, or one per processor. If the
+/// system does not start them all, everything runs on the calling thread.
 ///
 /// # Errors
-/// [`Failure::Threads`] where there are threads at first, and then none.
+/// [`Failure::Threads`] if the system started the threads when tried, but not for the pool.
 pub fn start(threads: Option<u32>) -> Result<(), Failure> {
     let processors = thread::available_parallelism().map_or(1, NonZero::get);
     let variable =
@@ -21,41 +21,42 @@ pub fn start(threads: Option<u32>) -> Result<(), Failure> {
     if let Some(asked) = asked.filter(|&asked| asked > count) {
         let name = if threads.is_some() { "--threads " } else { "RAYON_NUM_THREADS=" };
         tracing::warn!(
-            "{name}{asked} is more than {processors} processors can use: {count} threads work"
+            "{name}{asked} is more than {processors} processors can use: using {count} threads"
         );
     }
-    // A pool that cannot be built cannot be tried again.
+    // Building the pool cannot be retried, so first check that the system starts the threads.
     let had = available(count);
     let builder = rayon::ThreadPoolBuilder::new();
     let built = if had == count {
         builder.num_threads(count).build_global()
     } else {
         tracing::warn!(
-            "the system gives {had} of {count} threads (`ulimit -u`, `ulimit -v`): one thread does all the work"
+            "the system started {had} of {count} threads (see `ulimit -u` and `ulimit -v`): \
+             one thread does all the work"
         );
         builder.num_threads(1).use_current_thread().build_global()
     };
     built.map_err(|error| Failure::Threads(error.to_string()))
 }
 
-/// The number of threads to work with.
+/// Returns the number of threads to use.
 fn count(asked: Option<usize>, processors: usize) -> usize {
     let most = processors.saturating_mul(OF_PROCESSOR).min(MOST);
     asked.filter(|&asked| asked > 0).unwrap_or(processors).clamp(1, most)
 }
 
-/// Whether the system gives another thread.
+/// Whether the system can start another thread.
 pub fn is_available() -> bool {
     available(1) == 1
 }
 
-/// How many threads of `count` the system gives at once.
+/// Returns how many of `count` threads the system runs at once.
 fn available(count: usize) -> usize {
     let (hold, wait) = mpsc::channel::<()>();
     let wait = std::sync::Arc::new(std::sync::Mutex::new(wait));
     let spawn = |_| {
         let wait = wait.clone();
-        // Each waits until all are there, and ends when the channel closes.
+        // Each thread waits until all have started, and ends when the channel closes.
         let body = move || drop(wait.lock().map(|wait| wait.recv()));
         thread::Builder::new().spawn(body).ok()
     };

@@ -1,6 +1,6 @@
-//! Times of frames.
+//! Frame times.
 
-/// What frames took, in milliseconds.
+/// Statistics of frame times, in milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Times {
     pub min: f64,
@@ -9,7 +9,7 @@ pub struct Times {
 }
 
 impl Times {
-    /// Of at least one time.
+    /// Returns the statistics of at least one time.
     pub fn of(mut times: Vec<f64>) -> Self {
         times.sort_by(f64::total_cmp);
         let middle = times.len() / 2;
@@ -26,7 +26,7 @@ impl Times {
     }
 }
 
-/// Steps of a frame and their times, as JSON.
+/// Returns the steps of a frame and their times, as JSON.
 pub fn steps(steps: &[(&'static str, f64)]) -> serde_json::Value {
     steps.iter().map(|(name, ms)| serde_json::json!({ "name": name, "ms": ms })).collect()
 }

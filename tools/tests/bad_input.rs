@@ -1,4 +1,5 @@
-//! What makes no picture of a volume is told in words, by its exit code, before a GPU is asked for where that can be.
+//! Inputs that give no picture of a volume have an exit code and a message. They fail before a GPU
+//! is opened if possible.
 
 mod common;
 
@@ -45,7 +46,8 @@ fn folder(name: &str) -> Folder {
     folder.put("lists.gltf", "[".repeat(100_000));
     folder.put(
         "list.nhdr",
-        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 1\nencoding: raw\ndata file: LIST\n../a.raw\n",
+        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 1\nencoding: raw\ndata file: LIST\n\
+         ../a.raw\n",
     );
     folder.put("none.pcd", format!("{fields}POINTS 1\nDATA ascii\nnan nan nan\n"));
     folder.put("single.csv", "1\n");
@@ -62,18 +64,20 @@ fn folder(name: &str) -> Folder {
     folder.put("huge.nrrd", volume("sizes: 1048576 1048576 1\nencoding: raw\n") + "12345678");
     folder.put(
         "crossed.nrrd",
-        b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nlattice:=fcc\nencoding: raw\n\n12345678",
+        b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nlattice:=fcc\nencoding: raw\n\n\
+          12345678",
     );
     folder
 }
 
-/// Arguments after `render`, the exit code, and the message.
+/// The arguments after `render`, the exit code, and a part of the message.
 const WRONG: &[(&str, i32, &str)] = &[
     // Inputs.
     (
         "a.nrrd --transfer clear.json",
         3,
-        "clear.json: transfer function: a transfer function without opacity shows nothing: every opacity is 0",
+        "clear.json: transfer function: a transfer function without opacity shows nothing: every \
+         opacity is 0",
     ),
     ("a.nrrd --transfer steep.json", 3, "gradient point 1 is at 2, before the previous one at 5"),
     (
@@ -84,12 +88,14 @@ const WRONG: &[(&str, i32, &str)] = &[
     (
         "flat.nrrd --transfer ct-bone",
         3,
-        "nothing to draw: the transfer function shows values between 150 and inf, but those of flat.nrrd lie between 7 and 7",
+        "nothing to draw: the transfer function shows values between 150 and inf, but the values \
+         of flat.nrrd lie between 7 and 7",
     ),
     (
         "flat.nrrd --iso 8",
         3,
-        "nothing to draw: the transfer function shows the value 8 alone, but those of flat.nrrd lie between 7 and 7",
+        "nothing to draw: the transfer function shows only the value 8, but the values of \
+         flat.nrrd lie between 7 and 7",
     ),
     ("crossed.nrrd", 3, "crossed.nrrd: lattice: “fcc” is not a known lattice"),
     ("hole.csv", 3, "hole.csv: line 3"),
@@ -146,7 +152,8 @@ const WRONG: &[(&str, i32, &str)] = &[
     (
         "a.nrrd --kernel sinc",
         2,
-        "there is no kernel “sinc”; there are gaussian, b-spline, hann, linear, catmull-rom, cubic-b-spline, and files",
+        "there is no kernel “sinc”; the kernels are gaussian, b-spline, hann, linear, \
+         catmull-rom, cubic-b-spline, or a file",
     ),
     ("a.nrrd --kernel linear --extent 1", 2, "leave out --extent"),
     (
@@ -154,19 +161,24 @@ const WRONG: &[(&str, i32, &str)] = &[
         2,
         "the kernel linear is classified after interpolation",
     ),
-    ("a.nrrd --kernel hann --sigma 1", 2, "--sigma is the Gaussian's; the kernel hann has none"),
+    (
+        "a.nrrd --kernel hann --sigma 1",
+        2,
+        "--sigma applies to the gaussian kernel only, not to hann",
+    ),
     (
         "a.nrrd --kernel cone.csv",
         2,
-        "cone.csv: a kernel of one's own needs --extent, where its last value lies",
+        "cone.csv: a kernel from a file needs --extent, the distance of its last value",
     ),
     ("a.nrrd --kernel none.csv --extent 2", 3, "none.csv: cannot open"),
-    ("a.nrrd --kernel words.csv --extent 2", 3, "words.csv: line 2: “one half” is no number"),
-    ("a.nrrd --kernel old.csv --extent 2", 3, "old.csv: line 3: “one half” is no number"),
+    ("a.nrrd --kernel words.csv --extent 2", 3, "words.csv: line 2: “one half” is not a number"),
+    ("a.nrrd --kernel old.csv --extent 2", 3, "old.csv: line 3: “one half” is not a number"),
     (
         "a.nrrd --kernel negative.json --extent 2",
         3,
-        "negative.json: content: a kernel's values must add up to more than 0 help: the form is a JSON array",
+        "negative.json: content: a kernel's values must add up to more than 0 help: the form is a \
+         JSON array",
     ),
     (
         "a.nrrd --kernel single.csv --extent 2",
@@ -188,7 +200,8 @@ const WRONG: &[(&str, i32, &str)] = &[
     (
         "a.nrrd --transfer sudden.json",
         3,
-        "sudden.json: content: the transfer function changes from 0 to 0.000000000000000000000000000001, too close together",
+        "sudden.json: content: the transfer function changes from 0 to \
+         0.000000000000000000000000000001, too close together",
     ),
     (
         "a.nrrd --transfer sudden.json --range 0,1e-9",
@@ -212,13 +225,15 @@ const WRONG: &[(&str, i32, &str)] = &[
     (
         "a.nrrd --range=-20,-10 --iso 300",
         3,
-        "nothing to draw: spread over --range -20,-10, the transfer function shows the value 300 alone, but those of a.nrrd lie",
+        "nothing to draw: spread over --range -20,-10, the transfer function shows only the value \
+         300, but the values of a.nrrd lie",
     ),
     // Clips.
     (
         "a.nrrd --clip box:20,20,20:30,30,30",
         3,
-        "nothing to draw: --clip 'box:20,20,20:30,30,30' leaves nothing of the scene, which lies between [0, 0, 0] and [15, 15, 15]",
+        "nothing to draw: --clip 'box:20,20,20:30,30,30' leaves nothing of the scene, which lies \
+         between [0, 0, 0] and [15, 15, 15]",
     ),
     ("a.nrrd --clip x<-100%", 3, "nothing to draw: --clip 'x<-100%' leaves nothing of the scene"),
     (
@@ -249,26 +264,29 @@ const WRONG: &[(&str, i32, &str)] = &[
         "the forms are plane:NX,NY,NZ,OFFSET, box:X0,Y0,Z0:X1,Y1,Z1 and 'x<AT' or 'x>AT'",
     ),
     (
-        "a.nrrd --clip x<9 --clip x<9 --clip x<9 --clip x<9 --clip x<9 --cut-out x<1 --cut-out x<1 --cut-out x<1 --cut-out x<1",
+        "a.nrrd --clip x<9 --clip x<9 --clip x<9 --clip x<9 --clip x<9 --cut-out x<1 \
+         --cut-out x<1 --cut-out x<1 --cut-out x<1",
         2,
-        "9 shapes of --clip and --cut-out are more than 8",
+        "--clip and --cut-out give 9 shapes; at most 8 are allowed",
     ),
-    // What does not go together.
+    // Options that cannot be combined.
     (
         "a.nrrd --back-to-front",
         2,
-        "--back-to-front is an order of single splats: it needs --mode splats",
+        "--back-to-front needs --mode splats: it sets the order of single splats",
     ),
     ("a.nrrd --mip --x-ray", 2, "the argument '--mip' cannot be used with '--x-ray'"),
     (
         "a.nrrd --mode splats --iso 50",
         2,
-        "isosurfaces and gradient opacity need image-aligned sheets, classified after interpolation",
+        "isosurfaces and gradient opacity need image-aligned sheets, classified after \
+         interpolation",
     ),
     (
         "a.nrrd --classify pre --gradient-opacity 0,0:9,1",
         2,
-        "isosurfaces and gradient opacity need image-aligned sheets, classified after interpolation",
+        "isosurfaces and gradient opacity need image-aligned sheets, classified after \
+         interpolation",
     ),
     (
         "a.nrrd --mode axis-sheets --mip",
@@ -279,8 +297,8 @@ const WRONG: &[(&str, i32, &str)] = &[
     ("a.nrrd --size 60000x60000", 2, "pixels is larger than 536870912 pixels"),
     ("a.nrrd --depth out.png", 2, "out.png: the picture and its depths would be one file"),
     ("a.nrrd --depth ./out.png", 2, "the picture and its depths would be one file"),
-    ("a.nrrd --iso 1,2,3,4,5,6,7,8,9", 2, "9 isosurfaces are more than 8"),
-    ("a.nrrd --iso 50:2", 2, "the opacity of a surface lies above 0 and up to 1"),
+    ("a.nrrd --iso 1,2,3,4,5,6,7,8,9", 2, "9 isosurfaces are given; at most 8 are allowed"),
+    ("a.nrrd --iso 50:2", 2, "the opacity of a surface must be above 0 and at most 1"),
     (
         "a.nrrd --gradient-opacity 5,0:2,1",
         2,
@@ -310,14 +328,14 @@ fn what_cannot_be_generated_is_told() {
         ),
         ("ball -o a.nrrd --lattice bcc --dims 100000x1x1", "samples can be made at once"),
         ("ball -o a.vtr --dims 1000x1000x1000", "samples can be made at once"),
-        ("scan --from cloud.xyz -o a.ply", "cloud.xyz has no triangles that could be cut in more"),
+        ("scan --from cloud.xyz -o a.ply", "cloud.xyz has no triangles to subdivide"),
     ] {
         folder.run(&format!("generate {arguments}")).fails(2, &[message]);
     }
     assert!(["a.nrrd", "a.vtr", "a.ply"].iter().all(|name| !folder.path(name).exists()));
 }
 
-/// What is read under a limit that it is over: the arguments, the message, and the flag that the hint names.
+/// Inputs over a limit: the arguments, the message, and the flag that the hint names.
 const OVER: &[(&str, &str, &str)] = &[
     (
         "info a.ply --limit-points 3",
@@ -336,12 +354,14 @@ const OVER: &[(&str, &str, &str)] = &[
     ),
     (
         "info a.nrrd --limit-bytes 5000",
-        "the size of the header in bytes together with what was read before is 5012, over the limit of 5000",
+        "the size of the header in bytes together with what was read before is 5012, over the \
+         limit of 5000",
         "--limit-bytes",
     ),
     (
         "info packed.gz --dims 16x16x16 --type u8 --limit-bytes 5000",
-        "the unpacked size in bytes together with what was read before is 8207, over the limit of 5000",
+        "the unpacked size in bytes together with what was read before is 8207, over the limit of \
+         5000",
         "--limit-bytes",
     ),
     (
@@ -406,7 +426,7 @@ fn each_limit_names_its_flag() {
         depth: Vec::new(),
     };
     folder.put("a.png", picture.encode(splatkit::picture::PictureFormat::Png, None).unwrap());
-    // 4096 bytes of 7, packed by gzip: stored as they are.
+    // 4096 bytes of 7 in a gzip file that stores them uncompressed.
     let stored =
         [&[0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 3, 1, 0x00, 0x10, 0xff, 0xef][..], &[7; 4096]].concat();
     folder.put("packed.gz", stored);
@@ -416,7 +436,7 @@ fn each_limit_names_its_flag() {
         let run = folder.run(arguments);
         let told = run.stderr();
         run.fails(3, &[message, &format!("raise {flag}")]);
-        // What the hint asks for is enough for what was met.
+        // The number in the hint is enough for the limit that was exceeded.
         let number = |text: &str| text.split(' ').find_map(|word| word.parse::<u64>().ok());
         let least =
             told.split_once(&format!("raise {flag} to ")).and_then(|(_, rest)| number(rest));
@@ -428,7 +448,7 @@ fn each_limit_names_its_flag() {
     }
 }
 
-/// What would wait, has no end or is elsewhere is refused before it is opened.
+/// Inputs that would block, have no end or lie elsewhere are refused before they are opened.
 #[cfg(unix)]
 #[test]
 fn pipes_devices_and_folders_are_refused() {
@@ -472,11 +492,14 @@ fn clouds_of_every_text_draw() {
         ("a.pcd", format!("{fields}{}", lines(""))),
         (
             "b.stl",
-            "solid\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid".into(),
+            "solid\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n\
+             endfacet\nendsolid"
+                .into(),
         ),
     ] {
         folder.put(name, content);
-        let found = folder.json(&format!("render {name} -o out.png --overwrite --json --size 32x24"));
+        let found =
+            folder.json(&format!("render {name} -o out.png --overwrite --json --size 32x24"));
         assert!(found["splats"].as_u64().is_some_and(|count| count >= 3), "{name}: {found}");
     }
 }
@@ -499,7 +522,7 @@ fn what_is_unusual_draws() {
         "a.nrrd --mode axis-sheets",
         "a.nrrd --mode splats --back-to-front",
         "a.nrrd --mip",
-        // Along the axis that points up.
+        // A view along the up axis.
         "a.nrrd --camera-position 7.5,7.5,60 --focal-point 7.5,7.5,7.5",
         "a.nrrd --x-ray",
         "a.nrrd --clip plane:1,1,0,15 --clip y>20% --cut-out box:0,0,0:50%,50%,50%",
@@ -515,14 +538,15 @@ fn what_is_unusual_draws() {
             "{found}"
         );
     }
-    // What several clips leave together is known by the picture.
+    // Only the picture shows that several clips together leave nothing.
     folder.run("render a.nrrd -o none.png --size 32x24 --clip x<30% --clip x>70%").fails(
         3,
-        &["the camera sees no splat that has opacity in what --clip 'x<30%' --clip 'x>70%' leaves"],
+        &["the camera sees no splat that has opacity after clipping by --clip 'x<30%' --clip \
+           'x>70%'"],
     );
 }
 
-/// Scripts cut what a command says: its exit code stays what it is.
+/// Scripts close a command's output early. Its exit code stays the same.
 #[test]
 fn errors_that_nobody_reads_keep_their_code() {
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_splatkit"));
@@ -530,7 +554,7 @@ fn errors_that_nobody_reads_keep_their_code() {
         command.args(["info", "gone.ply"]).stderr(std::process::Stdio::piped()).spawn().unwrap();
     drop(child.stderr.take());
     assert_eq!(child.wait().unwrap().code(), Some(3));
-    // What it logs on the way as well.
+    // The same holds if nobody reads the log.
     let folder = folder("unread");
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_splatkit"));
     command.args(["-vv", "convert", "a.nrrd", "-o", "a.splv"]).current_dir(folder.path(""));
@@ -544,8 +568,9 @@ fn errors_that_nobody_reads_keep_their_code() {
 const HOSTILE: &str = "\u{1b}]0;title\u{7}\u{1b}[31m\u{9b}32m\u{7f}\u{202e}";
 
 fn hostile_files(folder: &Folder) {
-    let elements = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float s\n\
-        property float t\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    let elements = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        property float s\nproperty float t\nelement face 1\n\
+        property list uchar int vertex_indices\nend_header\n";
     let rows = "0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n";
     for (name, text) in [
         ("name.ply", format!("ply\nformat ascii 1.0\nelement vertex {HOSTILE}\nend_header\n")),
@@ -582,7 +607,7 @@ fn hostile_files(folder: &Folder) {
     folder.put("ball.nrrd", nrrd("uint8", &ball()));
 }
 
-/// What a file says is shown, and does nothing to the terminal that shows it.
+/// The text of a file is shown, but does nothing to the terminal that shows it.
 #[test]
 fn no_text_of_a_file_commands_the_terminal() {
     let folder = Folder::new("terminal");
@@ -616,7 +641,7 @@ fn no_text_of_a_file_commands_the_terminal() {
     assert_eq!(warned, 2, "warnings of missing pictures and materials");
     let run = folder.run("render ball.nrrd --transfer a.json -o out.png");
     assert!(is_quiet(&run, "a.json").contains(r"\u{1b}[31m\u{9b}32m"));
-    // Log lines stay as they are otherwise.
+    // Otherwise, log lines are unchanged.
     folder.put("points.xyz", "1 2 3\n4 5 6\n7 8 10\n");
     let log = folder.run("-vv convert points.xyz -o points.splk").stderr();
     assert!(log.contains(": close time.busy="), "{log}");
@@ -638,7 +663,8 @@ fn no_text_of_a_file_commands_the_terminal() {
     is_quiet(&run, "flag");
 }
 
-/// Messages are lines that other programs read, where no terminal does; texts of files in them have an end.
+/// Without a terminal, messages are whole lines, because other programs read them. The texts of
+/// files in them have a limited length.
 #[test]
 fn messages_are_whole_lines_and_not_too_long() {
     let folder = Folder::new("lines");
@@ -717,7 +743,7 @@ fn trained_gaussians_are_told() {
     assert!(!folder.run("info a.ply").stderr().contains("Gaussians"));
 }
 
-/// A result that nobody got is no success, whatever it is.
+/// Any result that could not be printed is a failure.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_fails_what_is_printed() {
@@ -754,7 +780,7 @@ fn a_full_disk_fails_what_is_printed() {
     }
 }
 
-/// Headers of two gigabytes, all but a few bytes of them zeros that take no room on the disk.
+/// Headers of two gigabytes. All but a few bytes are zeros, which take no space on the disk.
 #[cfg(unix)]
 #[test]
 fn headers_of_two_gigabytes_are_refused_soon() {
@@ -797,7 +823,8 @@ fn headers_of_two_gigabytes_are_refused_soon() {
         run.fails(3, &[message]);
         std::fs::remove_file(folder.path(name)).unwrap();
     }
-    // No limit helps a file of a few bytes that claims many points; one helps that has them.
+    // Raising a limit does not help a file of a few bytes that claims many points; it helps a file
+    // that has them.
     folder.put("many.ply", PLY.replace("vertex 4", "vertex 4000000000"));
     folder
         .run("info many.ply")

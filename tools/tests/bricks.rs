@@ -57,12 +57,14 @@ fn bricks_tell_what_they_hold() {
     assert_eq!((told["levels"].as_u64(), told["bricks"].as_u64()), (Some(3), Some(29)));
     assert_eq!((told["unit"].as_str(), told["source"].as_str()), (Some("mm"), Some("a.raw")));
     assert_eq!(folder.json("check a.splv --json")["ok"].as_bool(), Some(true));
-    // A file that tells by its first bytes what it is.
+    // The first bytes of a file name its kind.
     std::fs::rename(folder.path("a.splv"), folder.path("b")).unwrap();
     assert_eq!(folder.json("info b --json")["levels"].as_u64(), Some(3));
     folder.run("render b -o b.png --size 64x48").ok();
-    folder.run("convert b -o b.splk").fails(2, &["hierarchies are made of meshes and clouds"]);
-    folder.run("convert b -o b.splv").fails(2, &["holds no volume of which this can be made"]);
+    folder
+        .run("convert b -o b.splk")
+        .fails(2, &["hierarchies are built from meshes and point clouds"]);
+    folder.run("convert b -o b.splv").fails(2, &["b holds a volume in bricks already"]);
 }
 
 #[test]

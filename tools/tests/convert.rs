@@ -48,7 +48,7 @@ fn body_centred_volumes_are_written_and_read() {
         (&Arrangement::BodyCentred, [11, 11, 22])
     );
     assert!(String::from_utf8_lossy(&text).contains("2662 (11 × 11 × 22, bcc)"));
-    // A lattice of the file's own stays.
+    // The file's own lattice stays.
     folder.run("convert bcc.nrrd -o again.nrrd").ok();
     let again = volume(&folder, "again.nrrd");
     assert_eq!((&again.samples, &again.lattice), (&written.samples, &written.lattice));
@@ -100,7 +100,7 @@ fn what_cannot_be_converted_is_told() {
     for output in ["b.splk", "b.ply"] {
         folder
             .run(&format!("convert a.nrrd -o {output}"))
-            .fails(2, &["hierarchies are made of meshes and clouds"]);
+            .fails(2, &["hierarchies are built from meshes and point clouds"]);
     }
     for output in ["b", "-"] {
         folder
@@ -110,14 +110,14 @@ fn what_cannot_be_converted_is_told() {
     folder.put("samples.csv", "x,y,z,value\n1,2,3,4\n5,6,7,8\n");
     folder.run("convert samples.csv -o b.nrrd").fails(
         2,
-        &["samples.csv holds no volume of which this can be made, but scattered samples"],
+        &["samples.csv holds scattered samples; only volumes on a lattice can be converted"],
     );
     std::fs::remove_file(folder.path("samples.csv")).unwrap();
     folder.run("convert a.nrrd -o a.splv").ok();
     for output in ["b.nrrd", "b.splv"] {
         folder.run(&format!("convert a.splv -o {output}")).fails(
             2,
-            &["a.splv holds no volume of which this can be made: it is in bricks already"],
+            &["a.splv holds a volume in bricks already; convert the volume it was made from"],
         );
     }
     std::fs::remove_file(folder.path("a.splv")).unwrap();
@@ -140,8 +140,9 @@ fn what_cannot_be_converted_is_told() {
         [header.replace("raw", "raw\nlattice:=fcc").as_bytes(), &[1; 16]].concat(),
     );
     folder.run("convert odd.nrrd -o b.nrrd").fails(3, &["odd.nrrd", "lattice", "fcc"]);
-    // Nor may what an input refers to be replaced.
-    let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 16 16 16\nencoding: raw\ndata file: data.nrrd\n";
+    // A file that an input refers to may not be replaced either.
+    let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 16 16 16\nencoding: raw\n\
+        data file: data.nrrd\n";
     folder.put("away.nhdr", header);
     folder.put("data.nrrd", ball());
     folder.put("text.nhdr", header.replace("raw", "ascii").replace("data.nrrd", "text.nrrd"));
@@ -177,7 +178,7 @@ fn what_cannot_be_converted_is_told() {
             std::fs::remove_file(folder.path(name)).unwrap();
         }
     }
-    // Nothing half done is left.
+    // No unfinished file is left.
     let mut names: Vec<_> =
         std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     names.sort();

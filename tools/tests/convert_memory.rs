@@ -25,7 +25,7 @@ fn what_can_only_be_read_as_a_whole_is_told() {
     folder.put("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     folder.run("convert a.obj -o a.splk --memory 100").fails(2, &["--memory allows more"]);
     folder.run("convert a.obj -o a.splk --memory much").fails(2, &["the units are KiB"]);
-    // Cut among its faces.
+    // Truncated among its faces.
     let whole = sheet(150);
     folder.put("cut.ply", &whole[..whole.len() - 100]);
     folder.run("convert cut.ply -o a.splk --memory 1MiB").fails(3, &["cut.ply", "the file ends"]);
@@ -42,15 +42,16 @@ fn what_can_only_be_read_as_a_whole_is_told() {
     assert_eq!(names, ["a.obj", "cut.ply", "lost.ply"]);
 }
 
-/// So many large triangles, each above the other, as PLY and as OBJ.
+/// Returns `count` large triangles, one above the other, as PLY and as OBJ.
 fn long(count: u32) -> (Vec<u8>, String) {
     let corners: Vec<[f32; 3]> = (0..count)
         .map(|i| i as f32 * 0.4)
         .flat_map(|z| [[0.0, 0.0, z], [100.0, 0.0, z], [0.0, 100.0, z]])
         .collect();
     let mut ply = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
-         element face {count}\nproperty list uchar int vertex_indices\nend_header\n",
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\n\
+         property float y\nproperty float z\nelement face {count}\n\
+         property list uchar int vertex_indices\nend_header\n",
         corners.len()
     )
     .into_bytes();
@@ -64,7 +65,8 @@ fn long(count: u32) -> (Vec<u8>, String) {
     (ply, obj)
 }
 
-/// Few triangles become many where they are cut: what that takes counts, and is told before.
+/// Few triangles become many when they are subdivided. The memory for that counts, and is reported
+/// before.
 #[test]
 fn cutting_keeps_to_the_memory() {
     let folder = Folder::new("cutting");
@@ -74,7 +76,7 @@ fn cutting_keeps_to_the_memory() {
     folder
         .run("convert a.obj -o a.splk --memory 40MiB")
         .fails(2, &["a.obj: this takes about", "--memory allows more"]);
-    // A dry run tells the same.
+    // A dry run reports the same.
     for arguments in ["--memory 40MiB", "--memory 40MiB --dry-run", "--memory 100 --dry-run --json"]
     {
         folder.run(&format!("convert a.ply -o a.splk {arguments}")).fails(
@@ -85,7 +87,7 @@ fn cutting_keeps_to_the_memory() {
     assert!(!folder.path("a.splk").exists());
 }
 
-/// What fits by itself need not fit beside others.
+/// An input that fits by itself need not fit beside others.
 #[test]
 fn inputs_keep_to_the_memory_together() {
     let folder = Folder::new("together");
@@ -101,9 +103,10 @@ fn inputs_keep_to_the_memory_together() {
     };
     assert!(!in_regions("a.ply b.ply") && in_regions("a.ply b.ply c.ply"));
     folder.run("convert a.obj -o a.splk --memory 34MiB --dry-run").ok();
-    folder
-        .run("convert a.obj b.obj c.obj -o a.splk --memory 34MiB")
-        .fails(2, &["c.obj: this takes about", "MiB of the inputs before", "--memory allows more"]);
+    folder.run("convert a.obj b.obj c.obj -o a.splk --memory 34MiB").fails(
+        2,
+        &["c.obj: this takes about", "MiB for the inputs before", "--memory allows more"],
+    );
 }
 
 #[test]
@@ -111,7 +114,7 @@ fn volumes_keep_to_the_memory() {
     let folder = Folder::new("volume_memory");
     folder.put("a.nrrd", nrrd("uint8", &ball()));
     folder.run("convert a.nrrd -o packed.nrrd --memory 5000").ok();
-    // The samples alone, and with what they are resampled from.
+    // The samples alone, and with the values that they are resampled from.
     folder
         .run("convert a.nrrd -o b.nrrd --memory 4000")
         .fails(2, &["a.nrrd: this takes", "--memory allows more"]);

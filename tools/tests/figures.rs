@@ -1,4 +1,4 @@
-//! Generated data and the figures that are measured with it.
+//! Generated data, and the figures measured with it.
 
 mod common;
 
@@ -22,7 +22,7 @@ fn phantoms_become_files() {
     folder.run("generate ball -o none.nrrd --dims 0x2x2").fails(2, &["holds none"]);
 }
 
-/// A table's figure, by the beginning of its row's name.
+/// Returns a figure of a table, by the beginning of its row's name.
 fn figure(table: &serde_json::Value, row: &str, column: &str) -> f64 {
     let rows = table["rows"].as_array().unwrap();
     let row = rows.iter().find(|found| found["name"].as_str().unwrap().starts_with(row)).unwrap();
@@ -45,7 +45,7 @@ fn figures_are_measured_and_written() {
     assert!(page.contains("| Gaussian, σ 0.6, extent 2 (default) | 1."), "{page}");
     let found = folder.json("figures --only bleeding --json");
     let bleeding = &found["tables"][0];
-    // Slices of the data along the other axis hold both slabs side by side.
+    // Slices of the data along the other axis contain both slabs side by side.
     assert!(
         figure(bleeding, "axis-aligned sheets", "50°")
             > 2.0 * figure(bleeding, "image-aligned sheets", "50°"),
@@ -53,7 +53,8 @@ fn figures_are_measured_and_written() {
     );
 }
 
-/// What cannot be measured or kept is told before a GPU is asked for: there is none of this name.
+/// Inputs that cannot be measured and results that cannot be kept are reported before a GPU is
+/// opened: none has this name.
 #[test]
 fn wrong_inputs_and_outputs_of_figures_are_told_first() {
     let folder = Folder::new("figures-first");
@@ -63,11 +64,11 @@ fn wrong_inputs_and_outputs_of_figures_are_told_first() {
     folder.put("b.obj", OBJ);
     folder.put("b_splats.png", "kept");
     for (arguments, code, words) in [
-        ("a.nrrd a.obj", 3, ["a.obj: file: is no volume", ""]),
+        ("a.nrrd a.obj", 3, ["a.obj: file: is not a volume", ""]),
         ("a.nrrd none.nrrd", 3, ["none.nrrd", "cannot open"]),
         ("a.nrrd --only ripple", 2, ["volumes are for the part dense", "--only"]),
-        ("--surfaces a.obj a.nrrd", 3, ["a.nrrd: file: is no mesh", ""]),
-        ("--detail a.obj a.nrrd", 3, ["a.nrrd: file: is no mesh, cloud or hierarchy", ""]),
+        ("--surfaces a.obj a.nrrd", 3, ["a.nrrd: file: is not a mesh", ""]),
+        ("--detail a.obj a.nrrd", 3, ["a.nrrd: file: is not a mesh, point cloud or hierarchy", ""]),
         ("--surfaces a.obj --pictures none", 1, ["none/a_truth.png", "make the folder first"]),
         (
             "--surfaces a.obj a.ply --pictures .",

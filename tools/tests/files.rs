@@ -62,8 +62,9 @@ fn texts_of_files_do_not_command_the_terminal() {
 #[test]
 fn scattered_samples_are_told_from_clouds_and_volumes() {
     let folder = Folder::new("samples");
-    let ply = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
-        property float p\nproperty float q\nproperty float radius\nend_header\n0 0 0 1 5 1\n1 0 0 2 6 1\n";
+    let ply = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n\
+        property float z\nproperty float p\nproperty float q\nproperty float radius\nend_header\n\
+        0 0 0 1 5 1\n1 0 0 2 6 1\n";
     folder.put("a.ply", ply);
     assert_eq!(folder.json("info a.ply --json")["kind"], "cloud");
     let samples = folder.json("info a.ply --json --scalar q");
@@ -81,14 +82,16 @@ fn scattered_samples_are_told_from_clouds_and_volumes() {
     );
     let header = "# vtk DataFile Version 3.0\n\nASCII\nDATASET";
     let image = format!(
-        "{header} STRUCTURED_POINTS\nDIMENSIONS 2 1 1\nPOINT_DATA 2\nSCALARS s int\nLOOKUP_TABLE d\n1 2\n"
+        "{header} STRUCTURED_POINTS\nDIMENSIONS 2 1 1\nPOINT_DATA 2\nSCALARS s int\n\
+         LOOKUP_TABLE d\n1 2\n"
     );
     assert_eq!(
         folder.json(&format!("info {} --json", folder.put("image.vtk", image)))["kind"],
         "volume"
     );
     let points = format!(
-        "{header} POLYDATA\nPOINTS 2 float\n0 0 0 1 1 1\nPOINT_DATA 2\nSCALARS s int\nLOOKUP_TABLE d\n1 2\n"
+        "{header} POLYDATA\nPOINTS 2 float\n0 0 0 1 1 1\nPOINT_DATA 2\nSCALARS s int\n\
+         LOOKUP_TABLE d\n1 2\n"
     );
     assert_eq!(
         folder.json(&format!("info {} --json", folder.put("points.vtk", points)))["kind"],
@@ -97,11 +100,12 @@ fn scattered_samples_are_told_from_clouds_and_volumes() {
     folder.run("info a.csv --neighbours 3").fails(2, &["4 to 64"]);
 }
 
-/// What a model refers to is an input as well, by whatever name it is called.
+/// The files that a model refers to are inputs as well, under any of their names.
 #[test]
 fn pictures_do_not_replace_what_the_scene_is_read_from() {
     let folder = Folder::new("replaced");
-    let text = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+    let text = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n\
+        f 1/1 2/2 3/3\n";
     folder.put("a.obj", text);
     folder.put("a.mtl", "newmtl m\nmap_Kd a.png\n");
     let pixels = vec![[1.0; 4]; 4];
@@ -132,7 +136,7 @@ fn pictures_do_not_replace_what_the_scene_is_read_from() {
         [folder.path("a.png"), folder.path("a_0001.png")].map(|path| std::fs::read(path).unwrap()),
         [png.clone(), png]
     );
-    // A texture that is no longer referred to.
+    // A texture that the model no longer refers to may be replaced.
     folder.run("render a.obj -o a.png --overwrite --reference --size 8x8").ok();
 }
 
@@ -225,7 +229,7 @@ fn the_cpu_engine_needs_no_adapter() {
     assert!(found["splats"].as_u64() > Some(0) && found["entries"].as_u64() > Some(0), "{found}");
     folder
         .run("render a.ply -o b.png --engine cpu --pass-entries 100")
-        .fails(2, &["--engine cpu takes none of"]);
+        .fails(2, &["--engine cpu cannot be used with"]);
 }
 
 #[test]
@@ -255,7 +259,7 @@ fn wrong_usage_is_told() {
     folder.run("--version").ok();
 }
 
-/// Systems on Unix take names that are no text; what is told of such a file has marks in their place.
+/// Unix allows file names that are not Unicode. Messages show them with replacement characters.
 #[cfg(target_os = "linux")]
 #[test]
 fn names_that_are_no_text_are_told() {

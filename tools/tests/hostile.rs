@@ -1,5 +1,5 @@
-//! Inputs of a few kilobytes that ask for minutes, limits that hold after reading, two commands that write one file, and
-//! systems that give no threads.
+//! Inputs of a few kilobytes that ask for minutes of work, limits that hold after reading, two
+//! commands that write one file, and systems that start no threads.
 
 #![cfg(unix)]
 
@@ -12,10 +12,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// What small inputs may take, on a slow machine that does other things too.
+/// Longest time for small inputs, on a slow machine that does other work too.
 const SOON: Duration = Duration::from_secs(20);
 
-/// A sheet of `side`² squares with a picture, as OBJ; vertex 7 has these texture coordinates.
+/// Writes a sheet of `side`² squares with a texture, as OBJ. Vertex 7 has these texture
+/// coordinates.
 fn textured(folder: &Folder, name: &str, side: usize, coordinates: &str) {
     let picture = splatkit::picture::Picture {
         width: 8,
@@ -45,7 +46,7 @@ fn textured(folder: &Folder, name: &str, side: usize, coordinates: &str) {
     folder.put(name, out);
 }
 
-/// A sheet whose vertex 5 is moved along x, as binary PLY.
+/// Returns a sheet as binary PLY, with vertex 5 moved along x.
 fn with_far_vertex(x: f32) -> Vec<u8> {
     let mut out = sheet(40);
     let start = out.windows(11).position(|bytes| bytes == b"end_header\n").unwrap() + 11;
@@ -84,7 +85,7 @@ fn texture_coordinates_do_not_keep_it_busy() {
         folder.run("convert a.obj -o a.splk --overwrite").ok();
         assert!(begin.elapsed() < SOON, "{coordinates}: {:?}", begin.elapsed());
     }
-    // Without a picture nobody asks for coordinates.
+    // Without a texture, the coordinates are not used.
     textured(&folder, "a.obj", 12, "nan nan");
     std::fs::remove_file(folder.path("m.mtl")).unwrap();
     folder.run("check a.obj").ok();
@@ -108,7 +109,8 @@ fn a_far_vertex_is_named_at_once() {
     folder.run("check a.ply").ok();
 }
 
-/// What is cut into millions of triangles, and a cloud of a million points, take longer than a second after reading.
+/// Subdividing into millions of triangles, and a cloud of 400,000 points, take longer than a second
+/// after reading.
 #[test]
 fn seconds_are_limited_after_reading() {
     let folder = Folder::new("seconds");
@@ -130,7 +132,7 @@ fn seconds_are_limited_after_reading() {
     ] {
         let begin = Instant::now();
         let run = folder.run(command);
-        // A fast machine may be done before.
+        // A fast machine may finish before the limit.
         if run.code() == Some(0) {
             continue;
         }
@@ -140,7 +142,8 @@ fn seconds_are_limited_after_reading() {
     }
 }
 
-/// Each of two commands that write one file ends well or with an error, and the file is a whole one of one of them.
+/// Commands that write the same file at once all succeed, and the file is the whole result of one
+/// of them.
 #[test]
 fn two_commands_write_one_file() {
     let folder = Folder::new("two");
@@ -158,7 +161,7 @@ fn two_commands_write_one_file() {
         command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
     };
     for round in 0..12 {
-        // One is killed, so that the next ones find a leftover.
+        // One is killed, so that the next ones find its leftover.
         let mut killed = start("b");
         std::thread::sleep(Duration::from_millis(3 * round));
         killed.kill().unwrap();
@@ -170,7 +173,7 @@ fn two_commands_write_one_file() {
             assert!(output.status.success(), "round {round}: {:?} {told}", output.status);
         }
         let found = std::fs::read(folder.path("out.splk")).unwrap();
-        // The name of the source is within.
+        // The file contains its source's name, so the results of a and b differ.
         assert!(whole.contains(&found), "round {round}: neither of them");
     }
     let names = std::fs::read_dir(&folder.0)
@@ -203,7 +206,7 @@ fn links_and_permissions_stay() {
     assert!(folder.path("nowhere.splk").is_symlink() && !folder.path("other/none.splk").exists());
 }
 
-/// Runs a command by a shell, with this before it.
+/// Runs a command in a shell, with `before` in front of it.
 fn run_by(folder: &Folder, before: &str, arguments: &str) -> Output {
     let script = format!("{before} '{}' {arguments}", env!("CARGO_BIN_EXE_splatkit"));
     Command::new("sh")
@@ -220,8 +223,8 @@ fn without_threads_one_does_the_work() {
     folder.put("a.ply", sheet(60));
     folder.run("convert a.ply -o a.splk").ok();
     let whole = std::fs::read(folder.path("a.splk")).unwrap();
-    // Stacks that no address space holds: no thread can be started. Many threads for few processors. As another user, who may
-    // have one process.
+    // Stacks that no address space holds, so that no thread can start; many threads for few
+    // processors; another user, who may have only one process.
     let mut cases =
         vec!["RUST_MIN_STACK=70368744177664", "RAYON_NUM_THREADS=100000", "RAYON_NUM_THREADS=0"];
     let limited = "setpriv --reuid 65534 --regid 65534 --clear-groups prlimit --nproc=1";

@@ -1,5 +1,6 @@
-//! The command that is killed, interrupted, or finds no room, at any time: the file that it was to write is the old one, the
-//! new one or none, and what is left besides is known for what it is.
+//! Commands that are killed, interrupted, or find no disk space or memory, at any time. The output
+//! file is then the old one, the new one or none, and what is left beside it is recognisable as a
+//! leftover.
 
 #![cfg(unix)]
 
@@ -12,7 +13,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// What is converted, to what: as a whole, in regions, slice by slice, and to Gaussians.
+/// Inputs and outputs of conversions: as a whole, in regions, slice by slice, and to Gaussians.
 const CONVERSIONS: [[&str; 2]; 5] = [
     ["a.ply", "a.splk"],
     ["a.ply", "b.splk --memory 8MiB"],
@@ -30,7 +31,7 @@ fn folder(name: &str) -> Folder {
     folder
 }
 
-/// What is in a folder besides the inputs and one output.
+/// Returns what is in a folder besides the inputs and one output.
 fn left(folder: &Folder, output: &str) -> Vec<String> {
     let entries = std::fs::read_dir(&folder.0).unwrap().map(|entry| entry.unwrap().file_name());
     let names = entries.map(|name| name.into_string().unwrap());
@@ -49,8 +50,8 @@ fn signal(child: &Child, name: &str) {
 
 const OLD: &[u8] = b"what was there before";
 
-/// Stops conversions at so many moments of each, spread over the time that they take; `check` is told how each ended, what
-/// is left besides, and where.
+/// Stops each conversion at `moments` moments, spread over the time that it takes. `check` gets the
+/// exit status, the leftover files, the folder, and the output's name.
 fn stop(
     name: &str,
     moments: u32,
@@ -87,7 +88,7 @@ fn stop(
             finished += u32::from(!is_old);
             stopped += u32::from(is_old);
             if !is_old {
-                // Faster than the first: the machine was busy then.
+                // Faster than the first run: the machine was busy then.
                 whole = whole.min(took);
             }
             check(status, &left(&folder, file), &folder, file);
@@ -120,7 +121,8 @@ fn who_is_killed_leaves_the_old_file_or_the_new_one() {
                 name.starts_with(&format!(".{file}.")) && name.ends_with(".splatkit-part"),
                 "{name}"
             );
-            // It is not read for what it is not: a file with all its checksums, or none.
+            // A leftover cannot be mistaken: it is a file with all its checksums, or `check`
+            // refuses it.
             if file.ends_with(".splk") || file.ends_with(".splv") {
                 std::fs::copy(folder.path(name), folder.path(&format!("copy.{file}"))).unwrap();
                 let code = folder.run(&format!("check copy.{file}")).code();
@@ -139,7 +141,7 @@ fn who_is_interrupted_leaves_nothing() {
     };
     let sent = [2, 15, 1].map(Some);
     let [stopped, _] = stop("interrupted", 12, interrupt, |status, left, _, file| {
-        // At the first moments the handler may not be there yet, nor may any file.
+        // In the first moments, neither the handler nor any file may exist yet.
         let by_signal = sent.contains(&std::os::unix::process::ExitStatusExt::signal(&status));
         assert!(matches!(status.code(), Some(0 | 130)) || by_signal, "{file}: {status}");
         assert_eq!(left, [""; 0], "{file}: {status}");
@@ -162,7 +164,7 @@ fn who_is_interrupted_while_drawing_ends_at_once() {
         signal(&child, "INT");
         let status = child.wait().unwrap();
         let picture = std::fs::read(folder.path("a.png")).ok();
-        // On a busy machine the handler may not be there yet, but not every time.
+        // On a busy machine the handler may not be installed yet, but not every time.
         let by_signal = std::os::unix::process::ExitStatusExt::signal(&status) == Some(2);
         answered += u32::from(!by_signal);
         assert!(matches!(status.code(), Some(0 | 130)) || by_signal, "moment {moment}: {status}");
@@ -172,7 +174,8 @@ fn who_is_interrupted_while_drawing_ends_at_once() {
     assert!(answered > 0);
 }
 
-/// Runs a conversion that may write files of so many blocks of 512 bytes at most; more is an error, as on a full disk.
+/// Runs a conversion that may write files of at most `blocks` blocks of 512 bytes. Writing more is
+/// an error, as on a full disk.
 fn with_room_for(folder: &Folder, blocks: u64, arguments: &str) -> (Option<i32>, String) {
     let command = env!("CARGO_BIN_EXE_splatkit");
     let script = format!("ulimit -f {blocks}; exec '{command}' {arguments}");
@@ -202,13 +205,13 @@ fn who_finds_no_room_says_so() {
     }
 }
 
-/// With ever more memory (Linux: `ulimit -v`) there is an error, or the picture, and soon. Mesa's driver may end the process
-/// where it finds none itself.
+/// With more and more memory (Linux: `ulimit -v`), the command soon ends with an error or draws the
+/// picture. Mesa's driver may end the process if it finds no memory itself.
 #[cfg(target_os = "linux")]
 #[test]
 fn who_finds_no_memory_says_so_or_ends() {
     let folder = folder("memory");
-    // Where the driver finds no memory, the other engine would draw.
+    // If the driver finds no memory, `--engine auto` would draw with the other engine.
     let arguments = "render a.nrrd --overwrite -o a.png --size 320x240 --engine gpu";
     folder.run(arguments).ok();
     let whole = std::fs::read(folder.path("a.png")).unwrap();
@@ -228,7 +231,8 @@ fn who_finds_no_memory_says_so_or_ends() {
             Some(0) => {
                 assert!(picture.as_ref() == Some(&whole), "{mebibytes} MiB: another picture")
             }
-            // The shell tells a signal by 128 and its number; 124 is a process that did not end.
+            // The shell reports a signal as 128 plus its number; 124 is a process that did not end
+            // in time.
             Some(3 | 4 | 134 | 135 | 139) | None => {
                 assert!(picture.is_none(), "{mebibytes} MiB: {code:?}, with a picture")
             }
@@ -254,7 +258,7 @@ fn where_nothing_can_be_written_it_is_told() {
     ] {
         folder.run(&format!("convert {arguments}")).fails(1, &told);
     }
-    // A folder that nobody may write to, not even the one who may do all else.
+    // A folder that nobody may write to, not even root.
     if cfg!(target_os = "linux") && Path::new("/sys/kernel").is_dir() {
         for output in ["/sys/kernel/a.splk", "/sys/kernel/a.splv"] {
             let input = if output.ends_with('k') { "a.ply" } else { "a.nrrd" };
@@ -290,7 +294,7 @@ fn inputs_that_are_cut_meanwhile_are_told() {
         let begin = Instant::now();
         folder.run(&arguments).ok();
         let mut whole = begin.elapsed();
-        // Ten moments, and some more where all came too early or too late.
+        // Ten moments, and more if all came too early or too late.
         let before = told;
         for moment in (0..10).cycle().take(40) {
             if moment == 0 && told > before + 1 {

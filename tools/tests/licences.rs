@@ -1,16 +1,17 @@
-//! Where what is built in comes from, and under which licences, by the rules of deny.toml. `cargo deny check` looks at more,
-//! where it is installed.
+//! The sources and licences of everything that is built in, by the rules of deny.toml. `cargo deny
+//! check` checks more if it is installed.
 
 use serde_json::Value;
 use std::{path::Path, process::Command};
 
-/// The licences that deny.toml allows.
+/// Returns the licences that deny.toml allows.
 fn allowed(rules: &str) -> Vec<&str> {
     let list = rules.split_once("\nallow = [").unwrap().1.split_once(']').unwrap().0;
     list.split('"').skip(1).step_by(2).collect()
 }
 
-/// Whether an expression of SPDX can be met: “or” binds less than “and”, and a slash is an old “or”.
+/// Whether the allowed licences satisfy an SPDX expression. OR binds less tightly than AND, and a
+/// slash is an old form of OR.
 fn is_met(expression: &str, allowed: &[&str]) -> bool {
     let spaced = expression.replace('(', " ( ").replace(')', " ) ").replace('/', " OR ");
     let words: Vec<&str> = spaced.split_whitespace().collect();
@@ -95,7 +96,7 @@ fn what_is_built_in_may_be_passed_on() {
         let (name, licence) = (&package["name"], package["license"].as_str().unwrap_or_default());
         assert!(
             is_met(licence, &allowed),
-            "{name} is of the licence “{licence}”, which deny.toml does not allow"
+            "{name} has the licence “{licence}”, which deny.toml does not allow"
         );
         let source = package["source"].as_str();
         let is_known = source

@@ -1,4 +1,4 @@
-//! The commands that draw: they need an adapter, a software one will do.
+//! The commands that draw. They need an adapter; a software adapter is enough.
 
 mod common;
 
@@ -40,11 +40,11 @@ fn every_format_gives_a_picture() {
                 && found["adapter"].is_string()
         );
     }
-    // The same bytes under a name that says nothing are known by their content.
+    // The same bytes under a name without an extension are recognised by their content.
     std::fs::copy(folder.path("a.ply"), folder.path("mesh")).unwrap();
     std::fs::copy(folder.path("a.nrrd"), folder.path("volume")).unwrap();
     folder.run(&format!("render mesh volume -o both.png {SMALL}")).ok();
-    // The same samples, read in three ways, give the same picture.
+    // The same samples, read from two formats, give the same picture.
     for name in ["a.nrrd", "a.vti"] {
         folder.run(&format!("render {name} -o {name}.png --zoom 1 {SMALL}")).ok();
     }
@@ -114,7 +114,8 @@ fn the_engine_draws_what_the_reference_draws() {
             folder.run(&format!("{arguments} -o engine.png")).ok();
             let found = folder.json(&format!("{arguments} -o reference.png --reference --json"));
             assert_eq!(found["adapter"], "reference");
-            // The engine counts in 32 and 16 bits, the reference in 64: their bytes differ by steps of 1/255.
+            // The engine computes in 32 and 16 bits, the reference in 64: their bytes differ by
+            // steps of 1/255.
             folder.run("compare engine.png reference.png --threshold 40").ok();
         }
     }
@@ -129,7 +130,7 @@ fn cameras_and_pictures_follow_their_flags() {
         let numbers = camera[name].as_array().unwrap().iter().map(ToString::to_string);
         numbers.collect::<Vec<_>>().join(",")
     };
-    // What VTK has for a box of 15³ after ResetCamera, Azimuth(30), Elevation(20), Zoom(1.3).
+    // VTK's camera for a box of 15³ after ResetCamera, Azimuth(30), Elevation(20), Zoom(1.3).
     let distance = 7.5 * 3f64.sqrt() / 15f64.to_radians().sin();
     let [azimuth, elevation] = [30f64, 20.0].map(f64::to_radians);
     let expected =
@@ -150,7 +151,8 @@ fn cameras_and_pictures_follow_their_flags() {
     );
     folder.run(&format!("render a.vti -o b.png {SMALL} {same}")).ok();
     folder.run("compare a.png b.png --threshold 60").ok();
-    let away = "--azimuth -150 --elevation -20 --background none --samples 4 --depth depth.png --radius-scale 1.2";
+    let away = "--azimuth -150 --elevation -20 --background none --samples 4 --depth depth.png \
+        --radius-scale 1.2";
     folder.run(&format!("render a.ply -o c.png {SMALL} {away}")).ok();
     assert!(is_png(&std::fs::read(folder.path("depth.png")).unwrap(), 64, 48));
     folder.run("compare a.png c.png --threshold 60").fails(5, &["dB"]);
@@ -204,7 +206,7 @@ fn adapters_are_listed_and_chosen() {
         .fails(4, &["nonexistent", "splatkit gpus"]);
     folder.run("render a.ply -o a.png --gpu 99").fails(4, &["99"]);
     folder.run(&format!("render a.ply -o a.png --gpu 0 --pass-entries 100000 {SMALL}")).ok();
-    // The budget is told by the name of its flag.
+    // The hint names the flag of the budget.
     folder
         .run(&format!("render a.nrrd -o b.png --evaluate scatter --pass-entries 16 {SMALL}"))
         .fails(4, &["raise --pass-entries", "--size"]);

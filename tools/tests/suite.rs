@@ -5,7 +5,7 @@ mod common;
 use common::*;
 use serde_json::Value;
 
-/// Whether a case tells everything that it should.
+/// Whether a case contains everything that it should.
 fn is_whole(case: &Value) -> bool {
     let numbers = [
         "effective_splats",
@@ -33,10 +33,13 @@ fn the_suite_measures_growth() {
     let folder = Folder::new("suite");
     folder.put(
         "page.md",
-        "a\n<!-- suite: written by `splatkit bench --suite --write` -->\n### other\n\nkept\n<!-- end of suite -->\nb\n",
+        "a\n<!-- suite: written by `splatkit bench --suite --write` -->\n### other\n\nkept\n\
+         <!-- end of suite -->\nb\n",
     );
-    let found = folder
-        .json("bench --suite --engine gpu --effort quick --only growth --frames 1 --repeat 2 --json --write page.md");
+    let found = folder.json(
+        "bench --suite --engine gpu --effort quick --only growth --frames 1 --repeat 2 --json \
+         --write page.md",
+    );
     assert!(
         !found["machine"]["adapter"].as_str().unwrap().is_empty()
             && found["machine"]["cores"].as_u64() > Some(0)
@@ -67,7 +70,7 @@ fn the_suite_measures_growth() {
         "{page}"
     );
     assert!(page.contains("| specimen, 16³ | generated: specimen, in bricks |"), "{page}");
-    // Another part alone would take the place of this one.
+    // Measuring another part alone would replace this one.
     folder
         .run("bench --suite --engine gpu --effort quick --only culling --write page.md")
         .fails(2, &["--write would remove", "“growth”", "--only"]);
@@ -80,13 +83,14 @@ fn tables_with_failed_cases_are_not_written() {
     let page =
         "<!-- suite: written by `splatkit bench --suite --write` -->\nold\n<!-- end of suite -->\n";
     folder.put("page.md", page);
-    // Every case loses its device, which is opened anew for the next.
+    // Every case loses its device, which is reopened for the next case.
     let run = folder.run(
-        "bench --suite --engine gpu --effort quick --only growth --frames 1 --gpu-timeout 0.000000001 --write page.md",
+        "bench --suite --engine gpu --effort quick --only growth --frames 1 \
+         --gpu-timeout 0.000000001 --write page.md",
     );
     assert_eq!(run.code(), Some(1), "{}", run.stderr());
     assert!(
-        run.stderr().contains("cases could not be drawn; page.md is as it was"),
+        run.stderr().contains("cases could not be drawn; page.md is unchanged"),
         "{}",
         run.stderr()
     );
@@ -107,7 +111,7 @@ fn the_classic_table_takes_files() {
     let case = |name: &str| cases.iter().find(|case| case["name"] == name).unwrap();
     assert_eq!(case("Aneurism")["drawn"], "aneurism.nrrd, 16×16×16");
     assert_eq!(case("Aneurism")["seed"]["fps"], 9.1);
-    // What cannot be read is told, and does not keep the others from being drawn.
+    // A file that cannot be read is reported, and does not keep the others from being drawn.
     assert!(case("Foot, semi")["error"].as_str().unwrap().contains("foot.nrrd"));
     assert!(is_whole(case("Bonsai, BCC")));
 }

@@ -7,16 +7,19 @@ use common::*;
 #[test]
 fn the_sweep_compares_neighbours() {
     let folder = Folder::new("sweep");
-    let page = "a\n<!-- sweep: written by `splatkit bench --sweep --write` -->\n<!-- end of sweep -->\nb\n";
+    let page = "a\n<!-- sweep: written by `splatkit bench --sweep --write` -->\n\
+        <!-- end of sweep -->\nb\n";
     folder.put("page.md", page);
-    let found =
-        folder.json("bench --sweep --engine cpu --effort quick --axes size,kernel --frames 1 --json --write page.md");
+    let found = folder.json(
+        "bench --sweep --engine cpu --effort quick --axes size,kernel --frames 1 --json \
+         --write page.md",
+    );
     let [size, kernel] = &found["axes"].as_array().unwrap()[..] else { panic!("{found}") };
     assert_eq!((size["name"].as_str(), kernel["name"].as_str()), (Some("size"), Some("kernel")));
     let steps = size["steps"].as_array().unwrap();
     assert!(steps.len() > 4 && steps[0]["beside"].is_null(), "{size}");
     for (before, step) in steps.iter().zip(&steps[1..]) {
-        // Each beside the one before it, of four times as many pixels.
+        // Each step is compared with the one before it and has four times as many pixels.
         assert_eq!(step["beside"], before["name"]);
         let ratio = step["pixels"].as_f64().unwrap() / before["pixels"].as_f64().unwrap();
         assert!((3.0..5.0).contains(&ratio), "{step}");

@@ -1,4 +1,4 @@
-//! What the samples of a field add up to.
+//! Sums of a field's samples.
 
 use super::*;
 use crate::volume::{Arrangement, Coefficients};
@@ -19,7 +19,7 @@ fn a_constant_field_lets_through_what_its_length_does() {
         let view = camera.view(settings.size).unwrap();
         let mut crossed = 0;
         for (i, found) in picture.color.iter().enumerate() {
-            // The length inside the box by asking many points.
+            // The length inside the box, by testing many points.
             let (origin, direction) =
                 view.ray(DVec2::new((i % 24) as f64 + 0.5, (i / 24) as f64 + 0.5));
             let steps = 40_000;
@@ -61,13 +61,14 @@ fn scattered_samples_fill_at_most_their_sheets() {
         let scene = Scene::new().with_samples(set(Payload::Scalar, splats), uniform([1.0; 3], 0.8));
         render(&scene, &camera, &settings).unwrap().color[0][3]
     };
-    // One sample: ∫ exp(−s²/2σ²) ds = √(2π)·σ, with σ² widened by (0.35 · 4)² (the only pixel is 4 units wide), and its weight
-    // less by as much as its volume is more. The ends of the splat's box cut its tails.
+    // One sample: ∫ exp(−s²/2σ²) ds = √(2π)·σ, with σ² widened by (0.35 · 4)² (the only pixel is 4
+    // units wide). Its weight shrinks by the factor by which its volume grows. The ends of the
+    // splat's box cut its tails.
     let deviation = (0.8_f64.powi(2) + 1.4_f64.powi(2)).sqrt();
     let weight = (0.8 / deviation).powi(3);
     let length = weight * (2.0 * std::f64::consts::PI).sqrt() * deviation;
     close(field(vec![sample(Vec3::ZERO, 7.0, 0.8)]), 1.0 - (-0.8 * length).exp(), 1e-4);
-    // A hundred of them at one place: no sheet holds more of them than it is thick.
+    // A hundred samples at one place: a sheet's W counts up to the sheet's thickness.
     let transfer = uniform([1.0; 3], 0.1);
     let many = vec![sample(Vec3::ZERO, 7.0, 0.8); 100];
     let scene = Scene::new().with_samples(set(Payload::Scalar, many), transfer);
@@ -80,11 +81,12 @@ fn scattered_samples_fill_at_most_their_sheets() {
             .min(plane[1] - plane[0])
     });
     let found = render(&scene, &camera, &settings).unwrap().color[0][3];
-    // Sheets filled to less than a ten-thousandth, the tails, have no value.
+    // Sheets filled to less than a ten-thousandth (the tails) have no value.
     close(found, 1.0 - (-0.1 * lengths.sum::<f64>()).exp(), 5e-6);
 }
 
-/// Asserts that a field is `value` with its `slope` at all faces of some pixels that lie within `reach` of the origin.
+/// Asserts that a field is `constant` + `slope`·x at the faces of a few pixels, within `reach` of
+/// the origin.
 fn assert_linear(
     scene: &Scene,
     projection: Projection,
@@ -138,7 +140,7 @@ fn a_linear_field_has_its_values_and_its_gradient() {
         shapes.into_iter().chain([sheared]).flat_map(|a| PROJECTIONS.map(|p| (a, p)))
     {
         for slope in [DVec3::X, DVec3::new(0.5, -1.0, 2.0), DVec3::ZERO] {
-            // Wide kernels keep the ripple of the lattice out of the test.
+            // Wide kernels have no ripple, which would disturb the test.
             for (kernel, tolerance) in
                 [(Shape::gaussian(0.9, 5.5).unwrap(), 1e-5), (Shape::b_spline(4.0).unwrap(), 3e-4)]
             {
@@ -195,7 +197,7 @@ fn a_linear_field_on_a_rectilinear_lattice_is_linear() {
     {
         let values = volume(lattice.clone(), |p| 3.0 + slope.dot(p));
         let scene = Scene::new().with_volume(values, kernel, uniform([1.0; 3], 0.8));
-        // Samples of 32 bits are all that is not exact.
+        // The only error is the rounding of samples to 32 bits.
         assert_linear(&scene, projection, slope, 3.0, 0.7, 1e-5);
     }
 }
@@ -268,7 +270,7 @@ fn the_mean_of_a_sample_with_a_slope_is_that_of_many_points() {
     let factor = [0.5, 0.1, 0.3, -0.2, 0.1, 0.4];
     let splats = vec![Splat::sample(center.as_vec3(), 3.0, factor, 2.0, slope.as_vec3())];
     let scene = Scene::new().with_samples(set(Payload::Scalar, splats), uniform([1.0; 3], 0.8));
-    // So many pixels that widening is nothing.
+    // With so many pixels, widening is negligible.
     let settings = unshaded([4001, 4001]);
     for projection in PROJECTIONS {
         let view = camera(projection).view(settings.size).unwrap();
@@ -297,7 +299,8 @@ fn the_mean_of_a_sample_with_a_slope_is_that_of_many_points() {
 
 #[test]
 fn what_makes_a_volume_sharp_is_drawn_in_its_own_box() {
-    // Coefficients on a lattice of two more samples on all sides, of another value than the volume's.
+    // Coefficients on a lattice with two more samples on all sides; they differ from the volume's
+    // values.
     let lattice = centered([5; 3], DMat3::from_diagonal(DVec3::splat(0.25)));
     let mut sharp = (*volume(lattice, |_| 1.0)).clone();
     let wide = centered([9; 3], DMat3::from_diagonal(DVec3::splat(0.25)));

@@ -1,4 +1,4 @@
-//! Surfaces of one value.
+//! Isosurfaces.
 
 use super::*;
 use crate::volume::{Isosurface, phantoms::Phantom};
@@ -39,7 +39,7 @@ fn a_ball_has_its_depth_and_its_normals() {
                 close(composite.half, s, 0.003);
                 close(composite.opacity, 1.0, 1e-8);
                 let cosine = ((ray.point(s) - center) / 0.6).dot(ray.direction).abs();
-                // The kernels' sum ripples by 1.3 %, and gradients with it.
+                // The kernels' sum ripples by 1.3 %, and so do the gradients.
                 close(composite.color.x, 0.8 * cosine, 0.012);
                 close(composite.color.y, 0.4 * cosine, 0.006);
             }

@@ -1,4 +1,4 @@
-//! Pictures that can be worked out by hand.
+//! Pictures that can be computed by hand.
 
 mod fields;
 mod isosurfaces;
@@ -21,7 +21,7 @@ use std::sync::Arc;
 const PROJECTIONS: [Projection; 2] =
     [Projection::Perspective { view_angle: 40.0 }, Projection::Orthographic { height: 4.0 }];
 
-/// Looks at the world's origin from a slant.
+/// A camera that looks at the world's origin at an oblique angle.
 fn camera(projection: Projection) -> Camera {
     Camera {
         position: DVec3::new(4.0, -3.0, 2.0),
@@ -35,7 +35,7 @@ fn unshaded(size: [u32; 2]) -> Settings {
     Settings { surface_shade: None, volume_shade: Some(None), ..Settings::new(size) }
 }
 
-/// One colour and one extinction for all values.
+/// A transfer function with one colour and one extinction for all values.
 fn uniform(color: [f64; 3], extinction: f64) -> TransferFunction {
     let opacity = -(-extinction).exp_m1();
     TransferFunction {
@@ -51,7 +51,7 @@ fn volume(lattice: Lattice, value: impl Fn(DVec3) -> f64) -> Arc<Volume> {
     Arc::new(Volume::new(lattice, Samples::F32(samples)).unwrap())
 }
 
-/// A lattice about the world's origin with given steps between its samples.
+/// A lattice centred at the world's origin, with given steps between its samples.
 fn centered(dims: [usize; 3], axes: DMat3) -> Lattice {
     let last = DVec3::from(dims.map(|n| n as f64 - 1.0));
     Lattice::cartesian(dims, -0.5 * (axes * last), axes)
@@ -84,7 +84,7 @@ fn sample(center: Vec3, value: f32, deviation: f32) -> Splat {
     Splat::sample(center, value, [deviation, 0.0, deviation, 0.0, 0.0, deviation], 1.0, Vec3::ZERO)
 }
 
-/// Looks down the world's z axis from a height, with parallel rays.
+/// A camera that looks down the world's z axis from a height, with parallel rays.
 fn from_above(height: f64, window: f64) -> Camera {
     Camera {
         position: DVec3::new(0.0, 0.0, height),
@@ -94,18 +94,18 @@ fn from_above(height: f64, window: f64) -> Camera {
     }
 }
 
-/// How much two pictures agree, in decibels.
+/// The PSNR of two pictures, in decibels.
 fn decibels(a: &Picture, b: &Picture) -> f64 {
     compare_pictures(a, b).unwrap().psnr.unwrap_or(f64::INFINITY)
 }
 
-/// What the ray of a pixel of a frame has passed.
+/// The composite of a pixel's ray.
 fn pixel(frame: &Frame, column: i64, row: i64) -> Composite {
     let everywhere: Vec<&Kernel> = frame.kernels.iter().collect();
     frame.pixel_of_sheets(&frame.ray(column, row), &everywhere, None)
 }
 
-/// Numbers that look random and are the same in every run (Marsaglia's xorshift, 2003), in −1 … 1.
+/// Pseudo-random numbers in −1 … 1, the same in every run (Marsaglia's xorshift, 2003).
 struct Random(u64);
 
 impl Random {

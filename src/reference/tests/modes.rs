@@ -1,4 +1,4 @@
-//! Samples classified before they are added, axis-aligned sheets and single splats.
+//! Samples classified before interpolation, axis-aligned sheets and single splats.
 
 use super::*;
 use crate::{scene::Order, volume::Arrangement};
@@ -9,7 +9,8 @@ fn before(mode: Mode) -> Settings {
 
 #[test]
 fn classified_before_a_constant_field_is_as_dense_as_it_is() {
-    // The kernels' sum over a lattice ripples; wide kernels show its mean. Fields reach half a cell over the samples' box.
+    // The kernels' sum over a lattice ripples; wide kernels show its mean. Fields reach half a cell
+    // beyond the samples' box.
     let color = [0.3, 0.6, 0.9];
     let axes = DMat3::from_diagonal(DVec3::new(0.2, 0.25, 0.2));
     let cubic = centered([33, 33, 10], axes);
@@ -91,7 +92,7 @@ fn both_orders_make_one_picture() {
 #[test]
 fn single_splats_are_composited_by_distance() {
     let at = |z: f32, color: u32| Splat { color, ..round(Vec3::new(0.0, 0.0, z), 0.7, 1.0) };
-    // Red lies before blue, though they overlap; the green one is behind the eye.
+    // Red is in front of blue, though they overlap; green is behind the eye.
     let splats = vec![at(-0.5, 0xffff_0000), at(0.5, 0xff00_00ff), at(9.0, 0xff00_ff00)];
     let scene = Scene::new().with_splats(set(Payload::Radiance, splats));
     let camera =
@@ -108,7 +109,7 @@ fn single_splats_are_composited_by_distance() {
 
 #[test]
 fn samples_classified_before_are_lit_by_their_field() {
-    // A slope to the side of the view: the cosine is √½.
+    // The slope is at 45° to the view: the cosine is √½.
     let lattice = centered([9; 3], DMat3::from_diagonal(DVec3::splat(0.25)));
     let shade = Shade { ambient: 0.1, diffuse: 0.4, specular: 0.0, power: 4.0 };
     let transfer = TransferFunction { shade: Some(shade), ..uniform([1.0; 3], 0.8) };
@@ -126,7 +127,8 @@ fn samples_classified_before_are_lit_by_their_field() {
 
 #[test]
 fn the_near_side_of_a_wall_hides_its_far_side() {
-    // Layers of values 0, 0.6, 1, 0.4, 0 from below: the one of 0.4 is the wall's upper side. All lie in one sheet.
+    // Layers with the values 0, 0.6, 1, 0.4, 0 from below. The layer of 0.4 is the wall's upper
+    // side. All of them lie in one sheet.
     let lattice = centered([9, 9, 5], DMat3::from_diagonal(DVec3::splat(0.25)));
     let layers = [0.0, 0.6, 1.0, 0.4, 0.0];
     let field = volume(lattice, |p| layers[(4.0 * p.z + 2.0).round() as usize]);
@@ -150,7 +152,7 @@ fn the_near_side_of_a_wall_hides_its_far_side() {
 #[test]
 fn axis_sheets_follow_the_data() {
     let view = camera(PROJECTIONS[0]).view([8, 8]).unwrap();
-    // The camera looks most along −x.
+    // The camera looks mostly along −x.
     let axis = whole::sheet_axis(&view, None);
     assert!((axis + view.rotation * DVec3::X).length() < 1e-12 && axis.z > 0.0);
     let axes = DMat3::from_cols(
@@ -160,13 +162,13 @@ fn axis_sheets_follow_the_data() {
     );
     let lattice = Lattice::cartesian([2; 3], DVec3::ZERO, axes);
     let axis = whole::sheet_axis(&view, Some(&lattice));
-    // Across the first and the third axis.
+    // Perpendicular to the first and the third axis.
     assert!(
         (view.rotation.transpose() * axis).cross(DVec3::new(5.0, 0.0, -1.0).normalize()).length()
             < 1e-9,
         "{axis}"
     );
-    // Two walls of unequal colour half a sheet apart lie in one sheet, or in two.
+    // Two walls of different colours lie in one thick sheet, or in two thin ones.
     let at = |z: f32, color: u32| Splat { color, ..round(Vec3::new(0.0, 0.0, z), 2.0, 1.0) };
     let splats = vec![at(0.0, 0xff00_00ff), at(1.0, 0xffff_0000)];
     let scene = Scene::new().with_splats(set(Payload::Radiance, splats));

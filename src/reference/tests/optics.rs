@@ -1,4 +1,4 @@
-//! Clips, X-rays, maxima and the gradient's factor.
+//! Clips, X-rays, maxima and the gradient factor.
 
 use super::*;
 use crate::{
@@ -81,7 +81,7 @@ fn an_x_ray_is_what_a_field_takes_from_white() {
     let camera = from_above(5.0, 0.01);
     let found = render(&scene, &camera, &settings).unwrap();
     found.color[0].iter().for_each(|channel| close(*channel, opacity(2.0), 1e-6));
-    // Half of the light is gone after ln 2 / 0.8, from z = 1 on.
+    // Half of the light is absorbed over a length of ln 2 / 0.8, from z = 1 on.
     close(found.depth[0], 4.0 + 2.0_f64.ln() / 0.8, 1e-5);
     let all = render(&both, &camera, &settings).unwrap().color[0];
     all.iter().for_each(|channel| close(*channel, 1.0 - (-1.6_f64 - 0.6).exp(), 1e-4));
@@ -89,7 +89,7 @@ fn an_x_ray_is_what_a_field_takes_from_white() {
 
 #[test]
 fn the_maximum_is_the_largest_value_on_the_ray() {
-    // A hill of height 1 at the origin, with wide kernels; its top stays where values are known.
+    // A hill of height 1, with its top at the sample in the origin.
     let lattice = centered([17; 3], DMat3::from_diagonal(DVec3::splat(0.125)));
     let hill = volume(lattice, |p| 1.0 - p.length_squared());
     let transfer = TransferFunction {
@@ -106,13 +106,14 @@ fn the_maximum_is_the_largest_value_on_the_ray() {
         for (i, color) in picture.color.iter().enumerate() {
             let [x, y] = [i % 5, i / 5].map(|at| 0.2 * (at as f64 - 2.0));
             let value = 1.0 - x * x - y * y;
-            // Kernels blur the hill by 3σ² = 0.017; the mean of a sheet misses its top a little more.
+            // Kernels blur the hill by 3σ² = 0.017. The mean of a sheet lies slightly further below
+            // the top.
             close(color[3], 0.8 * value, 0.02);
             close(color[0], f64::from(color[3] * color[3]) / 0.8, 1e-6);
         }
         assert!(picture.depth.iter().all(|depth| depth.is_infinite()));
     }
-    // A clip leaves the slope alone.
+    // A clip leaves only the slope of the hill.
     let shape = ClipShape::HalfSpace { normal: DVec3::Z, offset: -0.5 };
     let settings = Settings {
         optics: Optics::Maximum,

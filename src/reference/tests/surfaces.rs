@@ -1,4 +1,4 @@
-//! Splats that carry radiance, alone and in fields; what cannot be drawn.
+//! Splats of radiance, alone and inside fields, and scenes that cannot be drawn.
 
 use super::*;
 use crate::{Error, splat::encode_normal};
@@ -49,10 +49,10 @@ fn opacity_scales_the_strength_and_normals_catch_the_light() {
     };
     let scene = Scene::new().with_splats(set(Payload::Radiance, vec![splat]));
     let shade = Shade { ambient: 0.1, diffuse: 0.4, specular: 0.2, power: 4.0 };
-    // A pixel in the middle: an odd number of them.
+    // An odd number of pixels: one lies in the middle.
     let settings = Settings { surface_shade: Some(shade), ..Settings::new([1, 1]) };
     let [red, .., opacity] = render(&scene, &camera, &settings).unwrap().color[0];
-    // Widened by a pixel of this size, it has stepped back a little.
+    // Widened by a pixel of this size, the splat has stepped back slightly.
     close(opacity, 1.0 - (-3.0_f64 * 128.0 / 255.0).exp(), 1e-3);
     // The cosine is √½, its fourth power ¼.
     close(red / opacity, 0.1 + 0.4 * 0.5_f64.sqrt() + 0.2 * 0.25, 1e-3);
@@ -63,7 +63,7 @@ fn the_depth_of_an_opaque_wall_is_where_it_stands() {
     for projection in PROJECTIONS {
         let camera =
             Camera { position: DVec3::new(0.0, 0.0, 5.0), view_up: DVec3::Y, ..camera(projection) };
-        // A disc in the plane z = 0.25, thin against the sheets.
+        // A disc in the plane z = 0.25, much thinner than the sheets.
         let factor = [3.0, 0.0, 3.0, 0.0, 0.0, 1e-3];
         let wall = Splat { factor, ..round(Vec3::new(0.0, 0.0, 0.25), 80.0, 1.0) };
         let scene = Scene::new()
@@ -74,7 +74,7 @@ fn the_depth_of_an_opaque_wall_is_where_it_stands() {
             if matches!(projection, Projection::Perspective { .. }) { 5.0 / 27.0 } else { 0.2 };
         for (color, &z) in picture.color.iter().zip(&picture.depth) {
             assert!(color[3] > 0.9999);
-            // The wall is widened by 0.35 pixels, and half of its light is taken in its near part.
+            // The wall is widened by 0.35 pixels, and absorbs half of the light in its near part.
             close(z, 4.75, pixel);
             assert!(z <= 4.75 + 0.02);
         }
@@ -98,7 +98,8 @@ fn a_surface_in_a_translucent_volume_is_veiled_by_what_lies_before_it() {
         let camera =
             Camera { position: DVec3::new(0.0, 0.0, 6.0), view_up: DVec3::Y, ..camera(projection) };
         for height in [-1.0_f32, 0.0, 1.5] {
-            // Fine pixels, so that the wall is widened but little: only the middle of a large picture is drawn.
+            // Fine pixels, so that the wall is widened only slightly. Only the middle of a large
+            // picture is drawn.
             let wall = Splat {
                 factor: [9.0, 0.0, 9.0, 0.0, 0.0, 1e-3],
                 ..round(Vec3::new(0.0, 0.0, height), 5e3, 1.0)
@@ -116,13 +117,14 @@ fn a_surface_in_a_translucent_volume_is_veiled_by_what_lies_before_it() {
             for (column, row) in [(400, 400), (420, 370)] {
                 let ray = frame.ray(column, row);
                 let composite = pixel(&frame, column, row);
-                // The samples' box begins at z = 2, 4 before the camera.
+                // The samples' box begins at z = 2, 4 units in front of the camera.
                 let length = (2.0 - f64::from(height)) / ray.direction.z;
                 let through = (-extinction * length).exp();
                 close(composite.opacity, 1.0, 1e-6);
                 for (c, wall) in [0xc0, 0x80, 0x40].into_iter().enumerate() {
                     let expected = (1.0 - through) * veil[c] + through * f64::from(wall) / 255.0;
-                    // The sheet that holds the wall's near side mixes it with its own bit of the volume.
+                    // The sheet with the wall's near side mixes the wall with the sheet's part of
+                    // the volume.
                     close(composite.color[c], expected, extinction * 0.02);
                 }
             }

@@ -1,4 +1,4 @@
-//! Sheets against rays that are looked at in many points, and against other sheets.
+//! Sheets compared with densely sampled rays, and with other sheets.
 
 use super::*;
 use crate::{
@@ -7,7 +7,7 @@ use crate::{
     volume::{Arrangement, Isosurface, phantoms::Phantom},
 };
 
-/// Extinction that changes fast, with a step.
+/// A transfer function whose extinction changes fast, with a step.
 fn steep() -> TransferFunction {
     TransferFunction {
         color: vec![(0.0, [0.1, 0.2, 0.9]), (0.5, [0.9, 0.8, 0.2]), (1.0, [0.9, 0.1, 0.1])],
@@ -33,7 +33,7 @@ fn small(classification: Classification, thickness: Option<f64>) -> Settings {
 
 #[test]
 fn a_step_on_a_ramp_is_as_long_as_it_is() {
-    // Extinction 2 where the value is over 0.137, which it is for 0.863 of depth.
+    // The extinction is 2 where the value exceeds 0.137, over a depth of 0.863.
     let lattice = centered([17; 3], DMat3::from_diagonal(DVec3::splat(0.125)));
     let opaque = 1.0 - (-2.0_f64).exp();
     let transfer =
@@ -42,7 +42,7 @@ fn a_step_on_a_ramp_is_as_long_as_it_is() {
     let field = volume(lattice, |p| p.z);
     let scene = Scene::new().with_volume(field, kernel, transfer);
     let camera = from_above(5.0, 0.01);
-    // Sheets inside, away from the border where fewer samples make the field lean.
+    // Inside, away from the border, where missing samples bend the field.
     let error = |classification, thickness| {
         let settings =
             Settings { classification, sheet_thickness: Some(thickness), ..unshaded([1, 1]) };
@@ -95,7 +95,7 @@ fn sheets_converge_to_the_rays() {
         ("shells", shells(24, Shape::default(), None), 10.0),
         ("blobs", blobs(Shape::default(), None), 10.0),
         ("spline", blobs(spline, None), 10.0),
-        // A sheet is lit once, so in the finest of shells its light is the smaller part of the error.
+        // Lit shells gain less: each part of a sheet is lit once.
         ("shells, lit", shells(24, Shape::default(), lit), 0.0),
         ("blobs, lit", blobs(Shape::default(), lit), 4.0),
     ] {
@@ -115,7 +115,8 @@ fn sheets_converge_to_the_rays() {
             let [inside, inside_thin] =
                 [1.0, 0.125].map(|share| found(Classification::PreIntegrated, share));
             println!(
-                "{name}: post {post:.1} → {post_thin:.1} dB, inside {inside:.1} → {inside_thin:.1} dB"
+                "{name}: post {post:.1} → {post_thin:.1} dB, \
+                 inside {inside:.1} → {inside_thin:.1} dB"
             );
             assert!(post_thin > post + 15.0 && inside_thin > inside + 15.0);
             assert!(inside > post + better);
@@ -195,7 +196,7 @@ fn rays_are_refused_where_they_cannot_be_followed() {
     assert!(refused(&scene.with_splats(splats), &settings, 0.1));
 }
 
-/// How long 256³ samples take at 256 × 256 pixels; run it by name.
+/// Prints the time of 256³ samples at 256 × 256 pixels; run it by name.
 #[test]
 #[ignore = "a minute"]
 fn rays_through_a_large_volume() {

@@ -13,7 +13,9 @@ impl Convert {
     /// Writes the volume as .splv.
     pub(super) fn bricks(self, progress: &Progress) -> Result<(), Failure> {
         let [file] = &self.files[..] else {
-            return Err(Failure::Usage("volumes are converted one by one".into()));
+            return Err(Failure::Usage(
+                "volumes are converted one by one; give a single file".into(),
+            ));
         };
         if self.lattice.is_some() {
             return Err(Failure::Usage("--lattice is for volumes written as .nrrd".into()));
@@ -36,8 +38,8 @@ impl Convert {
         match &source {
             Source::Whole(volume) => bricks::write(volume, &self.output, &options, &watch),
             Source::Stream(stream) => {
-                let range = stream
-                    .range(&|done, all| stages.set("Looking through the input", done, all))?;
+                let range =
+                    stream.range(&|done, all| stages.set("Scanning the input", done, all))?;
                 bricks::convert(stream, range, &self.output, &options, &watch)
             }
         }
@@ -67,12 +69,13 @@ impl Convert {
         output::line(format_args!("time            {:.2} s", milliseconds(start) / 1e3))
     }
 
-    /// Tells what a conversion would take.
+    /// Prints what a conversion would take.
     fn expect_bricks(&self, source: &Source, progress: &Progress) -> Result<(), Failure> {
         progress.clear();
         let (lattice, scalar) = source.shape();
         let need = memory_of(source);
-        // Levels above the finest have a seventh of its samples, blocks a 32nd of the bricks' samples.
+        // The levels above the finest have a seventh of its samples, the blocks a 32nd of the
+        // bricks' samples.
         let unpacked = (lattice.len() as u64).saturating_mul(scalar.bytes() as u64) / 7 * 8;
         let slice_by_slice = matches!(source, Source::Stream(_));
         if self.json {
@@ -92,13 +95,13 @@ impl Convert {
             scalar.name()
         ))?;
         output::line(format_args!(
-            "bytes           {unpacked} with all levels, less what packing takes away"
+            "bytes           {unpacked} with all levels, before compression"
         ))?;
         output::line(format_args!("memory          about {} MiB, {how}", need >> 20))
     }
 }
 
-/// About how much memory converting takes.
+/// Estimates the bytes of memory for a conversion.
 fn memory_of(source: &Source) -> u64 {
     let (lattice, scalar) = source.shape();
     let whole = match source {

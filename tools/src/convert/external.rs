@@ -1,4 +1,4 @@
-//! Files larger than memory, region by region.
+//! Conversion of files larger than memory, region by region.
 
 use super::{Convert, memory::Need, surface::Frame};
 use crate::{failure::Failure, output, progress::Progress, render::milliseconds};
@@ -15,7 +15,7 @@ use splatkit::{
 use std::time::Instant;
 
 impl Convert {
-    /// Converts what needs more than the `most` bytes that there are.
+    /// Converts inputs that need more than the `most` bytes of memory that may be used.
     pub(super) fn in_regions(
         &self,
         extension: &str,
@@ -26,8 +26,9 @@ impl Convert {
         let [wanted, most_mib] = [need.bytes, most].map(|bytes| bytes >> 20);
         if !need.in_pieces? || extension != "splk" {
             return Err(Failure::Usage(format!(
-                "this takes about {wanted} MiB, but only {most_mib} MiB may be taken, and only binary PLY of points or \
-                 triangles, LAS and LAZ become hierarchies in less; --memory allows more"
+                "converting this takes about {wanted} MiB, but only {most_mib} MiB may be used; \
+                 only binary PLY of points or triangles, LAS and LAZ become hierarchies in less; \
+                 --memory allows more"
             )));
         }
         let start = Instant::now();
@@ -35,13 +36,13 @@ impl Convert {
             memory: most,
             preset: self.surface.preset(),
             block_splats: BuildOptions::default().block_splats,
-            // Each region has a deadline of its own.
+            // Each region has its own deadline.
             surfels: self.surface.surfel_options(Deadline::NEVER),
         };
         let stages = progress.stages();
         let watch = |stage: Stage, done: u64, total: u64| {
             let name = match stage {
-                Stage::Reading => "Looking through the input",
+                Stage::Reading => "Scanning the input",
                 Stage::Distributing => "Distributing to regions",
                 Stage::Building => "Building the hierarchy",
                 Stage::Writing => "Writing the file",
@@ -50,7 +51,7 @@ impl Convert {
         };
         let limits = self.load.limits();
         if self.dry_run {
-            // Blocks at work take so much in any case.
+            // The blocks being built take this much in any case.
             let taken = most.max(BLOCKS);
             check(&self.files, &limits, &options, &watch)?;
             drop(stages);

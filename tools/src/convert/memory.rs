@@ -1,4 +1,4 @@
-//! How much memory a conversion may take, and would take.
+//! How much memory a conversion may use, and how much it needs.
 
 use crate::failure::Failure;
 use splatkit::{
@@ -9,23 +9,24 @@ use splatkit::{
 };
 use std::path::{Path, PathBuf};
 
-/// What converting files as a whole takes.
+/// The memory for converting files as a whole.
 #[derive(Debug)]
 pub struct Need {
-    /// Bytes, about; of a file whose header tells no counts by its size.
+    /// Approximate number of bytes. If a file's header has no counts, the file's size decides.
     pub bytes: u64,
-    /// Whether all files can be read in pieces, or what is wrong with one.
+    /// Whether all files can be read in pieces, or the error of a file that cannot be opened.
     pub in_pieces: splatkit::Result<bool>,
 }
 
-/// Of a file that tells no counts: what is made of it for each of its bytes, and with them.
+/// Memory for each byte of a file whose header has no counts: the byte and what is made from it.
 const OF_BYTE: u64 = 4;
-/// The same of a hierarchy, whose splats are packed.
+/// The same for a hierarchy, whose splats are packed.
 const OF_PACKED_BYTE: u64 = 24;
 
-/// About what converting files takes where all of them are in memory, as far as it matters where so much is `enough`. What is cut
-/// into more triangles counts as that where it does: then files are looked through, one after another, until it is known whether
-/// all of them together are more.
+/// Estimates the memory for converting files that are all in memory at once. The estimate is only
+/// as exact as a comparison with `enough` requires. It includes the subdivision of triangles if
+/// that decides the comparison. In that case, files are scanned one after another until it is known
+/// whether all of them together need more than `enough` bytes.
 pub fn need(files: &[PathBuf], limits: &Limits, options: &SurfelOptions, enough: u64) -> Need {
     let mut in_pieces = Ok(true);
     let mut is_stream = false;
@@ -41,7 +42,7 @@ pub fn need(files: &[PathBuf], limits: &Limits, options: &SurfelOptions, enough:
                 continue;
             }
             Ok(None) => in_pieces = in_pieces.map(|_| false),
-            // Where the file fits, its reader tells what is wrong with it.
+            // If the file fits into memory, its reader reports what is wrong with it.
             Err(error) => in_pieces = in_pieces.and(Err(error)),
         }
         let is_packed =
@@ -58,7 +59,7 @@ pub fn need(files: &[PathBuf], limits: &Limits, options: &SurfelOptions, enough:
         if least_of_this < most_of_this {
             match looked_through(file, limits, options, enough - (least - least_of_this)) {
                 Ok(bytes) => between[index] = [bytes; 2],
-                // As above.
+                // As above, the reader reports this error.
                 Err(error) => {
                     between[index] = [least_of_this; 2];
                     in_pieces = in_pieces.and(Err(error));
@@ -69,12 +70,13 @@ pub fn need(files: &[PathBuf], limits: &Limits, options: &SurfelOptions, enough:
     Need { bytes: sums(&between, blocks)[0], in_pieces }
 }
 
-/// What all files take at least and at most.
+/// Returns the lower and upper bound for all files together.
 fn sums(between: &[[u64; 2]], blocks: u64) -> [u64; 2] {
     [0, 1].map(|side| between.iter().map(|bytes| bytes[side]).fold(blocks, u64::saturating_add))
 }
 
-/// What a file takes that is read in pieces, where so much is `enough`.
+/// Scans a file that is read in pieces and returns the memory that it needs. A need above `enough`
+/// may be larger than the result.
 fn looked_through(
     file: &Path,
     limits: &Limits,
@@ -86,16 +88,21 @@ fn looked_through(
     Ok(memory_of_stream(&mut stream, options, enough.saturating_sub(own))?.saturating_add(own))
 }
 
-/// Refuses what needs more memory than `most`, where other inputs have `taken` some of it already.
+/// Refuses an input that needs more than `most` bytes of memory, together with the bytes that
+/// earlier inputs have `taken`.
 pub fn check(file: &Path, need: u64, taken: u64, most: u64) -> Result<(), Failure> {
     if need.saturating_add(taken) <= most {
         return Ok(());
     }
     let [need, taken, most] = [need, taken, most].map(|bytes| bytes.div_ceil(1 << 20));
-    let before =
-        if taken > 0 { format!(" beside {taken} MiB of the inputs before") } else { String::new() };
+    let before = if taken > 0 {
+        format!(" in addition to {taken} MiB for the inputs before")
+    } else {
+        String::new()
+    };
     Err(Failure::Usage(format!(
-        "{}: this takes about {need} MiB{before}, but only {most} MiB may be taken; --memory allows more",
+        "{}: this takes about {need} MiB{before}, but only {most} MiB may be used; --memory allows \
+         more",
         file.display()
     )))
 }

@@ -1,4 +1,4 @@
-//! `splatkit convert`: what is written decides what is made of the inputs.
+//! `splatkit convert`: the output's extension decides what the inputs become.
 
 mod bricks;
 mod external;
@@ -13,26 +13,28 @@ use std::path::PathBuf;
 
 #[derive(Args, Debug)]
 pub struct Convert {
-    /// Meshes, clouds and hierarchies, which become one; or a volume.
+    /// Meshes, point clouds and hierarchies, which are merged into one; or a single volume.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
-    /// The file to write. Of meshes, clouds and hierarchies: .splk, a hierarchy of splats, or .ply, the splats of the finest
-    /// level as 3D Gaussians for other viewers. Of volumes: .nrrd, or .splv, levels of bricks that are read one by one.
+    /// Write to this file. Meshes, point clouds and hierarchies become .splk, a hierarchy of
+    /// splats, or .ply, the splats of the finest level as 3D Gaussians for other viewers. A volume
+    /// becomes .nrrd, or .splv, levels of bricks that are read one by one.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     #[command(flatten)]
     surface: surface::SurfaceFlags,
-    /// Resamples a Cartesian volume: bcc is the body-centred cubic lattice, 29.3 % fewer samples for the same detail in all
-    /// directions [default: the file's lattice]
+    /// Resample a Cartesian volume. bcc is the body-centred cubic lattice, which has 29.3 % fewer
+    /// samples for the same detail in all directions [default: the file's lattice]
     #[arg(long, value_name = "NAME")]
     lattice: Option<volume::Wanted>,
-    /// Replaces a file that is there already.
+    /// Replace an existing file.
     #[arg(long)]
     overwrite: bool,
-    /// Tells how large the result would be and what making it would take, by trying a part; writes nothing.
+    /// Print how large the result would be and what making it would take, by trying a part; write
+    /// nothing.
     #[arg(long)]
     dry_run: bool,
-    /// Writes JSON.
+    /// Print the result as JSON.
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -69,7 +71,7 @@ impl Convert {
         if self.dry_run { Ok(()) } else { output::check_unneeded(&self.output, read) }
     }
 
-    /// The bytes of memory that a conversion may take.
+    /// Returns the bytes of memory that a conversion may use.
     fn most_memory(&self) -> u64 {
         self.surface.memory.or_else(splatkit::memory::most).unwrap_or(u64::MAX)
     }

@@ -1,4 +1,4 @@
-//! A volume that is converted: slice by slice where that can be, or as a whole.
+//! The volume to convert, read slice by slice if possible, or as a whole.
 
 use super::Convert;
 use crate::{failure::Failure, load::Input};
@@ -11,7 +11,7 @@ use std::path::Path;
 
 /// A volume to convert.
 pub enum Source {
-    /// Slice by slice.
+    /// Read slice by slice.
     Stream(VolumeStream),
     Whole(Volume),
 }
@@ -26,20 +26,20 @@ impl Source {
 }
 
 impl Convert {
-    /// Opens the input, slice by slice where that can be; as a whole in `most` bytes of memory.
+    /// Opens the input: slice by slice if possible, or as a whole in `most` bytes of memory.
     pub(super) fn source(&self, file: &Path, most: u64) -> Result<Source, Failure> {
         let name = file.display();
         match self.load.kind(file)? {
             Kind::Volume => {}
             Kind::Bricks => {
                 let message = format!(
-                    "{name} holds no volume of which this can be made: it is in bricks already; convert the one that it was made from"
+                    "{name} holds a volume in bricks already; convert the volume it was made from"
                 );
                 return Err(Failure::Usage(message));
             }
             Kind::Samples => {
                 return Err(Failure::Usage(format!(
-                    "{name} holds no volume of which this can be made, but scattered samples"
+                    "{name} holds scattered samples; only volumes on a lattice can be converted"
                 )));
             }
             Kind::Mesh | Kind::Hierarchy => return Err(none(file)),
@@ -48,12 +48,13 @@ impl Convert {
             self.check_unneeded(&[stream.path().to_owned()])?;
             return Ok(Source::Stream(stream));
         }
-        // What is not packed takes no less memory than its file; what is shows when it is unpacked.
+        // Uncompressed data takes no less memory than its file. What compressed data takes is known
+        // once it is unpacked.
         let bytes = file.metadata().map_err(|e| Error::file(file, "read", e))?.len();
         if bytes > most {
             return Err(Failure::Usage(format!(
-                "{}: {} MiB cannot be read as a whole in {} MiB; of raw volumes, and NRRD files of raw encoding, .splv files \
-                 are made slice by slice, others need more --memory",
+                "{}: {} MiB cannot be read as a whole in {} MiB of memory; raw volumes and NRRD \
+                 files of raw encoding become .splv slice by slice, others need more --memory",
                 file.display(),
                 bytes >> 20,
                 most >> 20
@@ -62,7 +63,7 @@ impl Convert {
         self.whole(file, Some(most)).map(Source::Whole)
     }
 
-    /// Reads a volume as a whole; in so many bytes of memory where it is not known what it takes.
+    /// Reads a volume as a whole. `memory` limits its bytes if its need is not known yet.
     pub(super) fn whole(&self, file: &Path, memory: Option<u64>) -> Result<Volume, Failure> {
         let mut read = Vec::new();
         let input = self.load.open_within(file, memory, &mut read)?;
@@ -77,6 +78,6 @@ impl Convert {
 fn none(file: &Path) -> Failure {
     let file = file.display();
     Failure::Usage(format!(
-        "{file} holds no volume of which this can be made; write surfaces as .splk or .ply"
+        "{file} holds no volume; write meshes, point clouds and hierarchies as .splk or .ply"
     ))
 }

@@ -1,4 +1,4 @@
-//! Meshes, clouds and hierarchies: to a hierarchy, or to 3D Gaussians.
+//! Meshes, point clouds and hierarchies: converted to a hierarchy, or to 3D Gaussians.
 
 use super::{Convert, memory};
 use crate::{
@@ -22,29 +22,30 @@ use std::{
     time::Instant,
 };
 
-/// How hierarchies are made.
+/// How hierarchies are built.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Hierarchy")]
 pub struct SurfaceFlags {
-    /// How much time building may take for how good a tree [default: balanced]
+    /// Trade the time of building for the quality of the tree [default: balanced]
     #[arg(long, value_enum, value_name = "NAME")]
     preset: Option<Preset>,
-    /// Keeps every bit of the splats, at about eight times the size.
+    /// Keep every bit of the splats, at about eight times the size.
     #[arg(long)]
     lossless: bool,
-    /// A factor on all radii; below 1 surfaces may show holes [default: 1]
+    /// Scale all radii by this factor. Below 1, surfaces may show holes [default: 1]
     #[arg(long, value_name = "FACTOR", value_parser = parse::radius_scale)]
     radius_scale: Option<f32>,
-    /// The axis that points up, for viewers of the result.
+    /// Record the axis that points up, for viewers of the result.
     #[arg(long, value_name = "AXIS")]
     up: Option<Up>,
-    /// The unit of lengths, for viewers of the result, such as m or mm [default: that of a hierarchy that is converted]
+    /// Record the unit of lengths, such as m or mm, for viewers of the result [default: that of a
+    /// converted hierarchy]
     #[arg(long, value_name = "NAME")]
     pub(super) unit: Option<String>,
-    /// What a conversion may take, such as 8GiB. Binary PLY of points or triangles, LAS and LAZ that would take more are
-    /// converted region by region, with files of about their size beside the output meanwhile. Volumes that are raw, or NRRD
-    /// of raw encoding, become .splv slice by slice. Region by region, 200 MiB are taken in any case [default: three quarters of
-    /// the memory that there is]
+    /// Limit the memory of the conversion, such as 8GiB. Binary PLY of points or triangles, LAS and
+    /// LAZ that need more are converted region by region, with temporary files of about their size
+    /// beside the output. Raw volumes and NRRD files of raw encoding become .splv slice by slice.
+    /// Region by region takes at least 200 MiB [default: three quarters of the machine's memory]
     #[arg(long, value_name = "BYTES", value_parser = parse::bytes)]
     pub(super) memory: Option<u64>,
 }
@@ -65,25 +66,25 @@ enum Up {
     Z,
 }
 
-/// The splats of all inputs, and what is known of their source.
+/// The splats of all inputs, and facts about their source.
 struct Gathered {
     set: SplatSet,
     closed: bool,
-    /// What the first input says of it.
+    /// The frame of the first input.
     frame: Frame,
     points: u64,
     read_ms: f64,
     splats_ms: f64,
 }
 
-/// What viewers are told of an input's coordinates.
+/// Facts about an input's coordinates, for viewers.
 #[derive(Default)]
 pub(super) struct Frame {
     pub up: Option<UpAxis>,
     pub unit: String,
 }
 
-/// Splats that a dry run tries.
+/// Number of splats that a dry run tries.
 const SAMPLE: usize = 1 << 17;
 
 impl Convert {
@@ -148,7 +149,7 @@ impl Convert {
         ))
     }
 
-    /// Reads all inputs and makes splats of them, around the first one's origin.
+    /// Reads all inputs and makes splats of them, relative to the first input's origin.
     fn gather(&self, progress: &Progress) -> Result<Gathered, Failure> {
         let mut gathered: Option<Gathered> = None;
         for path in &self.files {
@@ -163,11 +164,11 @@ impl Convert {
         gathered.ok_or_else(|| Failure::Usage("there is nothing to convert".into()))
     }
 
-    /// The splats of an input, beside those of others that have `taken` so many bytes.
+    /// Returns the splats of an input. The splats of earlier inputs have `taken` this many bytes.
     fn splats_of(&self, path: &Path, taken: u64, progress: &Progress) -> Result<Gathered, Failure> {
         progress.stage(format!("Reading {}", path.display()));
         let start = Instant::now();
-        // Reading and what follows share the time.
+        // One deadline covers reading the input and making its splats.
         let deadline = self.load.limits().deadline();
         let most = self.most_memory();
         let mut read = Vec::new();
@@ -201,18 +202,20 @@ impl Convert {
             Input::Volume(_) | Input::Samples(_) | Input::Bricks(_) => {
                 let file = path.display();
                 return Err(Failure::Usage(format!(
-                    "{file} holds a volume or samples; hierarchies are made of meshes and clouds"
+                    "{file} holds a volume or samples; hierarchies are built from meshes and point \
+                     clouds"
                 )));
             }
         };
         Ok(Gathered { set, closed, frame, points, read_ms, splats_ms: milliseconds(start) })
     }
 
-    /// Tells what a conversion would take, by that of a run of the splats.
+    /// Prints what a conversion would take, extrapolated from a contiguous part of the splats.
     fn expect(&self, gathered: &Gathered, need: u64, progress: &Progress) -> Result<(), Failure> {
         progress.stage("Trying a part");
         let splats = &gathered.set.splats;
-        // Triangles that are cut are many more splats; what these are made from takes about as much again.
+        // Subdivided triangles give many more splats; the data that splats are made from takes
+        // about as much again.
         let memory = need.max(2 * memory_of_splats(splats.len()));
         let count = splats.len().min(SAMPLE);
         let first = (splats.len() - count) / 2;
@@ -255,7 +258,8 @@ impl Convert {
         let [read, made] = [gathered.read_ms, gathered.splats_ms].map(|ms| ms / 1e3);
         let build = build_ms / 1e3;
         output::line(format_args!(
-            "time            {read:.2} s reading, {made:.2} s splats, about {build:.1} s tree and file"
+            "time            {read:.2} s reading, {made:.2} s splats, about {build:.1} s tree and \
+             file"
         ))
     }
 }
@@ -267,7 +271,7 @@ impl Gathered {
             return Err(Error::input(
                 path,
                 "splats",
-                "their footprints end elsewhere than the first input's",
+                "their footprints have another extent than those of the first input",
             )
             .into());
         }
@@ -283,7 +287,7 @@ impl Gathered {
 }
 
 impl SurfaceFlags {
-    /// Refuses flags that would change nothing in a file of this extension.
+    /// Refuses flags that have no effect on files of this extension.
     pub(super) fn check(&self, extension: &str) -> Result<(), Failure> {
         let flags = [
             ("--preset", self.preset.is_some(), &["splk"][..]),
@@ -300,7 +304,7 @@ impl SurfaceFlags {
                     .collect::<Vec<_>>()
                     .join(" and ");
                 Err(Failure::Usage(format!(
-                    "{flag} is for {of} files; it changes nothing in .{extension} ones"
+                    "{flag} is for {of} files; it has no effect on .{extension} files"
                 )))
             }
             None => Ok(()),
@@ -335,7 +339,7 @@ impl SurfaceFlags {
         }
     }
 
-    /// What the `frame` says counts where no flag says otherwise.
+    /// Returns the options for writing. The `frame` counts unless a flag overrides it.
     pub(super) fn write_options(&self, files: &[PathBuf], frame: &Frame) -> WriteOptions {
         let name =
             |path: &PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());

@@ -1,4 +1,4 @@
-//! Volumes: in another format, or on another lattice.
+//! Volumes: written in another format, or on another lattice.
 
 use super::{Convert, memory, source::Source};
 use crate::{failure::Failure, output, progress::Progress};
@@ -9,7 +9,7 @@ use splatkit::{
     volume::{self, Arrangement, Volume},
 };
 
-/// The lattices that can be asked for.
+/// The lattices that can be chosen.
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq)]
 pub enum Wanted {
     Cartesian,
@@ -20,11 +20,13 @@ impl Convert {
     /// Writes the volume as .nrrd.
     pub(super) fn volume(self, progress: &Progress) -> Result<(), Failure> {
         let [file] = &self.files[..] else {
-            return Err(Failure::Usage("volumes are converted one by one".into()));
+            return Err(Failure::Usage(
+                "volumes are converted one by one; give a single file".into(),
+            ));
         };
         if self.dry_run {
             return Err(Failure::Usage(
-                "--dry-run is for .splk and .splv; the size of others is that of their samples"
+                "--dry-run is for .splk and .splv; a .nrrd is at most about as large as its samples"
                     .into(),
             ));
         }
@@ -62,8 +64,8 @@ impl Convert {
     }
 }
 
-/// About how much memory converting takes: the samples, and of a body-centred lattice its own (0.71 of them) and what they are
-/// interpolated from.
+/// Estimates the bytes of memory for a conversion: the samples and, for a body-centred lattice, its
+/// own samples (0.71 times as many) and the values that they are interpolated from.
 fn memory_of(source: &Source, wanted: Option<Wanted>) -> u64 {
     let (lattice, scalar) = source.shape();
     let is_resampled = wanted == Some(Wanted::Bcc) && lattice.arrangement == Arrangement::Cartesian;
@@ -82,7 +84,7 @@ fn on_lattice(volume: Volume, wanted: Option<Wanted>) -> Result<Volume, Error> {
             let (from, to) =
                 (name_of(&volume), if wanted == Wanted::Bcc { "bcc" } else { "cartesian" });
             Err(Error::Argument(format!(
-                "a volume on a {from} lattice cannot be resampled on a {to} one"
+                "a volume on a {from} lattice cannot be resampled to a {to} one"
             )))
         }
     }

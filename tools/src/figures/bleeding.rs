@@ -1,4 +1,4 @@
-//! How much of what an opaque slab hides shows through it.
+//! How much of the light behind an opaque slab shows through it.
 
 use super::Stage;
 use crate::{
@@ -14,13 +14,14 @@ use splatkit::{
     volume::{TransferFunction, phantoms::Phantom},
 };
 
-/// Samples along each axis: the front slab of [`Phantom::Slabs`] holds three, the back one six.
+/// Samples along each axis: three in the front slab of [`Phantom::Slabs`], six in the back one.
 const SIDE: usize = 41;
 const SPACING: f64 = 2.0 / (SIDE - 1) as f64;
 /// The front slab fills a picture of this height from all directions below.
 const HEIGHT: f64 = 0.2;
 const PIXELS: u32 = 64;
-/// Directions of the view, in degrees from the slabs' normal. The axis nearest to the view changes at 45.
+/// Directions of the view, in degrees from the slabs' normal. The axis nearest to the view changes
+/// at 45°.
 const DIRECTIONS: [f64; 5] = [0.0, 30.0, 44.0, 50.0, 70.0];
 /// The front slab: samples, and the opacity over each.
 const LAYERS: f64 = 3.0;
@@ -35,8 +36,9 @@ pub const MODES: [(&str, Mode); 3] = [
 pub fn table(stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {
     let mut table = Table::new(
         "Colour bleeding.",
-        "A blue slab of three samples, 90 % opaque over each, right before a red one: percent of red in the picture, by the \
-         angle between the view and the slabs' normal. The first row is what a slab with hard edges lets through.",
+        "A blue slab of three samples, 90 % opaque over each, directly in front of a red one: \
+         percent of red in the picture, by the angle between the view and the slabs' normal. The \
+         first row is what a slab with hard edges lets through.",
         &["mode", "0°", "30°", "44°", "50°", "70°"],
     );
     let percent = |share: f64| Cell::Number(100.0 * share, 3);
@@ -80,7 +82,7 @@ fn camera(degrees: f64) -> Camera {
     camera
 }
 
-/// The mean share of red.
+/// Returns the mean share of red.
 fn red(picture: &Picture) -> f64 {
     let shares =
         picture.color.iter().map(|[red, _, blue, _]| f64::from(red / (red + blue).max(1e-6)));

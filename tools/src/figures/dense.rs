@@ -1,4 +1,4 @@
-//! Sheets against the integral along the ray that they stand for.
+//! Sheets compared with the integral along the ray that they approximate.
 
 use super::Stage;
 use crate::{
@@ -19,8 +19,8 @@ use splatkit::{
 /// The step of the dense integration, in samples.
 const STEP: f64 = 0.05;
 
-/// What is wrong with a file of another kind.
-pub const OTHER: &str = "is no volume";
+/// The error for a file of another kind.
+pub const OTHER: &str = "is not a volume";
 
 /// A volume and how it is shown.
 pub struct Case {
@@ -31,7 +31,7 @@ pub struct Case {
 }
 
 impl Case {
-    /// As the command shows it by default.
+    /// Shows a volume as the command does by default.
     pub fn automatic(name: impl Into<String>, volume: Volume) -> Self {
         let transfer = TransferFunction::automatic(&volume);
         Self { name: name.into(), volume, kernel: Kernel::default(), transfer }
@@ -42,7 +42,7 @@ impl Case {
     }
 }
 
-/// Volumes with and without steep edges, and all ways to reconstruct them.
+/// Returns volumes with and without steep edges, in all ways to reconstruct them.
 pub fn generated() -> Result<Vec<Case>, Failure> {
     let told = splatkit::Error::Argument;
     let specimen = Phantom::Specimen.sample_bytes([48; 3]).map_err(told)?;
@@ -77,8 +77,8 @@ pub fn table(
     let mut table = Table::new(
         "Sheets against dense integration.",
         format!(
-            "PSNR in dB of unlit pictures of {}×{} pixels, drawn by the engine, against the reference's integral in steps of \
-             {STEP} samples through the same field.",
+            "PSNR in dB of unlit pictures of {}×{} pixels, drawn by the engine, compared with the \
+             reference's integral in steps of {STEP} samples through the same field.",
             size[0], size[1]
         ),
         &["volume", "default thickness", "a quarter of it"],

@@ -1,5 +1,5 @@
-//! What a cut costs and how steady it is: the splats and the time of a picture from near and far, and how much it changes
-//! while the camera goes away.
+//! The cost of a cut and how steady it is: the splats and the time of a picture from near and far,
+//! and how much the picture changes while the camera moves away.
 
 use super::{Stage, popping::change, surfaces::Source};
 use crate::{
@@ -22,18 +22,18 @@ use std::{path::Path, sync::Arc, time::Instant};
 /// Pixels along each side of the pictures that are timed, and of those of the sweep.
 const PIXELS: u32 = 1024;
 const SWEEP_PIXELS: u32 = 256;
-/// Pictures of the sweep, and how much farther away its end is than its beginning.
+/// Pictures of the sweep, and how many times farther away the camera is at its end.
 const SWEEP: u32 = 200;
 const FARTHEST: f64 = 16.0;
-/// Frames of which the middle one's time counts.
+/// Number of frames, of which the median time counts.
 const FRAMES: usize = 5;
 /// The cut, in pixels.
 const CUT: f64 = Detail::PIXELS;
 
-/// What is wrong with a file of another kind.
-pub const OTHER: &str = "is no mesh, cloud or hierarchy";
+/// The error for a file of another kind.
+pub const OTHER: &str = "is not a mesh, point cloud or hierarchy";
 
-/// The hierarchy of a file, made of a mesh or cloud where it is one.
+/// Returns the hierarchy in a file, or builds it from a mesh or point cloud.
 fn hierarchy(source: &Source, input: Input) -> Result<Arc<Hierarchy>, Failure> {
     match input {
         Input::Hierarchy(hierarchy) => Ok(hierarchy),
@@ -47,7 +47,7 @@ fn hierarchy(source: &Source, input: Input) -> Result<Arc<Hierarchy>, Failure> {
     }
 }
 
-/// A camera that sees all, from so many times as far away.
+/// Returns a camera that sees the whole model, from `farther` times the distance.
 fn camera(
     hierarchy: &Hierarchy,
     source: &Source,
@@ -69,8 +69,9 @@ pub fn tables(
     let mut cost = Table::new(
         "Cost of a cut.",
         format!(
-            "Pictures of {PIXELS}² pixels, all of the model in view, and from 4 and 16 times as far; a cut of {CUT} pixels. The \
-             middle of {FRAMES} frames, after one that brought the pages."
+            "Pictures of {PIXELS}² pixels with the whole model in view, and from 4 and 16 times as \
+             far; a cut of {CUT} pixels. The median of {FRAMES} frames, after one that loaded the \
+             pages."
         ),
         &[
             "model",
@@ -87,8 +88,9 @@ pub fn tables(
     let mut sweep = Table::new(
         "Zoom sweep.",
         format!(
-            "{SWEEP} pictures of {SWEEP_PIXELS}² pixels while the camera goes {FARTHEST} times as far away: the largest root \
-             mean square change from one to the next, in steps of 1/255, of a cut of {CUT} pixels and of the leaves."
+            "{SWEEP} pictures of {SWEEP_PIXELS}² pixels while the camera moves {FARTHEST} times as \
+             far away: the largest root mean square change from one picture to the next, in steps \
+             of 1/255, for a cut of {CUT} pixels and for the leaves."
         ),
         &["model", "cut", "leaves", "ratio"],
     );

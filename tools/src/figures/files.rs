@@ -1,4 +1,4 @@
-//! What a hierarchy's file keeps of its splats, and in how many bytes.
+//! How exactly a hierarchy's file keeps its splats, and in how many bytes.
 
 use crate::report::{Cell, Table};
 use glam::{DVec3, Vec3};
@@ -12,19 +12,20 @@ use splatkit::{
 };
 use std::path::Path;
 
-/// Leaves whose neighbours are looked for.
+/// Number of leaves that are compared.
 const SAMPLE: usize = 1000;
-/// Neighbours whose mean distance is the spacing.
+/// Number of neighbours whose mean distance is the spacing.
 const NEIGHBOURS: usize = 6;
 
 pub fn table() -> Table {
     Table::new(
         "Files.",
         format!(
-            "Bytes of the file a point of the source and a splat; nodes a leaf; the error of a leaf's place in parts of the \
-             spacing (the mean distance of {NEIGHBOURS} neighbours), of its normal in degrees, and the factor on its radius, each \
-             of {SAMPLE} leaves: the mean and the largest, and what 99 of 100 places keep within; the radius of the root over \
-             that of the smallest sphere."
+            "Bytes of the file per point of the source and per splat; nodes per leaf; the error of \
+             a leaf's position as a share of the spacing (the mean distance of {NEIGHBOURS} \
+             neighbours), of its normal in degrees, and the factor on its radius, each for \
+             {SAMPLE} leaves: the mean, the largest, and the bound that 99 of 100 positions keep; \
+             the radius of the root over that of the smallest sphere."
         ),
         &[
             "model",
@@ -45,7 +46,7 @@ pub fn table() -> Table {
     )
 }
 
-/// Writes a tree, reads it, and compares.
+/// Writes a tree, reads it back, and compares.
 pub fn row(tree: &Tree) -> splatkit::Result<(Hierarchy, Vec<Cell>)> {
     let bytes = to_bytes(tree, &WriteOptions::default())?;
     let length = bytes.len() as f64;
@@ -94,8 +95,8 @@ pub fn row(tree: &Tree) -> splatkit::Result<(Hierarchy, Vec<Cell>)> {
     Ok((hierarchy, cells))
 }
 
-/// What was read of a leaf: writing changes the order of siblings, so the nearest is it. Splats of one vertex share their
-/// place and differ in direction and size.
+/// Returns the leaf that was read for `leaf`. Writing changes the order of siblings, so the nearest
+/// leaf is the one. Splats of one vertex share their position and differ in direction and size.
 fn nearest<'a>(leaf: &Node, kept: &[&'a Node]) -> &'a Node {
     let (place, normal) = (Vec3::from(leaf.splat.center), decode_normal(leaf.splat.normal));
     let mut found = (f32::INFINITY, kept[0]);
@@ -113,7 +114,7 @@ fn nearest<'a>(leaf: &Node, kept: &[&'a Node]) -> &'a Node {
     found.1
 }
 
-/// The mean distance of the nearest neighbours, other than those at the same place.
+/// Returns the mean distance of the nearest neighbours that are not at the same position.
 fn spacing(places: &[Vec3], index: usize) -> f64 {
     let mut nearest = [f32::INFINITY; NEIGHBOURS];
     for place in places {
@@ -128,7 +129,8 @@ fn spacing(places: &[Vec3], index: usize) -> f64 {
         / NEIGHBOURS as f64
 }
 
-/// The radius of the smallest sphere around the leaves' as they were, nearly: by many small steps.
+/// Approximates, by many small steps, the radius of the smallest sphere around the leaves' original
+/// spheres.
 fn smallest_sphere(leaves: &[&Node]) -> f64 {
     let spheres: Vec<(DVec3, f64)> = leaves
         .iter()

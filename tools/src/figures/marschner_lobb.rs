@@ -1,7 +1,9 @@
-//! How near the field that the engine draws comes to the one that was sampled: the test signal of Marschner and Lobb.
+//! How close the field that the engine draws is to the field that was sampled: the test signal of
+//! Marschner and Lobb.
 //!
-//! A cut through the field is drawn as a picture: clips leave a slice far thinner than a sample, a transfer function opaque
-//! from its first hundredth shows the slice's value as a grey, and the picture is read as 32-bit floats.
+//! A cut through the field is drawn as a picture. Clips leave a slice far thinner than a sample. A
+//! transfer function that is opaque within the first hundredth of the slice shows its value as a
+//! grey. The picture is read as 32-bit floats.
 
 use super::Stage;
 use crate::{
@@ -20,23 +22,25 @@ use splatkit::{
 
 const SIGNAL: Phantom = Phantom::MarschnerLobb;
 
-/// The cube that is looked at: far enough from the border that no method depends on what it makes of it.
+/// Half the width of the cube that is measured: far enough from the border that no method depends
+/// on how it treats the border.
 const HALF: f64 = 0.72;
-/// Pixels along each side of a cut, a number that does not repeat with the samples.
+/// Pixels along each side of a cut; a number whose pattern does not repeat with the samples.
 const PIXELS: u32 = 89;
 /// Cuts through the cube.
 const CUTS: u32 = 5;
 /// Half the thickness of a cut, in samples.
 const SLICE: f64 = 2e-3;
-/// The greys stand for values from here to there: sharp kernels leave 0 … 1.
+/// The values that black and white stand for: sharp kernels leave 0 … 1.
 const GREYS: [f64; 2] = [-0.25, 1.25];
 
 pub fn table(stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {
     let mut table = Table::new(
         "Marschner–Lobb.",
         format!(
-            "Root mean square error × 100 at {CUTS} × {PIXELS}² places in the middle {HALF} of the cube. The fields of \
-             kernels are the engine's; trilinear and Catmull–Rom interpolation of the same samples stand beside them."
+            "Root mean square error × 100 at {CUTS} × {PIXELS}² positions in the middle {HALF} of \
+             the cube. The fields of kernels are the engine's; trilinear and Catmull–Rom \
+             interpolation of the same samples are listed for comparison."
         ),
         &["reconstruction", "40³", "64³"],
     );
@@ -78,7 +82,7 @@ pub fn table(stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {
     Ok(table)
 }
 
-/// The error of the field that the engine draws.
+/// Measures the error of the field that the engine draws.
 fn drawn_error(stage: &mut Stage, volume: Volume, kernel: Kernel) -> Result<Cell, Failure> {
     let spacing = volume.lattice.kernel_spacing();
     let slice = SLICE * spacing;
@@ -86,7 +90,7 @@ fn drawn_error(stage: &mut Stage, volume: Volume, kernel: Kernel) -> Result<Cell
     let transfer = TransferFunction {
         color: vec![(low, [0.0; 3]), (high, [1.0; 3])],
         opacity: vec![(low, 1.0)],
-        // Opaque within the slice many times over.
+        // Opaque many times over within the slice.
         unit: 0.1 * slice,
         ..TransferFunction::default()
     };
@@ -115,7 +119,7 @@ fn drawn_error(stage: &mut Stage, volume: Volume, kernel: Kernel) -> Result<Cell
     Ok(root_mean(squares))
 }
 
-/// The sum of squared errors of a cut; infinite where a pixel shows no value.
+/// Returns the sum of squared errors of a cut; infinite if a pixel shows no value.
 fn squared_error(picture: &Picture, z: f64) -> f64 {
     let [low, high] = GREYS;
     let error = |(at, pixel): (usize, &[f32; 4])| {
@@ -126,7 +130,7 @@ fn squared_error(picture: &Picture, z: f64) -> f64 {
     picture.color.iter().enumerate().map(error).sum()
 }
 
-/// The error of a field that is a function.
+/// Measures the error of a field given as a function.
 fn error(field: impl Fn(DVec3) -> f64) -> Cell {
     let mut squares = 0.0;
     for cut in 0..CUTS {
@@ -141,19 +145,20 @@ fn root_mean(squares: f64) -> Cell {
     Cell::Number(100.0 * mean.sqrt(), 3)
 }
 
-/// The height of a cut: spread by the golden ratio, so that no two lie alike between the samples.
+/// Returns the height of a cut. The golden ratio spreads the cuts, so that no two lie alike between
+/// the samples.
 fn depth(cut: u32) -> f64 {
     HALF * (2.0 * (f64::from(cut) * 0.618_033_988_749_895 + 0.5).fract() - 1.0)
 }
 
-/// The place of a pixel of a cut, in rows from the top.
+/// Returns the position of a pixel of a cut. Pixels are in rows from the top.
 fn place(at: usize, z: f64) -> DVec3 {
     let side = PIXELS as usize;
     let along = |i: usize| HALF * (2.0 * (i as f64 + 0.5) / side as f64 - 1.0);
     DVec3::new(along(at % side), -along(at / side), z)
 }
 
-/// The value between the samples of a Cartesian volume, by weights of the four samples around along each axis.
+/// Interpolates a Cartesian volume, with weights for the four nearest samples along each axis.
 fn interpolated(volume: &Volume, p: DVec3, weights: fn(f64) -> [f64; 4]) -> f64 {
     let dims = volume.lattice.dims;
     let steps = volume.lattice.axes.inverse() * (p - volume.lattice.origin);

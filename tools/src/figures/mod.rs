@@ -1,4 +1,4 @@
-//! `splatkit figures`: what the documentation says of quality, measured.
+//! `splatkit figures`: measures what the documentation says about quality.
 
 mod bleeding;
 mod dense;
@@ -19,8 +19,8 @@ use crate::{
 use clap::Args;
 use splatkit::{
     Error,
-    engine::{AdapterChoice, Gpu, PreparedScene, Renderer},
     formats::Kind,
+    gpu::{AdapterChoice, Gpu, PreparedScene, Renderer},
     math::Camera,
     picture::Picture,
     scene::{Scene, Settings},
@@ -29,50 +29,64 @@ use std::path::{Path, PathBuf};
 
 #[derive(Args, Debug)]
 pub struct Figures {
-    /// Volumes that are drawn in sheets and by dense integration too, beside the generated ones.
+    /// Compare these volumes too, drawn in sheets, with dense integration; by default only
+    /// generated ones.
     #[arg(value_name = "VOLUME")]
     files: Vec<PathBuf>,
-    /// Meshes that are drawn as surfels and traced as triangles; with the axis that is up where that is not +Y. Measures
-    /// these alone.
-    #[arg(long, value_name = "MESH[:AXIS]", num_args = 1.., value_parser = surfaces::Source::parse, conflicts_with_all = ["files", "only"])]
+    /// Measure these meshes only, drawn as surfels and traced as triangles. Add the axis that is up
+    /// if it is not +Y.
+    #[arg(
+        long,
+        value_name = "MESH[:AXIS]",
+        num_args = 1..,
+        value_parser = surfaces::Source::parse,
+        conflicts_with_all = ["files", "only"]
+    )]
     surfaces: Vec<surfaces::Source>,
-    /// Writes the pictures of surfaces to this folder.
+    /// Write the pictures of surfaces to this folder.
     #[arg(long, value_name = "FOLDER", requires = "surfaces")]
     pictures: Option<PathBuf>,
-    /// Replaces pictures that are there already.
+    /// Replace existing pictures.
     #[arg(long, requires = "pictures")]
     overwrite: bool,
-    /// Hierarchies, meshes and clouds of which cuts are drawn from near and far; with the axis that is up where that is not
-    /// +Y. Measures these alone.
-    #[arg(long, value_name = "FILE[:AXIS]", num_args = 1.., value_parser = surfaces::Source::parse, conflicts_with_all = ["files", "only"])]
+    /// Measure cuts of these hierarchies, meshes and point clouds only, from near and far. Add the
+    /// axis that is up if it is not +Y.
+    #[arg(
+        long,
+        value_name = "FILE[:AXIS]",
+        num_args = 1..,
+        value_parser = surfaces::Source::parse,
+        conflicts_with_all = ["files", "only"]
+    )]
     detail: Vec<surfaces::Source>,
-    /// Leaves out all but these.
+    /// Measure these parts only.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "PART,…")]
     only: Vec<Part>,
-    /// Size of the pictures that are integrated densely.
+    /// Set the size of the pictures that are integrated densely.
     #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "96x72")]
     size: [u32; 2],
-    /// Replaces the marked block of this file by the tables; where not all are measured, those of the same names in it.
+    /// Replace the marked block of this file by the tables. If not all are measured, replace only
+    /// those of the same titles.
     #[arg(long, value_name = "FILE.md")]
     write: Option<PathBuf>,
-    /// Writes JSON.
+    /// Print the tables as JSON.
     #[arg(long)]
     json: bool,
-    /// The adapter, as for render.
+    /// Choose the adapter, as for render.
     #[arg(long, value_name = "N|NAME|software", help_heading = "Engine")]
     gpu: Option<String>,
     #[command(flatten)]
     load: LoadFlags,
 }
 
-/// What is measured.
+/// The parts of the figures.
 #[derive(Debug, Clone, Copy, PartialEq, clap::ValueEnum)]
 enum Part {
     /// How even the sum of a kernel's copies is.
     Ripple,
     /// The error of the field that the engine draws.
     MarschnerLobb,
-    /// What shows through an opaque slab.
+    /// The light that shows through an opaque slab.
     Bleeding,
     /// How much a picture jumps while the camera turns.
     Popping,
@@ -80,7 +94,7 @@ enum Part {
     Dense,
 }
 
-/// The engine, for one scene after another.
+/// The engine, which draws one scene after another.
 struct Stage {
     renderer: Renderer,
 }
@@ -150,7 +164,7 @@ impl Figures {
         }
         progress.clear();
         let text = report.markdown();
-        // Where the file is not written after all, nothing has to be measured again.
+        // Printed first: if the file cannot be written after all, nothing has to be measured again.
         if self.json {
             output::line(report.json())?;
         } else {
@@ -167,7 +181,7 @@ impl Figures {
             && (self.only.is_empty() || self.only.contains(&part))
     }
 
-    /// Refuses files that nothing could be measured with, before the first of them is.
+    /// Refuses files that cannot be measured, before any file is.
     fn look_at_inputs(&self) -> Result<(), Failure> {
         if !self.files.is_empty() && !self.measures(Part::Dense) {
             return Err(Failure::Usage(

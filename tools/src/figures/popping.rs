@@ -1,4 +1,5 @@
-//! How much a picture jumps while the camera turns past the direction where axis-aligned sheets change their axis.
+//! How much a picture jumps while the camera turns past the direction at which axis-aligned sheets
+//! change their axis.
 
 use super::{Stage, bleeding::MODES};
 use crate::{
@@ -25,8 +26,9 @@ pub fn table(stage: &mut Stage, progress: &Progress) -> Result<Table, Failure> {
     let mut table = Table::new(
         "Popping.",
         format!(
-            "The specimen of {SIDE}³ samples, unlit, from 40° to 50° in steps of {STEP}°: the largest change of a pixel, and \
-             the root mean square change of all, in steps of 1/255. A steady method changes as much in every step."
+            "The specimen of {SIDE}³ samples, unlit, from 40° to 50° in steps of {STEP}°: the \
+             largest change of a pixel, and the root mean square change of all pixels, in steps of \
+             1/255. A steady method changes as much in every step."
         ),
         &[
             "mode",
@@ -75,7 +77,7 @@ fn camera(bounds: &Bounds, degrees: f64) -> Camera {
     camera
 }
 
-/// The largest change of a channel, and the root mean square of all.
+/// Returns the largest change of a channel, and the root mean square change of all channels.
 pub fn change(a: &Picture, b: &Picture) -> [f64; 2] {
     let channels = a.color.iter().flatten().zip(b.color.iter().flatten());
     let changes = channels.map(|(a, b)| f64::from((a - b).abs()));

@@ -1,16 +1,17 @@
-//! How even the sum of a kernel's copies at all samples of a lattice is.
+//! How even the sum of a kernel's copies is, with one copy at each sample of a lattice.
 
 use crate::report::{Cell, Table};
 use glam::DVec3;
 use splatkit::math::Kernel;
 
-/// Places along each edge of a cell at which the sum is taken.
+/// Positions along each edge of a cell at which the sum is computed.
 const PLACES: i32 = 20;
 
 pub fn table() -> splatkit::Result<Table> {
     let mut table = Table::new(
         "Ripple of the kernel sum.",
-        "(largest − smallest) / mean over a cell, in percent. Every picture is divided by this sum, so that it does not show.",
+        "(largest − smallest) / mean over a cell, in percent. Every picture is divided by this \
+         sum, so that the ripple does not show.",
         &["kernel", "Cartesian", "body-centred"],
     );
     for (name, kernel) in [
@@ -29,7 +30,7 @@ pub fn table() -> splatkit::Result<Table> {
 }
 
 fn ripple(kernel: &Kernel, body_centred: bool) -> f64 {
-    // A body-centred cell whose spectrum repeats at the same distance is √2 as long.
+    // A body-centred cell is √2 as long if its spectrum repeats at the same distance.
     let edge = if body_centred { std::f64::consts::SQRT_2 } else { 1.0 };
     let reach = (kernel.extent / edge).ceil() as i32 + 1;
     let corners = |shift: f64| {
@@ -45,7 +46,8 @@ fn ripple(kernel: &Kernel, body_centred: bool) -> f64 {
     let place = |i: i32| edge * f64::from(i) / f64::from(PLACES);
     let (mut low, mut high, mut sum) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
     for at in 0..PLACES.pow(3) {
-        // Right at a sample others lie exactly at the extent, and rounding would decide on them; beside it, half are inside.
+        // Exactly at a sample, others lie exactly at the extent, and rounding would decide about
+        // them. Beside it, half of them are inside.
         let beside = DVec3::new(1e-7, 2e-7, 3e-7);
         let p = beside
             + DVec3::new(

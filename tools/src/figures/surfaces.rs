@@ -1,4 +1,4 @@
-//! Surfels against the triangles that they stand for.
+//! Surfels compared with the triangles that they approximate.
 
 use super::{Stage, files};
 use crate::{
@@ -24,15 +24,15 @@ use std::path::{Path, PathBuf};
 
 /// Pixels along each side of the pictures.
 const PIXELS: u32 = 1024;
-/// Rays of the truth along each side of a pixel.
+/// Rays along each side of a pixel of the true picture.
 const RAYS: u32 = 4;
-/// Pixels from an outline that count as lying at it, and from the outside of what has no holes.
+/// Pixels within this distance of a silhouette count as lying at it. Holes are counted beyond it.
 const BESIDE: usize = 2;
-/// A step in depth between neighbouring pixels that is an outline, in pixels.
+/// A step in depth between neighbouring pixels that counts as a silhouette, in pixels.
 const STEP: f64 = 8.0;
 
-/// What is wrong with a file of another kind.
-pub const OTHER: &str = "is no mesh";
+/// The error for a file of another kind.
+pub const OTHER: &str = "is not a mesh";
 
 /// A mesh file, and the axis that is up in its picture.
 #[derive(Debug, Clone)]
@@ -50,13 +50,13 @@ impl Source {
         Ok(Self { path: path.into(), up })
     }
 
-    /// The name of its rows.
+    /// Returns the name of its rows.
     pub fn name(&self) -> String {
         self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
     }
 }
 
-/// A mesh, how it is looked at, and its true picture.
+/// The view of a mesh, and its true picture.
 pub struct Truth {
     camera: Camera,
     settings: Settings,
@@ -75,8 +75,8 @@ impl Truth {
         Ok(Self { camera, settings, picture })
     }
 
-    /// What a scene that stands for the mesh looks like, and how far that is from the truth. `scene` may hold all splats or
-    /// a hierarchy, of which `detail` is drawn. Also gives how many splats were drawn.
+    /// Draws a scene that represents the mesh, and compares it with the truth. `scene` contains all
+    /// splats, or a hierarchy of which `detail` is drawn. Also returns how many splats were drawn.
     pub fn measure(
         &self,
         stage: &mut Stage,
@@ -96,21 +96,22 @@ impl Truth {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
     psnr: Option<f64>,
-    /// Parts of the squared error: at the outline, at steps in depth within it, and on the rest.
+    /// Shares of the squared error: at the silhouette, at steps in depth within it, and elsewhere.
     shares: [f64; 3],
-    /// How far each pixel lies outside that is half covered or more, but not so in truth: from the nearest that is, in
-    /// pixels, ascending.
+    /// For each pixel that is half covered or more, but not so in truth: the distance to the
+    /// nearest pixel that truly is, in pixels, ascending.
     over: Vec<f64>,
-    /// Pixels that are half covered or more in truth alone.
+    /// Number of pixels that are half covered or more only in truth.
     under: usize,
-    /// Pixels that are half covered or more in truth.
+    /// Number of pixels that are half covered or more in truth.
     covered: usize,
-    /// Pixels inside that let more than a tenth of the light through, and more than half.
+    /// Number of pixels inside that let through more than a tenth of the light, and more than half.
     holes: [usize; 2],
 }
 
 impl Found {
-    /// `scale`: pixels that a world length takes at distance 1 of a perspective view.
+    /// Compares a picture with its truth. `scale` is how many pixels a unit of world length covers
+    /// at distance 1 in a perspective view.
     fn between(picture: &Picture, truth: &Picture, scale: f64) -> splatkit::Result<Self> {
         let comparison = compare_pictures(picture, truth)?;
         let size = [truth.width, truth.height].map(|side| side as usize);
@@ -154,7 +155,7 @@ impl Found {
         Ok(found)
     }
 
-    /// In the order of [`table`]'s columns.
+    /// Returns the cells in the order of the columns in [`tables`].
     fn cells(&self, splats: u64) -> Vec<Cell> {
         let count = |value: usize| Cell::Number(value as f64, 0);
         let percent = |value: f64| Cell::Number(100.0 * value, 2);
@@ -177,7 +178,7 @@ impl Found {
     }
 }
 
-/// The pixels at most `reach` rows and columns away.
+/// Returns the pixels at most `reach` rows and columns away.
 fn around(at: usize, [width, height]: [usize; 2], reach: usize) -> impl Iterator<Item = usize> {
     let (x, y) = (at % width, at / width);
     let rows = y.saturating_sub(reach)..(y + reach + 1).min(height);
@@ -195,7 +196,7 @@ fn is_step(depth: &[f32], at: usize, width: usize, scale: f64) -> bool {
         .any(|&next| f64::from((next - own).abs()) * scale > STEP * f64::from(own.min(next)))
 }
 
-/// The distance to the nearest covered pixel, at most 64.
+/// Returns the distance to the nearest covered pixel, at most 64 pixels.
 fn nearest(at: usize, size: [usize; 2], covered: impl Fn(usize) -> bool) -> f64 {
     let place = |at: usize| [(at % size[0]) as f64, (at / size[0]) as f64];
     let [x, y] = place(at);
@@ -211,7 +212,8 @@ fn nearest(at: usize, size: [usize; 2], covered: impl Fn(usize) -> bool) -> f64 
     64.0
 }
 
-/// The files of each source's truth and splats in a folder; none of them may be in the way, nor be one with another.
+/// Returns the files of each source's truth and splats in a folder. Fails if one of them exists
+/// already, or if two sources have the same files.
 pub fn pictures(
     sources: &[Source],
     folder: &Path,
@@ -226,7 +228,8 @@ pub fn pictures(
             let [first, second] = [first, at].map(|at| sources[at].path.display());
             let picture = own[0].display();
             return Err(Failure::Usage(format!(
-                "{picture} would be the picture of {first} and of {second}: rename one, or measure them one by one"
+                "{picture} would be the picture of {first} and of {second}: rename one, or \
+                 measure them one by one"
             )));
         }
         own.iter().try_for_each(|file| output::check(file, overwrite))?;
@@ -235,7 +238,7 @@ pub fn pictures(
     Ok(files)
 }
 
-/// `keep` names the pictures of each source, where they are kept.
+/// Measures the sources. `keep` contains the files of each source's pictures if they are kept.
 pub fn tables(
     stage: &mut Stage,
     sources: &[Source],
@@ -247,10 +250,11 @@ pub fn tables(
     let mut table = Table::new(
         "Surfels against triangles.",
         format!(
-            "Pictures of {PIXELS}² pixels by the default camera against {} rays a pixel: PSNR in dB; percent of the squared \
-             error within {BESIDE} pixels of the outline, of steps in depth, and elsewhere; pixels covered (half or more) \
-             outside the true outline in percent of those inside, and their distance from it; pixels inside left open; pixels \
-             more than {BESIDE} from the outline with an opacity below 0.9 and 0.5.",
+            "Pictures of {PIXELS}² pixels by the default camera, compared with {} rays per pixel: \
+             PSNR in dB; percent of the squared error within {BESIDE} pixels of the outline, at \
+             steps in depth, and elsewhere; pixels covered (half or more) outside the true outline \
+             in percent of those inside, and their distance from it; pixels inside left open; \
+             pixels more than {BESIDE} from the outline with an opacity below 0.9 and 0.5.",
             RAYS * RAYS
         ),
         &[
@@ -326,7 +330,7 @@ mod tests {
         assert_eq!((found.over.len(), found.under, found.covered), (14, 14, 140));
         assert_eq!((found.over[0], found.over[13]), (1.0, 2.0));
         assert_eq!(found.holes, [14, 7]);
-        // Two columns of 1, and one, at the outline; 0.04 and 0.36 elsewhere.
+        // At the outline, two columns and one column of error 1; 0.04 and 0.36 elsewhere.
         assert!(
             (found.shares[0] - 3.0 / 3.4).abs() < 1e-6 && found.shares[1] == 0.0,
             "{:?}",

@@ -1,4 +1,4 @@
-//! A case of the suite: a scene and how it is looked at.
+//! A case of the suite: a scene and its view.
 
 use crate::camera::{CameraFlags, Subject};
 use splatkit::{
@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// A case before its scene is made, so that only one scene is in memory at a time.
 pub struct Plan {
     pub name: String,
-    /// Makes the case; says why where it cannot.
+    /// Makes the case, or returns the reason why it cannot.
     pub make: Box<dyn FnOnce() -> splatkit::Result<Case>>,
 }
 
@@ -25,27 +25,28 @@ impl Plan {
 }
 
 pub struct Case {
-    /// A file, or what was generated.
+    /// The file, or the generated content.
     pub drawn: String,
     pub scene: Scene,
     pub subject: Subject,
     pub settings: Settings,
-    /// How many times as far away the camera stands as where the scene fills the picture.
+    /// Distance of the camera, in multiples of the distance at which the scene fills the picture.
     pub distance: f64,
-    /// Splats that could show: samples that the transfer function does not leave out, or all surfels.
+    /// Splats that could be visible: all surfels, or the samples that the transfer function does
+    /// not leave out.
     pub effective: u64,
     pub seed: Option<Seed>,
     pub series: Option<Series>,
 }
 
-/// What the seed's table says of a case.
+/// The case's entry in the classic table (`seed`).
 #[derive(Debug, Clone, Copy)]
 pub struct Seed {
     pub splats: u64,
     pub fps: f64,
 }
 
-/// Cases that differ in one number alone, and that number.
+/// Cases that differ in one number only, and that number.
 #[derive(Debug, Clone)]
 pub struct Series {
     pub name: &'static str,
@@ -62,7 +63,7 @@ impl Case {
         settings: Settings,
         effective: u64,
     ) -> Self {
-        // The tables count splats.
+        // The tables count splats, which gathering does not draw.
         let settings = Settings { evaluate: Evaluate::Scatter, ..settings };
         Self {
             drawn: drawn.into(),
@@ -76,7 +77,7 @@ impl Case {
         }
     }
 
-    /// The camera of `bench`, turned so many degrees about the up axis.
+    /// Returns the camera of `bench`, turned by `turn` degrees about the up axis.
     pub fn camera(&self, turn: f64) -> Camera {
         let mut camera = CameraFlags::default().turned(&self.subject, self.settings.size, turn);
         camera.position =
@@ -85,14 +86,14 @@ impl Case {
     }
 }
 
-/// How many samples of a volume the engine keeps under a transfer function.
+/// Returns how many samples of a volume the engine keeps under a transfer function.
 pub fn effective(volume: &Volume, kernel: &Kernel, transfer: &TransferFunction) -> u64 {
     let first = first_visible(transfer, volume.range);
     let ranges = volume.drawn_ranges(kernel);
     ranges.iter().filter(|[low, high]| u16::from(*high) >= first[usize::from(*low)]).count() as u64
 }
 
-/// A volume under a transfer function, and how many of its samples show.
+/// Returns a scene of a volume under a transfer function, and how many of its samples are visible.
 pub fn volume(volume: Arc<Volume>, transfer: TransferFunction) -> (Scene, u64) {
     let kernel = Kernel::default();
     let shown = effective(&volume, &kernel, &transfer);

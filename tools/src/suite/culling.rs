@@ -1,4 +1,4 @@
-//! What is saved by leaving out what cannot be seen.
+//! What culling saves: pictures with invisible parts left out, and drawn.
 
 use super::{
     Effort,
@@ -22,10 +22,10 @@ const VOLUME_SIZE: u32 = 512;
 const POINTS: u32 = 650_000;
 const MODEL_SIZE: u32 = 1024;
 
-/// What is left out of a picture.
+/// The parts that are left out of a picture.
 #[derive(Debug, Clone, Copy)]
 enum Culling {
-    /// What is hidden, and of closed surfaces what faces away.
+    /// Hidden parts, and the back faces of closed surfaces.
     All,
     NoOcclusion,
     NoBackfaces,
@@ -68,12 +68,13 @@ pub fn plans(effort: Effort) -> Vec<Plan> {
     ]
 }
 
-/// A volume that is opaque from its rind on.
+/// Makes a volume that is opaque from its rind on.
 fn opaque_volume(effort: Effort) -> Result<Case> {
     volume(effort, 0.95)
 }
 
-/// The same so thin that nothing is hidden, though a line through all of it may become opaque.
+/// Makes the same volume so thin that nothing is hidden, though a line through all of it may become
+/// opaque.
 fn clear_volume(effort: Effort) -> Result<Case> {
     volume(effort, 0.02)
 }
@@ -99,7 +100,7 @@ fn volume(effort: Effort, opacity: f64) -> Result<Case> {
     ))
 }
 
-/// A knot inside a sphere of about as many points, which hides it.
+/// Makes a knot inside a sphere of about as many points, which hides the knot.
 fn hidden_model(effort: Effort) -> Result<Case> {
     let mut case = surfaces::model(effort.points(POINTS), effort.pixels(MODEL_SIZE))?;
     let reach = case.subject.bounds.diagonal() * 0.5;

@@ -1,18 +1,25 @@
-//! How much is measured, and where it is written: the flags that the suite and the sweep share.
+//! How much is measured, and where the tables are written: the flags that the suite and the sweep
+//! share.
 
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
-/// The group of the flags that measure cases of their own.
+/// The group of the flags that measure their own cases.
 pub const MEASURED: &str = "measured";
 
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Suite and sweep")]
 pub struct EffortFlags {
-    /// How much is measured.
-    #[arg(long, value_enum, default_value_t = Effort::Usual, requires = MEASURED, conflicts_with = "inputs")]
+    /// Choose how much is measured.
+    #[arg(
+        long,
+        value_enum,
+        default_value_t = Effort::Usual,
+        requires = MEASURED,
+        conflicts_with = "inputs"
+    )]
     pub effort: Effort,
-    /// Replaces this machine's tables in the marked block of this file.
+    /// Replace this machine's tables in the marked block of this file.
     #[arg(long, value_name = "FILE.md", requires = MEASURED, conflicts_with = "inputs")]
     pub write: Option<PathBuf>,
 }
@@ -20,17 +27,17 @@ pub struct EffortFlags {
 /// How much is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Effort {
-    /// Everything at a quarter of its length: some seconds, to see that all works.
+    /// Everything at a quarter of its length: takes seconds and checks that all works.
     Quick,
     /// A few minutes on a processor without a GPU.
     Usual,
-    /// The suite: also models of 10 million points and volumes of 512³ and 1024³ samples: 16 GiB of memory, and much time. The
-    /// sweep: more frames of each step.
+    /// In the suite, also models of 10 million points and volumes of 512³ and 1024³ samples, which
+    /// need 16 GiB of memory and much time. In the sweep, more frames of each step.
     Full,
 }
 
 impl Effort {
-    /// What each length of a quick case is divided by.
+    /// Divisor of each length of a quick case.
     const QUICK: u64 = 4;
 
     fn divided(self, number: u64, dimensions: u32) -> u64 {
@@ -40,7 +47,7 @@ impl Effort {
         }
     }
 
-    /// A picture's width, or a volume's side.
+    /// Returns a picture's width, or a volume's side.
     pub fn side(self, side: usize) -> usize {
         self.divided(side as u64, 1) as usize
     }

@@ -1,4 +1,5 @@
-//! How time grows: with the samples of a volume of the same content, and with the part of the picture that a model fills.
+//! How time grows: with the samples of a volume of the same content, and with the part of the
+//! picture that a model fills.
 
 use super::{
     Effort,
@@ -17,10 +18,10 @@ use std::sync::Arc;
 
 /// Samples along each side of the volumes.
 const SIDES: [usize; 3] = [64, 128, 256];
-/// The same of those that take minutes, and gigabytes.
+/// Samples along each side of the volumes that take minutes and gigabytes.
 const MANY_SIDES: [usize; 2] = [512, 1024];
 const VOLUME_SIZE: u32 = 512;
-/// Points of the model, and parts of the picture's width that it fills.
+/// Points of the model, and how many times wider than the model the picture is.
 const POINTS: u32 = 650_000;
 const PARTS: [u32; 3] = [1, 4, 16];
 const MODEL_SIZE: u32 = 1024;
@@ -55,7 +56,8 @@ pub fn plans(effort: Effort) -> Vec<Plan> {
 fn volume(side: usize, size: u32) -> Result<Case> {
     let volume = Phantom::Specimen.sample_bytes([side; 3]).map_err(Error::Argument)?;
     let [min, max] = volume.bounds();
-    // One transfer function for all sizes: the range is the same, and opacity holds for a length.
+    // One transfer function for all sizes: the range of values is the same, and opacity holds for a
+    // length.
     let shown = Phantom::Specimen.sample_bytes([64; 3]).map_err(Error::Argument)?;
     let (kernel, transfer) = (Kernel::default(), TransferFunction::automatic(&shown));
     let effective = case::effective(&volume, &kernel, &transfer);

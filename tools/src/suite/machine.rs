@@ -1,4 +1,4 @@
-//! What the suite ran on.
+//! The machine that the suite ran on.
 
 use serde_json::{Value, json};
 use splatkit::Device;
@@ -8,7 +8,8 @@ pub struct Machine {
     adapter: String,
     driver: String,
     cores: usize,
-    /// Passes are timed by the GPU's clock, or by waiting for each; none on the CPU.
+    /// Whether the GPU's clock times passes (`true`), or waiting for each (`false`); `None` on the
+    /// CPU.
     has_clock: Option<bool>,
 }
 
@@ -33,7 +34,7 @@ impl Machine {
         }
     }
 
-    /// How steps are timed.
+    /// Returns how passes are timed.
     pub fn timing(&self) -> &'static str {
         match self.has_clock {
             None => "as they follow one another",
@@ -43,7 +44,12 @@ impl Machine {
     }
 
     pub fn json(&self) -> Value {
-        json!({ "adapter": self.adapter, "driver": self.driver, "cores": self.cores, "has_clock": self.has_clock })
+        json!({
+            "adapter": self.adapter,
+            "driver": self.driver,
+            "cores": self.cores,
+            "has_clock": self.has_clock,
+        })
     }
 }
 

@@ -6,14 +6,13 @@ use super::{
 };
 use crate::{bench::STEP, progress::Progress, render::milliseconds, timing::Times};
 use splatkit::{
-    Device, Error, Renderer, Result,
-    engine::FrameStats,
+    Device, Error, FrameStats, Renderer, Result,
     picture::Picture,
     scene::{Evaluate, Settings},
 };
 use std::time::Instant;
 
-/// A case that was planned, and what it took, or why it was not drawn.
+/// A planned case and its measurement, or why it was not drawn.
 pub struct Outcome {
     pub name: String,
     pub result: Result<Measured>,
@@ -27,13 +26,13 @@ pub struct Measured {
     pub series: Option<Series>,
     pub times: Times,
     pub stats: FrameStats,
-    /// The peak of the process's memory from the upload on, the scene's own included.
+    /// The peak memory of the process from the upload on, including the scene's own.
     pub cpu_peak: Option<u64>,
     /// Milliseconds of each step of the first view.
     pub steps: Vec<(&'static str, f64)>,
     /// The same scene gathered, if it can be.
     pub gathered: Option<Gathered>,
-    /// Whether every run drew the same bytes, where there was more than one.
+    /// Whether every run drew the same bytes; `None` if there was only one run.
     pub same_bytes: Option<bool>,
 }
 
@@ -46,7 +45,7 @@ pub struct Gathered {
     pub bytes: u64,
 }
 
-/// How often things are done.
+/// How many frames are measured, and how many runs are compared.
 #[derive(Debug, Clone, Copy)]
 pub struct Counts {
     pub frames: u32,
@@ -71,8 +70,8 @@ pub fn outcomes(
     outcomes
 }
 
-/// Opens a device anew that an error tells to be lost: all later cases would fail too. Where it does not open, the next one tells
-/// of it and tries again.
+/// Reopens the device if the error says that it is lost, because all later cases would fail too. If
+/// it does not reopen, the next case fails with that error and tries again.
 pub fn reopen(device: &mut Device, error: &Error) {
     if matches!(error, Error::DeviceLost(_))
         && let Device::Gpu(gpu, _) = device
@@ -82,7 +81,7 @@ pub fn reopen(device: &mut Device, error: &Error) {
     }
 }
 
-/// Refuses a picture that takes nothing of a scene.
+/// Returns an error if a picture draws nothing of a scene.
 pub fn require_content(stats: &FrameStats) -> Result<()> {
     if stats.splats == 0 && stats.gathered == 0 {
         return Err(Error::NothingToDraw("the camera sees no splat that has opacity".into()));
@@ -90,7 +89,7 @@ pub fn require_content(stats: &FrameStats) -> Result<()> {
     Ok(())
 }
 
-/// Makes the scene of a plan, draws it and lets it go.
+/// Makes a plan's scene, measures it and drops it.
 fn outcome(plan: Plan, device: &Device, counts: Counts, progress: &Progress) -> Outcome {
     let Plan { name, make } = plan;
     progress.stage(format!("Making {name}"));
@@ -177,7 +176,8 @@ fn same_bytes(case: &Case, device: &Device, runs: u32) -> Result<bool> {
     Ok(true)
 }
 
-/// Numbers are compared by their bits: a zero of either sign, and what is no number, count too.
+/// Whether two pictures are the same bit by bit: a NaN equals itself, and zeros of different sign
+/// differ.
 fn same(a: &Picture, b: &Picture) -> bool {
     let bits = |picture: &Picture| {
         let numbers = picture.color.as_flattened().iter().chain(&picture.depth);
@@ -191,7 +191,7 @@ impl Measured {
         1e3 / self.times.median
     }
 
-    /// So many of something in a frame, as a rate.
+    /// Returns a count per frame as a rate per second.
     pub fn per_second(&self, count: u64) -> f64 {
         count as f64 * self.fps()
     }

@@ -1,14 +1,14 @@
-//! The largest amount of memory that the process has held, where the operating system tells it (Linux).
+//! The peak memory of the process, if the operating system reports it (Linux).
 
 use std::fs;
 
-/// Forgets the peak so far. Where that is not allowed, peaks include what came before.
+/// Resets the peak. If that is not allowed, peaks include what came before.
 pub fn reset_peak() {
-    // 5 stands for the peak alone (man 5 proc).
+    // 5 resets only the peak (man 5 proc).
     fs::write("/proc/self/clear_refs", "5").ok();
 }
 
-/// The peak in bytes.
+/// Returns the peak in bytes.
 pub fn peak() -> Option<u64> {
     peak_of(&fs::read_to_string("/proc/self/status").ok()?)
 }

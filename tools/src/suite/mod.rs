@@ -1,4 +1,4 @@
-//! `splatkit bench --suite`: the cases that docs/performance.md tells of, measured.
+//! `splatkit bench --suite`: measures the cases that docs/performance.md describes.
 
 mod case;
 mod culling;
@@ -23,11 +23,11 @@ use sections::{HEADING, check_kept, with_section};
 use std::path::{Path, PathBuf};
 use tables::Chapter;
 
-/// Frames that are measured of each case.
+/// Number of frames measured for each case.
 const FRAMES: u32 = 5;
 
-/// What decides a scene, a view or a picture: the suite brings its own. Groups of flags stand by their name where clap makes one,
-/// which it does not where a group holds another.
+/// Flags that set a scene, a view or a picture: the suite has its own. A group of flags is listed
+/// by its name if clap makes a group of it, which clap does not if it contains another group.
 pub const OTHERS: &[&str] = &[
     "inputs",
     "LoadFlags",
@@ -58,16 +58,18 @@ pub const OTHERS: &[&str] = &[
 
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Suite")]
-// Clap lets a requirement go where it conflicts with what is given; so the options conflict with scenes themselves.
+// Clap drops a requirement if it conflicts with a given flag, so the options conflict with scenes
+// themselves.
 pub struct SuiteFlags {
-    /// Measures a suite of cases instead of a scene: docs/performance.md tells of each.
+    /// Measure a suite of cases instead of a scene. docs/performance.md describes each case.
     #[arg(long, group = MEASURED, conflicts_with_all = OTHERS, conflicts_with = "evaluate")]
     pub suite: bool,
-    /// A folder of the classic volumes, by name: vortex, jet, turbulent, foot, lobster, aneurism, bonsai, head, engine,
-    /// unc-head, each in any format that tells its size; generated ones stand for those that are not there.
+    /// Read the classic volumes from this folder, by name: vortex, jet, turbulent, foot, lobster,
+    /// aneurism, bonsai, head, engine, unc-head, each in any format that states its size. Generated
+    /// volumes replace missing ones.
     #[arg(long, value_name = "FOLDER", requires = "suite", conflicts_with = "inputs")]
     data: Option<PathBuf>,
-    /// Leaves out all parts but these.
+    /// Measure these parts only.
     #[arg(
         long,
         value_enum,
@@ -77,21 +79,28 @@ pub struct SuiteFlags {
         conflicts_with = "inputs"
     )]
     only: Vec<Part>,
-    /// Draws each case so many times anew and checks that the bytes are the same; 1 checks nothing.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000), requires = "suite", conflicts_with = "inputs")]
+    /// Draw each case this many times anew and check that the bytes are the same; 1 checks nothing.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        value_parser = clap::value_parser!(u32).range(1..=1000),
+        requires = "suite",
+        conflicts_with = "inputs"
+    )]
     repeat: u32,
 }
 
-/// What is measured.
+/// The parts of the suite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Part {
     /// The classic table of splatting on a GPU.
     Seed,
-    /// Surfaces of ever more points.
+    /// Surfaces of more and more points.
     Surfaces,
-    /// Volumes of ever more samples; a model that moves away.
+    /// Volumes of more and more samples; a model that moves away.
     Growth,
-    /// What cannot be seen, left out and drawn.
+    /// Invisible parts, left out and drawn.
     Culling,
 }
 
@@ -105,14 +114,15 @@ impl Part {
         })
     }
 
-    /// Its name, its title and what it is.
+    /// Returns the name, the title and a description.
     fn told(self) -> [&'static str; 3] {
         match self {
             Self::Seed => [
                 "seed",
                 "The classic table.",
-                "Volumes of the sizes of 2005's table of splatting on a GPU, lit, whole in view; its numbers are at the right. \
-                 Each is shown from the value on that leaves about as many splats.",
+                "Volumes of the sizes in the 2005 table of splatting on a GPU, lit, whole in view; \
+                 the table's numbers are on the right. Each volume is shown from the value on that \
+                 leaves about as many splats.",
             ],
             Self::Surfaces => {
                 ["surfaces", "Surfaces.", "Hierarchies of surfels, with a cut of one pixel."]
@@ -120,12 +130,13 @@ impl Part {
             Self::Growth => [
                 "growth",
                 "Growth.",
-                "One content in ever more samples, in bricks of levels; a model that fills ever less of the picture.",
+                "The same content in more and more samples, in levels of bricks; a model that \
+                 fills less and less of the picture.",
             ],
             Self::Culling => [
                 "culling",
                 "Culling.",
-                "The same pictures with what cannot be seen left out, and drawn.",
+                "The same pictures with invisible parts left out, and drawn.",
             ],
         }
     }

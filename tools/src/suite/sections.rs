@@ -3,15 +3,15 @@
 use crate::failure::Failure;
 use std::fmt;
 
-/// How the part of a machine begins in a document.
+/// How the section of a machine begins in a document.
 pub const HEADING: &str = "### ";
 
-/// The first line of a section.
+/// Returns the first line of a section.
 fn heading(section: &str) -> &str {
     section.lines().next().unwrap_or_default()
 }
 
-/// The sections of a text, one for each machine.
+/// Returns the sections of a text, one for each machine.
 fn sections(text: &str) -> Vec<&str> {
     let mut sections = Vec::new();
     let mut rest = text.trim();
@@ -24,7 +24,7 @@ fn sections(text: &str) -> Vec<&str> {
     sections
 }
 
-/// The section of a machine, empty where there is none.
+/// Returns the section of a machine; empty if there is none.
 fn section_of(text: &str, machine: impl fmt::Display) -> String {
     let wanted = format!("{HEADING}{machine}");
     sections(text)
@@ -34,7 +34,7 @@ fn section_of(text: &str, machine: impl fmt::Display) -> String {
         .to_owned()
 }
 
-/// A text with sections of several machines, one of them put in or replaced.
+/// Returns a text with sections of several machines, in which this section is added or replaced.
 pub fn with_section(text: &str, section: &str) -> String {
     let mut sections = sections(text);
     match sections.iter_mut().find(|old| heading(old) == heading(section)) {
@@ -44,8 +44,9 @@ pub fn with_section(text: &str, section: &str) -> String {
     sections.join("\n\n") + "\n"
 }
 
-/// A machine's section is replaced as a whole: refuses to where it has tables of parts that are not measured now. These are told
-/// by their names and titles, with the flag that leaves them out.
+/// A machine's section is replaced as a whole. Returns an error if that would remove tables of
+/// parts that are not measured now. `left_out` contains the names and titles of these parts, and
+/// `flag` is the flag that leaves them out.
 pub fn check_kept(
     text: &str,
     machine: impl fmt::Display,
@@ -55,8 +56,8 @@ pub fn check_kept(
     let section = section_of(text, machine);
     match left_out.into_iter().find(|(_, title)| section.contains(&format!("**{title}**"))) {
         Some((name, _)) => Err(Failure::Usage(format!(
-            "--write would remove this machine's tables of “{name}”, which {flag} leaves out; measure it too, or leave \
-             --write out"
+            "--write would remove this machine's tables of “{name}”, which {flag} leaves out; \
+             measure that part too, or leave --write out"
         ))),
         None => Ok(()),
     }

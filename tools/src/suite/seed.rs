@@ -1,5 +1,6 @@
-//! The classic table of splatting on a GPU (2005, image-aligned sheet buffers; the last row in axis-aligned sheets): its
-//! volumes where the user has them, else generated ones of the same size, shown so that about as many splats count.
+//! The classic table of splatting on a GPU (2005, image-aligned sheet buffers; the last row in
+//! axis-aligned sheets). Its volumes are read if the user has them. Generated volumes of the same
+//! size replace missing ones, shown so that about as many splats count.
 
 use super::{
     Effort,
@@ -39,14 +40,15 @@ use Look::{Semi, Surface};
 #[derive(Debug, Clone, Copy)]
 struct Row {
     name: &'static str,
-    /// How its file begins.
+    /// The first part of its file's name.
     file: &'static str,
     dims: [usize; 3],
-    /// Its lattice is body-centred cubic.
+    /// Whether its lattice is body-centred cubic.
     centred: bool,
     look: Look,
     seed: Seed,
-    /// What stands for it, and half the width of the cube that is sampled: more leaves more air around the phantom.
+    /// The phantom that replaces it, and half the width of the cube that is sampled: a wider cube
+    /// leaves more air around the phantom.
     phantom: Phantom,
     reach: f64,
 }
@@ -97,7 +99,7 @@ const ROWS: [Row; 16] = [
     row(AXIS_ALIGNED, "unc-head", [208, 256, 225], Semi, 2_955_242, 2.86).by(Phantom::Head, 0.85),
 ];
 
-/// The cases of all rows; files are looked for in `data`.
+/// Returns the cases of all rows. Files are searched for in `data`.
 pub fn plans(effort: Effort, data: Option<&Path>) -> Result<Vec<Plan>> {
     let files = data.map(volumes).transpose()?.unwrap_or_default();
     let plan = |row: Row| {
@@ -107,7 +109,7 @@ pub fn plans(effort: Effort, data: Option<&Path>) -> Result<Vec<Plan>> {
     Ok(ROWS.into_iter().map(plan).collect())
 }
 
-/// The files of a folder that tell by themselves that they hold volumes, in the order of their names.
+/// Returns the files of a folder that are recognised as volumes, sorted by name.
 fn volumes(folder: &Path) -> Result<Vec<PathBuf>> {
     let failed = |e| Error::file(folder, "read", e);
     let mut files = Vec::new();
@@ -123,7 +125,7 @@ fn volumes(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// A file's name up to its first dot, in small letters.
+/// Returns a file's name up to its first dot, in lower case.
 fn stem(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     name.split('.').next().unwrap_or_default().to_owned()
@@ -157,10 +159,10 @@ impl Row {
         Ok(case)
     }
 
-    /// The phantom in bytes, as the table's volumes were, on a lattice with equal steps.
+    /// Samples the phantom in bytes, as the table's volumes were, on a lattice with equal steps.
     fn generated(self, effort: Effort) -> std::result::Result<Volume, String> {
         let dims = self.dims.map(|side| effort.side(side));
-        // Body-centred lattices count layers of both kinds along z: two to a step.
+        // Body-centred lattices count layers of both kinds along z: two per step.
         let layers = if self.centred { 2.0 } else { 1.0 };
         let cells = DVec3::new(dims[0] as f64, dims[1] as f64, dims[2] as f64 / layers);
         let step = 2.0 * self.reach / cells.max_element();
@@ -190,7 +192,8 @@ fn name_of(phantom: Phantom) -> &'static str {
 }
 
 impl Look {
-    /// Shows the values above that with which the number of splats is nearest to `wanted`.
+    /// Returns a transfer function that shows the values above a threshold. The threshold brings
+    /// the number of splats closest to `wanted`.
     fn transfer(self, volume: &Volume, wanted: u64) -> TransferFunction {
         let mut counts = [0u64; 256];
         volume
@@ -198,7 +201,8 @@ impl Look {
             .iter()
             .for_each(|[_, high]| counts[usize::from(*high)] += 1);
         let mut shown = 0;
-        // From the largest value down: with step k clear, the samples show that reach a step above it.
+        // From the largest value down: if the values up to a step are transparent, the samples that
+        // reach a higher step are visible.
         let start = (0..255usize).rev().map(|step| {
             shown += counts[step + 1];
             (shown.abs_diff(wanted), step)
@@ -225,7 +229,8 @@ impl Look {
 mod tests {
     use super::*;
 
-    /// The stand-ins are compared with the table's rates, so their numbers of splats must be near.
+    /// The replacements are compared with the table's rates, so their numbers of splats must be
+    /// close.
     #[test]
     fn generated_volumes_have_about_as_many_splats() {
         let small = |row: &Row| row.dims.iter().product::<usize>() < 4 << 20;

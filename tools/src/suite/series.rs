@@ -1,10 +1,10 @@
-//! How time follows a number, over cases that differ in it alone.
+//! How time follows a number, over cases that differ in that number only.
 
 use super::measure::Measured;
 use serde_json::{Value, json};
 use std::fmt;
 
-/// Time grows as a power of a number.
+/// The exponent with which time grows as a power of a number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slope {
     name: &'static str,
@@ -12,7 +12,8 @@ pub struct Slope {
     pub power: f64,
 }
 
-/// The slope of each series of two cases at least, of the logarithm of the median time over that of the number.
+/// Returns the slope of each series of at least two cases: the logarithm of the median time over
+/// the logarithm of the number.
 pub fn slopes<'a>(cases: impl Iterator<Item = &'a Measured>) -> impl Iterator<Item = Slope> {
     let mut all: Vec<(Slope, Vec<[f64; 2]>)> = Vec::new();
     for (series, time) in cases.filter_map(|case| Some((case.series.as_ref()?, case.times.median)))
@@ -28,7 +29,7 @@ pub fn slopes<'a>(cases: impl Iterator<Item = &'a Measured>) -> impl Iterator<It
         .map(|(slope, points)| Slope { power: fit(&points), ..slope })
 }
 
-/// The slope of the line with the least squares.
+/// Returns the slope of the least-squares line.
 fn fit(points: &[[f64; 2]]) -> f64 {
     let mean =
         |axis: usize| points.iter().map(|point| point[axis]).sum::<f64>() / points.len() as f64;

@@ -1,4 +1,5 @@
-//! Surfaces of ever more points, as hierarchies of which a picture takes what its pixels can show.
+//! Surfaces of more and more points, as hierarchies. A picture draws no more of them than its
+//! pixels can show.
 
 use super::{
     Effort,
@@ -16,7 +17,7 @@ use splatkit::{
 
 /// Points of the models.
 const POINTS: [u32; 4] = [35_000, 150_000, 650_000, 2_600_000];
-/// Points of those that take minutes to build, and gigabytes.
+/// Points of the models that take minutes and gigabytes to build.
 const MANY_POINTS: [u32; 1] = [10_500_000];
 const SIZE: u32 = 1024;
 /// Pixels of the cut.
@@ -37,7 +38,7 @@ pub fn plans(effort: Effort) -> Vec<Plan> {
     POINTS.iter().chain(many).map(plan).collect()
 }
 
-/// A knot of about so many points, as a hierarchy of surfels.
+/// Makes a knot of about this many points, as a hierarchy of surfels.
 pub fn model(points: u32, size: u32) -> Result<Case> {
     let (hierarchy, bounds) = hierarchy(&knot(points))?;
     let settings = Settings { detail: Detail::Pixels(CUT), ..Settings::new([size; 2]) };
@@ -46,13 +47,14 @@ pub fn model(points: u32, size: u32) -> Result<Case> {
     Ok(Case::new("generated: knot", scene, Subject { bounds, up: DVec3::Y }, settings, leaves))
 }
 
-/// A knot whose triangles are about as long as they are wide: it is twelve times as long as around.
+/// Makes a knot whose triangles are about as long as they are wide: the knot is twelve times as
+/// long as around.
 pub fn knot(points: u32) -> Mesh {
     let around = f64::from(points / 12).sqrt().round() as u32;
     Mesh::knot(12 * around, around)
 }
 
-/// The hierarchy of a closed mesh, and the box around it.
+/// Builds the hierarchy of a closed mesh; also returns the box around the mesh.
 pub fn hierarchy(mesh: &Mesh) -> Result<(Hierarchy, Bounds)> {
     let [min, max] =
         mesh.bounds().ok_or_else(|| Error::NothingToDraw("there are no points".into()))?;

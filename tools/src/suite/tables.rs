@@ -1,4 +1,4 @@
-//! What was measured, as Markdown and as JSON.
+//! Measurements as Markdown and as JSON.
 
 use super::{
     measure::{Measured, Outcome},
@@ -18,7 +18,8 @@ pub struct Chapter {
     pub outcomes: Vec<Outcome>,
 }
 
-/// What every case tells, and what some do: the seed's rate, and whether repeated runs agreed.
+/// The columns of all cases. Further columns are the classic table's numbers, and whether repeated
+/// runs agreed.
 const COLUMNS: [&str; 13] = [
     "case",
     "drawn",
@@ -112,7 +113,7 @@ impl Chapter {
             let Ok(found) = result else { continue };
             table.row(name, step_cells(&names, &found.steps));
             if let Some(gathered) = &found.gathered {
-                table.row(&format!("{name}, gathered"), step_cells(&names, &gathered.steps));
+                table.row(format!("{name}, gathered"), step_cells(&names, &gathered.steps));
             }
         }
         table

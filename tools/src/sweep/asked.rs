@@ -1,6 +1,7 @@
-//! What a picture asks for, whatever an engine makes of it: pixels, places on their rays, samples.
+//! The work that a picture asks for, independent of the engine: pixels, positions on their rays,
+//! and samples.
 //!
-//! Nothing here is told by an engine but which pixels are covered.
+//! The engine decides only which pixels are covered.
 
 use glam::{DVec2, DVec3};
 use splatkit::{
@@ -12,31 +13,36 @@ use splatkit::{
 };
 use std::sync::Arc;
 
-/// Rays along each side of the picture, and places on the diagonal of a volume's box, by which places on rays are estimated.
+/// Rays along each side of the picture, and positions on the diagonal of a volume's box, for
+/// estimating the positions on rays.
 const RAYS: u32 = 40;
 const PLACES: f64 = 160.0;
-/// Places along each side of the box by which the samples in view are estimated.
+/// Positions along each side of the box, for estimating the samples in view.
 const SAMPLES: u32 = 24;
-/// The optical depth at which nothing behind shows.
+/// The optical depth behind which nothing is visible.
 const OPAQUE: f64 = 7.6;
-/// Neighbouring splats of a cut overlap, and near sides lie before far ones: about so many may lie over a pixel of a cut of one.
+/// About how many splats may cover a pixel at a cut of one pixel: neighbouring splats overlap, and
+/// near sides lie in front of far ones.
 const SPLATS_OF_PIXEL: f64 = 4.0;
-/// Pixels with less opacity would be none in a picture of 8 bits.
+/// Least opacity that shows in a picture of 8 bits.
 const COVERED: f32 = 0.5 / 255.0;
 
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Asked {
-    /// Pixels that show something.
+    /// Number of pixels that show something.
     pub pixels: f64,
-    /// Samples along the rays of all pixels: those that show something, up to where a ray is opaque; sheets, where they are
-    /// asked to be thinner. Kernels count by how many samples they reach, that of the default as 1. None for surfaces.
+    /// Samples along the rays of all pixels: those that show something, up to where a ray is
+    /// opaque. Sheets count instead if they are set thinner. Kernels count by how many samples they
+    /// reach; the default kernel counts as 1. 0 for surfaces.
     pub on_rays: f64,
-    /// Samples in view that show something, counted likewise; points in view, of a hierarchy at most what the cut asks for.
+    /// Samples in view that show something, counted likewise. For surfaces, the points in view; a
+    /// hierarchy counts at most as many as its cut asks for.
     pub in_view: f64,
 }
 
 impl Asked {
-    /// How many times as much this asks for as another does: of what grows most; at least 1.
+    /// Returns how many times as much this asks for as `other`, in the quantity that grows most; at
+    /// least 1.
     pub fn times(&self, other: &Self) -> f64 {
         let ratio = |own: f64, other: f64| if own > 0.0 && other > 0.0 { own / other } else { 1.0 };
         let ratios = [
@@ -48,7 +54,7 @@ impl Asked {
     }
 }
 
-/// What a scene holds, as far as pictures ask for it.
+/// The content of a scene, as far as it decides what pictures ask for.
 pub enum Content {
     Field(Box<Field>),
     Surface(Surface),
@@ -57,12 +63,12 @@ pub enum Content {
 /// A phantom on a lattice.
 pub struct Field {
     pub phantom: Phantom,
-    /// A sample's value for a phantom's of 1.
+    /// The value of a sample where the phantom is 1.
     pub scale: f64,
     pub transfer: TransferFunction,
     pub bounds: Bounds,
     pub samples: usize,
-    /// Samples along a unit of each axis.
+    /// Samples per unit length along each axis.
     pub density: DVec3,
     /// The kernel's reach in samples.
     pub extent: f64,
@@ -70,7 +76,7 @@ pub struct Field {
 
 /// A model of many points.
 pub struct Surface {
-    /// Some of them.
+    /// A selection of the points.
     pub points: Arc<[DVec3]>,
     pub count: u64,
     /// The cut in pixels.
@@ -114,7 +120,7 @@ impl Field {
             let (start, direction) = view.ray(part * DVec2::new(width, height));
             let (start, direction) = (view.position + turn * start, turn * direction);
             let Some([near, far]) = within(&self.bounds, start, direction) else { continue };
-            // Sheets that are thicker than samples ask for no fewer of them.
+            // Sheets that are thicker than samples do not reduce the samples on a ray.
             let density = (self.density * direction)
                 .length()
                 .max(thickness.map_or(0.0, |length| 1.0 / length));
@@ -149,12 +155,12 @@ impl Surface {
     fn in_view(&self, view: &View, pixels: f64) -> f64 {
         let seen = self.points.iter().filter(|&&point| is_in(view, point)).count();
         let all = self.count as f64 * seen as f64 / self.points.len().max(1) as f64;
-        // Of the finest level no fewer are asked for.
+        // The finest level always asks for all of its points.
         if self.cut > 0.0 { all.min(SPLATS_OF_PIXEL * pixels / self.cut.powi(2)) } else { all }
     }
 }
 
-/// Whether a place is in the picture.
+/// Whether a position is in the picture.
 fn is_in(view: &View, place: DVec3) -> bool {
     let place = view.to_view(place);
     if view.perspective && place.z <= 0.0 {
@@ -164,7 +170,7 @@ fn is_in(view: &View, place: DVec3) -> bool {
     pixel.abs().cmple(view.center).all()
 }
 
-/// Where a ray is in a box, from the ray's origin on where the view has perspective.
+/// Returns the distances at which a ray enters and leaves a box, from the ray's origin on.
 fn within(bounds: &Bounds, start: DVec3, direction: DVec3) -> Option<[f64; 2]> {
     let (first, second) = ((bounds.min - start) / direction, (bounds.max - start) / direction);
     let near = first.min(second).max_element().max(0.0);
@@ -196,7 +202,7 @@ mod tests {
         }
     }
 
-    /// A camera that sees the cube in half the picture's width, and no perspective.
+    /// Returns a view without perspective that sees the cube in half the picture's width.
     fn view() -> View {
         let mut camera = Camera::framing(&field().bounds, DVec3::Y, DVec3::Z, 1.0);
         camera.projection = splatkit::math::Projection::Orthographic { height: 4.0 };
@@ -208,7 +214,7 @@ mod tests {
         let near = |found: f64, wanted: f64| {
             assert!((found / wanted - 1.0).abs() < 0.05, "{found} {wanted}")
         };
-        // 40 × 40 pixels, each of 10 samples.
+        // 40 × 40 pixels of 10 samples each.
         near(field().on_rays(&view(), None), 16_000.0);
         near(field().on_rays(&view(), Some(1.0)), 16_000.0);
         near(field().on_rays(&view(), Some(0.1)), 32_000.0);

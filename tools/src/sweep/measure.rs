@@ -11,10 +11,11 @@ use crate::{
     suite::measure::{reopen, require_content},
     timing::Times,
 };
-use splatkit::{Device, Error, Renderer, Result, engine::FrameStats, scene::Evaluate};
+use splatkit::{Device, Error, FrameStats, Renderer, Result, scene::Evaluate};
 use std::time::Instant;
 
-/// How many frames of a step are drawn: the least, and more, up to the most, until they have taken so many milliseconds.
+/// How many frames of a step are drawn: at least `least`, and more, up to `most`, until they have
+/// taken `enough` milliseconds.
 #[derive(Debug, Clone, Copy)]
 pub struct Frames {
     pub least: usize,
@@ -29,10 +30,10 @@ impl Frames {
     }
 }
 
-/// A step that costs this many times what is explained does so on a busy machine as on an idle one.
+/// A step with this excess cost is a cliff on an idle machine as well as on a busy one.
 const HIGH: f64 = 2.0 * CLIFF;
 
-/// A step that was planned, and what it took, or why it was not drawn.
+/// A planned step and its measurement, or why it was not drawn.
 pub struct Outcome {
     pub name: String,
     pub against: Option<usize>,
@@ -47,25 +48,26 @@ pub struct Measured {
 }
 
 impl Outcome {
-    /// Whether it could not be measured, though the engine draws such scenes.
+    /// Whether measuring failed although the engine draws such scenes.
     pub fn has_failed(&self) -> bool {
         self.result.as_ref().is_err_and(|error| !is_undrawn(error))
     }
 }
 
-/// Whether an engine tells that it does not draw something.
+/// Whether an error says that the engine does not draw such a scene.
 fn is_undrawn(error: &Error) -> bool {
     matches!(error, Error::Argument(_))
 }
 
-/// The outcome that one is compared with, and how. The least times of frames count: other programs do not lower them.
+/// Returns the outcome that `outcome` is compared with, and the comparison. It uses the shortest
+/// frame times, because other programs do not lower them.
 pub fn compared<'a>(outcomes: &'a [Outcome], outcome: &Outcome) -> Option<(&'a Outcome, Ratio)> {
     let neighbour = &outcomes[outcome.against?];
     let (own, other) = (outcome.result.as_ref().ok()?, neighbour.result.as_ref().ok()?);
     Some((neighbour, Ratio::of((own.times.min, &own.asked), (other.times.min, &other.asked))))
 }
 
-/// How steps are drawn.
+/// How steps are measured.
 pub struct Measure<'a> {
     pub device: &'a mut Device,
     pub evaluate: Evaluate,
@@ -84,7 +86,8 @@ impl Measure<'_> {
         outcomes
     }
 
-    /// Measures both sides of each low cliff once more: another program may have had the processor. High ones are none of its doing.
+    /// Measures both sides of each low cliff once more, because another program may have used the
+    /// processor. That would not explain a high cliff.
     fn look_again(&mut self, axis: &str, plans: &[Plan], outcomes: &mut [Outcome]) {
         let mut sides: Vec<usize> = Vec::new();
         for (at, outcome) in outcomes.iter().enumerate() {
@@ -107,7 +110,7 @@ impl Measure<'_> {
         }
     }
 
-    /// Makes a plan's scene, draws it and lets it go.
+    /// Makes a plan's scene, measures it and drops it.
     fn result(&mut self, axis: &str, plan: &Plan) -> Result<Measured> {
         let name = &plan.name;
         self.progress.stage(format!("Making {axis}, {name}"));

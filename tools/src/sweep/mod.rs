@@ -1,5 +1,5 @@
-//! `splatkit bench --sweep`: what a frame costs while one thing after another changes in steps, so that no step costs far more
-//! than its neighbour without reason.
+//! `splatkit bench --sweep`: the cost of a frame while one parameter after another changes in
+//! steps. It shows whether a step costs far more than its neighbour without reason.
 
 mod asked;
 mod measure;
@@ -28,17 +28,17 @@ use measure::{Frames, Measure, Outcome};
 use plan::Plan;
 use tables::Chapter;
 
-/// The sides of pictures.
+/// The side lengths of pictures, in pixels.
 const SIZES: [u32; 7] = [64, 128, 256, 512, 1024, 2048, 4096];
 
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Sweep")]
 pub struct SweepFlags {
-    /// Measures how a frame's time follows the view, the data and the settings, step by step, instead of a scene:
-    /// docs/performance.md tells how to read it.
+    /// Measure, instead of a scene, how the frame time follows the view, the data and the settings,
+    /// step by step. docs/performance.md explains how to read the tables.
     #[arg(long, group = MEASURED, conflicts_with_all = OTHERS, conflicts_with = "suite")]
     pub sweep: bool,
-    /// Leaves out all axes but these.
+    /// Measure these axes only.
     #[arg(
         long,
         value_enum,
@@ -50,16 +50,16 @@ pub struct SweepFlags {
     axes: Vec<Axis>,
 }
 
-/// What changes from step to step.
+/// The parameter that changes from step to step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Axis {
-    /// The camera comes nearer, into the volume.
+    /// The camera approaches and enters the volume.
     Distance,
-    /// The camera goes around, along axes and diagonals.
+    /// The camera orbits the volume, along axes and diagonals.
     Angle,
-    /// The same around slices five times as far apart as their samples.
+    /// The camera orbits slices that are five times as far apart as their samples.
     SliceAngle,
-    /// The picture's middle is enlarged.
+    /// The middle of the picture is enlarged.
     Zoom,
     /// From no perspective to a wide lens.
     Lens,
@@ -69,11 +69,11 @@ enum Axis {
     Samples,
     /// Cartesian, body-centred and rectilinear lattices, and bricks.
     Lattice,
-    /// Steps of a lattice that differ by up to 30 times; flat stacks.
+    /// Lattices whose steps differ by up to 30 times; flat stacks.
     Anisotropy,
     /// The kernels.
     Kernel,
-    /// How far a Gaussian reaches.
+    /// The reach of a Gaussian.
     Extent,
     /// Kernels that pass through the samples.
     Sharp,
@@ -81,7 +81,7 @@ enum Axis {
     Thickness,
     /// From faint to opaque.
     Opacity,
-    /// The camera comes nearer to a surface, and through it.
+    /// The camera approaches a surface and passes through it.
     SurfaceDistance,
     /// The size of a surface's picture.
     SurfaceSize,
@@ -112,50 +112,52 @@ impl Axis {
         }
     }
 
-    /// As the flag has it.
+    /// Returns the axis's name, as the flag has it.
     fn name(self) -> String {
         self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
-    /// Its title and what it is.
+    /// Returns the title and a description.
     fn told(self) -> [&'static str; 2] {
         match self {
             Self::Distance => [
                 "Distance.",
-                "From far away into the volume; at 1 its sphere fills the picture, at 0.26 the camera is on that, at 0 in the middle.",
+                "From far away into the volume. At 1 its bounding sphere fills the picture, at \
+                 0.26 the camera is on that sphere, at 0 in the centre.",
             ],
             Self::Angle => ["Angle.", "Azimuth and elevation; 0° and 90° look along axes."],
             Self::SliceAngle => [
                 "Angle to slices.",
                 "The same, with slices five times as far apart as the samples in them.",
             ],
-            Self::Zoom => ["Zoom.", "The picture's middle enlarged; the camera stays."],
+            Self::Zoom => ["Zoom.", "The middle of the picture is enlarged; the camera stays."],
             Self::Lens => [
                 "Lens.",
-                "The vertical view angle; the camera stands where the volume's sphere fills the picture.",
+                "The vertical view angle. The volume's bounding sphere fills the picture.",
             ],
-            Self::Size => ["Picture.", "Its size."],
-            Self::Samples => ["Samples.", "Of the same content."],
-            Self::Lattice => ["Lattice.", "Of about as many samples, beside the Cartesian one."],
+            Self::Size => ["Picture.", "The size of the picture."],
+            Self::Samples => ["Samples.", "The same content in more samples."],
+            Self::Lattice => ["Lattice.", "About as many samples, beside the Cartesian lattice."],
             Self::Anisotropy => [
                 "Anisotropy.",
-                "How far apart slices are for samples 1 apart, in a cube of about as many samples; then one stack of slices ever nearer to each other.",
+                "The distance of slices whose samples are 1 apart, in a cube of about as many \
+                 samples; then one stack whose slices come closer and closer.",
             ],
             Self::Kernel => ["Kernel.", "Beside the Gaussian."],
             Self::Extent => ["Extent.", "Of the Gaussian, in samples."],
-            Self::Sharp => ["Sharp.", "Beside the same kernel as it is."],
+            Self::Sharp => ["Sharp.", "Beside the same kernel without sharpening."],
             Self::Thickness => ["Thickness of sheets.", "In samples."],
-            Self::Opacity => ["Opacity.", "Of a length of one sample."],
+            Self::Opacity => ["Opacity.", "Over a length of one sample."],
             Self::SurfaceDistance => {
                 ["Distance of a surface.", "A knot of 650 thousand points; distances as above."]
             }
-            Self::SurfaceSize => ["Picture of a surface.", "Its size."],
+            Self::SurfaceSize => ["Picture of a surface.", "The size of the picture."],
             Self::Cut => ["Cut of a hierarchy.", "In pixels; 0 is the finest level."],
         }
     }
 }
 
-/// The frames of each step.
+/// Returns how many frames of each step are drawn.
 fn frames(effort: Effort) -> Frames {
     match effort {
         Effort::Quick => Frames { least: 1, most: 3, enough: 20.0 },

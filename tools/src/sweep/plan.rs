@@ -1,4 +1,4 @@
-//! A step of a sweep: a scene, a view of it and what that asks for.
+//! A step of a sweep: a scene, a view, and the work that they ask for.
 
 use super::asked::Content;
 use splatkit::{
@@ -18,7 +18,7 @@ pub struct Step {
 /// A step before its scene is made.
 pub struct Plan {
     pub name: String,
-    /// The number of the step that it is compared with; none for the first.
+    /// The index of the step that it is compared with; `None` for the first.
     pub against: Option<usize>,
     pub make: Box<dyn Fn() -> Result<Step>>,
 }
@@ -29,7 +29,7 @@ impl Plan {
     }
 }
 
-/// Steps in an order: each is compared with the one before it.
+/// Orders the steps: each is compared with the one before it.
 pub fn in_order(mut plans: Vec<Plan>) -> Vec<Plan> {
     for (at, plan) in plans.iter_mut().enumerate() {
         plan.against = at.checked_sub(1);
@@ -37,13 +37,13 @@ pub fn in_order(mut plans: Vec<Plan>) -> Vec<Plan> {
     plans
 }
 
-/// Steps without an order: each is compared with the first.
+/// Leaves the steps without an order: each is compared with the first.
 pub fn with_first(mut plans: Vec<Plan>) -> Vec<Plan> {
     plans.iter_mut().skip(1).for_each(|plan| plan.against = Some(0));
     plans
 }
 
-/// Steps of two: the second of each is compared with its first.
+/// Pairs the steps: the second of each pair is compared with the first.
 pub fn in_pairs(mut plans: Vec<Plan>) -> Vec<Plan> {
     for (at, plan) in plans.iter_mut().enumerate() {
         plan.against = (at % 2 == 1).then(|| at - 1);
@@ -51,7 +51,7 @@ pub fn in_pairs(mut plans: Vec<Plan>) -> Vec<Plan> {
     plans
 }
 
-/// Something that several steps use, made once.
+/// A value that several steps use and that is made once.
 pub type Shared<T> = Rc<dyn Fn() -> Result<T>>;
 
 pub fn shared<T: Clone + 'static>(make: impl Fn() -> Result<T> + 'static) -> Shared<T> {

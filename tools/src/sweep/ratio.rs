@@ -1,28 +1,31 @@
-//! Whether a step costs more than what it asks for explains.
+//! Whether a step costs more than the work it asks for explains.
 
 use super::asked::Asked;
 
-/// A step that costs more than this many times what is explained is a cliff.
+/// A step with more than this excess cost is a cliff: it costs that many times what its work
+/// explains.
 pub const CLIFF: f64 = 2.0;
 
-/// A step's cost beside its neighbour's. Of the two it is told how many times as much the dearer one costs.
+/// The cost of a step beside that of its neighbour. The comparison is made for the more expensive
+/// of the two.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ratio {
     /// The step's time over its neighbour's.
     pub time: f64,
-    /// How many times as much the dearer of both asks for; at least 1.
+    /// How many times as much work the more expensive of the two asks for; at least 1.
     pub asked: f64,
 }
 
 impl Ratio {
-    /// Of a step and its neighbour: milliseconds, and what they ask for.
+    /// Compares a step with its neighbour. Each is given by its milliseconds and its work.
     pub fn of(own: (f64, &Asked), neighbour: (f64, &Asked)) -> Self {
         let time = own.0 / neighbour.0;
         let asked = if time > 1.0 { own.1.times(neighbour.1) } else { neighbour.1.times(own.1) };
         Self { time, asked }
     }
 
-    /// How many times as much the dearer of both costs as is explained.
+    /// Returns the excess cost of the more expensive of the two: its ratio of time over its ratio
+    /// of work.
     pub fn beyond(self) -> f64 {
         self.time.max(1.0 / self.time) / self.asked
     }
@@ -47,7 +50,7 @@ mod tests {
             (ratio.time, ratio.asked, ratio.beyond(), ratio.is_cliff()),
             (4.0, 4.0, 1.0, false)
         );
-        // Less may cost as much: what every frame costs.
+        // A step that asks for less may cost as much, because every frame has a fixed cost.
         assert!(!Ratio::of((10.0, &asked(1.0)), (10.0, &asked(25.0))).is_cliff());
     }
 

@@ -16,11 +16,11 @@ use splatkit::{
 };
 use std::sync::Arc;
 
-/// Points of the model, pixels of the picture and of the cut.
+/// Points of the model, side of the picture in pixels, and pixels of the cut.
 const POINTS: u32 = 650_000;
 const SIZE: u32 = 1024;
 const CUT: f64 = 1.0;
-/// One of so many points is looked at to estimate how many are in view.
+/// One in this many points is used to estimate how many points are in view.
 const EVERY: usize = 50;
 
 #[derive(Clone)]
@@ -52,7 +52,7 @@ impl Model {
     }
 }
 
-/// The model, seen in a way for each of some values.
+/// Plans one step for each value, with the model seen as `view` returns it.
 fn each<T: Copy + 'static>(
     effort: Effort,
     values: &[T],
@@ -68,7 +68,7 @@ fn each<T: Copy + 'static>(
 }
 
 pub fn distances(effort: Effort) -> Vec<Plan> {
-    // In the middle there is none of it to see.
+    // From its centre, nothing of the knot is visible.
     let [distances @ .., _] = &views::DISTANCES;
     each(
         effort,

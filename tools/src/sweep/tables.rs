@@ -1,4 +1,4 @@
-//! What was measured, as Markdown and as JSON.
+//! Measurements as Markdown and as JSON.
 
 use super::{
     measure::{Measured, Outcome, compared},
@@ -33,7 +33,7 @@ const COLUMNS: [&str; 15] = [
     "",
 ];
 
-/// What is told of a step beyond what is explained.
+/// The mark of a step that costs more than is explained.
 const CLIFF: &str = "cliff";
 
 impl Chapter {
@@ -58,19 +58,22 @@ impl Chapter {
         json!({ "name": self.name, "steps": steps })
     }
 
-    /// Its cliffs, each with how many times as much it costs as is explained.
+    /// Returns the cliffs, each with its excess cost.
     pub fn cliffs(&self) -> impl Iterator<Item = (f64, String)> {
         self.outcomes.iter().filter_map(|outcome| {
             let (beside, ratio) = compared(&self.outcomes, outcome)?;
             let times = ratio.time.max(1.0 / ratio.time);
-            // The dearer one first.
-            let [dear, cheap] =
-                if ratio.time > 1.0 { [&outcome.name, &beside.name] } else { [&beside.name, &outcome.name] };
+            // The more expensive one first.
+            let [dear, cheap] = if ratio.time > 1.0 {
+                [&outcome.name, &beside.name]
+            } else {
+                [&beside.name, &outcome.name]
+            };
             let (name, asked, beyond) = (&self.name, ratio.asked, ratio.beyond());
             ratio.is_cliff().then(|| {
                 let text = format!(
-                    "{name}: “{dear}” costs {times:.1} times as much as “{cheap}” and asks for {asked:.1} times as much: \
-                     {beyond:.1} times beyond."
+                    "{name}: “{dear}” costs {times:.1} times as much as “{cheap}” and asks for \
+                     {asked:.1} times as much: {beyond:.1} times what is explained."
                 );
                 (beyond, text)
             })
@@ -130,7 +133,7 @@ fn cells(found: &Measured, compared: Option<(&Outcome, Ratio)>) -> Vec<Cell> {
     cells
 }
 
-/// All cliffs, the worst first.
+/// Returns a list of all cliffs, the worst first.
 pub fn cliffs(chapters: &[Chapter]) -> String {
     let mut cliffs: Vec<_> = chapters.iter().flat_map(Chapter::cliffs).collect();
     cliffs.sort_by(|(a, _), (b, _)| b.total_cmp(a));
@@ -145,7 +148,7 @@ pub fn cliffs(chapters: &[Chapter]) -> String {
 mod tests {
     use super::*;
     use crate::{sweep::asked::Asked, timing::Times};
-    use splatkit::engine::FrameStats;
+    use splatkit::FrameStats;
 
     fn outcome(name: &str, against: Option<usize>, ms: f64) -> Outcome {
         let asked = Asked { pixels: 100.0, on_rays: 1000.0, in_view: 10.0 };
@@ -170,7 +173,10 @@ mod tests {
         let text = chapter.markdown();
         assert!(text.contains("| 30.0 | 30.0 | 3.00 | 1.00 | 3.00 | **cliff** |"), "{text}");
         assert!(
-            text.contains("| d | c | 9×9 | 100 | 0.001 | 0.0 | – | – | – | 6.0 | 6.0 | 1.20 | 1.00 | 1.20 |  |"),
+            text.contains(
+                "| d | c | 9×9 | 100 | 0.001 | 0.0 | – | – | – | 6.0 | 6.0 | 1.20 | 1.00 | 1.20 \
+                 |  |"
+            ),
             "{text}"
         );
         assert_eq!(chapter.json()["steps"][2]["cliff"], true);

@@ -4,11 +4,13 @@ use crate::camera::{CameraFlags, Subject};
 use glam::DVec3;
 use splatkit::math::{Bounds, Camera};
 
-/// From far away to the middle, in distances at which the sphere around the scene fills the picture. Its surface lies at 0.26.
+/// From far away to the centre, in multiples of the distance at which the sphere around the scene
+/// fills the picture. The sphere's surface lies at 0.26.
 pub const DISTANCES: [f64; 13] =
     [8.0, 4.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.12, 0.06, 0.0];
 
-/// Azimuths and elevations, along axes, in planes of two and along the diagonal of all three.
+/// Azimuths and elevations in degrees: along axes, in planes of two axes, and along the diagonal of
+/// all three.
 pub const ANGLES: [[f64; 2]; 14] = [
     [0.0, 0.0],
     [1.0, 0.0],
@@ -26,21 +28,21 @@ pub const ANGLES: [[f64; 2]; 14] = [
     [45.0, 90.0],
 ];
 
-/// The elevation of a cube's diagonal.
+/// The elevation of a cube's diagonal, in degrees.
 const DIAGONAL: f64 = 35.264_389_682_754_654;
 
-/// View angles of lenses.
+/// View angles of lenses, in degrees.
 pub const LENSES: [f64; 8] = [5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 90.0, 120.0];
 
-/// What the picture's middle is enlarged by.
+/// Factors that enlarge the middle of the picture.
 pub const ZOOMS: [f64; 8] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
 
-/// The camera of `bench`.
+/// Returns the camera of `bench`.
 pub fn usual(bounds: &Bounds, up: DVec3) -> Camera {
     CameraFlags::default().turned(&Subject { bounds: *bounds, up }, [1; 2], 0.0)
 }
 
-/// The same at another distance, which may be none: the direction stays.
+/// Returns the same camera at `times` the distance, which may be 0. The direction stays.
 pub fn at_distance(times: f64, bounds: &Bounds, up: DVec3) -> Camera {
     let mut camera = usual(bounds, up);
     let away = camera.position - camera.focal_point;
@@ -49,7 +51,7 @@ pub fn at_distance(times: f64, bounds: &Bounds, up: DVec3) -> Camera {
     camera
 }
 
-/// From an azimuth and an elevation; the sphere around the scene fills the picture.
+/// Returns a camera at an azimuth and an elevation. The sphere around the scene fills the picture.
 pub fn from_angle([azimuth, elevation]: [f64; 2], bounds: &Bounds) -> Camera {
     let mut camera = Camera::framing(bounds, DVec3::Y, DVec3::Z, 1.0);
     camera.azimuth(azimuth);
@@ -57,16 +59,17 @@ pub fn from_angle([azimuth, elevation]: [f64; 2], bounds: &Bounds) -> Camera {
     camera
 }
 
-/// Through a lens, at the distance at which the sphere around the scene fills the picture.
+/// Returns a camera with a view angle, at the distance at which the sphere around the scene fills
+/// the picture.
 pub fn through_lens(view_angle: f64, bounds: &Bounds) -> Camera {
     let usual = usual(bounds, DVec3::Z);
     Camera::framing_with(bounds, usual.focal_point - usual.position, usual.view_up, 1.0, view_angle)
 }
 
-/// Enlarged as by a lens; the camera stays.
+/// Returns the camera of `bench` with a lens that enlarges the picture; the camera stays.
 pub fn zoomed(factor: f64, bounds: &Bounds) -> Camera {
     let mut camera = usual(bounds, DVec3::Z);
-    // A lens's picture follows the tangent of half its angle.
+    // The size of the picture follows the tangent of half the view angle.
     let half = (0.5 * Camera::DEFAULT_VIEW_ANGLE).to_radians().tan() / factor;
     camera.projection =
         splatkit::math::Projection::Perspective { view_angle: 2.0 * half.atan().to_degrees() };

@@ -1,4 +1,5 @@
-//! The axes of volumes: the specimen in bytes, lit and translucent, of which one thing changes.
+//! The axes of volumes: the specimen in bytes, lit and translucent. One parameter changes at a
+//! time.
 
 use super::{
     Effort,
@@ -18,15 +19,15 @@ use splatkit::{
 };
 use std::sync::Arc;
 
-/// Samples along each side, and pixels of the picture.
+/// Samples along each side of the volume, and pixels along each side of the picture.
 const SIDE: usize = 128;
 const SIZE: u32 = 512;
-/// The opacity of a length of one sample.
+/// The opacity over a length of one sample.
 const OPACITY: f64 = 0.1;
-/// The largest value of a byte stands for the phantom's 1.
+/// The byte that stands for the phantom's 1.
 const SCALE: f64 = 255.0;
 
-/// The volume of most steps.
+/// Makes the volume of most steps.
 fn usual(effort: Effort) -> Shared<Arc<Volume>> {
     shared(move || cube(effort.side(SIDE)))
 }
@@ -35,20 +36,21 @@ fn cube(side: usize) -> Result<Arc<Volume>> {
     volume(box_lattice([side; 3], DVec3::ONE))
 }
 
-/// The specimen in bytes.
+/// Samples the specimen in bytes.
 fn volume(lattice: Lattice) -> Result<Arc<Volume>> {
     let volume = Phantom::Specimen.sample_on(lattice).map_err(Error::Argument)?;
     let bytes = (0..volume.len()).map(|i| (SCALE * volume.value(i)).round() as u8).collect();
     Ok(Arc::new(Volume::new(volume.lattice, Samples::U8(bytes)).map_err(Error::Argument)?))
 }
 
-/// A Cartesian lattice that fills a box of so much around the middle.
+/// Returns a Cartesian lattice that fills the box from `-half` to `half`.
 fn box_lattice(dims: [usize; 3], half: DVec3) -> Lattice {
     let cells = DVec3::from(dims.map(|n| n.saturating_sub(1).max(1) as f64));
     Lattice::cartesian(dims, -half, DMat3::from_diagonal(2.0 * half / cells))
 }
 
-/// How a volume is shown: values above a byte of 20, with the same opacity for a length whatever the lattice.
+/// Returns how a volume is shown: bytes above 20, with the same opacity over a length on all
+/// lattices.
 fn transfer(effort: Effort, opacity: f64) -> TransferFunction {
     TransferFunction {
         color: vec![(20.0, [0.7, 0.3, 0.2]), (255.0, [1.0, 0.9, 0.7])],
@@ -81,7 +83,7 @@ impl Show {
         Bounds { min, max }
     }
 
-    /// As `bench` sees it.
+    /// Returns the step as `bench` sees it.
     fn step(self) -> Result<Step> {
         let camera = views::usual(&self.bounds(), DVec3::Z);
         self.seen(camera)
@@ -108,8 +110,8 @@ impl Show {
     }
 }
 
-/// Samples along a unit of each axis, on average. Layers of a body-centred lattice count with their distance in a Cartesian one of
-/// as many samples.
+/// Returns the mean number of samples per unit length along each axis. Layers of a body-centred
+/// lattice count with their distance in a Cartesian lattice of as many samples.
 fn density(lattice: &Lattice, bounds: &Bounds) -> DVec3 {
     let [x, y, z] = lattice.dims.map(|n| n as f64);
     let (counts, more) = match lattice.arrangement {
@@ -119,7 +121,7 @@ fn density(lattice: &Lattice, bounds: &Bounds) -> DVec3 {
     more * counts / (bounds.max - bounds.min)
 }
 
-/// The usual volume, changed by each of some values.
+/// Plans one step for each value, with the usual volume changed by it.
 fn each<T: Copy + 'static>(
     effort: Effort,
     values: &[T],
@@ -158,7 +160,7 @@ pub fn angles(effort: Effort) -> Vec<Plan> {
     ))
 }
 
-/// Angles of a volume whose slices are five times as far apart as its samples.
+/// Plans angles to a volume whose slices are five times as far apart as its samples.
 pub fn slice_angles(effort: Effort) -> Vec<Plan> {
     let volume = shared(move || volume(stretched(effort, 5.0)));
     let plan = |&angle: &[f64; 2]| {
@@ -246,7 +248,8 @@ pub fn lattices(effort: Effort) -> Vec<Plan> {
     ])
 }
 
-/// Slices that each lie a little beside the last, as of a tilted scanner.
+/// Returns a lattice whose slices are each shifted a little from the one before, as from a tilted
+/// scanner.
 fn sheared(side: usize) -> Lattice {
     let mut lattice = box_lattice([side; 3], DVec3::ONE);
     lattice.axes.z_axis.x = 0.2 * lattice.axes.z_axis.z;
@@ -254,7 +257,7 @@ fn sheared(side: usize) -> Lattice {
     lattice
 }
 
-/// A body-centred lattice of as many samples.
+/// Returns a body-centred lattice of about `side`³ samples.
 fn body_centred(side: usize) -> Lattice {
     let cells = (side as f64 / 2f64.cbrt()).round();
     let edge = 2.0 / (cells - 0.5);
@@ -262,7 +265,8 @@ fn body_centred(side: usize) -> Lattice {
     Lattice::body_centred(dims, DVec3::NEG_ONE, DMat3::from_diagonal(DVec3::splat(edge)))
 }
 
-/// Steps that are longer at the ends: (1 + bend) / (1 − bend) times as long as in the middle.
+/// Returns a lattice with steps that are longer at the ends: (1 + bend) / (1 − bend) times as long
+/// as in the middle.
 fn rectilinear(side: usize, bend: f64) -> Lattice {
     let last = side.saturating_sub(1).max(1) as f64;
     let place = |i: usize| {
@@ -279,7 +283,8 @@ fn rectilinear(side: usize, bend: f64) -> Lattice {
     }
 }
 
-/// About as many samples in the same cube, with slices so many times as far apart as the samples in them.
+/// Returns a lattice of about as many samples in the same cube, with slices `ratio` times as far
+/// apart as the samples in them.
 fn stretched(effort: Effort, ratio: f64) -> Lattice {
     let side = effort.side(SIDE) as f64;
     let (within, across) = ((side * ratio.cbrt()).round(), (side * ratio.powf(-2.0 / 3.0)).round());
@@ -296,7 +301,7 @@ pub fn steps(effort: Effort) -> Vec<Plan> {
     };
     let mut plans: Vec<_> =
         [1.0, 1.02, 1.114, 1.3, 1.5, 2.0, 2.2, 3.0, 5.0, 10.0, 30.0].map(plan).into();
-    // One flat stack, with slices ever nearer to each other.
+    // One flat stack, whose slices come closer and closer.
     let stack = |ratio: f64| {
         let dims = [effort.side(300), effort.side(300), effort.side(9).max(5)];
         let [x, y, z] = dims;
@@ -310,7 +315,7 @@ pub fn steps(effort: Effort) -> Vec<Plan> {
     in_order(plans)
 }
 
-/// Kernels by name.
+/// Returns the kernel of this name.
 fn kernel(name: &str) -> Result<Kernel> {
     Ok(match name {
         "b-spline" => Kernel::b_spline(2.0)?,
@@ -370,7 +375,7 @@ pub fn thicknesses(effort: Effort) -> Vec<Plan> {
 
 pub fn opacities(effort: Effort) -> Vec<Plan> {
     let opacities = [0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9, 0.999];
-    // The length is that of the step's own volume.
+    // The length is one sample of the step's own volume.
     in_order(each(
         effort,
         &opacities,

@@ -1,6 +1,6 @@
-//! Runs the command in a folder of its own, on files that the tests make.
+//! Runs the command in a folder of its own, on files that the tests write.
 
-#![allow(dead_code, reason = "each test file uses its part")]
+#![allow(dead_code, reason = "each test file uses only a part")]
 
 use std::{
     ffi::OsStr,
@@ -23,7 +23,7 @@ impl Folder {
         self.0.join(name)
     }
 
-    /// Writes an input; gives its name.
+    /// Writes an input and returns its name.
     pub fn put<'a>(&self, name: &'a str, bytes: impl AsRef<[u8]>) -> &'a str {
         std::fs::write(self.path(name), bytes).unwrap();
         name
@@ -59,7 +59,7 @@ impl Drop for Folder {
     }
 }
 
-/// A finished run: its arguments, and what it left.
+/// A finished run: its arguments and its output.
 pub struct Run(String, Output);
 
 impl Run {
@@ -68,12 +68,12 @@ impl Run {
     }
 
     pub fn stderr(&self) -> String {
-        // Messages are wrapped where the terminal ends; their words are what matters.
+        // Messages are wrapped at the terminal's width; only their words matter.
         let text = String::from_utf8_lossy(&self.1.stderr).replace(['│', '╰', '├', '─', '▶'], " ");
         text.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
-    /// All that was printed, as it was printed.
+    /// Returns all that was printed, as it was printed.
     pub fn printed(&self) -> String {
         format!("{}{}", self.stdout(), String::from_utf8_lossy(&self.1.stderr))
     }
@@ -82,13 +82,14 @@ impl Run {
         String::from_utf8_lossy(&self.1.stdout).into_owned()
     }
 
-    /// The run must have succeeded.
+    /// Asserts that the run succeeded.
     pub fn ok(self) -> Output {
         assert!(self.1.status.success(), "splatkit {}: {}", self.0, self.stderr());
         self.1
     }
 
-    /// The run must have failed with this exit code and a message that holds every one of these words.
+    /// Asserts that the run failed with this exit code and a message that contains each of these
+    /// words.
     pub fn fails(self, code: i32, words: &[&str]) {
         let message = self.stderr();
         assert_eq!(self.1.status.code(), Some(code), "splatkit {}: {message}", self.0);
@@ -105,9 +106,9 @@ impl Run {
 }
 
 /// A tetrahedron.
-pub const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
-    property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 4\n\
-    property list uchar int vertex_indices\nend_header\n\
+pub const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\n\
+    property float y\nproperty float z\nproperty uchar red\nproperty uchar green\n\
+    property uchar blue\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n\
     0 0 0 255 0 0\n7 0 0 0 255 0\n0 7 0 0 0 255\n0 0 7 255 255 255\n\
     3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
 
@@ -126,7 +127,8 @@ pub fn ball() -> Vec<u8> {
 
 pub fn nrrd(type_name: &str, samples: &[u8]) -> Vec<u8> {
     let header = format!(
-        "NRRD0004\ntype: {type_name}\ndimension: 3\nsizes: 16 16 16\nendian: little\nencoding: raw\n\n"
+        "NRRD0004\ntype: {type_name}\ndimension: 3\nsizes: 16 16 16\nendian: little\n\
+         encoding: raw\n\n"
     );
     [header.as_bytes(), samples].concat()
 }
@@ -134,7 +136,8 @@ pub fn nrrd(type_name: &str, samples: &[u8]) -> Vec<u8> {
 pub fn vti() -> String {
     let values: Vec<String> = ball().iter().map(u8::to_string).collect();
     format!(
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"0.1\" byte_order=\"LittleEndian\">\n\
+        "<?xml version=\"1.0\"?>\n\
+         <VTKFile type=\"ImageData\" version=\"0.1\" byte_order=\"LittleEndian\">\n\
          <ImageData WholeExtent=\"0 15 0 15 0 15\" Origin=\"0 0 0\" Spacing=\"1 1 1\">\n\
          <Piece Extent=\"0 15 0 15 0 15\"><PointData Scalars=\"v\">\n\
          <DataArray type=\"UInt8\" Name=\"v\" format=\"ascii\">{}</DataArray>\n\
@@ -143,7 +146,7 @@ pub fn vti() -> String {
     )
 }
 
-/// A square with a texture of four colours, all in one file.
+/// Returns a square with a texture of four colours, all in one file.
 pub fn glb() -> Vec<u8> {
     let color = [[255u8, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]];
     let pixels: Vec<[f32; 4]> =
@@ -164,15 +167,20 @@ pub fn glb() -> Vec<u8> {
     binary.extend(&png);
     let size = png.len();
     let mut json = format!(
-        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
-        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"TEXCOORD_0":1}},"indices":2,"material":0}}]}}],
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,
+        "scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+        "meshes":[{{"primitives":[
+        {{"attributes":{{"POSITION":0,"TEXCOORD_0":1}},"indices":2,"material":0}}]}}],
         "materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}],
         "textures":[{{"source":0}}],"images":[{{"bufferView":3,"mimeType":"image/png"}}],
-        "accessors":[{{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}},
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3",
+        "min":[0,0,0],"max":[1,1,0]}},
         {{"bufferView":1,"componentType":5126,"count":4,"type":"VEC2"}},
         {{"bufferView":2,"componentType":5123,"count":6,"type":"SCALAR"}}],
-        "bufferViews":[{{"buffer":0,"byteLength":48}},{{"buffer":0,"byteOffset":48,"byteLength":32}},
-        {{"buffer":0,"byteOffset":80,"byteLength":12}},{{"buffer":0,"byteOffset":92,"byteLength":{size}}}],
+        "bufferViews":[{{"buffer":0,"byteLength":48}},
+        {{"buffer":0,"byteOffset":48,"byteLength":32}},
+        {{"buffer":0,"byteOffset":80,"byteLength":12}},
+        {{"buffer":0,"byteOffset":92,"byteLength":{size}}}],
         "buffers":[{{"byteLength":{}}}]}}"#,
         binary.len()
     )
@@ -186,11 +194,12 @@ pub fn glb() -> Vec<u8> {
     file
 }
 
-/// A wavy sheet of binary triangles.
+/// Returns a wavy sheet of triangles as binary PLY.
 pub fn sheet(side: u32) -> Vec<u8> {
     let mut out = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
-         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\n\
+         property float y\nproperty float z\nelement face {}\n\
+         property list uchar int vertex_indices\nend_header\n",
         side * side,
         (side - 1) * (side - 1) * 2
     )
@@ -210,14 +219,14 @@ pub fn sheet(side: u32) -> Vec<u8> {
     out
 }
 
-/// Whether a file is a whole PNG of this size, by its header and its end.
+/// Whether the bytes are a whole PNG of this size, by its header and its end.
 pub fn is_png(bytes: &[u8], width: u32, height: u32) -> bool {
     bytes.starts_with(b"\x89PNG\r\n\x1a\n")
         && bytes.get(16..24) == Some(&[width.to_be_bytes(), height.to_be_bytes()].concat()[..])
         && bytes.ends_with(b"IEND\xaeB`\x82")
 }
 
-/// The folder of real scans, where there is one.
+/// Returns the folder of real scans, if there is one.
 pub fn real_data() -> Option<PathBuf> {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     let folder = std::env::var_os("SPLATKIT_DATA").map_or_else(beside, PathBuf::from);

@@ -1,0 +1,296 @@
+// March: one workgroup per tile processes the tile's entries front to back. Four sheets are open at
+// once, one in each lane of a vec4; an entry adds its splat's sections to all four (kernels.wgsl).
+// When the next entry lies behind a sheet, that sheet is closed (sheet.wgsl): its field is
+// classified and shaded, its optical depth composited, and its lane shifted out. Nothing is sorted
+// by depth, unless every splat is composited on its own.
+//
+// A window of four sheets from sheet k contains the planes k+1, k+2 and k+3, and adds everything
+// behind the last of them to the fourth lane. A longer splat gets its next window three sheets
+// further on. There, the first lane takes back the excess of the previous window. So each entry
+// evaluates three planes, however long its splat is.
+//
+// A tile with very many entries stops among them and continues in another dispatch, because some
+// drivers silently end long loops (see docs/engine.md). Its sums are saved meanwhile (saved.wgsl).
+//
+// An invocation has ROWS pixels, one below the other, which share the loads of an entry.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> planes: array<f32>;
+@group(0) @binding(2) var<uniform> stage: Pass;
+@group(0) @binding(3) var<storage, read> records: array<vec4<f32>>;
+@group(0) @binding(4) var<storage, read> bins: array<u32>;
+@group(0) @binding(5) var<storage, read> entries: array<u32>;
+// Binding 6: the tables of tables.wgsl. Binding 7: premultiplied colour and opacity. Binding 8: the
+// distance at which half of the light is absorbed, or the largest value. Both carry over from pass
+// to pass. Behind the colours lie the slots of saved.wgsl.
+@group(0) @binding(7) var<storage, read_write> colors: array<vec4<f32>>;
+@group(0) @binding(8) var<storage, read_write> depths: array<f32>;
+// See progress.wgsl.
+@group(0) @binding(9) var<storage, read_write> progress: array<atomic<u32>>;
+
+// Values on the plane behind the sheet that is being closed, for differences between neighbouring
+// pixels.
+var<workgroup> neighbours: array<f32, 64>;
+// Whether an invocation of the tile stopped, and the tile's slot.
+var<workgroup> any_stopped: atomic<u32>;
+var<workgroup> own_slot: u32;
+
+@compute @workgroup_size(8, LANE_ROWS)
+fn march(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) lane: vec3<u32>) {
+    let tile_count = atomicLoad(&progress[progress_word(LISTED)]);
+    let number = dealt(group_number(group), tile_count);
+    if number >= tile_count {
+        return;
+    }
+    let tile = atomicLoad(&progress[listed_tile(number)]);
+    let column = tile % frame.tiles.x;
+    let row = tile / frame.tiles.x;
+    let resumed = atomicLoad(&progress[tile]);
+    begin_field(tile);
+    // All lanes must read the tile's progress before one of them changes it, and see that change
+    // before another one.
+    storageBarrier();
+    if resumed == FINISHED {
+        return;
+    }
+    if all(lane.xy == vec2(0u)) {
+        atomicStore(&progress[tile], FINISHED);
+    }
+    storageBarrier();
+    let corner = vec2<i32>(vec2(column, row)) * TILE_STEP - APRON;
+    let first_pixel = corner + vec2<i32>(i32(lane.x), i32(lane.y * ROWS));
+    for (var r = 0u; r < ROWS; r++) {
+        let at = first_pixel + vec2(0, i32(r));
+        if all(at >= vec2(0)) && all(at < vec2<i32>(frame.size)) {
+            load_pixel(r, u32(at.y) * frame.size.x + u32(at.x));
+        } else {
+            pixels[r].transmittance = select(0.0, 1.0, CENTRAL);
+        }
+        aim(r, at);
+    }
+
+    let tile_bins = ((row - stage.first_row) * frame.tiles.x + column) * stage.groups;
+    let end = bin_end(tile_bins + stage.groups - 1u);
+    let origin = stage.first_sheet - 1u;
+    var bin = tile_bins;
+    var at = 0u;
+    if bin > 0u {
+        at = bin_end(bin - 1u);
+    }
+    var front = origin;
+    // Number of sheets, from `front` on, that may have sums.
+    var open = 0u;
+    if CAN_STOP && resumed > 0u {
+        let walk = restore(resumed - 1u, lane.xy);
+        at = walk.x;
+        bin = walk.y;
+        front = walk.z;
+        open = walk.w;
+    }
+    var group_end = bin_end(bin);
+    var entries_left = MOST_ENTRIES;
+    var stopped = false;
+    loop {
+        if at >= end {
+            break;
+        }
+        if CAN_STOP && entries_left == 0u {
+            stopped = true;
+            break;
+        }
+        while group_end <= at {
+            bin++;
+            group_end = bin_end(bin);
+        }
+        let entry_sheet = entries[at] >> ENTRY_SHEET_SHIFT;
+        let sheet = origin + ((bin - tile_bins) << stage.group_shift) + entry_sheet;
+        if open > 0u {
+            let closed = min(sheet - front, open);
+            let sheets = closed + close(front, closed, lane.xy);
+            entries_left -= min(entries_left, sheets * CLOSING_ENTRIES);
+            open -= closed;
+        }
+        front = sheet;
+        // With differences between pixels, all lanes must reach every barrier.
+        if !CENTRAL && !BACK_TO_FRONT {
+            var light = 0.0;
+            for (var r = 0u; r < ROWS; r++) {
+                light = max(light, pixels[r].transmittance);
+            }
+            if light < OPAQUE {
+                at = end;
+                break;
+            }
+        }
+        let stop = min(min(end, group_end), at + max(entries_left, 1u));
+        loop {
+            let entry = entries[at];
+            var taken = 1u;
+            if ISOTROPIC_RECORDS && (!GENERAL_RECORDS || (entry & ENTRY_ISOTROPIC) != 0u) {
+                for (var i = 1u; i < TOGETHER; i++) {
+                    if taken == i && at + i < stop && is_alike(entries[at + i], entry) {
+                        taken++;
+                    }
+                }
+                add_isotropic(at, taken, front, first_pixel);
+            } else if GENERAL_RECORDS {
+                add_general(entry, front, first_pixel);
+            }
+            at += taken;
+            entries_left -= min(entries_left, 1u);
+            if at >= stop || (entries[at] >> ENTRY_SHEET_SHIFT) != entry_sheet {
+                break;
+            }
+        }
+        open = 4u;
+    }
+    if !stopped {
+        // Sheets behind the pass's last one belong to the next pass.
+        close(front, min(open, stage.end_sheet - front), lane.xy);
+        open = 0u;
+        if GATHER {
+            pass_field_before(stage.end_sheet);
+        }
+    }
+    if CAN_STOP {
+        if stopped {
+            atomicStore(&any_stopped, 1u);
+        }
+        workgroupBarrier();
+        if atomicLoad(&any_stopped) > 0u {
+            if all(lane.xy == vec2(0u)) {
+                own_slot = resumed - 1u;
+                if resumed == 0u {
+                    own_slot = claim_slot();
+                }
+                atomicStore(&progress[tile], own_slot + 1u);
+                atomicStore(&progress[progress_word(UNFINISHED)], 1u);
+                atomicAdd(&progress[progress_word(STOPS)], select(1u, 0u, own_slot == NO_SLOT));
+            }
+            workgroupBarrier();
+            if own_slot == NO_SLOT {
+                // The tile starts again, from the pixels stored in the picture.
+                return;
+            }
+            save(own_slot, lane.xy, vec4(at, bin, front, open));
+        } else if resumed > 0u && all(lane.xy == vec2(0u)) {
+            free_slot(resumed - 1u);
+        }
+    }
+
+    if all(lane.xy == vec2(0u)) {
+        end_field(tile);
+    }
+    for (var r = 0u; r < ROWS; r++) {
+        let own = vec2<i32>(lane.xy) + vec2(0, i32(lane.y * (ROWS - 1u) + r));
+        let pixel = first_pixel + vec2(0, i32(r));
+        if all(own >= vec2(APRON)) && all(own < vec2(8 - APRON))
+            && all(pixel < vec2<i32>(frame.size)) {
+            store_pixel(r, u32(pixel.y) * frame.size.x + u32(pixel.x));
+        }
+    }
+}
+
+// Whether two entries of a group have the same sheet and the same kind of record.
+fn is_alike(a: u32, b: u32) -> bool {
+    let same = ((a ^ b) >> ENTRY_SHEET_SHIFT) == 0u;
+    return same && (!GENERAL_RECORDS || ((a ^ b) & ENTRY_ISOTROPIC) == 0u);
+}
+
+fn bin_end(bin: u32) -> u32 {
+    return min(bins[bin], frame.entry_capacity);
+}
+
+// Closes `count` sheets from `front` on. Returns the number of sheets in front of and between them
+// that contain only a gathered field.
+fn close(front: u32, count: u32, lane: vec2<u32>) -> u32 {
+    if SINGLE_SPLATS {
+        return 0u;
+    }
+    if count == 0u {
+        return 0u;
+    }
+    var others = 0u;
+    // The condition is at the end, because a driver that only masks inactive lanes (Mesa's software
+    // Vulkan) runs a loop with its condition at the beginning once more than necessary.
+    var sheet = front;
+    loop {
+        if CENTRAL {
+            share_faces(lane);
+        }
+        others += open_field(sheet);
+        for (var r = 0u; r < ROWS; r++) {
+            var own = resolve(r, sheet);
+            if CENTRAL {
+                own.back.slope = slope_on_plane(r, difference(lane, r), planes[sheet + 1u]);
+            }
+            if SUMS {
+                pixels[r].front = own.back;
+            }
+            composite(r, sheet, own);
+        }
+        if CENTRAL {
+            workgroupBarrier();
+        }
+        sheet++;
+        if sheet >= front + count {
+            break;
+        }
+    }
+    return others;
+}
+
+// Shares the values on the plane behind the sheet being closed with the tile's neighbouring pixels.
+fn share_faces(lane: vec2<u32>) {
+    for (var r = 0u; r < ROWS; r++) {
+        let weight = pixels[r].face_weight.x;
+        let at = (lane.y * ROWS + r) * 8u + lane.x;
+        neighbours[at] = select(
+            NO_VALUE,
+            pixels[r].face_value.x / max(weight, 1e-37),
+            weight > frame.isotropic.w,
+        );
+    }
+    workgroupBarrier();
+}
+
+// Returns the slopes of the values around a pixel: central differences, one-sided if a neighbour
+// has no value.
+fn difference(lane: vec2<u32>, r: u32) -> vec2<f32> {
+    let y = lane.y * ROWS + r;
+    let own = neighbours[y * 8u + lane.x];
+    let before = vec2(
+        neighbours[y * 8u + max(lane.x, 1u) - 1u],
+        neighbours[(max(y, 1u) - 1u) * 8u + lane.x],
+    );
+    let after = vec2(
+        neighbours[y * 8u + min(lane.x + 1u, 7u)],
+        neighbours[min(y + 1u, 7u) * 8u + lane.x],
+    );
+    let has_before = before > vec2(NO_VALUE);
+    let has_after = after > vec2(NO_VALUE);
+    let span = vec2<f32>(vec2<u32>(has_before) + vec2<u32>(has_after));
+    return (select(vec2(own), after, has_after) - select(vec2(own), before, has_before))
+        / max(span, vec2(1.0));
+}
+
+// Composites one splat, without sheets, in front of or behind the pixels so far.
+fn composite_single(r: u32, depth: f32, splat: Loaded) {
+    var color = splat.color;
+    if SURFACE_SHADED && any(splat.normal != vec3(0.0)) {
+        color = lit(color, splat.normal, direction_of(r), frame.surface_shade);
+    }
+    let left = exp(-depth);
+    let before = pixels[r].transmittance;
+    if BACK_TO_FRONT {
+        pixels[r].color = pixels[r].color * left + (1.0 - left) * color;
+    } else {
+        pixels[r].color += before * (1.0 - left) * color;
+    }
+    pixels[r].transmittance = before * left;
+    // Back to front, the absorption of the splats in front is not known yet. There, the nearest
+    // splat that absorbs half of the light by itself counts.
+    if select(before > 0.5 && before * left <= 0.5, left <= 0.5, BACK_TO_FRONT) {
+        pixels[r].hit = select(splat.center.z, length(splat.center), PERSPECTIVE);
+    }
+}

@@ -1,0 +1,143 @@
+// Order: sorts each bin's entries, by sheet and then by record, or single splats by sheet and then
+// by distance. Bins are filled in the arbitrary order in which invocations run. After sorting, the
+// same input is added in the same order and gives the same bytes every time.
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> stage: Pass;
+@group(0) @binding(2) var<storage, read> bins: array<u32>;
+@group(0) @binding(3) var<storage, read_write> entries: array<u32>;
+// Bins too long for one invocation.
+@group(0) @binding(4) var<storage, read_write> long_bins: array<u32>;
+// The number of long bins.
+@group(0) @binding(5) var<storage, read_write> long_count: atomic<u32>;
+// The workgroups of `order_long`.
+@group(1) @binding(0) var<storage, read_write> long_arguments: array<u32, 3>;
+@group(0) @binding(6) var<storage, read> records: array<vec4<f32>>;
+@group(0) @binding(7) var<storage, read> progress: array<u32>;
+
+const SHORT: u32 = 2048u;
+
+var<workgroup> shared_number: u32;
+
+fn distance_of(entry: u32) -> f32 {
+    let center = records[entry & ENTRY_RECORD].xyz;
+    let distance = select(center.z, length(center), PERSPECTIVE);
+    return select(distance, -distance, BACK_TO_FRONT);
+}
+
+fn goes_before(a: u32, b: u32) -> bool {
+    if SINGLE_SPLATS && (a >> ENTRY_SHEET_SHIFT) == (b >> ENTRY_SHEET_SHIFT) {
+        let of_a = distance_of(a);
+        let of_b = distance_of(b);
+        // Splats at equal distance keep the order of the scene, in either direction.
+        return of_a < of_b || (of_a == of_b && (a < b) != BACK_TO_FRONT);
+    }
+    return a < b;
+}
+
+fn bin_start(bin: u32) -> u32 {
+    if bin == 0u {
+        return 0u;
+    }
+    return min(bins[bin - 1u], frame.entry_capacity);
+}
+
+fn bin_end(bin: u32) -> u32 {
+    return min(bins[bin], frame.entry_capacity);
+}
+
+@compute @workgroup_size(64)
+fn order(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let bins = progress[progress_word(LISTED)] * stage.groups;
+    let groups = (bins + 63u) / 64u;
+    let number = dealt(group_number(group), groups) * 64u + lane;
+    if number >= bins {
+        return;
+    }
+    let tile = progress[listed_tile(number / stage.groups)] - stage.first_row * frame.tiles.x;
+    let bin = tile * stage.groups + number % stage.groups;
+    let start = bin_start(bin);
+    let end = bin_end(bin);
+    if end - start > SHORT {
+        long_bins[atomicAdd(&long_count, 1u)] = bin;
+        return;
+    }
+    // Insertion sort over shrinking distances (Shell 1959, with Knuth's distances), which suits
+    // nearly sorted bins.
+    var gap = 1u;
+    while 3u * gap + 1u < (end - start) / 8u {
+        gap = 3u * gap + 1u;
+    }
+    loop {
+        for (var i = start + gap; i < end; i++) {
+            let own = entries[i];
+            var at = i;
+            while at >= start + gap && goes_before(own, entries[at - gap]) {
+                entries[at] = entries[at - gap];
+                at -= gap;
+            }
+            entries[at] = own;
+        }
+        if gap == 1u {
+            break;
+        }
+        gap /= 3u;
+    }
+}
+
+// Maximum number of workgroups that share the long bins.
+const LONG_WORKGROUPS: u32 = 4096u;
+
+@compute @workgroup_size(1)
+fn count_long() {
+    long_arguments[0] = min(atomicLoad(&long_count), min(LONG_WORKGROUPS, MOST_WORKGROUPS));
+    long_arguments[1] = 1u;
+    long_arguments[2] = 1u;
+}
+
+// A bitonic network (Batcher 1968) in the form with a flipped first step. There every comparison
+// puts the smaller entry first, so missing entries behind the last one count as largest and need no
+// memory.
+@compute @workgroup_size(64)
+fn order_long(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    if lane == 0u {
+        shared_number = atomicLoad(&long_count);
+    }
+    let long = workgroupUniformLoad(&shared_number);
+    for (var i = group.x; i < long; i += groups.x) {
+        if lane == 0u {
+            shared_number = long_bins[i];
+        }
+        let bin = workgroupUniformLoad(&shared_number);
+        sort_bin(bin_start(bin), bin_end(bin), lane);
+    }
+}
+
+fn sort_bin(start: u32, end: u32, lane: u32) {
+    let count = end - start;
+    for (var block = 2u; block < 2u * count; block *= 2u) {
+        for (var half = block / 2u; half > 0u; half /= 2u) {
+            for (var pair = lane; pair < count; pair += 64u) {
+                let within = pair % half;
+                let low = (pair / half) * 2u * half + within;
+                var high = low + half;
+                if half == block / 2u {
+                    high = low + block - 1u - 2u * within;
+                }
+                if high < count {
+                    let a = entries[start + low];
+                    let b = entries[start + high];
+                    if goes_before(b, a) {
+                        entries[start + low] = b;
+                        entries[start + high] = a;
+                    }
+                }
+            }
+            storageBarrier();
+        }
+    }
+}

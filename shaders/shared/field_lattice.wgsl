@@ -1,0 +1,275 @@
+// The field of a lattice, gathered: at a place it is the weighted mean of the samples within reach
+// of the kernel. A Gaussian on a lattice is a product of Gaussians along its axes, so four weights
+// an axis replace the 64 kernels in reach. The gradient follows from the first moments: ∂E[f]/∂p =
+// (E[n·f] − E[n]·E[f])/σ², with n the sample's index along the axis.
+//
+// The shader that includes this file declares `shown`. It has a bit for each sample: whether
+// something may be visible at the places nearest to that sample. Behind these bits it has, for each
+// entry of the transfer function's table, the number of visible entries before it. Then follow, for
+// each tile, the sheets in which something may be visible, as bits, and the list of tiles with such
+// sheets.
+
+// The samples in the type of their file. Each row along x is packed in 32-bit words, with padding
+// behind its end. It is a texture, because Mesa's software Vulkan reads eight elements of a buffer
+// one by one, but eight texels of 32 bits at once.
+@group(1) @binding(0) var samples: texture_3d<u32>;
+
+// How far outside the lattice a place may lie and still have a sample in reach, in steps.
+const BEYOND_LATTICE: f32 = 1.999;
+
+// Whether samples are bytes, or have 16 bits.
+const BYTES: bool = SAMPLE_KIND == SAMPLE_U8 || SAMPLE_KIND == SAMPLE_FOUR;
+const HALVES: bool = SAMPLE_KIND == SAMPLE_U16 || SAMPLE_KIND == SAMPLE_I16;
+
+fn word_at(x: i32, y: i32, z: i32) -> u32 {
+    return textureLoad(samples, vec3(x, y, z), 0).x;
+}
+
+// Returns a 32-bit sample as a value.
+fn whole_at(x: i32, y: i32, z: i32) -> f32 {
+    let word = word_at(x, y, z);
+    if SAMPLE_KIND == SAMPLE_I32 {
+        // In two parts, because a 32-bit float cannot hold the whole integer.
+        let low = word & 0xffffu;
+        return counted_sum(f32(bitcast<i32>(word - low)), f32(low));
+    }
+    return counted(bitcast<f32>(word));
+}
+
+// Returns the 32 bits that begin `shift` bits after the start of the first of two words.
+fn joined(first: u32, second: u32, shift: u32) -> u32 {
+    return (first >> shift) | ((second << (31u - shift)) << 1u);
+}
+
+// Returns four samples along x. Those behind the last sample have no weight, but must be finite
+// numbers.
+fn row_at(taps: Taps, y: i32, z: i32) -> vec4<f32> {
+    let x = taps.word;
+    if BYTES {
+        var word = word_at(x, y, z);
+        if SAMPLE_KIND == SAMPLE_U8 {
+            word = joined(word, word_at(x + 1, y, z), taps.shift);
+        }
+        return vec4(
+            f32(word & 0xffu),
+            f32((word >> 8u) & 0xffu),
+            f32((word >> 16u) & 0xffu),
+            f32(word >> 24u),
+        );
+    }
+    if HALVES {
+        let middle = word_at(x + 1, y, z);
+        let low = joined(word_at(x, y, z), middle, taps.shift);
+        let high = joined(middle, word_at(x + 2, y, z), taps.shift);
+        if SAMPLE_KIND == SAMPLE_U16 {
+            return vec4(f32(low & 0xffffu), f32(low >> 16u), f32(high & 0xffffu), f32(high >> 16u))
+                - frame.transfer.x;
+        }
+        let a = bitcast<i32>(low);
+        let b = bitcast<i32>(high);
+        return vec4(f32((a << 16u) >> 16u), f32(a >> 16u), f32((b << 16u) >> 16u), f32(b >> 16u))
+            - frame.transfer.x;
+    }
+    return vec4(
+        whole_at(x, y, z),
+        whole_at(x + 1, y, z),
+        whole_at(x + 2, y, z),
+        whole_at(x + 3, y, z),
+    );
+}
+
+// Converts a mean of row_at's samples to entries of the transfer function's table.
+fn counted_mean(mean: f32) -> f32 {
+    if BYTES {
+        return (mean - frame.transfer.x) * frame.transfer.y;
+    }
+    if HALVES {
+        return mean * frame.transfer.y;
+    }
+    return mean;
+}
+
+// Larger exponents of weights are clamped. They occur only at places outside the lattice, where no
+// ray is drawn.
+const MOST_EXPONENT: f32 = 30.0;
+
+// Returns the weights of four successive samples along an axis, which add up to 1. They are a
+// geometric series times the weights at whole steps, so one exponential suffices.
+fn weights_at(place: f32, first: f32, last: f32) -> vec4<f32> {
+    // Relative to the second sample.
+    let q = exp(clamp((place - first - 1.0) * frame.taps.x, -MOST_EXPONENT, MOST_EXPONENT));
+    let all = vec4(frame.taps.y / q, 1.0, frame.taps.y * q, frame.taps.z * q * q);
+    let weights = select(vec4(0.0), all, first + vec4(0.0, 1.0, 2.0, 3.0) <= vec4(last));
+    return weights * (1.0 / ((weights.x + weights.y) + (weights.z + weights.w)));
+}
+
+// The data to load and weight the samples around a place: the first word along x and the shift in
+// it; rows and slices; weights.
+struct Taps {
+    word: i32,
+    shift: u32,
+    rows: vec4<i32>,
+    slices: vec4<i32>,
+    x: vec4<f32>,
+    y: vec4<f32>,
+    z: vec4<f32>,
+}
+
+fn taps_at(r: u32, distance: f32) -> Taps {
+    let last = vec3<f32>(frame.lattice.xyz - 1u);
+    let place = clamp(place_at(r, distance), vec3(-BEYOND_LATTICE), last + BEYOND_LATTICE);
+    let first = clamp(floor(place) - 1.0, vec3(0.0), max(last - 3.0, vec3(0.0)));
+    let at = vec3<i32>(first);
+    let end = vec3<i32>(frame.lattice.xyz) - 1;
+    var taps: Taps;
+    taps.word = at.x;
+    if SAMPLE_KIND == SAMPLE_U8 {
+        taps.word = at.x >> 2u;
+        taps.shift = 8u * (u32(at.x) & 3u);
+    } else if HALVES {
+        taps.word = at.x >> 1u;
+        taps.shift = 16u * (u32(at.x) & 1u);
+    }
+    taps.rows = min(at.y + vec4(0, 1, 2, 3), vec4(end.y));
+    taps.slices = min(at.z + vec4(0, 1, 2, 3), vec4(end.z));
+    taps.x = weights_at(place.x, first.x, last.x);
+    taps.y = weights_at(place.y, first.y, last.y);
+    taps.z = weights_at(place.z, first.z, last.z);
+    return taps;
+}
+
+// Returns a place on a pixel's ray, in steps of the lattice.
+fn place_at(r: u32, distance: f32) -> vec3<f32> {
+    return frame.field_origin.xyz + in_steps(origin_of(r)) + in_steps(direction_of(r)) * distance;
+}
+
+// Four rows of a slice, weighted along y, and their first moment.
+struct Slice {
+    sum: vec4<f32>,
+    moment: vec4<f32>,
+}
+
+fn slice_with_moment(taps: Taps, z: i32) -> Slice {
+    let a = taps.y.x * row_at(taps, taps.rows.x, z);
+    let b = taps.y.y * row_at(taps, taps.rows.y, z);
+    let c = taps.y.z * row_at(taps, taps.rows.z, z);
+    let d = taps.y.w * row_at(taps, taps.rows.w, z);
+    return Slice((a + b) + (c + d), (c - a) + 2.0 * d);
+}
+
+// Sample offsets for moments, relative to the second of four samples.
+const OFFSETS: vec4<f32> = vec4(-1.0, 0.0, 1.0, 2.0);
+
+// Returns the value and the gradient on a plane between two sheets.
+fn face_at(r: u32, plane: u32) -> Face {
+    return field_at(r, planes[plane]);
+}
+
+// Returns the same at a distance.
+fn field_at(r: u32, distance: f32) -> Face {
+    let taps = taps_at(r, distance);
+    let a = slice_with_moment(taps, taps.slices.x);
+    let b = slice_with_moment(taps, taps.slices.y);
+    let c = slice_with_moment(taps, taps.slices.z);
+    let d = slice_with_moment(taps, taps.slices.w);
+    let sum = (taps.z.x * a.sum + taps.z.y * b.sum) + (taps.z.z * c.sum + taps.z.w * d.sum);
+    let sum_y = (taps.z.x * a.moment + taps.z.y * b.moment)
+        + (taps.z.z * c.moment + taps.z.w * d.moment);
+    let sum_z = 2.0 * taps.z.w * d.sum + (taps.z.z * c.sum - taps.z.x * a.sum);
+    let mean = dot(taps.x, sum);
+    let moments = vec3(dot(taps.x * OFFSETS, sum), dot(taps.x, sum_y), dot(taps.x, sum_z));
+    let means = vec3(dot(taps.x, OFFSETS), dot(taps.y, OFFSETS), dot(taps.z, OFFSETS));
+    // Per step along each axis.
+    var slopes = (moments - means * mean) * frame.taps.x;
+    if BYTES || HALVES {
+        slopes *= frame.transfer.y;
+    }
+    let gradient = slopes.x * frame.field_axis_x.xyz + slopes.y * frame.field_axis_y.xyz
+        + slopes.z * frame.field_axis_z.xyz;
+    let direction = direction_of(r);
+    var face: Face;
+    face.has_value = true;
+    face.value = counted_mean(mean);
+    face.along = dot(gradient, direction);
+    face.slope = (gradient - face.along * direction).xy * frame.gradients.z;
+    return face;
+}
+
+// Returns the mean of a sheet: that of the cubic with the values and slopes along the ray of both
+// faces (Hermite). If only the mean is classified, the value in the middle makes it exact to the
+// fifth degree (Simpson's rule with slopes).
+fn mean_of(r: u32, sheet: u32, front: Face, back: Face) -> f32 {
+    let bend = (front.along - back.along) * (planes[sheet + 1u] - planes[sheet]);
+    if POST {
+        let middle = field_at(r, 0.5 * (planes[sheet] + planes[sheet + 1u])).value;
+        return ((front.value + back.value) * 7.0 + middle * 16.0) * (1.0 / 30.0)
+            + bend * (1.0 / 60.0);
+    }
+    return 0.5 * (front.value + back.value) + bend * (1.0 / 12.0);
+}
+
+fn sample_shows(place: vec3<f32>) -> bool {
+    let at = vec3<u32>(clamp(floor(place + 0.5), vec3(0.0), vec3<f32>(frame.lattice.xyz - 1u)));
+    let number = (at.z * frame.lattice.y + at.y) * frame.lattice.x + at.x;
+    return ((shown[number >> 5u] >> (number & 31u)) & 1u) != 0u;
+}
+
+// Whether something may be visible at a pixel in a sheet: around its front, its middle and its
+// back.
+fn may_show(r: u32, sheet: u32) -> bool {
+    let start = planes[sheet];
+    let end = planes[sheet + 1u];
+    if !(max(pixels[r].inside.x, start) < min(pixels[r].inside.y, end)) {
+        return false;
+    }
+    return sample_shows(place_at(r, start)) || sample_shows(place_at(r, 0.5 * (start + end)))
+        || sample_shows(place_at(r, end));
+}
+
+// Whether any value that a sheet may have between two faces is visible.
+fn range_shows(sheet: u32, front: Face, back: Face) -> bool {
+    // Hermite interpolation: the mean of the ends, plus an eighth of the difference of the slopes
+    // there.
+    let bend = (front.along - back.along) * (planes[sheet + 1u] - planes[sheet]);
+    let middle = 0.5 * (front.value + back.value) + 0.125 * bend;
+    let low = min(middle, min(front.value, back.value));
+    let high = max(middle, max(front.value, back.value));
+    // A parabola exceeds the range of its values at both ends and the middle by at most an eighth
+    // of that range. Integrals cover at least NARROW entries.
+    let slack = 0.125 * (high - low) + 0.5 * NARROW + 1.0;
+    let ends = clamp(
+        vec2(low - slack, high + slack) + frame.transfer.w,
+        vec2(0.0),
+        vec2(frame.transfer.z),
+    );
+    return shown[frame.shown.x + u32(ends.y) + 1u] > shown[frame.shown.x + u32(ends.x)];
+}
+
+// Returns the next sheet from `sheet` on in which something may be visible in a tile, or `end` if
+// there is none before it.
+fn next_marked(tile: u32, sheet: u32, end: u32) -> u32 {
+    if sheet >= end {
+        return end;
+    }
+    let marks = frame.shown.y + tile * frame.shown.w;
+    var word = sheet >> 5u;
+    var bits = shown[marks + word] & (0xffffffffu << (sheet & 31u));
+    loop {
+        if bits != 0u || (word + 1u) * 32u >= end {
+            break;
+        }
+        word++;
+        bits = shown[marks + word];
+    }
+    return select(end, min(word * 32u + firstTrailingBit(bits), end), bits != 0u);
+}
+
+// Resolves the field of the sheet between the two planes that were evaluated last. The shader that
+// includes this file defines shows_field, which says whether the field is wanted there.
+fn resolve_field(r: u32, sheet: u32, own: ptr<function, Sheet>) {
+    (*own).has_value = shows_field(r, sheet);
+    (*own).filling = 1.0;
+    (*own).front = pixels[r].front;
+    (*own).back = pixels[r].behind;
+    (*own).value = mean_of(r, sheet, (*own).front, (*own).back);
+}

@@ -1,0 +1,193 @@
+// The data of the picture for every pass: the view, the sheets, the light. Mirrors
+// engine/uniforms.rs.
+
+struct Frame {
+    // Size of the picture in pixels, and in tiles.
+    size: vec2<u32>,
+    tiles: vec2<u32>,
+    // Pixel coordinates of the optical axis; focal length in pixels (perspective) or pixels per
+    // world unit.
+    center: vec2<f32>,
+    scale: f32,
+    perspective: u32,
+    // Sheets are numbered from 1; sheet 0 is everything in front of the first plane and is never
+    // drawn.
+    sheet_count: u32,
+    geometric_sheets: u32,
+    ratio_log2_inverse: f32,
+    step_inverse: f32,
+    // Smallest view-space z that any pixel sees (perspective).
+    z_near: f32,
+    // Spans count tiles in units of 2^tile_shift.
+    tile_shift: u32,
+    // Capacities of a pass, in records (in vec4) and entries.
+    record_capacity: u32,
+    entry_capacity: u32,
+    // View space to lattice steps: steps = field_origin + field_axes * position; samples fill
+    // field_low … field_high.
+    field_axis_x: vec4<f32>,
+    field_axis_y: vec4<f32>,
+    field_axis_z: vec4<f32>,
+    field_origin: vec4<f32>,
+    field_low: vec4<f32>,
+    field_high: vec4<f32>,
+    // Ambient, diffuse, specular, power.
+    volume_shade: vec4<f32>,
+    surface_shade: vec4<f32>,
+    // Standard deviation of the isotropic lattice kernel (world units), its inverse, its squared
+    // extent in standard deviations; the minimum sum of kernels for which a value exists.
+    isotropic: vec4<f32>,
+    // The value that counts as 0, table entries per value, the last entry of the transfer
+    // function's table; the place of that value among the entries.
+    transfer: vec4<f32>,
+    // The magnitude of the first entry of the gradient factor, entries per magnitude; the world
+    // length over which gradients count, and that length in pixels, as `scale`.
+    gradients: vec4<f32>,
+    // The starts of the parts of `tables`: integrals, gradient factors, kernel, sections.
+    table_starts: vec4<u32>,
+    // Extinction times colour, and extinction, of values before the first table entry, and behind
+    // the last one.
+    before: vec4<f32>,
+    behind: vec4<f32>,
+    // The field's kernel: radius in kernel space, its inverse; one over the average sum of the
+    // kernels.
+    kernel: vec4<f32>,
+    // Volumes in bricks: the shares of the finer and of the coarser level.
+    levels: vec4<f32>,
+    // Axis-aligned sheets: their normal in view space.
+    sheet_normal: vec4<f32>,
+    // A gathered lattice: samples along x, y and z; one over the kernel's variance in squared
+    // steps, its weights one and two steps from its centre. The starts of the parts of `shown`:
+    // visibility of the transfer function's entries, the tiles' sheets, the list of tiles; and the
+    // number of words of a tile's sheets.
+    lattice: vec4<u32>,
+    taps: vec4<f32>,
+    shown: vec4<u32>,
+    // Columns of the rotation from view space to the world's axes.
+    world_x: vec4<f32>,
+    world_y: vec4<f32>,
+    world_z: vec4<f32>,
+    // The regions that are kept, and the boxes that are cut out; relative to the eye, along the
+    // world's axes.
+    clips: array<Clip, 8>,
+    holes: array<Clip, 8>,
+    isosurfaces: array<Isosurface, 8>,
+}
+
+// A box from `low` to `high` if high.w is positive, otherwise the points x with low·x ≤ high.x.
+struct Clip {
+    low: vec4<f32>,
+    high: vec4<f32>,
+}
+
+struct Isosurface {
+    // Value, in entries of the table; opacity, optical depth.
+    value: vec4<f32>,
+    color: vec4<f32>,
+}
+
+// One depth pass: a range of sheets and of rows of tiles. Written by plan.wgsl. Its bins are tiles
+// times groups of sheets.
+struct Pass {
+    // Sheets: first … end-1.
+    first_sheet: u32,
+    end_sheet: u32,
+    // Rows of tiles: first … end-1.
+    first_row: u32,
+    end_row: u32,
+    // Groups of 2^group_shift sheets per tile; 0 if there is no such pass.
+    groups: u32,
+    group_shift: u32,
+    unused: vec2<u32>,
+}
+
+// The placement of one item in the view. Mirrors engine/uniforms.rs.
+struct Source {
+    // Columns of the matrix to view space, from the item's local frame (explicit splats) or from
+    // lattice steps.
+    axis_x: vec4<f32>,
+    axis_y: vec4<f32>,
+    axis_z: vec4<f32>,
+    origin: vec4<f32>,
+    // Lattices: the kernel's covariance in view space (xx, xy, xz, yy), (yz, zz), and the kernel's
+    // unit.
+    covariance_a: vec4<f32>,
+    covariance_b: vec4<f32>,
+    // Samples along x, y and z, and the type of the samples (see sample_value).
+    lattice: vec4<u32>,
+    // First slice of this chunk; first and last slice in its data, which may include neighbouring
+    // chunks' slices. Number of candidates.
+    slices: vec4<u32>,
+    // Radius of the footprint in standard deviations.
+    extent: f32,
+    // Number of splats, capacity for nodes, or number of samples of the lattice.
+    count: u32,
+    // First batch of this chunk in the frame's list of batches.
+    first_run: u32,
+    // RADIANCE, ISOTROPIC, ENDS, NODES, COARSE.
+    flags: u32,
+}
+
+const RADIANCE: u32 = 1u;
+const ISOTROPIC: u32 = 2u;
+// The kernel ends at its extent along the ray too.
+const ENDS: u32 = 4u;
+// Candidates are nodes of a hierarchy.
+const NODES: u32 = 8u;
+// Samples are those of the coarser of two levels.
+const COARSE: u32 = 16u;
+
+// Returns the number of words of a splat's record.
+fn record_words(flags: u32) -> u32 {
+    return select(4u, 1u, (flags & ISOTROPIC) != 0u);
+}
+
+// A pixel that transmits less light than this is finished.
+const OPAQUE: f32 = 0.0005;
+
+// Returns the columns and rows of a dispatch. A row has at most MOST_WORKGROUPS workgroups
+// (engine/stage.rs); more go into further rows.
+fn rows_of(workgroups: u32) -> vec2<u32> {
+    let columns = min(workgroups, MOST_WORKGROUPS);
+    return vec2(columns, (workgroups + columns - 1u) / max(columns, 1u));
+}
+
+// Returns the number of a workgroup.
+fn group_number(group: vec3<u32>) -> u32 {
+    return group.x + group.y * MOST_WORKGROUPS;
+}
+
+fn number_of(id: vec3<u32>) -> u32 {
+    return id.x + id.y * (64u * MOST_WORKGROUPS);
+}
+
+// Some drivers (Mesa's software Vulkan) give each of their threads one row of a dispatch's
+// workgroups. If neighbouring workgroups have similar amounts of work, one row may have all of it.
+// So numbers are dealt out like cards, to this many lanes.
+const HANDS: u32 = 16u;
+
+// Returns the dealt number, or `count` for a number behind the last card.
+fn dealt(number: u32, count: u32) -> u32 {
+    let each = (count + HANDS - 1u) / HANDS;
+    return select((number % each) * HANDS + number / each, count, number >= each * HANDS);
+}
+
+// Returns how many numbers must be dealt so that all numbers below `count` come up; some results
+// lie beyond it.
+fn dealt_count(count: u32) -> u32 {
+    return (count + HANDS - 1u) / HANDS * HANDS;
+}
+
+// The batch size: candidates that one invocation handles in order, so that lists have the same
+// order every time.
+const RUN: u32 = 16u;
+// One splat, in the upper half of a batch's needs.
+const ONE_SPLAT: u32 = 0x10000u;
+
+// An entry: sheet within its group (7 bits), window after the splat's first (1), isotropic record
+// (1), record of the coarser level (1), place of the record (22).
+const ENTRY_SHEET_SHIFT: u32 = 25u;
+const ENTRY_CONTINUED: u32 = 0x1000000u;
+const ENTRY_ISOTROPIC: u32 = 0x800000u;
+const ENTRY_COARSE: u32 = 0x400000u;
+const ENTRY_RECORD: u32 = 0x3fffffu;

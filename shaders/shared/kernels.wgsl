@@ -1,0 +1,369 @@
+// Adds a splat to the pixels of an invocation: its sections in the four open sheets, and its kernel
+// on the three planes between them.
+
+const SQRT_TAU: f32 = 2.5066283;
+
+// The normal distribution function, within 2e-7 (Abramowitz & Stegun 1964, 26.2.19). Its tails must
+// be right: their error is multiplied by the strength of an opaque splat, and lies in front of the
+// splat.
+fn normal_cdf(t: vec3<f32>) -> vec3<f32> {
+    let x = min(abs(t), vec3(8.0));
+    var p = 1.0 + x * (0.049867347 + x * (0.0211410061 + x * (0.00327762632
+        + x * (3.8003575e-05 + x * (4.88906356e-05 + x * (5.382975e-06))))));
+    p *= p;
+    p *= p;
+    p *= p;
+    p *= p;
+    let tail = 0.5 / p;
+    return select(tail, 1.0 - tail, t >= vec3(0.0));
+}
+
+// The same within 2.3e-4, without a division: an odd polynomial with value 0.5 and slope 0 at 3.55
+// (least squares, weighted to even errors). Only for surfaces. There an error moves optical depth
+// from one sheet to the next, both with the same splat's colour, and removes none.
+fn near_normal_cdf(t: vec3<f32>) -> vec3<f32> {
+    let x = clamp(t, vec3(-3.55), vec3(3.55));
+    let y = x * x;
+    let p = 0.39808504 + y * (-0.064429414 + y * (0.0085235118 + y * (-0.00072436168
+        + y * (3.4515190e-05 - y * 6.9134990e-07))));
+    return 0.5 + x * p;
+}
+
+// Maximum distance of a plane from a kernel, in standard deviations. Further planes count as this
+// far: nothing of the kernel is left there, and the list of planes ends with numbers that would
+// overflow.
+const FAR: vec3<f32> = vec3(12.0);
+
+// Returns the four sections of a window, from the distribution function at its three inner planes.
+fn sections(t: vec3<f32>, base: f32) -> vec4<f32> {
+    var f: vec3<f32>;
+    if SUMS || CLASSIFIED {
+        f = normal_cdf(t);
+    } else {
+        f = near_normal_cdf(t);
+    }
+    return vec4(f.x - base, f.y - f.x, f.z - f.y, 1.0 - f.z);
+}
+
+// An isotropic lattice sample in the picture. Far from the eye, the shells of the sheets are flat
+// across its footprint, so its values along the ray are the same for all pixels.
+struct Round {
+    // The projected centre; ρ² as a quadratic form of the offset from there: xx, xy, yy.
+    at: vec2<f32>,
+    form: vec3<f32>,
+    // The sections, and the kernel on the planes between them.
+    along: vec4<f32>,
+    on_plane: vec3<f32>,
+    value: f32,
+    // Negative for an unused sample.
+    extent2: f32,
+}
+
+fn load_isotropic(entry: u32, is_one: bool, near: vec3<f32>) -> Round {
+    let record = records[entry & ENTRY_RECORD];
+    let c = record.xyz;
+    var sigma = frame.isotropic.x;
+    var inverse_sigma = frame.isotropic.y;
+    var share = 1.0;
+    if TWO_LEVELS {
+        let coarse = (entry & ENTRY_COARSE) != 0u;
+        sigma *= select(1.0, 2.0, coarse);
+        inverse_sigma *= select(1.0, 0.5, coarse);
+        share = select(frame.levels.x, frame.levels.y, coarse);
+    }
+    let per_pixel = inverse_sigma / frame.scale;
+    var sample: Round;
+    var distance = c.z;
+    sample.at = frame.center + frame.scale * c.xy;
+    sample.form = vec3(1.0, 0.0, 1.0) * (per_pixel * per_pixel);
+    if PERSPECTIVE {
+        distance = length(c);
+        let p = c.xy / c.z;
+        sample.at = frame.center + frame.scale * p;
+        let k = c.z * per_pixel;
+        sample.form = vec3(1.0 + p.y * p.y, -p.x * p.y, 1.0 + p.x * p.x) * (k * k);
+    }
+    let base = select(0.0, 1.0, (entry & ENTRY_CONTINUED) != 0u);
+    let t = clamp((near - distance) * inverse_sigma, -FAR, FAR);
+    sample.along = sections(t, base) * (SQRT_TAU * sigma * share);
+    sample.on_plane = exp(-0.5 * t * t) * share;
+    sample.value = record.w;
+    sample.extent2 = select(-1.0, frame.isotropic.z, is_one);
+    return sample;
+}
+
+// Number of isotropic samples that are added together: a pixel's sums are then read and written
+// once for all of them. Two measure best on software drivers, where the sums lie in memory
+// (docs/performance.md).
+const TOGETHER: u32 = 2u;
+
+// Adds `count` entries from `at` on to all pixels.
+fn add_isotropic(at: u32, count: u32, front: u32, first_pixel: vec2<i32>) {
+    let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
+    var samples: array<Round, TOGETHER>;
+    for (var i = 0u; i < TOGETHER; i++) {
+        samples[i] = load_isotropic(entries[at + min(i, count - 1u)], i < count, near);
+    }
+    for (var r = 0u; r < ROWS; r++) {
+        let cosine2 = pixels[r].cosine * pixels[r].cosine;
+        var weight = vec4(0.0);
+        var value = vec4(0.0);
+        var face_weight = vec3(0.0);
+        var face_value = vec3(0.0);
+        var weight_x = vec3(0.0);
+        var weight_y = vec3(0.0);
+        var value_x = vec3(0.0);
+        var value_y = vec3(0.0);
+        for (var i = 0u; i < TOGETHER; i++) {
+            let own = samples[i];
+            let d = vec2<f32>(first_pixel + vec2(0, i32(r))) + 0.5 - own.at;
+            let turned = vec2(
+                own.form.x * d.x + own.form.y * d.y,
+                own.form.y * d.x + own.form.z * d.y,
+            );
+            let rho2 = dot(d, turned) * cosine2;
+            let e = select(0.0, exp(-0.5 * rho2), rho2 <= own.extent2);
+            let v = e * own.value;
+            weight += own.along * e;
+            value += own.along * v;
+            face_weight += own.on_plane * e;
+            face_value += own.on_plane * v;
+            if GRADIENTS && !CENTRAL {
+                let slope = turned * cosine2;
+                weight_x += own.on_plane * (e * slope.x);
+                weight_y += own.on_plane * (e * slope.y);
+                value_x += own.on_plane * (v * slope.x);
+                value_y += own.on_plane * (v * slope.y);
+            }
+        }
+        pixels[r].weight += weight;
+        pixels[r].value += value;
+        pixels[r].face_weight += face_weight;
+        pixels[r].face_value += face_value;
+        if GRADIENTS && !CENTRAL {
+            pixels[r].weight_x += weight_x;
+            pixels[r].weight_y += weight_y;
+            pixels[r].value_x += value_x;
+            pixels[r].value_y += value_y;
+        }
+    }
+}
+
+// Returns the facing weight. Within a sheet, splats that face the eye hide those that face away: if
+// an object is thinner than a sheet, its far side must not mix into the colour and light of its
+// near side. Far sides keep a small weight, so that they have a colour when alone.
+fn facing_weight(normal: vec3<f32>, center: vec3<f32>) -> f32 {
+    var away = normal.z;
+    if PERSPECTIVE {
+        away = dot(normal, center) / max(length(center), 1e-30);
+    }
+    return clamp(0.5 - 4.0 * away, 1.0 / 255.0, 1.0);
+}
+
+// A general record, unpacked.
+struct Loaded {
+    center: vec3<f32>,
+    strength: f32,
+    extent2: f32,
+    // Whether the payload is radiance. That includes samples classified before interpolation.
+    is_radiance: bool,
+    color: vec3<f32>,
+    normal: vec3<f32>,
+    facing: f32,
+    // Scalars.
+    weight: f32,
+    slope: vec3<f32>,
+}
+
+fn load(a: vec4<f32>, c: vec4<f32>, d: vec4<f32>) -> Loaded {
+    var splat: Loaded;
+    splat.center = a.xyz;
+    splat.strength = a.w;
+    splat.extent2 = abs(c.z);
+    splat.weight = 1.0;
+    splat.facing = 1.0;
+    // The sign of the squared extent says which payload it is.
+    splat.is_radiance = RADIANCE_PAYLOAD && (!(SUMS || CLASSIFIED) || c.z > 0.0);
+    if RADIANCE_PAYLOAD {
+        splat.color = unpack4x8unorm(bitcast<u32>(d.x)).xyz;
+        let packed = bitcast<u32>(d.y);
+        if packed != NO_NORMAL {
+            splat.normal = decode_normal(packed);
+        }
+    }
+    if CLASSIFIED && !splat.is_radiance {
+        let shown = classify(a.w);
+        splat.color = shown.xyz;
+        splat.strength = shown.w * d.w * frame.kernel.z;
+    }
+    if RADIANCE_PAYLOAD && any(splat.normal != vec3(0.0)) {
+        splat.facing = facing_weight(splat.normal, a.xyz);
+    }
+    if SUMS && WEIGHTS {
+        splat.weight = d.w;
+    }
+    if SUMS && SLOPES {
+        splat.slope = d.xyz;
+    }
+    return splat;
+}
+
+// Adds any ellipsoid, with centre c and whitening M. Along a pixel's ray direction b: β = M·b; v =
+// M·c × β, which is zero at the projected centre and grows linearly from there; ρ² = |v|²/|β|²; the
+// closest approach is where |β|²·z = L, at v × β / |β|² in whitened space. All of these are exact
+// in perspective. They are computed from vectors, not from expanded polynomials, which cancel
+// beside the eye. See docs/engine.md.
+fn add_general(entry: u32, front: u32, first_pixel: vec2<i32>) {
+    let index = entry & ENTRY_RECORD;
+    let a = records[index];
+    let b = records[index + 1u];
+    let c = records[index + 2u];
+    let splat = load(a, c, records[index + 3u]);
+    let near = vec3(planes[front + 1u], planes[front + 2u], planes[front + 3u]);
+    let base = select(0.0, 1.0, (entry & ENTRY_CONTINUED) != 0u);
+    // The change of the whitened ray per pixel to the right and down, and its constant part.
+    let m0 = b.xyz / frame.scale;
+    let m1 = vec3(0.0, b.w, c.x) / frame.scale;
+    let m2 = vec3(0.0, 0.0, c.y);
+    var at = frame.center + frame.scale * a.xy;
+    var whitened = m2 * a.z;
+    var v0 = cross(m2, m0);
+    var v1 = cross(m2, m1);
+    if PERSPECTIVE {
+        // A centre beside the eye projects to infinity. Moving it by a thousandth of its distance
+        // is invisible.
+        let least = 1e-3 * length(a.xyz);
+        let z = select(a.z, select(-least, least, a.z >= 0.0), abs(a.z) < least);
+        at = frame.center + frame.scale * a.xy / z;
+        whitened = (m0 * a.x + m1 * a.y) * frame.scale + m2 * z;
+        v0 = cross(whitened, m0);
+        v1 = cross(whitened, m1);
+    }
+    let dx = f32(first_pixel.x) + 0.5 - at.x;
+    let v_column = v0 * dx;
+    let beta_column = m2 + m0 * (f32(first_pixel.x) + 0.5 - frame.center.x);
+    for (var r = 0u; r < ROWS; r++) {
+        let y = f32(first_pixel.y) + (f32(r) + 0.5);
+        let v = v_column + v1 * (y - at.y);
+        var beta = m2;
+        var l = 0.0;
+        if PERSPECTIVE {
+            beta = beta_column + m1 * (y - frame.center.y);
+            l = dot(whitened, beta);
+        } else {
+            l = dot(whitened - m0 * dx - m1 * (y - at.y), beta);
+        }
+        let size2 = dot(beta, beta);
+        let inverse = inverseSqrt(max(size2, 1e-37));
+        let rho2 = dot(v, v) * inverse * inverse;
+        let t = clamp((size2 * (near * pixels[r].cosine) - l) * inverse, -FAR, FAR);
+        // The kernel at the closest approach and on the planes, −h′/r on the planes, and the
+        // sections.
+        var e = select(0.0, exp(-0.5 * rho2), rho2 <= splat.extent2);
+        var on_plane: vec3<f32>;
+        var steep: vec3<f32>;
+        var along: vec4<f32>;
+        if TABLE_KERNEL && !splat.is_radiance {
+            let rho = sqrt(rho2);
+            let half = kernel_integral(rho, 3e38);
+            let f = vec3(
+                kernel_integral(rho, t.x),
+                kernel_integral(rho, t.y),
+                kernel_integral(rho, t.z),
+            );
+            along = vec4(f.x + half - 2.0 * half * base, f.y - f.x, f.z - f.y, half - f.z);
+            let k0 = kernel_at(sqrt(rho2 + t.x * t.x));
+            let k1 = kernel_at(sqrt(rho2 + t.y * t.y));
+            let k2 = kernel_at(sqrt(rho2 + t.z * t.z));
+            on_plane = vec3(k0.x, k1.x, k2.x);
+            steep = vec3(k0.y, k1.y, k2.y);
+            e = select(0.0, 1.0, rho2 <= splat.extent2);
+            along *= e;
+        } else {
+            along = sections(t, base) * (e * select(SQRT_TAU, 1.0, splat.is_radiance));
+            on_plane = exp(-0.5 * t * t) * e;
+            steep = on_plane;
+        }
+        if WHOLE {
+            along = vec4(e, 0.0, 0.0, 0.0);
+            if TABLE_KERNEL && !splat.is_radiance {
+                along.x = 2.0 * kernel_integral(sqrt(rho2), 3e38) * e;
+            } else if CLASSIFIED && !splat.is_radiance {
+                along.x = e * SQRT_TAU;
+            }
+            if PERSPECTIVE && l <= 0.0 {
+                // The kernel's middle is behind the eye.
+                along.x = 0.0;
+            }
+        }
+        // Whitened length to world length along the ray.
+        let length_of = inverse / pixels[r].cosine;
+        if RADIANCE_PAYLOAD && (splat.is_radiance || CLASSIFIED) {
+            var strength = splat.strength;
+            if CLASSIFIED && !splat.is_radiance {
+                strength *= length_of;
+            }
+            if CLIPS + HOLES > 0u && !is_kept(r, l * inverse * length_of) {
+                strength = 0.0;
+            }
+            add_radiance(r, along * strength, splat);
+        } else if SUMS {
+            var value = vec3(splat.strength);
+            var section = along * (length_of * splat.weight);
+            pixels[r].weight += section;
+            pixels[r].value += section * splat.strength;
+            on_plane *= splat.weight;
+            steep *= splat.weight;
+            let nearest = cross(v, beta) * (inverse * inverse);
+            let unit = beta * inverse;
+            if SLOPES {
+                let slope_along = dot(splat.slope, unit);
+                value += dot(splat.slope, nearest) + t * slope_along;
+                let g = on_plane;
+                let carried = vec4(-g.x, g.x - g.y, g.y - g.z, g.z) * slope_along;
+                pixels[r].value += section * dot(splat.slope, nearest) + carried * length_of;
+            }
+            pixels[r].face_weight += on_plane;
+            pixels[r].face_value += on_plane * value;
+            if GRADIENTS && !CENTRAL {
+                // The change of x′ on a plane per pixel to the right and down.
+                var across = array<vec3<f32>, 2>(m0, m1);
+                var size = vec3(1.0);
+                if PERSPECTIVE {
+                    let k = pixels[r].cosine * pixels[r].cosine / frame.scale;
+                    across[0] -= beta * (pixels[r].ray.x * k);
+                    across[1] -= beta * (pixels[r].ray.y * k);
+                    size = near * pixels[r].cosine;
+                }
+                let x = size * (dot(nearest, across[0]) + t * dot(unit, across[0]));
+                let y = size * (dot(nearest, across[1]) + t * dot(unit, across[1]));
+                pixels[r].weight_x += steep * x;
+                pixels[r].weight_y += steep * y;
+                pixels[r].value_x += steep * x * value;
+                pixels[r].value_y += steep * y * value;
+                if SLOPES {
+                    pixels[r].value_x -= on_plane * size * dot(splat.slope, across[0]);
+                    pixels[r].value_y -= on_plane * size * dot(splat.slope, across[1]);
+                }
+            }
+        }
+    }
+}
+
+fn add_radiance(r: u32, w: vec4<f32>, splat: Loaded) {
+    if SINGLE_SPLATS {
+        composite_single(r, w.x, splat);
+        return;
+    }
+    let w_facing = w * splat.facing;
+    pixels[r].depth += w;
+    pixels[r].facing += w_facing;
+    pixels[r].red += w_facing * splat.color.x;
+    pixels[r].green += w_facing * splat.color.y;
+    pixels[r].blue += w_facing * splat.color.z;
+    if SURFACE_SHADED {
+        pixels[r].normal_x += w_facing * splat.normal.x;
+        pixels[r].normal_y += w_facing * splat.normal.y;
+        pixels[r].normal_z += w_facing * splat.normal.z;
+    }
+}

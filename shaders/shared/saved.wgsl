@@ -1,0 +1,106 @@
+// The saved state of tiles that march stops among their entries: the position of each invocation,
+// and the sums of its pixels. It lies in slots behind the colours of the picture. A tile takes a
+// slot when it first stops, and frees the slot when it is finished. The sums are saved exactly, so
+// a tile that stops draws the same as without a stop.
+
+// Vectors of a pixel: the position of its invocation, then 16 of sums.
+const SAVED_VECTORS: u32 = 17u;
+const NO_SLOT: u32 = 0xffffffffu;
+
+fn saved_at(slot: u32, lane: vec2<u32>, r: u32) -> u32 {
+    let pixel = (lane.y * ROWS + r) * 8u + lane.x;
+    return frame.size.x * frame.size.y + (slot * 64u + pixel) * SAVED_VECTORS;
+}
+
+// Takes a free slot. If there is none, the tile starts again once other tiles are done.
+fn claim_slot() -> u32 {
+    let slots = (arrayLength(&colors) - frame.size.x * frame.size.y) / (64u * SAVED_VECTORS);
+    for (var word = 0u; word < SLOT_WORDS; word++) {
+        let at = progress_word(SLOTS + word);
+        let free = ~atomicLoad(&progress[at]);
+        if free != 0u {
+            let bit = firstTrailingBit(free);
+            if 32u * word + bit >= slots {
+                return NO_SLOT;
+            }
+            if (atomicOr(&progress[at], 1u << bit) & (1u << bit)) == 0u {
+                return 32u * word + bit;
+            }
+        }
+    }
+    return NO_SLOT;
+}
+
+fn free_slot(slot: u32) {
+    atomicAnd(&progress[progress_word(SLOTS + slot / 32u)], ~(1u << (slot % 32u)));
+}
+
+fn save(slot: u32, lane: vec2<u32>, walk: vec4<u32>) {
+    for (var r = 0u; r < ROWS; r++) {
+        let at = saved_at(slot, lane, r);
+        colors[at] = bitcast<vec4<f32>>(walk);
+        let front = pixels[r].front;
+        if SUMS {
+            colors[at + 1u] = pixels[r].weight;
+            colors[at + 2u] = pixels[r].value;
+            colors[at + 3u] = vec4(pixels[r].face_weight, front.value);
+            colors[at + 4u] = vec4(pixels[r].face_value, select(0.0, 1.0, front.has_value));
+        }
+        if SUMS && GRADIENTS {
+            colors[at + 5u] = vec4(pixels[r].weight_x, front.slope.x);
+            colors[at + 6u] = vec4(pixels[r].weight_y, front.slope.y);
+            colors[at + 7u] = vec4(pixels[r].value_x, 0.0);
+            colors[at + 8u] = vec4(pixels[r].value_y, 0.0);
+        }
+        if RADIANCE_PAYLOAD {
+            colors[at + 9u] = pixels[r].depth;
+            colors[at + 10u] = pixels[r].facing;
+            colors[at + 11u] = pixels[r].red;
+            colors[at + 12u] = pixels[r].green;
+            colors[at + 13u] = pixels[r].blue;
+        }
+        if SURFACE_SHADED {
+            colors[at + 14u] = pixels[r].normal_x;
+            colors[at + 15u] = pixels[r].normal_y;
+            colors[at + 16u] = pixels[r].normal_z;
+        }
+    }
+}
+
+fn restore(slot: u32, lane: vec2<u32>) -> vec4<u32> {
+    for (var r = 0u; r < ROWS; r++) {
+        let at = saved_at(slot, lane, r);
+        if SUMS {
+            let face_weight = colors[at + 3u];
+            let face_value = colors[at + 4u];
+            pixels[r].weight = colors[at + 1u];
+            pixels[r].value = colors[at + 2u];
+            pixels[r].face_weight = face_weight.xyz;
+            pixels[r].face_value = face_value.xyz;
+            pixels[r].front.value = face_weight.w;
+            pixels[r].front.has_value = face_value.w > 0.0;
+        }
+        if SUMS && GRADIENTS {
+            let weight_x = colors[at + 5u];
+            let weight_y = colors[at + 6u];
+            pixels[r].weight_x = weight_x.xyz;
+            pixels[r].weight_y = weight_y.xyz;
+            pixels[r].front.slope = vec2(weight_x.w, weight_y.w);
+            pixels[r].value_x = colors[at + 7u].xyz;
+            pixels[r].value_y = colors[at + 8u].xyz;
+        }
+        if RADIANCE_PAYLOAD {
+            pixels[r].depth = colors[at + 9u];
+            pixels[r].facing = colors[at + 10u];
+            pixels[r].red = colors[at + 11u];
+            pixels[r].green = colors[at + 12u];
+            pixels[r].blue = colors[at + 13u];
+        }
+        if SURFACE_SHADED {
+            pixels[r].normal_x = colors[at + 14u];
+            pixels[r].normal_y = colors[at + 15u];
+            pixels[r].normal_z = colors[at + 16u];
+        }
+    }
+    return bitcast<vec4<u32>>(colors[saved_at(slot, lane, 0u)]);
+}

@@ -1,0 +1,297 @@
+// Closes a sheet at one pixel: resolves its sums, classifies and shades it, and composites it.
+
+// A sheet with less optical depth than this has no colour: such a small sum may be a rounding
+// remainder of the sections that a splat's windows add and take back. For fields, frame.isotropic.w
+// is the limit, with a margin for kernels of both signs.
+const LEAST_DEPTH: f32 = 1e-5;
+// Optical depth that counts as opaque.
+const MOST_DEPTH: f32 = 20.0;
+
+// Returns a lit colour: Blinn's model (1977) with a light at the eye, on both sides.
+fn lit(color: vec3<f32>, normal: vec3<f32>, direction: vec3<f32>, shade: vec4<f32>) -> vec3<f32> {
+    let size = length(normal);
+    if !(size > 1e-20) {
+        return color * (shade.x + shade.y);
+    }
+    let facing = min(abs(dot(normal, direction)) / size, 1.0);
+    return min(color * (shade.x + shade.y * facing) + shade.z * pow(facing, shade.w), vec3(1.0));
+}
+
+// Converts a slope per pixel to the slope across the picture on the plane at a distance. Gradients
+// are in table entries per thickness of a sheet, approximately (`frame.gradients`), so that their
+// squares fit 32 bits in any units.
+fn slope_on_plane(r: u32, slope: vec2<f32>, distance: f32) -> vec2<f32> {
+    return slope * frame.gradients.w / select(1.0, pixels[r].cosine * distance, PERSPECTIVE);
+}
+
+// Returns the gradient in view space, from the slope across the picture and the derivative along
+// the ray.
+fn gradient(r: u32, slope: vec2<f32>, along: f32) -> vec3<f32> {
+    let d = direction_of(r);
+    let g = slope + along * d.xy;
+    return vec3(g, (along - dot(g, d.xy)) / d.z);
+}
+
+fn shift(sums: vec4<f32>) -> vec4<f32> {
+    return vec4(sums.yzw, 0.0);
+}
+
+// Resolves the front lane to a sheet and shifts it out.
+fn resolve(r: u32, sheet: u32) -> Sheet {
+    var own: Sheet;
+    if SCALAR {
+        resolve_field(r, sheet, &own);
+    }
+    if RADIANCE_PAYLOAD && !SINGLE_SPLATS {
+        let depth = pixels[r].depth.x;
+        let sum = vec3(pixels[r].red.x, pixels[r].green.x, pixels[r].blue.x);
+        // If next to nothing faces the eye, rounding may have left a weight of any sign; the result
+        // must stay a colour.
+        var color = clamp(sum / max(pixels[r].facing.x, 1e-12), vec3(0.0), vec3(1.0));
+        if SURFACE_SHADED {
+            let normal = vec3(pixels[r].normal_x.x, pixels[r].normal_y.x, pixels[r].normal_z.x);
+            // Splats without a normal keep their colours.
+            if dot(normal, normal) > 0.0 {
+                color = lit(color, normal, direction_of(r), frame.surface_shade);
+            }
+            pixels[r].normal_x = shift(pixels[r].normal_x);
+            pixels[r].normal_y = shift(pixels[r].normal_y);
+            pixels[r].normal_z = shift(pixels[r].normal_z);
+        }
+        own.radiance = select(vec4(0.0), vec4(depth * color, depth), depth >= LEAST_DEPTH);
+        pixels[r].facing = shift(pixels[r].facing);
+        pixels[r].depth = shift(pixels[r].depth);
+        pixels[r].red = shift(pixels[r].red);
+        pixels[r].green = shift(pixels[r].green);
+        pixels[r].blue = shift(pixels[r].blue);
+    }
+    return own;
+}
+
+// The field of a sheet, composited front to back.
+struct Medium {
+    // Transmitted light, and the optical depth that absorbed the rest.
+    through: f32,
+    depth: f32,
+    // Lit colour times opacity.
+    color: vec3<f32>,
+    // The field along the ray: values at the front, in the parabola's middle and at the back; the
+    // sheet's thickness.
+    curve: vec3<f32>,
+    thickness: f32,
+    // The slopes across the picture at both faces.
+    front: vec2<f32>,
+    back: vec2<f32>,
+    // The largest value.
+    peak: f32,
+    // Whether an isosurface absorbed half of the light.
+    has_hit: bool,
+}
+
+const NO_VALUE: f32 = -3e38;
+
+// Returns the gradient at a place: across the picture interpolated between the faces, along the ray
+// the parabola's derivative, which knows more of the inside.
+fn gradient_at(r: u32, medium: Medium, u: f32) -> vec3<f32> {
+    let curve = medium.curve;
+    let along = curve.x * (4.0 * u - 3.0) + curve.y * (4.0 - 8.0 * u) + curve.z * (4.0 * u - 1.0);
+    return gradient(
+        r,
+        mix(medium.front, medium.back, u),
+        along * (frame.gradients.z / medium.thickness),
+    );
+}
+
+// Adds the part of a sheet between two distances. The field there is a parabola with the values of
+// the faces at the ends and the sheet's mean.
+fn pass_piece(r: u32, sheet: u32, own: Sheet, begin: f32, end: f32, medium: ptr<function, Medium>) {
+    let start = planes[sheet];
+    let thickness = (*medium).thickness;
+    let curve = (*medium).curve;
+    let step = (end - begin) / f32(PARTS);
+    var place = (begin - start) / thickness;
+    var value = parabola(curve, place);
+    for (var part = 0u; part < PARTS; part++) {
+        let near = begin + f32(part) * step;
+        let next_place = (near + step - start) / thickness;
+        let next = parabola(curve, next_place);
+        if MAXIMUM {
+            (*medium).peak = max((*medium).peak, max(value, next));
+        } else {
+            var shown: vec4<f32>;
+            if POST {
+                shown = classify(own.value);
+                shown = vec4(shown.xyz * shown.w, shown.w);
+            } else {
+                shown = classify_between(value, next);
+            }
+            var normal: vec3<f32>;
+            if GRADIENTS {
+                normal = gradient_at(r, *medium, 0.5 * (place + next_place));
+            }
+            if GRADIENT_OPACITY {
+                shown *= gradient_factor(length(normal));
+            }
+            // Differences of integrals: rounding remainders, where nothing is visible, must stay a
+            // colour.
+            let depth = max(shown.w, 0.0) * step * select(own.filling, 1.0, LATTICE);
+            var color = clamp(shown.xyz / max(shown.w, 1e-20), vec3(0.0), vec3(1.0));
+            if VOLUME_SHADED {
+                color = lit(color, normal, direction_of(r), frame.volume_shade);
+            }
+            var done = 0.0;
+            for (var i = 0u; i < ISOSURFACES; i++) {
+                let surface = frame.isosurfaces[select(ISOSURFACES - 1u - i, i, next > value)];
+                let level = surface.value.x;
+                if (value < level) != (next < level) {
+                    let share = (level - value) / (next - value);
+                    pass_part(depth * (share - done), color, medium);
+                    done = share;
+                    pass_surface(
+                        r,
+                        surface,
+                        mix(place, next_place, share),
+                        near + step * share,
+                        medium,
+                    );
+                }
+            }
+            pass_part(depth * (1.0 - done), color, medium);
+        }
+        place = next_place;
+        value = next;
+    }
+}
+
+fn parabola(curve: vec3<f32>, u: f32) -> f32 {
+    if !PARABOLA {
+        return (curve.x + 4.0 * curve.y + curve.z) / 6.0;
+    }
+    return curve.x * (1.0 - u) * (1.0 - 2.0 * u) + 4.0 * curve.y * u * (1.0 - u)
+        + curve.z * u * (2.0 * u - 1.0);
+}
+
+// Returns the share of light that an optical depth absorbs, 1 − e^−τ. For small τ, subtracting from
+// 1 would lose the result in rounding.
+fn taken(depth: f32) -> f32 {
+    return select(1.0 - exp(-depth), depth * (1.0 - 0.5 * depth), depth < 1e-3);
+}
+
+// Minimum optical depth that is divided by: far below what is visible, far above the smallest
+// float.
+const LEAST_DIVISOR: f32 = 1e-20;
+
+fn pass_part(depth: f32, color: vec3<f32>, medium: ptr<function, Medium>) {
+    let share = (*medium).through * taken(depth);
+    (*medium).color += share * color;
+    (*medium).through -= share;
+    (*medium).depth += depth;
+}
+
+fn pass_surface(
+    r: u32,
+    surface: Isosurface,
+    place: f32,
+    distance: f32,
+    medium: ptr<function, Medium>,
+) {
+    let share = (*medium).through * surface.value.y;
+    let before = pixels[r].transmittance * (*medium).through;
+    (*medium).through -= share;
+    (*medium).depth += surface.value.z;
+    if before > 0.5 && pixels[r].transmittance * (*medium).through <= 0.5 {
+        pixels[r].hit = distance;
+        (*medium).has_hit = true;
+    }
+    var color = surface.color.xyz;
+    if VOLUME_SHADED {
+        color = lit(color, gradient_at(r, *medium, place), direction_of(r), frame.volume_shade);
+    }
+    (*medium).color += share * color;
+}
+
+// Returns the medium of a sheet, inside the box of the samples and what the clips leave.
+fn pass_field(r: u32, sheet: u32, own: Sheet) -> Medium {
+    var medium: Medium;
+    medium.through = 1.0;
+    medium.peak = NO_VALUE;
+    let front = select(own.value, own.front.value, own.front.has_value);
+    let back = select(own.value, own.back.value, own.back.has_value);
+    medium.curve = vec3(front, 1.5 * own.value - 0.25 * (front + back), back);
+    medium.thickness = planes[sheet + 1u] - planes[sheet];
+    if GRADIENTS && (own.front.has_value || own.back.has_value) {
+        medium.front = select(own.back.slope, own.front.slope, own.front.has_value);
+        medium.back = select(own.front.slope, own.back.slope, own.back.has_value);
+    }
+    var begin = max(planes[sheet], pixels[r].inside.x);
+    let last = min(planes[sheet + 1u], pixels[r].inside.y);
+    if HOLES == 0u {
+        if begin < last {
+            pass_piece(r, sheet, own, begin, last, &medium);
+        }
+        return medium;
+    }
+    for (var piece = 0u; piece <= HOLES; piece++) {
+        // Skip the holes that contain `begin`; leaving one may lead into another.
+        for (var i = 0u; i < HOLES * HOLES; i++) {
+            let hole = pixels[r].holes[i % HOLES_OR_ONE];
+            begin = select(begin, hole.y, hole.x <= begin && begin < hole.y);
+        }
+        var end = last;
+        for (var i = 0u; i < HOLES; i++) {
+            let hole = pixels[r].holes[i];
+            end = select(end, min(end, hole.x), hole.x > begin && hole.x < hole.y);
+        }
+        if begin < end {
+            pass_piece(r, sheet, own, begin, end, &medium);
+        }
+        begin = max(begin, end);
+    }
+    return medium;
+}
+
+// Adds a sheet to the picture.
+fn composite(r: u32, sheet: u32, own: Sheet) {
+    let in_pass = sheet >= stage.first_sheet && sheet < stage.end_sheet;
+    // A gathered field may remain from sheets before the pass.
+    if !GATHER && !in_pass {
+        return;
+    }
+    let radiance = select(vec4(0.0), own.radiance, in_pass);
+    var premultiplied = radiance.xyz;
+    var depth = radiance.w;
+    let before = pixels[r].transmittance;
+    var has_hit = false;
+    if SCALAR && own.has_value {
+        var medium = pass_field(r, sheet, own);
+        if MAXIMUM {
+            pixels[r].hit = max(pixels[r].hit, medium.peak);
+            return;
+        }
+        // Converts opacity to optical depth: τ / (1 − e^−τ). For small τ that ratio would lose its
+        // digits.
+        let field_depth = min(medium.depth, MOST_DEPTH);
+        let ratio = select(
+            field_depth / (1.0 - exp(-field_depth)),
+            1.0 + 0.5 * field_depth,
+            field_depth < 1e-2,
+        );
+        premultiplied += ratio * medium.color;
+        depth += field_depth;
+        has_hit = medium.has_hit;
+    }
+    if XRAY {
+        premultiplied = vec3(depth);
+    }
+    if depth > LEAST_DIVISOR {
+        let share = before * taken(depth);
+        let left = before - share;
+        pixels[r].color += share / depth * premultiplied;
+        // Inside the sheet, optical depth counts as evenly spread; an isosurface counts at its
+        // exact place.
+        if !has_hit && before > 0.5 && left <= 0.5 {
+            pixels[r].hit = mix(planes[sheet], planes[sheet + 1u], log(2.0 * before) / depth);
+        }
+        pixels[r].transmittance = left;
+    }
+}

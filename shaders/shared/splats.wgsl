@@ -1,0 +1,69 @@
+// Explicit splats (48 bytes each, see splat.rs), for sources/splats.wgsl and sources/nodes.wgsl,
+// which bind them.
+
+// The picture is sampled at pixel centres. A blur of this many pixels keeps small splats from
+// falling between them.
+const FOOTPRINT_BLUR: f32 = 0.35;
+// Opaque surfaces must not grow through the blur: see splat.rs.
+const STEP_BACK: f32 = 2.4;
+
+// Returns a splat in view space, widened.
+fn splat_at(index: u32) -> Candidate {
+    let a = splats[3u * index];
+    let b = splats[3u * index + 1u];
+    let d = splats[3u * index + 2u];
+    let to_view = mat3x3<f32>(source.axis_x.xyz, source.axis_y.xyz, source.axis_z.xyz);
+    var splat: Candidate;
+    splat.center = to_view * a.xyz + source.origin.xyz;
+    // Columns of B, rotated into view space; B = (b00 0 0, b10 b11 0, b20 b21 b22) row by row.
+    let c0 = to_view * vec3(b.x, b.y, b.w);
+    let c1 = to_view * vec3(0.0, b.z, d.x);
+    let c2 = to_view * vec3(0.0, 0.0, d.y);
+    var pixel = 1.0 / frame.scale;
+    if frame.perspective != 0u {
+        pixel = pixel * length(splat.center);
+    }
+    let blur = FOOTPRINT_BLUR * pixel;
+    let blur2 = blur * blur;
+    splat.covariance.xx = c0.x * c0.x + c1.x * c1.x + c2.x * c2.x + blur2;
+    splat.covariance.xy = c0.x * c0.y + c1.x * c1.y + c2.x * c2.y;
+    splat.covariance.xz = c0.x * c0.z + c1.x * c1.z + c2.x * c2.z;
+    splat.covariance.yy = c0.y * c0.y + c1.y * c1.y + c2.y * c2.y + blur2;
+    splat.covariance.yz = c0.y * c0.z + c1.y * c1.z + c2.y * c2.z;
+    splat.covariance.zz = c0.z * c0.z + c1.z * c1.z + c2.z * c2.z + blur2;
+    splat.extent = source.extent;
+    splat.strength = a.w;
+    splat.color = bitcast<u32>(d.z);
+    splat.normal = bitcast<u32>(d.w);
+    if SAMPLES && (source.flags & RADIANCE) == 0u {
+        // The slope is in the splat's own whitened space; B⁻ᵀ maps it to the set's space.
+        let low = unpack2x16float(splat.color);
+        let high = unpack2x16float(splat.normal);
+        // A widened sample keeps its weight over space. Otherwise a sample far smaller than a pixel
+        // would drown its surroundings. Both determinants are in units of the splat's own size, so
+        // that they fit 32 bits.
+        let s = splat.covariance;
+        let unit = inverseSqrt(max(s.xx + s.yy + s.zz, 1e-37));
+        let x = vec3(s.xx, s.xy, s.xz) * unit * unit;
+        let y = vec3(s.xy, s.yy, s.yz) * unit * unit;
+        let z = vec3(s.xz, s.yz, s.zz) * unit * unit;
+        let before = abs(b.x * unit * b.z * unit * d.y * unit);
+        splat.weight = low.x * before * inverseSqrt(max(dot(x, cross(y, z)), 1e-37));
+        let slope_z = high.y / d.y;
+        let slope_y = (high.x - d.x * slope_z) / b.z;
+        let slope_x = (low.y - b.y * slope_y - b.w * slope_z) / b.x;
+        splat.gradient = to_view * vec3(slope_x, slope_y, slope_z) * frame.transfer.y;
+        splat.strength = counted(splat.strength);
+    }
+    if (source.flags & RADIANCE) != 0u {
+        splat.strength = splat.strength * f32(splat.color >> 24u) / 255.0;
+        if splat.normal != NO_NORMAL {
+            let normal = to_view * decode_normal(splat.normal);
+            splat.normal = encode_normal(normal);
+            let own = vec3(dot(c0, normal), dot(c1, normal), dot(c2, normal));
+            let own2 = dot(own, own);
+            splat.center -= normal * (STEP_BACK * (sqrt(own2 + blur2) - sqrt(own2)));
+        }
+    }
+    return splat;
+}

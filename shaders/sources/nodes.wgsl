@@ -1,0 +1,19 @@
+// Candidates from a hierarchy: the nodes that cut.wgsl found, each with its share of its optical
+// depth.
+
+@group(1) @binding(0) var<uniform> source: Source;
+@group(1) @binding(1) var<storage, read> splats: array<vec4<f32>>;
+// Number of the node, with its share in the upper ten bits; the element behind the last possible
+// one is the count.
+@group(1) @binding(2) var<storage, read> selected: array<u32>;
+
+fn candidate_count() -> u32 {
+    return selected[source.count];
+}
+
+fn candidate(order: u32) -> Candidate {
+    let own = selected[order];
+    var splat = splat_at(own & 0x3fffffu);
+    splat.strength = splat.strength * (f32(own >> 22u) / 1023.0);
+    return splat;
+}

@@ -1,0 +1,163 @@
+//! What can go wrong with a device at any time, made into errors: it is lost, it does not answer, its memory runs out. What was
+//! drawn meanwhile is never given out as a picture.
+
+use crate::{Error, Result, gpu::device::Gpu};
+use std::{
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{Arc, Mutex, OnceLock, PoisonError},
+    time::Duration,
+};
+
+/// The longest between the end of the device's work and the call that tells of it.
+const CALL_BACK: Duration = Duration::from_secs(10);
+
+/// What a device has told of itself.
+#[derive(Debug, Default)]
+pub(crate) struct Condition {
+    /// Why it is lost, once it is.
+    lost: OnceLock<String>,
+    /// The first error outside of what is watched, since the last time.
+    stray: Mutex<Option<String>>,
+}
+
+impl Condition {
+    /// Listens to a device of our own.
+    pub fn listen(self: &Arc<Self>, device: &wgpu::Device) {
+        let own = self.clone();
+        device.set_device_lost_callback(move |_, reason| own.lose(reason));
+        let own = self.clone();
+        // Without a handler wgpu ends the program where memory runs out.
+        device
+            .on_uncaptured_error(Arc::new(move |error: wgpu::Error| own.note(&error.to_string())));
+    }
+
+    fn note(&self, complaint: &str) {
+        self.stray
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get_or_insert_with(|| complaint.to_owned());
+    }
+
+    fn lose(&self, reason: impl Into<String>) {
+        // The first reason counts: others follow from it.
+        let _ = self.lost.set(reason.into());
+    }
+}
+
+impl Gpu {
+    /// Does some work and gives what came of it, or else what the device complained of meanwhile.
+    pub(crate) fn watch<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<Result<T>> {
+        self.sound()?;
+        let (done, complaint) = self.hear(work);
+        if complaint.is_some() {
+            // Whatever is made on a lost device is not valid; that it is lost shows when it is asked.
+            drop(catch_unwind(AssertUnwindSafe(|| self.device.poll(wgpu::PollType::Poll))));
+        }
+        if complaint.is_some() || done.is_ok() {
+            self.sound()?;
+        }
+        complaint.map_or(Ok(done), Err)
+    }
+
+    /// As [`Self::watch`], for what gives no errors: whoever asks next is told what the device complained of.
+    pub(crate) fn watch_later<T>(&self, work: impl FnOnce() -> T) -> T {
+        let (done, complaint) = self.hear(work);
+        if let Some(complaint) = complaint {
+            self.condition.note(&complaint.to_string());
+        }
+        done
+    }
+
+    fn hear<T>(&self, work: impl FnOnce() -> T) -> (T, Option<Error>) {
+        let filters = [
+            wgpu::ErrorFilter::Validation,
+            wgpu::ErrorFilter::Internal,
+            wgpu::ErrorFilter::OutOfMemory,
+        ];
+        let scopes = filters.map(|filter| self.device.push_error_scope(filter));
+        let done = work();
+        // The last that was opened is closed first. Memory that ran out is the reason of what else went wrong.
+        let complaints = scopes.into_iter().rev().map(|scope| pollster::block_on(scope.pop()));
+        let complaint = complaints.reduce(Option::or).flatten().map(|complaint| {
+            let (name, reason) = (&self.info.name, complaint.to_string());
+            Error::Gpu(match complaint {
+                wgpu::Error::OutOfMemory { .. } => {
+                    format!("the memory of {name} ran out: {reason}")
+                }
+                _ => format!("{name}: {reason}"),
+            })
+        });
+        (done, complaint)
+    }
+
+    /// Waits until the device has done all that was submitted.
+    ///
+    /// # Errors
+    /// [`Error::DeviceLost`] where it is lost; [`Error::Gpu`] where it does not answer in time ([`Self::with_patience`]), which
+    /// loses it, or reported an error since the last time.
+    pub fn wait(&self) -> Result<()> {
+        if self.condition.lost.get().is_some() {
+            return self.sound();
+        }
+        let poll = wgpu::PollType::Wait { submission_index: None, timeout: Some(self.patience) };
+        // wgpu panics where a device is lost while it is waited for.
+        match catch_unwind(AssertUnwindSafe(|| self.device.poll(poll))) {
+            Ok(Ok(_)) => {}
+            Ok(Err(wgpu::PollError::Timeout)) => {
+                let seconds = self.patience.as_secs_f64();
+                self.condition.lose(format!("it did not answer within {seconds} s"));
+                // Letting go of a device waits for it. This one may never be done, so its memory stays where it is.
+                std::mem::forget(self.clone());
+                // The device opened anew would take as long again: this is not told as a loss that can be mended.
+                return Err(Error::Gpu(format!(
+                    "{} did not answer within {seconds} s",
+                    self.info.name
+                )));
+            }
+            Ok(Err(error)) => self.condition.lose(error.to_string()),
+            Err(_) => self.condition.lose("it was gone when it was waited for"),
+        }
+        self.sound()
+    }
+
+    /// Whether nothing went wrong since the last time.
+    fn sound(&self) -> Result<()> {
+        if let Some(reason) = self.condition.lost.get() {
+            return Err(Error::DeviceLost(format!("{} was lost: {reason}", self.info.name)));
+        }
+        match self.condition.stray.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            None => Ok(()),
+            Some(stray) => Err(Error::Gpu(stray)),
+        }
+    }
+
+    /// Reads a part of a buffer back, when the device has done all before.
+    pub(crate) fn read(&self, buffer: &wgpu::Buffer, offset: u64, bytes: u64) -> Result<Vec<u8>> {
+        let staging = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("read back"),
+            size: bytes,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut encoder =
+            self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(buffer, offset, &staging, 0, bytes);
+        self.queue.submit([encoder.finish()]);
+        let (sender, receiver) = std::sync::mpsc::channel();
+        // The receiver outlives the callback: it is waited for below.
+        staging.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
+        self.wait()?;
+        // Another thread that waits for the same device may be about to call back; one that is lost may forget to.
+        match receiver.recv_timeout(self.patience.min(CALL_BACK)) {
+            Ok(Ok(())) => {}
+            _ => {
+                return Err(Error::DeviceLost(format!(
+                    "{} did not give back what was drawn",
+                    self.info.name
+                )));
+            }
+        }
+        let view = staging.get_mapped_range(..).map_err(|e| Error::Gpu(e.to_string()))?;
+        Ok(view.to_vec())
+    }
+}

@@ -1,0 +1,195 @@
+//! The order of the passes of a frame.
+
+use crate::gpu::{
+    device::Gpu,
+    passes::{
+        bin::Bin, clear::Clear, cull::Cull, cut::Cut, gather::Gather, large::Large, march::March,
+        measure::Measure, occlusion::Occlusion, order::Order, plan::Plan, project::Project,
+        resume::Resume, tiles::Tiles,
+    },
+    pipeline::{
+        scan::Scan,
+        state::{AGAIN_ARGUMENTS, MARCH_ARGUMENTS, SCAN_ARGUMENTS},
+        variant::Variant,
+    },
+    scene::{PreparedScene, chunk::Origin},
+    targets::Targets,
+};
+
+/// The pipelines of a variant: those that scatter splats, and that which gathers a lattice.
+#[derive(Debug)]
+pub struct Pipelines {
+    scatter: Option<Scatter>,
+    gather: Option<Gather>,
+}
+
+#[derive(Debug)]
+struct Scatter {
+    measure: Measure,
+    plan: Plan,
+    project: Project,
+    cull: Cull,
+    bin: Bin,
+    large: Large,
+    order: Order,
+    march: March,
+    occlusion: Option<Occlusion>,
+}
+
+impl Pipelines {
+    pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        Self {
+            scatter: variant.scatters().then(|| Scatter::new(gpu, variant)),
+            gather: variant.gather.then(|| Gather::new(gpu, variant)),
+        }
+    }
+}
+
+impl Scatter {
+    fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        Self {
+            measure: Measure::new(gpu, variant),
+            plan: Plan::new(gpu, variant),
+            project: Project::new(gpu, variant),
+            cull: Cull::new(gpu, variant),
+            bin: Bin::new(gpu, variant),
+            large: Large::new(gpu, variant),
+            order: Order::new(gpu, variant),
+            march: March::new(gpu, variant),
+            occlusion: variant.occlusion.then(|| Occlusion::new(gpu, variant)),
+        }
+    }
+}
+
+/// One step of a frame, for profiles.
+pub type Step<'a> = (&'static str, Box<dyn Fn(&mut wgpu::CommandEncoder) + 'a>);
+
+/// What the steps of a frame work with.
+#[derive(Clone, Copy)]
+pub struct Work<'a> {
+    pub gpu: &'a Gpu,
+    pub cut: &'a Cut,
+    pub scan: &'a Scan,
+    pub clear: &'a Clear,
+    pub resume: &'a Resume,
+    pub tiles: &'a Tiles,
+    pub pipelines: &'a Pipelines,
+    pub targets: &'a Targets,
+    pub prepared: &'a PreparedScene,
+}
+
+impl<'a> Work<'a> {
+    /// The steps before the first pass: the cuts of hierarchies, then measure and plan.
+    pub fn opening(self) -> Vec<Step<'a>> {
+        let Self { gpu, cut, scan, pipelines, targets, prepared, .. } = self;
+        let mut steps: Vec<Step<'a>> = Vec::new();
+        if targets.gathered.is_some() {
+            let clear = |encoder: &mut wgpu::CommandEncoder| {
+                for buffer in [&targets.colors, &targets.depths, &targets.progress] {
+                    encoder.clear_buffer(buffer, 0, None);
+                }
+            };
+            steps.push(("clear", Box::new(clear)));
+        }
+        let Some(scatter) = &pipelines.scatter else { return steps };
+        for chunk in &prepared.chunks {
+            if let Origin::Nodes { slots, .. } = &chunk.origin {
+                let own = slots.chunk(&chunk.uniform, &chunk.data);
+                steps.push(("cut", Box::new(move |encoder| cut.encode(gpu, encoder, scan, &own))));
+            }
+        }
+        steps.push((
+            "measure",
+            Box::new(move |encoder| {
+                for buffer in [&targets.needs, &targets.colors, &targets.depths, &targets.map] {
+                    encoder.clear_buffer(buffer, 0, None);
+                }
+                for chunk in &prepared.chunks {
+                    scatter.measure.encode(gpu, encoder, targets, chunk);
+                }
+            }),
+        ));
+        steps.push(("plan", Box::new(move |encoder| scatter.plan.encode(gpu, encoder, targets))));
+        steps
+    }
+
+    /// The steps of the next depth pass; they do nothing where the frame is done.
+    pub fn depth_pass(self) -> Vec<Step<'a>> {
+        let Self { gpu, scan, clear, resume, tiles, pipelines, targets, prepared, .. } = self;
+        let Some(scatter) = &pipelines.scatter else { return Vec::new() };
+        let chunks = prepared.chunks.as_slice();
+        let mut steps: Vec<Step<'a>> = vec![
+            (
+                "cull",
+                Box::new(move |encoder| {
+                    scatter.plan.encode_advance(gpu, encoder, targets);
+                    scatter.cull.encode(gpu, encoder, targets, chunks);
+                    scan.encode(gpu, encoder, &targets.runs, targets.run_total + 1);
+                }),
+            ),
+            (
+                "project",
+                Box::new(move |encoder| scatter.project.encode(gpu, encoder, targets, chunks)),
+            ),
+            (
+                "bin",
+                Box::new(move |encoder| {
+                    clear.encode(gpu, encoder, targets);
+                    scatter.bin.encode_count(gpu, encoder, targets);
+                    scatter.large.encode_count(gpu, encoder, targets);
+                    let arguments = (&targets.arguments, SCAN_ARGUMENTS);
+                    scan.encode_indirect(gpu, encoder, &targets.bins, &targets.bin_size, arguments);
+                    scatter.bin.encode_fill(gpu, encoder, targets);
+                    scatter.large.encode_fill(gpu, encoder, targets);
+                    tiles.encode(gpu, encoder, targets);
+                }),
+            ),
+            ("order", Box::new(move |encoder| scatter.order.encode(gpu, encoder, targets))),
+            (
+                "march",
+                Box::new(move |encoder| {
+                    scatter.march.encode(gpu, encoder, targets, MARCH_ARGUMENTS);
+                    resume.encode_again(gpu, encoder, targets);
+                    scatter.march.encode(gpu, encoder, targets, AGAIN_ARGUMENTS);
+                    resume.encode_hold(gpu, encoder, targets);
+                }),
+            ),
+        ];
+        steps.extend(self.occlusion());
+        steps
+    }
+
+    /// The steps that go on with a pass at which the frame stopped.
+    pub fn resumed(self) -> Vec<Step<'a>> {
+        // Each march that finds nothing left is empty.
+        const MARCHES: usize = 8;
+        let Self { gpu, resume, pipelines, targets, .. } = self;
+        let Some(scatter) = &pipelines.scatter else { return Vec::new() };
+        let march: Step<'a> = (
+            "march",
+            Box::new(move |encoder| {
+                resume.encode_resume(gpu, encoder, targets);
+                scatter.march.encode(gpu, encoder, targets, MARCH_ARGUMENTS);
+                for _ in 1..MARCHES {
+                    resume.encode_again(gpu, encoder, targets);
+                    scatter.march.encode(gpu, encoder, targets, AGAIN_ARGUMENTS);
+                }
+                resume.encode_hold(gpu, encoder, targets);
+            }),
+        );
+        [march].into_iter().chain(self.occlusion()).collect()
+    }
+
+    /// The step that gathers what is left of a lattice's field.
+    pub fn gathered(self) -> Vec<Step<'a>> {
+        let Self { gpu, pipelines, targets, .. } = self;
+        let Some(gather) = &pipelines.gather else { return Vec::new() };
+        vec![("gather", Box::new(move |encoder| gather.encode(gpu, encoder, targets)))]
+    }
+
+    fn occlusion(self) -> Option<Step<'a>> {
+        let Self { gpu, pipelines, targets, .. } = self;
+        let occlusion = pipelines.scatter.as_ref()?.occlusion.as_ref()?;
+        Some(("occlusion", Box::new(move |encoder| occlusion.encode(gpu, encoder, targets))))
+    }
+}

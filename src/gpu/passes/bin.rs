@@ -1,0 +1,71 @@
+//! Bin: the entries of a pass, each into its bin (shaders/passes/bin.wgsl).
+
+use crate::gpu::{
+    device::Gpu,
+    pipeline::{
+        shaders,
+        stage::{Binding, Stage},
+        variant::Variant,
+    },
+    targets::Targets,
+};
+
+/// The pass: as many workgroups as it has records, which only the GPU knows.
+#[derive(Debug)]
+pub struct Bin {
+    prepare: Stage,
+    count: Stage,
+    fill: Stage,
+}
+
+impl Bin {
+    pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        use Binding::{Read, Uniform, Write};
+        let constants = variant.constants();
+        let bindings: &[Binding] =
+            &[Uniform, Uniform, Uniform, Read, Read, Write, Write, Write, Write];
+        let stage = |label, entry, groups: &[&[Binding]]| {
+            let sources = [&constants, shaders::FRAME, shaders::BINS, shaders::STATE, shaders::BIN];
+            Stage::new(gpu, label, &sources, entry, groups)
+        };
+        Self {
+            prepare: stage("bin: prepare", "prepare", &[bindings, &[Write]]),
+            count: stage("bin: count", "count", &[bindings]),
+            fill: stage("bin: fill", "fill", &[bindings]),
+        }
+    }
+
+    fn buffers(targets: &Targets) -> [wgpu::BufferBinding<'_>; 9] {
+        [
+            &targets.frame,
+            &targets.pass,
+            &targets.run_count,
+            &targets.boxes,
+            &targets.runs,
+            &targets.bins,
+            &targets.entries,
+            &targets.large,
+            &targets.state,
+        ]
+        .map(|b| b.as_entire_buffer_binding())
+    }
+
+    /// Finds the sizes of the bins, but for what large splats add, and lists these.
+    pub fn encode_count(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+        let buffers = Self::buffers(targets);
+        let arguments =
+            self.prepare.bind(gpu, 1, &[targets.bin_arguments.as_entire_buffer_binding()]);
+        self.prepare.dispatch(encoder, &[&self.prepare.bind(gpu, 0, &buffers), &arguments], 1);
+        self.count.dispatch_indirect(
+            encoder,
+            &[&self.count.bind(gpu, 0, &buffers)],
+            (&targets.bin_arguments, 0),
+        );
+    }
+
+    /// Fills the bins.
+    pub fn encode_fill(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+        let group = self.fill.bind(gpu, 0, &Self::buffers(targets));
+        self.fill.dispatch_indirect(encoder, &[&group], (&targets.bin_arguments, 0));
+    }
+}

@@ -1,0 +1,29 @@
+//! Clear: empties the bins of a pass, as many as it has (shaders/passes/clear.wgsl).
+
+use crate::gpu::{
+    device::Gpu,
+    pipeline::{
+        shaders,
+        stage::{Binding, Stage},
+        state::SCAN_ARGUMENTS,
+    },
+    targets::Targets,
+};
+
+/// The pass.
+#[derive(Debug)]
+pub struct Clear(Stage);
+
+impl Clear {
+    pub fn new(gpu: &Gpu) -> Self {
+        use Binding::{Uniform, Write};
+        let sources = [shaders::FRAME, shaders::PROGRESS, shaders::CLEAR];
+        Self(Stage::new(gpu, "clear", &sources, "clear", &[&[Uniform, Uniform, Write, Write]]))
+    }
+
+    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+        let buffers = [&targets.frame, &targets.bin_size, &targets.bins, &targets.progress];
+        let group = self.0.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
+        self.0.dispatch_indirect(encoder, &[&group], (&targets.arguments, SCAN_ARGUMENTS));
+    }
+}

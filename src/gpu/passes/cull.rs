@@ -1,0 +1,83 @@
+//! Cull: which candidates a pass draws, and which are hidden by the passes before it (shaders/passes/cull.wgsl).
+
+use crate::gpu::{
+    device::Gpu,
+    pipeline::{
+        shaders,
+        stage::{Binding, Stage},
+        variant::Variant,
+    },
+    scene::chunk::{Chunk, Origin, WORKGROUP_CANDIDATES},
+    targets::Targets,
+};
+
+/// To how many hands workgroups are dealt (`HANDS` in frame.wgsl).
+const HANDS: u32 = 16;
+
+/// The pass.
+#[derive(Debug)]
+pub struct Cull {
+    cull: Stage,
+    prepare: Stage,
+}
+
+impl Cull {
+    pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        use Binding::{Read, Uniform, Write};
+        let constants = variant.constants();
+        let sources = [
+            &constants,
+            shaders::FRAME,
+            shaders::SPANS,
+            shaders::MAP,
+            shaders::STATE,
+            shaders::ACTIVE,
+            shaders::CULL,
+        ];
+        let own: &[Binding] = &[Uniform, Uniform, Read, Read, Read, Write, Write, Write];
+        let chunk: &[Binding] = &[Uniform, Read];
+        Self {
+            cull: Stage::new(gpu, "cull", &sources, "cull", &[own, chunk]),
+            prepare: Stage::new(gpu, "cull: prepare", &sources, "prepare", &[own, chunk, &[Write]]),
+        }
+    }
+
+    pub fn encode(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        targets: &Targets,
+        chunks: &[Chunk],
+    ) {
+        // Runs behind a hierarchy's last drawn node, and the element after the last run, count nothing.
+        encoder.clear_buffer(&targets.runs, 0, None);
+        encoder.clear_buffer(&targets.active, 0, None);
+        for chunk in chunks {
+            let buffers = [
+                &targets.frame,
+                &targets.pass,
+                &chunk.spans,
+                &targets.run_spans,
+                &targets.map,
+                &targets.active,
+                &targets.runs,
+                &targets.state,
+            ];
+            // Only of nodes the number is unknown here; others have nothing to bind in its place but their data.
+            let numbers = match &chunk.origin {
+                Origin::Nodes { slots, .. } => &slots.selected,
+                _ => &chunk.data,
+            };
+            let buffers = buffers.map(|b| b.as_entire_buffer_binding());
+            let own = [&chunk.uniform, numbers].map(|b| b.as_entire_buffer_binding());
+            let groups = [self.cull.bind(gpu, 0, &buffers), self.cull.bind(gpu, 1, &own)];
+            let workgroups =
+                chunk.candidates.div_ceil(WORKGROUP_CANDIDATES).next_multiple_of(HANDS);
+            self.cull.dispatch(encoder, &[&groups[0], &groups[1]], workgroups);
+            let arguments =
+                self.prepare.bind(gpu, 2, &[chunk.active_arguments.as_entire_buffer_binding()]);
+            let groups = [self.prepare.bind(gpu, 0, &buffers), self.prepare.bind(gpu, 1, &own)];
+            self.prepare.dispatch(encoder, &[&groups[0], &groups[1], &arguments], 1);
+        }
+    }
+}

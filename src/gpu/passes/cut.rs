@@ -1,0 +1,122 @@
+//! Cut: which nodes of a hierarchy are drawn (shaders/passes/cut.wgsl), and how many each possible cut would draw
+//! (shaders/passes/tally.wgsl).
+
+use crate::gpu::{
+    device::Gpu,
+    pipeline::{
+        scan::Scan,
+        shaders,
+        stage::{Binding, Stage},
+    },
+    scene::nodes::{NodeChunk, OWN_NODES, RUN_NODES, SLOT_NODES, counts_of},
+};
+
+// A workgroup of tally looks at the nodes of a slot, as many of cut do together.
+const _: () = assert!(SLOT_NODES == 64 * RUN_NODES && SLOT_NODES.is_multiple_of(64 * OWN_NODES));
+
+/// Counters of a tally, eight an octave, the first for a cut of 2⁻⁸ pixels (tally.wgsl).
+const TALLY_COUNT: usize = 256;
+
+const TALLY_STEPS: f64 = 8.0;
+
+const TALLY_FIRST: f64 = -8.0;
+
+/// The pass.
+#[derive(Debug)]
+pub struct Cut {
+    count: Stage,
+    write: Stage,
+    tally: Stage,
+}
+
+impl Cut {
+    pub fn new(gpu: &Gpu) -> Self {
+        use Binding::{Read, Uniform, Write};
+        let nodes = [Uniform, Uniform, Read, Read, Read, Read];
+        let stage = |label, shader, entry, groups: &[&[Binding]]| {
+            let sources = [shaders::FRAME, shaders::NORMAL, shaders::NODES, shader];
+            Stage::new(gpu, label, &sources, entry, groups)
+        };
+        Self {
+            count: stage("cut: count", shaders::CUT, "count", &[&nodes, &[Read, Write, Write]]),
+            write: stage(
+                "cut: write",
+                shaders::CUT,
+                "write",
+                &[&[Uniform], &[Read, Write, Write, Write, Write]],
+            ),
+            tally: stage(
+                "tally",
+                shaders::TALLY,
+                "count",
+                &[&[nodes.as_slice(), &[Write]].concat()],
+            ),
+        }
+    }
+
+    /// Encodes the making of a chunk's list.
+    pub fn encode(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        scan: &Scan,
+        chunk: &NodeChunk<'_>,
+    ) {
+        let (nodes, list) = (chunk.nodes(), chunk.list());
+        let at_hand = chunk.slots.active() * SLOT_NODES;
+        let groups = at_hand / (64 * OWN_NODES);
+        let bound = [self.count.bind(gpu, 0, &nodes), self.count.bind(gpu, 1, &list[..3])];
+        self.count.dispatch(encoder, &[&bound[0], &bound[1]], groups);
+        scan.encode(gpu, encoder, &chunk.slots.counts, counts_of(at_hand));
+        let bound = [self.write.bind(gpu, 0, &nodes[..1]), self.write.bind(gpu, 1, &list)];
+        self.write.dispatch(encoder, &[&bound[0], &bound[1]], groups);
+    }
+
+    /// Encodes the counting of a chunk's nodes into `counters` ([`tally_bytes`] of them).
+    pub fn encode_tally(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        chunk: &NodeChunk<'_>,
+        counters: &wgpu::Buffer,
+    ) {
+        let buffers = [chunk.nodes().as_slice(), &[counters.as_entire_buffer_binding()]].concat();
+        self.tally.dispatch(encoder, &[&self.tally.bind(gpu, 0, &buffers)], chunk.slots.active());
+    }
+}
+
+pub const fn tally_bytes() -> u64 {
+    4 * TALLY_COUNT as u64
+}
+
+/// The finest cut, in pixels, that draws no more than `most` splats.
+pub fn finest_within(tally: &[i32], most: u64) -> f64 {
+    let mut drawn = 0i64;
+    let counts = tally.iter().map(|difference| {
+        drawn += i64::from(*difference);
+        drawn
+    });
+    let counts: Vec<i64> = counts.collect();
+    // Not all nodes of a cut get coarser together: the last that is too much decides.
+    let step = counts
+        .iter()
+        .rposition(|&count| u64::try_from(count).is_ok_and(|count| count > most))
+        .map_or(0, |last| last + 1);
+    2f64.powf(TALLY_FIRST + step as f64 / TALLY_STEPS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_finest_cut_within_a_budget_is_found() {
+        let mut tally = [0; TALLY_COUNT];
+        (tally[0], tally[64], tally[72], tally[80]) = (100, -60, -30, -5);
+        assert_eq!(finest_within(&tally, 100), 2f64.powi(-8));
+        assert_eq!(finest_within(&tally, 99), 1.0);
+        assert_eq!(finest_within(&tally, 39), 2.0);
+        assert_eq!(finest_within(&tally, 10), 2.0);
+        assert_eq!(finest_within(&tally, 9), 4.0);
+    }
+}

@@ -1,0 +1,60 @@
+//! Gather: draws the field of a lattice without splats (shaders/passes/gather.wgsl and field_lattice.wgsl). The splats of other items
+//! in the scene are scattered as ever; march then looks for the field itself, sheet by sheet.
+
+use crate::gpu::{
+    device::Gpu,
+    pipeline::{
+        shaders,
+        stage::{Binding, Stage},
+        variant::Variant,
+    },
+    targets::Targets,
+};
+
+/// Tiles are dealt to this many hands (`HANDS` in frame.wgsl).
+const HANDS: u32 = 16;
+
+/// The pass.
+#[derive(Debug)]
+pub struct Gather(Stage);
+
+impl Gather {
+    pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        use Binding::{Read, Uniform, Write};
+        // An invocation draws one pixel, and looks at nothing but the field.
+        let own = Variant { rows: 1, radiance: false, surface_shaded: false, ..*variant };
+        let sources = [
+            &own.constants(),
+            shaders::FRAME,
+            shaders::TABLES,
+            shaders::PIXEL,
+            shaders::SHEET,
+            shaders::PICTURE,
+            shaders::VALUE,
+            shaders::FIELD_LATTICE,
+            shaders::PROGRESS,
+            shaders::GATHER,
+        ];
+        let bindings = [Uniform, Read, Uniform, Read, Write, Write, Read, Write];
+        Self(Stage::new(gpu, "gather", &sources, "gather", &[&bindings, &[Binding::Texture]]))
+    }
+
+    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+        let Some(gathered) = &targets.gathered else { return };
+        for window in &gathered.windows {
+            let buffers = [
+                &targets.frame,
+                &targets.planes,
+                window,
+                &gathered.shown,
+                &targets.progress,
+                &targets.depths,
+                &targets.tables,
+                &targets.colors,
+            ];
+            let group = self.0.bind(gpu, 0, &buffers.map(|b| b.as_entire_buffer_binding()));
+            let samples = self.0.bind_texture(gpu, 1, &gathered.samples);
+            self.0.dispatch(encoder, &[&group, &samples], gathered.tiles.next_multiple_of(HANDS));
+        }
+    }
+}

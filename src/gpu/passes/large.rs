@@ -1,0 +1,71 @@
+//! Large: the entries of splats that meet many bins (shaders/passes/large.wgsl).
+
+use crate::gpu::{
+    device::Gpu,
+    pipeline::{
+        shaders,
+        stage::{Binding, Stage},
+        variant::Variant,
+    },
+    targets::Targets,
+};
+
+/// The pass: its first half before the bins are scanned, its second after they are filled otherwise.
+#[derive(Debug)]
+pub struct Large {
+    prepare: Stage,
+    count: Stage,
+    fill: Stage,
+}
+
+impl Large {
+    pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        use Binding::{Read, Uniform, Write};
+        let constants = variant.constants();
+        let bindings: &[Binding] = &[Uniform, Uniform, Read, Write, Write, Read];
+        let stage = |label, entry, groups: &[&[Binding]]| {
+            let sources = [&constants, shaders::FRAME, shaders::BINS, shaders::LARGE];
+            Stage::new(gpu, label, &sources, entry, groups)
+        };
+        Self {
+            prepare: stage("large: prepare", "prepare", &[bindings, &[Write]]),
+            count: stage("large: count", "count", &[bindings]),
+            fill: stage("large: fill", "fill", &[bindings]),
+        }
+    }
+
+    fn buffers(targets: &Targets) -> [wgpu::BufferBinding<'_>; 6] {
+        [
+            &targets.frame,
+            &targets.pass,
+            &targets.boxes,
+            &targets.bins,
+            &targets.entries,
+            &targets.large,
+        ]
+        .map(|b| b.as_entire_buffer_binding())
+    }
+
+    /// Counts the entries of the splats that bin has listed.
+    pub fn encode_count(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+        let buffers = Self::buffers(targets);
+        let arguments =
+            self.prepare.bind(gpu, 1, &[targets.large_arguments.as_entire_buffer_binding()]);
+        self.prepare.dispatch(encoder, &[&self.prepare.bind(gpu, 0, &buffers), &arguments], 1);
+        self.count.dispatch_indirect(
+            encoder,
+            &[&self.count.bind(gpu, 0, &buffers)],
+            (&targets.large_arguments, 0),
+        );
+    }
+
+    /// Writes their entries.
+    pub fn encode_fill(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+        let buffers = Self::buffers(targets);
+        self.fill.dispatch_indirect(
+            encoder,
+            &[&self.fill.bind(gpu, 0, &buffers)],
+            (&targets.large_arguments, 0),
+        );
+    }
+}

@@ -1,0 +1,81 @@
+//! March: walks each tile's entries front to back and composites its sheets (shaders/passes/march.wgsl).
+
+use crate::gpu::{
+    device::Gpu,
+    pipeline::{
+        shaders,
+        stage::{Binding, Stage},
+        variant::Variant,
+    },
+    targets::Targets,
+};
+
+/// The pass.
+#[derive(Debug)]
+pub struct March(Stage);
+
+impl March {
+    pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        use Binding::{Read, Uniform, Write};
+        let constants = variant.constants();
+        let mut sources = vec![
+            constants.as_str(),
+            shaders::FRAME,
+            shaders::NORMAL,
+            shaders::TABLES,
+            shaders::PIXEL,
+            shaders::KERNELS,
+            shaders::SHEET,
+            shaders::PICTURE,
+            shaders::PROGRESS,
+            shaders::SAVED,
+            shaders::MARCH,
+        ];
+        let mut bindings =
+            vec![Uniform, Read, Uniform, Read, Read, Read, Read, Write, Write, Write];
+        if variant.gather {
+            sources.extend([shaders::VALUE, shaders::FIELD_LATTICE, shaders::MARCH_LATTICE]);
+            bindings.push(Read);
+        } else {
+            sources.push(shaders::FIELD_SUMS);
+        }
+        let texture: &[&[Binding]] = if variant.gather { &[&[Binding::Texture]] } else { &[] };
+        Self(Stage::new(
+            gpu,
+            "march",
+            &sources,
+            "march",
+            &[&[bindings.as_slice()], texture].concat(),
+        ))
+    }
+
+    /// `arguments`: where in the pass's the dispatch stands.
+    pub fn encode(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        targets: &Targets,
+        arguments: u64,
+    ) {
+        let mut buffers = vec![
+            targets.frame.as_entire_buffer_binding(),
+            targets.planes.as_entire_buffer_binding(),
+            targets.pass.as_entire_buffer_binding(),
+            targets.records.as_entire_buffer_binding(),
+            targets.bins.as_entire_buffer_binding(),
+            targets.entries.as_entire_buffer_binding(),
+            targets.tables.as_entire_buffer_binding(),
+            targets.colors.as_entire_buffer_binding(),
+            targets.depths.as_entire_buffer_binding(),
+            targets.progress.as_entire_buffer_binding(),
+        ];
+        let mut samples = None;
+        if let Some(gathered) = &targets.gathered {
+            buffers.push(gathered.shown.as_entire_buffer_binding());
+            samples = Some(self.0.bind_texture(gpu, 1, &gathered.samples));
+        }
+        let group = self.0.bind(gpu, 0, &buffers);
+        let groups: Vec<_> = std::iter::once(&group).chain(&samples).collect();
+        self.0.dispatch_indirect(encoder, &groups, (&targets.arguments, arguments));
+    }
+}

@@ -1,0 +1,17 @@
+//! The passes of a frame: one file here and one shader of the same name in shaders/passes/ each.
+
+pub(crate) mod bin;
+pub(crate) mod clear;
+pub(crate) mod cull;
+pub(crate) mod cut;
+pub(crate) mod gather;
+pub(crate) mod large;
+pub(crate) mod march;
+pub(crate) mod measure;
+pub(crate) mod occlusion;
+pub(crate) mod order;
+pub(crate) mod plan;
+pub(crate) mod project;
+pub(crate) mod resume;
+pub(crate) mod sources;
+pub(crate) mod tiles;

@@ -1,0 +1,71 @@
+//! Order: sorts the entries of each bin, so that every run adds them up alike (shaders/passes/order.wgsl).
+
+use crate::gpu::{
+    device::Gpu,
+    pipeline::{
+        shaders,
+        stage::{Binding, Stage},
+        state::ORDER_ARGUMENTS,
+        variant::Variant,
+    },
+    targets::Targets,
+};
+
+/// The pass: short bins by one invocation each, long ones by a workgroup each.
+#[derive(Debug)]
+pub struct Order {
+    short: Stage,
+    count_long: Stage,
+    long: Stage,
+}
+
+impl Order {
+    pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        use Binding::{Read, Uniform, Write};
+        let constants = variant.constants();
+        let bindings = [Uniform, Uniform, Read, Write, Write, Write, Read, Read];
+        let stage = |label, entry, arguments: &[&[Binding]]| {
+            let groups = [&[bindings.as_slice()], arguments].concat();
+            Stage::new(
+                gpu,
+                label,
+                &[&constants, shaders::FRAME, shaders::PROGRESS, shaders::ORDER],
+                entry,
+                &groups,
+            )
+        };
+        Self {
+            short: stage("order", "order", &[]),
+            count_long: stage("order: count long", "count_long", &[&[Write]]),
+            long: stage("order: long", "order_long", &[]),
+        }
+    }
+
+    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+        encoder.clear_buffer(&targets.long_count, 0, None);
+        let buffers = [
+            targets.frame.as_entire_buffer_binding(),
+            targets.pass.as_entire_buffer_binding(),
+            targets.bins.as_entire_buffer_binding(),
+            targets.entries.as_entire_buffer_binding(),
+            targets.long_bins.as_entire_buffer_binding(),
+            targets.long_count.as_entire_buffer_binding(),
+            targets.records.as_entire_buffer_binding(),
+            targets.progress.as_entire_buffer_binding(),
+        ];
+        let group = self.short.bind(gpu, 0, &buffers);
+        self.short.dispatch_indirect(encoder, &[&group], (&targets.arguments, ORDER_ARGUMENTS));
+        let arguments =
+            self.count_long.bind(gpu, 1, &[targets.long_arguments.as_entire_buffer_binding()]);
+        self.count_long.dispatch(
+            encoder,
+            &[&self.count_long.bind(gpu, 0, &buffers), &arguments],
+            1,
+        );
+        self.long.dispatch_indirect(
+            encoder,
+            &[&self.long.bind(gpu, 0, &buffers)],
+            (&targets.long_arguments, 0),
+        );
+    }
+}

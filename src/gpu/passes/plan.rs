@@ -1,0 +1,83 @@
+//! Plan: cuts a frame into depth passes that fit the buffers (shaders/passes/survey.wgsl and plan.wgsl).
+
+use crate::gpu::{
+    device::Gpu,
+    pipeline::{
+        shaders,
+        stage::{Binding, Stage},
+        variant::Variant,
+    },
+    targets::Targets,
+};
+
+/// The passes: once a frame, and `advance` before each depth pass.
+#[derive(Debug)]
+pub struct Plan {
+    total: Stage,
+    survey: Stage,
+    accumulate: Stage,
+    advance: Stage,
+}
+
+impl Plan {
+    pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        use Binding::{Read, Uniform, Write};
+        let constants = variant.constants();
+        let shared = [&constants, shaders::FRAME, shaders::SPANS, shaders::CENSUS];
+        let plan = |label, entry| {
+            let own = [shaders::STATE, shaders::MAP, shaders::PROGRESS, shaders::PLAN];
+            let bindings = [Uniform, Read, Uniform, Write, Write, Write, Write, Write, Read];
+            Stage::new(gpu, label, &[shared.as_slice(), &own].concat(), entry, &[&bindings])
+        };
+        let survey = [shared.as_slice(), &[shaders::SURVEY]].concat();
+        Self {
+            total: plan("plan: total", "total"),
+            survey: Stage::new(
+                gpu,
+                "survey",
+                &survey,
+                "survey",
+                &[&[Uniform, Read, Read, Uniform, Write]],
+            ),
+            accumulate: plan("plan: accumulate", "accumulate"),
+            advance: plan("plan: advance", "advance"),
+        }
+    }
+
+    fn buffers(targets: &Targets) -> [wgpu::BufferBinding<'_>; 9] {
+        [
+            &targets.frame,
+            &targets.needs,
+            &targets.run_count,
+            &targets.state,
+            &targets.census,
+            &targets.pass,
+            &targets.arguments,
+            &targets.bin_size,
+            &targets.map,
+        ]
+        .map(|b| b.as_entire_buffer_binding())
+    }
+
+    /// Sums up what measure found.
+    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+        let buffers = Self::buffers(targets);
+        self.total.dispatch(encoder, &[&self.total.bind(gpu, 0, &buffers)], 1);
+        encoder.clear_buffer(&targets.census, 0, None);
+        let own = [
+            &targets.frame,
+            &targets.run_spans,
+            &targets.needs,
+            &targets.run_count,
+            &targets.census,
+        ];
+        let survey = self.survey.bind(gpu, 0, &own.map(|b| b.as_entire_buffer_binding()));
+        self.survey.dispatch(encoder, &[&survey], targets.run_total.div_ceil(64));
+        self.accumulate.dispatch(encoder, &[&self.accumulate.bind(gpu, 0, &buffers)], 1);
+    }
+
+    /// Decides how far the next pass reaches.
+    pub fn encode_advance(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+        self.advance.dispatch(encoder, &[&self.advance.bind(gpu, 0, &Self::buffers(targets))], 1);
+    }
+}

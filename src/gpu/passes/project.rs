@@ -1,0 +1,59 @@
+//! Project: the records of a pass's splats (shaders/passes/project.wgsl).
+
+use crate::gpu::{
+    device::Gpu,
+    passes::sources::{Sources, per_source},
+    pipeline::{
+        shaders,
+        stage::{Binding, Stage},
+        variant::Variant,
+    },
+    scene::chunk::Chunk,
+    targets::Targets,
+};
+
+/// The pass, once per kind of source.
+#[derive(Debug)]
+pub struct Project(Sources<Stage>);
+
+impl Project {
+    pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        use Binding::{Read, Uniform, Write};
+        let constants = variant.constants();
+        Self(per_source(|source, bindings| {
+            let sources = [
+                &constants,
+                shaders::FRAME,
+                shaders::NORMAL,
+                shaders::FOOTPRINT,
+                source,
+                shaders::BINS,
+                shaders::ACTIVE,
+                shaders::PROJECT,
+            ];
+            let own = [Uniform, Read, Read, Read, Write, Write];
+            Stage::new(gpu, "project", &sources, "project", &[&own, bindings])
+        }))
+    }
+
+    pub fn encode(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        targets: &Targets,
+        chunks: &[Chunk],
+    ) {
+        let buffers = [
+            &targets.frame,
+            &targets.planes,
+            &targets.runs,
+            &targets.active,
+            &targets.records,
+            &targets.boxes,
+        ]
+        .map(|b| b.as_entire_buffer_binding());
+        for chunk in chunks {
+            self.0.dispatch_indirect(gpu, encoder, chunk, &buffers, &chunk.active_arguments);
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! Passes that read candidates come in four kinds, one per source of candidates: explicit splats
+//! (shaders/sources/splats.wgsl), hierarchies (shaders/sources/nodes.wgsl), lattices (shaders/sources/lattice.wgsl) and volumes in
+//! bricks (shaders/sources/bricks.wgsl).
+
+use crate::gpu::{
+    device::Gpu,
+    pipeline::{
+        shaders,
+        stage::{Binding, Stage},
+    },
+    scene::chunk::{Chunk, Origin, WORKGROUP_CANDIDATES},
+};
+
+/// One thing per kind of source.
+#[derive(Debug)]
+pub struct Sources<T> {
+    splats: T,
+    nodes: T,
+    lattice: T,
+    bricks: T,
+}
+
+/// Makes all kinds of a stage from the source's shader and the bindings of its group.
+pub fn per_source(make: impl Fn(&str, &[Binding]) -> Stage) -> Sources<Stage> {
+    use Binding::{Read, Uniform};
+    let lattice = [shaders::VALUE, shaders::SAMPLE, shaders::SOURCE_LATTICE].concat();
+    let bricks = [shaders::VALUE, shaders::SAMPLE, shaders::SOURCE_BRICKS].concat();
+    Sources {
+        splats: make(
+            &[shaders::VALUE, shaders::SPLATS, shaders::SOURCE_SPLATS].concat(),
+            &[Uniform, Read],
+        ),
+        nodes: make(
+            &[shaders::VALUE, shaders::SPLATS, shaders::SOURCE_NODES].concat(),
+            &[Uniform, Read, Read],
+        ),
+        lattice: make(&lattice, &[Uniform, Read, Read, Uniform]),
+        bricks: make(&bricks, &[Uniform, Read, Read, Uniform]),
+    }
+}
+
+impl Sources<Stage> {
+    /// Encodes the stage over the candidates of a chunk; `buffers` is its first bind group.
+    pub fn dispatch(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        chunk: &Chunk,
+        buffers: &[wgpu::BufferBinding<'_>],
+    ) {
+        match &chunk.origin {
+            // The number of drawn nodes is known on the GPU alone.
+            Origin::Nodes { slots, .. } => {
+                self.dispatch_indirect(gpu, encoder, chunk, buffers, &slots.arguments)
+            }
+            _ => {
+                let (stage, groups) = self.bound(gpu, chunk, buffers);
+                let workgroups = chunk.candidates.div_ceil(WORKGROUP_CANDIDATES);
+                stage.dispatch(encoder, &[&groups[0], &groups[1]], workgroups);
+            }
+        }
+    }
+
+    /// The same over as many workgroups as a buffer says.
+    pub fn dispatch_indirect(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        chunk: &Chunk,
+        buffers: &[wgpu::BufferBinding<'_>],
+        arguments: &wgpu::Buffer,
+    ) {
+        let (stage, groups) = self.bound(gpu, chunk, buffers);
+        stage.dispatch_indirect(encoder, &[&groups[0], &groups[1]], (arguments, 0));
+    }
+
+    fn bound(
+        &self,
+        gpu: &Gpu,
+        chunk: &Chunk,
+        buffers: &[wgpu::BufferBinding<'_>],
+    ) -> (&Stage, [wgpu::BindGroup; 2]) {
+        let (stage, own) = match &chunk.origin {
+            Origin::Splats { .. } => (&self.splats, vec![&chunk.uniform, &chunk.data]),
+            Origin::Nodes { slots, .. } => {
+                (&self.nodes, vec![&chunk.uniform, &chunk.data, &slots.selected])
+            }
+            Origin::Lattice { selection, places, .. } => {
+                (&self.lattice, vec![&chunk.uniform, &chunk.data, &selection.selected, places])
+            }
+            Origin::Bricks { slab, .. } => {
+                (&self.bricks, vec![&chunk.uniform, &chunk.data, &slab.selected, &slab.slots])
+            }
+        };
+        let own: Vec<_> = own.into_iter().map(wgpu::Buffer::as_entire_buffer_binding).collect();
+        (stage, [stage.bind(gpu, 0, buffers), stage.bind(gpu, 1, &own)])
+    }
+}

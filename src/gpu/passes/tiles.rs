@@ -1,0 +1,46 @@
+//! Tiles: which tiles of the picture have entries in a pass (shaders/passes/tiles.wgsl).
+
+use crate::gpu::{
+    device::Gpu,
+    pipeline::{
+        shaders,
+        stage::{Binding, Stage},
+        state::TILE_ARGUMENTS,
+    },
+    targets::Targets,
+};
+
+/// The pass.
+#[derive(Debug)]
+pub struct Tiles {
+    list: Stage,
+    prepare: Stage,
+}
+
+impl Tiles {
+    pub fn new(gpu: &Gpu) -> Self {
+        use Binding::{Read, Uniform, Write};
+        let stage = |label, entry, groups: &[&[Binding]]| {
+            let sources = [shaders::FRAME, shaders::STATE, shaders::PROGRESS, shaders::TILES];
+            Stage::new(gpu, label, &sources, entry, groups)
+        };
+        let bindings = [Uniform, Uniform, Read, Write];
+        Self {
+            list: stage("tiles: list", "list", &[&bindings]),
+            prepare: stage("tiles: prepare", "prepare", &[&bindings, &[Write; 2]]),
+        }
+    }
+
+    pub fn encode(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, targets: &Targets) {
+        let buffers = [&targets.frame, &targets.pass, &targets.bins, &targets.progress];
+        let buffers = buffers.map(|b| b.as_entire_buffer_binding());
+        let group = self.list.bind(gpu, 0, &buffers);
+        self.list.dispatch_indirect(encoder, &[&group], (&targets.arguments, TILE_ARGUMENTS));
+        let arguments = self.prepare.bind(
+            gpu,
+            1,
+            &[&targets.arguments, &targets.state].map(|b| b.as_entire_buffer_binding()),
+        );
+        self.prepare.dispatch(encoder, &[&self.prepare.bind(gpu, 0, &buffers), &arguments], 1);
+    }
+}

@@ -1,0 +1,82 @@
+//! Scan: exclusive prefix sums in place (shaders/passes/scan.wgsl).
+
+use crate::gpu::{
+    device::{
+        Gpu,
+        buffers::{buffer, filled_buffer},
+    },
+    pipeline::{
+        shaders,
+        stage::{Binding, Stage},
+    },
+};
+
+/// The most numbers that one scan takes.
+pub const SCAN_CAPACITY: u32 = 1 << 24;
+
+/// Numbers per invocation (`SEGMENT` in scan.wgsl).
+const SEGMENT: u32 = 64;
+
+/// The pass, with room for the sums of its segments.
+#[derive(Debug)]
+pub struct Scan {
+    sum: Stage,
+    spine: Stage,
+    spread: Stage,
+    segments: wgpu::Buffer,
+}
+
+impl Scan {
+    pub fn new(gpu: &Gpu) -> Self {
+        let stage = |label, entry| {
+            let bindings = [Binding::Uniform, Binding::Write, Binding::Write];
+            Stage::new(gpu, label, &[shaders::SCAN], entry, &[&bindings])
+        };
+        Self {
+            sum: stage("scan: sum", "sum"),
+            spine: stage("scan: spine", "spine"),
+            spread: stage("scan: spread", "spread"),
+            segments: buffer(
+                gpu,
+                "scan segments",
+                4 * u64::from(SCAN_CAPACITY / SEGMENT),
+                wgpu::BufferUsages::STORAGE,
+            ),
+        }
+    }
+
+    /// Replaces numbers by the sum of those before each; `size` holds how many there are, and the indirect dispatch their
+    /// segments.
+    pub fn encode_indirect(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        numbers: &wgpu::Buffer,
+        size: &wgpu::Buffer,
+        arguments: (&wgpu::Buffer, u64),
+    ) {
+        let buffers = [size, numbers, &self.segments].map(|b| b.as_entire_buffer_binding());
+        self.sum.dispatch_indirect(encoder, &[&self.sum.bind(gpu, 0, &buffers)], arguments);
+        self.spine.dispatch(encoder, &[&self.spine.bind(gpu, 0, &buffers)], 1);
+        self.spread.dispatch_indirect(encoder, &[&self.spread.bind(gpu, 0, &buffers)], arguments);
+    }
+
+    /// Replaces each of the first `count` numbers by the sum of those before it.
+    pub fn encode(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        numbers: &wgpu::Buffer,
+        count: u32,
+    ) {
+        debug_assert!(count <= SCAN_CAPACITY);
+        let size = [count, 0, 0, 0];
+        let size =
+            filled_buffer(gpu, "scan size", bytemuck::bytes_of(&size), wgpu::BufferUsages::UNIFORM);
+        let buffers = [&size, numbers, &self.segments].map(|b| b.as_entire_buffer_binding());
+        let groups = count.div_ceil(SEGMENT * 64);
+        self.sum.dispatch(encoder, &[&self.sum.bind(gpu, 0, &buffers)], groups);
+        self.spine.dispatch(encoder, &[&self.spine.bind(gpu, 0, &buffers)], 1);
+        self.spread.dispatch(encoder, &[&self.spread.bind(gpu, 0, &buffers)], groups);
+    }
+}

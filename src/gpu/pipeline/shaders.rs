@@ -1,0 +1,51 @@
+//! The shader files. `passes/` holds one file per pass, `sources/` one per source of candidates, and
+//! `shared/` the declarations that they are joined with.
+
+pub const SELECT: &str = include_str!("../../../shaders/passes/select.wgsl");
+pub const SELECT_BRICKS: &str = include_str!("../../../shaders/passes/select_bricks.wgsl");
+pub const CUT: &str = include_str!("../../../shaders/passes/cut.wgsl");
+pub const TALLY: &str = include_str!("../../../shaders/passes/tally.wgsl");
+pub const MEASURE: &str = include_str!("../../../shaders/passes/measure.wgsl");
+pub const SURVEY: &str = include_str!("../../../shaders/passes/survey.wgsl");
+pub const PLAN: &str = include_str!("../../../shaders/passes/plan.wgsl");
+pub const PROJECT: &str = include_str!("../../../shaders/passes/project.wgsl");
+pub const SCAN: &str = include_str!("../../../shaders/passes/scan.wgsl");
+pub const BIN: &str = include_str!("../../../shaders/passes/bin.wgsl");
+pub const CLEAR: &str = include_str!("../../../shaders/passes/clear.wgsl");
+pub const CULL: &str = include_str!("../../../shaders/passes/cull.wgsl");
+pub const OCCLUSION: &str = include_str!("../../../shaders/passes/occlusion.wgsl");
+pub const RESUME: &str = include_str!("../../../shaders/passes/resume.wgsl");
+pub const TILES: &str = include_str!("../../../shaders/passes/tiles.wgsl");
+pub const LARGE: &str = include_str!("../../../shaders/passes/large.wgsl");
+pub const ORDER: &str = include_str!("../../../shaders/passes/order.wgsl");
+pub const GATHER: &str = include_str!("../../../shaders/passes/gather.wgsl");
+pub const MARCH: &str = include_str!("../../../shaders/passes/march.wgsl");
+
+pub const SOURCE_NODES: &str = include_str!("../../../shaders/sources/nodes.wgsl");
+pub const SOURCE_SPLATS: &str = include_str!("../../../shaders/sources/splats.wgsl");
+pub const SOURCE_LATTICE: &str = include_str!("../../../shaders/sources/lattice.wgsl");
+pub const SOURCE_BRICKS: &str = include_str!("../../../shaders/sources/bricks.wgsl");
+
+pub const FRAME: &str = include_str!("../../../shaders/shared/frame.wgsl");
+pub const NORMAL: &str = include_str!("../../../shaders/shared/normal.wgsl");
+pub const VALUE: &str = include_str!("../../../shaders/shared/value.wgsl");
+pub const SAMPLE: &str = include_str!("../../../shaders/shared/sample.wgsl");
+pub const FOOTPRINT: &str = include_str!("../../../shaders/shared/footprint.wgsl");
+pub const SPLATS: &str = include_str!("../../../shaders/shared/splats.wgsl");
+pub const SPANS: &str = include_str!("../../../shaders/shared/spans.wgsl");
+pub const CENSUS: &str = include_str!("../../../shaders/shared/census.wgsl");
+pub const BINS: &str = include_str!("../../../shaders/shared/bins.wgsl");
+pub const NODES: &str = include_str!("../../../shaders/shared/nodes.wgsl");
+pub const ACTIVE: &str = include_str!("../../../shaders/shared/active.wgsl");
+pub const MAP: &str = include_str!("../../../shaders/shared/map.wgsl");
+pub const PROGRESS: &str = include_str!("../../../shaders/shared/progress.wgsl");
+pub const SAVED: &str = include_str!("../../../shaders/shared/saved.wgsl");
+pub const STATE: &str = include_str!("../../../shaders/shared/state.wgsl");
+pub const TABLES: &str = include_str!("../../../shaders/shared/tables.wgsl");
+pub const PIXEL: &str = include_str!("../../../shaders/shared/pixel.wgsl");
+pub const KERNELS: &str = include_str!("../../../shaders/shared/kernels.wgsl");
+pub const SHEET: &str = include_str!("../../../shaders/shared/sheet.wgsl");
+pub const FIELD_SUMS: &str = include_str!("../../../shaders/shared/field_sums.wgsl");
+pub const FIELD_LATTICE: &str = include_str!("../../../shaders/shared/field_lattice.wgsl");
+pub const MARCH_LATTICE: &str = include_str!("../../../shaders/shared/march_lattice.wgsl");
+pub const PICTURE: &str = include_str!("../../../shaders/shared/picture.wgsl");

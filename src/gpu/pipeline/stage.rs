@@ -1,0 +1,185 @@
+//! One compute pipeline with its bindings. Shaders are put together from whole files: shared declarations first, then the
+//! pass's own file, so that each shader says what it uses; what is generated are constants alone.
+
+use crate::gpu::device::Gpu;
+
+/// What a binding holds, in the order of the shader's binding numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Binding {
+    Uniform,
+    Read,
+    Write,
+    /// A three-dimensional texture of 32-bit words.
+    Texture,
+}
+
+/// A compute pipeline and the layouts of its bind groups.
+#[derive(Debug)]
+pub struct Stage {
+    label: &'static str,
+    pipeline: wgpu::ComputePipeline,
+    layouts: Vec<wgpu::BindGroupLayout>,
+    /// Workgroups along one dimension of a dispatch, which the shaders know as `MOST_WORKGROUPS`.
+    most_workgroups: u32,
+}
+
+impl Stage {
+    /// Compiles `entry` of the joined `sources`; `groups` lists the bindings of each bind group.
+    pub fn new(
+        gpu: &Gpu,
+        label: &'static str,
+        sources: &[&str],
+        entry: &str,
+        groups: &[&[Binding]],
+    ) -> Self {
+        let device = &gpu.device;
+        let most_workgroups = device.limits().max_compute_workgroups_per_dimension;
+        let source =
+            format!("{}\nconst MOST_WORKGROUPS: u32 = {most_workgroups}u;\n", sources.concat());
+        let descriptor = wgpu::ShaderModuleDescriptor {
+            label: Some(label),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        };
+        // Loop counters and clamped indices keep the driver from unrolling the loops over an invocation's pixels, whose sums
+        // then live in memory instead of registers: march took 5 times as long with them (Mesa 22.3 software Vulkan).
+        let checks = wgpu::ShaderRuntimeChecks {
+            force_loop_bounding: false,
+            bounds_checks: false,
+            ..wgpu::ShaderRuntimeChecks::checked()
+        };
+        // SAFETY: the shaders are this crate's own files. Every loop in them counts towards a constant, a number of tiles,
+        // sheets or entries of the frame, or the length of a list. Indices come from counts that the CPU sized the buffers
+        // by, or are compared with the buffers' capacities before use (records and entries); none comes from a file.
+        #[expect(unsafe_code, reason = "shaders without the checks that untrusted ones need")]
+        let module = unsafe { device.create_shader_module_trusted(descriptor, checks) };
+        let layouts: Vec<_> =
+            groups.iter().map(|bindings| layout(device, label, bindings)).collect();
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(label),
+            bind_group_layouts: &layouts.iter().map(Some).collect::<Vec<_>>(),
+            immediate_size: 0,
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(label),
+            layout: Some(&pipeline_layout),
+            module: &module,
+            entry_point: Some(entry),
+            // Nothing reads workgroup memory before it is written.
+            compilation_options: wgpu::PipelineCompilationOptions {
+                zero_initialize_workgroup_memory: false,
+                ..Default::default()
+            },
+            cache: None,
+        });
+        Self { label, pipeline, layouts, most_workgroups }
+    }
+
+    /// Binds buffers (whole, or parts) to group `group`, in the order of their binding numbers.
+    pub fn bind(
+        &self,
+        gpu: &Gpu,
+        group: usize,
+        buffers: &[wgpu::BufferBinding<'_>],
+    ) -> wgpu::BindGroup {
+        let entries: Vec<_> = (0..)
+            .zip(buffers)
+            .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                binding,
+                resource: wgpu::BindingResource::Buffer(buffer.clone()),
+            })
+            .collect();
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(self.label),
+            layout: &self.layouts[group],
+            entries: &entries,
+        })
+    }
+
+    /// Binds a texture as the only one of group `group`.
+    pub fn bind_texture(
+        &self,
+        gpu: &Gpu,
+        group: usize,
+        texture: &wgpu::TextureView,
+    ) -> wgpu::BindGroup {
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(self.label),
+            layout: &self.layouts[group],
+            entries: &[wgpu::BindGroupEntry {
+                binding: 0,
+                resource: wgpu::BindingResource::TextureView(texture),
+            }],
+        })
+    }
+
+    /// Encodes a dispatch of a fixed number of workgroups. More than fit one dimension go on in the second, so that
+    /// workgroup (x, y) is number x + y · `MOST_WORKGROUPS`, and a few of the last row may be too many.
+    pub fn dispatch(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        groups: &[&wgpu::BindGroup],
+        workgroups: u32,
+    ) {
+        let columns = workgroups.min(self.most_workgroups);
+        if columns > 0 {
+            self.begin(encoder, groups).dispatch_workgroups(
+                columns,
+                workgroups.div_ceil(columns),
+                1,
+            );
+        }
+    }
+
+    /// Encodes a dispatch whose number of workgroups lies in `arguments` at a byte offset.
+    pub fn dispatch_indirect(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        groups: &[&wgpu::BindGroup],
+        (arguments, offset): (&wgpu::Buffer, u64),
+    ) {
+        self.begin(encoder, groups).dispatch_workgroups_indirect(arguments, offset);
+    }
+
+    fn begin<'a>(
+        &self,
+        encoder: &'a mut wgpu::CommandEncoder,
+        groups: &[&wgpu::BindGroup],
+    ) -> wgpu::ComputePass<'a> {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some(self.label),
+            timestamp_writes: None,
+        });
+        pass.set_pipeline(&self.pipeline);
+        for (index, group) in (0..).zip(groups) {
+            pass.set_bind_group(index, *group, &[]);
+        }
+        pass
+    }
+}
+
+fn layout(device: &wgpu::Device, label: &str, bindings: &[Binding]) -> wgpu::BindGroupLayout {
+    let buffer =
+        |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let entries: Vec<_> = (0..)
+        .zip(bindings)
+        .map(|(binding, kind)| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: match kind {
+                Binding::Uniform => buffer(wgpu::BufferBindingType::Uniform),
+                Binding::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
+                Binding::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
+                Binding::Texture => wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Uint,
+                    view_dimension: wgpu::TextureViewDimension::D3,
+                    multisampled: false,
+                },
+            },
+            count: None,
+        })
+        .collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some(label),
+        entries: &entries,
+    })
+}

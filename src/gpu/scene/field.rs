@@ -1,0 +1,344 @@
+//! The field of a lattice that is gathered: its samples as a texture, and what of it may show.
+
+use crate::{
+    cpu::{
+        field::deviation,
+        gather::unsuited_kernel,
+        skip::{Shown, field_ranges},
+    },
+    gpu::{
+        device::{
+            Gpu, MOST_BUFFERS,
+            buffers::{buffer, filled_buffer},
+        },
+        pipeline::variant::Variant,
+    },
+    math::{Kernel, Sheets, View},
+    plan::uniforms::Frame,
+    scene::{Item, Scene, Settings},
+    volume::{Arrangement, Scalar, Volume},
+};
+use rayon::prelude::*;
+use std::sync::Arc;
+use wgpu::BufferUsages as Usage;
+
+/// The most bytes that samples take which are laid out a word each.
+const MOST_FOURS: u64 = 512 << 20;
+
+/// Their type (value.wgsl).
+const FOUR: u32 = 5;
+
+/// Room behind the samples' bits: of every sheet and tile that a picture may have (`MOST_BINS` in frame.rs) a bit, and the
+/// tables.
+const TAIL_BYTES: u64 = 64 << 20;
+
+/// Why the engine cannot gather a volume, whatever the settings.
+pub fn unsuited(volume: &Volume, kernel: &Kernel) -> Option<&'static str> {
+    if volume.lattice.arrangement != Arrangement::Cartesian {
+        return Some("body-centred and rectilinear lattices");
+    }
+    if volume.coefficients.is_some() && kernel.as_tensor().is_none() {
+        return Some("sharp volumes of radial kernels");
+    }
+    unsuited_kernel(kernel)
+}
+
+/// Why the engine cannot gather a scene's field in these settings; none where it can.
+pub fn obstacle(
+    scene: &Scene,
+    settings: &Settings,
+    sheets: &Sheets,
+    gpu: &Gpu,
+) -> Option<&'static str> {
+    let parts = crate::cpu::gather::parts(scene, sheets, None);
+    if let Some(what) = crate::cpu::gather::obstacle(scene, settings, parts, unsuited) {
+        return Some(what);
+    }
+    if parts > 1 {
+        return Some("sheets thicker than two samples");
+    }
+    let volume = scene
+        .items
+        .iter()
+        .find_map(|item| if let Item::Volume(volume, ..) = item { Some(volume) } else { None });
+    let Some(volume) = volume else { return Some("volumes in bricks") };
+    let limits = gpu.device.limits();
+    if texture_size(volume, kind_of(volume.samples.scalar()))
+        .iter()
+        .any(|side| *side > limits.max_texture_dimension_3d as usize)
+    {
+        return Some("a volume with more samples along an axis than the device's textures have");
+    }
+    // A bit for each sample, and what tiles and the transfer function add.
+    if volume.lattice.len() as u64 / 8 + TAIL_BYTES > gpu.binding_size() {
+        return Some("a volume larger than the device's bindings allow");
+    }
+    if scene.items.len() > 1 && limits.max_storage_buffers_per_shader_stage < MOST_BUFFERS {
+        return Some("a volume among surfaces on a device whose shaders bind eight buffers");
+    }
+    None
+}
+
+/// The type of samples as sample.wgsl numbers it.
+pub fn kind_of(scalar: Scalar) -> u32 {
+    match scalar {
+        Scalar::U8 => 0,
+        Scalar::U16 => 1,
+        Scalar::I16 => 2,
+        Scalar::I32 => 3,
+        Scalar::F32 => 4,
+    }
+}
+
+/// Texels along the axes: rows of samples packed in words, with what the taps of a row may read behind its end.
+fn texture_size(volume: &Volume, kind: u32) -> [usize; 3] {
+    let [width, height, depth] = volume.lattice.dims;
+    let words = match kind {
+        0 => width.div_ceil(4) + 1,
+        1 | 2 => width.div_ceil(2) + 2,
+        FOUR => width,
+        _ => width.max(4),
+    };
+    [words, height, depth]
+}
+
+/// How the samples of a volume are laid out: in their own type, or bytes four a word, for each sample those behind it, so that
+/// one word holds a row of a kernel. Mesa's software driver takes a third less time with these.
+fn layout(gpu: &Gpu, volume: &Volume) -> u32 {
+    let kind = kind_of(volume.samples.scalar());
+    let most = gpu.device.limits().max_texture_dimension_3d as usize;
+    let fits = 4 * volume.lattice.len() as u64 <= MOST_FOURS && volume.lattice.dims[0] <= most;
+    if kind == 0 && gpu.is_software() && fits { FOUR } else { kind }
+}
+
+/// Bytes that the samples of a volume take.
+pub fn texture_bytes(gpu: &Gpu, volume: &Volume) -> u64 {
+    texture_size(volume, layout(gpu, volume)).iter().fold(4, |bytes, side| bytes * *side as u64)
+}
+
+/// Writes a row of samples as a row of texels.
+fn write_row(from: &[u8], kind: u32, to: &mut [u8]) {
+    if kind != FOUR {
+        to[..from.len()].copy_from_slice(from);
+        return;
+    }
+    for (index, word) in to.chunks_exact_mut(4).enumerate() {
+        let own = &from[index..(index + 4).min(from.len())];
+        word[..own.len()].copy_from_slice(own);
+    }
+}
+
+fn texture(gpu: &Gpu, volume: &Volume, kind: u32) -> wgpu::Texture {
+    /// Bytes that are copied at once, about.
+    const COPIED: usize = 16 << 20;
+    let [words, rows, slices] = texture_size(volume, kind);
+    let [width, height, depth] = [words, rows, slices].map(|side| side as u32);
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("samples"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: depth },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D3,
+        format: wgpu::TextureFormat::R32Uint,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    let row = volume.lattice.dims[0] * volume.samples.sample_bytes();
+    let (to_row, to_slice) = (4 * words, 4 * words * rows);
+    let each = (COPIED / to_slice).max(1);
+    for (first, own) in
+        (0..depth).step_by(each).zip(volume.samples.bytes().chunks(row * rows * each))
+    {
+        let mut packed = vec![0u8; own.len() / row * to_row];
+        packed
+            .par_chunks_mut(to_row)
+            .zip(own.par_chunks(row))
+            .for_each(|(to, from)| write_row(from, kind, to));
+        let layers = (packed.len() / to_slice) as u32;
+        gpu.queue.write_texture(
+            wgpu::TexelCopyTextureInfo {
+                texture: &texture,
+                mip_level: 0,
+                origin: wgpu::Origin3d { x: 0, y: 0, z: first },
+                aspect: wgpu::TextureAspect::All,
+            },
+            &packed,
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(to_row as u32),
+                rows_per_image: Some(height),
+            },
+            wgpu::Extent3d { width, height, depth_or_array_layers: layers },
+        );
+    }
+    texture
+}
+
+/// What the engine keeps of a lattice to gather it.
+#[derive(Debug)]
+pub struct Field {
+    volume: Arc<Volume>,
+    /// The kernel's standard deviation in steps.
+    sigma: f64,
+    /// The extremes around each sample.
+    ranges: Vec<[u8; 2]>,
+    /// The samples, rows packed in words.
+    samples: wgpu::Texture,
+    texture_bytes: u64,
+    /// How they are laid out (`SAMPLE_KIND` in field_lattice.wgsl).
+    pub kind: u32,
+    /// What may show, for the transfer function's table of that.
+    shown: Option<([u16; 256], Shown)>,
+    /// `shown` of field_lattice.wgsl.
+    buffer: wgpu::Buffer,
+    /// Whether the bits of the samples lie in it.
+    has_bits: bool,
+}
+
+/// What a picture's passes need of it.
+#[derive(Debug)]
+pub struct Gathered {
+    pub samples: wgpu::TextureView,
+    pub shown: wgpu::Buffer,
+    /// The sheets of each dispatch of gather (`Pass` in frame.wgsl).
+    pub windows: Vec<wgpu::Buffer>,
+    /// Tiles in which something may show.
+    pub tiles: u32,
+    /// (tile, sheet) pairs in which something may show.
+    pub pairs: u64,
+}
+
+impl Gathered {
+    /// Workgroups of all dispatches that have a tile.
+    pub fn workgroups(&self) -> u32 {
+        self.tiles * self.windows.len() as u32
+    }
+}
+
+impl Field {
+    pub fn new(gpu: &Gpu, volume: &Arc<Volume>, kernel: &Kernel) -> Self {
+        let kind = layout(gpu, volume);
+        Self {
+            kind,
+            volume: volume.clone(),
+            sigma: deviation(kernel).unwrap_or(1.0),
+            ranges: field_ranges(volume, kernel),
+            samples: texture(gpu, volume, kind),
+            texture_bytes: texture_bytes(gpu, volume),
+            shown: None,
+            buffer: buffer(gpu, "shown", 0, Usage::STORAGE),
+            has_bits: false,
+        }
+    }
+
+    /// Bytes of GPU memory.
+    pub fn bytes(&self) -> u64 {
+        self.texture_bytes + self.buffer.size()
+    }
+
+    /// Finds what the transfer function may show; `first` as of
+    /// [`first_visible`](crate::volume::reach::first_visible).
+    pub fn show(&mut self, first: &[u16; 256]) {
+        if self.shown.as_ref().is_none_or(|(own, _)| own != first) {
+            self.shown = Some((*first, Shown::new(self.volume.lattice.dims, &self.ranges, first)));
+            self.has_bits = false;
+        }
+    }
+
+    /// Lists what a picture has to look at, and tells its shaders where that lies.
+    pub fn list(
+        &mut self,
+        gpu: &Gpu,
+        view: &View,
+        sheets: &Sheets,
+        variant: &Variant,
+        table: &[[f32; 4]],
+        frame: &mut Frame,
+    ) -> Option<Gathered> {
+        let (_, shown) = self.shown.as_ref()?;
+        // Shaders number sheets from 1.
+        let words = (sheets.count() + 1).div_ceil(32);
+        let marks = shown.sheets_of_tiles(&self.volume.lattice, view, sheets);
+        let mut tail = visible_before(variant, table, frame);
+        let bits = self.volume.lattice.len().div_ceil(32);
+        let starts = [bits, bits + tail.len(), bits + tail.len() + marks.len() * words];
+        let (mut tiles, mut pairs) = (Vec::new(), 0);
+        for (tile, own) in (0u32..).zip(&marks) {
+            let count: u32 = own.iter().map(|word| word.count_ones()).sum();
+            if count > 0 {
+                tiles.push(tile);
+                pairs += u64::from(count);
+            }
+            tail.extend(numbered_from_one(own).take(words));
+        }
+        tail.extend(&tiles);
+        let bytes = 4 * (bits + tail.len()) as u64;
+        if self.buffer.size() < bytes {
+            self.buffer = buffer(gpu, "shown", bytes, Usage::STORAGE);
+            self.has_bits = false;
+        }
+        if !std::mem::replace(&mut self.has_bits, true) {
+            gpu.queue.write_buffer(&self.buffer, 0, bytemuck::cast_slice(&shown.bits()));
+        }
+        gpu.queue.write_buffer(&self.buffer, 4 * bits as u64, bytemuck::cast_slice(&tail));
+        let [width, height, depth] = self.volume.lattice.dims.map(|n| n as u32);
+        frame.lattice = [width, height, depth, 0];
+        let per_variance = 1.0 / (self.sigma * self.sigma);
+        let weight = |steps: f64| (-0.5 * steps * steps * per_variance).exp() as f32;
+        frame.taps = [per_variance as f32, weight(1.0), weight(2.0), 0.0];
+        frame.shown = [starts[0] as u32, starts[1] as u32, starts[2] as u32, words as u32];
+        let (last, window) = (sheets.count() as u32 + 1, variant.gathered_sheets());
+        let windows = (1..last).step_by(window as usize).map(|first| {
+            let end = first.saturating_add(window).min(last);
+            let pass = [first, end, 0, 0, tiles.len() as u32, 0, 0, 0];
+            filled_buffer(gpu, "window", bytemuck::cast_slice(&pass), Usage::UNIFORM)
+        });
+        Some(Gathered {
+            samples: self.samples.create_view(&wgpu::TextureViewDescriptor::default()),
+            shown: self.buffer.clone(),
+            windows: windows.collect(),
+            tiles: tiles.len() as u32,
+            pairs,
+        })
+    }
+}
+
+/// For each entry of the transfer function's table, and one behind the last, how many before it show something.
+fn visible_before(variant: &Variant, table: &[[f32; 4]], frame: &Frame) -> Vec<u32> {
+    let [_, _, last, place] = frame.transfer;
+    let mut shows: Vec<bool> = table[..=last as usize].iter().map(|entry| entry[3] > 0.0).collect();
+    for surface in &frame.isosurfaces[..variant.isosurfaces as usize] {
+        let at = (surface[0][0] + place).clamp(0.0, last) as usize;
+        let end = (at + 2).min(shows.len());
+        shows[at..end].fill(true);
+    }
+    let sums = shows.iter().scan(0, |sum, shows| {
+        *sum += u32::from(*shows);
+        Some(*sum)
+    });
+    std::iter::once(0).chain(sums).collect()
+}
+
+/// Bits that count from 0, as words in which they count from 1.
+fn numbered_from_one(words: &[u64]) -> impl Iterator<Item = u32> {
+    let halves = words.iter().flat_map(|word| [*word as u32, (*word >> 32) as u32]).chain([0]);
+    halves.scan(0, |carried, half| {
+        let own = half << 1 | *carried;
+        *carried = half >> 31;
+        Some(own)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sheets_are_numbered_from_one_across_words() {
+        let marks = [1 << 31 | 1 << 63 | 1, 1u64 << 30];
+        let words: Vec<u32> = numbered_from_one(&marks).collect();
+        let found: Vec<usize> =
+            (0..32 * words.len()).filter(|bit| words[bit / 32] >> (bit % 32) & 1 != 0).collect();
+        assert_eq!(found, [1, 32, 64, 95]);
+    }
+}

@@ -1,0 +1,416 @@
+//! Hierarchies on the GPU: their pages in slots, as many as a view needs and the room allows.
+//!
+//! Slots lie in chunks, each as large as a binding holds. Before a frame the pages that the view may need are found by
+//! their bounds, the coarse ones first; those not at hand are read and take free slots, or the slots of pages that no
+//! recent view needed. Where there is no room for more, the nodes above them are drawn instead.
+
+use crate::{
+    Result,
+    gpu::device::{Gpu, buffers::buffer},
+    hierarchy::{
+        self, CutSphere, Hierarchy,
+        file::{PAGE_NODES, Page},
+        needed::{Needed, parents_around},
+    },
+    math::View,
+    scene::Settings,
+};
+use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
+use std::sync::{
+    Arc,
+    atomic::{AtomicU32, Ordering::Relaxed},
+};
+use wgpu::BufferUsages as Usage;
+
+/// Nodes of a run (`SELECT_RUN` in nodes.wgsl).
+pub const RUN_NODES: u32 = 64;
+
+/// Invocations that share a run (`SHARERS` in cut.wgsl).
+const SHARERS: u32 = 8;
+
+/// Nodes of a run for each of them.
+pub const OWN_NODES: u32 = RUN_NODES / SHARERS;
+
+/// Nodes of a slot (`SLOT_NODES` in nodes.wgsl): the most of a page.
+pub const SLOT_NODES: u32 = PAGE_NODES as u32;
+
+/// Slots of a chunk at most: a node's number has 22 bits in cut.wgsl's list.
+const MOST_SLOTS: u64 = (1 << 22) / SLOT_NODES as u64;
+
+/// Pages read before they are sent.
+const BATCH: usize = 64;
+
+/// `Node` in nodes.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+struct GpuNode {
+    center: [f32; 3],
+    radius: f32,
+    size: f32,
+    cone: f32,
+    child_page: u32,
+    parent_size: f32,
+    parent_center: [f32; 3],
+    parent_radius: f32,
+}
+
+const _: () = assert!(size_of::<GpuNode>() == size_of::<crate::splat::Splat>());
+
+/// `Bounds` in cut.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+struct GpuBounds {
+    center: [f32; 3],
+    radius: f32,
+    size: f32,
+    unused: [f32; 3],
+}
+
+/// Bytes of the bounds of a slot's runs.
+const SLOT_BOUNDS: u64 = (SLOT_NODES / RUN_NODES) as u64 * size_of::<GpuBounds>() as u64;
+
+/// Bytes of a slot's nodes, and of their splats.
+const SLOT_HALF: u64 = SLOT_NODES as u64 * size_of::<GpuNode>() as u64;
+
+/// Bytes that a slot takes: these, what the cut makes of them, and their spans.
+const SLOT_BYTES: u64 =
+    2 * SLOT_HALF + SLOT_BOUNDS + 4 * (4 * SLOT_NODES + counts_of(SLOT_NODES)) as u64;
+
+/// `Cut` in nodes.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+struct GpuCut {
+    sides: [[f32; 4]; 4],
+    scale: f32,
+    fineness: f32,
+    perspective: u32,
+    culls: u32,
+    sin_margin: f32,
+    cos_margin: f32,
+    unused: [f32; 2],
+}
+
+/// The buffers of one chunk of slots, beside its splats.
+#[derive(Debug)]
+pub struct Slots {
+    nodes: wgpu::Buffer,
+    slots: wgpu::Buffer,
+    bounds: wgpu::Buffer,
+    pub counts: wgpu::Buffer,
+    found: wgpu::Buffer,
+    pub selected: wgpu::Buffer,
+    pub arguments: wgpu::Buffer,
+    resident: wgpu::Buffer,
+    cut: wgpu::Buffer,
+    first_slot: usize,
+    count: usize,
+    active: AtomicU32,
+}
+
+/// A chunk of slots, with its splats and how they lie in the view.
+pub struct NodeChunk<'a> {
+    pub source: &'a wgpu::Buffer,
+    pub splats: &'a wgpu::Buffer,
+    pub slots: &'a Slots,
+}
+
+impl NodeChunk<'_> {
+    /// What nodes.wgsl binds.
+    pub fn nodes(&self) -> [wgpu::BufferBinding<'_>; 6] {
+        let Slots { cut, nodes, slots, resident, .. } = self.slots;
+        [self.source, cut, nodes, self.splats, slots, resident]
+            .map(|b| b.as_entire_buffer_binding())
+    }
+
+    /// What cut.wgsl binds besides.
+    pub fn list(&self) -> [wgpu::BufferBinding<'_>; 5] {
+        let Slots { bounds, counts, found, selected, arguments, .. } = self.slots;
+        [bounds, counts, found, selected, arguments].map(|b| b.as_entire_buffer_binding())
+    }
+}
+
+impl Slots {
+    pub fn chunk<'a>(
+        &'a self,
+        source: &'a wgpu::Buffer,
+        splats: &'a wgpu::Buffer,
+    ) -> NodeChunk<'a> {
+        NodeChunk { source, splats, slots: self }
+    }
+
+    /// Bytes of its own buffers.
+    pub fn bytes(&self) -> u64 {
+        let own = [&self.nodes, &self.bounds, &self.counts, &self.found, &self.selected];
+        own.map(wgpu::Buffer::size).iter().sum()
+    }
+
+    /// How many slots take part in the frame.
+    pub fn active(&self) -> u32 {
+        self.active.load(Relaxed)
+    }
+}
+
+/// A chunk that a hierarchy has grown by, for the caller to keep with the others.
+#[derive(Debug)]
+pub struct Growth {
+    pub slots: Slots,
+    pub splats: wgpu::Buffer,
+    pub capacity: u32,
+}
+
+/// The pages of one hierarchy that are at hand.
+#[derive(Debug)]
+pub struct Forest {
+    pub hierarchy: Arc<Hierarchy>,
+    resident: wgpu::Buffer,
+    cut: wgpu::Buffer,
+    /// The page in each slot, and the last frame that needed it.
+    slots: Vec<Option<(u32, u64)>>,
+    /// The slot of each page.
+    slot_of: Vec<Option<u32>>,
+    needed: Needed,
+    frame: u64,
+    /// Pages that the last view needed and that found no room.
+    pub missing: usize,
+}
+
+impl Forest {
+    pub fn new(gpu: &Gpu, hierarchy: &Arc<Hierarchy>) -> Self {
+        let pages = hierarchy.pages().len();
+        Self {
+            hierarchy: hierarchy.clone(),
+            resident: buffer(gpu, "resident pages", pages.div_ceil(32) as u64 * 4, Usage::STORAGE),
+            cut: buffer(gpu, "cut", size_of::<GpuCut>() as u64, Usage::UNIFORM),
+            slots: Vec::new(),
+            slot_of: vec![None; pages],
+            needed: Needed::new(hierarchy),
+            frame: 0,
+            missing: 0,
+        }
+    }
+
+    /// The cut of this hierarchy in a view.
+    pub fn cut(&self, view: &View, settings: &Settings, pixels: f64) -> hierarchy::Cut {
+        let header = self.hierarchy.header();
+        let culls = settings.culls(header.closed, &header.bounds, view);
+        hierarchy::Cut::new(view, header.origin, pixels, culls)
+    }
+
+    /// The pages that a cut may need, the coarse ones first, with all pages above them.
+    pub fn needed(&self, cut: &hierarchy::Cut) -> Vec<u32> {
+        self.needed.of(&self.hierarchy, cut)
+    }
+
+    /// The finest cut, in pixels, whose pages hold no more than `most` nodes.
+    pub fn finest_within(&self, view: &View, settings: &Settings, most: u64) -> f64 {
+        self.needed.finest_within(&self.hierarchy, most, |pixels| self.cut(view, settings, pixels))
+    }
+
+    /// Sets the cut without changing what is at hand.
+    pub fn set_cut(&self, gpu: &Gpu, cut: &hierarchy::Cut) {
+        let (sin_margin, cos_margin) = hierarchy::cone_margin();
+        let uniform = GpuCut {
+            sides: cut.sides.map(|side| side.to_array()),
+            scale: cut.scale,
+            fineness: cut.fineness,
+            perspective: u32::from(cut.perspective),
+            culls: u32::from(cut.culls),
+            sin_margin,
+            cos_margin,
+            unused: [0.0; 2],
+        };
+        gpu.queue.write_buffer(&self.cut, 0, bytemuck::bytes_of(&uniform));
+    }
+
+    /// Brings the pages that a cut needs to the GPU, within `room` bytes. `chunks` are this hierarchy's, in order, each with
+    /// its splats; those that it grows by are returned.
+    pub fn update(
+        &mut self,
+        gpu: &Gpu,
+        cut: &hierarchy::Cut,
+        room: u64,
+        chunks: &[(&Slots, &wgpu::Buffer)],
+    ) -> Result<Vec<Growth>> {
+        self.frame += 1;
+        self.set_cut(gpu, cut);
+        let mut needed = self.needed(cut);
+        let most = usize::try_from(room / SLOT_BYTES).unwrap_or(usize::MAX).max(1);
+        self.missing = needed.len().saturating_sub(most);
+        needed.truncate(most);
+        let mut absent = Vec::new();
+        for &page in &needed {
+            match self.slot_of[page as usize] {
+                Some(slot) => self.slots[slot as usize] = Some((page, self.frame)),
+                None => absent.push(page),
+            }
+        }
+        let free = self.slots.iter().filter(|slot| slot.is_none()).count();
+        let held = self.slots.len();
+        let mut grown = Vec::new();
+        while self.slots.len() < most && free + grown_slots(&grown) < absent.len() {
+            let wanted = absent.len() - free - grown_slots(&grown);
+            grown.push(self.grow(gpu, wanted, most - self.slots.len()));
+        }
+        let all: Vec<(&Slots, &wgpu::Buffer)> = chunks
+            .iter()
+            .copied()
+            .chain(grown.iter().map(|g: &Growth| (&g.slots, &g.splats)))
+            .collect();
+        if let Err(error) = self.load(gpu, &absent, &all) {
+            // The buffers that it grew by go, and what was put in them.
+            for (page, _) in self.slots.drain(held..).flatten() {
+                self.slot_of[page as usize] = None;
+            }
+            return Err(error);
+        }
+        self.describe(gpu, &all);
+        Ok(grown)
+    }
+
+    /// A chunk with room for about `wanted` more pages, and no more than `most`.
+    fn grow(&mut self, gpu: &Gpu, wanted: usize, most: usize) -> Growth {
+        let most = most.min((gpu.binding_size() / SLOT_HALF).min(MOST_SLOTS) as usize);
+        // A view's neighbours need some more; the last chunk of a small file need not be larger than it.
+        let left = self.slot_of.len() - self.slots.len().min(self.slot_of.len());
+        let count = (wanted + wanted / 4 + 1).min(left.max(1)).max(wanted).min(most);
+        let capacity = count as u32 * SLOT_NODES;
+        let half = count as u64 * SLOT_HALF;
+        let slots = Slots {
+            nodes: buffer(gpu, "nodes", half, Usage::STORAGE),
+            slots: buffer(gpu, "slots", 8 * count as u64, Usage::STORAGE),
+            bounds: buffer(gpu, "node bounds", count as u64 * SLOT_BOUNDS, Usage::STORAGE),
+            counts: buffer(gpu, "cut counts", 4 * u64::from(counts_of(capacity)), Usage::STORAGE),
+            found: buffer(gpu, "found nodes", 4 * u64::from(capacity), Usage::STORAGE),
+            selected: buffer(gpu, "drawn nodes", 4 * (u64::from(capacity) + 1), Usage::STORAGE),
+            arguments: buffer(gpu, "drawn arguments", 12, Usage::STORAGE | Usage::INDIRECT),
+            resident: self.resident.clone(),
+            cut: self.cut.clone(),
+            first_slot: self.slots.len(),
+            count,
+            active: AtomicU32::new(0),
+        };
+        self.slots.extend(std::iter::repeat_n(None, count));
+        Growth { slots, splats: buffer(gpu, "node splats", half, Usage::STORAGE), capacity }
+    }
+
+    /// Reads pages and puts them in slots that are free or whose pages were not needed for longest.
+    fn load(
+        &mut self,
+        gpu: &Gpu,
+        absent: &[u32],
+        chunks: &[(&Slots, &wgpu::Buffer)],
+    ) -> Result<()> {
+        let mut places: Vec<u32> = (0..self.slots.len() as u32).collect();
+        let last_needed = |slot: &u32| self.slots[*slot as usize].map_or(0, |(_, frame)| frame);
+        places.retain(|slot| last_needed(slot) < self.frame);
+        places.sort_by_key(last_needed);
+        let mut places = places.into_iter();
+        for batch in absent.chunks(BATCH) {
+            let pages: Vec<Page> = batch
+                .par_iter()
+                .map(|&page| self.hierarchy.read_page(page))
+                .collect::<Result<_>>()?;
+            for (&page, content) in batch.iter().zip(&pages) {
+                let Some(slot) = places.next() else {
+                    self.missing += 1;
+                    continue;
+                };
+                if let Some((old, _)) = self.slots[slot as usize] {
+                    self.slot_of[old as usize] = None;
+                }
+                self.slots[slot as usize] = Some((page, self.frame));
+                self.slot_of[page as usize] = Some(slot);
+                let holder = chunks.iter().find(|(s, _)| {
+                    (s.first_slot..s.first_slot + s.count).contains(&(slot as usize))
+                });
+                let Some((slots, splats)) = holder else { continue };
+                let place = (slot as usize - slots.first_slot) as u64;
+                let nodes: Vec<GpuNode> =
+                    (0..content.nodes.len()).map(|index| gpu_node(content, index)).collect();
+                let own: Vec<crate::splat::Splat> =
+                    content.nodes.iter().map(|node| node.splat).collect();
+                let runs = (0..content.nodes.len()).step_by(RUN_NODES as usize);
+                let bounds: Vec<GpuBounds> = runs.map(|first| run_bounds(content, first)).collect();
+                gpu.queue.write_buffer(
+                    &slots.nodes,
+                    place * SLOT_HALF,
+                    bytemuck::cast_slice(&nodes),
+                );
+                gpu.queue.write_buffer(
+                    &slots.bounds,
+                    place * SLOT_BOUNDS,
+                    bytemuck::cast_slice(&bounds),
+                );
+                gpu.queue.write_buffer(splats, place * SLOT_HALF, bytemuck::cast_slice(&own));
+            }
+            // What is written waits in staging memory until something is submitted.
+            gpu.queue.submit([]);
+        }
+        Ok(())
+    }
+
+    /// Tells the GPU which pages take part in this frame, and which are at hand.
+    fn describe(&self, gpu: &Gpu, chunks: &[(&Slots, &wgpu::Buffer)]) {
+        let mut bits = vec![0u32; self.slot_of.len().div_ceil(32)];
+        // Pages at hand that the view does not need, or that are beyond its room, count as not at hand.
+        for (page, _) in self.slots.iter().flatten().filter(|(_, frame)| *frame == self.frame) {
+            bits[*page as usize / 32] |= 1 << (page % 32);
+        }
+        gpu.queue.write_buffer(&self.resident, 0, bytemuck::cast_slice(&bits));
+        for (slots, _) in chunks {
+            let own = &self.slots[slots.first_slot..slots.first_slot + slots.count];
+            let nodes = |page: u32| self.hierarchy.pages()[page as usize].nodes;
+            let taking_part = (0..).zip(own).filter_map(|(number, slot)| match slot {
+                Some((page, frame)) if *frame == self.frame => Some([number, nodes(*page)]),
+                _ => None,
+            });
+            let mut active: Vec<[u32; 2]> = taking_part.collect();
+            if active.is_empty() {
+                // An empty list has to be made, too.
+                active.push([0, 0]);
+            }
+            slots.active.store(active.len() as u32, Relaxed);
+            gpu.queue.write_buffer(&slots.slots, 0, bytemuck::cast_slice(&active));
+        }
+    }
+}
+
+fn grown_slots(grown: &[Growth]) -> usize {
+    grown.iter().map(|growth| growth.slots.count).sum()
+}
+
+/// What bounds the parents of a run of nodes, as the shader reads it.
+fn run_bounds(page: &Page, first: usize) -> GpuBounds {
+    match parents_around(page, first, RUN_NODES as usize) {
+        None => GpuBounds { size: -1.0, ..GpuBounds::default() },
+        Some(CutSphere { center, radius, size }) => {
+            GpuBounds { center, radius, size, unused: [0.0; 3] }
+        }
+    }
+}
+
+fn gpu_node(page: &Page, index: usize) -> GpuNode {
+    let node = &page.nodes[index];
+    let parent = page.parents.get(page.parent[index] as usize).copied();
+    let child_page = page.child_pages[index];
+    // A portal gives way to its block wherever that is at hand.
+    let size = if page.is_portal(index) { f32::MAX } else { node.size };
+    let CutSphere { center, radius, size: parent_size } =
+        parent.unwrap_or(CutSphere { center: [0.0; 3], radius: 0.0, size: -1.0 });
+    GpuNode {
+        center: node.center,
+        radius: node.radius,
+        size,
+        cone: node.cone,
+        child_page,
+        parent_size,
+        parent_center: center,
+        parent_radius: radius,
+    }
+}
+
+/// Numbers that the cut of so many nodes counts: one an invocation, and one behind them.
+pub const fn counts_of(nodes: u32) -> u32 {
+    nodes.div_ceil(OWN_NODES) + 1
+}

@@ -1,0 +1,587 @@
+//! A scene on the GPU: every item cut into chunks that fit a binding.
+
+use super::chunk::{Chunk, Origin, SPAN_BYTES, list_bytes, runs_of, spans};
+use crate::{
+    Error, Result,
+    gpu::{
+        device::{
+            Gpu,
+            buffers::{buffer, filled_buffer, upload},
+        },
+        pipeline::scan::Scan,
+        scene::{
+            bricks::{Listed, Room, Shelf, Slab},
+            field::{Field, texture_bytes, unsuited},
+            nodes::{Forest, Growth, Slots},
+            select::{Select, Selection},
+            select_bricks::SelectBricks,
+        },
+    },
+    hierarchy::{Cut, Levels},
+    math::{Bounds, Kernel, View},
+    plan::uniforms::Source,
+    scene::{Item, Optics, Scene, Settings},
+    splat::{Payload, Splat, SplatSet},
+    volume::{
+        Arrangement, Lattice, Samples, TransferFunction, Volume,
+        bricks::Choice,
+        reach::{EVERYTHING, first_visible},
+    },
+};
+use glam::{UVec3, Vec3};
+use rayon::prelude::*;
+use std::{borrow::Cow, sync::Arc};
+
+/// Voxels of a chunk at most, besides those of its neighbours, so that the spans of all of them fit a binding of 128 MiB.
+const CHUNK_VOXELS: u64 = 1 << 24;
+
+/// Slices of the neighbouring chunks that a chunk's data hold, for gradients: layers of one kind of a body-centred lattice
+/// lie two apart.
+const NEIGHBOURS: usize = 2;
+
+/// Coordinates of a rectilinear lattice: what fits the smallest uniform binding that WebGPU promises.
+const MOST_PLACES: usize = 8192;
+
+/// A set of splats with levels of detail, of which the GPU holds what the last view showed.
+#[derive(Debug)]
+struct LevelledSet {
+    item: usize,
+    levels: Levels,
+    /// The cut of the last view.
+    cut: Option<Cut>,
+    /// What lies on the GPU.
+    set: Option<Arc<SplatSet>>,
+}
+
+/// A scene whose splats and samples lie on the GPU. Cameras, settings and transfer functions may change between frames.
+#[derive(Debug)]
+pub struct PreparedScene {
+    pub(crate) scene: Scene,
+    pub(crate) chunks: Vec<Chunk>,
+    /// The splats that pictures may show by levels of detail.
+    levels: Vec<LevelledSet>,
+    /// The hierarchies, in the scene's order.
+    pub(crate) forests: Vec<Forest>,
+    /// The bricks at hand of the scene's volume in bricks.
+    pub(crate) shelf: Option<Shelf>,
+    /// What it takes to gather the scene's volume, from the first picture on that does.
+    pub(crate) field: Option<Field>,
+    /// Runs of candidates in all chunks.
+    pub(crate) runs: u32,
+    /// Bytes of GPU memory that the scene holds.
+    pub(crate) bytes: u64,
+    /// What lies on the GPU cannot be trusted: something went wrong there.
+    pub(crate) broken: bool,
+    /// The box around everything, which does not change.
+    pub(crate) bounds: Bounds,
+    /// Where all of it lies.
+    gpu: Gpu,
+}
+
+impl PreparedScene {
+    /// Uploads a scene. The scene's splats and samples are shared with the caller's, not copied.
+    pub(crate) fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
+        scene.validate()?;
+        if let Some(tensor) = scene.tensor() {
+            let name = tensor.name();
+            return Err(Error::Argument(format!(
+                "the GPU engine does not draw the kernel {name} yet; the CPU engine does"
+            )));
+        }
+        let mut prepared = Self {
+            scene: scene.clone(),
+            chunks: Vec::new(),
+            levels: Vec::new(),
+            forests: Vec::new(),
+            shelf: None,
+            field: None,
+            runs: 0,
+            bytes: 0,
+            broken: false,
+            bounds: scene.bounds(),
+            gpu: gpu.clone(),
+        };
+        for (number, item) in scene.items.iter().enumerate() {
+            if let Item::Radiance(set) | Item::Scalar(set, _) = item
+                && let Some(levels) = Levels::new(set)
+            {
+                prepared.levels.push(LevelledSet { item: number, levels, cut: None, set: None });
+                continue;
+            }
+            gpu.check_memory(prepared.bytes + bytes_of(item))?;
+            match item {
+                Item::Radiance(set) => prepared.add_splats(gpu, set, true, number),
+                Item::Hierarchy(hierarchy) => prepared.forests.push(Forest::new(gpu, hierarchy)),
+                Item::Scalar(set, _) => prepared.add_splats(gpu, set, false, number),
+                // Others go the one way or the other when they are drawn.
+                Item::Volume(volume, kernel, _) if unsuited(volume, kernel).is_some() => {
+                    prepared.add_volume(gpu, volume, kernel.clone())?;
+                }
+                Item::Volume(..) => {}
+                Item::Bricks(bricks, kernel, _) => {
+                    prepared.shelf = Some(Shelf::new(bricks, kernel))
+                }
+            }
+        }
+        Ok(prepared)
+    }
+
+    /// Refuses what lies on another device.
+    pub(crate) fn check_device(&self, gpu: &Gpu) -> Result<()> {
+        if self.gpu.is(gpu) {
+            return Ok(());
+        }
+        let name = &gpu.info.name;
+        Err(Error::Argument(format!(
+            "the scene was prepared on another device than the renderer's ({name}); prepare it by this renderer"
+        )))
+    }
+
+    /// Uploads the scene anew where it is broken.
+    pub(crate) fn mend(&mut self, gpu: &Gpu) -> Result<()> {
+        if self.broken {
+            *self = Self::new(gpu, &self.scene)?;
+        }
+        Ok(())
+    }
+
+    /// Shows the scene's volume or sample set by another transfer function. Nothing is rebuilt on the CPU.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for one that [`Renderer::prepare`](crate::gpu::Renderer::prepare) would refuse; the scene is then shown as
+    /// before.
+    pub fn set_transfer(&mut self, transfer: &TransferFunction) -> Result<()> {
+        self.scene = self.scene.shown_by(transfer)?;
+        Ok(())
+    }
+
+    /// Makes the scene's volume ready to be gathered, and takes its samples from those that are scattered.
+    pub(crate) fn update_field(&mut self, gpu: &Gpu, settings: &Settings) -> Result<()> {
+        let volume = self.scene.items.iter().find_map(|item| match item {
+            Item::Volume(volume, kernel, transfer) => Some((volume, kernel, transfer)),
+            _ => None,
+        });
+        let Some((volume, kernel, transfer)) = volume else { return Ok(()) };
+        let first = match settings.optics {
+            Optics::Maximum => EVERYTHING,
+            _ => first_visible(transfer, volume.range),
+        };
+        let field = match &mut self.field {
+            Some(field) => field,
+            None => {
+                let bytes = texture_bytes(gpu, volume);
+                gpu.check_memory(self.bytes + bytes)?;
+                self.bytes += bytes;
+                self.field.insert(Field::new(gpu, volume, kernel))
+            }
+        };
+        field.show(&first);
+        for chunk in &mut self.chunks {
+            let before = chunk.list_bytes();
+            let Origin::Lattice { selection, .. } = &mut chunk.origin else { continue };
+            if selection.forget(gpu) {
+                chunk.candidates = 0;
+                chunk.spans = spans(gpu, 0);
+                self.bytes = self.bytes - before + chunk.list_bytes();
+            }
+        }
+        self.number_runs();
+        Ok(())
+    }
+
+    /// Brings the samples of a volume that is scattered for the first time.
+    fn bring_lattice(&mut self, gpu: &Gpu) -> Result<()> {
+        if self.chunks.iter().any(|chunk| matches!(chunk.origin, Origin::Lattice { .. })) {
+            return Ok(());
+        }
+        for item in self.scene.items.clone() {
+            if let Item::Volume(volume, kernel, _) = &item {
+                gpu.check_memory(self.bytes + bytes_of(&item))?;
+                self.add_volume(gpu, volume, kernel.clone())?;
+            }
+        }
+        self.order_chunks();
+        Ok(())
+    }
+
+    /// Sums depend on the order of the splats, which must not depend on the views before.
+    fn order_chunks(&mut self) {
+        self.chunks.sort_by_key(|chunk| match &chunk.origin {
+            Origin::Splats { item, .. } => *item,
+            Origin::Lattice { .. } => usize::MAX - 1,
+            _ => usize::MAX,
+        });
+    }
+
+    /// Lists the samples of lattices anew where others show something than did, or all of them are asked for.
+    pub(crate) fn update_selections(
+        &mut self,
+        gpu: &Gpu,
+        select: &Select,
+        scan: &Scan,
+        view: &View,
+        all: bool,
+    ) -> Result<()> {
+        let shown = self.scene.items.iter().find_map(|item| match item {
+            Item::Volume(..) if all => Some(EVERYTHING),
+            Item::Volume(volume, _, transfer) => Some(first_visible(transfer, volume.range)),
+            _ => None,
+        });
+        let Some(shown) = shown else { return Ok(()) };
+        self.bring_lattice(gpu)?;
+        for chunk in &mut self.chunks {
+            let (source, before) = (chunk.source(view, false, &self.forests), chunk.list_bytes());
+            let Origin::Lattice { selection, .. } = &mut chunk.origin else { continue };
+            if selection.is_for(&shown) {
+                continue;
+            }
+            gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
+            let rest = self.bytes - before;
+            select.update(gpu, scan, selection, &chunk.uniform, &shown, |count| {
+                gpu.check_memory(rest + list_bytes(u64::from(count)))
+            })?;
+            chunk.candidates = selection.count;
+            chunk.spans = spans(gpu, selection.count);
+            self.bytes = rest + chunk.list_bytes();
+        }
+        self.number_runs();
+        Ok(())
+    }
+
+    /// Brings the bricks of a choice to the GPU and lists what they show, unless that is more than there is room for; tells which.
+    pub(crate) fn update_bricks(
+        &mut self,
+        gpu: &Gpu,
+        select: &SelectBricks,
+        scan: &Scan,
+        view: &View,
+        choice: &Choice,
+        room: Room,
+    ) -> Result<Listed> {
+        let Some(shelf) = &mut self.shelf else { return Ok(Listed::All) };
+        if shelf.draws(choice) {
+            let (runs, most) = (self.brick_runs(), room.runs);
+            return Ok(if runs <= most { Listed::All } else { Listed::TooMany { runs, most } });
+        }
+        let grown = shelf.update(gpu, choice, room.bytes)?;
+        let (bricks, kernel) = (shelf.bricks.clone(), shelf.kernel.clone());
+        for samples in grown {
+            // One chunk for each of two levels: they share the slots.
+            for part in 0..2 {
+                let slab = Box::new(Slab::new(gpu, &samples, part));
+                self.bytes += slab.bytes();
+                let (bricks, kernel, data) = (bricks.clone(), kernel.clone(), samples.data.clone());
+                let origin = Origin::Bricks { bricks, kernel, slab, level: 0 };
+                self.push_chunk(gpu, origin, data, samples.capacity());
+            }
+            // Counted twice.
+            self.bytes += samples.ranges.size();
+            self.bytes -= samples.data.size();
+        }
+        self.select_bricks(gpu, select, scan, view, choice, room.runs)
+    }
+
+    /// Runs of candidates in bricks.
+    fn brick_runs(&self) -> u64 {
+        let bricks =
+            self.chunks.iter().filter(|chunk| matches!(chunk.origin, Origin::Bricks { .. }));
+        bricks.map(|chunk| u64::from(runs_of(chunk.candidates))).sum()
+    }
+
+    /// The bytes that each hierarchy, and the volume in bricks, may take with all lists: equal parts of what the device has for
+    /// what is read as it is drawn. So none depends on what another was first to take.
+    pub(crate) fn room_to_read(&self, gpu: &Gpu) -> u64 {
+        let held = self.chunks.iter().map(|chunk| match &chunk.origin {
+            Origin::Nodes { .. } => chunk.data.size() + chunk.list_bytes(),
+            Origin::Bricks { slab, .. } => slab.slots.size() + chunk.list_bytes(),
+            Origin::Splats { .. } | Origin::Lattice { .. } => 0,
+        });
+        let slots = self.shelf.as_ref().map_or(0, Shelf::bytes);
+        let readers = self.forests.len() + usize::from(self.shelf.is_some());
+        gpu.memory_left(self.bytes.saturating_sub(slots + held.sum::<u64>()))
+            / readers.max(1) as u64
+    }
+
+    /// Runs of candidates in all that does not lie in bricks.
+    pub(crate) fn other_runs(&self) -> u64 {
+        u64::from(self.runs) - self.brick_runs()
+    }
+
+    /// Lists the samples of all slots in use that can add to the picture.
+    fn select_bricks(
+        &mut self,
+        gpu: &Gpu,
+        select: &SelectBricks,
+        scan: &Scan,
+        view: &View,
+        choice: &Choice,
+        most: u64,
+    ) -> Result<Listed> {
+        let Some(shelf) = &mut self.shelf else { return Ok(Listed::All) };
+        let (mut own, mut before) = (Vec::new(), 0);
+        for chunk in &mut self.chunks {
+            let Origin::Bricks { slab, level, .. } = &mut chunk.origin else { continue };
+            let drawn = choice.levels.get(slab.part).map(|(level, _)| *level);
+            *level = drawn.unwrap_or(0);
+            shelf.describe(gpu, slab, drawn);
+            let source = chunk.source(view, false, &self.forests);
+            gpu.queue.write_buffer(&chunk.uniform, 0, bytemuck::bytes_of(&source));
+            before += chunk.list_bytes();
+            let Origin::Bricks { slab, .. } = &mut chunk.origin else { continue };
+            own.push((slab.as_mut(), &chunk.uniform));
+        }
+        let rest = self.bytes - before;
+        let runs = select.update(gpu, scan, &mut own, &choice.shown, most, |count| {
+            gpu.check_memory(rest + list_bytes(count))
+        })?;
+        if runs > most {
+            return Ok(Listed::TooMany { runs, most });
+        }
+        self.bytes -= before;
+        for chunk in &mut self.chunks {
+            let Origin::Bricks { slab, .. } = &chunk.origin else { continue };
+            chunk.candidates = slab.count;
+            chunk.spans = spans(gpu, slab.count);
+            self.bytes += chunk.list_bytes();
+        }
+        shelf.set_drawn(choice);
+        self.number_runs();
+        Ok(Listed::All)
+    }
+
+    /// Numbers the runs of candidates through all chunks; before each chunk's one number stays free (active.wgsl).
+    fn number_runs(&mut self) {
+        self.runs = 0;
+        for chunk in &mut self.chunks {
+            chunk.first_run = self.runs + 1;
+            self.runs += runs_of(chunk.candidates);
+        }
+    }
+
+    /// Brings what a view shows of the sets with levels of detail to the GPU; `pixels` as of [`Detail::Pixels`].
+    pub(crate) fn update_levels(&mut self, gpu: &Gpu, view: &View, pixels: f64) -> Result<()> {
+        let mut levels = std::mem::take(&mut self.levels);
+        let done = levels.iter_mut().try_for_each(|own| self.update_level(gpu, own, view, pixels));
+        self.levels = levels;
+        self.order_chunks();
+        self.number_runs();
+        done
+    }
+
+    fn update_level(
+        &mut self,
+        gpu: &Gpu,
+        own: &mut LevelledSet,
+        view: &View,
+        pixels: f64,
+    ) -> Result<()> {
+        let cut = Cut::new(view, own.levels.origin(), pixels, false);
+        if own.cut == Some(cut) {
+            return Ok(());
+        }
+        let set = own.levels.drawn(&cut)?;
+        own.cut = Some(cut);
+        if own.set.as_ref().is_some_and(|shown| Arc::ptr_eq(shown, &set)) {
+            return Ok(());
+        }
+        let is_old = |chunk: &Chunk| matches!(&chunk.origin, Origin::Splats { item, .. } if *item == own.item);
+        self.bytes -=
+            self.chunks.iter().filter(|chunk| is_old(chunk)).map(Chunk::bytes).sum::<u64>();
+        self.chunks.retain(|chunk| !is_old(chunk));
+        own.set = None;
+        gpu.check_memory(self.bytes + splat_bytes(&set))?;
+        self.add_splats(gpu, &set, set.payload == Payload::Radiance, own.item);
+        own.set = Some(set);
+        Ok(())
+    }
+
+    fn add_splats(&mut self, gpu: &Gpu, set: &Arc<SplatSet>, radiance: bool, item: usize) {
+        let most = (gpu.binding_size() / size_of::<Splat>() as u64) as usize;
+        for splats in in_space_order(&set.splats).chunks(most) {
+            let origin = Origin::Splats { set: set.clone(), radiance, item };
+            self.add_chunk(gpu, origin, bytemuck::cast_slice(splats), splats.len() as u32);
+        }
+    }
+
+    fn add_volume(&mut self, gpu: &Gpu, volume: &Arc<Volume>, kernel: Kernel) -> Result<()> {
+        let lattice = volume.drawn_lattice();
+        let [width, height, depth] = lattice.dims;
+        let slice = (width * height) as u64;
+        let bytes =
+            volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
+        let held = gpu.binding_size() / bytes / slice;
+        // Of its own samples it also holds spans, where all of them show.
+        let own = CHUNK_VOXELS.min(gpu.binding_size() / SPAN_BYTES) / slice;
+        let slices = held.saturating_sub(2 * NEIGHBOURS as u64).min(own) as usize;
+        if slices == 0 {
+            return Err(Error::Argument(format!(
+                "a slice of the volume holds {slice} samples, of which {} are too many for {}; convert the volume to bricks \
+                 (.splv), which are drawn whatever its size",
+                2 * NEIGHBOURS + 1,
+                gpu.info.name
+            )));
+        }
+        let places = places(gpu, lattice)?;
+        let ranges = volume.drawn_ranges(&kernel);
+        for first in (0..depth).step_by(slices) {
+            let end = (first + slices).min(depth);
+            let held = first.saturating_sub(NEIGHBOURS)..(end + NEIGHBOURS).min(depth);
+            let in_slices = |slices: std::ops::Range<usize>| {
+                slices.start * slice as usize..slices.end * slice as usize
+            };
+            let own = in_slices(first..end);
+            let dims = [width, height, end - first].map(|n| n as u32);
+            let selection = Selection::new(gpu, dims, &ranges[own.clone()]);
+            self.bytes += selection.bytes();
+            let origin = Origin::Lattice {
+                volume: volume.clone(),
+                kernel: kernel.clone(),
+                slices: [first, held.start, held.end - 1].map(|slice| slice as u32),
+                selection: Box::new(selection),
+                places: places.clone(),
+            };
+            let part = in_slices(held);
+            let bytes = match (&volume.coefficients, &volume.samples) {
+                (Some(coefficients), _) => bytemuck::cast_slice(&coefficients.values[part]),
+                (None, Samples::U8(v)) => bytemuck::cast_slice(&v[part]),
+                (None, Samples::U16(v)) => bytemuck::cast_slice(&v[part]),
+                (None, Samples::I16(v)) => bytemuck::cast_slice(&v[part]),
+                (None, Samples::I32(v)) => bytemuck::cast_slice(&v[part]),
+                (None, Samples::F32(v)) => bytemuck::cast_slice(&v[part]),
+            };
+            self.add_chunk(gpu, origin, bytes, own.len() as u32);
+        }
+        Ok(())
+    }
+
+    fn add_chunk(&mut self, gpu: &Gpu, origin: Origin, bytes: &[u8], count: u32) {
+        let data = upload(gpu, "chunk", bytes);
+        self.push_chunk(gpu, origin, data, count);
+    }
+
+    /// Brings what the cuts of all hierarchies need to the GPU, as far as there is room for it.
+    pub(crate) fn update_forests(
+        &mut self,
+        gpu: &Gpu,
+        view: &View,
+        settings: &Settings,
+        pixels: f64,
+    ) -> Result<()> {
+        let room = settings.page_memory.min(self.room_to_read(gpu));
+        for index in 0..self.forests.len() {
+            let cut = self.forests[index].cut(view, settings, pixels);
+            let own: Vec<(&Slots, &wgpu::Buffer)> = self
+                .chunks
+                .iter()
+                .filter_map(|chunk| match &chunk.origin {
+                    Origin::Nodes { forest, slots } if *forest == index => {
+                        Some((slots.as_ref(), &chunk.data))
+                    }
+                    _ => None,
+                })
+                .collect();
+            let grown = self.forests[index].update(gpu, &cut, room, &own)?;
+            for Growth { slots, splats, capacity } in grown {
+                self.bytes += slots.bytes();
+                self.push_chunk(
+                    gpu,
+                    Origin::Nodes { forest: index, slots: Box::new(slots) },
+                    splats,
+                    capacity,
+                );
+            }
+        }
+        Ok(())
+    }
+
+    fn push_chunk(&mut self, gpu: &Gpu, origin: Origin, data: wgpu::Buffer, count: u32) {
+        let uniform =
+            buffer(gpu, "source", size_of::<Source>() as u64, wgpu::BufferUsages::UNIFORM);
+        // Those of samples are not known yet.
+        let candidates = if matches!(origin, Origin::Lattice { .. } | Origin::Bricks { .. }) {
+            0
+        } else {
+            count
+        };
+        let spans = spans(gpu, candidates);
+        self.bytes += data.size() + spans.size();
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
+        let active_arguments = buffer(gpu, "active arguments", 12, usage);
+        self.chunks.push(Chunk {
+            origin,
+            data,
+            uniform,
+            spans,
+            active_arguments,
+            count,
+            candidates,
+            first_run: 0,
+        });
+        self.number_runs();
+    }
+}
+
+/// Splats so that neighbours in the list are neighbours in space, along the curve of Morton (1966). Runs of them then meet the
+/// same tiles and sheets, and hide together. Few of them are left as they are.
+fn in_space_order(splats: &[Splat]) -> Cow<'_, [Splat]> {
+    const FEW: usize = 1 << 15;
+    if splats.len() <= FEW {
+        return Cow::Borrowed(splats);
+    }
+    let centers = || splats.par_iter().map(|splat| Vec3::from_array(splat.center));
+    let low = centers().reduce(|| Vec3::INFINITY, Vec3::min);
+    let size = centers().reduce(|| Vec3::NEG_INFINITY, Vec3::max) - low;
+    let to_cells = 1023.0 / size.max_element().max(f32::MIN_POSITIVE);
+    // Ten bits, two zeros after each.
+    let spread = |cell: u32| (0..10).fold(0, |code, bit| code | (cell >> bit & 1) << (3 * bit));
+    let code = |splat: &Splat| {
+        let cell =
+            ((Vec3::from_array(splat.center) - low) * to_cells).as_uvec3().min(UVec3::splat(1023));
+        spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2
+    };
+    let mut order: Vec<(u32, u32)> =
+        splats.par_iter().zip(0u32..splats.len() as u32).map(|(s, i)| (code(s), i)).collect();
+    order.par_sort_unstable();
+    Cow::Owned(order.into_par_iter().map(|(_, index)| splats[index as usize]).collect())
+}
+
+/// The coordinate and the unit of every sample along x, then y, then z, from the first sample; nothing but on rectilinear
+/// lattices.
+fn places(gpu: &Gpu, lattice: &Lattice) -> Result<wgpu::Buffer> {
+    let mut places = vec![[0.0f32; 2]; MOST_PLACES];
+    if let Arrangement::Rectilinear(coordinates) = &lattice.arrangement {
+        let count: usize = lattice.dims.iter().sum();
+        if count > MOST_PLACES {
+            return Err(Error::Argument(format!(
+                "the rectilinear volume has {count} coordinates along its axes, more than {MOST_PLACES}"
+            )));
+        }
+        let each = (0..3).flat_map(|axis| (0..lattice.dims[axis]).map(move |at| (axis, at)));
+        for (place, (axis, at)) in places.iter_mut().zip(each) {
+            let mut index = [0; 3];
+            index[axis] = at;
+            *place = [coordinates[axis][at] - coordinates[axis][0], lattice.unit(index)[axis]]
+                .map(|v| v as f32);
+        }
+    }
+    Ok(filled_buffer(gpu, "places", bytemuck::cast_slice(&places), wgpu::BufferUsages::UNIFORM))
+}
+
+/// Bytes of an item's splats or samples on the GPU, with what is known of each beforehand: its span, or the range around it. What
+/// is read as it is drawn takes none yet.
+fn bytes_of(item: &Item) -> u64 {
+    match item {
+        Item::Radiance(set) | Item::Scalar(set, _) => splat_bytes(set),
+        Item::Volume(volume, ..) => {
+            let sample =
+                volume.coefficients.as_ref().map_or(volume.samples.sample_bytes() as u64, |_| 4);
+            volume.drawn_lattice().len() as u64 * (sample + 2)
+        }
+        Item::Hierarchy(_) | Item::Bricks(..) => 0,
+    }
+}
+
+/// Bytes of a set's splats on the GPU, and of what these meet.
+fn splat_bytes(set: &SplatSet) -> u64 {
+    set.splats.len() as u64 * (size_of::<Splat>() as u64 + SPAN_BYTES)
+}

@@ -1,0 +1,301 @@
+//! The buffers of a frame: what the passes write for each other, and the picture.
+
+use crate::{
+    Error, Result,
+    gpu::{
+        budget::Budget,
+        device::{
+            Gpu,
+            buffers::{buffer, filled_buffer, upload},
+        },
+        pipeline::{
+            scan::SCAN_CAPACITY,
+            state::{ARGUMENT_BYTES, PASS_BYTES, State},
+            variant::{MOST_BINS, MOST_GROUP_SHIFT, Variant},
+        },
+        scene::{PreparedScene, chunk::RUN, field::Gathered},
+    },
+    math::{Sheets, View},
+    plan::{tables::Tables, uniforms::Frame},
+    scene::{Item, Settings},
+    volume::bricks::Choice,
+};
+use wgpu::BufferUsages as Usage;
+
+/// Bytes of a run's span, and of what it needs.
+const RUN_BYTES: u64 = 8;
+
+/// Runs of candidates that a picture takes at most.
+pub fn most_runs(gpu: &Gpu) -> u32 {
+    // One place stays free for their sum.
+    (gpu.binding_size() / RUN_BYTES).min(u64::from(SCAN_CAPACITY)) as u32 - 1
+}
+
+/// Columns and rows of tiles that a span tells apart (10 bits each in spans.wgsl).
+const SPAN_TILES: u32 = 1 << 10;
+
+/// Rows of tiles that a box tells apart (14 bits in bins.wgsl).
+const BOX_ROWS: u64 = 1 << 14;
+
+/// Groups of 2 to the power `shift` sheets that a pass through all of them has: one more than they fill, as it starts a sheet
+/// early and counts from there.
+fn groups(sheets: usize, shift: u32) -> u64 {
+    ((sheets as u64 + 2) >> shift) + 1
+}
+
+/// Rows of pixels that have bins enough for so many sheets, whatever is drawn, and whose tiles' rows a box tells apart.
+pub fn most_rows(width: u32, sheets: usize) -> u64 {
+    // A tile without the edge that it may share with its neighbours.
+    const STEP: u32 = 6;
+    let bins = groups(sheets, MOST_GROUP_SHIFT) * u64::from(width.div_ceil(STEP));
+    u64::from(STEP) * (u64::from(MOST_BINS) / bins).min(BOX_ROWS)
+}
+
+/// Tiles that march may stop in one pass with their sums kept (`SLOT_WORDS` in progress.wgsl has a bit for each).
+const SLOTS: u64 = 1024;
+
+/// Bytes of a tile's sums (`SAVED_VECTORS` in saved.wgsl).
+const SLOT_BYTES: u64 = 64 * 17 * 16;
+
+/// Bytes that slots take at most behind the colours of a picture, which they share a binding with.
+pub fn most_slot_bytes(gpu: &Gpu) -> u64 {
+    SLOTS.min(gpu.binding_size() / 2 / SLOT_BYTES) * SLOT_BYTES
+}
+
+/// The buffers of a frame: what the passes write for each other, and the picture.
+#[derive(Debug)]
+pub struct Targets {
+    pub frame: wgpu::Buffer,
+    pub planes: wgpu::Buffer,
+    pub tables: wgpu::Buffer,
+    pub run_spans: wgpu::Buffer,
+    pub needs: wgpu::Buffer,
+    pub census: wgpu::Buffer,
+    pub state: wgpu::Buffer,
+    pub pass: wgpu::Buffer,
+    pub arguments: wgpu::Buffer,
+    pub bin_size: wgpu::Buffer,
+    pub map: wgpu::Buffer,
+    pub run_count: wgpu::Buffer,
+    pub runs: wgpu::Buffer,
+    pub active: wgpu::Buffer,
+    pub records: wgpu::Buffer,
+    pub boxes: wgpu::Buffer,
+    pub bins: wgpu::Buffer,
+    pub entries: wgpu::Buffer,
+    pub bin_arguments: wgpu::Buffer,
+    pub large: wgpu::Buffer,
+    pub large_arguments: wgpu::Buffer,
+    pub long_bins: wgpu::Buffer,
+    pub long_count: wgpu::Buffer,
+    pub long_arguments: wgpu::Buffer,
+    pub progress: wgpu::Buffer,
+    pub colors: wgpu::Buffer,
+    pub depths: wgpu::Buffer,
+    /// What is gathered.
+    pub gathered: Option<Gathered>,
+    pub run_total: u32,
+    pub tiles: [u32; 2],
+}
+
+impl Targets {
+    /// Bytes of GPU memory.
+    pub fn bytes(&self) -> u64 {
+        let Self {
+            frame,
+            planes,
+            tables,
+            run_spans,
+            needs,
+            census,
+            state,
+            map,
+            runs,
+            active,
+            records,
+            boxes,
+            ..
+        } = self;
+        let Self { bins, entries, large, long_bins, progress, colors, depths, .. } = self;
+        [frame, planes, tables, run_spans, needs, census, state, map, runs, active, records, boxes]
+            .into_iter()
+            .chain([bins, entries, large, long_bins, progress, colors, depths])
+            .map(wgpu::Buffer::size)
+            .sum()
+    }
+}
+
+/// Large buffers, kept from frame to frame while they are large enough.
+#[derive(Debug, Default)]
+pub struct Pool(Vec<(&'static str, wgpu::Buffer)>);
+
+impl Pool {
+    fn take(&mut self, gpu: &Gpu, label: &'static str, bytes: u64) -> wgpu::Buffer {
+        let bytes = bytes.max(16).next_multiple_of(16);
+        if let Some((_, buffer)) =
+            self.0.iter().find(|(name, buffer)| *name == label && buffer.size() >= bytes)
+        {
+            return buffer.clone();
+        }
+        self.0.retain(|(name, _)| *name != label);
+        let buffer = buffer(
+            gpu,
+            label,
+            bytes,
+            Usage::STORAGE | Usage::UNIFORM | Usage::INDIRECT | Usage::COPY_SRC | Usage::COPY_DST,
+        );
+        self.0.push((label, buffer.clone()));
+        buffer
+    }
+}
+
+/// Makes (or takes from the pool) everything a frame needs.
+#[allow(
+    clippy::too_many_arguments,
+    reason = "each is a different thing that the renderer holds apart"
+)]
+pub fn targets(
+    gpu: &Gpu,
+    pool: &mut Pool,
+    prepared: &mut PreparedScene,
+    variant: &Variant,
+    view: &View,
+    sheets: &Sheets,
+    settings: &Settings,
+    budget: Budget,
+    choice: Option<&Choice>,
+) -> Result<Targets> {
+    let [width, height] = view.size;
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels * 16 > gpu.binding_size() {
+        // The renderer cuts pictures in strips of whole rows; only a single row can be too long.
+        return Err(Error::Argument(format!(
+            "a picture {width} pixels wide is too wide for {}",
+            gpu.info.name
+        )));
+    }
+    let most_runs = most_runs(gpu);
+    if prepared.runs > most_runs {
+        return Err(Error::Argument(format!(
+            "the scene has more than {} splats and samples that may show, more than one picture takes on {}; \
+             convert it, and draw it by a coarser --cut, or let a transfer function show less",
+            u64::from(most_runs) * u64::from(RUN),
+            gpu.info.name
+        )));
+    }
+    let budget = budget.within(gpu);
+    let scatters = variant.scatters();
+    let room = |count: u64| if scatters { count } else { 0 };
+    let step = variant.tile_step();
+    let tiles = [width.div_ceil(step), height.div_ceil(step)];
+    let tile_count = tiles[0] * tiles[1];
+    let groups = |shift: u32| groups(sheets.count(), shift);
+    if groups(MOST_GROUP_SHIFT) * u64::from(tile_count) > u64::from(MOST_BINS) {
+        return Err(Error::Argument(format!(
+            "a picture of {width}x{height} with {} sheets is too large; draw it smaller or with thicker sheets",
+            sheets.count()
+        )));
+    }
+    let slots = (u64::from(tile_count) * SLOT_BYTES).min(most_slot_bytes(gpu));
+    let slots = if variant.can_stop() { room(slots) } else { 0 };
+    // The number of entries stands behind the last bin.
+    let bin_count = room((groups(0) * u64::from(tile_count)).min(u64::from(MOST_BINS)) + 1);
+    let most_tiles = tiles[0].max(tiles[1]);
+
+    let mut frame = Frame::new(&prepared.scene, view, sheets, settings, choice);
+    frame.tiles = tiles;
+    frame.tile_shift = most_tiles.div_ceil(SPAN_TILES).next_power_of_two().trailing_zeros();
+    frame.entry_capacity = budget.entries;
+    frame.record_capacity = budget.record_words;
+    let table = tables_of(prepared, view, sheets, &mut frame);
+    let field = prepared.field.as_mut().filter(|_| variant.gather);
+    let before = field.as_ref().map_or(0, |field| field.bytes());
+    let gathered =
+        field.and_then(|field| field.list(gpu, view, sheets, variant, &table, &mut frame));
+    if gathered.is_some() {
+        prepared.bytes += prepared.field.as_ref().map_or(0, |field| field.bytes()) - before;
+    }
+
+    // The sheet before the first reaches back, the one after the last forward, without end.
+    let mut planes = vec![-3e38f32];
+    planes.extend(sheets.planes.iter().map(|&s| s as f32));
+    planes.extend([3e38; 4]);
+
+    let uniform = |label, bytes: &[u8]| filled_buffer(gpu, label, bytes, Usage::UNIFORM);
+    let words = room(u64::from(budget.record_words));
+    let runs = room(u64::from(prepared.runs));
+    Ok(Targets {
+        frame: uniform("frame", bytemuck::bytes_of(&frame)),
+        planes: upload(gpu, "planes", bytemuck::cast_slice(&planes)),
+        tables: upload(gpu, "tables", bytemuck::cast_slice(&table)),
+        run_count: uniform("run count", bytemuck::bytes_of(&[prepared.runs, 0, 0, 0])),
+        run_spans: pool.take(gpu, "run spans", RUN_BYTES * runs),
+        needs: pool.take(gpu, "needs", RUN_BYTES * runs),
+        census: pool.take(gpu, "census", room(census_bytes(sheets.count()))),
+        state: pool.take(gpu, "state", size_of::<State>() as u64),
+        pass: pool.take(gpu, "pass", PASS_BYTES),
+        arguments: pool.take(gpu, "arguments", ARGUMENT_BYTES),
+        bin_size: pool.take(gpu, "bin size", 16),
+        map: pool.take(gpu, "map", room(map_bytes(tiles))),
+        runs: pool.take(gpu, "runs", 4 * (runs + 1)),
+        active: pool.take(gpu, "active", 8 * runs),
+        records: pool.take(gpu, "records", 16 * words),
+        boxes: pool.take(gpu, "boxes", 12 * words),
+        bins: pool.take(gpu, "bins", 4 * bin_count),
+        entries: pool.take(gpu, "entries", room(4 * u64::from(budget.entries))),
+        bin_arguments: pool.take(gpu, "bin arguments", 12),
+        large: pool.take(gpu, "large", 4 * (words + 1)),
+        large_arguments: pool.take(gpu, "large arguments", 12),
+        long_bins: pool.take(gpu, "long bins", 4 * bin_count),
+        long_count: pool.take(gpu, "long count", 4),
+        long_arguments: pool.take(gpu, "long arguments", 12),
+        progress: pool.take(
+            gpu,
+            "progress",
+            4 * (gathered_word(tile_count) + 1 + u64::from(tile_count)),
+        ),
+        colors: pool.take(gpu, "colors", 16 * pixels + slots),
+        depths: pool.take(gpu, "depths", 4 * pixels),
+        gathered,
+        run_total: prepared.runs,
+        tiles,
+    })
+}
+
+/// The word of `progress` that counts tiles that gather has drawn (progress.wgsl).
+pub fn gathered_word(tiles: u32) -> u64 {
+    2 * u64::from(tiles) + SLOTS / 32 + 3
+}
+
+/// The tables of the scene's field; a frame without one gets some of no meaning.
+fn tables_of(
+    prepared: &PreparedScene,
+    view: &View,
+    sheets: &Sheets,
+    frame: &mut Frame,
+) -> Vec<[f32; 4]> {
+    let field = prepared.scene.items.iter().find_map(|item| match item {
+        Item::Radiance(_) | Item::Hierarchy(_) => None,
+        Item::Scalar(set, transfer) => Some((transfer, set.value_range(), None)),
+        Item::Volume(volume, kernel, transfer) => Some((transfer, volume.range, Some(kernel))),
+        Item::Bricks(bricks, kernel, transfer) => {
+            Some((transfer, bricks.header().range, Some(kernel)))
+        }
+    });
+    let Some((transfer, range, kernel)) = field else { return vec![[0.0; 4]; 2] };
+    let tables = Tables::new(transfer, range, kernel);
+    frame.set_tables(&tables, transfer, view, sheets);
+    tables.entries
+}
+
+/// Bytes of the census for a number of sheets: 6 counts for each of 16 bands and for all together, also for the sheet before
+/// the first and the one behind the last.
+pub fn census_bytes(sheets: usize) -> u64 {
+    (sheets as u64 + 2) * 17 * 6 * 4
+}
+
+/// Bytes of the map of so many tiles.
+pub fn map_bytes([columns, rows]: [u32; 2]) -> u64 {
+    let (columns, rows) = (u64::from(columns), u64::from(rows));
+    4 * ((columns + 1) * (rows + 1) + columns * rows)
+}

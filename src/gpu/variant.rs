@@ -1,0 +1,148 @@
+//! The variant of a picture: which of the shaders' parts its scene, view and settings need.
+
+use crate::{
+    gpu::{budget::Budget, device::Gpu, pipeline::variant::Variant, scene::PreparedScene},
+    math::{Kernel, Profile, View},
+    plan::{
+        tables::{self},
+        uniforms::{self},
+    },
+    scene::{Gradient, Item, Optics, Settings},
+    volume::{Arrangement, Lattice, bricks::Choice},
+};
+
+/// Which light and which sources a picture has decides what is compiled.
+pub fn variant(
+    gpu: &Gpu,
+    prepared: &PreparedScene,
+    view: &View,
+    settings: &Settings,
+    budget: Budget,
+    choice: Option<&Choice>,
+    gather: bool,
+) -> Variant {
+    let mut variant = Variant {
+        perspective: view.perspective,
+        mode: settings.mode,
+        classification: settings.classification,
+        optics: settings.optics,
+        scalar: false,
+        classified: false,
+        lattice: false,
+        body_centred: false,
+        rectilinear: false,
+        gather,
+        sample_kind: 0,
+        two_levels: false,
+        radiance: false,
+        isotropic: false,
+        table_kernel: false,
+        beyond: false,
+        volume_shaded: false,
+        surface_shaded: false,
+        gradient_opacity: false,
+        occlusion: settings.occlusion && settings.hides() && prepared.scene.can_hide(),
+        least_share: 0,
+        isosurfaces: 0,
+        clips: 0,
+        holes: 0,
+        central: false,
+        // A software adapter runs eight invocations at once: eight columns of eight pixels fill a tile.
+        rows: if gpu.is_software() { 8 } else { 1 },
+        most_entries: budget.tile_entries.unwrap_or(if gpu.is_software() {
+            SOFTWARE_ENTRIES
+        } else {
+            u32::MAX
+        }),
+    };
+    [variant.clips, variant.holes] = uniforms::clip_counts(settings);
+    let classified = settings.classifies_samples();
+    // Light is seen in emission alone.
+    let is_lit = settings.optics == Optics::EmissionAbsorption;
+    for item in &prepared.scene.items {
+        let transfer = match item {
+            Item::Radiance(_) | Item::Hierarchy(_) => {
+                variant.radiance = true;
+                variant.surface_shaded |= is_lit && settings.surface_shade.is_some();
+                continue;
+            }
+            Item::Scalar(_, transfer)
+            | Item::Volume(_, _, transfer)
+            | Item::Bricks(_, _, transfer) => transfer,
+        };
+        let shaded = is_lit && settings.shade_of(transfer).is_some();
+        if classified {
+            variant.classified = true;
+            variant.surface_shaded |= shaded;
+        } else {
+            variant.scalar = true;
+            variant.volume_shaded = shaded;
+            variant.gradient_opacity =
+                !transfer.gradient.is_empty() && settings.optics != Optics::Maximum;
+            variant.isosurfaces = if is_lit { transfer.isosurfaces.len() as u32 } else { 0 };
+        }
+        variant.beyond = match item {
+            Item::Volume(volume, ..) => tables::leaves_out(transfer, volume.range),
+            Item::Bricks(bricks, ..) => tables::leaves_out(transfer, bricks.header().range),
+            // To find their range takes longer.
+            _ => true,
+        };
+        if let Item::Volume(volume, kernel, _) = item {
+            variant.lattice = true;
+            variant.body_centred = volume.lattice.arrangement == Arrangement::BodyCentred;
+            variant.rectilinear = matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_));
+            variant.table_kernel = !matches!(kernel.profile, Profile::Gaussian(_));
+            let alike = !variant.rectilinear && !variant.table_kernel && !classified;
+            variant.isotropic = alike && !gather && are_flat(&volume.lattice, kernel, view, item);
+            variant.sample_kind =
+                prepared.field.as_ref().filter(|_| gather).map_or(0, |field| field.kind);
+        }
+        if let (Item::Bricks(bricks, kernel, _), Some(choice)) = (item, choice) {
+            variant.lattice = true;
+            variant.two_levels = choice.levels.len() > 1;
+            let flat =
+                |&(level, _): &(usize, f64)| are_flat(&bricks.lattice(level), kernel, view, item);
+            variant.isotropic = choice.levels.iter().all(flat);
+        }
+    }
+    // Where a pass ends, march meets splats again and closes sheets twice: of a field that costs more than of a surface.
+    variant.least_share =
+        budget.least_share.unwrap_or(if variant.scalar { 1 << 21 } else { 1 << 18 });
+    variant.central = variant.gradients() && settings.gradient == Gradient::Central;
+    if gather && variant.rows > 1 {
+        // Each pixel looks at the samples around its own ray, so pixels of an invocation would share nothing.
+        variant.rows = GATHERED_ROWS;
+        variant.most_entries = variant.most_entries.min(GATHERED_ENTRIES);
+    }
+    variant
+}
+
+/// Mesa's software driver ends all loops of an invocation after 65,535 iterations together. In march an entry takes up to
+/// six: its own, and those that find its sheet and close the sheets before it.
+const SOFTWARE_ENTRIES: u32 = 10_000;
+
+/// The same beside a field that is gathered: all sheets may lie between two entries.
+const GATHERED_ENTRIES: u32 = 5_000;
+
+/// Pixels of an invocation of march on such a driver, beside a field that is gathered.
+const GATHERED_ROWS: u32 = 1;
+
+/// Beyond this many footprint radii the sections of an isotropic kernel count as the same for all pixels. The error is at
+/// most a hundredth of the radius, at the footprint's rim; tests/engine_equals_reference.rs bounds the picture's.
+const ISOTROPIC_DISTANCE: f64 = 50.0;
+
+/// Whether the kernels of a lattice are round, and so far away that their sections are the same for all pixels.
+fn are_flat(lattice: &Lattice, kernel: &Kernel, view: &View, item: &Item) -> bool {
+    let near = view.distances(&item.bounds())[0];
+    // The sections of a kernel shift by ρ²σ²/2|c| between its centre and radius ρσ.
+    let reach = kernel.extent * lattice.spacing().max_element();
+    (!view.perspective || near > ISOTROPIC_DISTANCE * reach) && is_isotropic(lattice.axes)
+}
+
+/// Steps of equal length at right angles.
+fn is_isotropic(axes: glam::DMat3) -> bool {
+    let product = axes.transpose() * axes;
+    let size = product.x_axis.x;
+    let difference = product - glam::DMat3::from_diagonal(glam::DVec3::splat(size));
+    difference.to_cols_array().iter().all(|d| d.abs() <= 1e-4 * size)
+}

@@ -1,0 +1,374 @@
+//! Functions of one value, tabulated for march (shaders/shared/tables.wgsl): the transfer function, its integral, the gradient's
+//! factor, the kernel and its sections. All lie in one buffer.
+
+use crate::{
+    math::{Kernel, Profile},
+    volume::TransferFunction,
+};
+
+/// Entries of the transfer function at least, over the values between which it changes.
+const VALUES: usize = 4096;
+
+/// The most of them: integrals of more are sums in which 32 bits lose single entries.
+const MOST_VALUES: usize = 4 * VALUES;
+
+/// Entries of the shortest part in which the function changes, where there are enough of them.
+const PART: f64 = 256.0;
+
+/// Entries before the first value that the function changes at, and behind the last one.
+const BESIDE: f64 = 2.0;
+
+/// Values of a field may leave the range of its samples by this part of it, where kernels have negative parts.
+const OVERSHOOT: f64 = 0.25;
+
+/// The part of the samples' range in which a step is looked up at least. Smaller ones are lost in the sums of a sheet.
+const LEAST_PART: f64 = 1.0 / 1048576.0;
+
+/// Entries of the gradient's factor.
+const GRADIENTS: usize = 1024;
+
+/// Entries of the kernel along its radius.
+pub const RADII: usize = 1024;
+
+/// Cells of the sections' table along each side.
+pub const SECTIONS: usize = 128;
+
+/// The constants that tables.wgsl reads them by.
+pub fn constants() -> String {
+    format!(
+        "const GRADIENT_ENTRIES: u32 = {GRADIENTS}u;\nconst RADIAL_ENTRIES: u32 = {RADII}u;\n\
+         const SECTION_CELLS: u32 = {SECTIONS}u;\n"
+    )
+}
+
+/// The tables of a picture, and what they are looked up by.
+#[derive(Debug)]
+pub struct Tables {
+    pub entries: Vec<[f32; 4]>,
+    /// Where the parts start behind the transfer function: its integrals, the gradient's factors, the kernel, its sections.
+    pub starts: [u32; 4],
+    /// The value that is counted as 0, which fits 32 bits; entries per value; the last entry; where the value lies among them.
+    pub values: [f64; 4],
+    /// The gradient's magnitude at the first of its factors, and factors per magnitude; value per world length.
+    pub gradients: [f64; 2],
+    /// Extinction times colour, and extinction, of all values before the first entry and of all behind the last one.
+    pub beyond: [[f32; 4]; 2],
+}
+
+impl Tables {
+    /// Of a transfer function and the range of the samples. Only a kernel without closed form gets tables.
+    pub fn new(transfer: &TransferFunction, range: [f64; 2], kernel: Option<&Kernel>) -> Self {
+        let Window { ends: [low, high], entries: count } = window(transfer, range);
+        let last = (count - 1) as f64;
+        let mut entries = transfer.table([low, high], count);
+        // One more than the last, for interpolation at the upper end.
+        entries.push(entries[count - 1]);
+        let mut starts = [entries.len() as u32; 4];
+        entries.extend(integrals(transfer, [low, high], count));
+        starts[1] = entries.len() as u32;
+        let (first, per_magnitude) = factors(transfer, &mut entries);
+        starts[2] = entries.len() as u32;
+        let is_radial_table =
+            |kernel: &&Kernel| !matches!(kernel.profile, Profile::Gaussian(_) | Profile::Tensor(_));
+        if let Some(kernel) = kernel.filter(is_radial_table) {
+            entries.extend(radial(kernel));
+            starts[3] = entries.len() as u32;
+            entries.extend(sections(kernel));
+        }
+        let (zero, per_value) = (zero(range), last / (high - low));
+        Self {
+            entries,
+            starts,
+            values: [zero, per_value, last, (zero - low) * per_value],
+            gradients: [first, per_magnitude],
+            beyond: [low, high].map(|value| shown(transfer, value).map(|v| v as f32)),
+        }
+    }
+}
+
+/// Extinction times colour, and extinction.
+fn shown(transfer: &TransferFunction, value: f64) -> [f64; 4] {
+    let extinction = transfer.extinction(value);
+    let [red, green, blue] = transfer.color(value);
+    [red, green, blue, 1.0].map(|part| part * extinction)
+}
+
+/// The values that get entries, and how many of these.
+#[derive(Debug, Clone, Copy)]
+struct Window {
+    ends: [f64; 2],
+    entries: usize,
+}
+
+/// The values between which the function changes, as far as a field with samples in `range` has them. So a function of a few
+/// values has its corners where they are, however wide the data's range is and wherever its other points are.
+fn window(transfer: &TransferFunction, [low, high]: [f64; 2]) -> Window {
+    // No samples have no range.
+    let [low, high] = if low <= high { [low, high] } else { [0.0; 2] };
+    let reach = OVERSHOOT * (high - low);
+    let within =
+        |[first, last]: [f64; 2]| [first, last].map(|value| value.clamp(low - reach, high + reach));
+    let changes: Vec<_> = changes(transfer).into_iter().map(within).collect();
+    let [mut first, mut last] = within(transfer.span());
+    let changing = changes
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], part| [a.min(part[0]), b.max(part[1])]);
+    // To look values up that have no entries costs a little more.
+    if changing[1] - changing[0] < 0.25 * (last - first) {
+        [first, last] = if changing[0] <= changing[1] { changing } else { [first; 2] };
+    }
+    // A single step, or a function that does not change there: as wide as values of 32 bits are apart, or more.
+    let least = (first.abs() * 2f64.powi(-22))
+        .max(LEAST_PART * (high - low))
+        .max(f64::from(f32::MIN_POSITIVE) * VALUES as f64);
+    let lack = (least - (last - first)).max(0.0);
+    let shortest = changes
+        .iter()
+        .map(|[a, b]| b - a)
+        .filter(|width| *width > 0.0)
+        .fold(f64::INFINITY, f64::min);
+    let wanted = PART * (last - first).max(least) / shortest;
+    let entries = (wanted.min(MOST_VALUES as f64) as usize).next_power_of_two().max(VALUES);
+    // Where it begins or ends by a step, both sides of that have entries.
+    let beside = (last - first).max(least) * BESIDE / (entries - 1) as f64;
+    Window { ends: [first - lack / 2.0 - beside, last + lack / 2.0 + beside], entries }
+}
+
+/// The value that is counted as 0: that of the samples which is nearest to it. Where all samples around have it, as beside what was
+/// scanned, sums of it are exact, and there is no slope that light could be seen on.
+fn zero([low, high]: [f64; 2]) -> f64 {
+    // No samples have no range.
+    if low <= high { f64::from(0.0f64.clamp(low, high) as f32) } else { 0.0 }
+}
+
+/// The parts between two points of the function in which what it shows changes.
+fn changes(transfer: &TransferFunction) -> Vec<[f64; 2]> {
+    let opacity = transfer
+        .opacity
+        .windows(2)
+        .filter(|pair| pair[0].1 != pair[1].1)
+        .map(|pair| [pair[0].0, pair[1].0]);
+    // Colours count where there is opacity.
+    let shown = transfer.opacity.windows(2).filter(|pair| pair[0].1 > 0.0 || pair[1].1 > 0.0);
+    let ends = |points: &[(f64, f64)]| {
+        [(points[0], f64::NEG_INFINITY), (points[points.len() - 1], f64::INFINITY)]
+    };
+    let beyond = ends(&transfer.opacity).into_iter().filter(|(point, _)| point.1 > 0.0);
+    let shown: Vec<[f64; 2]> = shown
+        .map(|pair| [pair[0].0, pair[1].0])
+        .chain(beyond.map(|((value, _), end)| [value.min(end), value.max(end)]))
+        .collect();
+    let color = transfer.color.windows(2).filter(|pair| pair[0].1 != pair[1].1).flat_map(|pair| {
+        let own = [pair[0].0, pair[1].0];
+        shown.iter().map(move |part| [own[0].max(part[0]), own[1].min(part[1])])
+    });
+    opacity.chain(color.filter(|part| part[0] <= part[1])).collect()
+}
+
+/// Running integrals of extinction times colour, and of extinction, in entries. Each step is a mean over points inside it, so
+/// that a jump of the function between two entries counts where it is.
+fn integrals(transfer: &TransferFunction, [low, high]: [f64; 2], count: usize) -> Vec<[f32; 4]> {
+    const INSIDE: usize = 4;
+    let last = (count - 1) as f64;
+    let mut sum = [0.0f64; 4];
+    let mut all = vec![[0.0f32; 4]];
+    for i in 0..count {
+        for j in 0..INSIDE {
+            let at = (i as f64 + (j as f64 + 0.5) / INSIDE as f64).min(last);
+            let value = low + (high - low) * at / last;
+            for (sum, part) in sum.iter_mut().zip(shown(transfer, value)) {
+                *sum += part / INSIDE as f64;
+            }
+        }
+        all.push(sum.map(|v| v as f32));
+    }
+    all
+}
+
+/// Adds the gradient's factors at the magnitudes between which they change; tells the first of these, and factors per
+/// magnitude.
+fn factors(transfer: &TransferFunction, entries: &mut Vec<[f32; 4]>) -> (f64, f64) {
+    let changing = transfer.gradient.windows(2).filter(|pair| pair[0].1 != pair[1].1);
+    let [first, last] = changing.fold([f64::INFINITY, 0.0], |[low, high], pair| {
+        [f64::min(low, pair[0].0), f64::max(high, pair[1].0)]
+    });
+    let first = if first <= last { first } else { 0.0 };
+    // A step has both its sides within two entries.
+    let width = (last - first)
+        .max(first * 2f64.powi(-12))
+        .max(f64::from(f32::MIN_POSITIVE) * GRADIENTS as f64);
+    let step = width / (GRADIENTS - 2) as f64;
+    let start = first - 0.5 * step;
+    let factor = |i: usize| transfer.gradient_factor(start + step * i.min(GRADIENTS - 1) as f64);
+    entries.extend((0..=GRADIENTS).map(|i| [factor(i) as f32, 0.0, 0.0, 0.0]));
+    (start, 1.0 / step)
+}
+
+/// Value and −h′(r)/r at each radius, beside those at the next.
+fn radial(kernel: &Kernel) -> Vec<[f32; 4]> {
+    let step = kernel.extent / (RADII - 1) as f64;
+    let at = |i: usize| {
+        // h′ by central differences; at the centre h′/r has a limit, which a radius beside it nearly has.
+        let r = (i as f64 * step).max(0.5 * step);
+        let d = 0.25 * step;
+        let slope = (kernel.value((r + d).min(kernel.extent)) - kernel.value(r - d))
+            / ((r + d).min(kernel.extent) - r + d);
+        [kernel.value(i as f64 * step) as f32, (-slope / r) as f32]
+    };
+    let entries: Vec<_> = (0..RADII).map(at).collect();
+    (0..RADII)
+        .map(|i| {
+            let ([a, b], [c, d]) = (entries[i], entries[(i + 1).min(RADII - 1)]);
+            [a, b, c, d]
+        })
+        .collect()
+}
+
+/// The integral from the closest approach to t along a line at distance ρ from the centre (Westover's footprint table of 1990
+/// with one more axis), for cells of ρ and t: its four corners, (ρ, t), (ρ, t+), (ρ+, t), (ρ+, t+).
+fn sections(kernel: &Kernel) -> Vec<[f32; 4]> {
+    // Steps of the integration inside a cell.
+    const INSIDE: usize = 8;
+    let cell = kernel.extent / SECTIONS as f64;
+    let row = |i: usize| {
+        let rho = i as f64 * cell;
+        let value = |t: f64| kernel.value((rho * rho + t * t).sqrt());
+        let step = cell / INSIDE as f64;
+        let mut sum = 0.0;
+        let mut row = vec![0.0f32];
+        for j in 0..SECTIONS * INSIDE {
+            let t = j as f64 * step;
+            sum += step / 6.0 * (value(t) + 4.0 * value(t + 0.5 * step) + value(t + step));
+            if (j + 1) % INSIDE == 0 {
+                row.push(sum as f32);
+            }
+        }
+        row
+    };
+    let rows: Vec<_> = (0..=SECTIONS).map(row).collect();
+    let corners =
+        |i: usize, j: usize| [rows[i][j], rows[i][j + 1], rows[i + 1][j], rows[i + 1][j + 1]];
+    (0..SECTIONS)
+        .flat_map(|i| (0..SECTIONS).map(move |j| (i, j)))
+        .map(|(i, j)| corners(i, j))
+        .collect()
+}
+
+/// Whether samples in a range have values that get no entries.
+pub fn leaves_out(transfer: &TransferFunction, range: [f64; 2]) -> bool {
+    let [low, high] = window(transfer, range).ends;
+    range[0] < low || high < range[1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parts_start_where_the_shader_looks() {
+        let transfer = TransferFunction {
+            gradient: vec![(0.0, 0.0), (2.0, 1.0)],
+            ..TransferFunction::default()
+        };
+        let tables = Tables::new(&transfer, [0.0, 1.0], Some(&Kernel::b_spline(2.0).unwrap()));
+        let [integrals, factors, radii, sections] = tables.starts.map(|start| start as usize);
+        assert_eq!(tables.entries.len(), sections + SECTIONS * SECTIONS);
+        assert_eq!(tables.entries[integrals], [0.0; 4]);
+        assert_eq!(tables.entries[radii][0], 1.0);
+        let factor = tables.entries[factors + GRADIENTS / 2][0];
+        assert!((factor - 0.5).abs() < 0.01, "{factor}");
+    }
+
+    #[test]
+    fn integrals_are_exact_across_a_jump() {
+        let opacity = vec![(0.0, 0.0), (0.5, 0.0), (0.5, 0.9), (1.0, 0.9)];
+        let transfer = TransferFunction { opacity, ..TransferFunction::default() };
+        let tables = Tables::new(&transfer, [0.0, 1.0], None);
+        let [zero, per_value, last, place] = tables.values;
+        let low = zero - place / per_value;
+        let whole =
+            f64::from(tables.entries[tables.starts[0] as usize + VALUES - 1][3]) / per_value;
+        let expected = (low + last / per_value - 0.5) * transfer.extinction(0.9);
+        assert!((whole / expected - 1.0).abs() < 1e-3, "{whole} {expected}");
+    }
+
+    #[test]
+    fn entries_stand_where_the_function_changes() {
+        let over = |points: &[(f64, f64)], range| {
+            let transfer = TransferFunction {
+                color: vec![(points[0].0, [1.0; 3])],
+                opacity: points.to_vec(),
+                ..TransferFunction::default()
+            };
+            window(&transfer, range).ends
+        };
+        // Of 16-bit data a few hundred values; of a function far wider than the data what these can have.
+        let near = |found: [f64; 2], expected: [f64; 2]| {
+            let beside = (expected[1] - expected[0]) * 2.0 / 4095.0;
+            let is_near = found[0] < expected[0] && expected[1] < found[1];
+            assert!(
+                is_near && found[1] - found[0] < expected[1] - expected[0] + 2.01 * beside,
+                "{found:?}"
+            );
+        };
+        near(over(&[(100.0, 0.0), (400.0, 1.0)], [-32768.0, 32767.0]), [100.0, 400.0]);
+        near(over(&[(-1e6, 0.0), (1e6, 1.0)], [0.0, 100.0]), [-25.0, 125.0]);
+        // No samples at all.
+        assert!(
+            over(&[(100.0, 0.0), (400.0, 1.0)], [f64::INFINITY, f64::NEG_INFINITY])
+                .iter()
+                .all(|v| v.is_finite())
+        );
+        // A step, at 0 too, and values that are all one.
+        for (value, range) in [(80.0, [0.0, 255.0]), (0.0, [-1.0, 1e30]), (7.0, [7.0, 7.0])] {
+            let [low, high] = over(&[(value, 0.0), (value, 1.0)], range);
+            assert!(
+                low < value
+                    && value < high
+                    && high - low <= (value * 1e-3).max((range[1] - range[0]) * 1e-6) + 1e-30,
+                "{low} {high}"
+            );
+            assert!(((VALUES as f64 / (high - low)) as f32).is_finite());
+        }
+    }
+
+    /// Steps at the first and at the last point have both their sides.
+    #[test]
+    fn values_before_and_behind_are_those_of_the_function() {
+        let with = |opacity: &[(f64, f64)]| {
+            let color = vec![(opacity[0].0, [1.0; 3])];
+            let transfer = TransferFunction {
+                color,
+                opacity: opacity.to_vec(),
+                ..TransferFunction::default()
+            };
+            let tables = Tables::new(&transfer, [0.0, 255.0], None);
+            let entries = [tables.entries[0][3], tables.entries[VALUES - 1][3]];
+            let beyond = tables.beyond.map(|shown| shown[3]);
+            assert_eq!(
+                entries,
+                [0.0, 255.0].map(|value| transfer.extinction(value) as f32),
+                "{opacity:?}"
+            );
+            assert_eq!(beyond, entries, "{opacity:?}");
+        };
+        with(&[(50.0, 0.8), (50.0, 0.0), (100.0, 0.0)]);
+        with(&[(0.2, 0.0), (0.9, 0.0), (0.9, 1.0)]);
+        with(&[(80.0, 0.0), (80.0, 0.5)]);
+    }
+
+    #[test]
+    fn sections_add_up_to_the_kernel() {
+        let kernel = Kernel::b_spline(2.0).unwrap();
+        let cells = sections(&kernel);
+        // Twice the integrals at all ρ, over the rings around the axis, are the integral over space.
+        let cell = kernel.extent / SECTIONS as f64;
+        let ring = |i: usize| {
+            let [_, inner, _, outer] = cells[i * SECTIONS + SECTIONS - 1].map(f64::from);
+            let (a, b) = (i as f64 * cell, (i + 1) as f64 * cell);
+            2.0 * std::f64::consts::PI * (a * inner + b * outer) * (b - a)
+        };
+        let whole: f64 = (0..SECTIONS).map(ring).sum();
+        assert!((whole / kernel.integral() - 1.0).abs() < 1e-3, "{whole}");
+    }
+}

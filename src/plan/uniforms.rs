@@ -1,0 +1,298 @@
+//! The structures that Rust writes and shaders read, field by field as in shaders/shared/frame.wgsl.
+
+use crate::{
+    math::{Bounds, Kernel, Profile, Sheets, View},
+    plan::tables::Tables,
+    scene::{Clip, ClipShape, Item, Mode, Scene, Settings},
+    splat::SplatSet,
+    volume::{Arrangement, Isosurface, Lattice, Shade, TransferFunction, bricks::Choice},
+};
+use bytemuck::{Pod, Zeroable};
+use glam::{DMat3, DVec2, DVec3};
+
+/// `Frame` in frame.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+pub struct Frame {
+    pub size: [u32; 2],
+    pub tiles: [u32; 2],
+    pub center: [f32; 2],
+    pub scale: f32,
+    pub perspective: u32,
+    pub sheet_count: u32,
+    pub geometric_sheets: u32,
+    pub ratio_log2_inverse: f32,
+    pub step_inverse: f32,
+    pub z_near: f32,
+    pub tile_shift: u32,
+    pub record_capacity: u32,
+    pub entry_capacity: u32,
+    pub field_axes: [[f32; 4]; 3],
+    pub field_origin: [f32; 4],
+    pub field_low: [f32; 4],
+    pub field_high: [f32; 4],
+    pub volume_shade: [f32; 4],
+    pub surface_shade: [f32; 4],
+    pub isotropic: [f32; 4],
+    pub transfer: [f32; 4],
+    pub gradients: [f32; 4],
+    pub table_starts: [u32; 4],
+    pub beyond: [[f32; 4]; 2],
+    pub kernel: [f32; 4],
+    pub levels: [f32; 4],
+    pub sheet_normal: [f32; 4],
+    pub lattice: [u32; 4],
+    pub taps: [f32; 4],
+    pub shown: [u32; 4],
+    pub world: [[f32; 4]; 3],
+    pub clips: [[[f32; 4]; 2]; Settings::MAX_CLIPS],
+    pub holes: [[[f32; 4]; 2]; Settings::MAX_CLIPS],
+    pub isosurfaces: [[[f32; 4]; 2]; TransferFunction::MAX_ISOSURFACES],
+}
+
+const _: () = assert!(size_of::<Frame>() == 64 + (23 + 3 * 16) * 16);
+
+/// `Source` in frame.wgsl.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+pub struct Source {
+    pub axes: [[f32; 4]; 3],
+    pub origin: [f32; 4],
+    pub covariance: [[f32; 4]; 2],
+    pub lattice: [u32; 4],
+    pub slices: [u32; 4],
+    pub extent: f32,
+    pub count: u32,
+    pub first_run: u32,
+    pub flags: u32,
+}
+
+const _: () = assert!(size_of::<Source>() == 9 * 16);
+
+/// `Source::flags`.
+pub const RADIANCE: u32 = 1;
+
+pub const ISOTROPIC: u32 = 2;
+
+pub const ENDS: u32 = 4;
+
+pub const NODES: u32 = 8;
+
+pub const COARSE: u32 = 16;
+
+fn wide(v: DVec3, w: f32) -> [f32; 4] {
+    [v.x as f32, v.y as f32, v.z as f32, w]
+}
+
+fn columns(m: DMat3) -> [[f32; 4]; 3] {
+    [wide(m.x_axis, 0.0), wide(m.y_axis, 0.0), wide(m.z_axis, 0.0)]
+}
+
+fn shade(s: Option<Shade>) -> [f32; 4] {
+    s.map_or([1.0, 0.0, 0.0, 1.0], |s| {
+        [s.ambient, s.diffuse, s.specular, s.power].map(|v| v as f32)
+    })
+}
+
+impl Source {
+    /// A chunk of explicit splats.
+    pub fn of_splats(view: &View, set: &SplatSet, radiance: bool) -> Self {
+        let flags = if radiance { RADIANCE } else { 0 };
+        Self { flags, ..Self::of_radiance(view, set.origin, set.extent) }
+    }
+
+    /// A chunk of radiance splats around an origin in the world.
+    pub fn of_radiance(view: &View, origin: DVec3, extent: f32) -> Self {
+        Self {
+            axes: columns(view.rotation),
+            origin: wide(view.to_view(origin), 0.0),
+            extent,
+            flags: RADIANCE,
+            ..Self::default()
+        }
+    }
+
+    /// A chunk of a lattice whose samples have a kernel. Rectilinear coordinates count from the first sample.
+    pub fn of_lattice(view: &View, lattice: &Lattice, kernel: &Kernel, isotropic: bool) -> Self {
+        let axes = view.rotation * lattice.axes;
+        let own = axes * DMat3::from_diagonal(lattice.unit([0; 3]) * kernel.unit());
+        let c = own * own.transpose();
+        let covariance = [
+            [c.x_axis.x, c.x_axis.y, c.x_axis.z, c.y_axis.y].map(|v| v as f32),
+            [c.y_axis.z, c.z_axis.z, 0.0, kernel.unit()].map(|v| v as f32),
+        ];
+        let is_gaussian = matches!(kernel.profile, Profile::Gaussian(_));
+        Self {
+            axes: columns(axes),
+            origin: wide(view.to_view(lattice.position(lattice.step_range()[0])), 0.0),
+            covariance,
+            extent: kernel.radius() as f32,
+            flags: if isotropic { ISOTROPIC } else { 0 } | if is_gaussian { 0 } else { ENDS },
+            ..Self::default()
+        }
+    }
+}
+
+/// Smallest cosine between a ray of the picture and the optical axis.
+fn smallest_cosine(view: &View) -> f64 {
+    let size = DVec2::new(f64::from(view.size[0]), f64::from(view.size[1]));
+    [DVec2::ZERO, DVec2::new(size.x, 0.0), DVec2::new(0.0, size.y), size]
+        .map(|corner| view.ray(corner).1.z)
+        .into_iter()
+        .fold(1.0, f64::min)
+}
+
+impl Frame {
+    /// Everything but the tiles, the capacities and the tables.
+    pub fn new(
+        scene: &Scene,
+        view: &View,
+        sheets: &Sheets,
+        settings: &Settings,
+        choice: Option<&Choice>,
+    ) -> Self {
+        let mut frame = Self {
+            size: view.size,
+            center: [view.center.x as f32, view.center.y as f32],
+            scale: view.scale as f32,
+            perspective: view.perspective.into(),
+            sheet_count: sheets.count() as u32,
+            geometric_sheets: sheets.turn as u32,
+            ratio_log2_inverse: if sheets.turn > 0 {
+                (1.0 / sheets.ratio.log2()) as f32
+            } else {
+                0.0
+            },
+            step_inverse: (1.0 / sheets.step) as f32,
+            // Axis-aligned sheets may begin behind an eye among them.
+            z_near: (sheets.planes[0] * smallest_cosine(view)).max(1e-6 * sheets.step) as f32,
+            surface_shade: shade(settings.surface_shade),
+            levels: [1.0, 1.0, 0.0, 0.0],
+            ..Self::default()
+        };
+        if settings.mode == Mode::AxisSheets {
+            frame.sheet_normal = wide(scene.sheet_normal(view), 0.0);
+        }
+        for item in &scene.items {
+            let transfer = match item {
+                Item::Radiance(_) | Item::Hierarchy(_) => continue,
+                Item::Scalar(set, transfer) => {
+                    frame.kernel[2] = 1.0 / set.overlap;
+                    frame.isotropic[3] = Kernel::default().least_sum() as f32;
+                    transfer
+                }
+                Item::Volume(volume, kernel, transfer) => {
+                    frame.set_field(view, &volume.lattice);
+                    frame.set_kernel(&volume.lattice, kernel);
+                    transfer
+                }
+                Item::Bricks(bricks, kernel, transfer) => {
+                    let levels = choice.map_or(&[][..], |choice| &choice.levels);
+                    // The field fills the same box whatever is drawn.
+                    frame.set_field(view, &bricks.header().lattice);
+                    frame.set_kernel(
+                        &bricks.lattice(levels.first().map_or(0, |(level, _)| *level)),
+                        kernel,
+                    );
+                    for (own, &(_, weight)) in frame.levels.iter_mut().zip(levels) {
+                        *own = weight as f32;
+                    }
+                    transfer
+                }
+            };
+            frame.kernel[3] = transfer.unit as f32;
+            frame.volume_shade = shade(settings.shade_of(transfer));
+            if settings.classifies_samples() {
+                frame.surface_shade = frame.volume_shade;
+            }
+        }
+        frame.set_clips(view, settings);
+        frame
+    }
+
+    /// How values are looked up. Gradients count over the thickness of a sheet.
+    pub fn set_tables(
+        &mut self,
+        tables: &Tables,
+        transfer: &TransferFunction,
+        view: &View,
+        sheets: &Sheets,
+    ) {
+        let [zero, per_value, ..] = tables.values;
+        self.transfer = tables.values.map(|v| v as f32);
+        let [first, per_magnitude] = tables.gradients;
+        let (to_own, length) = (per_value * sheets.step, sheets.step);
+        // Of factors that do not change, or by one step, there may be more than 32 bits hold.
+        let per_own = (per_magnitude / to_own).min(1e30);
+        self.gradients = [first * to_own, per_own, length, view.scale * length].map(|v| v as f32);
+        self.table_starts = tables.starts;
+        self.beyond = tables.beyond;
+        let mut surfaces = transfer.isosurfaces.clone();
+        surfaces.sort_by(|a, b| a.value.total_cmp(&b.value));
+        for (own, surface) in self.isosurfaces.iter_mut().zip(surfaces) {
+            let Isosurface { value, color: [red, green, blue], opacity } = surface;
+            let (entry, depth) = ((value - zero) * per_value, -(1.0 - opacity).max(1e-9).ln());
+            *own = [[entry, opacity, depth, 0.0], [red, green, blue, 0.0]]
+                .map(|part| part.map(|v| v as f32));
+        }
+    }
+
+    fn set_field(&mut self, view: &View, lattice: &Lattice) {
+        let inverse = (view.rotation * lattice.axes).inverse();
+        let rows = inverse.transpose();
+        self.field_axes = columns(rows);
+        // Counted from the first sample, as far as 32-bit numbers go.
+        let [low, high] = lattice.step_range();
+        self.field_origin = wide(-(inverse * view.to_view(lattice.position(low))), 0.0);
+        // A lattice of one sample across still fills its cell.
+        let unit = lattice.unit([0; 3]);
+        let margin = DVec3::select((high - low).cmpgt(DVec3::ZERO), DVec3::ZERO, 0.5 * unit);
+        self.field_low = wide(-margin, 0.0);
+        self.field_high = wide(high - low + margin, 0.0);
+    }
+
+    fn set_kernel(&mut self, lattice: &Lattice, kernel: &Kernel) {
+        let unit = lattice.unit([0; 3]);
+        let sigma = kernel.unit() * unit.x * lattice.axes.x_axis.length();
+        let radius = kernel.radius();
+        self.isotropic =
+            [sigma, 1.0 / sigma, radius * radius, kernel.least_sum()].map(|v| v as f32);
+        // A cell of the body-centred lattice holds two samples.
+        let overlap = match lattice.arrangement {
+            Arrangement::BodyCentred => kernel.integral() * (unit.x * unit.y * unit.z) / 0.5,
+            _ => kernel.integral(),
+        };
+        let length = kernel.extent / kernel.unit();
+        self.kernel = [length, 1.0 / length, 1.0 / overlap, 0.0].map(|v| v as f32);
+    }
+
+    /// The clips around the eye, along the world's axes: half-spaces and boxes that are kept, boxes that are cut out.
+    fn set_clips(&mut self, view: &View, settings: &Settings) {
+        self.world = columns(view.rotation.transpose());
+        let (mut clips, mut holes) = (self.clips.iter_mut(), self.holes.iter_mut());
+        for clip in &settings.clips {
+            let (slot, parts) = match clip.shape {
+                ClipShape::HalfSpace { normal, offset } => {
+                    // The complement of a half-space is another one.
+                    let size = if clip.inside { normal.length() } else { -normal.length() };
+                    let offset = (offset - normal.dot(view.position)) / size;
+                    (clips.next(), [wide(normal / size, 0.0), [offset as f32, 0.0, 0.0, 0.0]])
+                }
+                ClipShape::Box(Bounds { min, max }) => {
+                    let slot = if clip.inside { clips.next() } else { holes.next() };
+                    (slot, [wide(min - view.position, 0.0), wide(max - view.position, 1.0)])
+                }
+            };
+            if let Some(slot) = slot {
+                *slot = parts;
+            }
+        }
+    }
+}
+
+/// How many convex parts clips keep, and how many boxes they cut out.
+pub fn clip_counts(settings: &Settings) -> [u32; 2] {
+    let is_hole = |clip: &&Clip| !clip.inside && matches!(clip.shape, ClipShape::Box(_));
+    let holes = settings.clips.iter().filter(is_hole).count();
+    [(settings.clips.len() - holes) as u32, holes as u32]
+}
