@@ -270,8 +270,7 @@ fn places_beyond_what_32_bits_count_are_found() {
     assert_eq!(read("far.raw", &Limits::default()), "[0.0, 63.0] 63");
     assert_eq!(
         read("far_cut.raw", &Limits::default()),
-        "far_cut.raw: size: holds 63 bytes after the header, but 4 × 4 × 4 samples of type u8 need \
-         64"
+        "far_cut.raw: size: has 63 bytes after the header, but 4 × 4 × 4 samples of type u8 need 64"
     );
     let little = Limits { bytes: 1 << 30, ..Limits::default() };
     assert_eq!(

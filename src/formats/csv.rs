@@ -1,4 +1,5 @@
-//! Scattered samples as tables of text (`.csv`, `.txt`, `.xyzv`): a sample a line, with a line of names or without.
+//! Scattered samples as text tables (`.csv`, `.txt`, `.xyzv`): one sample a line, with or without a
+//! line of column names.
 
 use super::shared::gather::{Columns, choose, gather};
 use crate::{
@@ -8,16 +9,21 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Columns of a covariance.
+/// Column names of a covariance.
 const COVARIANCE: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
 
-/// Reads samples. With names: `x`, `y`, `z`, a value (the column `scalar` names, else `value` or `scalar`, else the only
-/// one left), and if there are some `radius` and `xx`, `xy`, `xz`, `yy`, `yz`, `zz` (or `cov_xx`, …). Without: x, y, z and
-/// value, and then nothing, a radius, or the six terms of a covariance.
+/// Reads samples. With column names, the table has:
+/// - `x`, `y` and `z`;
+/// - a value: the column that `scalar` names, else `value` or `scalar`, else the only column left;
+/// - optionally `radius`, and `xx`, `xy`, `xz`, `yy`, `yz`, `zz` (or `cov_xx`, …).
+///
+/// Without names, the columns are x, y, z and value, then nothing, a radius, or the six terms of a
+/// covariance in that order.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) with the line, for columns that are not these, lines of another length, what is no
-/// number, and numbers that are not finite; [`Error::Limit`](crate::Error::Limit) for more lines than points are allowed.
+/// [`Error::Input`](crate::Error::Input) with the line, for other columns, lines with another
+/// number of columns, words that are not numbers, and numbers that are not finite;
+/// [`Error::Limit`](crate::Error::Limit) for more lines than the limits allow points.
 pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
     let text = Text::of(source, |_, _| Ok(false))?;
     let layout = match &text.names {
@@ -43,7 +49,7 @@ pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
     gather(source, count, position, |row| text.place(row), columns)
 }
 
-/// Which column means what.
+/// The meaning of the columns.
 struct Layout {
     position: [usize; 3],
     value: usize,
@@ -58,9 +64,10 @@ impl Layout {
             4 => Ok(plain),
             5 => Ok(Self { radius: Some(4), ..plain }),
             10 => Ok(Self { covariance: Some([4, 5, 6, 7, 8, 9]), ..plain }),
-            _ => Err(source
-                .error("line 1", format!("has {count} columns without names"))
-                .hint("write x, y, z, value and then nothing, a radius, or xx, xy, xz, yy, yz, zz; or name the columns in the first line")),
+            _ => Err(source.error("line 1", format!("has {count} columns without names")).hint(
+                "write x, y, z, value and then nothing, a radius, or xx, xy, xz, yy, yz, zz; \
+                       or name the columns in the first line",
+            )),
         }
     }
 
@@ -68,7 +75,7 @@ impl Layout {
         let place = format!("line {line}");
         let at = |name: &str| names.iter().position(|other| other.eq_ignore_ascii_case(name));
         let need = |name: &str| {
-            at(name).ok_or_else(|| source.error(&place, format!("names no column “{name}”")))
+            at(name).ok_or_else(|| source.error(&place, format!("has no column “{name}”")))
         };
         let position = [need("x")?, need("y")?, need("z")?];
         let radius = at("radius");
@@ -147,8 +154,8 @@ mod tests {
     #[test]
     fn what_is_wrong_is_told_with_its_line() {
         for (text, scalar, word) in [
-            ("", None, "no lines"),
-            ("# nothing\n", None, "no lines"),
+            ("", None, "no rows"),
+            ("# nothing\n", None, "no rows"),
             ("hello", None, "no column “x”"),
             ("1 2 3", None, "3 columns without names"),
             ("x,y,z\n1,2,3", None, "line 1: has no scalar"),
@@ -161,7 +168,7 @@ mod tests {
             ("1 2 3 4\n5 6 7 8 9", None, "line 2: has 5 columns"),
             ("1 2 3 4\n5 6 seven 8", None, "line 2: “seven” is not a number"),
             ("1;2;3;4\n5;6;7;8,5", None, "“8,5” is not a number"),
-            ("\"1,5\",\"2,5\",\"3,5\",\"4\"\n", None, "neither numbers nor names"),
+            ("\"1,5\",\"2,5\",\"3,5\",\"4\"\n", None, "neither numbers nor column names"),
             ("1,2,3,4\n\"1,5\",\"2,5\",\"3,5\",\"4\"\n", None, "“1,5” is not a number"),
             ("1 2 3 4 0", None, "radius of sample 0 is 0"),
             ("1 2 3 1e39", None, "line 1: the value"),
@@ -178,7 +185,7 @@ mod tests {
         ));
     }
 
-    /// A cut text is an error, or fewer lines, or one of its numbers shorter.
+    /// A truncated text is an error, has fewer lines, or has one number that is shorter.
     #[test]
     fn every_cut_is_an_error_or_less() {
         let whole = "x,y,z,v\n1,2,3,4\n5,6,7,85\n";

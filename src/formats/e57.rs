@@ -1,4 +1,5 @@
-//! E57, the format of terrestrial laser scanners (ASTM E2807): all scans of a file in one cloud, by the `e57` crate.
+//! E57, the format of terrestrial laser scanners (ASTM E2807): all scans of a file as one point
+//! cloud, read by the `e57` crate.
 
 mod description;
 mod streams;
@@ -15,23 +16,26 @@ use ::e57::{CartesianCoordinate, E57Reader, PointCloud, RecordDataType, RecordNa
 use glam::DVec3;
 use std::io::Cursor;
 
-/// Points that are read between two looks at the clock.
+/// Points that are read between two checks of the time limit.
 const POINTS: u64 = 1 << 16;
 
-/// Reads all scans, each moved by its pose: points by Cartesian or spherical coordinates, and colours, or where no scan has
-/// any the intensities as greys. Points without a valid position are left out. A scanner stood at the origin of its scan,
-/// unless the points lie in the world's coordinates already: that is taken from a scan without a pose of its own whose points
-/// are neither spherical nor in rows and columns.
+/// Reads all scans, each transformed by its pose. Points have Cartesian or spherical coordinates,
+/// and colours. If no scan has colours, intensities are drawn as greys. Points without a valid
+/// position are left out.
+///
+/// A scanner stood at the origin of its scan, unless the points are in world coordinates already.
+/// This is assumed of a scan without a pose of its own whose points are neither spherical nor in
+/// rows and columns.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) for a malformed file, a page whose checksum is wrong, and scans that end before
-/// their last point; [`Error::Limit`](crate::Error::Limit) for more points than the limits allow.
+/// [`Error::Input`](crate::Error::Input) for a malformed file, a page with a wrong checksum, and
+/// scans that end before their last point; [`Error::Limit`](crate::Error::Limit) for more points
+/// than the limits allow.
 pub fn read(source: &Source) -> Result<Mesh> {
-    // The crate asserts and clamps by numbers of the file, which may panic.
+    // The crate asserts on numbers of the file and clamps by them, which may panic.
     let cloud = isolated(source, "scans", || {
-        let unreadable = |error: ::e57::Error| {
-            source.error("file", format!("is no E57 file that can be read: {error}"))
-        };
+        let unreadable =
+            |error: ::e57::Error| source.error("file", format!("cannot be read as E57: {error}"));
         let xml = E57Reader::raw_xml(Cursor::new(source.bytes())).map_err(unreadable)?;
         description::check(source, &xml)?;
         let mut file = E57Reader::new(Cursor::new(source.bytes())).map_err(unreadable)?;
@@ -56,8 +60,9 @@ pub fn read(source: &Source) -> Result<Mesh> {
             for point in points {
                 let point = match point {
                     Ok(point) => point,
-                    // What the crate says of a packet that completes no point, such as one of an index. The next call
-                    // reads on, and meets the end of the file if nothing else.
+                    // The crate returns this for a packet that completes no point, such as an index
+                    // packet. The next call reads on, and reaches the end of the file at the
+                    // latest.
                     Err(::e57::Error::Internal { .. }) => {
                         source.check_time()?;
                         continue;
@@ -65,7 +70,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
                     Err(error) => return Err(wrong(format!("ends after {index} points: {error}"))),
                 };
                 index += 1;
-                // Points without a position are kept nowhere, but take their time.
+                // Points without a position are not kept, but take time.
                 if index.is_multiple_of(POINTS) {
                     source.check_time()?;
                 }
@@ -77,7 +82,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
                 positions.push(position)?;
                 let color = point.color.as_ref().map(|color| [color.red, color.green, color.blue]);
                 has_colors |= color.is_some();
-                // What has no colour beside points that have one is white.
+                // Points without a colour are white if others have colours.
                 let [r, g, b] = color.unwrap_or([1.0; 3]).map(|part| (part * 255.0).round() as u8);
                 colors.push([r, g, b, 255])?;
                 intensities.push(point.intensity.unwrap_or(f32::NAN))?;
@@ -90,7 +95,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
         if left_out > 0 {
             tracing::info!(points = left_out, "points without a valid position are left out");
         }
-        // Once more sorted by size.
+        // `greys` sorts a copy of the intensities.
         source.room::<f32>("the intensities", intensities.len())?;
         let colors = if has_colors { colors.into_inner() } else { greys(&intensities) };
         Ok(Cloud {
@@ -104,7 +109,8 @@ pub fn read(source: &Source) -> Result<Mesh> {
     cloud.into_mesh(source, |point| format!("point {point}"))
 }
 
-/// Refuses a scan whose values all take no bits: nothing would end what the crate makes of it.
+/// Returns an error for a scan whose values all take zero bits: nothing would end the crate's
+/// iteration over it.
 fn check(scan: &PointCloud) -> Result<(), &'static str> {
     let takes_bits = scan.prototype.iter().any(|record| match record.data_type {
         RecordDataType::Integer { min, max } | RecordDataType::ScaledInteger { min, max, .. } => {
@@ -112,10 +118,10 @@ fn check(scan: &PointCloud) -> Result<(), &'static str> {
         }
         _ => true,
     });
-    if !takes_bits { Err("has points of no bits") } else { Ok(()) }
+    if !takes_bits { Err("has points that take zero bits") } else { Ok(()) }
 }
 
-/// Where the scanner of a scan stood.
+/// Returns where the scanner of a scan stood.
 fn sensor(scan: &PointCloud) -> Option<DVec3> {
     let has = |name: RecordName| scan.prototype.iter().any(|record| record.name == name);
     let as_scanned = has(RecordName::SphericalRange)

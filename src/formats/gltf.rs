@@ -1,7 +1,8 @@
 //! glTF 2.0 and GLB: the meshes of the default scene, with base colours and pictures.
 //!
-//! The JSON is read into the types of the gltf crate, unvalidated: its validation panics on some broken files and lets
-//! others pass (cycles, counts without bytes). Every index is looked up and every range checked where it is used.
+//! The JSON is read into the types of the gltf crate without its validation, which panics on some
+//! broken files and accepts others (cycles, counts without bytes). Every index is looked up and
+//! every range checked where it is used.
 
 mod accessor;
 mod buffers;
@@ -21,22 +22,24 @@ use glam::{DMat3, DMat4, DVec3, Mat2, Vec2, Vec3};
 use materials::Alpha;
 use std::{collections::HashMap, sync::Arc};
 
-/// Extensions that a file may require: those that are read (`KHR_materials_pbrSpecularGlossiness` among them), and those
-/// that change only the looks of a material in ways that splats do not show.
+/// Extensions that a file may require, by prefix: those that are read (among them
+/// `KHR_materials_pbrSpecularGlossiness`), and those that only change the look of a material in
+/// ways that splats do not show.
 const KNOWN: [&str; 4] =
     ["KHR_mesh_quantization", "KHR_texture_transform", "KHR_lights_punctual", "KHR_materials_"];
 
-/// Reads a glTF or GLB file: the triangles of the default scene in its world frame (or its points, where it has no
-/// triangles), vertex colours, base colours and textures, with opacities as the alpha modes want them. Skins, morph targets
-/// and animations are not applied.
+/// Reads a glTF or GLB file: the triangles of the default scene in its world frame, or its points
+/// if it has no triangles. Reads vertex colours, base colours and textures, with opacities as the
+/// alpha modes require. Skins, morph targets and animations are not applied.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) for malformed JSON, indices and ranges outside their target, cyclic nodes,
-/// references outside the file's folder, positions that are not finite, and required extensions that are not read
-/// (Draco and meshopt compression among them); [`Error::Limit`](crate::Error::Limit) for counts over the limits.
+/// [`Error::Input`](crate::Error::Input) for malformed JSON, indices and ranges outside their
+/// target, cyclic nodes, references outside the file's folder, positions that are not finite, and
+/// required extensions that are not supported (among them Draco and meshopt compression);
+/// [`Error::Limit`](crate::Error::Limit) for counts over the limits.
 pub fn read(source: &Source) -> Result<Mesh> {
     let (text, binary) = buffers::split(source)?;
-    // The copy of the text counts as well.
+    // The copy of the text counts too.
     source.spend(
         "the size of the scene's tree in bytes",
         tree_bytes(text).saturating_add(text.len() as u64),
@@ -49,7 +52,10 @@ pub fn read(source: &Source) -> Result<Mesh> {
         if !KNOWN.iter().any(|known| extension.starts_with(known)) {
             return Err(source
                 .error("extensionsRequired", format!("the extension {extension} is not supported"))
-                .hint("convert the file without compression, for example with gltf-transform or gltfpack"));
+                .hint(
+                    "convert the file without compression, for example with gltf-transform or \
+                       gltfpack",
+                ));
         }
     }
     let buffers = Buffers::open(source, &root, binary)?;
@@ -70,8 +76,9 @@ pub fn read(source: &Source) -> Result<Mesh> {
     builder.finish()
 }
 
-/// Bytes that the tree of a JSON text may take: the largest of what objects become for each of them, and a number, with the
-/// room that lists keep in store, for each comma.
+/// Returns an upper bound on the bytes that the tree of a JSON text takes: for each object the
+/// largest type that objects become, and for each comma a number. Both include the spare capacity
+/// of lists.
 fn tree_bytes(text: &[u8]) -> u64 {
     let largest = [
         size_of::<json::Node>(),
@@ -87,26 +94,27 @@ fn tree_bytes(text: &[u8]) -> u64 {
     text.len() as u64 + 2 * object * count(b'{') + 16 * count(b',')
 }
 
-/// Bytes that a vertex may take in all lists while it is read, and the corner of a face.
+/// Bytes that a vertex, and the corner of a face, may take in all lists while the file is read.
 const VERTEX: u64 = 160;
 const CORNER: u64 = 40;
 
-/// The mesh as it grows.
+/// The mesh while it is being built.
 struct Builder<'a> {
     source: &'a Source<'a>,
     root: &'a json::Root,
     buffers: &'a Buffers<'a>,
     positions: Vec<DVec3>,
     mesh: Mesh,
-    /// Index in the mesh's materials of a file's material (`None`: the default one).
+    /// Index in the mesh's materials, by index in the file (`None`: the default material).
     material_of: HashMap<Option<usize>, u32>,
-    /// Decoded images, as each alpha mode shows them.
+    /// Decoded images, by image and alpha mode.
     pictures: HashMap<(usize, Alpha), Arc<Texture>>,
 }
 
 impl Builder<'_> {
-    /// Takes what the scene will occupy from the budget. A mesh may stand at many nodes, and one accessor in many
-    /// primitives: then the scene is larger than the file by far, and its size should be known before it is built.
+    /// Adds the memory of the whole scene to the budget. A mesh may be used by many nodes, and an
+    /// accessor by many primitives. Then the scene is far larger than the file, so its size must be
+    /// known before it is built.
     fn make_room(&self, meshes: &[(DMat4, usize)]) -> Result<()> {
         let of_primitive = |primitive: &json::mesh::Primitive| {
             let position = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
@@ -114,7 +122,7 @@ impl Builder<'_> {
             let corners = primitive
                 .indices
                 .map_or(vertices, |accessor| self.buffers.claimed(accessor.value()));
-            // A corner of a strip or fan makes a triangle.
+            // Each corner of a strip or fan makes one triangle.
             let triangles = if primitive.mode == Checked::Valid(Mode::Triangles) {
                 corners / 3
             } else {
@@ -142,7 +150,7 @@ impl Builder<'_> {
         let Some(mesh) = root.meshes.get(index) else {
             return Err(self.source.error(
                 format!("mesh {index}"),
-                format!("there are {} meshes", root.meshes.len()),
+                format!("does not exist; there are {} meshes", root.meshes.len()),
             ));
         };
         for (number, primitive) in mesh.primitives.iter().enumerate() {
@@ -174,7 +182,11 @@ impl Builder<'_> {
         let total =
             self.source.check_points("the number of vertices", (base + points.len()) as u64)?;
         if u32::try_from(total).is_err() {
-            return Err(self.source.error(place, "more vertices than 32-bit indices can name"));
+            return Err(self.source.error(
+                place,
+                "has more vertices than 32-bit indices can \
+                                                 address",
+            ));
         }
         self.positions.extend(
             points.iter().map(|p| transform.transform_point3(Vec3::from_array(*p).as_dvec3())),
@@ -194,8 +206,8 @@ impl Builder<'_> {
         if let Some(accessor) = attribute(Semantic::Normals) {
             let normals: Vec<[f32; 3]> = self.buffers.floats(accessor, place, false)?;
             check("normals", normals.len())?;
-            // The cofactors turn normals as the inverse transpose does, and exist for a flat transform too. They have the
-            // determinant as a factor, and with it its sign.
+            // The cofactor matrix transforms normals like the inverse transpose, and also exists
+            // for a flat transform. It carries the determinant as a factor, and so its sign.
             let [x, y, z] = DMat3::from_mat4(transform).to_cols_array_2d().map(DVec3::from_array);
             let sign = if mirrors { -1.0 } else { 1.0 };
             let turn = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * sign;
@@ -259,7 +271,7 @@ impl Builder<'_> {
     fn finish(mut self) -> Result<Mesh> {
         let count = self.positions.len();
         if count == 0 {
-            return Err(self.source.error("scene", "holds no meshes with positions"));
+            return Err(self.source.error("scene", "contains no meshes with positions"));
         }
         let positions = &self.positions;
         (self.mesh.origin, self.mesh.positions) = positions::settle(
@@ -281,14 +293,14 @@ impl Builder<'_> {
     }
 }
 
-/// A colour as displayed (sRGB) from linear light; the opacity is unchanged.
+/// Converts a colour from linear light to display values (sRGB); the opacity is unchanged.
 fn displayed([r, g, b, a]: [f32; 4]) -> [f32; 4] {
     let encode =
         |v: f32| if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
     [encode(r), encode(g), encode(b), a].map(|v| if v.is_nan() { 1.0 } else { v.clamp(0.0, 1.0) })
 }
 
-/// Gives the triangles of a list, strip or fan of corners.
+/// Passes the triangles of a list, strip or fan of corners to `give`.
 fn triangles(mode: Mode, corners: &[u32], mut give: impl FnMut([u32; 3])) {
     match mode {
         Mode::Triangles => corners.chunks_exact(3).for_each(|t| give([t[0], t[1], t[2]])),

@@ -1,4 +1,5 @@
-//! What a file holds: told by its extension, and where that leaves it open by its content.
+//! Which kind of data a file contains: determined by its extension, and by its content if the
+//! extension does not decide.
 
 use super::{ply, vtk, xyz};
 use crate::{
@@ -7,7 +8,7 @@ use crate::{
 };
 use std::path::Path;
 
-/// The kinds of inputs, each with its way to read it.
+/// The kinds of inputs, each with the function that reads it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// [`load_mesh`](super::load_mesh)
@@ -22,30 +23,37 @@ pub enum Kind {
     Bricks,
 }
 
-/// How LAS, E57 and PCD files begin, and STL files of text.
+/// The first bytes of LAS, E57 and PCD files, and of STL text files.
 const MESHES: [&[u8]; 4] = [b"LASF", b"ASTM-E57", b"# .PCD", b"solid "];
 
 impl Kind {
-    /// The kind of a file; none where neither its name nor its first bytes tell. A PLY file with faces is a mesh; one without
-    /// is a cloud, or where a scalar is asked for (`with_scalar`) samples. Legacy VTK files are volumes or samples by the
-    /// data set that they hold.
+    /// Returns the kind of a file, or `None` if neither its name nor its first bytes determine it.
+    /// A PLY file with faces is a mesh. A PLY file without faces is a point cloud, or samples if
+    /// the caller asks for a scalar (`with_scalar`). Legacy VTK files are volumes or samples,
+    /// depending on their data set.
     ///
-    /// Tables of text (`.xyz`, `.pts`, `.asc`, `.csv`, `.txt`) are samples where a scalar is asked for. Else `.xyz`, `.pts`
-    /// and `.asc` are clouds; `.csv` and `.txt` are clouds if their first line names a colour or a normal but no `value` or
-    /// `scalar`, if it names nothing but `x`, `y`, `z`, or if it has 3, 6, 7 or 9 numbers and no names (or one, as the
-    /// count of points that `.pts` files begin with), and samples otherwise. `.xyzv` are samples.
+    /// Text tables (`.xyz`, `.pts`, `.asc`, `.csv`, `.txt`) are samples if the caller asks for a
+    /// scalar. Otherwise `.xyz`, `.pts` and `.asc` are point clouds. `.csv` and `.txt` are point
+    /// clouds in these cases, and samples in all others:
+    /// - The first line names a colour or a normal but no `value` or `scalar`.
+    /// - The first line names nothing but `x`, `y`, `z`.
+    /// - The first line has no names and 3, 6, 7 or 9 numbers, or one number: the count of points
+    ///   that `.pts` files begin with.
+    ///
+    /// `.xyzv` files are samples.
     ///
     /// # Errors
-    /// Those of opening the file; [`Error::Input`](crate::Error::Input) for a PLY file or a legacy VTK file with a malformed
-    /// header.
+    /// Those of opening the file; [`Error::Input`](crate::Error::Input) for a PLY file or a legacy
+    /// VTK file with a malformed header.
     pub fn of(path: &Path, limits: &Limits, with_scalar: bool) -> Result<Option<Self>> {
         Self::of_source(&Source::open(path, limits)?, with_scalar)
     }
 
-    /// As [`of`](Self::of), of what is open already, which may be in memory ([`Source::from_bytes`]).
+    /// As [`of`](Self::of), but reads from an open source, which may be in memory
+    /// ([`Source::from_bytes`]).
     ///
     /// # Errors
-    /// Those of [`of`](Self::of) but for opening.
+    /// Those of [`of`](Self::of), except those of opening the file.
     pub fn of_source(source: &Source, with_scalar: bool) -> Result<Option<Self>> {
         source.unless_changed(Self::find(source, with_scalar))
     }

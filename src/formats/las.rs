@@ -1,8 +1,9 @@
-//! LAS, and its packed form LAZ, of which COPC is a kind: point clouds from the air and from the ground. After the LAS
-//! specification 1.4 R15 of the American Society for Photogrammetry and Remote Sensing.
+//! Point clouds from airborne and terrestrial scanners: LAS, its compressed form LAZ, and COPC, a
+//! kind of LAZ. Follows the LAS specification 1.4 R15 of the American Society for Photogrammetry
+//! and Remote Sensing.
 //!
-//! The header and the points are read here, so that every count is checked against the bytes that there are; the `laz`
-//! crate unpacks the chunks of points (`packed`).
+//! The header and the points are read here, so that every count is checked against the bytes
+//! present. The `laz` crate unpacks the chunks of points (`packed`).
 
 mod packed;
 mod pieces;
@@ -17,12 +18,13 @@ use crate::{Result, input::Source, surface::Mesh};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Reads a cloud: positions and colours, or intensities as greys where there are none. Points that are marked as withheld
-/// are left out.
+/// Reads a point cloud: positions and colours, or intensities as greys if there are no colours.
+/// Points that are marked as withheld are left out.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) for a malformed header, fewer points than it counts, and what cannot be unpacked;
-/// [`Error::Limit`](crate::Error::Limit) for more points than the limits allow.
+/// [`Error::Input`](crate::Error::Input) for a malformed header, fewer points than it counts, and
+/// chunks that cannot be unpacked; [`Error::Limit`](crate::Error::Limit) for more points than the
+/// limits allow.
 pub fn read(source: &Source) -> Result<Mesh> {
     let header = Header::read(source)?;
     let points =
@@ -51,7 +53,7 @@ fn plain(source: &Source, header: &Header) -> Result<Vec<Point>> {
     Ok(data.par_chunks_exact(header.size).filter_map(|record| header.point(record)).collect())
 }
 
-/// The bytes of points that are not packed.
+/// Returns the bytes of points that are not packed.
 fn plain_bytes<'a>(source: &'a Source, header: &Header) -> Result<&'a [u8]> {
     let data = &source.bytes()[header.start..];
     let size = (header.points as u64).saturating_mul(header.size as u64);
@@ -67,34 +69,34 @@ fn plain_bytes<'a>(source: &'a Source, header: &Header) -> Result<&'a [u8]> {
     Ok(&data[..size as usize])
 }
 
-/// Bytes that a point takes beside that: its place, its colour of 16 bits and of 8, its intensity.
+/// Bytes per point besides `Point`: its position, its colour in 16 and in 8 bits, its intensity.
 const POINT: u64 = 24 + 6 + 4 + 4;
 
-/// What matters here of a point.
+/// The attributes of a point that are used.
 struct Point {
     position: [i32; 3],
     color: [u16; 3],
     intensity: u16,
 }
 
-/// What the header says.
+/// The contents of the header.
 struct Header {
-    /// Where the points begin, how many there are, and the bytes of each.
+    /// Offset of the points, their number, and the bytes of each.
     start: usize,
     points: usize,
     size: usize,
-    /// The format of the points, 0 to 10.
+    /// The point format, 0 to 10.
     format: u8,
     packed: bool,
     scale: DVec3,
     offset: DVec3,
-    /// Where the colour is in a point.
+    /// Offset of the colour in a point.
     color_at: Option<usize>,
-    /// Where the first record of variable length is, and how many there are.
+    /// Offset of the first variable length record, and the number of these records.
     records: (usize, u32),
 }
 
-/// The least bytes of a point of each format.
+/// Minimum bytes per point of each format.
 const SIZES: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
 
 impl Header {
@@ -117,10 +119,10 @@ impl Header {
         let [major, minor] = field.at(24).map_err(wrong)?;
         if major != 1 {
             return Err(wrong(format!(
-                "is of version {major}.{minor}, but only 1.0 to 1.4 are known"
+                "has version {major}.{minor}, but only 1.0 to 1.4 can be read"
             )));
         }
-        // Version 1.4 has room for more points; what is older is still filled in where it suffices.
+        // Version 1.4 has a wider count. Writers still fill in the older one if it suffices.
         if minor >= 4 && header_size >= 255 {
             let wide = u64::from_le_bytes(field.at(247).map_err(wrong)?);
             points = if wide > 0 { wide } else { points };
@@ -129,7 +131,7 @@ impl Header {
         let format = format & 0x3f;
         let Some(&least) = SIZES.get(usize::from(format)) else {
             return Err(wrong(format!(
-                "has points of format {format}, but only 0 to 10 are known"
+                "has points of format {format}, but only 0 to 10 can be read"
             )));
         };
         if size < least {
@@ -138,11 +140,14 @@ impl Header {
             )));
         }
         if !scale.is_finite() || !offset.is_finite() || scale.min_element() <= 0.0 {
-            return Err(wrong(format!("has the scale {scale} and the offset {offset}")));
+            return Err(wrong(format!(
+                "has the scale {scale} and the offset {offset}; both must be \
+                                      finite, and the scale above 0"
+            )));
         }
         if start < header_size || start > bytes.len() {
             let message =
-                format!("puts the points at byte {start}, but the file has {}", bytes.len());
+                format!("puts the points at byte {start}, but the file has {} bytes", bytes.len());
             return Err(wrong(message));
         }
         Ok(Self {
@@ -163,7 +168,7 @@ impl Header {
         })
     }
 
-    /// A point from its bytes; none where it is withheld.
+    /// Returns a point from its bytes; `None` if it is withheld.
     fn point(&self, record: &[u8]) -> Option<Point> {
         let short = |at: usize| u16::from_le_bytes([record[at], record[at + 1]]);
         let position =
@@ -181,7 +186,7 @@ impl Header {
     }
 }
 
-/// Numbers at places that may lie beyond the end.
+/// Reads numbers at offsets that may lie beyond the end.
 struct Fields<'a> {
     bytes: &'a [u8],
     place: &'static str,
@@ -191,7 +196,13 @@ impl Fields<'_> {
     fn at<const N: usize>(&self, at: usize) -> Result<[u8; N], String> {
         let found = self.bytes.get(at..).and_then(|rest| rest.first_chunk()).copied();
         found.ok_or_else(|| {
-            format!("{} reaches to byte {}, but there are {}", self.place, at + N, self.bytes.len())
+            format!(
+                "{} extends to byte {}, but only {} bytes are \
+                     present",
+                self.place,
+                at + N,
+                self.bytes.len()
+            )
         })
     }
 }

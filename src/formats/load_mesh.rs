@@ -1,4 +1,4 @@
-//! One door for all mesh and cloud formats.
+//! The single entry point for all mesh and point cloud formats.
 
 use super::{e57, gltf, las, obj, pcd, ply, stl, xyz};
 use crate::{
@@ -8,25 +8,28 @@ use crate::{
 };
 use std::path::Path;
 
-/// Reads a mesh or cloud: PLY, OBJ, glTF, GLB, STL, LAS, LAZ, E57, PCD, or a table of text (XYZ, PTS, ASC, CSV, TXT), by
-/// the file's extension, or by its first bytes where that is another.
+/// Reads a mesh or point cloud: PLY, OBJ, glTF, GLB, STL, LAS, LAZ, E57, PCD, or a text table (XYZ,
+/// PTS, ASC, CSV, TXT). The file's extension selects the format; for other extensions, the first
+/// bytes do.
 ///
 /// # Errors
-/// Those of the format's reader; [`Error::Input`](crate::Error::Input) for a file of none of these formats.
+/// Those of the format's reader; [`Error::Input`](crate::Error::Input) for a file of none of these
+/// formats.
 pub fn load_mesh(path: &Path, limits: &Limits) -> Result<Mesh> {
     read_mesh(&Source::open(path, limits)?)
 }
 
-/// As [`load_mesh`], of what is open already, which may be in memory ([`Source::from_bytes`]).
+/// As [`load_mesh`], but reads from an open source, which may be in memory
+/// ([`Source::from_bytes`]).
 ///
 /// # Errors
-/// Those of [`load_mesh`] but for opening.
+/// Those of [`load_mesh`], except those of opening the file.
 pub fn read_mesh(source: &Source) -> Result<Mesh> {
     let _span = tracing::info_span!("load_mesh", file = %source.path.display()).entered();
     source.unless_changed(read(source))
 }
 
-/// As [`read_mesh`], whatever becomes of the file meanwhile.
+/// As [`read_mesh`], but does not check whether the file changed meanwhile.
 pub(super) fn read(source: &Source) -> Result<Mesh> {
     let extension =
         source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
@@ -47,10 +50,10 @@ pub(super) fn read(source: &Source) -> Result<Mesh> {
         _ if start.starts_with(b"# .PCD") => pcd::read(source),
         _ if start.starts_with(b"solid ") => stl::read(source),
         _ => Err(source
-            .error("path", format!("“.{extension}” is no mesh format that can be read"))
+            .error("path", format!("“.{extension}” is not a mesh format that can be read"))
             .hint(
-                "meshes and clouds are read from .ply, .obj, .gltf, .glb, .stl, .las, .laz, .e57, .pcd, .xyz, .pts, .asc, .csv \
-                 and .txt",
+                "meshes and point clouds are read from .ply, .obj, .gltf, .glb, .stl, .las, .laz, \
+                 .e57, .pcd, .xyz, .pts, .asc, .csv and .txt",
             )),
     }
 }

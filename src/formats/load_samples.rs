@@ -1,4 +1,4 @@
-//! One door for all formats of scattered samples.
+//! The single entry point for all formats of scattered samples.
 
 use super::{csv, npy, ply, vtk, vtu};
 use crate::{
@@ -8,25 +8,28 @@ use crate::{
 };
 use std::path::Path;
 
-/// Reads scattered samples: PLY, VTU, VTP, legacy VTK, NPY, and tables as text (CSV, TXT, XYZV), by the file's extension, or
-/// by its first bytes where that is another. `scalar` names the values where a file has several.
+/// Reads scattered samples: PLY, VTU, VTP, legacy VTK, NPY, and text tables (CSV, TXT, XYZV). The
+/// file's extension selects the format; for other extensions, the first bytes do. `scalar` names
+/// the values to read if a file has several.
 ///
 /// # Errors
-/// Those of the format's reader; [`Error::Input`](crate::Error::Input) for a file of none of these formats.
+/// Those of the format's reader; [`Error::Input`](crate::Error::Input) for a file of none of these
+/// formats.
 pub fn load_samples(path: &Path, limits: &Limits, scalar: Option<&str>) -> Result<Points> {
     read_samples(&Source::open(path, limits)?, scalar)
 }
 
-/// As [`load_samples`], of what is open already, which may be in memory ([`Source::from_bytes`]).
+/// As [`load_samples`], but reads from an open source, which may be in memory
+/// ([`Source::from_bytes`]).
 ///
 /// # Errors
-/// Those of [`load_samples`] but for opening.
+/// Those of [`load_samples`], except those of opening the file.
 pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
     let _span = tracing::info_span!("load_samples", file = %source.path.display()).entered();
     source.unless_changed(read(source, scalar))
 }
 
-/// As [`read_samples`], whatever becomes of the file meanwhile.
+/// As [`read_samples`], but does not check whether the file changed meanwhile.
 pub(super) fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
     let extension =
         source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
@@ -42,7 +45,13 @@ pub(super) fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
         _ if start.starts_with(b"# vtk DataFile") => vtk::read_samples(source, scalar),
         _ if start.starts_with(b"\x93NUMPY") => npy::read(source),
         _ => Err(source
-            .error("path", format!("“.{extension}” is no format of scattered samples that can be read"))
-            .hint("scattered samples are read from .ply, .vtu, .vtp, .vtk, .npy, .csv, .txt and .xyzv")),
+            .error(
+                "path",
+                format!("“.{extension}” is not a format of scattered samples that can be read"),
+            )
+            .hint(
+                "scattered samples are read from .ply, .vtu, .vtp, .vtk, .npy, .csv, .txt and \
+                 .xyzv",
+            )),
     }
 }

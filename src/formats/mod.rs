@@ -1,10 +1,9 @@
 //! Readers and writers of files, one module per format.
 //!
 //! [`load_mesh`], [`load_volume`] and [`load_samples`] look at the name and the first bytes, and
-//! return a mesh (or point cloud), a volume or scattered samples; [`Kind`] says which of them a file
-//! needs. [`read_mesh`], [`read_volume`] and [`read_samples`] do the same with bytes in memory
-//! ([`Source::from_bytes`]). All of them read through a [`Source`], within its
-//! [`Limits`].
+//! return a mesh (or point cloud), a volume or scattered samples; [`Kind`] says which of them a
+//! file needs. [`read_mesh`], [`read_volume`] and [`read_samples`] do the same with bytes in memory
+//! ([`Source::from_bytes`]). All of them read through a [`Source`], within its [`Limits`].
 
 #![deny(clippy::disallowed_methods)]
 
@@ -53,25 +52,28 @@ use crate::{
 };
 use std::path::Path;
 
-/// Reads a volume: VTI, VTR, legacy VTK and NRRD by their extensions (`.vti`, `.vtr`, `.vtk`, `.nrrd`, `.nhdr`), any other
-/// file as raw where `raw` gives its layout, and by its first bytes otherwise. World units are those of the file.
+/// Reads a volume. The extensions `.vti`, `.vtr`, `.vtk`, `.nrrd` and `.nhdr` select the format.
+/// Any other file is read as raw if `raw` gives its layout, and otherwise by its first bytes. World
+/// units are those of the file.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) for what is no such file, [`Error::Limit`](crate::Error::Limit) and
-/// [`Error::File`](crate::Error::File) as for every input.
+/// [`Error::Input`](crate::Error::Input) for a file that is not such a volume,
+/// [`Error::Limit`](crate::Error::Limit) and [`Error::File`](crate::Error::File) as for every
+/// input.
 pub fn load_volume(path: &Path, limits: &Limits, raw: Option<&RawLayout>) -> Result<Volume> {
     read_volume(&Source::open(path, limits)?, raw)
 }
 
-/// As [`load_volume`], of what is open already, which may be in memory ([`Source::from_bytes`]).
+/// As [`load_volume`], but reads from an open source, which may be in memory
+/// ([`Source::from_bytes`]).
 ///
 /// # Errors
-/// Those of [`load_volume`] but for opening.
+/// Those of [`load_volume`], except those of opening the file.
 pub fn read_volume(source: &Source, raw: Option<&RawLayout>) -> Result<Volume> {
     source.unless_changed(volume_of(source, raw))
 }
 
-/// As [`read_volume`], whatever becomes of the file meanwhile.
+/// As [`read_volume`], but does not check whether the file changed meanwhile.
 fn volume_of(source: &Source, raw: Option<&RawLayout>) -> Result<Volume> {
     let extension = source.path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let beginning = &source.bytes()[..source.bytes().len().min(1024)];
@@ -86,12 +88,12 @@ fn volume_of(source: &Source, raw: Option<&RawLayout>) -> Result<Volume> {
         _ if beginning.windows(15).any(|w| w == b"RectilinearGrid") => vtr::read(source),
         _ if beginning.windows(8).any(|w| w == b"<VTKFile") => vti::read(source),
         _ => Err(source
-            .error("file", "is not a volume that can be read: neither VTI, VTR, VTK nor NRRD")
-            .hint("a raw file needs its dimensions and its sample type")),
+            .error("file", "is not a volume that can be read (VTI, VTR, VTK or NRRD)")
+            .hint("to read a raw file, give its dimensions and its sample type")),
     }
 }
 
-/// The error of texture coordinates that are not finite in 32 bits.
+/// Returns the error for texture coordinates that are not finite in 32 bits.
 fn uv_error(source: &Source, place: impl Into<String>, uv: glam::Vec2) -> crate::Error {
     let message =
         format!("the texture coordinates {uv} are not finite; numbers up to 3e38 are expected");

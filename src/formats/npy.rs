@@ -1,5 +1,5 @@
-//! NumPy arrays (`.npy`, versions 1 to 3) of samples: n rows of 4, 5 or 10 floats in C order. After the format's
-//! description in NumPy Enhancement Proposal 1.
+//! NumPy arrays (`.npy`, versions 1 to 3) of samples: n rows of 4, 5 or 10 floats in C order.
+//! Follows the format's description in NumPy Enhancement Proposal 1.
 
 use super::{
     Endian, SampleType,
@@ -12,15 +12,17 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Reads rows of x, y, z, value and then nothing, a radius, or the six terms xx, xy, xz, yy, yz, zz of a covariance.
+/// Reads rows of x, y, z and value, followed by nothing, a radius, or the six terms xx, xy, xz, yy,
+/// yz, zz of a covariance.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) for what is no such array, for another size than the header claims, and for numbers
-/// that are not finite, with the row; [`Error::Limit`](crate::Error::Limit) for more rows than points are allowed.
+/// [`Error::Input`](crate::Error::Input) for a file that is not such an array, for another size
+/// than the header claims, and for numbers that are not finite, with the row;
+/// [`Error::Limit`](crate::Error::Limit) for more rows than the limits allow points.
 pub fn read(source: &Source) -> Result<Points> {
     let bytes = source.bytes();
     let (header, start) = header(bytes).ok_or_else(|| {
-        source.error("header", "is cut off, is longer than 1 MiB, or is none of NumPy's")
+        source.error("header", "is cut off, is longer than 1 MiB, or is not a NumPy header")
     })?;
     let wrong = |message: String| source.error("header", message);
     let field = |name: &str| field(&header, name).ok_or_else(|| wrong(format!("has no “{name}”")));
@@ -35,7 +37,7 @@ pub fn read(source: &Source) -> Result<Points> {
         }
     };
     if field("fortran_order")? != "False" {
-        return Err(wrong("is in Fortran's order".into()).hint("write the array in C's order"));
+        return Err(wrong("is in Fortran order".into()).hint("write the array in C order"));
     }
     let shape = field("shape")?;
     let sizes = || -> Option<Vec<u64>> {
@@ -47,8 +49,14 @@ pub fn read(source: &Source) -> Result<Points> {
             (source.check_points("the number of rows", rows)?, width as usize)
         }
         _ => {
-            return Err(wrong(format!("has the shape {shape}"))
-                .hint("a sample is a row of x, y, z, value and then nothing, a radius, or xx, xy, xz, yy, yz, zz"));
+            return Err(wrong(format!(
+                "has the shape {shape}, but (n, 4), (n, 5) or (n, 10) was \
+                                      expected"
+            ))
+            .hint(
+                "a sample is a row of x, y, z, value and then nothing, a radius, or xx, xy, \
+                       xz, yy, yz, zz",
+            ));
         }
     };
     let size = kind.bytes_of([rows, width, 1]).unwrap_or(u64::MAX);
@@ -83,7 +91,7 @@ pub fn read(source: &Source) -> Result<Points> {
     )
 }
 
-/// The header's text, and where the data begin.
+/// Returns the header's text, and the offset of the data.
 fn header(bytes: &[u8]) -> Option<(String, usize)> {
     let version = bytes.strip_prefix(b"\x93NUMPY")?.first()?;
     let (length, start) = match version {
@@ -91,12 +99,13 @@ fn header(bytes: &[u8]) -> Option<(String, usize)> {
         2 | 3 => (u32::from_le_bytes(*bytes.get(8..)?.first_chunk()?) as usize, 12),
         _ => return None,
     };
-    // No header of a real file comes near this many bytes.
+    // Headers of real files are far shorter than this.
     let text = bytes.get(start..)?.get(..length).filter(|text| text.len() <= 1 << 20)?;
     Some((copy::lossy(text), start + length))
 }
 
-/// What stands behind a name in the header, a Python dictionary: up to the comma outside brackets.
+/// Returns the value of a name in the header, a Python dictionary: the text up to the next comma
+/// outside brackets.
 fn field<'a>(header: &'a str, name: &str) -> Option<&'a str> {
     let rest = header
         .split_once(&format!("'{name}':"))
@@ -183,7 +192,7 @@ mod tests {
             (file(1, "'<f4'", "False", "(-1, 4)", &data), "shape"),
             (file(1, "'<f4'", "False", "(2, 4)", &data), "16 bytes where 32"),
             (file(1, "'<f4'", "False", "(0, 4)", &[]), "no samples"),
-            (file(4, "'<f4'", "False", "(1, 4)", &data), "none of NumPy's"),
+            (file(4, "'<f4'", "False", "(1, 4)", &data), "not a NumPy header"),
             (
                 file(1, "'<f4'", "False", "(1, 4)", &[0, 0, 192, 127].repeat(4)),
                 "row 0: the value NaN",

@@ -1,4 +1,4 @@
-//! NRRD volumes (Teem's format, versions 1 to 5), attached and detached, after its definition at
+//! NRRD volumes (Teem's format, versions 1 to 5), attached and detached. Follows the definition at
 //! <https://teem.sourceforge.net/nrrd/format.html>.
 
 mod files;
@@ -15,23 +15,27 @@ use glam::{DMat3, DVec3};
 use std::{borrow::Cow, collections::HashMap, path::Path, sync::Arc};
 pub use write::{write, write_bytes};
 
-/// Reads a volume of three axes with one scalar each. Positions are in the file's own space (RAS, LPS, …: nothing is
-/// turned round); without `space directions` the axes are x, y, z at the `spacings`, 1 where those are missing or NaN.
+/// Reads a volume of three axes with one scalar per sample. Positions are in the file's own space
+/// (RAS, LPS, …); nothing is rotated. Without `space directions`, the axes are x, y and z with the
+/// steps in `spacings`, or 1 where those are missing or NaN.
 ///
-/// A key and value of splatkit's own, `lattice:=bcc`, marks a body-centred cubic lattice: `sizes` counts its layers along the
-/// third axis, those of both Cartesian lattices in turn; the first two directions are the edges of the cubic cell, the third
-/// is the step from layer to layer, half an edge. Odd layers are displaced by half an edge along the first two. Readers that
-/// do not know the key see a stack of slices, each second one half a pixel off. All other keys are skipped.
+/// The key `lattice:=bcc`, splatkit's own, marks a body-centred cubic lattice. `sizes` then counts
+/// its layers along the third axis; the layers of its two Cartesian lattices alternate. The first
+/// two directions are the edges of the cubic cell. The third is the step from layer to layer, half
+/// an edge. Odd layers are displaced by half an edge along the first two. Readers that do not know
+/// the key see a stack of slices in which every second slice is shifted by half a pixel. All other
+/// keys are skipped.
 ///
-/// A rectilinear lattice has the keys `axis positions 0`, `axis positions 1` and `axis positions 2`, a convention of our own
-/// (`axis positions 0:=0 1 2.5`): ascending positions of the samples along each axis, in lengths of its space direction, from
-/// the space origin.
+/// A rectilinear lattice has the keys `axis positions 0`, `axis positions 1` and `axis positions
+/// 2`, also splatkit's own convention (`axis positions 0:=0 1 2.5`). They give the ascending
+/// positions of the samples along each axis, from the space origin, in lengths of its space
+/// direction.
 ///
-/// Encodings: raw, gzip, ascii and hex. `data file` may name one file inside the header's folder, or several: as a list, or by
-/// a pattern with a number (`slice%03d.raw 1 90 1`).
+/// Encodings: raw, gzip, ascii and hex. `data file` may name one file inside the header's folder,
+/// or several: as a list, or by a pattern with a number (`slice%03d.raw 1 90 1`).
 ///
 /// # Errors
-/// [`Error::Input`] with the field that is missing or wrong, for data that are cut off and for
+/// [`Error::Input`] with the field that is missing or wrong, for data that are cut off, and for
 /// samples that are not finite; [`Error::Limit`] for sizes over the limits.
 pub fn read(source: &Source) -> Result<Volume> {
     let (header, body) = Header::read(source)?;
@@ -40,7 +44,7 @@ pub fn read(source: &Source) -> Result<Volume> {
     let kind = header.sample_type()?;
     let rest = &source.bytes()[body..];
     let claimed = kind.bytes_of(dims).unwrap_or(u64::MAX);
-    // No limit helps where raw samples are missing, so that is told first.
+    // Raising a limit would not help if raw samples are missing, so check that first.
     if header.data_file().is_none()
         && !header.has_skips()
         && header.is_raw()?
@@ -84,8 +88,8 @@ pub fn read(source: &Source) -> Result<Volume> {
         .map_err(|message| source.error("samples", message))
 }
 
-/// Where the samples of a file of raw encoding stand; `None` for other encodings, and where something is to be skipped or
-/// several files are named.
+/// Returns where the samples are in a file with raw encoding; `None` for other encodings, and if
+/// bytes or lines are to be skipped or the header names several files.
 pub(super) fn plain(source: &Source) -> Result<Option<Plain>> {
     let (header, body) = Header::read(source)?;
     let lattice = header.lattice(header.dims()?)?;
@@ -100,7 +104,7 @@ pub(super) fn plain(source: &Source) -> Result<Option<Plain>> {
         Some(name) => {
             let path = source.neighbour("data file", name)?;
             let size = sample_type.bytes_of(lattice.dims).unwrap_or(u64::MAX);
-            // Fewer bytes are told where they are read.
+            // Too few bytes are an error when they are read.
             if let Ok(found) = path.metadata() {
                 refuse_more(&path, found.len(), size)?;
             }
@@ -110,22 +114,29 @@ pub(super) fn plain(source: &Source) -> Result<Option<Plain>> {
     Ok(Some(Plain { path, start, sample_type, endian, lattice }))
 }
 
-/// Refuses raw samples in a file of their own that has more bytes than they take.
+/// Returns an error if a separate file of raw samples has more bytes than the samples need.
 fn refuse_more(path: &Path, there: u64, expected: u64) -> Result<()> {
     if there <= expected {
         return Ok(());
     }
-    Err(Error::input(path, "data", format!("there are {there} bytes where {expected} were expected"))
-        .hint("“sizes” or “type” of the header are wrong, or “byte skip” is missing (-1 takes the last bytes)"))
+    Err(Error::input(
+        path,
+        "data",
+        format!("there are {there} bytes where {expected} were expected"),
+    )
+    .hint(
+        "“sizes” or “type” in the header is wrong, or “byte skip” is missing (-1 takes the \
+               last bytes)",
+    ))
 }
 
-/// No header of a real file comes near this many bytes.
+/// Maximum size of a header in bytes; headers of real files are far smaller.
 const LONGEST: usize = 64 << 20;
 
-/// Bytes that a line of the header takes beside its text.
+/// Bytes of memory for a line of the header, besides its text.
 const ENTRY: u64 = 256;
 
-/// The fields of a header, names in lower case, and its keys with their values.
+/// The fields of a header, with names in lower case, and its keys with their values.
 struct Header<'a> {
     source: &'a Source<'a>,
     fields: HashMap<String, String>,
@@ -133,7 +144,7 @@ struct Header<'a> {
 }
 
 impl<'a> Header<'a> {
-    /// Reads up to the empty line or the end of the file; also gives where the data begin.
+    /// Reads up to the empty line or the end of the file. Also returns the offset of the data.
     fn read(source: &'a Source<'a>) -> Result<(Self, usize)> {
         let bytes = source.bytes();
         if !(bytes.starts_with(b"NRRD000") && matches!(bytes.get(7), Some(b'1'..=b'5'))) {
@@ -141,10 +152,10 @@ impl<'a> Header<'a> {
         }
         let mut fields = HashMap::new();
         let mut keys = HashMap::new();
-        // The line of each field, by its name in the spelling without spaces.
+        // The line number of each field, by its name without spaces.
         let mut lines: HashMap<String, usize> = HashMap::new();
         let mut at = 0;
-        // A byte more tells a line that is too long.
+        // One byte over the maximum shows that the header is too long.
         let window = &bytes[..bytes.len().min(LONGEST + 1)];
         for (number, line) in window.split_inclusive(|&b| b == b'\n').enumerate() {
             at += line.len();
@@ -173,7 +184,7 @@ impl<'a> Header<'a> {
                         && is_read
                     {
                         let message =
-                            format!("the key “{}” is given twice; it must stand once", shown(key));
+                            format!("the key “{}” is given twice; give it once", shown(key));
                         return Err(source.error(format!("line {}", number + 1), message));
                     }
                 }
@@ -186,19 +197,20 @@ impl<'a> Header<'a> {
                     let is_list = spelling == "datafile" && files::is_list(value);
                     if let Some(before) = lines.insert(spelling, number + 1) {
                         let message = format!(
-                            "the field “{}” is given twice, in line {before} too; it must stand once",
+                            "the field “{}” is given twice, in line {before} too; give it once",
                             shown(&name)
                         );
                         return Err(source.error(format!("line {}", number + 1), message));
                     }
                     fields.insert(name, value.to_owned());
-                    // The names of files follow, up to the end.
+                    // File names follow, up to the end.
                     if is_list {
                         break;
                     }
                 }
                 None => {
-                    let message = "is neither a field, a key and value, a comment, nor the empty line before the data";
+                    let message = "is neither a field, a key and value, a comment, nor the empty \
+                                   line before the data";
                     return Err(source.error(format!("line {}", number + 1), message));
                 }
             }
@@ -206,12 +218,13 @@ impl<'a> Header<'a> {
         Ok((Self { source, fields, keys }, at))
     }
 
-    /// A field by its spellings.
+    /// Returns a field by any of its spellings.
     fn get(&self, names: &[&str]) -> Option<&str> {
         names.iter().find_map(|&name| self.fields.get(name)).map(String::as_str)
     }
 
-    /// What tells where the samples are; `None` where they are in this file.
+    /// Returns the field that names the files with the samples; `None` if the samples are in this
+    /// file.
     fn data_file(&self) -> Option<&str> {
         self.get(&["data file", "datafile"])
     }
@@ -221,17 +234,17 @@ impl<'a> Header<'a> {
             .ok_or_else(|| self.source.error("header", format!("has no field “{name}”")))
     }
 
-    /// Whether the samples stand as they are.
+    /// Returns whether the samples have raw encoding.
     fn is_raw(&self) -> Result<bool> {
         Ok(self.need("encoding")?.eq_ignore_ascii_case("raw"))
     }
 
-    /// Whether something stands before the samples that is to be skipped.
+    /// Returns whether lines or bytes before the samples are to be skipped.
     fn has_skips(&self) -> bool {
         self.get(&["line skip", "lineskip", "byte skip", "byteskip"]).is_some()
     }
 
-    /// The numbers of a field, exactly `N`.
+    /// Returns the numbers of a field, exactly `N`.
     fn numbers<const N: usize, T: std::str::FromStr>(
         &self,
         name: &str,
@@ -252,7 +265,7 @@ impl<'a> Header<'a> {
                 format!("is {dimension}, but a volume has 3 axes with one scalar for each sample"),
             ));
         }
-        // An axis of colours or vectors is none of space.
+        // An axis of colours or vectors is not an axis of space.
         let several =
             ["color", "vector", "normal", "gradient", "matrix", "quaternion", "complex", "point"];
         let kinds = self.get(&["kinds"]).unwrap_or_default().to_ascii_lowercase();
@@ -261,7 +274,8 @@ impl<'a> Header<'a> {
             .find(|kind| several.iter().any(|name| kind.contains(name)))
         {
             let message = format!(
-                "one axis holds values of the kind “{kind}”, but a volume has one scalar for each sample"
+                "one axis holds values of the kind “{kind}”, but a volume has one scalar for each \
+                 sample"
             );
             return Err(self
                 .source
@@ -289,28 +303,29 @@ impl<'a> Header<'a> {
         };
         let lattice = match self.keys.get("lattice").map(String::as_str) {
             None => Lattice { dims, origin, axes, arrangement: self.arrangement()? },
-            // Two layers make an edge.
+            // Two layers span an edge.
             Some("bcc") => Lattice::body_centred(
                 dims,
                 origin,
                 DMat3::from_cols(axes.x_axis, axes.y_axis, 2.0 * axes.z_axis),
             ),
             Some(other) => {
-                let error = self
-                    .source
-                    .error("lattice", format!("“{other}” is not a lattice that is known"));
-                return Err(
-                    error.hint("lattice:=bcc marks body-centred cubic lattices; Cartesian ones have no such key")
-                );
+                let error =
+                    self.source.error("lattice", format!("“{other}” is not a known lattice"));
+                return Err(error.hint(
+                    "lattice:=bcc marks body-centred cubic lattices; Cartesian ones \
+                                have no such key",
+                ));
             }
         };
         lattice.validate().map_err(|message| self.source.error("header", message))?;
         Ok(lattice)
     }
 
-    /// Where the first sample is along each axis, and how far the next, by the fields of single axes.
+    /// Returns the position of the first sample and the step along each axis, from the per-axis
+    /// fields.
     fn along_axes(&self, dims: [usize; 3]) -> Result<[[f64; 2]; 3]> {
-        // NaN stands for what is not known of an axis.
+        // NaN marks an unknown value of an axis.
         let numbers = |names: &[&str]| match self.get(names) {
             Some(text) => self.numbers::<3, f64>(names[0], text),
             None => Ok([f64::NAN; 3]),
@@ -318,7 +333,7 @@ impl<'a> Header<'a> {
         let spacings = numbers(&["spacings"])?;
         let (mins, maxs) =
             (numbers(&["axis mins", "axismins"])?, numbers(&["axis maxs", "axismaxs"])?);
-        // Samples stand in the middle of cells where nothing tells that they are nodes.
+        // Samples are at the centres of cells unless the header says that they are nodes.
         let centers = self.get(&["centers", "centerings"]).unwrap_or_default();
         let is_node: Vec<bool> = centers
             .split_ascii_whitespace()
@@ -356,7 +371,7 @@ impl<'a> Header<'a> {
         Ok(Arrangement::Rectilinear(Arc::new(places)))
     }
 
-    /// Vectors written as (x,y,z), exactly `N`.
+    /// Returns vectors written as (x,y,z), exactly `N`.
     fn vectors<const N: usize>(&self, name: &str, text: &str) -> Result<[DVec3; N]> {
         let wrong = || self.source.error(name, format!("“{}” is not {N} × (x,y,z)", shown(text)));
         let vector = |part: &str| {
@@ -405,7 +420,7 @@ impl<'a> Header<'a> {
             _ => {
                 return Err(self
                     .source
-                    .error("type", format!("“{}” is not a type of scalars", shown(&name))));
+                    .error("type", format!("“{}” is not a scalar type", shown(&name))));
             }
         })
     }
@@ -424,7 +439,8 @@ impl<'a> Header<'a> {
         }
     }
 
-    /// Unpacks `size` bytes of samples from the data, which may be in a file of their own; and tells their order.
+    /// Decodes `size` bytes of samples from the data, which may be in a separate file. Also returns
+    /// their byte order.
     fn bytes<'d>(
         &self,
         file: &Source,
@@ -453,12 +469,19 @@ impl<'a> Header<'a> {
         if from_end && encoding != "raw" {
             return Err(self
                 .source
-                .error("byte skip", "-1 counts from the end, which only raw data can"));
+                .error("byte skip", "-1 counts from the end, which works only for raw data"));
         }
         let skip = skip.max(0) as usize;
         let after_skip = || {
-            data.get(skip..)
-                .ok_or_else(|| file.error(place, format!("end before the {skip} bytes to skip do")))
+            data.get(skip..).ok_or_else(|| {
+                file.error(
+                    place,
+                    format!(
+                        "have fewer than the {skip} bytes to \
+                                                          skip"
+                    ),
+                )
+            })
         };
         let text = || {
             let bytes = after_skip()?;
@@ -479,7 +502,7 @@ impl<'a> Header<'a> {
                 })?;
                 (found.into(), self.endian(kind)?)
             }
-            // Skipped lines stand before the packed stream, skipped bytes inside it.
+            // Skipped lines precede the compressed stream; skipped bytes are inside it.
             "gzip" | "gz" => {
                 let mut unpacked =
                     file.unpack(place, MultiGzDecoder::new(data), skip.saturating_add(size))?;
@@ -509,7 +532,7 @@ impl<'a> Header<'a> {
     }
 }
 
-/// The beginning of a text, for an error.
+/// Returns the first 80 characters of a text, for an error.
 fn shown(text: &str) -> String {
     if text.chars().nth(80).is_none() {
         text.to_owned()
@@ -518,11 +541,16 @@ fn shown(text: &str) -> String {
     }
 }
 
-/// Bytes of two hexadecimal digits each; white space does not count.
+/// Decodes bytes of two hexadecimal digits each; white space is ignored.
 fn from_hex(text: &str, size: usize) -> Result<Vec<u8>, String> {
     let mut digits = Vec::new();
     for c in text.chars().filter(|c| !c.is_ascii_whitespace()) {
-        digits.push(c.to_digit(16).ok_or_else(|| format!("“{c}” is no hexadecimal digit"))? as u8);
+        digits.push(c.to_digit(16).ok_or_else(|| {
+            format!(
+                "“{c}” is not a hexadecimal \
+                                                          digit"
+            )
+        })? as u8);
     }
     if digits.len() % 2 != 0 || digits.len() / 2 != size {
         return Err(format!(

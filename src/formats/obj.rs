@@ -1,8 +1,9 @@
 //! Wavefront OBJ with its MTL materials and pictures.
 //!
-//! tobj reads the statements. A survey of our own goes first (`survey`): it gives errors their line, and its feed
-//! keeps from tobj what tobj would read wrongly. OBJ has no counts and no end mark, so a file that is cut at the end of
-//! a line, or within its last number, reads as a smaller one.
+//! tobj parses the statements. Before that, our own survey (`survey`) scans the file. It gives
+//! errors their line, and its feed hides from tobj what tobj would read wrongly. OBJ has no counts
+//! and no end mark. So a file that is cut at the end of a line, or within its last number, reads as
+//! a smaller one.
 
 mod material;
 mod survey;
@@ -19,13 +20,15 @@ use glam::{DVec3, Vec2, Vec3};
 use std::{cell::RefCell, collections::HashMap, path::Path};
 use survey::Survey;
 
-/// Reads an OBJ file: polygons, concave ones too, cut into triangles, with vertex colours, normals and materials. Texture
-/// coordinates are kept where a material has a picture; a vertex is split where corners differ in normal or texture
-/// coordinates. A file of vertices only is a cloud. Lines and points are passed over.
+/// Reads an OBJ file. Polygons, including concave ones, are cut into triangles, with vertex
+/// colours, normals and materials. Texture coordinates are kept if a material has a picture. A
+/// vertex is split if its corners differ in normal or texture coordinates. A file with vertices
+/// only is a point cloud. Lines and points are skipped.
 ///
 /// # Errors
-/// [`Error::Input`] for malformed numbers, positions, and texture coordinates in pictures, that are not finite, indices without a vertex, and references to
-/// files outside the file's folder. Missing material files and pictures are warnings.
+/// [`Error::Input`] for malformed numbers; for positions, and texture coordinates in pictures, that
+/// are not finite; for indices without a vertex; and for references to files outside the file's
+/// folder. Missing material files and pictures are warnings.
 pub fn read(source: &Source) -> Result<Mesh> {
     source.room::<u8>("the text", source.bytes().len())?;
     let text = join_lines(source, copy::lossy(source.bytes()))?;
@@ -36,7 +39,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
     let library = RefCell::new(material::Library::new(source));
     let failure: RefCell<Option<Error>> = RefCell::new(None);
     let mut feed = survey.feed(&text);
-    // tobj's triangles are fans, which cover what is outside of a concave polygon.
+    // tobj would triangulate by fans, which also cover area outside a concave polygon.
     let options =
         tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     let load = |path: &Path| {
@@ -48,7 +51,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
             },
         )
     };
-    // tobj does arithmetic on what it reads.
+    // tobj does unchecked arithmetic on numbers of the file.
     let loaded =
         isolated(source, "statements", || Ok(tobj::load_obj_buf(&mut feed, &options, load)))?;
     let line = feed.line();
@@ -82,7 +85,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
     source.check_points("the number of vertices", corners.positions.len() as u64)?;
     source.check_points("the number of triangles", corners.triangles.len() as u64)?;
     if corners.triangles.is_empty() {
-        return Err(source.error("file", "has faces, but none of three corners or more"));
+        return Err(source.error("file", "has faces, but none with three or more corners"));
     }
     let positions = &corners.positions;
     (mesh.origin, mesh.positions) = positions::settle(
@@ -98,7 +101,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// What is drawn where a face names no material that exists.
+/// The material of faces that name no existing material.
 fn neutral() -> Material {
     Material { name: "none".into(), color: [0.8, 0.8, 0.8, 1.0], texture: None }
 }
@@ -112,7 +115,7 @@ fn join_lines(source: &Source, text: String) -> Result<String> {
     Ok(text)
 }
 
-/// The vertices of all models; a corner's index triple makes one.
+/// The vertices of all models; each distinct index triple of a corner makes one.
 #[derive(Default)]
 struct Corners {
     positions: Vec<DVec3>,
@@ -123,7 +126,7 @@ struct Corners {
 }
 
 impl Corners {
-    /// Adds a model. `with_uv`: its texture coordinates matter; `any_uv`: those of some model do.
+    /// Adds a model. `with_uv`: its texture coordinates matter; `any_uv`: those of any model do.
     fn add(
         &mut self,
         source: &Source,
@@ -154,7 +157,7 @@ impl Corners {
         self.cut(source, &corners, &mesh.face_arities)
     }
 
-    /// Adds the vertices that a model's corners make, and puts them in the corners' place.
+    /// Adds the vertices that a model's corners make, and replaces the corners by their indices.
     fn add_split(&mut self, mesh: &tobj::Mesh, corners: &mut [u32], with_uv: bool, any_uv: bool) {
         let mut vertex_of: HashMap<(u32, u32, u32), u32> = HashMap::new();
         for (corner, index) in corners.iter_mut().enumerate() {
@@ -173,7 +176,7 @@ impl Corners {
                     self.normals.push(positions::unit(normal.as_vec3()));
                 }
                 if any_uv {
-                    // OBJ counts v from the bottom of the picture.
+                    // In OBJ, v = 0 is the bottom of the picture.
                     let uv = uv.map_or([0.0, 0.0], |uv| {
                         [mesh.texcoords[uv as usize * 2], 1.0 - mesh.texcoords[uv as usize * 2 + 1]]
                     });
@@ -184,7 +187,8 @@ impl Corners {
         }
     }
 
-    /// Cuts faces into triangles, given the corners of all and how many each has; without the latter, all are triangles.
+    /// Cuts faces into triangles, given all corners and the number of corners of each face. If
+    /// `arities` is empty, all faces are triangles.
     fn cut(&mut self, source: &Source, corners: &[u32], arities: &[u32]) -> Result<()> {
         if arities.is_empty() {
             self.triangles.extend_from_slice(corners.as_chunks().0);
@@ -192,7 +196,7 @@ impl Corners {
         }
         let mut rest = corners;
         for (face, &arity) in arities.iter().enumerate() {
-            // A face of many corners may take its time.
+            // Cutting a face with many corners may take long.
             if arity > 64 || face.is_multiple_of(1 << 12) {
                 source.check_time()?;
             }
@@ -211,7 +215,7 @@ impl Corners {
     }
 }
 
-/// Colours as bytes. They are fractions of 1 in most files, of 255 in some.
+/// Converts colours to bytes. In most files they are fractions of 1, in some fractions of 255.
 fn to_bytes(colors: &[[f64; 3]]) -> Vec<[u8; 4]> {
     let largest = colors.iter().flatten().fold(0.0, |a: f64, &b| a.max(b));
     let scale = if largest > 1.0 { 1.0 } else { 255.0 };
@@ -224,7 +228,7 @@ fn to_bytes(colors: &[[f64; 3]]) -> Vec<[u8; 4]> {
         .collect()
 }
 
-/// Vertices without faces, which tobj does not give.
+/// Reads vertices without faces, which tobj does not return.
 fn read_cloud(source: &Source, text: &str, survey: &Survey) -> Result<Mesh> {
     let mut mesh = Mesh::default();
     let mut points: Vec<(DVec3, usize)> = Vec::new();
@@ -248,7 +252,8 @@ fn read_cloud(source: &Source, text: &str, survey: &Survey) -> Result<Mesh> {
     if points.is_empty() {
         return Err(source.error("file", "has no vertices (no line that begins with “v ”)"));
     }
-    // Vertices come before faces: a mesh that is cut in its vertices looks like a cloud, but for its last line.
+    // Vertices come before faces, so a mesh that is cut within its vertices looks like a point
+    // cloud, except for its last line.
     if !source.bytes().ends_with(b"\n") {
         return Err(source
             .error(

@@ -1,4 +1,4 @@
-//! PCD, the format of the Point Cloud Library: text, binary, and packed by LZF.
+//! PCD, the format of the Point Cloud Library: text, binary, and binary compressed by LZF.
 
 mod header;
 mod lzf;
@@ -16,18 +16,19 @@ use header::{Data, Field, Header};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
-/// Bytes that a point takes with all that it may have, and its number.
+/// Bytes per point with every attribute, and its index.
 const POINT: u64 = 8 + 24 + 12 + 4;
 
-/// Reads a cloud: `x`, `y`, `z`, and if there are some `normal_x`, `normal_y`, `normal_z` (or `nx`, …) and `rgb` or `rgba`,
-/// whose opacity is passed over, since many writers leave it 0. Points that are not finite are how the format marks missing
-/// ones, and are left out. The viewpoint is where the scanner stood, but one at the origin only if the points are in rows
-/// and columns: it is also what is written where nothing is known.
+/// Reads a point cloud: `x`, `y`, `z`, and optionally `normal_x`, `normal_y`, `normal_z` (or `nx`,
+/// …) and `rgb` or `rgba`. Opacity is ignored, since many writers leave it 0. The format marks
+/// missing points by coordinates that are not finite; they are left out. The viewpoint is where the
+/// scanner stood. A viewpoint at the origin counts only if the points are in rows and columns,
+/// because writers also use it as the default.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) for a malformed header, another size than it claims, what cannot be unpacked, and a
-/// line of text that is not as the header says; [`Error::Limit`](crate::Error::Limit) for more points or bytes than the limits
-/// allow.
+/// [`Error::Input`](crate::Error::Input) for a malformed header, another size than it claims, data
+/// that cannot be unpacked, and lines of text that do not match the header;
+/// [`Error::Limit`](crate::Error::Limit) for more points or bytes than the limits allow.
 pub fn read(source: &Source) -> Result<Mesh> {
     let header = header::read(source)?;
     let count = source.check_points("the number of points", header.points)?;
@@ -70,12 +71,12 @@ pub fn read(source: &Source) -> Result<Mesh> {
     cloud.into_mesh(source, |point| format!("point {}", kept[point]))
 }
 
-/// Where the numbers lie.
+/// Where the numbers are.
 enum Rows<'a> {
-    /// The numbers of each point of a text one after the other.
+    /// The numbers of a text file, point after point.
     Text { numbers: Vec<f64>, width: usize },
-    /// Bytes of which each field's begin at `start` · offset, and of which each point takes `stride` or as many as the
-    /// field has.
+    /// The field of a row begins at `start` · offset + row · stride. If `stride` is `None`, it is
+    /// the size of the field: each field is stored for all points in turn.
     Bytes { bytes: Cow<'a, [u8]>, start: usize, stride: Option<usize> },
 }
 
@@ -153,8 +154,9 @@ impl<'a> Rows<'a> {
             }
         }
         if found < count {
-            return Err(source
-                .error("data", format!("holds {found} points where the header claims {count}")));
+            return Err(
+                source.error("data", format!("has {found} points, but the header claims {count}"))
+            );
         }
         Ok(Self::Text { numbers: numbers.into_inner(), width })
     }
@@ -166,7 +168,8 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// The bits of a colour: an unsigned number, or a float of the same bits.
+    /// Returns the bits of a colour, which is stored as an unsigned number or as a float with the
+    /// same bits.
     fn bits(&self, row: usize, field: &Field) -> u32 {
         match self {
             Self::Text { numbers, width } => {
@@ -179,7 +182,7 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// The bytes of a field's first number.
+    /// Returns the bytes of a field's first number.
     fn bytes(&self, row: usize, field: &Field) -> &[u8] {
         let Self::Bytes { bytes, start, stride } = self else { return &[] };
         &bytes[start * field.offset + row * stride.unwrap_or(field.bytes())..][..field.size]

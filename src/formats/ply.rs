@@ -1,8 +1,10 @@
-//! PLY, in text and binary of either byte order: meshes and clouds, with normals, colours and texture coordinates.
+//! PLY, in text and binary of either byte order: meshes and point clouds, with normals, colours and
+//! texture coordinates.
 //!
-//! The header gives every element's columns (`header`); the rows are found without decoding (`rows`); then the
-//! columns that mean something here are decoded in parallel. Other elements and columns are passed over. A text file
-//! that ends within its very last number cannot be told from a whole one and reads as that shorter number.
+//! The header lists every element's columns (`header`). The rows are located without decoding them
+//! (`rows`). Then the relevant columns are decoded in parallel. Other elements and columns are
+//! skipped. A text file that ends within its very last number cannot be distinguished from a whole
+//! one; it is read with the shorter number.
 
 mod faces;
 mod gaussians;
@@ -34,19 +36,20 @@ pub use samples::{has_faces, read_samples};
 use table::Table;
 pub use write::write;
 
-/// Rows of one parallel task.
+/// Rows per parallel task.
 const CHUNK: usize = 1 << 14;
 
 /// Reads a PLY file.
 ///
-/// Faces of more than three corners are cut into triangles, and `tristrips` too. Texture coordinates are those of vertices, or
-/// else those that faces have for their corners (`texcoord`, with a `texnumber`). Colours are bytes, 16-bit numbers or
-/// fractions of 1; as wider types they are bytes where the largest of all tells so.
+/// Faces with more than three corners are cut into triangles, and so are `tristrips`. Texture
+/// coordinates are those of the vertices, or else those that faces have for their corners
+/// (`texcoord`, with a `texnumber`). Colours are bytes, 16-bit numbers or fractions of 1. In wider
+/// types, they are bytes if the largest value of the file shows it.
 ///
 /// # Errors
-/// A malformed header, a file that ends before its last row, positions that are not finite, and face indices without a
-/// vertex are [`Error::Input`](crate::Error::Input); more vertices or faces than the limits allow are
-/// [`Error::Limit`](crate::Error::Limit).
+/// [`Error::Input`](crate::Error::Input) for a malformed header, a file that ends before its last
+/// row, positions that are not finite, and face indices without a vertex;
+/// [`Error::Limit`](crate::Error::Limit) for more vertices or faces than the limits allow.
 pub fn read(source: &Source) -> Result<Mesh> {
     let header = header::read(source)?;
     let vertices = header.elements.iter().find(|element| element.name == "vertex");
@@ -68,7 +71,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
             }
             read_vertices(source, element, &rows, &mut mesh)?;
         } else if is_face {
-            // Their vertices may stand behind them.
+            // Faces are read last, because their vertices may come after them.
             faces.push((element, rows));
         }
     }
@@ -89,15 +92,16 @@ pub fn read(source: &Source) -> Result<Mesh> {
     if mesh.uvs.is_empty() {
         let file = source.path.display();
         tracing::warn!(
-            "{file}: names a picture, but neither vertices nor faces have coordinates in it; drawn without it"
+            "{file}: names a picture, but neither vertices nor faces have texture coordinates; \
+             drawn without it"
         );
         return Ok(mesh);
     }
-    // Those of vertices that were split stand behind those of the file's rows.
+    // Vertices added by splitting come after those of the file's rows.
     if let Some(vertex) = mesh.uvs.par_iter().position_first(|uv| !uv.is_finite()) {
         return Err(super::uv_error(source, format!("vertex {vertex}"), mesh.uvs[vertex]));
     }
-    // Coordinates of vertices are those in the first picture.
+    // Texture coordinates of vertices refer to the first picture.
     let shown = if of_corners { header.textures.len() } else { 1 };
     for name in header.textures.into_iter().take(shown) {
         let texture = texture::read_reference(source, "comment TextureFile", &name)?;
@@ -110,7 +114,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// The columns of a vertex that mean something here, in the order of [`Role`].
+/// Names of the vertex columns that are read. The constants below give their indices.
 const ROLES: [&[&str]; 12] = [
     &["x"],
     &["y"],
@@ -144,7 +148,7 @@ fn read_vertices(source: &Source, element: &Element, rows: &Rows, mesh: &mut Mes
     fill(source, element, rows, &columns, |row, role| table.value(row, role), mesh)
 }
 
-/// Fills the mesh from the value of a row and a role.
+/// Fills the mesh from the values of rows and roles.
 fn fill(
     source: &Source,
     element: &Element,
@@ -181,14 +185,14 @@ fn fill(
     }
     if has(UV, 2) {
         source.room::<Vec2>("the texture coordinates", count)?;
-        // PLY counts v from the bottom of the picture.
+        // In PLY, v = 0 is the bottom of the picture.
         let uv = |row| Vec2::new(value(row, UV) as f32, 1.0 - value(row, UV + 1) as f32);
         mesh.uvs = (0..count).into_par_iter().map(uv).collect();
     }
     Ok(())
 }
 
-/// The type of a channel of colour.
+/// The type of a colour channel.
 #[derive(Clone, Copy, PartialEq)]
 enum ColorKind {
     Byte,
@@ -197,13 +201,14 @@ enum ColorKind {
 }
 
 impl ColorKind {
-    /// Whether its type alone does not tell what the largest value means.
+    /// Returns whether the meaning of the largest value depends on all values, not just on the
+    /// type.
     fn is_wide(&self) -> bool {
         *self != Self::Byte
     }
 }
 
-/// The types of a vertex's channels of colour; none for one that there is not.
+/// Returns the types of a vertex's colour channels; `None` for a missing channel.
 fn color_kind(element: &Element, columns: &[Option<usize>; ROLES.len()]) -> [Option<ColorKind>; 4] {
     debug_assert_eq!(COLOR + 3, ALPHA);
     [0, 1, 2, 3].map(|channel| {
@@ -215,10 +220,10 @@ fn color_kind(element: &Element, columns: &[Option<usize>; ROLES.len()]) -> [Opt
     })
 }
 
-/// What makes a byte of each channel, by the largest values of all colours: some programs write bytes as 16-bit numbers, and
-/// some as floating point ones.
+/// Returns the factor that converts each channel to bytes, given the largest values of all colours.
+/// Some programs write bytes as 16-bit numbers, others as floats.
 fn color_scale(kinds: &[Option<ColorKind>; 4], largest: [f64; 4]) -> [Option<f64>; 4] {
-    // Fractions may shine a little brighter than 1.
+    // Fractions may be somewhat brighter than 1.
     const BRIGHTEST: f64 = 16.0;
     let hue = largest[..3].iter().copied().fold(0.0, f64::max);
     std::array::from_fn(|channel| {
@@ -232,14 +237,14 @@ fn color_scale(kinds: &[Option<ColorKind>; 4], largest: [f64; 4]) -> [Option<f64
     })
 }
 
-/// A colour of scaled channels; what there is not is full.
+/// Returns a colour from scaled channels; missing channels are 255.
 fn color(scale: [Option<f64>; 4], value: impl Fn(usize) -> f64) -> [u8; 4] {
     std::array::from_fn(|channel| {
         scale[channel].map_or(255, |scale| (value(channel) * scale).round() as u8)
     })
 }
 
-/// The larger values of each channel.
+/// Returns the larger value of each channel.
 pub(super) fn larger(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
     std::array::from_fn(|channel| a[channel].max(b[channel]))
 }

@@ -1,4 +1,4 @@
-//! Raw volumes: samples with no header, or one to skip. The layout comes from the caller.
+//! Raw volumes: samples without a header, or after a header to skip. The caller gives the layout.
 
 use super::{Endian, SampleType, volume_stream::Plain};
 use crate::{
@@ -10,30 +10,30 @@ use flate2::read::MultiGzDecoder;
 use glam::DVec3;
 use std::borrow::Cow;
 
-/// What a raw file cannot say about itself.
+/// The layout of a raw file, which the file itself does not describe.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawLayout {
-    /// Samples along each axis, first axis fastest in the file.
+    /// Samples along each axis. The first axis varies fastest in the file.
     pub dims: [usize; 3],
     pub sample_type: SampleType,
     /// World units between samples along each axis.
     pub spacing: DVec3,
     pub endian: Endian,
-    /// Bytes before the first sample (of the unpacked file, where it is packed).
+    /// Bytes before the first sample, of the uncompressed file if it is compressed.
     pub header: u64,
 }
 
-/// Reads a raw file, or one packed by gzip. Sample (0, 0, 0) is at the world's origin.
+/// Reads a raw file, which may be compressed by gzip. Sample (0, 0, 0) is at the world's origin.
 ///
 /// # Errors
-/// [`Error::Input`] where the file does not hold header and samples exactly, with a guess at what it does hold;
-/// [`Error::Limit`] for a layout over the limits.
+/// [`Error::Input`] if the file's size is not exactly that of header and samples, with a guess at
+/// the layout it fits; [`Error::Limit`] for a layout over the limits.
 pub fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
     let (lattice, wanted) = whole(source, layout)?;
     let bytes = source.bytes();
     let mut unpacked: Cow<[u8]> = if is_packed(source, wanted) {
         let unpacked = source.unpack("gzip stream", MultiGzDecoder::new(bytes), wanted);
-        // gzip ends with the unpacked size, of which it keeps 32 bits.
+        // gzip ends with the lower 32 bits of the unpacked size.
         let claim = bytes.last_chunk().map_or(0, |&size| u64::from(u32::from_le_bytes(size)));
         unpacked.map_err(|e| e.hint(guess(claim, layout)))?.into()
     } else {
@@ -42,7 +42,7 @@ pub fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
     if unpacked.len() != wanted {
         let [nx, ny, nz] = layout.dims;
         let message = format!(
-            "holds {} bytes after the header, but {nx} × {ny} × {nz} samples of type {} need {}",
+            "has {} bytes after the header, but {nx} × {ny} × {nz} samples of type {} need {}",
             (bytes.len() as u64).saturating_sub(layout.header),
             layout.sample_type.name(),
             wanted as u64 - layout.header
@@ -62,10 +62,11 @@ pub fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
     Volume::new(lattice, samples).map_err(|message| source.error("samples", message))
 }
 
-/// Where the samples of a file stand that holds header and samples exactly; `None` for others, and for packed ones.
+/// Returns where the samples are in a file that contains exactly the header and the samples; `None`
+/// for other files and for compressed ones.
 ///
 /// # Errors
-/// As of [`read`], for the layout alone.
+/// As [`read`], for the layout only.
 pub(super) fn plain(source: &Source, layout: &RawLayout) -> Result<Option<Plain>> {
     let (lattice, wanted) = whole(source, layout)?;
     let &RawLayout { sample_type, endian, header, .. } = layout;
@@ -79,7 +80,7 @@ pub(super) fn plain(source: &Source, layout: &RawLayout) -> Result<Option<Plain>
     Ok((source.bytes().len() == wanted && !is_packed(source, wanted)).then_some(plain))
 }
 
-/// The lattice of a layout, and the bytes of header and samples.
+/// Returns the lattice of a layout, and the number of bytes of header and samples.
 fn whole(source: &Source, layout: &RawLayout) -> Result<(Lattice, usize)> {
     let lattice = Lattice::with_spacing(layout.dims, layout.spacing);
     lattice.validate().map_err(Error::Argument)?;
@@ -90,14 +91,14 @@ fn whole(source: &Source, layout: &RawLayout) -> Result<(Lattice, usize)> {
     Ok((lattice, wanted))
 }
 
-/// Whether a file is packed by gzip. A raw file may begin with gzip's magic number by chance: then it has the right size and
-/// no such name.
+/// Returns whether a file is compressed by gzip. A raw file may begin with gzip's magic number by
+/// chance. Then it has the expected size and no `.gz` extension.
 fn is_packed(source: &Source, wanted: usize) -> bool {
     let named = source.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     source.bytes().starts_with(&[0x1f, 0x8b]) && (named || source.bytes().len() != wanted)
 }
 
-/// What a file of `size` bytes could be.
+/// Returns a guess at the layout of a file of `size` bytes, as a hint.
 fn guess(size: u64, layout: &RawLayout) -> String {
     let RawLayout { dims: [nx, ny, nz], sample_type, header, .. } = layout;
     let names = ["u8", "i16", "f32", "f64"];
@@ -201,7 +202,7 @@ mod tests {
         let message = error(layout([4, 4, 4], SampleType::U8)).to_string();
         assert!(
             message.contains(
-                "holds 128 bytes after the header, but 4 × 4 × 4 samples of type u8 need 64"
+                "has 128 bytes after the header, but 4 × 4 × 4 samples of type u8 need 64"
             ),
             "{message}"
         );

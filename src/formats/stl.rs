@@ -1,5 +1,6 @@
-//! STL, binary and as text. Every triangle has three vertices of its own; those at one place are made one where surfels
-//! are made. The normals of the facets say nothing that the corners do not, and are passed over.
+//! STL, binary and as text. Every triangle has three vertices of its own; vertices at the same
+//! position are merged when surfels are made. The facets' normals add nothing to their corners, so
+//! they are ignored.
 
 use crate::{
     Result,
@@ -8,16 +9,17 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Bytes before the count of a binary file, and of one of its facets.
+/// Bytes before the count of a binary file, and bytes per facet.
 const HEADER: usize = 80;
 const FACET: usize = 50;
 
-/// Reads an STL file. It is binary where its size is the one that its count of facets asks for, whatever its first word.
+/// Reads an STL file. It is binary if its size matches its count of facets, whatever its first word
+/// is.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) for a size that fits no count, with the line for text that is none of the
-/// format's, for positions that are not finite, and for a file without triangles; [`Error::Limit`](crate::Error::Limit)
-/// for more facets than the limits allow.
+/// [`Error::Input`](crate::Error::Input) for a size that does not match the count, with the line
+/// for text that does not follow the format, for positions that are not finite, and for a file
+/// without triangles; [`Error::Limit`](crate::Error::Limit) for more facets than the limits allow.
 pub fn read(source: &Source) -> Result<Mesh> {
     let bytes = source.bytes();
     let count = bytes
@@ -25,9 +27,9 @@ pub fn read(source: &Source) -> Result<Mesh> {
         .and_then(|rest| rest.first_chunk())
         .map(|&count| u32::from_le_bytes(count));
     let size = count.map(|count| HEADER as u64 + 4 + u64::from(count) * FACET as u64);
-    // Some writers end the file with a few bytes of their own.
+    // Some writers append a few bytes of their own.
     let fits = size.is_some_and(|size| (size..size + FACET as u64).contains(&(bytes.len() as u64)));
-    // No text has a byte 0, and a count and three numbers have several.
+    // Text has no zero bytes; a count and three numbers have several.
     let is_text = bytes.trim_ascii_start().starts_with(b"solid")
         && !bytes.iter().take(HEADER + 4 + FACET).any(|&b| b == 0);
     let (corners, lines) = if !fits && is_text {
@@ -45,13 +47,16 @@ pub fn read(source: &Source) -> Result<Mesh> {
                 "counts {count} facets, which need {size} bytes, but the file has {}",
                 bytes.len()
             );
-            return Err(source.error("header", message).hint("the file is cut, or another format"));
+            return Err(source.error("header", message).hint(
+                "the file is cut off or in another \
+                                                             format",
+            ));
         }
         source.room::<[DVec3; 3]>("the corners", count as usize)?;
         (of_bytes(&bytes[HEADER + 4..], count as usize), Vec::new())
     };
     if corners.is_empty() {
-        return Err(source.error("file", "holds no facets"));
+        return Err(source.error("file", "contains no facets"));
     }
     let place = |corner: usize| match lines.get(corner) {
         Some(line) => format!("line {line}"),
@@ -76,11 +81,11 @@ fn of_bytes(facets: &[u8], count: usize) -> Vec<DVec3> {
     corners.collect()
 }
 
-/// The corners of a text, and the line of each. Of the words only `facet`, `vertex` and the ends of facets and solids
-/// matter; `solid` may have any name behind it.
+/// Returns the corners of a text file, and the line of each. Only the words `facet`, `vertex` and
+/// the ends of facets and solids matter. Any name may follow `solid`.
 fn of_text(source: &Source) -> Result<(Vec<DVec3>, Vec<usize>)> {
     let mut corners = Growing::new(source, "the corners");
-    let mut lines = Growing::new(source, "the places of the corners");
+    let mut lines = Growing::new(source, "the line numbers of the corners");
     let mut in_solid = false;
     let mut start = None;
     let mut last = 1;
@@ -152,9 +157,10 @@ mod tests {
 
     const FACETS: [[f32; 9]; 2] =
         [[0., 0., 0., 1., 0., 0., 0., 1., 0.], [1., 0., 0., 1., 1., 0., 0., 1., 0.]];
-    const TEXT: &str = "solid two of them\n facet normal 0 0 1\n outer loop\n vertex 0 0 0\n vertex 1 0 0\n vertex 0 1 0\n\
-        endloop\n endfacet\n\nFACET NORMAL 0 0 1\r\nOUTER LOOP\r\nVERTEX 1e0 0 0\r\nVERTEX 1 1 0\r\nVERTEX 0 1 -0\r\n\
-        ENDLOOP\r\nENDFACET\r\nendsolid";
+    const TEXT: &str = "solid two of them\n facet normal 0 0 1\n outer loop\n vertex 0 0 0\n \
+                        vertex 1 0 0\n vertex 0 1 0\nendloop\n endfacet\n\nFACET NORMAL 0 0 1\r\n\
+                        OUTER LOOP\r\nVERTEX 1e0 0 0\r\nVERTEX 1 1 0\r\nVERTEX 0 1 -0\r\n\
+                        ENDLOOP\r\nENDFACET\r\nendsolid";
 
     fn load(content: impl AsRef<[u8]>) -> Result<Mesh> {
         let folder = Folder::new();
@@ -168,7 +174,7 @@ mod tests {
             let mesh = load(content).unwrap();
             assert_eq!(mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
             assert_eq!(mesh.positions[1..5], [Vec3::X, Vec3::Y, Vec3::X, Vec3::new(1.0, 1.0, 0.0)]);
-            // The shared corners are one.
+            // Shared corners are merged.
             let whole = SurfelOptions { largest_spacing: 9.0, ..SurfelOptions::default() };
             assert_eq!(mesh.surfels(&whole).unwrap().splats.len(), 4);
         }

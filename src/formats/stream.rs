@@ -1,4 +1,5 @@
-//! Points and triangles of a file in pieces, as often as they are wanted, for those who cannot hold all of them.
+//! Reads the points and triangles of a file in pieces, as often as needed, for callers that cannot
+//! hold all of them.
 
 use super::{las, ply};
 use crate::{
@@ -10,14 +11,14 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// What a file's header counts.
+/// The counts in a file's header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counts {
     pub points: u64,
     pub triangles: u64,
 }
 
-/// A point as the file has it.
+/// A point in the file's own coordinates.
 pub(super) struct Found {
     pub row: usize,
     pub position: DVec3,
@@ -29,23 +30,25 @@ pub(super) struct Found {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct StreamPoint {
-    /// Its number in the file.
+    /// Its index in the file.
     pub index: u32,
     pub position: [f32; 3],
-    /// Unit length; zero where the file has none.
+    /// Unit length; zero if the file has none.
     pub normal: [f32; 3],
-    /// As of [`Mesh::colors`](crate::surface::Mesh::colors); white where the file has none.
+    /// As in [`Mesh::colors`](crate::surface::Mesh::colors); white if the file has none.
     pub color: [u8; 4],
 }
 
-/// A file of points, or of a mesh, that is read in pieces: binary PLY of triangles or points, LAS and LAZ.
+/// A point cloud or mesh file that is read in pieces: binary PLY of points or triangles, LAS and
+/// LAZ.
 ///
-/// What it gives is what [`load_mesh`](super::load_mesh) gives of the file: around the same origin, in the same colours, in
-/// the same order. The pages of the file that were read go back to the system again and again.
+/// It yields the same data as [`load_mesh`](super::load_mesh): around the same origin, in the same
+/// colours, in the same order. It regularly returns the pages of the file that were read to the
+/// system.
 pub struct Stream<'a> {
     source: Source<'a>,
     form: Form,
-    /// Of points that are not withheld.
+    /// Number of points that are not withheld.
     points: u64,
     origin: DVec3,
     bounds: [Vec3; 2],
@@ -57,19 +60,22 @@ enum Form {
 }
 
 impl<'a> Stream<'a> {
-    /// Looks at a file's header alone. `None` for one that can only be read as a whole.
+    /// Opens a file and reads its header only. Returns `None` for a file that can only be read as a
+    /// whole.
     ///
     /// # Errors
-    /// Those of opening the file; [`Error::Input`](crate::Error::Input) for a malformed header and for a file that ends
-    /// before its last point, [`Error::Limit`](crate::Error::Limit) for more points than the limits allow.
+    /// Those of opening the file; [`Error::Input`](crate::Error::Input) for a malformed header and
+    /// for a file that ends before its last point; [`Error::Limit`](crate::Error::Limit) for more
+    /// points than the limits allow.
     pub fn open(path: &'a Path, limits: &'a Limits) -> Result<Option<Self>> {
         Self::of(Source::open(path, limits)?)
     }
 
-    /// As [`open`](Self::open), of what is open already, which may be in memory ([`Source::from_bytes`]).
+    /// As [`open`](Self::open), but takes an open source, which may be in memory
+    /// ([`Source::from_bytes`]).
     ///
     /// # Errors
-    /// Those of [`open`](Self::open) but for opening.
+    /// Those of [`open`](Self::open), except those of opening the file.
     pub fn of(source: Source<'a>) -> Result<Option<Self>> {
         let extension =
             source.path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
@@ -83,7 +89,7 @@ impl<'a> Stream<'a> {
         Ok(form.map(|form| Self { source, form, points: 0, origin, bounds }))
     }
 
-    /// What the header counts.
+    /// Returns the counts in the header.
     pub fn counts(&self) -> Counts {
         let (points, triangles) = match &self.form {
             Form::Ply(pieces) => (pieces.points(), pieces.triangles()),
@@ -92,7 +98,7 @@ impl<'a> Stream<'a> {
         Counts { points: points as u64, triangles: triangles as u64 }
     }
 
-    /// Warns where the file holds more than its points, which alone are read.
+    /// Warns if the file contains more than the points, because only those are read.
     pub(crate) fn warn(&self) {
         if let Form::Ply(pieces) = &self.form
             && pieces.are_gaussians
@@ -101,24 +107,25 @@ impl<'a> Stream<'a> {
         }
     }
 
-    /// Whether the third axis of its points is up, as for [`Mesh::z_is_up`](crate::surface::Mesh::z_is_up).
+    /// Returns whether the third axis of its points is up, as for
+    /// [`Mesh::z_is_up`](crate::surface::Mesh::z_is_up).
     pub fn z_is_up(&self) -> bool {
         matches!(self.form, Form::Las(_))
     }
 
-    /// The first pass over all points: where they are, and what their colours are made from. `watch` is told how many have
-    /// been seen.
+    /// The first pass over all points: finds their bounds and what their colours are scaled by.
+    /// Calls `watch` with the number of points visited so far.
     pub(crate) fn settle(&mut self, watch: &dyn Fn(u64)) -> Result<()> {
         let counted = self.counts().points;
         if counted > u64::from(u32::MAX) {
             let message = format!(
-                "counts {counted} points, but a file that is read in pieces has {} at most",
+                "counts {counted} points, but a file read in pieces may have at most {}",
                 u32::MAX
             );
             return Err(self
                 .source
                 .error("header", message)
-                .hint("cut it in several files and convert them together"));
+                .hint("split it into several files and convert them together"));
         }
         let (points, [low, high]) = match &mut self.form {
             Form::Las(pieces) => self.source.unless_changed(pieces.survey(&self.source, watch))?,
@@ -163,22 +170,22 @@ impl<'a> Stream<'a> {
         Ok((points, [low, high]))
     }
 
-    /// What is wrong at a place of the file.
+    /// Creates an error at a place in the file.
     pub(crate) fn error(&self, place: &str, message: impl Into<String>) -> crate::Error {
         self.source.error(place, message)
     }
 
-    /// World position that the points are relative to.
+    /// Returns the world position that the points are relative to.
     pub(crate) fn origin(&self) -> DVec3 {
         self.origin
     }
 
-    /// The corners of the box around all points.
+    /// Returns the corners of the bounding box of all points.
     pub(crate) fn bounds(&self) -> [Vec3; 2] {
         self.bounds
     }
 
-    /// Points that are not withheld.
+    /// Returns the number of points that are not withheld.
     pub(crate) fn point_count(&self) -> u64 {
         self.points
     }
@@ -198,8 +205,8 @@ impl<'a> Stream<'a> {
         matches!(&self.form, Form::Ply(pieces) if pieces.has_uvs)
     }
 
-    /// Goes through all points in their order: `map` makes something of each piece, beside the others; `take` takes that of
-    /// one piece after the other.
+    /// Visits all points in order. `map` converts the pieces, several in parallel. `take` receives
+    /// the results one after the other, in order.
     pub(crate) fn points<T: Send>(
         &self,
         map: impl Fn(&[StreamPoint]) -> T + Sync,
@@ -227,7 +234,8 @@ impl<'a> Stream<'a> {
         }
     }
 
-    /// As [`points`](Self::points), of the triangles; `map` also gets the number of the first one.
+    /// As [`points`](Self::points), for the triangles. `map` also gets the index of the piece's
+    /// first triangle.
     pub(crate) fn triangles<T: Send>(
         &self,
         map: impl Fn(usize, &[[u32; 3]]) -> T + Sync,
@@ -241,7 +249,7 @@ impl<'a> Stream<'a> {
         self.in_order(pieces.pieces()[1], of_piece, take)
     }
 
-    /// The place of a vertex of a mesh.
+    /// Returns the position of a vertex of a mesh.
     pub(crate) fn position(&self, index: u32) -> Vec3 {
         match &self.form {
             Form::Ply(pieces) => {
@@ -251,7 +259,7 @@ impl<'a> Stream<'a> {
         }
     }
 
-    /// A vertex of a mesh.
+    /// Returns a vertex of a mesh.
     pub(crate) fn vertex(&self, index: u32) -> StreamPoint {
         match &self.form {
             Form::Ply(pieces) => self.settled(pieces.vertex(&self.source, index as usize)),
@@ -279,14 +287,14 @@ impl<'a> Stream<'a> {
             self.source.restart_time();
             let made: Vec<Result<T>> =
                 (first..(first + batch).min(pieces)).into_par_iter().map(&make).collect();
-            // Nothing that was made of a file and half of another is taken.
+            // If the file has changed, the results may mix old and new content, so none is taken.
             self.source.intact()?;
             for made in made {
                 take(made?)?;
             }
             self.source.release();
         }
-        // What was taken may have looked at single points.
+        // `take` may have read single points from the file.
         self.source.intact()
     }
 }

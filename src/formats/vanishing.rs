@@ -1,4 +1,4 @@
-//! Files that are cut while they are read, by every way of reading.
+//! Files that are truncated while they are read, by every way of reading.
 
 use super::{
     Endian, RawLayout, SampleType, Stream, VolumeStream, load_mesh, load_samples, ply, volume_of,
@@ -27,7 +27,7 @@ fn is_told<T>(name: &str, found: Result<T>) {
     assert!(error.to_string().contains("changed while it was read"), "{name}: {error}");
 }
 
-/// Opens a file, cuts it at several places and reads what was opened.
+/// Opens a file, truncates it at several lengths and reads the open source.
 fn cut_when_open<T>(name: &str, bytes: impl AsRef<[u8]>, read: impl Fn(&Source) -> Result<T>) {
     let (folder, limits, bytes) = (Folder::new(), Limits::default(), bytes.as_ref());
     assert!(bytes.len() > 3 << 12, "{name}: {} bytes are too few pages", bytes.len());
@@ -74,7 +74,8 @@ fn meshes_and_clouds() {
         las.extend([i % 50, i / 50, i % 3].iter().flat_map(|v| v.to_le_bytes()));
         las.extend([0; 8]);
     }
-    let pcd = "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 3000\nHEIGHT 1\nPOINTS 3000\nDATA ascii\n";
+    let pcd = "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 3000\nHEIGHT \
+               1\nPOINTS 3000\nDATA ascii\n";
     let faces = lines(2000, |i| format!("f {} {} {}\n", i + 1, i + 2, i + 62));
     let files: [(&str, Vec<u8>); 7] = [
         ("binary.ply", std::fs::read(&binary).unwrap()),
@@ -97,15 +98,15 @@ fn meshes_and_clouds() {
 fn volumes_and_samples() {
     let values = lines(30 * 30 * 30, |i| format!("{} ", i % 200));
     let vti = format!(
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"0.1\" byte_order=\"LittleEndian\">\n\
-         <ImageData WholeExtent=\"0 29 0 29 0 29\" Origin=\"0 0 0\" Spacing=\"1 1 1\">\n\
-         <Piece Extent=\"0 29 0 29 0 29\"><PointData Scalars=\"v\">\n\
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"0.1\" \
+         byte_order=\"LittleEndian\">\n<ImageData WholeExtent=\"0 29 0 29 0 29\" Origin=\"0 0 0\" \
+         Spacing=\"1 1 1\">\n<Piece Extent=\"0 29 0 29 0 29\"><PointData Scalars=\"v\">\n\
          <DataArray type=\"UInt8\" Name=\"v\" format=\"ascii\">{values}</DataArray>\n\
          </PointData></Piece></ImageData></VTKFile>\n"
     );
     let vtk = format!(
-        "# vtk DataFile Version 3.0\n\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 30 30 30\nPOINT_DATA 27000\n\
-         SCALARS s int\nLOOKUP_TABLE d\n{values}"
+        "# vtk DataFile Version 3.0\n\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 30 30 30\n\
+         POINT_DATA 27000\nSCALARS s int\nLOOKUP_TABLE d\n{values}"
     );
     let samples: Vec<u8> = (0..27_000).map(|i| (i % 200) as u8).collect();
     let nrrd =

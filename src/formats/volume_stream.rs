@@ -1,4 +1,4 @@
-//! The slices of a volume one after another, for those who cannot hold all of them.
+//! Reads a volume slice by slice, for callers that cannot hold all of it.
 
 use super::{Endian, RawLayout, SampleType, nrrd, raw};
 use crate::{
@@ -11,36 +11,39 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Where the samples of a file stand, one behind the other and not packed.
+/// Location and layout of the samples in a file: contiguous and not compressed.
 pub(super) struct Plain {
-    /// The file that holds them.
+    /// The file that contains the samples.
     pub path: PathBuf,
-    /// The byte of the first one.
+    /// The byte offset of the first sample.
     pub start: usize,
     pub sample_type: SampleType,
     pub endian: Endian,
     pub lattice: Lattice,
 }
 
-/// A volume whose samples stand in a file as they are: a raw file, or a NRRD file of raw encoding. What it gives is what
-/// [`load_volume`](super::load_volume) gives of the file. The pages of the file that were read go back to the system again
-/// and again.
+/// A volume whose samples are stored uncompressed: a raw file, or an NRRD file with raw encoding.
+/// It yields the same data as [`load_volume`](super::load_volume). It regularly returns the pages
+/// of the file that were read to the system.
 pub struct VolumeStream {
     plain: Plain,
     scalar: Scalar,
     map: Mapping,
 }
 
-/// Slices that are looked at together.
+/// Slices that are read together.
 const PIECE: usize = 8;
 
 impl VolumeStream {
-    /// Looks at a file's header, or at its size where `raw` gives its layout. `None` for what can only be read as a whole:
-    /// other formats, packed samples, types that become others by their values (u32, u64, i64), and files in which
-    /// [`load_volume`](super::load_volume) will find something wrong.
+    /// Opens a file and reads its header, or checks its size if `raw` gives its layout. Returns
+    /// `None` for a file that can only be read as a whole:
+    /// - other formats and compressed samples,
+    /// - types whose decoded type depends on their values (u32, u64, i64),
+    /// - files in which [`load_volume`](super::load_volume) will find an error.
     ///
     /// # Errors
-    /// Those of opening the file, [`Error::Input`] for a malformed header, and [`Error::Limit`] for sizes over the limits.
+    /// Those of opening the file, [`Error::Input`] for a malformed header, and [`Error::Limit`] for
+    /// sizes over the limits.
     pub fn open(path: &Path, limits: &Limits, raw: Option<&RawLayout>) -> Result<Option<Self>> {
         let source = Source::open(path, limits)?;
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
@@ -71,28 +74,29 @@ impl VolumeStream {
         Ok(is_whole.then_some(Self { plain, scalar, map }))
     }
 
-    /// The file that holds the samples: a detached header's is another one.
+    /// Returns the file that contains the samples. For a detached header, this is not the header's
+    /// file.
     pub fn path(&self) -> &Path {
         &self.plain.path
     }
 
-    /// Where the samples lie.
+    /// Returns the lattice that the samples lie on.
     pub fn lattice(&self) -> &Lattice {
         &self.plain.lattice
     }
 
-    /// The type of the samples that [`slices`](Self::slices) gives.
+    /// Returns the type of the samples that [`slices`](Self::slices) returns.
     pub fn scalar(&self) -> Scalar {
         self.scalar
     }
 
-    /// The samples of some slices across the last axis.
+    /// Returns the samples of a range of slices across the last axis.
     ///
     /// # Errors
-    /// [`Error::Input`] where the file is not the one that was opened any more.
+    /// [`Error::Input`] if the file has changed since it was opened.
     ///
     /// # Panics
-    /// Where the volume does not have them.
+    /// If the range exceeds the volume's slices.
     pub fn slices(&self, z: Range<usize>) -> Result<Samples> {
         let Plain { start, sample_type, endian, ref lattice, .. } = self.plain;
         let slice = lattice.dims[0] * lattice.dims[1] * sample_type.bytes();
@@ -102,8 +106,8 @@ impl VolumeStream {
         intact(&self.map, &self.plain.path).map(|()| samples)
     }
 
-    /// The smallest and the largest value of all samples: goes through the file once. `watch` is told how many slices have
-    /// been seen, of how many.
+    /// Returns the minimum and maximum of all samples, in one pass over the file. Calls `watch`
+    /// with the number of slices visited so far and their total.
     ///
     /// # Errors
     /// [`Error::Input`] for samples that are not finite.
@@ -129,7 +133,7 @@ mod tests {
     use crate::{formats::load_volume, input::testing::Folder};
     use glam::DVec3;
 
-    /// Numbers that every type can hold, as bytes.
+    /// Numbers that every type can represent, as bytes.
     fn bytes(sample_type: SampleType, endian: Endian) -> Vec<u8> {
         let text: Vec<String> = (0..3 * 4 * 19).map(|i| (i / 2).to_string()).collect();
         let little = sample_type.parse(&text.join(" "), text.len()).unwrap();

@@ -1,4 +1,4 @@
-//! VTK's XML image data (`.vti`): a volume in one of the forms of vtk_xml.rs.
+//! VTK's XML image data (`.vti`): a volume in any of the encodings of vtk_xml.rs.
 
 use super::{
     Endian, SampleType,
@@ -11,12 +11,14 @@ use crate::{
 };
 use glam::{DMat3, DVec3};
 
-/// Reads the active scalars of the points: the array that `Scalars` names, else the first with one component. Several
-/// pieces are put together. World positions are the file's: `Origin` + `Direction` · (`Spacing` × index).
+/// Reads the active scalars of the points: the array that `Scalars` names, else the first with one
+/// component. Several pieces are joined. World positions are the file's: `Origin` + `Direction` ·
+/// (`Spacing` × index).
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) for what is no image data, packed by anything but zlib, without such scalars, cut
-/// off, or with samples that are not finite; [`Error::Limit`](crate::Error::Limit) for extents over the limits.
+/// [`Error::Input`](crate::Error::Input) for a file that is not image data, is compressed by
+/// anything but zlib, has no such scalars, is cut off, or has samples that are not finite;
+/// [`Error::Limit`](crate::Error::Limit) for extents over the limits.
 pub fn read(source: &Source) -> Result<Volume> {
     let document = Document::read(source, "ImageData")?;
     let whole = whole_extent(source, &document, "ImageData")?;
@@ -27,7 +29,7 @@ pub fn read(source: &Source) -> Result<Volume> {
     Volume::new(lattice, samples).map_err(|message| source.error("samples", message))
 }
 
-/// The extent of all pieces together.
+/// Returns the extent of all pieces together.
 pub(super) fn whole_extent(source: &Source, document: &Document, kind: &str) -> Result<Extent> {
     let text = document
         .attributes
@@ -56,7 +58,7 @@ fn lattice(source: &Source, document: &Document, whole: Extent) -> Result<Lattic
     Ok(lattice)
 }
 
-/// The active scalars of all pieces.
+/// Returns the active scalars of all pieces.
 pub(super) fn samples<'a>(
     source: &Source,
     document: &'a Document,
@@ -69,8 +71,8 @@ pub(super) fn samples<'a>(
         let extent = extent(source, "Piece", text)?;
         let array = piece.section("PointData").scalars().ok_or_else(|| {
             source
-                .error("PointData", "holds no array with one number for each point")
-                .hint("values of cells are not read; turn them into values of points")
+                .error("PointData", "contains no array with one number for each point")
+                .hint("cell values are not read; convert them to point values")
         })?;
         if array.components() != "1" {
             let message =
@@ -83,11 +85,11 @@ pub(super) fn samples<'a>(
     assemble(source, whole, parts)
 }
 
-/// How often a point may be there, on average: pieces of one cell have each of their points eight times, and more where they
-/// overlap. Several pieces may have the same bytes of the file.
+/// Maximum average number of copies of a point. In pieces of a single cell, each point occurs eight
+/// times, and more often if they overlap. Several pieces may share the same bytes of the file.
 const MOST_TIMES: u64 = 64;
 
-/// Puts pieces together to the whole extent. Neighbouring pieces share the points between them.
+/// Joins pieces to the whole extent. Neighbouring pieces share the points between them.
 fn assemble<'a>(
     source: &Source,
     whole: Extent,
@@ -104,23 +106,23 @@ fn assemble<'a>(
             .zip(&whole)
             .all(|(piece, whole)| whole[0] <= piece[0] && piece[1] <= whole[1]);
         if !inside {
-            return Err(wrong(&format!("{i} reaches out of the whole extent")));
+            return Err(wrong(&format!("piece {i} extends beyond the whole extent")));
         }
         if i > 0 && (part.kind, part.endian) != (kind, endian) {
-            return Err(wrong(&format!("{i} is written in another type or format than the first")));
+            return Err(wrong(&format!("piece {i} has another type or format than the first")));
         }
         (kind, endian) = (part.kind, part.endian);
         held += (part.bytes.len() / kind.bytes()) as u64;
     }
-    // Before anything is allocated: the pieces must hold enough to fill the whole.
+    // Checked before anything is allocated: the pieces must have enough points to fill the whole.
     if held < count {
         return Err(wrong(&format!(
-            "holds {held} points with all others, but the whole extent has {count}"
+            "all pieces together have {held} points, but the whole extent has {count}"
         )));
     }
     if held / MOST_TIMES > count {
         return Err(wrong(&format!(
-            "holds {held} points with all others, too many for an extent of {count}"
+            "all pieces together have {held} points, too many for an extent of {count}"
         )));
     }
     if parts.len() == 1 {
@@ -128,7 +130,7 @@ fn assemble<'a>(
         return parts.pop().map(|(_, part)| part).ok_or_else(|| wrong("is missing"));
     }
     let width = kind.bytes();
-    // Bytes, and whether there are any.
+    // The bytes, and a flag per sample whether it is filled.
     source.spend("the size of the samples in bytes", count.saturating_mul(1 + width as u64))?;
     let mut bytes = vec![0; count as usize * width];
     let mut filled = vec![false; count as usize];
@@ -145,7 +147,7 @@ fn assemble<'a>(
         }
     }
     match filled.iter().position(|filled| !filled) {
-        Some(index) => Err(wrong(&format!("is missing: no piece holds point {index}"))),
+        Some(index) => Err(wrong(&format!("no piece contains point {index}"))),
         None => Ok(Part { kind, endian, bytes: bytes.into() }),
     }
 }

@@ -1,6 +1,6 @@
-//! VTK's legacy files (`.vtk`), in text and binary: structured points and rectilinear grids as volumes; unstructured grids,
-//! polygons and structured grids as scattered samples. After the format's description in the VTK User's Guide, with the
-//! cells of version 5.1.
+//! VTK's legacy files (`.vtk`), in text and binary: structured points and rectilinear grids as
+//! volumes; unstructured grids, polygons and structured grids as scattered samples. Follows the
+//! format's description in the VTK User's Guide, and version 5.1 for its cells.
 
 mod parser;
 #[cfg(test)]
@@ -16,10 +16,10 @@ use crate::{
 use glam::{DMat3, DVec3};
 use parser::Parser;
 
-/// Words of a line that are looked at.
+/// Maximum number of words that are read from a line.
 const MOST_WORDS: usize = 16;
 
-/// A data set as the file has it.
+/// A data set as in the file.
 #[derive(Default)]
 struct DataSet<'a> {
     /// `STRUCTURED_POINTS`, …
@@ -27,21 +27,22 @@ struct DataSet<'a> {
     dims: [u64; 3],
     origin: DVec3,
     spacing: DVec3,
-    /// Along x, y and z, of rectilinear grids.
+    /// Coordinates along x, y and z of a rectilinear grid.
     places: [Vec<f64>; 3],
     cells: Cells,
     points: Attributes<'a>,
     of_cells: Attributes<'a>,
 }
 
-/// The data of the points or the cells: how many there are, and arrays of one component by their names.
+/// The data of the points or of the cells: their count, and arrays of one component with their
+/// names.
 #[derive(Default)]
 struct Attributes<'a> {
     count: usize,
     arrays: Vec<(String, Part<'a>)>,
 }
 
-/// Whether a file holds a volume: structured points or a rectilinear grid.
+/// Returns whether a file contains a volume: structured points or a rectilinear grid.
 ///
 /// # Errors
 /// [`Error::Input`] for a malformed header.
@@ -57,17 +58,17 @@ fn is_volume(kind: &str) -> bool {
 /// Reads structured points or a rectilinear grid: the first scalars of the points.
 ///
 /// # Errors
-/// [`Error::Input`] for another data set, without scalars, cut off, or with numbers that are not finite; [`Error::Limit`] for
-/// counts over the limits.
+/// [`Error::Input`] for another data set, missing scalars, a file that is cut off, or numbers that
+/// are not finite; [`Error::Limit`] for counts over the limits.
 pub fn read_volume(source: &Source) -> Result<Volume> {
     let mut data = DataSet::read(source)?;
     if !is_volume(&data.kind) {
-        return Err(source.error("DATASET", format!("is {}, which is no volume", data.kind)));
+        return Err(source.error("DATASET", format!("is {}, which is not a volume", data.kind)));
     }
     if data.points.arrays.is_empty() {
         return Err(source
-            .error("POINT_DATA", "holds no scalars")
-            .hint("values of cells are not read; turn them into values of points"));
+            .error("POINT_DATA", "contains no scalars")
+            .hint("cell values are not read; convert them to point values"));
     }
     let (_, part) = data.points.arrays.swap_remove(0);
     source.spend("the size of the samples in bytes", part.kind.decoded_bytes(part.bytes.len()))?;
@@ -89,16 +90,22 @@ pub fn read_volume(source: &Source) -> Result<Volume> {
     volume.map_err(|message| source.error("samples", message))
 }
 
-/// Reads an unstructured grid, polygons or a structured grid, as [`vtu::read`](super::vtu::read) does.
+/// Reads an unstructured grid, polygons or a structured grid, as [`vtu::read`](super::vtu::read)
+/// does.
 ///
 /// # Errors
-/// Those of [`read_volume`]; [`Error::Input`] also where there is no array of the name `scalar`.
+/// Those of [`read_volume`]. Also [`Error::Input`] if no array is named `scalar`.
 pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
     let data = DataSet::read(source)?;
     if is_volume(&data.kind) {
-        return Err(
-            source.error("DATASET", format!("is {}, a volume and no scattered samples", data.kind))
-        );
+        return Err(source.error(
+            "DATASET",
+            format!(
+                "is {}, which is a volume, not scattered \
+                                             samples",
+                data.kind
+            ),
+        ));
     }
     let wanted = |attributes: &Attributes| {
         let is = |name: &String| scalar.is_none_or(|scalar| scalar == name);
@@ -109,7 +116,7 @@ pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
         if there == claim {
             Ok(())
         } else {
-            Err(source.error(place, format!("claims {claim} of {there}")))
+            Err(source.error(place, format!("claims {claim} values, but there are {there}")))
         }
     };
     if let Some(index) = wanted(&data.points) {
@@ -131,10 +138,10 @@ impl<'a> DataSet<'a> {
     fn read(source: &'a Source) -> Result<Self> {
         let (mut parser, kind) = Parser::open(source)?;
         let mut data = Self { kind, spacing: DVec3::ONE, ..Self::default() };
-        // The data that attributes belong to: none, points or cells.
+        // The data that attributes belong to: none yet, points (`false`) or cells (`true`).
         let mut attributes: Option<bool> = None;
         while let Some((place, line)) = parser.line()? {
-            // No keyword has more words behind it.
+            // No keyword is followed by more words.
             let words: Vec<&str> = line.split_ascii_whitespace().take(MOST_WORDS).collect();
             let wrong = |message: String| source.error(place.clone(), message);
             source.check_time()?;
@@ -153,11 +160,11 @@ impl<'a> DataSet<'a> {
                         .array(&place, parser.count(&place, count)?, kind)?
                         .doubles(source)?;
                 }
-                // Cells that were read refer to points that were there.
+                // Cells that were already read refer to the points that were present then.
                 ("POINTS", _)
                     if !(data.cells.points.is_empty() && data.cells.corners.is_empty()) =>
                 {
-                    return Err(wrong("POINTS are given twice, or behind the cells".into()));
+                    return Err(wrong("POINTS are given twice, or after the cells".into()));
                 }
                 ("POINTS", [count, kind]) => {
                     let count = parser.count(&place, count)?;
@@ -204,7 +211,7 @@ impl<'a> DataSet<'a> {
                 (_, [name, rest @ ..]) => {
                     let Some(attributes) = data.attributes(attributes) else {
                         return Err(wrong(format!(
-                            "“{keyword}” is not known before POINT_DATA or CELL_DATA"
+                            "“{keyword}” is not a known keyword before POINT_DATA or CELL_DATA"
                         )));
                     };
                     let count = attributes.count;
@@ -224,7 +231,7 @@ impl<'a> DataSet<'a> {
                             parser.skip_colors(&place, count, parser.count(&place, components)?)?;
                             continue;
                         }
-                        _ => return Err(wrong(format!("“{keyword}” is not known"))),
+                        _ => return Err(wrong(format!("“{keyword}” is not a known keyword"))),
                     };
                     if keyword == "SCALARS" {
                         parser.expect("LOOKUP_TABLE")?;
@@ -236,7 +243,7 @@ impl<'a> DataSet<'a> {
                 }
                 _ => {
                     return Err(wrong(format!(
-                        "“{}” is not known",
+                        "“{}” is not a known keyword",
                         line.chars().take(40).collect::<String>()
                     )));
                 }

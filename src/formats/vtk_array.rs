@@ -1,4 +1,4 @@
-//! The bytes of an array in a VTK XML file: base64, a leading count, and blocks packed by zlib.
+//! The bytes of an array in a VTK XML file: base64, a leading count, and blocks compressed by zlib.
 
 use super::Endian;
 use crate::{Result, input::Source};
@@ -7,22 +7,22 @@ use flate2::read::ZlibDecoder;
 use rayon::prelude::*;
 use std::{borrow::Cow, io::Read};
 
-/// How the arrays of one file are written.
+/// How the arrays of a file are encoded.
 #[derive(Debug, Clone, Copy)]
 pub struct ArrayEncoding {
     pub endian: Endian,
-    /// Counts take 8 bytes and not 4.
+    /// Counts have 8 bytes instead of 4.
     pub wide_counts: bool,
-    /// Arrays are cut into blocks, each packed by zlib.
+    /// Arrays are split into blocks, each compressed by zlib.
     pub packed: bool,
 }
 
-/// Deflate packs 1032 bytes into one at most; a block that claims more is a lie.
+/// Maximum compression ratio of deflate, 1032 bytes per byte; a block that claims more is invalid.
 const DEFLATE_RATIO: u64 = 1032;
 
 impl ArrayEncoding {
-    /// The array of `size` bytes that `bytes` begin with, its counts first; whatever follows it is left out. `place` names
-    /// it in errors.
+    /// Returns the array of `size` bytes at the start of `bytes`, which begins with its counts.
+    /// Bytes after it are ignored. `place` names it in errors.
     pub fn array<'b>(
         &self,
         source: &Source,
@@ -57,8 +57,9 @@ impl ArrayEncoding {
         })
     }
 
-    /// Blocks: their number, the unpacked size of each but the last, that of the last (0: as the others), the packed
-    /// size of each; then the blocks.
+    /// Unpacks an array of blocks. It begins with the number of blocks, the unpacked size of each
+    /// but the last, that of the last (0: as the others), and the packed size of each. Then the
+    /// blocks follow.
     fn unpack(&self, source: &Source, place: &str, bytes: &[u8], size: usize) -> Result<Vec<u8>> {
         let wrong = |message: String| source.error(place, message);
         let cut = || wrong("ends inside the sizes of its blocks".into());
@@ -68,7 +69,8 @@ impl ArrayEncoding {
         let claim = whole.checked_mul(block).and_then(|n| n.checked_add(last));
         if claim != Some(size as u64) || last > block {
             return Err(wrong(format!(
-                "claims {blocks} blocks of {block} bytes, the last of {last}, where {size} bytes were expected"
+                "claims {blocks} blocks of {block} bytes, the last of {last}, where {size} bytes \
+                 were expected"
             )));
         }
         let sizes_end =
@@ -76,7 +78,7 @@ impl ArrayEncoding {
         let sizes_end =
             sizes_end.filter(|&end| end <= bytes.len() as u64).ok_or_else(cut)? as usize;
         let mut rest = &bytes[sizes_end..];
-        source.room::<&[u8]>("the places of the blocks", blocks as usize)?;
+        source.room::<&[u8]>("the list of blocks", blocks as usize)?;
         let mut packed = Vec::with_capacity(blocks as usize);
         for i in 0..blocks as usize {
             let length = head(3 + i)?;
@@ -94,12 +96,13 @@ impl ArrayEncoding {
         let present: u64 = packed.iter().map(|block| block.len() as u64).sum();
         if present.saturating_mul(DEFLATE_RATIO) < size as u64 {
             return Err(wrong(format!(
-                "claims {size} bytes, which {present} packed ones cannot hold"
+                "claims {size} bytes, more than {present} compressed bytes can hold"
             )));
         }
         source.spend("the unpacked size in bytes", size as u64)?;
         let mut unpacked = vec![0; size];
-        // `size` is over 0, so `block` is; with `last` at most `block` there are as many parts as blocks.
+        // `size` is above 0, so `block` is too. `last` is at most `block`, so there are as many
+        // parts as blocks.
         unpacked.par_chunks_mut(block as usize).zip(packed).enumerate().try_for_each(
             |(i, (part, packed))| {
                 source.check_time()?;
@@ -124,7 +127,7 @@ impl ArrayEncoding {
         if self.wide_counts { 8 } else { 4 }
     }
 
-    /// The count at a place in a list of them.
+    /// Returns the count at an index of a list of counts.
     fn count(&self, bytes: &[u8], index: usize) -> Option<u64> {
         let bytes = bytes.get(index.checked_mul(self.count_bytes())?..)?;
         Some(match (self.wide_counts, self.endian) {
@@ -136,8 +139,8 @@ impl ArrayEncoding {
     }
 }
 
-/// Bytes from base64 with any white space in it. The counts may be encoded apart from the data that follow them, so
-/// padding may stand inside.
+/// Decodes base64 with any white space in it. The counts may be encoded separately from the data
+/// after them, so padding may occur inside.
 pub fn from_base64(source: &Source, place: &str, text: &[u8]) -> Result<Vec<u8>> {
     source.spend("the size of base64 in bytes", 2 * text.len() as u64)?;
     let clean: Vec<u8> = text.iter().copied().filter(|b| !b.is_ascii_whitespace()).collect();
@@ -148,7 +151,7 @@ pub fn from_base64(source: &Source, place: &str, text: &[u8]) -> Result<Vec<u8>>
         let end = padded.map_or(rest.len(), |at| rest.len().min((at / 4 + 1) * 4));
         let (part, after) = rest.split_at(end);
         STANDARD.decode_vec(part, &mut bytes).map_err(|e| {
-            source.error(place, format!("is no base64 (after {} bytes): {e}", bytes.len()))
+            source.error(place, format!("is not valid base64 (after {} bytes): {e}", bytes.len()))
         })?;
         rest = after;
     }

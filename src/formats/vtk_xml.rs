@@ -1,5 +1,6 @@
-//! VTK's XML files, whatever they hold: pieces, their sections, and the arrays in them: as text, as base64 in place, or
-//! appended (raw or base64), packed by zlib or not. After the file formats' description in the VTK User's Guide.
+//! VTK's XML files of any data set: pieces, their sections, and the arrays in them. Arrays may be
+//! text, base64 in place, or appended (raw or base64), compressed by zlib or not. Follows the
+//! description of the file formats in the VTK User's Guide.
 
 use super::{
     Endian, SampleType,
@@ -15,23 +16,23 @@ use quick_xml::{
 };
 use std::{borrow::Cow, collections::HashMap};
 
-/// Bytes that an element takes with the names and the places of a few attributes.
+/// Bytes per element with the names and places of a few attributes.
 const ELEMENT: u64 = 1024;
 
-/// First and last index along each axis, both included.
+/// First and last index along each axis, both inclusive.
 pub type Extent = [[i64; 2]; 3];
 
 /// The attributes of an element.
 pub type Attributes = HashMap<String, String>;
 
-/// What the XML says.
+/// The content of the XML.
 pub struct Document<'a> {
     source: &'a Source<'a>,
     /// The attributes of the data set's element.
     pub attributes: Attributes,
     pub pieces: Vec<Piece<'a>>,
     encoding: ArrayEncoding,
-    /// Where appended arrays begin, in ascending order.
+    /// Offsets of appended arrays, in ascending order.
     offsets: Vec<usize>,
     appended: Option<Appended<'a>>,
 }
@@ -43,7 +44,7 @@ pub struct Piece<'a> {
     empty: Section<'a>,
 }
 
-/// The arrays of one purpose: `PointData`, `Points`, `Cells`, …
+/// A group of arrays: `PointData`, `Points`, `Cells`, …
 #[derive(Default)]
 pub struct Section<'a> {
     name: String,
@@ -64,7 +65,7 @@ pub struct Part<'a> {
 }
 
 impl Part<'_> {
-    /// How many numbers there are.
+    /// Returns the number of numbers.
     pub fn len(&self) -> usize {
         self.bytes.len() / self.kind.bytes()
     }
@@ -76,10 +77,11 @@ impl Part<'_> {
 }
 
 impl<'a> Document<'a> {
-    /// Reads the XML of a file that holds a data set of one `kind` (`ImageData`, …).
+    /// Reads the XML of a file that contains a data set of one `kind` (`ImageData`, …).
     ///
     /// # Errors
-    /// [`Error::Input`] for what is no such file, is packed by anything but zlib, or is cut off.
+    /// [`Error::Input`] for a file that does not contain it, is compressed by anything but zlib, or
+    /// is cut off.
     pub fn read(source: &'a Source<'a>, kind: &str) -> Result<Self> {
         let bytes = source.bytes();
         let end = b"</VTKFile>";
@@ -101,7 +103,7 @@ impl<'a> Document<'a> {
         document.walk(xml, kind)?;
         document.offsets.sort_unstable();
         if document.pieces.is_empty() {
-            return Err(source.error("XML", format!("holds no piece of {kind}")));
+            return Err(source.error("XML", format!("contains no piece of {kind}")));
         }
         Ok(document)
     }
@@ -111,7 +113,8 @@ impl<'a> Document<'a> {
         let mut reader = Reader::from_str(xml);
         reader.config_mut().expand_empty_elements = true;
         let mut depth = 0;
-        // The section that is being read, and the array in it with how many elements inside that are open.
+        // The current section, and the current array in it with the number of open elements inside
+        // the array.
         let mut section: Option<Section> = None;
         let mut array: Option<(Array, usize)> = None;
         loop {
@@ -128,7 +131,7 @@ impl<'a> Document<'a> {
                 _ => {}
             }
             match event
-                .map_err(|e| source.error(format!("byte {at}"), format!("is no XML: {e}")))?
+                .map_err(|e| source.error(format!("byte {at}"), format!("is not valid XML: {e}")))?
             {
                 Event::Start(tag) => match (&mut array, &section) {
                     (Some((_, depth)), _) => *depth += 1,
@@ -165,7 +168,7 @@ impl<'a> Document<'a> {
                         }
                     }
                 },
-                // Elements inside an array (its statistics) have texts of their own.
+                // Elements inside an array (its statistics) have text of their own.
                 Event::Text(text) => match &mut array {
                     Some((array, 0)) if array.text.is_empty() => array.text = text.into_inner(),
                     Some((array, 0)) => array.text.to_mut().push_str(&text),
@@ -177,7 +180,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// Takes what an element says that is no section; whether it is none.
+    /// Stores an element that is not a section. Returns whether it was one of these.
     fn element(&mut self, name: &str, kind: &str, attributes: &Attributes) -> Result<bool> {
         match name {
             "VTKFile" => self.encoding = encoding(self.source, kind, attributes)?,
@@ -192,7 +195,7 @@ impl<'a> Document<'a> {
         Ok(true)
     }
 
-    /// The `count` numbers of an array.
+    /// Returns the `count` numbers of an array.
     pub fn part<'b>(&'b self, array: &'b Array, count: u64) -> Result<Part<'b>> {
         let source = self.source;
         let place = array.place();
@@ -215,15 +218,20 @@ impl<'a> Document<'a> {
             "binary" => from_base64(source, &place, array.text.as_bytes())?.into(),
             "appended" => {
                 let appended = self.appended.as_ref();
-                let appended =
-                    appended.ok_or_else(|| source.error(&place, "is appended, but nothing is"))?;
+                let appended = appended.ok_or_else(|| {
+                    source.error(
+                        &place,
+                        "is appended, but the file has no \
+                                                                 appended data",
+                    )
+                })?;
                 let offset =
                     array.get("offset").ok_or_else(|| source.error(&place, "has no offset"))?;
                 appended.array(source, &place, number(source, &place, offset)?, &self.offsets)?
             }
             other => return Err(source.error(place, format!("format “{other}” is not supported"))),
         };
-        // Nothing is not written with counts by all writers.
+        // Not all writers write counts for an empty array.
         let bytes = if size == 0 {
             Cow::Borrowed(&[][..])
         } else {
@@ -234,12 +242,12 @@ impl<'a> Document<'a> {
 }
 
 impl<'a> Piece<'a> {
-    /// A section; an empty one where the piece has none of that name.
+    /// Returns a section; an empty one if the piece has none with this name.
     pub fn section(&self, name: &str) -> &Section<'a> {
         self.sections.iter().find(|section| section.name == name).unwrap_or(&self.empty)
     }
 
-    /// A number among the attributes; 0 where it is missing.
+    /// Returns a number from the attributes; 0 if it is missing.
     pub fn count(&self, source: &Source, name: &str) -> Result<u64> {
         self.attributes.get(name).map_or(Ok(0), |text| number(source, name, text))
     }
@@ -250,7 +258,8 @@ impl<'a> Section<'a> {
         self.arrays.iter().find(|array| array.get("Name") == Some(name))
     }
 
-    /// The active scalars: the array that `Scalars` names, else the first with one component.
+    /// Returns the active scalars: the array that `Scalars` names, else the first with one
+    /// component.
     pub fn scalars(&self) -> Option<&Array<'a>> {
         let named = self.attributes.get("Scalars").and_then(|name| self.array(name));
         named.or_else(|| self.arrays.iter().find(|array| array.components() == "1"))
@@ -266,7 +275,7 @@ impl Array<'_> {
         self.get("NumberOfComponents").map_or("1", str::trim)
     }
 
-    /// Its name, for errors.
+    /// Returns its name, for errors.
     pub fn place(&self) -> String {
         format!("DataArray “{}”", self.get("Name").unwrap_or_default())
     }
@@ -303,14 +312,15 @@ fn encoding(source: &Source, kind: &str, attributes: &Attributes) -> Result<Arra
     })
 }
 
-/// The section behind the XML that arrays refer to by offsets.
+/// The section after the XML, to which arrays refer by offsets.
 struct Appended<'a> {
     base64: bool,
     data: &'a [u8],
 }
 
 impl<'a> Appended<'a> {
-    /// Cuts a file before its appended section. That one is no XML where it is raw, so it is found by its bytes.
+    /// Splits a file before its appended section. A raw section is not XML, so the section is found
+    /// by its bytes.
     fn split(source: &'a Source) -> Result<(&'a [u8], Option<Self>)> {
         let bytes = source.bytes();
         let mut tags = bytes.iter().enumerate().filter(|&(_, &b)| b == b'<').map(|(at, _)| at);
@@ -342,8 +352,8 @@ impl<'a> Appended<'a> {
         Ok((xml, Some(Self { base64, data })))
     }
 
-    /// The bytes from an offset on. Base64 ends with the section or where the next array begins, raw bytes say
-    /// themselves how many there are.
+    /// Returns the bytes from an offset on. Base64 ends where the next array begins or with the
+    /// section; raw bytes begin with their own size.
     fn array(
         &self,
         source: &Source,
@@ -383,15 +393,15 @@ fn sample_type(name: &str) -> Option<SampleType> {
     })
 }
 
-/// Attributes of one element; VTK's have a dozen.
+/// Maximum number of attributes of an element; VTK's elements have about a dozen.
 const MOST_ATTRIBUTES: usize = 64;
 
 fn attributes(source: &Source, at: u64, tag: &BytesStart) -> Result<Attributes> {
     let wrong =
-        |e: String| source.error(format!("byte {at}"), format!("has a wrong attribute: {e}"));
+        |e: String| source.error(format!("byte {at}"), format!("has an invalid attribute: {e}"));
     let mut attributes = Attributes::new();
     for attribute in tag.attributes() {
-        // Each is compared with all before it.
+        // Each attribute is compared with all before it.
         if attributes.len() == MOST_ATTRIBUTES {
             return Err(wrong(format!("there are more than {MOST_ATTRIBUTES}")));
         }
@@ -407,7 +417,7 @@ fn attributes(source: &Source, at: u64, tag: &BytesStart) -> Result<Attributes> 
 pub fn number<T: std::str::FromStr>(source: &Source, place: &str, text: &str) -> Result<T> {
     text.trim()
         .parse()
-        .map_err(|_| source.error(place, format!("“{text}” is not a number that fits here")))
+        .map_err(|_| source.error(place, format!("“{text}” is not a valid number here")))
 }
 
 pub fn numbers<const N: usize, T: std::str::FromStr>(
@@ -427,7 +437,8 @@ pub fn extent(source: &Source, place: &str, text: &str) -> Result<Extent> {
     Ok([[x0, x1], [y0, y1], [z0, z1]])
 }
 
-/// Points along each axis of an extent that holds some, no more of them than the limits allow.
+/// Returns the number of points along each axis of an extent. The extent must not be empty, and its
+/// points must be within the limits.
 pub fn dims(source: &Source, extent: &Extent) -> Result<[usize; 3]> {
     let mut dims = [0; 3];
     let mut points = 1u64;
@@ -437,7 +448,7 @@ pub fn dims(source: &Source, extent: &Extent) -> Result<[usize; 3]> {
             .and_then(|n| n.checked_add(1))
             .and_then(|n| u64::try_from(n).ok());
         let length = length.filter(|&n| n > 0).ok_or_else(|| -> Error {
-            source.error("extent", format!("{first} to {last} holds no points"))
+            source.error("extent", format!("{first} to {last} is not a valid range of indices"))
         })?;
         points = points.saturating_mul(length);
         *dim = source.check_bytes("the number of points", points).map(|_| length as usize)?;

@@ -1,4 +1,5 @@
-//! VTK's XML rectilinear grids (`.vtr`): a volume whose samples have coordinates of their own along each axis.
+//! VTK's XML rectilinear grids (`.vtr`): a volume whose samples have their own coordinates along
+//! each axis.
 
 use super::{
     vti,
@@ -12,7 +13,8 @@ use crate::{
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
-/// Reads the active scalars of the points, as [`vti::read`] does, on a rectilinear lattice along x, y and z.
+/// Reads the active scalars of the points, as [`vti::read`] does, on a rectilinear lattice along x,
+/// y and z.
 ///
 /// # Errors
 /// Those of [`vti::read`]; also for coordinates that are missing or do not ascend.
@@ -20,14 +22,15 @@ pub fn read(source: &Source) -> Result<Volume> {
     let document = Document::read(source, "RectilinearGrid")?;
     let whole = vti::whole_extent(source, &document, "RectilinearGrid")?;
     let part = vti::samples(source, &document, whole)?;
-    // The samples were there, so the extent is no lie and lists along its axes are small beside them.
+    // The samples were present, so the extent is true and the coordinates along its axes are small
+    // beside them.
     let places = coordinates(source, &document, whole)?;
     source.spend("the size of the samples in bytes", part.kind.decoded_bytes(part.bytes.len()))?;
     let samples = part.kind.decode(part.bytes, part.endian);
     volume(places, samples).map_err(|message| source.error("RectilinearGrid", message))
 }
 
-/// A volume with samples at these coordinates along x, y and z.
+/// Returns a volume with samples at these coordinates along x, y and z.
 pub(super) fn volume(
     places: [Vec<f64>; 3],
     samples: crate::volume::Samples,
@@ -37,7 +40,7 @@ pub(super) fn volume(
     Volume::new(Lattice { dims, origin: DVec3::ZERO, axes: DMat3::IDENTITY, arrangement }, samples)
 }
 
-/// The coordinates along each axis, put together from all pieces.
+/// Returns the coordinates along each axis, joined from all pieces.
 fn coordinates(source: &Source, document: &Document, whole: Extent) -> Result<[Vec<f64>; 3]> {
     let counts = dims(source, &whole)?;
     source.room::<f64>("the coordinates", counts.iter().sum())?;
@@ -50,13 +53,16 @@ fn coordinates(source: &Source, document: &Document, whole: Extent) -> Result<[V
         let counts = dims(source, &extent)?;
         let arrays = &piece.section("Coordinates").arrays;
         if arrays.len() != 3 {
-            let message =
-                format!("holds {} arrays where one for each of 3 axes was expected", arrays.len());
+            let message = format!(
+                "contains {} arrays, but one for each of 3 axes was \
+                         expected",
+                arrays.len()
+            );
             return Err(source.error("Coordinates", message));
         }
         for (axis, (array, count)) in arrays.iter().zip(counts).enumerate() {
             let part = document.part(array, count as u64)?;
-            // Pieces lie inside the whole: their samples were put together before.
+            // Pieces lie inside the whole: their samples were joined before.
             let first = (extent[axis][0] - whole[axis][0]) as usize;
             places[axis][first..first + count].copy_from_slice(&part.doubles(source)?);
         }
@@ -73,15 +79,19 @@ mod tests {
         let pieces: String = pieces
             .iter()
             .map(|(extent, places, values)| {
-                let places = places.map(|p| format!("<DataArray type='Float64' format='ascii'>{p}</DataArray>")).concat();
+                let places = places
+                    .map(|p| format!("<DataArray type='Float64' format='ascii'>{p}</DataArray>"))
+                    .concat();
                 format!(
-                    "<Piece Extent='{extent}'><PointData Scalars='s'><DataArray type='UInt8' Name='s' format='ascii'>{values}\
-                     </DataArray></PointData><Coordinates>{places}</Coordinates></Piece>"
+                    "<Piece Extent='{extent}'><PointData Scalars='s'><DataArray type='UInt8' \
+                     Name='s' format='ascii'>{values}</DataArray></PointData>\
+                     <Coordinates>{places}</Coordinates></Piece>"
                 )
             })
             .collect();
         format!(
-            "<VTKFile type='RectilinearGrid'><RectilinearGrid WholeExtent='{whole}'>{pieces}</RectilinearGrid></VTKFile>"
+            "<VTKFile type='RectilinearGrid'><RectilinearGrid \
+             WholeExtent='{whole}'>{pieces}</RectilinearGrid></VTKFile>"
         )
     }
 

@@ -1,5 +1,5 @@
-//! VTK's XML unstructured grids (`.vtu`) and polygons (`.vtp`), read as scattered samples: values of points, or values of
-//! cells at their centres.
+//! VTK's XML unstructured grids (`.vtu`) and polygons (`.vtp`), read as scattered samples: values
+//! of points, or values of cells at their centres.
 
 use super::{
     shared::gather::which_scalar,
@@ -9,8 +9,8 @@ use super::{
 use crate::{Result, input::Source, scattered::Points};
 use glam::DVec3;
 
-/// The sections of a piece that hold cells, in the order in which data of cells count them, and the attributes with their
-/// numbers of cells.
+/// The sections of a piece that contain cells, each with the attribute that counts its cells. They
+/// are in the order in which cell data count them.
 const UNSTRUCTURED: &[[&str; 2]] = &[["Cells", "NumberOfCells"]];
 const POLYGONS: &[[&str; 2]] = &[
     ["Verts", "NumberOfVerts"],
@@ -19,14 +19,18 @@ const POLYGONS: &[[&str; 2]] = &[
     ["Strips", "NumberOfStrips"],
 ];
 
-/// Reads an unstructured grid or polygons. The values are the array that `scalar` names, among those of points and then of
-/// cells; else the active scalars of the points (those that `Scalars` names, or the first with one component), else of the
-/// cells. Values of cells become samples at the means of their corners, with radii from the cells' sizes. Pieces are
-/// joined; points that they share count for one together.
+/// Reads an unstructured grid or polygons. The values are the array that `scalar` names, among
+/// those of the points, then of the cells. Without `scalar`, they are the active scalars of the
+/// points (those that `Scalars` names, or the first with one component), else of the cells.
+///
+/// Values of cells become samples at the means of their corners, with radii from the cells' sizes.
+/// Pieces are joined; copies of a point that several pieces share have the weight of one sample
+/// together.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) for what is no such file, cut off, without such an array, with cells of points that
-/// there are not, or with numbers that are not finite; [`Error::Limit`](crate::Error::Limit) for counts over the limits.
+/// [`Error::Input`](crate::Error::Input) for a file that is not such a grid, is cut off, has no
+/// such array, has cells that refer to missing points, or has numbers that are not finite;
+/// [`Error::Limit`](crate::Error::Limit) for counts over the limits.
 pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
     let start = &source.bytes()[..source.bytes().len().min(1024)];
     let polygons = start.windows(8).any(|w| w == b"PolyData");
@@ -65,7 +69,7 @@ pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
         let array = piece.section(section).array(&name);
         if count > 0 {
             let array = array.ok_or_else(|| {
-                source.error(section, format!("has no array “{name}” in every piece"))
+                source.error(section, format!("lacks the array “{name}” in a piece"))
             })?;
             values.extend(document.part(array, count)?.doubles(source)?);
         }
@@ -77,7 +81,8 @@ pub fn read(source: &Source, scalar: Option<&str>) -> Result<Points> {
     }
 }
 
-/// The array to be shown: whether it is one of cells, and its name. Pieces all have the same arrays.
+/// Returns the array to read: whether it belongs to cells, and its name. All pieces have the same
+/// arrays.
 fn choose(source: &Source, pieces: &[Piece], scalar: Option<&str>) -> Result<(bool, String)> {
     let mut names = Vec::new();
     for (of_cells, section) in [(false, "PointData"), (true, "CellData")] {
@@ -115,7 +120,7 @@ fn add_points(
         return Ok(());
     }
     let Some(array) = piece.section("Points").arrays.first() else {
-        return Err(source.error("Points", "holds no array of positions"));
+        return Err(source.error("Points", "contains no array of positions"));
     };
     if array.components() != "3" {
         let message = format!("has {} components, but positions have 3", array.components());
@@ -136,7 +141,7 @@ fn add_cells(
     cells: &mut Cells,
 ) -> Result<()> {
     let need = |name: &str| {
-        section.array(name).ok_or_else(|| source.error("Cells", format!("hold no array “{name}”")))
+        section.array(name).ok_or_else(|| source.error("Cells", format!("have no array “{name}”")))
     };
     let ends = document.part(need("offsets")?, count)?.doubles(source)?;
     // The last offset is the number of corners; the cast saturates.
@@ -157,7 +162,7 @@ mod tests {
         format!("<DataArray format='ascii' {attributes}>{text}</DataArray>")
     }
 
-    /// A tetrahedron of edge 2 and a square beside it.
+    /// A tetrahedron with edge 2 and a square beside it.
     fn grid(point_data: &str, cell_data: &str) -> String {
         let points = array(
             "type='Float32' NumberOfComponents='3'",
@@ -167,9 +172,10 @@ mod tests {
         let ends = array("type='Int64' Name='offsets'", "4 8");
         let kinds = array("type='UInt8' Name='types'", "10 9");
         format!(
-            "<VTKFile type='UnstructuredGrid'><UnstructuredGrid><Piece NumberOfPoints='8' NumberOfCells='2'>\
-             <PointData>{point_data}</PointData><CellData>{cell_data}</CellData><Points>{points}</Points>\
-             <Cells>{corners}{ends}{kinds}</Cells></Piece></UnstructuredGrid></VTKFile>"
+            "<VTKFile type='UnstructuredGrid'><UnstructuredGrid><Piece NumberOfPoints='8' \
+             NumberOfCells='2'><PointData>{point_data}</PointData><CellData>{cell_data}</CellData>\
+             <Points>{points}</Points><Cells>{corners}{ends}{kinds}</Cells></Piece>\
+             </UnstructuredGrid></VTKFile>"
         )
     }
 
@@ -206,7 +212,7 @@ mod tests {
             (&whole.replace("4 8", "9 8"), None, "ends at corner 9"),
             (&whole.replace("4 8", "-4 8"), None, "ends at corner -4"),
             (&whole.replace("4 8", "0 8"), None, "cell 0: has no corners"),
-            (&whole.replace("6 7<", "6 8<"), None, "corner 8, but there are 8 points"),
+            (&whole.replace("6 7<", "6 8<"), None, "point 8, but there are 8 points"),
             (&whole.replace("10 -20", "10"), None, "1 numbers where 2"),
             (&whole.replace("5 2 0<", "5 2 nan<"), None, "not finite"),
             (&whole.replace("Name='offsets'", ""), None, "no array “offsets”"),
@@ -235,8 +241,8 @@ mod tests {
             };
             format!(
                 "<Piece NumberOfPoints='4' NumberOfVerts='1' NumberOfLines='0' NumberOfPolys='2'>\
-                 <CellData Scalars='c'>{}</CellData><Points>{points}</Points><Verts>{}</Verts><Lines>{}</Lines>\
-                 <Polys>{}</Polys></Piece>",
+                 <CellData Scalars='c'>{}</CellData><Points>{points}</Points><Verts>{}</Verts>\
+                 <Lines>{}</Lines><Polys>{}</Polys></Piece>",
                 array("type='Float32' Name='c'", values),
                 cells("3", "1"),
                 cells("", ""),

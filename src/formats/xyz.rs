@@ -1,5 +1,6 @@
-//! Point clouds as tables of text (`.xyz`, `.pts`, `.asc`, `.csv`, `.txt`): a point a line, with a line of names or without.
-//! `.pts` files begin each scan with its count of points in a line of its own.
+//! Point clouds as text tables (`.xyz`, `.pts`, `.asc`, `.csv`, `.txt`): one point a line, with or
+//! without a line of column names. `.pts` files begin each scan with its number of points on a line
+//! of its own.
 
 use super::shared::cloud::{Cloud, greys};
 use crate::{
@@ -13,10 +14,10 @@ use crate::{
 };
 use glam::{DVec3, Vec3};
 
-/// Bytes that a point takes with all that it may have.
+/// Bytes per point if it has every attribute.
 const POINT: u64 = 24 + 12 + 8;
 
-/// The names of what a point has; names are compared without regard to case.
+/// Column names of each attribute; case is ignored.
 const POSITION: [&[&str]; 3] = [&["x"], &["y"], &["z"]];
 const COLOR: [&[&str]; 3] = [&["r", "red"], &["g", "green"], &["b", "blue"]];
 const NORMAL: [&[&str]; 3] = [
@@ -26,16 +27,24 @@ const NORMAL: [&[&str]; 3] = [
 ];
 const INTENSITY: &[&str] = &["intensity", "i", "grey", "gray", "reflectance"];
 
-/// Reads a cloud. With names: `x`, `y`, `z` and if there are some `r`, `g`, `b` (or `red`, …), `nx`, `ny`, `nz` (or
-/// `normal_x`, …) and `intensity`; other columns are passed over. Without: 3 columns of a position, and then an intensity,
-/// or a colour or normal, or both of them in either order, or an intensity and a colour, or these and a normal. Three numbers
-/// are a normal where all lie between −1 and 1 and some are below 0 or all lengths are 1. Intensities are drawn as greys where
-/// there are no colours. Colours are bytes, or of 16 bits where some are larger, or fractions where none is above 1.
+/// Reads a point cloud. With column names, the table has `x`, `y`, `z` and optionally `r`, `g`, `b`
+/// (or `red`, …), `nx`, `ny`, `nz` (or `normal_x`, …) and `intensity`. Other columns are ignored.
+///
+/// Without names, the first three columns are a position. One of these may follow:
+/// - nothing;
+/// - an intensity;
+/// - a colour or a normal, or both in either order;
+/// - an intensity and a colour, or these and a normal.
+///
+/// Three columns are a normal if all numbers lie between −1 and 1 and either one is negative or all
+/// lengths are 1. Without colours, intensities are drawn as greys. Colours are fractions if none is
+/// above 1, 16-bit numbers if one is above 255, and bytes otherwise.
 ///
 /// # Errors
-/// [`Error::Input`](crate::Error::Input) with the line, for columns that are not these, lines of another length, what is no
-/// number, numbers that are not finite, and fewer points than the file counts; [`Error::Limit`](crate::Error::Limit) for more
-/// lines than points are allowed.
+/// [`Error::Input`](crate::Error::Input) with the line, for other columns, lines with another
+/// number of columns, words that are not numbers, numbers that are not finite, and fewer points
+/// than the file counts; [`Error::Limit`](crate::Error::Limit) for more lines than the limits allow
+/// points.
 pub fn read(source: &Source) -> Result<Mesh> {
     let mut counts = Growing::new(source, "the counts");
     let text = Text::of(source, |number, line| match copy::number::<u64>(line) {
@@ -61,7 +70,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
     let three = |row: usize, columns: [usize; 3]| {
         DVec3::from_array(columns.map(|column| value(row, column)))
     };
-    // Without names the numbers tell what they are.
+    // Without names, the values decide whether columns are a normal.
     let is_normal = |columns: [usize; 3]| {
         let mut all = rows().map(|row| three(row, columns));
         let unit = rows().all(|row| (three(row, columns).length() - 1.0).abs() < 0.02);
@@ -74,7 +83,7 @@ pub fn read(source: &Source) -> Result<Mesh> {
             return Err(source
                 .error(
                     format!("line {}", text.first),
-                    "has two colours or two normals behind the position",
+                    "has two colours or two normals after the position",
                 )
                 .hint("name the columns in the first line"));
         }
@@ -102,8 +111,9 @@ pub fn read(source: &Source) -> Result<Mesh> {
     cloud.into_mesh(source, |row| text.place(row))
 }
 
-/// Whether a table is a cloud and not samples: its first line names colours or normals but no `value` or `scalar`, or names
-/// nothing but a position, or has as many numbers without names as a cloud has and samples have not.
+/// Returns whether a table is a point cloud rather than samples. It is one if its first line names
+/// colours or normals but no `value` or `scalar`, or names only a position. Without names, it is
+/// one if the number of columns is that of a cloud and not of samples.
 pub(super) fn is_cloud(source: &Source) -> bool {
     let Some((words, named)) = first_words(source.bytes()) else { return false };
     if !named {
@@ -115,14 +125,14 @@ pub(super) fn is_cloud(source: &Source) -> bool {
         && (triple(&words, COLOR).is_some() || triple(&words, NORMAL).is_some() || words.len() == 3)
 }
 
-/// Which column means what.
+/// The meaning of the columns.
 #[derive(Default)]
 struct Layout {
     position: [usize; 3],
     color: Option<[usize; 3]>,
     normal: Option<[usize; 3]>,
     intensity: Option<usize>,
-    /// Columns that are a colour or a normal.
+    /// Columns that are a colour or a normal; their values decide which.
     untold: Vec<[usize; 3]>,
 }
 
@@ -131,9 +141,7 @@ impl Layout {
         let Some(position) = triple(names, POSITION) else {
             let missing =
                 POSITION.iter().find(|name| find(names, name).is_none()).map_or("", |name| name[0]);
-            return Err(
-                source.error(format!("line {line}"), format!("names no column “{missing}”"))
-            );
+            return Err(source.error(format!("line {line}"), format!("has no column “{missing}”")));
         };
         Ok(Self {
             position,
@@ -152,11 +160,24 @@ impl Layout {
             6 => Ok(Self { untold: vec![[3, 4, 5]], ..plain }),
             7 => Ok(Self { intensity: Some(3), color: Some([4, 5, 6]), ..plain }),
             9 => Ok(Self { untold: vec![[3, 4, 5], [6, 7, 8]], ..plain }),
-            10 => Ok(Self { intensity: Some(3), color: Some([4, 5, 6]), normal: Some([7, 8, 9]), ..plain }),
-            _ => Err(source.error(format!("line {line}"), format!("has {width} columns without names")).hint(
-                "a point is x, y, z and then a colour, a normal, both, or an intensity and a colour; or name the columns in the \
-                 first line",
-            )),
+            10 => Ok(Self {
+                intensity: Some(3),
+                color: Some([4, 5, 6]),
+                normal: Some([7, 8, 9]),
+                ..plain
+            }),
+            _ => Err(source
+                .error(
+                    format!("line {line}"),
+                    format!(
+                        "has {width} columns without \
+                                                                   names"
+                    ),
+                )
+                .hint(
+                    "a point is x, y, z and then a colour, a normal, both, or an intensity and a \
+                 colour; or name the columns in the first line",
+                )),
         }
     }
 
@@ -234,7 +255,7 @@ mod tests {
     #[test]
     fn what_is_wrong_is_told_with_its_line() {
         for (text, word) in [
-            ("", "no lines"),
+            ("", "no rows"),
             ("hello", "no column “x”"),
             ("x y\n1 2", "no column “z”"),
             ("1 2\n", "line 1: has 2 columns without names"),
@@ -262,7 +283,8 @@ mod tests {
         assert!(matches!(read(&Source::open(&path, &limits).unwrap()), Err(Error::Limit { .. })));
     }
 
-    /// A file that counts its points notices each cut but that of its last number.
+    /// In a file that counts its points, every truncation is an error, except within the last
+    /// number.
     #[test]
     fn every_cut_is_an_error_or_less() {
         let whole = "2\n1 2 3 9 255 128 0\n4 5 6 8 0 0 51";

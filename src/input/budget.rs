@@ -1,4 +1,5 @@
-//! What reading one input has taken so far: bytes, time and files. The files of one model share a budget.
+//! What reading one input has used so far: bytes, time and files. All files of one model share a
+//! budget.
 
 use super::Limits;
 use crate::{Result, error::LimitKind};
@@ -11,13 +12,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Bytes that were taken, and when reading began.
+/// The bytes used, the time reading began, and the files opened.
 pub(crate) struct Budget {
     spent: AtomicU64,
     created: Instant,
-    /// Nanoseconds from then to the beginning of what the limit of time holds for.
+    /// Nanoseconds from `created` to the start of the interval that the time limit applies to.
     begun: AtomicU64,
-    /// The files that were opened.
+    /// The files opened so far.
     files: Mutex<Vec<PathBuf>>,
 }
 
@@ -31,8 +32,8 @@ impl Budget {
         }
     }
 
-    /// Takes bytes for `what`. Nothing is given back: what is dropped while a file is read counts as well, so the sum is
-    /// never below what is held at any time.
+    /// Adds bytes to the sum; `what` names their use. Nothing is given back: arrays that are
+    /// dropped while a file is read still count. So the sum never falls below the memory in use.
     pub fn spend(&self, limits: &Limits, file: &Path, what: &str, bytes: u64) -> Result<()> {
         limits.check(LimitKind::Bytes, file, what, bytes)?;
         let before = self.spent.fetch_add(bytes, Relaxed);
@@ -46,32 +47,27 @@ impl Budget {
         Ok(())
     }
 
-    /// Keeps the path of a file that was opened.
+    /// Records the path of an opened file.
     pub fn opened(&self, file: &Path) {
         self.files.lock().unwrap_or_else(PoisonError::into_inner).push(file.to_owned());
     }
 
-    /// The files that were opened so far.
+    /// Returns the files opened so far.
     pub fn files(&self) -> Vec<PathBuf> {
         self.files.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Refuses to go on where reading took too long.
+    /// Returns an error if reading has taken longer than the limit.
     pub fn check_time(&self, limits: &Limits, file: &Path) -> Result<()> {
         let begun = Duration::from_nanos(self.begun.load(Relaxed));
         let taken = self.created.elapsed().saturating_sub(begun);
         if taken <= Duration::from_secs(limits.seconds) {
             return Ok(());
         }
-        limits.check(
-            LimitKind::Seconds,
-            file,
-            "the time for reading, in seconds,",
-            taken.as_secs() + 1,
-        )
+        limits.check(LimitKind::Seconds, file, "the reading time in seconds", taken.as_secs() + 1)
     }
 
-    /// Lets the time begin again.
+    /// Restarts the clock of the time limit.
     pub fn restart(&self) {
         self.begun.store(self.created.elapsed().as_nanos() as u64, Relaxed);
     }

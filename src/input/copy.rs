@@ -1,47 +1,49 @@
 //! Text from mapped files.
 //!
-//! Other programs may write to a mapped file while it is read. A `&str` that borrows from the mapping can then stop being UTF-8
-//! after it was checked, and code that relies on the check reads out of bounds. Mapped bytes are therefore used as bytes alone.
-//! What is needed as text is copied first and checked afterwards, by the functions of this module. Clippy refuses the standard
-//! library's borrowing conversions in all other modules of readers (`clippy.toml`).
+//! Other programs may write to a mapped file while it is read. A `&str` that borrows from the
+//! mapping can then stop being UTF-8 after it was checked, and code that relies on the check reads
+//! out of bounds. So mapped bytes are only ever used as bytes. The functions of this module copy
+//! what is needed as text first and check the copy. Clippy refuses the standard library's borrowing
+//! conversions in all other modules of readers (`clippy.toml`).
 
 #![expect(
     clippy::disallowed_methods,
-    reason = "the one place that checks text, after it is copied"
+    reason = "this module alone checks text, and only after copying it"
 )]
 
 use std::{hint::black_box, str::FromStr};
 
-/// Words of numbers that are not longer need no memory from the allocator.
+/// Words up to this length, in bytes, are parsed without allocating.
 const SHORT: usize = 48;
 
-/// A copy of the bytes. The compiler may not read the original again instead of the copy.
+/// Returns a copy of the bytes. `black_box` keeps the compiler from reading the original again
+/// instead of the copy.
 fn copied(bytes: &[u8]) -> Vec<u8> {
     black_box(bytes.to_vec())
 }
 
-/// A copy of the bytes as text.
+/// Returns a copy of the bytes as text.
 ///
 /// # Errors
-/// The place of the first byte that is not UTF-8.
+/// The offset of the first byte that is not UTF-8.
 pub(crate) fn text(bytes: &[u8]) -> Result<String, usize> {
     String::from_utf8(copied(bytes)).map_err(|error| error.utf8_error().valid_up_to())
 }
 
-/// A copy of the bytes as text, with a replacement character for what is not UTF-8.
+/// Returns a copy of the bytes as text, with replacement characters for bytes that are not UTF-8.
 pub(crate) fn lossy(bytes: &[u8]) -> String {
     String::from_utf8(copied(bytes))
         .unwrap_or_else(|error| String::from_utf8_lossy(error.as_bytes()).into_owned())
 }
 
-/// The beginning of a word, for an error message.
+/// Returns the first 40 characters of a word, for an error message.
 pub(crate) fn excerpt(word: &[u8]) -> String {
     const MOST: usize = 40;
-    // A character takes four bytes at most.
+    // A UTF-8 character has at most four bytes.
     lossy(&word[..word.len().min(4 * MOST)]).chars().take(MOST).collect()
 }
 
-/// The number that a word is.
+/// Parses a word as a number.
 pub(crate) fn number<T: FromStr>(word: &[u8]) -> Option<T> {
     let mut short = [0; SHORT];
     match short.get_mut(..word.len()) {

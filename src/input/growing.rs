@@ -3,11 +3,11 @@
 use super::Source;
 use crate::Result;
 
-/// How many items are taken between two looks at the clock.
+/// Items that are added between two checks of the time limit.
 const BREATH: usize = 1 << 12;
 
-/// A list that grows under the limits: what it makes room for is taken from the budget before, and the time is looked at
-/// now and then.
+/// A list that grows within the limits. It takes its capacity from the budget before it allocates,
+/// and checks the time every `BREATH` items.
 pub(crate) struct Growing<'a, T> {
     source: &'a Source<'a>,
     what: &'static str,
@@ -15,7 +15,7 @@ pub(crate) struct Growing<'a, T> {
 }
 
 impl<'a, T> Growing<'a, T> {
-    /// An empty list; `what` names it in errors.
+    /// Creates an empty list; `what` names it in errors.
     pub fn new(source: &'a Source<'a>, what: &'static str) -> Self {
         Self { source, what, items: Vec::new() }
     }

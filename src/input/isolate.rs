@@ -1,4 +1,4 @@
-//! A wall around decoders that are not ours.
+//! Isolation of third-party decoders: their panics become errors.
 
 use super::Source;
 use crate::Result;
@@ -9,13 +9,13 @@ use std::{
 };
 
 thread_local! {
-    /// How many walls this thread is behind.
+    /// Number of nested [`isolated`] calls on this thread.
     static BEHIND: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Runs a decoder that may panic on bytes that it did not expect, and makes an input error of that. What it worked on is
-/// dropped, so nothing half changed is seen afterwards. The panic is not printed; those of other threads are, so a decoder
-/// is to be isolated on the thread that it runs on.
+/// Runs a decoder that may panic on bytes that it did not expect, and turns the panic into an input
+/// error. The decoder's state is dropped, so nobody sees it half changed. The panic is not printed.
+/// Panics of other threads still are, so isolate a decoder on the thread that it runs on.
 pub(crate) fn isolated<T>(
     source: &Source,
     place: &str,
@@ -29,17 +29,18 @@ pub(crate) fn isolated<T>(
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text =
             text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("the decoder gave up");
-        Err(source.error(place, format!("holds what cannot be decoded: {text}")))
+        Err(source.error(place, format!("cannot be decoded: {text}")))
     })
 }
 
-/// Puts a hook before the one that there is, once: it keeps quiet about panics that are told as errors.
+/// Installs a panic hook in front of the existing one, once. It silences panics that [`isolated`]
+/// returns as errors.
 fn hush() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         let before = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |info| {
-            // A thread that ends has no such count any more.
+            // A thread that is ending no longer has this thread-local.
             if BEHIND.try_with(Cell::get).unwrap_or(0) == 0 {
                 before(info);
             }
@@ -60,10 +61,7 @@ mod tests {
             isolated(source, "chunk 3", || -> Result<()> { panic!("index {} of 2", 5) })
         };
         let message = read_with(&path, decode).unwrap_err().to_string();
-        assert!(
-            message.contains("chunk 3: holds what cannot be decoded: index 5 of 2"),
-            "{message}"
-        );
+        assert!(message.contains("chunk 3: cannot be decoded: index 5 of 2"), "{message}");
     }
 
     #[test]

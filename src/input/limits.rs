@@ -1,23 +1,25 @@
-//! What a reader may spend on one input. Allocation follows the bytes present, not the counts claimed.
+//! Limits on what a reader may spend on one input. Readers allocate by the bytes that are present,
+//! not by the counts that a file claims.
 
 use crate::{Deadline, Error, Result, error::LimitKind};
 use std::path::Path;
 
-/// Bounds for every reader. The defaults take the largest scans and volumes that a workstation handles and stop
-/// what a hostile or broken file claims beyond that.
+/// Limits for every reader. The defaults admit the largest scans and volumes that a workstation can
+/// handle. They refuse larger claims of broken or hostile files.
 #[derive(Debug, Clone)]
 pub struct Limits {
-    /// Vertices, points or faces of one file.
+    /// Maximum number of vertices, points or faces in one file.
     pub points: u64,
-    /// Bytes that one input may occupy: its file, the files that it refers to, and all arrays that are made of them until
-    /// it is read, those that are dropped on the way among them.
+    /// Maximum number of bytes that one input may occupy. This counts the file, the files that it
+    /// refers to, and every array made while it is read, including arrays that are dropped on the
+    /// way.
     pub bytes: u64,
-    /// Nesting of scene nodes and of elements.
+    /// Maximum nesting depth of scene nodes and of XML elements.
     pub depth: usize,
-    /// Pixels of one picture.
+    /// Maximum number of pixels in one picture.
     pub texels: u64,
-    /// Seconds that reading may take. Of a file that is read in pieces, those that a batch of pieces may take. The steps
-    /// that follow reading take a [`deadline`](Self::deadline).
+    /// Maximum time for reading, in seconds. For a file that is read in pieces, it applies to each
+    /// batch of pieces. The steps that follow reading take a [`deadline`](Self::deadline).
     pub seconds: u64,
 }
 
@@ -28,12 +30,12 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// The deadline of work that begins now and may take [`seconds`](Self::seconds).
+    /// Returns the deadline of work that begins now and may take [`seconds`](Self::seconds).
     pub fn deadline(&self) -> Deadline {
         Deadline::after(self.seconds)
     }
 
-    /// For what was never a file.
+    /// Returns limits that allow everything, for data that never was a file.
     pub(crate) fn none() -> Self {
         Self {
             points: u64::MAX,
@@ -44,7 +46,7 @@ impl Limits {
         }
     }
 
-    /// One of the limits.
+    /// Returns one of the limits.
     pub fn of(&self, kind: LimitKind) -> u64 {
         match kind {
             LimitKind::Points => self.points,
@@ -55,7 +57,8 @@ impl Limits {
         }
     }
 
-    /// Refuses what is over one of the limits; `what` names it in the error.
+    /// Returns an error if `found` exceeds the limit of this kind. `what` names the quantity in the
+    /// error.
     pub(crate) fn check(
         &self,
         kind: LimitKind,

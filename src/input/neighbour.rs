@@ -1,14 +1,15 @@
-//! References from one file to another: relative, and inside the folder of the file that has them.
+//! References from one file to another: relative, and inside the folder of the referring file.
 
 use super::Source;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
 impl Source<'_> {
-    /// The path of a file that this file refers to: relative, and inside this file's folder after links are resolved.
+    /// Returns the path of a file that this file refers to. The reference must be relative and,
+    /// after links are resolved, inside this file's folder.
     ///
-    /// What is a path elsewhere, on any system, is refused on all of them: a model that one machine takes is taken by
-    /// every other.
+    /// A reference that any system would take for a path elsewhere is refused on all systems. So a
+    /// model that loads on one machine loads on every other.
     pub fn neighbour(&self, place: &str, reference: &str) -> Result<PathBuf> {
         let refuse = |reason: &str| {
             let shown: String = reference.chars().take(80).collect();
@@ -47,19 +48,19 @@ impl Source<'_> {
     }
 }
 
-/// Whether a reference is a path inside a folder, by its text alone.
+/// Returns whether a reference is a path inside a folder, by its text alone.
 pub(crate) fn is_inside(reference: &str) -> bool {
     refusal(reference).is_none()
 }
 
-/// Why a reference is none to a file inside the folder, by its text alone.
+/// Returns why a reference cannot be a file inside the folder, by its text alone.
 fn refusal(reference: &str) -> Option<&'static str> {
     let parts = || reference.split(['/', '\\']);
     if reference.trim().is_empty() {
         return Some("which names no file");
     }
     if reference.contains('\0') {
-        return Some("which is no path");
+        return Some("which is not a valid path");
     }
     // “C:” is a drive, “file:” and “http:” are schemes; no portable name has a colon.
     if reference.contains(':') {
@@ -115,7 +116,7 @@ mod tests {
             ("b.bin:stream", "an address or a drive"),
             ("", "names no file"),
             ("  ", "names no file"),
-            ("b\0.bin", "is no path"),
+            ("b\0.bin", "is not a valid path"),
             ("below", "not a regular file"),
             (".", "not a regular file"),
             ("a.gltf", "the file itself"),
@@ -158,7 +159,7 @@ mod tests {
             let message = source.neighbour("buffer 0", reference).unwrap_err().to_string();
             assert!(message.contains(reason), "{reference}: {message}");
         }
-        // What waits for another process, or has no end, is not opened.
+        // Files that wait for another process or have no end are not opened.
         let pipe = inside.join("pipe.bin");
         if std::process::Command::new("mkfifo")
             .arg(&pipe)

@@ -1,15 +1,16 @@
-//! From the doubles of a file to 32-bit positions around an origin.
+//! Converts the double-precision positions of a file to 32-bit positions around an origin.
 
 use super::Source;
 use crate::{Error, Result};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Positions this far from the origin still have squares that fit in 32 bits.
+/// The squares of coordinates up to this size still fit in 32-bit floats.
 const LARGEST: f64 = 1e18;
 
-/// Chooses an origin and gives the positions relative to it. The origin is zero where the coordinates are not large
-/// beside the extent of the whole, else the whole number nearest to the centre. `place` names a row in an error.
+/// Chooses an origin and returns it with the positions relative to it. The origin is zero unless
+/// the coordinates are large compared with the extent of the whole. Then it is the centre, rounded
+/// to whole numbers. `place` names a row in an error.
 pub(crate) fn settle(
     source: &Source,
     count: usize,
@@ -34,7 +35,7 @@ pub(crate) fn settle(
     Ok((origin, (0..count).into_par_iter().map(|row| (position(row) - origin).as_vec3()).collect()))
 }
 
-/// The origin for positions between two corners.
+/// Returns the origin for positions between two corners.
 pub(crate) fn origin(source: &Source, low: DVec3, high: DVec3) -> Result<DVec3> {
     let (center, extent) = (low * 0.5 + high * 0.5, (high * 0.5 - low * 0.5).max_element());
     let origin =
@@ -43,7 +44,7 @@ pub(crate) fn origin(source: &Source, low: DVec3, high: DVec3) -> Result<DVec3> 
         return Err(source.error(
             "positions",
             format!(
-                "spread from {:?} to {:?}, more than 32 bits can hold",
+                "range from {:?} to {:?}, too wide for 32-bit coordinates",
                 low.to_array(),
                 high.to_array()
             ),
@@ -52,14 +53,14 @@ pub(crate) fn origin(source: &Source, low: DVec3, high: DVec3) -> Result<DVec3> 
     Ok(origin)
 }
 
-/// The error of a position that is not finite.
+/// Returns the error for a position that is not finite.
 pub(crate) fn not_finite(source: &Source, place: String, position: DVec3) -> Error {
     source
         .error(place, format!("the position {position} is not finite"))
         .hint("remove the point, or write the file again without undefined coordinates")
 }
 
-/// A normal of unit length, or zero where the file's is unusable.
+/// Returns a normal of unit length, or zero if the file's normal is unusable.
 pub(crate) fn unit(normal: Vec3) -> Vec3 {
     normal.as_dvec3().normalize_or_zero().as_vec3()
 }

@@ -1,5 +1,5 @@
-//! The guarded opening: every format reads its bytes through a [`Source`], which maps the file, holds the limits
-//! and gives errors that name the file.
+//! Guarded access to input files. Every format reads its bytes through a [`Source`]. It maps the
+//! file, holds the limits and creates errors that name the file.
 
 use super::{Limits, budget::Budget, copy, mapping::Mapping};
 use crate::{Error, Result, error::LimitKind, memory};
@@ -10,38 +10,42 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
-/// Bytes that are unpacked between two looks at the clock.
+/// Bytes that are unpacked between two checks of the time limit.
 const PORTION: u64 = 16 << 20;
 
-/// The system is not asked for less than this many bytes.
+/// Below this number of bytes, the system is not asked for available memory.
 const SMALL: u64 = 64 << 10;
 
 /// Where the bytes of an input are.
 enum Content<'a> {
     Mapped(Mapping),
-    /// In place of a file.
+    /// Bytes from the caller, instead of a file.
     Held(&'a [u8]),
 }
 
-/// An opened input: its path, its bytes (mapped) and the limits that hold for it.
+/// An opened input: its path, its bytes (mapped) and the limits that apply to it.
 pub struct Source<'a> {
     pub path: &'a Path,
     pub limits: &'a Limits,
     content: Content<'a>,
-    /// Text of the file that the reader refers to, as a copy.
+    /// Text of the file that a reader borrows from, as a copy.
     text: OnceLock<String>,
     /// Shared by all files of a model.
     budget: Arc<Budget>,
 }
 
 impl<'a> Source<'a> {
-    /// Opens and maps a regular file. Directories, devices, missing files and files over the byte limit are errors.
+    /// Opens and maps a regular file.
+    ///
+    /// # Errors
+    /// [`Error::File`] for a missing file or one that cannot be opened, [`Error::Input`] for
+    /// directories and devices, and [`Error::Limit`] for a file over the byte limit.
     pub fn open(path: &'a Path, limits: &'a Limits) -> Result<Self> {
         Self::open_within(path, limits, Arc::new(Budget::new()))
     }
 
-    /// Opens a file that this one refers to, at a path from [`neighbour`](Self::neighbour), or that is read together with it:
-    /// both count as one.
+    /// Opens a file that belongs to this one: it refers to it, by a path from
+    /// [`neighbour`](Self::neighbour), or both are read together. Both share one budget.
     pub(crate) fn open_beside<'b>(&self, path: &'b Path) -> Result<Source<'b>>
     where
         'a: 'b,
@@ -54,19 +58,20 @@ impl<'a> Source<'a> {
         Ok(Self { path, limits, content, text: OnceLock::new(), budget })
     }
 
-    /// Maps a file as [`open`](Self::open) does, for those who read from it later.
+    /// Maps a file as [`open`](Self::open) does, for callers that read from it later.
     pub(crate) fn map(path: &Path, limits: &Limits) -> Result<Mapping> {
         map_within(path, limits, &Budget::new())
     }
 
-    /// The files that were opened so far: this one, and those that it refers to where a reader has asked for them.
+    /// Returns the files opened so far: this one, and those it refers to that a reader has opened.
     pub fn files(&self) -> Vec<PathBuf> {
         self.budget.files()
     }
 
-    /// Takes bytes in place of a file: of a program that has them from elsewhere. `name` is what errors call them, and its
-    /// extension tells their format where that is asked for. There is no folder around them, so what they refer to is not
-    /// read: missing materials and pictures are left out with a warning, missing data are an error.
+    /// Uses bytes instead of a file, for programs that get their data from elsewhere. `name` stands
+    /// for the path in errors; its extension gives the format where readers look at extensions.
+    /// There is no folder, so files that the bytes refer to are not read. Missing materials and
+    /// pictures are left out with a warning; missing data are an error.
     ///
     /// # Errors
     /// [`Error::Limit`] for more bytes than the limits allow.
@@ -82,12 +87,12 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// Whether this is no file but bytes from elsewhere, which have no neighbours.
+    /// Returns whether this source holds bytes from the caller, which have no neighbouring files.
     pub(crate) fn is_in_memory(&self) -> bool {
         matches!(self.content, Content::Held(_))
     }
 
-    /// The whole file.
+    /// Returns all bytes of the file.
     pub fn bytes(&self) -> &[u8] {
         match &self.content {
             Content::Mapped(mapping) => mapping,
@@ -95,11 +100,12 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// An error if the file is not the one that was opened any more, so that what was read may be neither the old nor the
-    /// new. The readers of whole files ask when they are done.
+    /// Checks that the file has not changed since it was opened. If it has, what was read may match
+    /// neither the old nor the new content. Readers of whole files call this when they have
+    /// finished.
     ///
     /// # Errors
-    /// [`Error::Input`] with what has become of the file.
+    /// [`Error::Input`] that says how the file has changed.
     pub fn intact(&self) -> Result<()> {
         match &self.content {
             Content::Mapped(mapping) => intact(mapping, self.path),
@@ -107,16 +113,17 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The text of a file that people write, as a copy: what was checked stays what it is. `what` names it in errors (“a
-    /// transfer function”).
+    /// Returns the text of a file that people write, as a copy: text that was checked stays as it
+    /// is. `what` names it in errors (“a transfer function”).
     ///
     /// # Errors
-    /// [`Error::Input`] for more than `most` bytes, for what is not UTF-8, and for a file that changed.
+    /// [`Error::Input`] for more than `most` bytes, for text that is not UTF-8, and for a file that
+    /// changed.
     pub fn small_text(&self, what: &str, most: usize) -> Result<String> {
         let size = self.bytes().len();
         if size > most {
             return Err(
-                self.error("file", format!("has {size} bytes, but {what} has {most} at most"))
+                self.error("file", format!("has {size} bytes, but {what} may have at most {most}"))
             );
         }
         let text = copy::text(self.bytes());
@@ -124,8 +131,8 @@ impl<'a> Source<'a> {
         text.map_err(|at| self.error(format!("byte {at}"), "is not UTF-8 text"))
     }
 
-    /// A part of the file as text, copied and kept as long as this source. Only one part can be kept: a second call returns
-    /// the first text. `what` names it in errors.
+    /// Returns a part of the file as text, copied and kept as long as this source. Only one part
+    /// can be kept: a second call returns the first text. `what` names it in errors.
     pub(crate) fn keep_text(&self, bytes: &[u8], what: &str) -> Result<&str> {
         self.room::<u8>("the text", bytes.len())?;
         let text = copy::text(bytes)
@@ -133,7 +140,8 @@ impl<'a> Source<'a> {
         Ok(self.text.get_or_init(|| text))
     }
 
-    /// What was made of the file, or why it was not; and where the file was changed meanwhile, that alone.
+    /// Returns `found`, the result of reading, unless the file has changed meanwhile. Then it
+    /// returns only the error that says so.
     pub(crate) fn unless_changed<T>(&self, found: Result<T>) -> Result<T> {
         self.intact().and(found)
     }
@@ -145,7 +153,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The mapping itself, for those who read from it later; bytes that are held have none.
+    /// Returns the mapping, for callers that read from it later; `None` for bytes from the caller.
     pub(crate) fn into_mapping(self) -> Option<Mapping> {
         match self.content {
             Content::Mapped(mapping) => Some(mapping),
@@ -153,7 +161,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// An input error at a place of this file (`"line 12"`, `"byte 407"`, `"header"`).
+    /// Creates an input error at a place in this file (`"line 12"`, `"byte 407"`, `"header"`).
     pub fn error(&self, place: impl Into<String>, message: impl Into<String>) -> Error {
         Error::input(self.path, place, message)
     }
@@ -163,35 +171,37 @@ impl<'a> Source<'a> {
         self.check(LimitKind::Points, what, count)
     }
 
-    /// Checks a claimed number of bytes against [`Limits::bytes`], without taking them.
+    /// Checks a claimed number of bytes against [`Limits::bytes`], without adding them to the
+    /// budget.
     pub fn check_bytes(&self, what: &str, bytes: u64) -> Result<usize> {
         self.check(LimitKind::Bytes, what, bytes)
     }
 
-    /// Checks a depth of nesting against [`Limits::depth`].
+    /// Checks a nesting depth against [`Limits::depth`].
     pub(crate) fn check_depth(&self, place: &str, depth: usize) -> Result<()> {
         self.limits.check(
             LimitKind::Depth,
             self.path,
-            format!("{place}: the depth of nesting"),
+            format!("{place}: the nesting depth"),
             depth as u64,
         )
     }
 
-    /// Checks that there is still time ([`Limits::seconds`]).
+    /// Checks that reading is within its time limit ([`Limits::seconds`]).
     pub(crate) fn check_time(&self) -> Result<()> {
         self.budget.check_time(self.limits, self.path)
     }
 
-    /// Lets the time begin again, for the next pieces of a file that is read in pieces.
+    /// Restarts the clock of the time limit, for the next pieces of a file that is read in pieces.
     pub(crate) fn restart_time(&self) {
         self.budget.restart();
     }
 
-    /// Takes so many bytes from what this input may occupy ([`Limits::bytes`]), and asks the system whether they are there.
+    /// Adds bytes to what this input occupies ([`Limits::bytes`]), and asks the system whether that
+    /// much memory is available.
     pub(crate) fn spend(&self, what: &str, bytes: u64) -> Result<()> {
         self.budget.spend(self.limits, self.path, what, bytes)?;
-        // Readers take small amounts for each item.
+        // Readers add small amounts for each item.
         if bytes < SMALL {
             return Ok(());
         }
@@ -202,7 +212,7 @@ impl<'a> Source<'a> {
         memory::room(&format!("reading {what}"), bytes).map_err(|error| error.in_file(self.path))
     }
 
-    /// As [`spend`](Self::spend), for an array: `what` names what it holds.
+    /// As [`spend`](Self::spend), for an array of `count` items. `what` names its contents.
     pub(crate) fn room<T>(&self, what: &str, count: usize) -> Result<()> {
         self.spend(
             &format!("the size of {what} in bytes"),
@@ -212,15 +222,17 @@ impl<'a> Source<'a> {
 
     fn check(&self, kind: LimitKind, what: &str, found: u64) -> Result<usize> {
         self.limits.check(kind, self.path, what, found)?;
-        // A 32-bit machine counts less than a limit may allow.
+        // A 32-bit `usize` may be smaller than a limit.
         usize::try_from(found)
             .map_err(|_| self.error(what, format!("is {found}, more than this machine can count")))
     }
 
-    /// Unpacks a stream whose unpacked size is known. A stream that ends early or holds more than `expected` is an
-    /// error; memory grows with what was really unpacked, so a lying size allocates nothing.
+    /// Unpacks a stream whose unpacked size is known. A stream that ends early or holds more than
+    /// `expected` bytes is an error. Memory grows with the bytes actually unpacked, so a false size
+    /// allocates nothing.
     pub fn unpack(&self, place: &str, mut stream: impl Read, expected: usize) -> Result<Vec<u8>> {
-        // The list grows with what is unpacked, and reading to its end gives an error where there is no memory.
+        // `spend` would also ask the system for the memory. That is not needed here: the list grows
+        // with the unpacked bytes, and `read_to_end` returns an error if memory runs out.
         self.budget.spend(self.limits, self.path, "the unpacked size in bytes", expected as u64)?;
         let mut out = Vec::new();
         loop {
@@ -237,7 +249,7 @@ impl<'a> Source<'a> {
         }
         if out.len() != expected {
             let found =
-                if out.len() > expected { "more".to_owned() } else { out.len().to_string() };
+                if out.len() > expected { "too many".to_owned() } else { out.len().to_string() };
             return Err(self
                 .error(place, format!("unpacks to {found} bytes where {expected} were expected")));
         }
@@ -246,7 +258,8 @@ impl<'a> Source<'a> {
 }
 
 fn map_within(path: &Path, limits: &Limits, budget: &Budget) -> Result<Mapping> {
-    // Opening a pipe would wait for its other end, and opening a device may start it: so look first.
+    // Opening a pipe would wait for its other end, and opening a device may start it. So check the
+    // type before opening.
     let look = std::fs::metadata(path).map_err(|e| Error::file(path, "open", e))?;
     let regular = |meta: &std::fs::Metadata| {
         if meta.is_file() {
@@ -264,9 +277,11 @@ fn map_within(path: &Path, limits: &Limits, budget: &Budget) -> Result<Mapping> 
     Mapping::new(file).map_err(|e| Error::file(path, "map", e))
 }
 
-/// An error if a file is not the one that was mapped any more.
+/// Returns an error if a file has changed since it was mapped.
 pub(crate) fn intact(mapping: &Mapping, path: &Path) -> Result<()> {
     let Some(change) = mapping.change() else { return Ok(()) };
-    Err(Error::input(path, "file", format!("changed while it was read: {change}"))
-        .hint("try again when nothing writes to it; programs that write a new file and rename it do no harm"))
+    Err(Error::input(path, "file", format!("changed while it was read: {change}")).hint(
+        "try again when no program writes to it; programs that write a new file and rename it \
+             do no harm",
+    ))
 }

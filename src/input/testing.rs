@@ -1,4 +1,4 @@
-//! What the tests of the readers share: files in a folder of their own, and every cut of a file.
+//! Helpers that the tests of the readers share: temporary folders, and truncation at every byte.
 
 use super::{Limits, Source};
 use crate::{Error, Result};
@@ -20,10 +20,11 @@ impl Folder {
         Self(path)
     }
 
-    /// Writes a file and gives its path.
+    /// Writes a file and returns its path.
     pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
         let path = self.0.join(name);
-        // Some file systems wait for the disk when a file is cut and written again, but not for a new one.
+        // Some file systems wait for the disk when a file is truncated and rewritten, but not for a
+        // new one.
         std::fs::remove_file(&path).ok();
         std::fs::write(&path, bytes).unwrap();
         path
@@ -46,7 +47,8 @@ pub fn read_with<T>(path: &Path, read: impl Fn(&Source) -> Result<T>) -> Result<
     read(&Source::open(path, &limits)?)
 }
 
-/// Reads the file cut off after every byte but the last: each must be an input error that names file and place.
+/// Reads the file truncated at every length. Each truncation must be an input error that names file
+/// and place.
 pub fn every_cut<T>(
     folder: &Folder,
     name: &str,
@@ -68,11 +70,11 @@ pub fn every_cut<T>(
     read_with(&path, &read).unwrap_or_else(|e| panic!("the whole file: {e}"));
 }
 
-/// A PNG of these texels.
+/// Encodes these texels as a PNG.
 pub fn png(width: u32, height: u32, texels: &[[u8; 4]]) -> Vec<u8> {
     let mut out = std::io::Cursor::new(Vec::new());
     let picture = image::RgbaImage::from_raw(width, height, texels.concat())
-        .expect("as many texels as the size says");
+        .expect("one texel per pixel of the size");
     picture.write_to(&mut out, image::ImageFormat::Png).expect("encodes");
     out.into_inner()
 }

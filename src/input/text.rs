@@ -1,38 +1,39 @@
-//! Tables of numbers as text: their lines, the names of their columns and their numbers.
+//! Tables of numbers as text: their lines, column names and numbers.
 //!
-//! Columns are parted by the first of these that the first line has: semicolons, commas, tabs, and else any white space.
-//! (The csv crate takes single bytes only, not runs of spaces.) Lines that are empty or begin with `#` or `//` are passed
-//! over, but for a first one that names the columns. Numbers have points, no decimal commas.
+//! The first of these that occurs in the first line separates the columns: semicolons, commas,
+//! tabs, otherwise any white space. (The csv crate takes single bytes only, not runs of spaces.)
+//! Empty lines and lines that begin with `#` or `//` are skipped, except a first line that names
+//! the columns. Numbers use a decimal point, not a comma.
 
 use super::{Source, copy, growing::Growing};
 use crate::{Error, Result};
 use rayon::prelude::*;
 
-/// No table has more columns.
+/// Maximum number of columns.
 const MOST_COLUMNS: usize = 4096;
-/// Rows that are read between two looks at the clock.
+/// Rows that are read between two checks of the time limit.
 const ROWS: usize = 1 << 12;
 
-/// A table whose lines are found but whose numbers are not read yet.
+/// A table whose lines have been found but whose numbers have not been read yet.
 pub(crate) struct Text<'a> {
-    /// The names of the columns, where the first line gives some.
+    /// The column names, if the first line gives them.
     pub names: Option<Vec<String>>,
-    /// Columns of the first line.
+    /// Number of columns in the first line.
     pub width: usize,
-    /// The number of the first line in the file.
+    /// Line number of the first row in the file.
     pub first: usize,
-    /// The rows with the numbers of their lines.
+    /// The rows, each with its line number.
     rows: Vec<(usize, &'a [u8])>,
     separator: Option<u8>,
 }
 
 impl<'a> Text<'a> {
-    /// Finds the lines of a file. Those that `skip` tells are passed over.
+    /// Finds the rows of a file. Lines for which `skip` returns true are skipped.
     pub fn of(
         source: &'a Source,
         mut skip: impl FnMut(usize, &[u8]) -> Result<bool>,
     ) -> Result<Self> {
-        let mut lines: Growing<(usize, &[u8])> = Growing::new(source, "the places of the lines");
+        let mut lines: Growing<(usize, &[u8])> = Growing::new(source, "the list of lines");
         for (number, line) in (1..).zip(lines_of(without_mark(source.bytes()))) {
             let line = line.trim_ascii();
             if is_row(line, lines.is_empty()) && !skip(number, line)? {
@@ -41,7 +42,7 @@ impl<'a> Text<'a> {
         }
         source.check_points("the number of lines", lines.len() as u64)?;
         let Some(&(first, line)) = lines.first() else {
-            return Err(source.error("file", "holds no lines of numbers"));
+            return Err(source.error("file", "contains no rows of numbers"));
         };
         let mut lines = lines.into_inner();
         let (separator, words) = split(line);
@@ -54,9 +55,9 @@ impl<'a> Text<'a> {
             return Err(source
                 .error(
                     format!("line {first}"),
-                    format!("{:?} is neither numbers nor names of columns", copy::excerpt(line)),
+                    format!("{:?} contains neither numbers nor column names", copy::excerpt(line)),
                 )
-                .hint("numbers have points, no decimal commas"));
+                .hint("write numbers with a decimal point, not a comma"));
         }
         if names.is_some() {
             lines.remove(0);
@@ -64,25 +65,26 @@ impl<'a> Text<'a> {
         Ok(Self { names, width: words.len(), first, rows: lines, separator })
     }
 
-    /// The number of rows.
+    /// Returns the number of rows.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// Where a row is, for an error.
+    /// Returns the place of a row, for an error.
     pub fn place(&self, row: usize) -> String {
         format!("line {}", self.rows[row].0)
     }
 
-    /// The numbers of all rows, one row after the other; zero in the columns that are not asked for, which may hold
-    /// anything.
+    /// Returns the numbers of all rows, row after row. Columns for which `asked` is false may hold
+    /// anything; their numbers are zero.
     pub fn numbers(
         &self,
         source: &Source,
         asked: impl Fn(usize) -> bool + Sync,
     ) -> Result<Vec<f64>> {
         let width = self.width;
-        // Each number takes a byte at least. Where they cannot all be there, some line is too short.
+        // Each number takes at least one byte. If the file is too small for all numbers, a line is
+        // too short.
         let numbers = self.rows.len().saturating_mul(width);
         if numbers > source.bytes().len() {
             self.check_widths(source)?;
@@ -103,15 +105,20 @@ impl<'a> Text<'a> {
                             let shown = copy::excerpt(word);
                             let error = source.error(place(), format!("“{shown}” is not a number"));
                             if shown.contains(',') {
-                                error.hint("numbers have points, no decimal commas")
+                                error.hint("write numbers with a decimal point, not a comma")
                             } else {
                                 error
                             }
                         })?;
                         if !slot.is_finite() {
-                            return Err(
-                                source.error(place(), format!("number {} is {slot}", count + 1))
-                            );
+                            return Err(source.error(
+                                place(),
+                                format!(
+                                    "number {} is {slot}, but numbers \
+                                                               must be finite",
+                                    count + 1
+                                ),
+                            ));
                         }
                     }
                     count += 1;
@@ -135,7 +142,7 @@ impl<'a> Text<'a> {
     }
 }
 
-/// The words of the first line that counts, and whether they are names; none in a file without such a line.
+/// Returns the words of the first row, and whether they are names; `None` for a file without rows.
 pub(crate) fn first_words(bytes: &[u8]) -> Option<(Vec<String>, bool)> {
     let line =
         lines_of(without_mark(bytes)).map(<[u8]>::trim_ascii).find(|line| is_row(line, true))?;
@@ -144,13 +151,14 @@ pub(crate) fn first_words(bytes: &[u8]) -> Option<(Vec<String>, bool)> {
     Some((words, named))
 }
 
-/// The lines of a text, which end as on any system: by a line feed, a carriage return, or both.
+/// Returns the lines of a text. They may end as on any system: with a line feed, a carriage return,
+/// or both.
 pub(crate) fn lines_of(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     text.split(|&b| b == b'\n')
         .flat_map(|line| line.strip_suffix(b"\r").unwrap_or(line).split(|&b| b == b'\r'))
 }
 
-/// Without quotation marks around it.
+/// Removes quotation marks around a word.
 fn without_quotes(mut word: &[u8]) -> &[u8] {
     while let [b'"', rest @ ..] | [rest @ .., b'"'] = word {
         word = rest;
@@ -158,18 +166,19 @@ fn without_quotes(mut word: &[u8]) -> &[u8] {
     word
 }
 
-/// Without the byte order mark that some writers of UTF-8 begin with.
+/// Removes the byte order mark that some writers of UTF-8 put first.
 fn without_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
 }
 
-/// Whether a line is one of the table. A comment may name the columns, if it comes first.
+/// Returns whether a line is a row of the table. A comment counts as one if it comes first and
+/// names the columns.
 fn is_row(line: &[u8], first: bool) -> bool {
     let comment = line.starts_with(b"#") || line.starts_with(b"//");
     !line.is_empty() && (!comment || first && names_columns(line))
 }
 
-/// Whether a comment is a line of names.
+/// Returns whether a comment names the columns.
 fn names_columns(line: &[u8]) -> bool {
     let separators = |b: &u8| b.is_ascii_whitespace() || matches!(b, b',' | b';' | b'#' | b'/');
     let has = |name: &[u8]| line.split(separators).any(|word| word.eq_ignore_ascii_case(name));
@@ -180,17 +189,18 @@ fn has_names(words: &[String]) -> bool {
     !words.iter().all(|word| word.parse::<f64>().is_ok())
 }
 
-/// The separator that a first line tells, and its words, out of their quotes.
+/// Returns the separator that a first line uses, and its words without quotes.
 fn split(line: &[u8]) -> (Option<u8>, Vec<String>) {
     let outside: Vec<&[u8]> = line.split(|&b| b == b'"').step_by(2).collect();
     let has = |separator: &u8| outside.iter().any(|part| part.contains(separator));
     let separator = [b';', b',', b'\t'].into_iter().find(has);
     let name = |word: &[u8]| copy::lossy(word).trim_matches('"').trim().to_owned();
-    // One more than there may be tells that there are too many.
+    // One word over the maximum, so that the caller sees that there are too many.
     (separator, words(line, separator).take(MOST_COLUMNS + 1).map(name).collect())
 }
 
-/// The words of a line; a comment's sign is none, and what stands between quotes is one (RFC 4180).
+/// Returns the words of a line. The sign of a comment is not part of a word, and text between
+/// quotes is one word (RFC 4180).
 fn words(line: &[u8], separator: Option<u8>) -> impl Iterator<Item = &[u8]> {
     let sign = line.iter().take_while(|&&b| matches!(b, b'#' | b'/')).count();
     let mut quoted = false;

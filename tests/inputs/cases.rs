@@ -110,12 +110,12 @@
         (
             "count64.ply",
             vertices("18446744073709551616", "1 2 3\n"),
-            "count64.ply: header line 3: “18446744073709551616” is no count of rows",
+            "count64.ply: header line 3: “18446744073709551616” is not a row count",
         ),
         (
             "countminus.ply",
             vertices("-1", "1 2 3\n"),
-            "countminus.ply: header line 3: “-1” is no count of rows",
+            "countminus.ply: header line 3: “-1” is not a row count",
         ),
         (
             "bare.ply",
@@ -172,8 +172,8 @@
         (
             "endless.ply",
             format!("ply\nformat ascii 1.0\n{}", "comment\n".repeat(200_000)).into(),
-            "endless.ply: header line 131072: the header is longer than 1048576 bytes, with no \
-             line “end_header” in them",
+            "endless.ply: header line 131072: the header is longer than 1048576 bytes and has no \
+             “end_header” line",
         ),
         // PLY: numbers that are not finite, or not numbers.
         (
@@ -195,8 +195,8 @@
         (
             "far.ply",
             vertices("2", "0 0 0\n1e30 0 0\n"),
-            "far.ply: positions: spread from [0.0, 0.0, 0.0] to [1e30, 0.0, 0.0], more than 32 \
-             bits can hold",
+            "far.ply: positions: range from [0.0, 0.0, 0.0] to [1e30, 0.0, 0.0], too wide for \
+             32-bit coordinates",
         ),
         (
             "comma.ply",
@@ -289,14 +289,14 @@
         (
             "empty.ply",
             Vec::new(),
-            "empty.ply: header line 1: the header has no “end_header” line; the file is cut or is \
-             no PLY",
+            "empty.ply: header line 1: the header has no “end_header” line; the file is cut off or \
+             is not PLY",
         ),
         (
             "zeros.ply",
             vec![0; 100],
-            "zeros.ply: header line 1: the header has no “end_header” line; the file is cut or is \
-             no PLY",
+            "zeros.ply: header line 1: the header has no “end_header” line; the file is cut off or \
+             is not PLY",
         ),
         // OBJ and the files that it refers to.
         (
@@ -317,7 +317,7 @@
         (
             "huge.obj",
             "v 0 0 0\nf 1 1 99999999999999999999\n".into(),
-            "huge.obj: line 2: “99999999999999999999” is no corner of a face",
+            "huge.obj: line 2: “99999999999999999999” is not a face corner",
         ),
         (
             "nan.obj",
@@ -342,12 +342,12 @@
         (
             "corner.obj",
             "v 0 0 0\nf 1\n".into(),
-            "corner.obj: file: has faces, but none of three corners or more",
+            "corner.obj: file: has faces, but none with three or more corners",
         ),
         (
             "slashes.obj",
             "v 0 0 0\nf //// 1 1\n".into(),
-            "slashes.obj: line 2: “////” is no corner of a face",
+            "slashes.obj: line 2: “////” is not a face corner",
         ),
         (
             "none.obj",
@@ -414,7 +414,7 @@
         (
             "none.stl",
             stl()[..80].iter().copied().chain([0; 4]).collect(),
-            "none.stl: file: holds no facets",
+            "none.stl: file: contains no facets",
         ),
         (
             "nan.stl",
@@ -447,12 +447,14 @@
         (
             "bytes.gltf",
             buffer("%ff%fe.bin"),
-            "bytes.gltf: buffer 0: refers to “%ff%fe.bin”, whose % codes are no UTF-8 text",
+            "bytes.gltf: buffer 0: refers to “%ff%fe.bin”, whose percent codes do not decode to \
+             UTF-8 text",
         ),
         (
             "percent.gltf",
             buffer("100%.bin"),
-            "percent.gltf: buffer 0: refers to “100%.bin”, whose % codes are no UTF-8 text",
+            "percent.gltf: buffer 0: refers to “100%.bin”, whose percent codes do not decode to \
+             UTF-8 text",
         ),
         (
             "absolute.gltf",
@@ -503,12 +505,13 @@
         (
             "zero.gltf",
             buffer("a%00.bin"),
-            "zero.gltf: buffer 0: refers to “a%00.bin”, whose % codes are no UTF-8 text",
+            "zero.gltf: buffer 0: refers to “a%00.bin”, whose percent codes do not decode to UTF-8 \
+             text",
         ),
         (
             "base64.gltf",
             buffer("data:;base64,????"),
-            "base64.gltf: buffer 0: is no base64: Invalid symbol 63, offset 0.",
+            "base64.gltf: buffer 0: is not valid base64: Invalid symbol 63, offset 0.",
         ),
         (
             "short.gltf",
@@ -536,12 +539,20 @@
             scene(r#"{"children":[1,1]},{"mesh":0}"#),
             "twice.gltf: node 1: is its own ancestor, or has two parents",
         ),
-        ("node.gltf", scene(r#"{"children":[9]}"#), "node.gltf: node 9: there are 1 nodes"),
-        ("mesh.gltf", scene(r#"{"mesh":9}"#), "mesh.gltf: mesh 9: there are 1 meshes"),
+        (
+            "node.gltf",
+            scene(r#"{"children":[9]}"#),
+            "node.gltf: node 9: does not exist; there are 1 nodes",
+        ),
+        (
+            "mesh.gltf",
+            scene(r#"{"mesh":9}"#),
+            "mesh.gltf: mesh 9: does not exist; there are 1 meshes",
+        ),
         (
             "deep.gltf",
             chain(65),
-            "deep.gltf: node 64: the depth of nesting is 65, over the limit of 64",
+            "deep.gltf: node 64: the nesting depth is 65, over the limit of 64",
         ),
         ("deepest.gltf", chain(64), "mesh 3 1 0"),
         (
@@ -614,8 +625,8 @@
         (
             "far.gltf",
             scene(r#"{"mesh":0,"scale":[1e30,1,1]}"#),
-            "far.gltf: positions: spread from [0.0, 0.0, 0.0] to [1.0000000150474662e30, 1.0, \
-             0.0], more than 32 bits can hold",
+            "far.gltf: positions: range from [0.0, 0.0, 0.0] to [1.0000000150474662e30, 1.0, 0.0], \
+             too wide for 32-bit coordinates",
         ),
         (
             "lists.gltf",
@@ -686,27 +697,29 @@
             "million.las: header: counts 1000000 points of 20 bytes, 20000000 in all, but 100 \
              bytes follow",
         ),
-        ("none.las", at(las(), 107, &[0; 4]), "none.las: file: holds no points"),
+        ("none.las", at(las(), 107, &[0; 4]), "none.las: file: contains no points"),
         (
             "scale.las",
             at(las(), 131, &f64::NAN.to_le_bytes()),
-            "scale.las: header: has the scale [NaN, 0.01, 0.01] and the offset [0, 0, 0]",
+            "scale.las: header: has the scale [NaN, 0.01, 0.01] and the offset [0, 0, 0]; both \
+             must be finite, and the scale above 0",
         ),
         (
             "flat.las",
             at(las(), 131, &0f64.to_le_bytes()),
-            "flat.las: header: has the scale [0, 0.01, 0.01] and the offset [0, 0, 0]",
+            "flat.las: header: has the scale [0, 0.01, 0.01] and the offset [0, 0, 0]; both must \
+             be finite, and the scale above 0",
         ),
         (
             "far.las",
             at(las(), 131, &1e300f64.to_le_bytes()),
-            "far.las: positions: spread from [0.0, 0.0, 0.0] to [4e300, 0.08, 0.12], more than 32 \
-             bits can hold",
+            "far.las: positions: range from [0.0, 0.0, 0.0] to [4e300, 0.08, 0.12], too wide for \
+             32-bit coordinates",
         ),
         (
             "start.las",
             at(las(), 96, &u32::MAX.to_le_bytes()),
-            "start.las: header: puts the points at byte 4294967295, but the file has 327",
+            "start.las: header: puts the points at byte 4294967295, but the file has 327 bytes",
         ),
         (
             "size.las",
@@ -716,19 +729,19 @@
         (
             "format.las",
             at(las(), 104, &[63]),
-            "format.las: header: has points of format 63, but only 0 to 10 are known",
+            "format.las: header: has points of format 63, but only 0 to 10 can be read",
         ),
         (
             "count.laz",
             at(laz(), 107, &1_000_000u32.to_le_bytes()),
-            "count.laz: table of chunks: has 6 points, but the header counts 1000000",
+            "count.laz: chunk table: has 6 points, but the header counts 1000000",
         ),
         ("records.laz", at(laz(), 100, &u32::MAX.to_le_bytes()), "mesh 5 0 0"),
         (
             "laughs.e57",
             e57(|xml| xml.replacen("?>", &format!("?>{laughs}"), 1).replacen("file", "&l29;", 1)),
-            "laughs.e57: file: is no E57 file that can be read: Invalid E57 content: Failed to \
-             parse XML data: XML with DTD detected",
+            "laughs.e57: file: cannot be read as E57: Invalid E57 content: Failed to parse XML \
+             data: XML with DTD detected",
         ),
         (
             "count.e57",
@@ -744,21 +757,29 @@
         (
             "none.e57",
             e57(|xml| xml.replace("recordCount=\"2\"", "recordCount=\"0\"")),
-            "none.e57: file: holds no points",
+            "none.e57: file: contains no points",
         ),
         // Text tables.
         (
             "comma.xyz",
             "1,5 2,5 3,5\n".into(),
-            "comma.xyz: line 1: \"1,5 2,5 3,5\" is neither numbers nor names of columns",
+            "comma.xyz: line 1: \"1,5 2,5 3,5\" contains neither numbers nor column names",
         ),
         (
             "comma.csv",
             "x;y;z;value\n1,5;2,5;3,5;4,5\n".into(),
             "comma.csv: line 2: “1,5” is not a number",
         ),
-        ("nan.xyz", "1 2 3\n1 nan 3\n".into(), "nan.xyz: line 2: number 2 is NaN"),
-        ("inf.xyz", "1 2 -inf\n".into(), "inf.xyz: line 1: number 3 is -inf"),
+        (
+            "nan.xyz",
+            "1 2 3\n1 nan 3\n".into(),
+            "nan.xyz: line 2: number 2 is NaN, but numbers must be finite",
+        ),
+        (
+            "inf.xyz",
+            "1 2 -inf\n".into(),
+            "inf.xyz: line 1: number 3 is -inf, but numbers must be finite",
+        ),
         ("one.xyz", "1 2 3\n".into(), "mesh 1 0 0"),
         ("same.xyz", "1 2 3\n1 2 3\n".into(), "mesh 2 0 0"),
         (
@@ -766,7 +787,7 @@
             "18446744073709551615\n1 2 3\n".into(),
             "count.pts: line 1: counts 18446744073709551615 points, but there are 1",
         ),
-        ("none.pts", "0\n".into(), "none.pts: file: holds no lines of numbers"),
+        ("none.pts", "0\n".into(), "none.pts: file: contains no rows of numbers"),
         (
             "wide.csv",
             vec!["1"; 5000].join(",").into(),
@@ -788,15 +809,15 @@
         (
             "far.csv",
             "x,y,z,value\n0,0,0,1\n1e30,0,0,1\n".into(),
-            "far.csv: positions: spread from [0.0, 0.0, 0.0] to [1e30, 0.0, 0.0], more than 32 \
-             bits can hold",
+            "far.csv: positions: range from [0.0, 0.0, 0.0] to [1e30, 0.0, 0.0], too wide for \
+             32-bit coordinates",
         ),
         (
             "zeros.csv",
             vec![0; 1000],
-            "zeros.csv: line 1: \"\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\\
-             0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\" is neither numbers nor \
-             names of columns",
+            "zeros.csv: line 1: \"\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\
+             \\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\\0\" contains neither numbers \
+             nor column names",
         ),
         // PCD.
         (
@@ -821,7 +842,7 @@
             b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 18446744073709551615\nPOINTS 1\n\
               DATA ascii\n"
                 .to_vec(),
-            "fields.pcd: header: “COUNT 1 1 18446744073709551615” has what is no count of numbers",
+            "fields.pcd: header: “COUNT 1 1 18446744073709551615” has an invalid count",
         ),
         (
             "bomb.pcd",
@@ -854,7 +875,7 @@
             npy("(1000000, 4)", &[1.0]),
             "million.npy: data: there are 4 bytes where 16000000 were expected",
         ),
-        ("none.npy", npy("(0, 4)", &[]), "none.npy: file: holds no samples"),
+        ("none.npy", npy("(0, 4)", &[]), "none.npy: file: contains no samples"),
         (
             "nan.npy",
             npy("(1, 4)", &[f32::NAN, 2.0, 3.0, 4.0]),
@@ -896,7 +917,7 @@
         (
             "bomb.nrrd",
             nrrd("1 1 1", "encoding: gzip", &gzip(&vec![0; 1 << 24])),
-            "bomb.nrrd: data: unpacks to more bytes where 1 were expected",
+            "bomb.nrrd: data: unpacks to too many bytes where 1 were expected",
         ),
         (
             "notgzip.nrrd",
@@ -991,21 +1012,22 @@
             vtk_xml("ImageData", "", &vti_piece(""))
                 .replace("0 1 0 1 0 0", "0 9223372036854775807 0 1 0 0")
                 .into(),
-            "extent.vti: extent: 0 to 9223372036854775807 holds no points",
+            "extent.vti: extent: 0 to 9223372036854775807 is not a valid range of indices",
         ),
         (
             "wrap.vti",
             vtk_xml("ImageData", "", &vti_piece(""))
                 .replace("0 1 0 1 0 0", "-9223372036854775808 9223372036854775807 0 1 0 0")
                 .into(),
-            "wrap.vti: extent: -9223372036854775808 to 9223372036854775807 holds no points",
+            "wrap.vti: extent: -9223372036854775808 to 9223372036854775807 is not a valid range of \
+             indices",
         ),
         (
             "backwards.vti",
             vtk_xml("ImageData", "", &vti_piece(&array("format='ascii'", "1")))
                 .replace("0 1 0 1 0 0", "1 0 0 1 0 0")
                 .into(),
-            "backwards.vti: extent: 1 to 0 holds no points",
+            "backwards.vti: extent: 1 to 0 is not a valid range of indices",
         ),
         (
             "large.vti",
@@ -1027,7 +1049,7 @@
         (
             "words.vti",
             vti("1 2 three 4"),
-            "words.vti: DataArray “v”: number 2 is “three”, which is no u8",
+            "words.vti: DataArray “v”: number 2 is “three”, which is not a valid u8",
         ),
         ("comma.vti", vti("1,5 2,5"), "volume [2, 2, 1] [1.0, 5.0]"),
         (
@@ -1057,7 +1079,8 @@
         (
             "base64.vti",
             vtk_xml("ImageData", "", &vti_piece(&array("format='binary'", "????"))).into(),
-            "base64.vti: DataArray “v”: is no base64 (after 3 bytes): Invalid symbol 63, offset 0.",
+            "base64.vti: DataArray “v”: is not valid base64 (after 3 bytes): Invalid symbol 63, \
+             offset 0.",
         ),
         (
             "laughs.vti",
@@ -1071,13 +1094,14 @@
                 String::from_utf8_lossy(&vti("1 2 3 4")).replace("Name='v'", "Name='&l29;'")
             )
             .into(),
-            "laughname.vti: byte 1998: has a wrong attribute: at 1..4: unrecognized entity `l29`",
+            "laughname.vti: byte 1998: has an invalid attribute: at 1..4: unrecognized entity \
+             `l29`",
         ),
         (
             "deep.vti",
             vtk_xml("ImageData", "", &format!("{}{}", "<a>".repeat(100), "</a>".repeat(100)))
                 .into(),
-            "deep.vti: byte 296: the depth of nesting is 65, over the limit of 64",
+            "deep.vti: byte 296: the nesting depth is 65, over the limit of 64",
         ),
         (
             "lz4.vti",
@@ -1087,12 +1111,12 @@
         (
             "corner.vtu",
             vtu("0 1 3").into(),
-            "corner.vtu: Cells: a cell has the corner 3, but there are 3 points",
+            "corner.vtu: Cells: a cell refers to point 3, but there are 3 points",
         ),
         (
             "minus.vtu",
             vtu("0 1 -1").into(),
-            "minus.vtu: Cells: a cell has the corner -1, but there are 3 points",
+            "minus.vtu: Cells: a cell refers to point -1, but there are 3 points",
         ),
         (
             "points.vtu",
@@ -1124,7 +1148,7 @@
              0 0 0 1 0 0\nCELLS 1 3\n2 0 1\nPOINTS 1 float\n0 0 0\nCELL_DATA 1\nSCALARS c float\n\
              LOOKUP_TABLE d\n5\n"
                 .into(),
-            "twice.vtk: byte 104: POINTS are given twice, or behind the cells",
+            "twice.vtk: byte 104: POINTS are given twice, or after the cells",
         ),
         (
             "dims.vtk",
@@ -1146,20 +1170,20 @@
         (
             "short.raw",
             vec![1; 63],
-            "short.raw: size: holds 63 bytes after the header, but 4 × 4 × 4 samples of type u8 \
-             need 64",
+            "short.raw: size: has 63 bytes after the header, but 4 × 4 × 4 samples of type u8 need \
+             64",
         ),
         (
             "long.raw",
             vec![1; 125],
-            "long.raw: size: holds 125 bytes after the header, but 4 × 4 × 4 samples of type u8 \
-             need 64",
+            "long.raw: size: has 125 bytes after the header, but 4 × 4 × 4 samples of type u8 need \
+             64",
         ),
         ("same.raw", vec![7; 64], "volume [4, 4, 4] [7.0, 7.0]"),
         (
             "bomb.gz",
             gzip(&vec![0; 1 << 24]),
-            "bomb.gz: gzip stream: unpacks to more bytes where 64 were expected",
+            "bomb.gz: gzip stream: unpacks to too many bytes where 64 were expected",
         ),
         // Hierarchies and bricks.
         (
@@ -1223,7 +1247,8 @@
         (
             "children.splk",
             crafted::with_node_bytes(76, &u32::MAX.to_le_bytes()),
-            "children.splk: page 0 (byte 229): its node 0 has 4294967295 children; at most 8 are allowed",
+            "children.splk: page 0 (byte 229): its node 0 has 4294967295 children; at most 8 are \
+             allowed",
         ),
         (
             "swapped.splk",
@@ -1313,7 +1338,7 @@
         (
             "long.json",
             vec![b' '; 2 << 20],
-            "long.json: file: has 2097152 bytes, but a transfer function has 1048576 at most",
+            "long.json: file: has 2097152 bytes, but a transfer function may have at most 1048576",
         ),
         // Files of no format.
         ("nothing.bin", Vec::new(), "nothing.bin: file: is of no kind"),

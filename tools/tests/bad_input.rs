@@ -97,13 +97,18 @@ const WRONG: &[(&str, i32, &str)] = &[
         "nothing to draw: the transfer function shows only the value 8, but the values of \
          flat.nrrd lie between 7 and 7",
     ),
-    ("crossed.nrrd", 3, "crossed.nrrd: lattice: “fcc” is not a lattice that is known"),
+    ("crossed.nrrd", 3, "crossed.nrrd: lattice: “fcc” is not a known lattice"),
     ("hole.csv", 3, "hole.csv: line 3"),
     ("a.nrrd --sharp --sigma 2", 2, "smaller sigma"),
     // Meshes and clouds.
-    ("cut.las", 3, "cut.las: header: the header reaches to byte 105, but there are 104"),
+    (
+        "cut.las",
+        3,
+        "cut.las: header: the header extends to byte 105, but only 104 bytes are \
+                    present",
+    ),
     ("cut.laz", 3, "cut.laz: header: does not begin with “LASF”"),
-    ("cut.e57", 3, "cut.e57: file: is no E57 file that can be read"),
+    ("cut.e57", 3, "cut.e57: file: cannot be read as E57"),
     ("cut.stl", 3, "cut.stl: header: counts 9 facets, which need 534 bytes, but the file has 134"),
     ("open.stl", 3, "open.stl: line 4: the file ends before “endsolid”: it is cut"),
     ("short.pts", 3, "short.pts: line 1: counts 3 points, but there are 2"),
@@ -115,11 +120,11 @@ const WRONG: &[(&str, i32, &str)] = &[
         3,
         "many.pcd: the size of the points in bytes is 51539607540, over the limit",
     ),
-    ("none.pcd", 3, "none.pcd: file: holds no points"),
-    ("comma.xyz", 3, "is neither numbers nor names of columns"),
-    ("comma.xyz", 3, "numbers have points, no decimal commas"),
+    ("none.pcd", 3, "none.pcd: file: contains no points"),
+    ("comma.xyz", 3, "contains neither numbers nor column names"),
+    ("comma.xyz", 3, "write numbers with a decimal point, not a comma"),
     ("comma.obj", 3, "comma.obj: line 1: “1,5” is not a number"),
-    ("corner.obj", 3, "corner.obj: file: has faces, but none of three corners or more"),
+    ("corner.obj", 3, "corner.obj: file: has faces, but none with three or more corners"),
     (
         "a.nrrd --transfer lists.json",
         3,
@@ -207,14 +212,14 @@ const WRONG: &[(&str, i32, &str)] = &[
     (
         "twice.nrrd",
         3,
-        "twice.nrrd: line 5: the field “sizes” is given twice, in line 4 too; it must stand once",
+        "twice.nrrd: line 5: the field “sizes” is given twice, in line 4 too; give it once",
     ),
     ("twice.nhdr", 3, "twice.nhdr: line 7: the field “datafile” is given twice, in line 6 too"),
     (
         "long.nhdr",
         3,
-        "long.raw: data: there are 9 bytes where 8 were expected help: “sizes” or “type” of the \
-         header are wrong",
+        "long.raw: data: there are 9 bytes where 8 were expected help: “sizes” or “type” in the \
+         header is wrong",
     ),
     ("huge.nrrd", 3, "huge.nrrd: data: there are 8 bytes where 1099511627776 were expected"),
     (
@@ -361,7 +366,7 @@ const OVER: &[(&str, &str, &str)] = &[
     ),
     (
         "info deep.gltf --limit-depth 2",
-        "deep.gltf: node 2: the depth of nesting is 3, over the limit of 2",
+        "deep.gltf: node 2: the nesting depth is 3, over the limit of 2",
         "--limit-depth",
     ),
     (
@@ -371,17 +376,17 @@ const OVER: &[(&str, &str, &str)] = &[
     ),
     (
         "info a.ply --limit-seconds 0",
-        "a.ply: the time for reading, in seconds, is 1, over the limit of 0",
+        "a.ply: the reading time in seconds is 1, over the limit of 0",
         "--limit-seconds",
     ),
     (
         "info a.glb --limit-seconds 0",
-        "a.glb: the time for reading, in seconds, is 1, over the limit of 0",
+        "a.glb: the reading time in seconds is 1, over the limit of 0",
         "--limit-seconds",
     ),
     (
         "info points.csv --limit-seconds 0",
-        "the time for reading, in seconds, is 1, over the limit of 0",
+        "the reading time in seconds is 1, over the limit of 0",
         "--limit-seconds",
     ),
     (
@@ -725,8 +730,8 @@ fn trained_gaussians_are_told() {
     let folder = Folder::new("gaussians");
     folder.put("a.ply", PLY);
     folder.run("convert a.ply -o gaussians.ply").ok();
-    let warning = "gaussians.ply: holds trained 3D Gaussians, whose shapes and colours are not \
-        read yet; their centres are drawn as points";
+    let warning = "gaussians.ply: contains trained 3D Gaussians, whose shapes and colours are not \
+                   read yet; their centres are drawn as points";
     for arguments in ["info gaussians.ply", "convert gaussians.ply -o a.splk"] {
         let run = folder.run(arguments);
         assert!(

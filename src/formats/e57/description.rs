@@ -1,16 +1,17 @@
-//! The XML in which an E57 file describes itself, before a parser sees it.
+//! Checks the XML that describes an E57 file, before a parser reads it.
 
 use super::Source;
 use crate::Result;
 
-/// Bytes that the parser's tree takes for a byte of XML.
+/// Bytes of the parser's tree per byte of XML.
 const TREE: u64 = 40;
-/// What the parser compares with all others of its kind: attributes of an element, and names of namespaces, which every
-/// element may add to.
+/// The parser compares each of these with all others of its kind: the attributes of an element, and
+/// the names of namespaces, which every element may add to.
 const MOST_ATTRIBUTES: usize = 256;
 const MOST_NAMESPACES: usize = 256;
 
-/// Refuses XML that would take a parser for ever, or much more memory than it has bytes.
+/// Returns an error for XML that would take the parser forever, or far more memory than it has
+/// bytes.
 pub fn check(source: &Source, xml: &[u8]) -> Result<()> {
     source.spend("the size of the description in bytes", TREE.saturating_mul(xml.len() as u64))?;
     let wrong = |at: usize, message: String| source.error("XML", format!("byte {at}: {message}"));

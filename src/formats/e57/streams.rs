@@ -1,19 +1,19 @@
-//! How the values of a scan lie in its packets: a stream for each record. A reader of points needs a value of each, and keeps
-//! those of the streams that are ahead of the others.
+//! How the packets of a scan hold its values: one stream per record. A reader of points needs a
+//! value from each stream. It buffers the values of the streams that are ahead of the others.
 
 use super::Source;
 use crate::Result;
 use ::e57::{PointCloud, RecordDataType};
 
-/// Values that may wait for those of other streams. Writers fill all streams of a packet for the same points, so these are
-/// the values of a packet of 64 KiB.
+/// Maximum number of values that may wait for those of other streams. Writers fill all streams of a
+/// packet for the same points, so this is about the number of values in a packet of 64 KiB.
 pub const MOST_WAITING: u64 = 1 << 22;
 
 const CHECKSUM: u64 = 4;
 const DATA_PACKET: u8 = 1;
 
-/// Refuses a scan of which more than `most` values would wait. What cannot be walked through is left to the reader of points,
-/// which stops there too.
+/// Returns an error for a scan of which more than `most` values would wait. Packets that cannot be
+/// parsed are left to the reader of points, which also stops there.
 pub fn check(source: &Source, scan: &PointCloud, number: usize, most: u64) -> Result<()> {
     let sizes: Vec<u64> = scan.prototype.iter().map(|record| bits(&record.data_type)).collect();
     let constants = sizes.iter().filter(|&&size| size == 0).count() as u64;
@@ -34,15 +34,17 @@ pub fn check(source: &Source, scan: &PointCloud, number: usize, most: u64) -> Re
         let ahead: u64 = items().map(|items| items - before).sum();
         let waiting = ahead.saturating_add((complete - before).saturating_mul(constants));
         if waiting > most {
-            let message =
-                format!("{waiting} values wait for others of their points, more than {most}");
+            let message = format!(
+                "{waiting} values wait for other values of their points; at most {most} \
+                         may wait"
+            );
             return Err(source.error(format!("scan {number}"), message));
         }
     }
     Ok(())
 }
 
-/// Bits of a value of a record.
+/// Returns the number of bits of a record's value.
 fn bits(kind: &RecordDataType) -> u64 {
     match kind {
         RecordDataType::Single { .. } => 32,
@@ -54,7 +56,8 @@ fn bits(kind: &RecordDataType) -> u64 {
     }
 }
 
-/// The packets of a section, by their headers alone. Places count bytes without the checksums that end each page of the file.
+/// Iterates over the packets of a section, by their headers only. Offsets count bytes without the
+/// checksums that end each page of the file.
 struct Packets<'a> {
     bytes: &'a [u8],
     page: u64,
@@ -73,12 +76,13 @@ impl<'a> Packets<'a> {
         Some(packets)
     }
 
-    /// Adds the bytes of a packet to those of each stream; whether there were any. `None` at the end, or at what is no packet.
+    /// Adds the packet's bytes to those of each stream. Returns whether it was a data packet;
+    /// `None` at the end of the file, or if the bytes are not a packet.
     fn next(&mut self, held: &mut [u64]) -> Option<bool> {
         let [kind, _, low, high] = self.take()?;
         let length = u64::from(u16::from_le_bytes([low, high])) + 1;
-        // As the reader goes on: behind all streams of a packet of data, and behind as many bytes as another tells of after its
-        // header.
+        // Continues where the reader would: after all streams of a data packet, and after the
+        // length in the header for other packets.
         match kind {
             DATA_PACKET => {
                 let count = u16::from_le_bytes(self.take()?);

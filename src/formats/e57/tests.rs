@@ -17,7 +17,7 @@ fn integer(max: i64) -> RecordDataType {
 /// A scan: its records, its points and its pose.
 type Scan = (Vec<(RecordName, RecordDataType)>, Vec<Vec<RecordValue>>, Option<Transform>);
 
-/// A file of scans, its description in XML changed.
+/// A file of scans, with a change to its XML description.
 fn file(scans: &[Scan], change: impl Fn(String) -> String) -> Vec<u8> {
     let mut out = Cursor::new(Vec::new());
     let mut writer = E57Writer::new(&mut out, "file").unwrap();
@@ -45,7 +45,7 @@ fn doubles(values: [f64; 3]) -> Vec<RecordValue> {
     values.map(RecordValue::Double).to_vec()
 }
 
-/// Turned by 90° around z and moved far off.
+/// Rotated by 90° around z and translated far away.
 fn pose() -> Option<Transform> {
     let half = 0.5f64.sqrt();
     Some(Transform {
@@ -54,7 +54,8 @@ fn pose() -> Option<Transform> {
     })
 }
 
-/// Two coloured points and an invalid one by Cartesian coordinates, and a scan by spherical ones with intensities.
+/// Two coloured points and an invalid one in Cartesian coordinates, and a scan in spherical
+/// coordinates with intensities.
 fn scans() -> [Scan; 2] {
     let colored = [RecordName::ColorRed, RecordName::ColorGreen, RecordName::ColorBlue]
         .map(|name| (name, integer(255)));
@@ -137,7 +138,7 @@ fn all_scans_are_one_cloud() {
         mesh.sensors.iter().map(|sensor| sensor.points.clone()).collect::<Vec<_>>(),
         [0..2, 2..4]
     );
-    // Points in the world's coordinates tell nothing of a scanner.
+    // Points in world coordinates do not show where a scanner stood.
     let merged =
         load(&file(&[(cartesian(), vec![doubles([1.0, 2.0, 3.0])], None)], |xml| xml)).unwrap();
     assert!(merged.sensors.is_empty() && merged.colors.is_empty());
@@ -156,7 +157,7 @@ fn cuts_and_lies_are_errors() {
     for (content, word) in [
         (replaced("recordCount=\"2\"", "recordCount=\"3\""), "scan 1: ends after 2 points"),
         (replaced("fileOffset=\"48\"", "fileOffset=\"99999999\""), "scan 0"),
-        (replaced("<e57Root", "<root"), "is no E57 file"),
+        (replaced("<e57Root", "<root"), "cannot be read as E57"),
         (file(&[], |xml| xml), "no points"),
         (file(&[(cartesian(), vec![doubles([f64::NAN; 3])], None)], |xml| xml), "no points"),
     ] {
@@ -170,7 +171,7 @@ fn cuts_and_lies_are_errors() {
     assert!(matches!(read(&Source::open(&path, &limits).unwrap()), Err(Error::Limit { .. })));
 }
 
-/// What takes no bits could be repeated for ever.
+/// Values of zero bits could be repeated forever.
 #[test]
 fn scans_of_no_bits_are_refused() {
     let records = cartesian().into_iter().map(|(name, _)| {
@@ -179,10 +180,10 @@ fn scans_of_no_bits_are_refused() {
     let scan = (records.collect(), vec![vec![RecordValue::ScaledInteger(3); 3]; 2], None);
     let content = file(&[scan], |xml| xml.replace("maximum=\"4\"", "maximum=\"3\""));
     let message = load(&content).unwrap_err().to_string();
-    assert!(message.contains("scan 0: has points of no bits"), "{message}");
+    assert!(message.contains("scan 0: has points that take zero bits"), "{message}");
 }
 
-/// Whatever a byte of the description is changed to, the file is read or refused.
+/// Whatever byte of the description is changed, the file is either read or refused.
 #[test]
 fn no_changed_description_does_harm() {
     let length = std::cell::Cell::new(0);
@@ -207,7 +208,7 @@ fn no_changed_description_does_harm() {
     }
 }
 
-/// What a parser would compare for ever is refused before it sees it.
+/// XML on which a parser would compare forever is refused before the parser sees it.
 #[test]
 fn descriptions_of_many_names_are_refused() {
     let many = |what: fn(usize) -> String| {
@@ -228,7 +229,8 @@ fn descriptions_of_many_names_are_refused() {
     assert!(message.contains("more than 256 namespaces"), "{message}");
 }
 
-/// Values of streams that are ahead of the others are kept until theirs come: that is counted by the packets' headers.
+/// The reader buffers values of streams that are ahead of the others. The packets' headers give
+/// their number.
 #[test]
 fn values_that_wait_for_others_are_counted() {
     let records = [
@@ -247,7 +249,8 @@ fn values_that_wait_for_others_are_counted() {
     let told =
         |most: u64| streams::check(&source, &scans[0], 0, most).map_err(|error| error.to_string());
     told(streams::MOST_WAITING).unwrap();
-    // A packet has some 2,500 points of 24 bytes and a bit, and of a record that takes none.
+    // A packet has about 2,500 points. Each takes 24 bytes and one bit, and has a record of zero
+    // bits.
     let message = told(1000).unwrap_err();
     let words: Vec<&str> = message.split(' ').collect();
     let at = words.iter().position(|word| *word == "values").unwrap();

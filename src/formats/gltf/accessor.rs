@@ -1,4 +1,5 @@
-//! Typed access to buffers: dequantised floats, colours and indices, every range checked before a byte is read.
+//! Typed access to buffers: dequantised floats, colours and indices. Every range is checked before
+//! a byte is read.
 
 use super::buffers::Buffers;
 use crate::Result;
@@ -10,7 +11,7 @@ struct Layout<'a> {
     component: ComponentType,
     multiplicity: usize,
     normalized: bool,
-    /// The bytes from the first element on, and the step between elements. `None` stands for zeros.
+    /// The bytes from the first element on, and the stride between elements. `None` means zeros.
     data: Option<(&'a [u8], usize)>,
     sparse: Option<Sparse<'a>>,
 }
@@ -23,13 +24,13 @@ struct Sparse<'a> {
 }
 
 impl Buffers<'_> {
-    /// What an accessor claims to hold; 0 for one that there is not.
+    /// Returns the number of elements that an accessor claims; 0 if it does not exist.
     pub fn claimed(&self, index: usize) -> u64 {
         self.root.accessors.get(index).map_or(0, |accessor| accessor.count.0)
     }
 
-    /// All elements of an accessor of `N` components; normalised integers (or, with `fractions`, all integers) are
-    /// scaled to 0 … 1 or −1 … 1.
+    /// Returns all elements of an accessor with `N` components. Normalised integers are scaled to 0
+    /// … 1 or −1 … 1; with `fractions`, all integers are.
     pub fn floats<const N: usize>(
         &self,
         index: usize,
@@ -71,7 +72,7 @@ impl Buffers<'_> {
         Ok(out)
     }
 
-    /// Linear colours with opacity, from three or four components.
+    /// Returns linear colours with opacity, from three or four components.
     pub fn colors(&self, index: usize, place: &str) -> Result<Vec<[f32; 4]>> {
         if self.layout(index, place)?.multiplicity == 3 {
             let colors: Vec<[f32; 3]> = self.floats(index, place, true)?;
@@ -80,7 +81,7 @@ impl Buffers<'_> {
         self.floats(index, place, true)
     }
 
-    /// Vertex indices, each below `vertices`.
+    /// Returns vertex indices, each below `vertices`.
     pub fn indices(&self, index: usize, place: &str, vertices: usize) -> Result<Vec<u32>> {
         let layout = self.layout(index, place)?;
         let place = format!("{place}, accessor {index}");
@@ -108,7 +109,11 @@ impl Buffers<'_> {
         let place = format!("{place}, accessor {index}");
         let error = |message: String| self.source.error(place.as_str(), message);
         let Some(accessor) = self.root.accessors.get(index) else {
-            return Err(error(format!("there are {} accessors", self.root.accessors.len())));
+            return Err(error(format!(
+                "does not exist; there are {} \
+                                      accessors",
+                self.root.accessors.len()
+            )));
         };
         let (Checked::Valid(component), Checked::Valid(kind)) =
             (accessor.component_type, accessor.type_)
@@ -140,7 +145,8 @@ impl Buffers<'_> {
                 }
                 Some((&bytes[offset as usize..], stride))
             }
-            // Zeros that the sparse part replaces: no bytes bound the count, so the size of the whole file does.
+            // The elements are zeros that the sparse part replaces. No bytes bound their count, so
+            // the size of the whole file does.
             None if accessor.sparse.is_none() => {
                 return Err(error("has no data".into())
                     .hint("compressed (meshopt, Draco) meshes are not read"));
@@ -197,7 +203,7 @@ impl Buffers<'_> {
     }
 }
 
-/// A component as its type holds it. `bytes` has at least its size.
+/// Converts a component of this type to a number. `bytes` has at least its size.
 fn number(bytes: &[u8], component: ComponentType) -> f64 {
     match component {
         ComponentType::I8 => f64::from(bytes[0] as i8),
@@ -213,7 +219,7 @@ fn number(bytes: &[u8], component: ComponentType) -> f64 {
     }
 }
 
-/// A normalised integer as a fraction (glTF 2.0, section 3.11).
+/// Converts a normalised integer to a fraction (glTF 2.0, section 3.11).
 fn fraction(value: f64, component: ComponentType) -> f64 {
     match component {
         ComponentType::I8 => (value / 127.0).max(-1.0),

@@ -1,4 +1,4 @@
-//! The bytes behind a glTF file: GLB chunks, data URIs and files beside it.
+//! The binary data of a glTF file: GLB chunks, data URIs and files beside it.
 
 use crate::{Result, input::Source};
 use ::gltf::json;
@@ -15,7 +15,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
 
-/// Splits a file in its JSON and, for GLB, its binary chunk.
+/// Splits a file into its JSON and, for GLB, its binary chunk.
 pub(super) fn split<'a>(source: &'a Source) -> Result<(&'a [u8], Option<&'a [u8]>)> {
     let bytes = source.bytes();
     if !bytes.starts_with(b"glTF") {
@@ -36,7 +36,11 @@ pub(super) fn split<'a>(source: &'a Source) -> Result<(&'a [u8], Option<&'a [u8]
         );
     }
     if length > bytes.len() || length < 12 {
-        let message = format!("the GLB header claims {length} bytes, the file has {}", bytes.len());
+        let message = format!(
+            "the GLB header claims {length} bytes, but the file has \
+                               {}",
+            bytes.len()
+        );
         return Err(source.error("byte 8", message).hint("the file is cut"));
     }
     let mut at = 12;
@@ -78,7 +82,8 @@ impl<'a> Buffers<'a> {
             let data = match (&buffer.uri, binary) {
                 (Some(uri), _) => Cow::Owned(resolve(source, &place, uri)?),
                 (None, Some(binary)) if index == 0 => Cow::Borrowed(binary),
-                // Without bytes it may stand for a compressed one; an error where it is used.
+                // A buffer without bytes may stand for a compressed one; it is an error where it is
+                // used.
                 (None, _) => Cow::Borrowed(&[][..]),
             };
             let claimed = buffer.byte_length.0;
@@ -92,7 +97,7 @@ impl<'a> Buffers<'a> {
         Ok(Self { source, root, bytes })
     }
 
-    /// The bytes of a buffer view, and its stride where it has one.
+    /// Returns the bytes of a buffer view, and its stride if it has one.
     pub fn view(&self, index: usize, place: &str) -> Result<(&[u8], Option<usize>)> {
         let Some(view) = self.root.buffer_views.get(index) else {
             let count = self.root.buffer_views.len();
@@ -122,14 +127,14 @@ impl<'a> Buffers<'a> {
         Ok((&bytes[start as usize..end as usize], view.byte_stride.as_ref().map(|stride| stride.0)))
     }
 
-    /// All bytes that the file brought, the JSON among them.
+    /// Returns the number of bytes of the file and all its buffers, including the JSON.
     pub fn total(&self) -> u64 {
         self.source.bytes().len() as u64
             + self.bytes.iter().map(|bytes| bytes.len() as u64).sum::<u64>()
     }
 }
 
-/// The bytes that a URI stands for: data in the URI, or a file beside this one.
+/// Returns the bytes that a URI refers to: data inside the URI, or a file beside this one.
 pub(super) fn resolve(source: &Source, place: &str, uri: &str) -> Result<Vec<u8>> {
     if let Some(data) = uri.strip_prefix("data:") {
         source.room::<u8>("a data URI", data.len())?;
@@ -139,19 +144,23 @@ pub(super) fn resolve(source: &Source, place: &str, uri: &str) -> Result<Vec<u8>
         if kind.ends_with(";base64") {
             return BASE64
                 .decode(data.trim())
-                .map_err(|e| source.error(place, format!("is no base64: {e}")));
+                .map_err(|e| source.error(place, format!("is not valid base64: {e}")));
         }
         return percent_decode(data)
-            .ok_or_else(|| source.error(place, "has a malformed % in its data URI"));
+            .ok_or_else(|| source.error(place, "has a malformed percent code in its data URI"));
     }
     let path = percent_decode(uri)
         .and_then(|bytes| String::from_utf8(bytes).ok())
         .filter(|path| !path.contains('\0'));
     let Some(path) = path else {
         let uri: String = uri.chars().take(80).collect();
-        return Err(
-            source.error(place, format!("refers to “{uri}”, whose % codes are no UTF-8 text"))
-        );
+        return Err(source.error(
+            place,
+            format!(
+                "refers to “{uri}”, whose percent codes do not decode to \
+                                         UTF-8 text"
+            ),
+        ));
     };
     let path = source.neighbour(place, &path)?;
     let file = source.open_beside(&path)?;
@@ -159,7 +168,7 @@ pub(super) fn resolve(source: &Source, place: &str, uri: &str) -> Result<Vec<u8>
     file.unless_changed(Ok(file.bytes().to_vec()))
 }
 
-/// Undoes percent codes; `None` where a % is not followed by two hexadecimal digits.
+/// Decodes percent codes; `None` if a % is not followed by two hexadecimal digits.
 fn percent_decode(text: &str) -> Option<Vec<u8>> {
     let mut out = Vec::with_capacity(text.len());
     let mut bytes = text.bytes();

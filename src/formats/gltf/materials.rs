@@ -1,4 +1,4 @@
-//! Materials: base colours, pictures, and what their alpha mode makes of opacities.
+//! Materials: base colours, pictures, and how alpha modes change opacities.
 
 use super::{super::shared::texture, Builder, buffers, displayed};
 use crate::{
@@ -8,25 +8,26 @@ use crate::{
 use ::gltf::json::{self, material::AlphaMode, validation::Checked};
 use std::sync::Arc;
 
-/// What a material says of the base colour.
+/// The base colour of a material.
 pub(super) struct Base<'a> {
     name: &'a str,
-    /// Linear light, and opacity.
+    /// RGB in linear light, and opacity.
     factor: [f32; 4],
     pub texture: Option<&'a json::texture::Info>,
     pub alpha: Alpha,
 }
 
-/// What becomes of the alphas of texels and vertices (glTF 2.0, section 3.9.4).
+/// How the alphas of texels and vertices are converted (glTF 2.0, section 3.9.4).
 ///
-/// MASK compares the product of factor, texel and vertex alpha with the cutoff. Texels and vertices are stored apart, so
-/// each is compared as if the other were opaque. That is exact where one of them is, and hides nothing that should show
-/// elsewhere.
+/// MASK compares the product of factor, texel and vertex alpha with the cutoff. Texels and vertices
+/// are stored separately, so each is compared as if the other were opaque. That is exact if one of
+/// the two is opaque; otherwise it hides nothing that should be visible.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Alpha {
-    /// BLEND: they stay as they are.
+    /// BLEND: alphas are kept.
     Blend,
-    /// Opaque from this one on, and invisible below: 0 for OPAQUE, 256 where a mask hides everything.
+    /// Opaque from this alpha on, and invisible below: 0 for OPAQUE, 256 if a mask hides
+    /// everything.
     From(u16),
 }
 
@@ -41,7 +42,7 @@ impl Alpha {
                 let shows = |alpha: &u16| factor * f32::from(*alpha) / 255.0 >= cutoff;
                 Self::From((0..=255).find(shows).unwrap_or(256))
             }
-            // An unknown mode is taken for the default.
+            // An unknown mode counts as the default.
             Checked::Valid(AlphaMode::Opaque) | Checked::Invalid => Self::OPAQUE,
         }
     }
@@ -56,7 +57,8 @@ impl Alpha {
 }
 
 impl<'a> Builder<'a> {
-    /// The base colour of a file's material (`None`: the default one). `place` names what refers to it.
+    /// Returns the base colour of a file's material (`None`: the default one). `place` names what
+    /// refers to it.
     pub(super) fn base(&self, material: Option<usize>, place: &str) -> Result<Base<'a>> {
         let root = self.root;
         let Some(index) = material else {
@@ -70,9 +72,10 @@ impl<'a> Builder<'a> {
         let Some(material) = root.materials.get(index) else {
             return Err(self
                 .source
-                .error(place, format!("refers to material {index}, which is not there")));
+                .error(place, format!("refers to material {index}, which does not exist")));
         };
-        // Where a file has both, the extension goes before what stands for it in programs that do not know it.
+        // If a file has both, the extension takes precedence over the core material, which is a
+        // fallback for programs that do not know the extension.
         let extensions = material.extensions.as_ref();
         let (factor, texture) =
             match extensions.and_then(|extensions| extensions.pbr_specular_glossiness.as_ref()) {
@@ -86,14 +89,15 @@ impl<'a> Builder<'a> {
         Ok(Base { name, factor, texture: texture.as_ref(), alpha: Alpha::of(material, factor[3]) })
     }
 
-    /// The index of a material in the mesh, which gets it at its first use.
+    /// Returns the index of a material in the mesh; adds the material at its first use.
     pub(super) fn material(&mut self, index: Option<usize>, base: &Base) -> Result<u32> {
         if let Some(&known) = self.material_of.get(&index) {
             return Ok(known);
         }
         let mut color = displayed(base.factor);
         if base.alpha != Alpha::Blend {
-            // Texels and vertices have the factor's alpha in them; without them, it is all that there is.
+            // The alphas of texels and vertices include the factor's alpha. Without them, the
+            // factor's alpha alone decides.
             color[3] = f32::from(base.alpha.apply(255)) / 255.0;
         }
         let texture =
@@ -107,14 +111,19 @@ impl<'a> Builder<'a> {
     fn texture(&mut self, index: usize, alpha: Alpha) -> Result<Arc<Texture>> {
         let Some(texture) = self.root.textures.get(index) else {
             let count = self.root.textures.len();
-            return Err(self
-                .source
-                .error(format!("texture {index}"), format!("there are {count} textures")));
+            return Err(self.source.error(
+                format!("texture {index}"),
+                format!(
+                    "does not exist; there are {count} \
+                                                            textures"
+                ),
+            ));
         };
         self.picture(texture.source.value(), alpha)
     }
 
-    /// A picture as an alpha mode shows it, made once for each mode. Modes that leave all alphas as they are share it.
+    /// Returns a picture with the alphas of an alpha mode, made once for each mode. Modes that
+    /// leave all alphas unchanged share it.
     fn picture(&mut self, image: usize, alpha: Alpha) -> Result<Arc<Texture>> {
         if let Some(known) = self.pictures.get(&(image, alpha)) {
             return Ok(known.clone());
@@ -136,9 +145,14 @@ impl<'a> Builder<'a> {
     fn decode(&self, image: usize) -> Result<Arc<Texture>> {
         let place = format!("image {image}");
         let Some(entry) = self.root.images.get(image) else {
-            return Err(self
-                .source
-                .error(place, format!("there are {} images", self.root.images.len())));
+            return Err(self.source.error(
+                place,
+                format!(
+                    "does not exist; there are {} \
+                                       images",
+                    self.root.images.len()
+                ),
+            ));
         };
         match (&entry.uri, entry.buffer_view) {
             (Some(uri), _) => {

@@ -1,21 +1,22 @@
-//! The walk over the nodes of the default scene.
+//! Traverses the nodes of the default scene.
 
 use crate::{Result, input::Source};
 use ::gltf::json;
 use glam::{DMat4, DQuat, DVec3};
 
-/// A node on the way: its number, the transform of its parent, and how deep it is.
+/// A node to visit: its index, the transform of its parent, and its depth.
 type Step = (usize, DMat4, usize);
 
-/// The meshes of the default scene (or the first; or, without scenes, of all nodes) with the transform from their own
-/// frame to the world. A node that is met twice (a cycle, or two parents) is an error, as is nesting over the limit.
+/// Returns the meshes of the default scene, each with the transform from its own frame to the
+/// world. Without a default scene it takes the first one; without scenes, all nodes. A node that is
+/// reached twice (a cycle, or two parents) is an error, as is nesting over the limit.
 pub(super) fn meshes(source: &Source, root: &json::Root) -> Result<Vec<(DMat4, usize)>> {
     let count = root.nodes.len();
     source.room::<[Step; 2]>("the nodes", count)?;
     let mut stack: Vec<Step> = Vec::new();
     let scene = root.scene.map_or(0, |scene| scene.value());
     match root.scenes.get(scene) {
-        // Lists of nodes may name one again and again: they are longer than there are nodes.
+        // A list may name the same node many times, so it may be longer than the number of nodes.
         Some(scene) => {
             source.room::<[Step; 2]>("the nodes of the scene", scene.nodes.len())?;
             stack.extend(scene.nodes.iter().rev().map(|node| (node.value(), DMat4::IDENTITY, 1)));
@@ -47,7 +48,7 @@ pub(super) fn meshes(source: &Source, root: &json::Root) -> Result<Vec<(DMat4, u
         source.check_time()?;
         let place = format!("node {index}");
         let Some(node) = root.nodes.get(index) else {
-            return Err(source.error(place, format!("there are {count} nodes")));
+            return Err(source.error(place, format!("does not exist; there are {count} nodes")));
         };
         if std::mem::replace(&mut met[index], true) {
             return Err(source.error(place, "is its own ancestor, or has two parents"));
@@ -67,7 +68,7 @@ pub(super) fn meshes(source: &Source, root: &json::Root) -> Result<Vec<(DMat4, u
     Ok(meshes)
 }
 
-/// The transform from a node's frame to its parent's.
+/// Returns the transform from a node's frame to its parent's.
 fn local(node: &json::Node) -> DMat4 {
     if let Some(matrix) = &node.matrix {
         return DMat4::from_cols_array(&matrix.map(f64::from));

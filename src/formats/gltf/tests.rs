@@ -43,7 +43,8 @@ fn bytes(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|value| value.to_le_bytes()).collect()
 }
 
-/// A square of four vertices: positions at 0, uvs at 48, colours at 80, u16 indices at 96; 108 bytes.
+/// A square of four vertices: positions at 0, uvs at 48, colours at 80, u16 indices at 96; 108
+/// bytes.
 fn square_bytes() -> Vec<u8> {
     let mut out = bytes(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0]);
     out.extend(bytes(&[0.25, 0.5, 0.75, 0.5, 0.75, 0.5, 0.25, 0.5]));
@@ -59,12 +60,14 @@ fn square() -> Value {
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0}],
         "meshes": [{"primitives": [{
-            "attributes": {"POSITION": 0, "TEXCOORD_0": 1, "COLOR_0": 2}, "indices": 3, "material": 0}]}],
+            "attributes": {"POSITION": 0, "TEXCOORD_0": 1, "COLOR_0": 2},
+            "indices": 3, "material": 0}]}],
         "materials": [{"pbrMetallicRoughness": {"baseColorFactor": [1, 0.5, 0, 0.25]}}],
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
             {"bufferView": 0, "byteOffset": 48, "componentType": 5126, "count": 4, "type": "VEC2"},
-            {"bufferView": 0, "byteOffset": 80, "componentType": 5121, "normalized": true, "count": 4, "type": "VEC4"},
+            {"bufferView": 0, "byteOffset": 80, "componentType": 5121, "normalized": true,
+                "count": 4, "type": "VEC4"},
             {"bufferView": 0, "byteOffset": 96, "componentType": 5123, "count": 6, "type": "SCALAR"}
         ],
         "bufferViews": [{"buffer": 0, "byteLength": 108}],
@@ -72,7 +75,7 @@ fn square() -> Value {
     })
 }
 
-/// The square with changes at JSON pointers.
+/// The square, changed at JSON pointers.
 fn changed(changes: &[(&str, Value)]) -> Value {
     let mut value = square();
     for (pointer, new) in changes {
@@ -91,7 +94,7 @@ fn a_square_with_colours() {
     let mesh = load_json(&square()).expect("loads");
     assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y]);
     assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
-    // Linear light becomes display values: 55/255 is about half as displayed, 0.5 about 0.735.
+    // Linear light becomes display values: 55/255 is about half when displayed, 0.5 about 0.735.
     assert_eq!(
         mesh.colors,
         [[255, 0, 0, 255], [128, 128, 128, 255], [0, 0, 0, 255], [255, 255, 255, 255]]
@@ -100,7 +103,8 @@ fn a_square_with_colours() {
     assert!((color[1] - 0.735).abs() < 1e-3 && color[3] == 1.0, "{color:?}");
 }
 
-/// The square with these materials, each on a primitive of its own, and a picture of four texels with these alphas.
+/// The square with these materials, each on its own primitive, and a picture of four texels with
+/// these alphas.
 fn painted(materials: &[Value], alphas: [u8; 4]) -> Mesh {
     let picture = png(4, 1, &alphas.map(|alpha| [9, 8, 7, alpha]));
     let mut value = changed(&[
@@ -118,7 +122,7 @@ fn painted(materials: &[Value], alphas: [u8; 4]) -> Mesh {
     load_json(&value).expect("loads")
 }
 
-/// A material with the picture, of a mode and with an alpha as its factor.
+/// A material with the picture, with an alpha mode and this alpha as its factor.
 fn picture_material(mode: &str, factor: f32) -> Value {
     let base = json!({"baseColorFactor": [1, 1, 1, factor], "baseColorTexture": {"index": 0}});
     json!({"alphaMode": mode, "pbrMetallicRoughness": base})
@@ -153,7 +157,7 @@ fn opaque_materials_ignore_every_alpha() {
             [9, 8, 7]
         );
     }
-    // Without a material, the default one counts, which is opaque.
+    // Without a material, the default one applies, which is opaque.
     let mut value = square();
     value["meshes"][0]["primitives"][0].as_object_mut().expect("an object").remove("material");
     assert_eq!(vertex_alphas(&load_json(&value).expect("loads")), [255; 4]);
@@ -209,7 +213,8 @@ fn specular_glossiness_replaces_the_base_colour() {
             "extensions": {"KHR_materials_pbrSpecularGlossiness": {
                 "diffuseFactor": [1, 0.5, 0, 0.25],
                 "diffuseTexture": {"index": 0,
-                    "extensions": {"KHR_texture_transform": {"offset": [0.5, 0.0], "scale": [2.0, 1.0]}}}
+                    "extensions": {"KHR_texture_transform":
+                        {"offset": [0.5, 0.0], "scale": [2.0, 1.0]}}}
             }}
         })],
         [255, 0, 255, 0],
@@ -267,7 +272,8 @@ fn a_text_file_cut_anywhere() {
 #[test]
 fn transforms_and_mirrors() {
     let nodes = json!([
-        {"children": [1], "translation": [10, 0, 0], "rotation": [0, 0, 0.5f64.sqrt(), 0.5f64.sqrt()]},
+        {"children": [1], "translation": [10, 0, 0],
+            "rotation": [0, 0, 0.5f64.sqrt(), 0.5f64.sqrt()]},
         {"mesh": 0, "matrix": [-1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0, 0, 0, 3, 1]}
     ]);
     let mesh = load_json(&changed(&[("/nodes", nodes)])).expect("loads");
@@ -283,10 +289,9 @@ fn normals_agree_with_triangles_under_mirrors() {
     let mut value = square();
     value["buffers"] = json!([{"byteLength": binary.len(), "uri": data_uri(&binary)}]);
     value["bufferViews"] = json!([{"buffer": 0, "byteLength": binary.len()}]);
-    value["accessors"]
-        .as_array_mut()
-        .expect("a list")
-        .push(json!({"bufferView": 0, "byteOffset": 108, "componentType": 5126, "count": 4, "type": "VEC3"}));
+    value["accessors"].as_array_mut().expect("a list").push(json!({
+        "bufferView": 0, "byteOffset": 108, "componentType": 5126, "count": 4, "type": "VEC3"
+    }));
     value["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = json!(4);
     for (scale, normal) in [
         ([1, 1, 1], Vec3::Z),
@@ -309,7 +314,9 @@ fn normals_agree_with_triangles_under_mirrors() {
 fn strips_fans_and_points() {
     let primitive = "/meshes/0/primitives/0";
     let with = |mode: u32| {
-        let indices = json!({"bufferView": 0, "byteOffset": 96, "componentType": 5123, "count": 4, "type": "SCALAR"});
+        let indices = json!({
+            "bufferView": 0, "byteOffset": 96, "componentType": 5123, "count": 4, "type": "SCALAR"
+        });
         changed(&[(&format!("{primitive}/mode"), json!(mode)), ("/accessors/3", indices)])
     };
     assert_eq!(load_json(&with(5)).expect("loads").triangles, [[0, 1, 2], [2, 1, 0]]);
@@ -329,7 +336,8 @@ fn quantised_positions() {
         let mesh = load_json(&json!({
             "asset": {"version": "2.0"}, "extensionsRequired": ["KHR_mesh_quantization"],
             "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
-            "accessors": [{"bufferView": 0, "componentType": 5122, "normalized": normalized, "count": 3, "type": "VEC3"}],
+            "accessors": [{"bufferView": 0, "componentType": 5122, "normalized": normalized,
+                "count": 3, "type": "VEC3"}],
             "bufferViews": [{"buffer": 0, "byteLength": 24, "byteStride": 8}],
             "buffers": [{"byteLength": 24, "uri": data_uri(&values)}]
         }))
@@ -343,11 +351,14 @@ fn quantised_positions() {
 #[test]
 fn sparse_accessors() {
     let sparse = |count: u64, index: u64, view: Value| {
-        let base = json!({"componentType": 5126, "count": 4, "type": "VEC3", "bufferView": view, "sparse": {
-            "count": count,
-            "indices": {"bufferView": 1, "componentType": 5121},
-            "values": {"bufferView": 0, "byteOffset": 12}
-        }});
+        let base = json!({
+            "componentType": 5126, "count": 4, "type": "VEC3", "bufferView": view,
+            "sparse": {
+                "count": count,
+                "indices": {"bufferView": 1, "componentType": 5121},
+                "values": {"bufferView": 0, "byteOffset": 12}
+            }
+        });
         let mut base = base;
         if view.is_null() {
             base.as_object_mut().expect("an object").remove("bufferView");
@@ -361,7 +372,10 @@ fn sparse_accessors() {
             ),
             (
                 "/buffers",
-                json!([{"byteLength": 108, "uri": data_uri(&square_bytes())}, {"byteLength": 1, "uri": indices}]),
+                json!([
+                    {"byteLength": 108, "uri": data_uri(&square_bytes())},
+                    {"byteLength": 1, "uri": indices}
+                ]),
             ),
         ])
     };
@@ -391,7 +405,7 @@ fn hostile_files_are_refused_with_a_reason() {
     for (pointer, value, reason) in [
         ("/nodes/0", json!({"mesh": 0, "children": [0]}), "own ancestor"),
         ("/nodes", json!([{"children": [1]}, {"children": [0]}]), "own ancestor"),
-        ("/nodes", json!(deep), "the depth of nesting is 65, over the limit of 64"),
+        ("/nodes", json!(deep), "the nesting depth is 65, over the limit of 64"),
         ("/nodes/0", json!({"children": [7]}), "node 7"),
         ("/nodes/0/mesh", json!(7), "mesh 7"),
         ("/scene", json!(7), "scene"),

@@ -1,5 +1,5 @@
-//! The chunks of points of a LAZ file. The `laz` crate unpacks each; that the chunks lie within the file, and what they may
-//! ask memory for, is checked before.
+//! The chunks of points of a LAZ file. The `laz` crate unpacks each chunk. Before that, this module
+//! checks that the chunks lie within the file and how much memory they claim.
 
 use super::{Fields, Header, Point, time::Times};
 use crate::{
@@ -16,10 +16,10 @@ use laz::{
 use rayon::prelude::*;
 use std::{io::Cursor, ops::Range};
 
-/// Points that are unpacked between two looks at the clock.
+/// Points that are unpacked between two checks of the time limit.
 const POINTS: usize = 1 << 16;
 
-/// A chunk: where its bytes are in the file, and its points.
+/// A chunk: its byte range in the file, and its number of points.
 pub(super) struct Chunk {
     pub number: usize,
     pub bytes: Range<usize>,
@@ -29,7 +29,7 @@ pub(super) struct Chunk {
 pub fn read(source: &Source, header: &Header) -> Result<Vec<Point>> {
     let layout = layout(source, header)?;
     let chunks = chunks(source, header, &layout)?;
-    // In chunks, and joined.
+    // Once in chunks, and once joined.
     source.room::<[Point; 2]>("the points", header.points)?;
     let parts: Vec<Vec<Point>> = chunks
         .par_iter()
@@ -38,14 +38,15 @@ pub fn read(source: &Source, header: &Header) -> Result<Vec<Point>> {
     Ok(parts.into_iter().flatten().collect())
 }
 
-/// How the points are packed, behind a wall. The decoder takes what it reads for true and panics at what it cannot be.
+/// Returns how the points are packed. Isolated, because the decoder trusts what it reads and panics
+/// on impossible values.
 pub(super) fn layout(source: &Source, header: &Header) -> Result<LazVlr> {
-    isolated(source, "record of LASzip", || find_layout(source, header))
+    isolated(source, "LASzip record", || find_layout(source, header))
 }
 
-/// How the points are packed: one of the file's records of variable length says it.
+/// Returns how the points are packed, from one of the file's variable length records.
 fn find_layout(source: &Source, header: &Header) -> Result<LazVlr> {
-    let place = "record of LASzip";
+    let place = "LASzip record";
     let bytes = source.bytes();
     let (mut at, count) = header.records;
     for _ in 0..count {
@@ -57,9 +58,7 @@ fn find_layout(source: &Source, header: &Header) -> Result<LazVlr> {
             id == LazVlr::RECORD_ID && bytes[at + 2..].starts_with(LazVlr::USER_ID.as_bytes());
         at += 54;
         let Some(data) = bytes[..header.start].get(at..at + length) else {
-            return Err(
-                source.error("header", "a record before the points ends behind their beginning")
-            );
+            return Err(source.error("header", "a record before the points overlaps them"));
         };
         at += length;
         if is_wanted {
@@ -69,45 +68,45 @@ fn find_layout(source: &Source, header: &Header) -> Result<LazVlr> {
             return Ok(layout);
         }
     }
-    Err(source.error("header", "says that the points are packed, but has no record that says how"))
+    Err(source.error("header", "marks the points as compressed, but has no LASzip record"))
 }
 
-/// The items that a point is packed as must be those of its format.
+/// Checks that the items that a point is packed as are those of its format.
 fn check(header: &Header, items: &[LazItem]) -> Result<(), String> {
     let size: usize = items.iter().map(|item| usize::from(item.size())).sum();
     if size != header.size {
         return Err(format!(
-            "packs points of {size} bytes, but the header has them of {}",
+            "packs points of {size} bytes, but the header claims points of {} bytes",
             header.size
         ));
     }
     let layered = header.format >= 6;
     let first = if layered { LazItemType::Point14 } else { LazItemType::Point10 };
     if items.first().map(LazItem::item_type) != Some(first) {
-        return Err(format!(
-            "does not begin with what a point of format {} begins with",
-            header.format
-        ));
+        return Err(format!("does not begin with the item of point format {}", header.format));
     }
     let versions = if layered { 3..=4 } else { 1..=2 };
     match items.iter().find(|item| !versions.contains(&item.version())) {
-        Some(item) => {
-            Err(format!("packs by version {}, which is not known for this format", item.version()))
-        }
+        Some(item) => Err(format!(
+            "uses version {} of an item, which is not known for this \
+                         format",
+            item.version()
+        )),
         None => Ok(()),
     }
 }
 
-/// The chunks by the table that the file keeps of them, behind a wall.
+/// Returns the chunks from the file's chunk table. Isolated, as [`layout`].
 pub(super) fn chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<Chunk>> {
-    isolated(source, "table of chunks", || find_chunks(source, header, layout))
+    isolated(source, "chunk table", || find_chunks(source, header, layout))
 }
 
 fn find_chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<Chunk>> {
     let bytes = source.bytes();
-    let wrong = |message: String| source.error("table of chunks", message);
-    let field = Fields { bytes, place: "the table of chunks" };
-    // Writers that cannot go back leave no place at the beginning, but one at the end.
+    let wrong = |message: String| source.error("chunk table", message);
+    let field = Fields { bytes, place: "the chunk table" };
+    // Writers that cannot seek back put the table's offset at the end of the file instead of the
+    // start.
     let mut table = i64::from_le_bytes(field.at(header.start).map_err(wrong)?);
     if table <= header.start as i64 {
         table = i64::from_le_bytes(field.at(bytes.len() - 8).map_err(wrong)?);
@@ -117,12 +116,12 @@ fn find_chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<
     let Some(table) = table else {
         return Err(wrong("lies outside of the file: it is cut".into()));
     };
-    // The crate makes room for all entries that the table claims.
+    // The crate allocates all entries that the table claims.
     let claimed = u32::from_le_bytes(field.at(table + 4).map_err(wrong)?) as usize;
     if claimed > table - header.start {
         return Err(wrong(format!("claims {claimed} chunks in {} bytes", table - header.start)));
     }
-    source.room::<[Chunk; 2]>("the table of chunks", claimed)?;
+    source.room::<[Chunk; 2]>("the chunk table", claimed)?;
     let mut cursor = Cursor::new(bytes);
     cursor.set_position(header.start as u64);
     let entries =
@@ -134,7 +133,7 @@ fn find_chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<
         let points = usize::try_from(entry.point_count).unwrap_or(usize::MAX).min(left);
         let end = usize::try_from(entry.byte_count).ok().and_then(|size| at.checked_add(size));
         let Some(end) = end.filter(|&end| end <= table) else {
-            return Err(wrong(format!("chunk {number} ends behind the packed points")));
+            return Err(wrong(format!("chunk {number} ends after the packed points")));
         };
         chunks.push(Chunk { number, bytes: at..end, points });
         at = end;
@@ -151,7 +150,8 @@ fn find_chunks(source: &Source, header: &Header, layout: &LazVlr) -> Result<Vec<
     Ok(chunks)
 }
 
-/// Unpacks a chunk point by point, so that memory grows with what was really unpacked; behind a wall.
+/// Unpacks a chunk point by point, so that memory grows with the points actually unpacked.
+/// Isolated, as [`layout`].
 pub(super) fn unpack(
     source: &Source,
     header: &Header,
@@ -175,7 +175,7 @@ fn unpack_here(
         check_layers(source, header, layout, chunk).map_err(wrong)?;
         let mut decoder = LayeredPointRecordDecompressor::new(input);
         decoder.set_fields_from(layout.items()).map_err(|error| wrong(error.to_string()))?;
-        // Times have a layer of their own, which is left out: see time.rs.
+        // Times have a layer of their own, which is skipped: see time.rs.
         decoder.set_selection(DecompressionSelection::all().skip_gps_time());
         Box::new(decoder)
     } else {
@@ -205,7 +205,8 @@ fn unpack_here(
     Ok(points)
 }
 
-/// A chunk of layers begins with its first point, its count and the size of each layer, which the decoder makes room for.
+/// Checks the sizes of the layers. A layered chunk begins with its first point, its count and the
+/// size of each layer. The decoder allocates these sizes.
 fn check_layers(
     source: &Source,
     header: &Header,

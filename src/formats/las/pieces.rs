@@ -1,4 +1,4 @@
-//! LAS and LAZ files in pieces.
+//! Reads LAS and LAZ files in pieces.
 
 use super::{
     super::{
@@ -16,20 +16,21 @@ use laz::LazVlr;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Points of a piece that is not packed.
+/// Points per piece of an uncompressed file.
 const POINTS: usize = 1 << 16;
-/// Packed points of a piece: a chunk is unpacked as a whole. Writers make chunks of some 50,000.
+/// Maximum points per piece of a compressed file: a chunk is unpacked as a whole. Writers make
+/// chunks of about 50,000 points.
 const MOST_POINTS: usize = 1 << 21;
 
 pub struct Pieces {
     header: Header,
     packed: Option<(LazVlr, Vec<packed::Chunk>)>,
-    /// The number of the first point of each piece.
+    /// Index of the first point of each piece.
     firsts: Vec<usize>,
     paint: Paint,
 }
 
-/// What a point's colour is made from.
+/// The source of the points' colours.
 #[derive(Debug, Clone, Copy)]
 enum Paint {
     None,
@@ -37,19 +38,19 @@ enum Paint {
     Grey { low: f32, high: f32 },
 }
 
-/// What the first pass sees of some points.
+/// What the first pass collects about points.
 struct Seen {
     low: DVec3,
     high: DVec3,
     largest: u16,
-    /// How many points have each intensity.
+    /// Number of points with each intensity.
     intensities: Vec<u64>,
     bad: Option<(usize, DVec3)>,
     points: u64,
 }
 
 impl Pieces {
-    /// `None` for chunks that are too large to be pieces.
+    /// Returns `None` if a chunk is too large to be a piece.
     pub fn find(source: &Source) -> Result<Option<Self>> {
         let header = Header::read(source)?;
         let packed = if header.packed {
@@ -77,7 +78,7 @@ impl Pieces {
         Ok(Some(Self { header, packed, firsts, paint: Paint::None }))
     }
 
-    /// Points that the header counts, withheld ones too.
+    /// Returns the number of points that the header counts, including withheld ones.
     pub fn points(&self) -> usize {
         self.header.points
     }
@@ -90,7 +91,8 @@ impl Pieces {
         !matches!(self.paint, Paint::None)
     }
 
-    /// The points of a piece with their numbers in the file. Withheld ones keep theirs to themselves.
+    /// Returns the points of a piece with their indices. Withheld points are left out. Within a
+    /// piece, the points are numbered without them.
     fn piece(&self, source: &Source, piece: usize) -> Result<impl Iterator<Item = (usize, Point)>> {
         let first = self.firsts[piece];
         let points: Vec<Point> = match &self.packed {
@@ -106,7 +108,7 @@ impl Pieces {
         Ok((first..).zip(points))
     }
 
-    /// The points of a piece, in their colours.
+    /// Returns the points of a piece with their colours.
     pub fn found(&self, source: &Source, piece: usize) -> Result<Vec<Found>> {
         let found = |(row, point): (usize, Point)| Found {
             row,
@@ -121,10 +123,11 @@ impl Pieces {
         Ok(self.piece(source, piece)?.map(found).collect())
     }
 
-    /// Goes through all points: gives their number and the corners of the box around them, and settles their colours.
+    /// Visits all points. Returns their number and the corners of their bounding box, and chooses
+    /// how their colours are made.
     ///
     /// # Errors
-    /// As of the reader.
+    /// Those of the reader.
     pub fn survey(&mut self, source: &Source, watch: &dyn Fn(u64)) -> Result<(u64, [DVec3; 2])> {
         let mut seen = Seen::nothing();
         let batch = 2 * rayon::current_num_threads();
@@ -142,7 +145,7 @@ impl Pieces {
             return Err(positions::not_finite(source, format!("point {point}"), position));
         }
         if seen.points == 0 {
-            return Err::<_, Error>(source.error("file", "holds no points"));
+            return Err::<_, Error>(source.error("file", "contains no points"));
         }
         self.paint = seen.paint(&self.header);
         Ok((seen.points, [seen.low, seen.high]))
@@ -184,7 +187,8 @@ impl Seen {
         self.points += other.points;
     }
 
-    /// Colours, or where there are none greys from the darkest to the brightest hundredth.
+    /// Returns how to colour the points: by their colours, or by greys from the first to the last
+    /// percentile of intensities.
     fn paint(&self, header: &Header) -> Paint {
         if header.color_at.is_some() && self.largest > 0 {
             return Paint::Color { largest: self.largest };

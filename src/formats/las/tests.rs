@@ -9,14 +9,14 @@ use std::{io::Cursor, path::Path};
 const SCALE: f64 = 0.001;
 const OFFSET: [f64; 3] = [4_500_000.0, 5_400_000.0, 100.0];
 
-/// A record of a format: its number in all that it says.
+/// A record of a format; every field that is read depends on its number.
 fn record(format: u8, number: i32, largest: u16, withheld: bool) -> Vec<u8> {
     let mut record = vec![0; SIZES[usize::from(format)]];
     for (axis, at) in [0, 4, 8].into_iter().enumerate() {
         record[at..at + 4].copy_from_slice(&(number * 7 + axis as i32).to_le_bytes());
     }
     record[12..14].copy_from_slice(&(number as u16 * 3).to_le_bytes());
-    // One return of one.
+    // One return out of one.
     record[14] = if format < 6 { 0b1001 } else { 0x11 };
     record[15] = if !withheld { 0 } else { if format < 6 { 0x80 } else { 0x04 } };
     let color_at = [0, 0, 20, 28, 0, 28, 0, 30, 30, 0, 30][usize::from(format)];
@@ -66,7 +66,7 @@ fn laz(format: u8, records: &[Vec<u8>], points: u64) -> Vec<u8> {
 fn in_chunks_of(size: u32, format: u8, records: &[Vec<u8>], points: u64) -> Vec<u8> {
     let items = LazItemRecordBuilder::default_for_point_format_id(format, 0).unwrap();
     let builder = LazVlrBuilder::new(items);
-    // As COPC has them, chunks of their own sizes.
+    // Chunks of varying sizes, as in COPC.
     let layout = if format < 6 {
         builder.with_fixed_chunk_size(size)
     } else {
@@ -115,7 +115,7 @@ fn every_format_plain_and_packed() {
                         [0, 1, 2].map(|a| OFFSET[a] + SCALE * f64::from(i * 7 + a as i32)),
                     )
                 };
-                // To a hundredth of a millimetre, thousands of kilometres from the origin.
+                // Accurate to 0.01 mm, thousands of kilometres from the origin.
                 assert!(
                     (mesh.origin + mesh.positions[6].as_dvec3()).distance(expected(6)) < 1e-5,
                     "{format}"
@@ -138,7 +138,7 @@ fn every_format_plain_and_packed() {
     }
 }
 
-/// Chunks are unpacked as a whole: a file of huge ones is not read in pieces.
+/// Chunks are unpacked as a whole, so a file with huge chunks is not read in pieces.
 #[test]
 fn huge_chunks_are_no_pieces() {
     let most = 1 << 21;
@@ -158,7 +158,7 @@ fn every_cut_is_an_error() {
     for format in [0, 3, 6, 7] {
         let records: Vec<Vec<u8>> = (0..30).map(|i| record(format, i, 255, false)).collect();
         every_cut(&folder, "a.las", &las(format, &records), read);
-        // Behind the table of chunks nothing is needed but the end of its code.
+        // After the chunk table, reading needs only the end of its code.
         let whole = laz(format, &records, 30);
         for end in 0..whole.len() - 8 {
             match load(&whole[..end]) {
@@ -189,7 +189,7 @@ fn lies_are_errors() {
         (change(&plain, 96, &[255; 4]), "at byte 4294967295"),
         (change(&plain, 131, &f64::NAN.to_le_bytes()), "the scale"),
         (change(&plain, 24, &[2]), "version 2.4"),
-        (change(&plain, 104, &[0x87]), "no record that says how"),
+        (change(&plain, 104, &[0x87]), "no LASzip record"),
         (laz(7, &records, 31), "has 30 points, but the header counts 31"),
         (change(&packed, start, &[255, 255, 255, 127]), "outside of the file"),
         (change(&packed, table + 4, &[255; 4]), "claims 4294967295 chunks"),
@@ -215,7 +215,7 @@ fn lies_are_errors() {
     assert!(matches!(read(&Source::open(&path, &limits).unwrap()), Err(Error::Limit { .. })));
 }
 
-/// Whatever a byte is changed to, the file is read or refused.
+/// Whatever byte is changed, the file is either read or refused.
 #[test]
 fn no_changed_byte_does_harm() {
     for format in [3, 7] {

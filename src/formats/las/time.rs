@@ -1,8 +1,9 @@
-//! The times of packed points, which are read over: nothing of a cloud depends on them, but in formats below 6 the other values
-//! of a point come out of the same stream behind them.
+//! Skips the times of packed points. No result depends on them, but in formats below 6 the other
+//! values of a point follow them in the same stream.
 //!
-//! The `laz` crate calls itself each time that a code says “another sequence”, as often as a file likes, which ends in a stack
-//! that is full and a process that is gone. Here a loop does the same (LASzip, Isenburg 2013, version 2 of the field).
+//! The `laz` crate recurses each time that a code means “another sequence”. A file may repeat that
+//! code without limit, so the stack overflows and the process dies. This module does the same in a
+//! loop (LASzip, Isenburg 2013, version 2 of the field).
 
 use laz::{
     decoders::ArithmeticDecoder,
@@ -12,28 +13,29 @@ use laz::{
 };
 use std::io::{Read, Result};
 
-/// The largest and the least multiple of the last difference that have a code.
+/// The largest and smallest multiple of the last difference that have a code.
 const MOST: i32 = 500;
 const LEAST: i32 = -10;
-/// Codes behind these: the time as before, a time of 64 bits, and from there on another sequence.
+/// Codes after these: the same time again, a 64-bit time, and from there on another sequence.
 const SAME: i32 = MOST - LEAST + 1;
 const WHOLE: i32 = SAME + 1;
 const CODES: u32 = WHOLE as u32 + 4;
-/// Codes after a difference of 0: the same, a difference, a time of 64 bits, and three other sequences.
+/// Codes after a difference of 0: the same time, a difference, a 64-bit time, and three other
+/// sequences.
 const CODES_AFTER_NONE: u32 = 6;
-/// The context of the upper half of a time of 64 bits, of nine in all.
+/// The context of the upper half of a 64-bit time, out of nine contexts.
 const UPPER: u32 = 8;
 
-/// A run of times that follow each other; a stream mixes four.
+/// A sequence of consecutive times; a stream interleaves four.
 #[derive(Clone, Copy, Default)]
 struct Sequence {
     time: i64,
     difference: i32,
-    /// How often in a row a difference was far from a small multiple of the last.
+    /// Number of consecutive differences that were far from a small multiple of the last one.
     jumps: u32,
 }
 
-/// Reads over the times of a stream, each a number of 64 bits.
+/// Decodes and discards the times of a stream, each a 64-bit number.
 pub struct Times {
     after_none: ArithmeticModel,
     multiple: ArithmeticModel,
@@ -55,7 +57,7 @@ impl Times {
         }
     }
 
-    /// Goes on by a difference that is expected to be near `near`.
+    /// Advances the time by a difference that is expected to be near `near`.
     fn step<R: Read>(
         &mut self,
         decoder: &mut ArithmeticDecoder<R>,
@@ -68,7 +70,8 @@ impl Times {
         Ok(difference)
     }
 
-    /// The same far off the expected: the fourth time in a row becomes what is expected.
+    /// As `step`, for a difference far from the expected one. The fourth such difference in a row
+    /// becomes the expected one.
     fn jump<R: Read>(
         &mut self,
         decoder: &mut ArithmeticDecoder<R>,
@@ -84,7 +87,7 @@ impl Times {
         Ok(())
     }
 
-    /// Begins a sequence in place of the oldest.
+    /// Starts a sequence in place of the oldest.
     fn begin<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> Result<()> {
         let before = (self.sequences[self.current].time >> 32) as i32;
         let upper = self.differences.decompress(decoder, before, UPPER)?;
@@ -99,7 +102,7 @@ impl Times {
     fn next<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> Result<()> {
         loop {
             let last = self.sequences[self.current].difference;
-            // Sequences from the current one on to go to.
+            // Number of sequences to advance from the current one.
             let onward;
             if last == 0 {
                 match decoder.decode_symbol(&mut self.after_none)? {
@@ -173,7 +176,7 @@ mod tests {
     };
     use std::io::Cursor;
 
-    /// Times in every manner that has a code of its own, packed by the crate's writer.
+    /// Times that use every kind of code, packed by the crate's writer.
     #[test]
     fn all_times_come_back() {
         let mut random = 9u64;
@@ -217,7 +220,7 @@ mod tests {
         }
         writer.done().expect("room");
         drop(writer);
-        // Behind the place of the table of chunks.
+        // After the offset of the chunk table.
         let bytes = packed.into_inner();
         let mut reader = SequentialPointRecordDecompressor::new(&bytes[8..]);
         reader.set_fields_from(&vec![layout.items()[0]]).expect("known fields");

@@ -1,4 +1,4 @@
-//! The files of a detached header: one, a list, or a pattern with a number.
+//! The data files of a detached header: one, a list, or a pattern with a number.
 
 use super::shown;
 use crate::{
@@ -6,25 +6,30 @@ use crate::{
     input::{Source, copy},
 };
 
-/// Whether a field tells that the names of files follow in the lines below.
+/// Returns whether a field says that file names follow on the lines below.
 pub fn is_list(field: &str) -> bool {
     field.split_ascii_whitespace().next() == Some("LIST")
 }
 
-/// Whether a field tells of several files.
+/// Returns whether a field names several files.
 pub fn are_several(field: &str) -> bool {
     is_list(field) || Pattern::of(field).is_some()
 }
 
-/// The names that a field tells of; `rest` is what stands behind the header. Files hold equal parts of the samples, in the
-/// order of the last axis. So many samples are known to fit into memory.
+/// Returns the file names of a field; `rest` is the text after the header. The files contain equal
+/// parts of the samples, in order along the last axis. The caller has checked that this number of
+/// samples fits into memory.
 pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Result<Vec<String>> {
     const PLACE: &str = "data file";
     let wrong = |message: String| source.error(PLACE, message);
     let (names, parts) = if is_list(field) {
         let mut words = field.split_ascii_whitespace().skip(1);
         let (parts, None) = (words.next(), words.next()) else {
-            return Err(wrong(format!("“{}” is not “LIST” with the axes of a file", shown(field))));
+            return Err(wrong(format!(
+                "“{}” is not “LIST” followed by the number of axes in a \
+                                      file",
+                shown(field)
+            )));
         };
         if rest.len() > super::LONGEST {
             return Err(wrong(format!(
@@ -32,15 +37,21 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
                 super::LONGEST
             )));
         }
-        source.spend("the size of the names of files in bytes", 5 * rest.len() as u64)?;
+        source.spend("the size of the file names in bytes", 5 * rest.len() as u64)?;
         let text = copy::text(rest)
             .map_err(|at| wrong(format!("byte {at} of the list of files is not text")))?;
         let names = text.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned);
         (names.collect(), parts)
     } else if let Some(pattern) = Pattern::of(field) {
-        let count =
-            pattern.count().ok_or_else(|| wrong(format!("“{}” counts no files", shown(field))))?;
-        // Each file holds a sample at least.
+        let count = pattern.count().ok_or_else(|| {
+            wrong(format!(
+                "“{}” names no files: its step does not \
+                                                         lead from the first number to the \
+                                                         last",
+                shown(field)
+            ))
+        })?;
+        // Each file contains at least one sample.
         if count > dims.iter().product::<usize>() as u64 {
             return Err(wrong(format!(
                 "“{}” counts {count} files, more than there are samples",
@@ -48,7 +59,7 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
             )));
         }
         source.spend(
-            "the size of the names of files in bytes",
+            "the size of the file names in bytes",
             count.saturating_mul(256 + field.len() as u64),
         )?;
         ((0..count).map(|index| pattern.name(index)).collect::<Vec<_>>(), pattern.parts)
@@ -60,7 +71,7 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
         Some(Ok(axes @ 1..=3)) => axes,
         Some(_) => {
             return Err(wrong(format!(
-                "“{}” does not tell 1, 2 or 3 axes of a file",
+                "“{}” must end with 1, 2 or 3, the number of axes in a file",
                 shown(field)
             )));
         }
@@ -81,7 +92,8 @@ pub fn names(source: &Source, field: &str, rest: &[u8], dims: [usize; 3]) -> Res
     Ok(names)
 }
 
-/// Names with a number, as printf writes them: `slice%03d.raw`, the first number, the last, the step; the axes of a file.
+/// A pattern of file names with a number, as printf formats it: `slice%03d.raw`, then the first
+/// number, the last number, the step, and optionally the number of axes in a file.
 struct Pattern<'a> {
     before: &'a str,
     behind: &'a str,
@@ -94,7 +106,7 @@ struct Pattern<'a> {
 }
 
 impl<'a> Pattern<'a> {
-    /// `None` for what is the name of one file.
+    /// Returns `None` for the name of a single file.
     fn of(field: &'a str) -> Option<Self> {
         let mut words = field.split_ascii_whitespace();
         let (before, number) = words.next()?.split_once('%')?;
@@ -106,7 +118,7 @@ impl<'a> Pattern<'a> {
         }
         let digits = number.bytes().take_while(u8::is_ascii_digit).count();
         let (width, behind) = number.split_at(digits);
-        // Wider names are longer than file systems take.
+        // Wider numbers would make names longer than file systems allow.
         let wide = if width.is_empty() {
             Some(0)
         } else {
@@ -124,7 +136,8 @@ impl<'a> Pattern<'a> {
         })
     }
 
-    /// How many files; `None` where the step leads nowhere.
+    /// Returns the number of files; `None` if the step does not lead from the first number to the
+    /// last.
     fn count(&self) -> Option<u64> {
         let way = i128::from(self.last) - i128::from(self.first);
         let steps = way.checked_div(self.step.into())?;
@@ -148,7 +161,7 @@ mod tests {
     use super::*;
     use crate::{formats::nrrd::read, input::testing::*, volume::Volume};
 
-    /// Reads a header of 2×1×4 bytes beside files of two and of four samples.
+    /// Reads a header of 2×1×4 bytes next to files of two and of four samples.
     fn volume(folder: &Folder, data_file: &str) -> Result<Volume> {
         for (index, name) in
             ["slice01.raw", "slice02.raw", "slice03.raw", "slice04.raw"].iter().enumerate()
@@ -158,7 +171,8 @@ mod tests {
         folder.write("slab 0.raw", [0, 1, 2, 3]);
         folder.write("slab 1.raw", [4, 5, 6, 7]);
         let text = format!(
-            "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 1 4\nencoding: raw\ndata file: {data_file}\n"
+            "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 1 4\nencoding: raw\ndata file: \
+             {data_file}\n"
         );
         read_with(&folder.write("volume.nhdr", text), read)
     }
@@ -196,13 +210,13 @@ mod tests {
         for (data_file, message) in [
             ("slice%02d.raw 1 3 1", "there are 3 files, but their number must be 4"),
             ("slab%2d.raw 0 2 1 3", "there are 3 files, but their number must divide 4"),
-            ("slice%02d.raw 1 4 0", "counts no files"),
-            ("slice%02d.raw 1 4 -1", "counts no files"),
+            ("slice%02d.raw 1 4 0", "names no files"),
+            ("slice%02d.raw 1 4 -1", "names no files"),
             ("slice%02d.raw 1 4 9", "there are 1 files"),
             ("slice%02d.raw 0 9223372036854775807 1", "more than there are samples"),
-            ("slice%02d.raw -9223372036854775808 9223372036854775807 1", "counts no files"),
-            ("slice%02d.raw 1 4 1 4", "does not tell 1, 2 or 3 axes"),
-            ("LIST 2 2\n", "is not “LIST” with the axes"),
+            ("slice%02d.raw -9223372036854775808 9223372036854775807 1", "names no files"),
+            ("slice%02d.raw 1 4 1 4", "must end with 1, 2 or 3"),
+            ("LIST 2 2\n", "is not “LIST” followed by the number of axes"),
             ("LIST", "there are 0 files"),
             ("LIST 3", "there are 0 files"),
             ("LIST\nslice01.raw", "there are 1 files"),

@@ -1,4 +1,4 @@
-//! Writing NRRD: samples in their own type, packed by gzip, in the header's own file.
+//! Writes NRRD: samples in their own type, compressed by gzip, in the same file as the header.
 
 use crate::{
     Error, Result, disk,
@@ -11,22 +11,25 @@ use std::{
     path::Path,
 };
 
-/// Writes a volume with its position in space; those that are not Cartesian with the keys that [`read`](super::read) knows.
+/// Writes a volume with its position in space. Lattices that are not Cartesian are written with the
+/// keys that [`read`](super::read) knows.
 ///
 /// # Errors
-/// [`Error::Argument`] for a volume that was put together by hand and contradicts itself; [`Error::Output`] where the file cannot
-/// be written.
+/// [`Error::Argument`] for a volume that was built by hand and contradicts itself;
+/// [`Error::Output`] if the file cannot be written.
 pub fn write(volume: &Volume, path: &Path) -> Result<()> {
     volume.validate().map_err(Error::Argument)?;
     disk::write_with(path, |out| write_to(volume, out))
 }
 
-/// Writes a volume of bytes that come slice by slice, not packed, so that it can be read slice by slice too
-/// ([`VolumeStream`](crate::formats::VolumeStream)). `slice` makes the samples of each slice across the last axis, in order.
+/// Writes a volume of bytes slice by slice, uncompressed, so that it can also be read slice by
+/// slice ([`VolumeStream`](crate::formats::VolumeStream)). `slice` returns the samples of each
+/// slice across the last axis; it is called in order.
 ///
 /// # Errors
-/// [`Error::Argument`] for a lattice that is none ([`Lattice::validate`]), and where `slice` gives another number of samples than
-/// a slice has; [`Error::Output`] where the file cannot be written. No file is left of either.
+/// [`Error::Argument`] for an invalid lattice ([`Lattice::validate`]), and if `slice` returns
+/// another number of samples than a slice has; [`Error::Output`] if the file cannot be written. In
+/// both cases no file is left behind.
 pub fn write_bytes(
     lattice: &Lattice,
     path: &Path,
@@ -50,7 +53,8 @@ pub fn write_bytes(
     wrong.map_or(written, |message| Err(Error::Argument(message)))
 }
 
-/// What stands before the samples: the fields that every file has, and the keys of lattices that are not Cartesian.
+/// Writes the header: the fields that every file has, and the keys of lattices that are not
+/// Cartesian.
 fn write_header(
     lattice: &Lattice,
     scalar: Scalar,

@@ -1,5 +1,5 @@
-//! MTL libraries. tobj's own reader panics on a colour of fewer than three numbers and knows no texture options, so
-//! the few statements that matter are read here, into tobj's types.
+//! MTL libraries. tobj's own reader panics on a colour with fewer than three numbers and does not
+//! know texture options. So the few relevant statements are read here, into tobj's types.
 
 use super::super::shared::texture;
 use crate::{
@@ -12,7 +12,7 @@ use std::{
     sync::Arc,
 };
 
-/// Bytes that a material takes beside its name, here, in the lists of tobj and in the mesh.
+/// Bytes per material besides its name: here, in tobj's lists and in the mesh.
 const MATERIAL: u64 = 1024;
 
 /// The materials of one OBJ file, and the pictures already decoded for them.
@@ -28,7 +28,8 @@ impl<'a, 'b> Library<'a, 'b> {
         Self { source, pictures: HashMap::new(), names: HashSet::new() }
     }
 
-    /// Reads the library that a `mtllib` names; a missing one is a warning and holds nothing.
+    /// Reads the library that a `mtllib` statement names. A missing library is a warning and has no
+    /// materials.
     pub fn load(&mut self, name: &str) -> Result<(Vec<tobj::Material>, HashMap<String, usize>)> {
         let mut materials: Vec<tobj::Material> = Vec::new();
         let mut index_of = HashMap::new();
@@ -72,8 +73,8 @@ impl<'a, 'b> Library<'a, 'b> {
                     material.dissolve =
                         rest.split_whitespace().last().and_then(|word| word.parse().ok())
                 }
-                // Of the format itself is `d` alone. Some programs mean by `Tr` what others mean by `d`, and write 1 for what
-                // is opaque: nobody exports what cannot be seen.
+                // Only `d` is part of the format. Some programs use `Tr` like `d`, and write 1 for
+                // opaque. A fully transparent material is unlikely, so `Tr` 1 is read as opaque.
                 "Tr" if material.dissolve.is_none() => {
                     material.dissolve = rest
                         .parse()
@@ -90,7 +91,7 @@ impl<'a, 'b> Library<'a, 'b> {
         Ok((materials, index_of))
     }
 
-    /// The material with its picture decoded.
+    /// Returns the material with its picture decoded.
     pub fn finish(&mut self, material: &tobj::Material) -> Result<Material> {
         let texture = match &material.diffuse_texture {
             None => None,
@@ -104,7 +105,7 @@ impl<'a, 'b> Library<'a, 'b> {
                 }
             },
         };
-        // A picture under a black Kd, as some programs write it, would be invisible.
+        // Some programs write a black Kd with a picture, which would make the picture invisible.
         let default = [if texture.is_some() { 1.0 } else { 0.8 }; 3];
         let [r, g, b] = match material.diffuse {
             Some([0.0, 0.0, 0.0]) | None if texture.is_some() => default,
@@ -118,7 +119,7 @@ impl<'a, 'b> Library<'a, 'b> {
     }
 }
 
-/// The file in a `map_Kd` statement, behind its options (`-s 2 2 1 name.png`).
+/// Returns the file name in a `map_Kd` statement, after its options (`-s 2 2 1 name.png`).
 fn file_name(statement: &str) -> String {
     let mut rest = statement.trim();
     while let Some(option) = rest.strip_prefix('-') {
@@ -132,7 +133,7 @@ fn file_name(statement: &str) -> String {
             let Some((value, after)) = tail.trim_start().split_once(char::is_whitespace) else {
                 break;
             };
-            // Options of numbers may have fewer than they could.
+            // Numeric options may have fewer values than their maximum.
             if taken > 0 && value.parse::<f64>().is_err() {
                 break;
             }

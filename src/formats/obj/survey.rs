@@ -1,44 +1,47 @@
-//! The look over an OBJ file before tobj reads it.
+//! Scans an OBJ file before tobj reads it.
 
 use crate::{Result, input::Source};
 use std::io::{BufRead, Read};
 
-/// Lines between two looks at the clock.
+/// Lines between two checks of the time limit.
 const LINES: usize = 1 << 16;
 
-/// Bytes that a statement takes in all lists, those of tobj and those made of them: a vertex, a texture coordinate or
-/// normal, a face, and a corner of one, which may become a triangle and a vertex of its own, and is held while its face
-/// is cut.
+/// Bytes per statement in all lists, tobj's and ours: for a vertex, for a texture coordinate or
+/// normal, for a face, and for a corner of a face. A corner may become a triangle and a vertex of
+/// its own, and is also held while its face is cut.
 const VERTEX: u64 = 160;
 const OTHER: u64 = 48;
 const FACE: u64 = 168;
 const CORNER: u64 = 384;
 
-/// What holds for the whole file. tobj mistakes lines (`l`) for faces, shifts colours and normals where only some
-/// vertices have them, and does arithmetic on indices unchecked; the survey finds these cases.
+/// Properties of the whole file. tobj mistakes lines (`l`) for faces, shifts colours and normals if
+/// only some vertices have them, and does unchecked arithmetic on indices. The survey detects these
+/// cases.
 #[derive(Debug, Default)]
 pub(super) struct Survey {
     vertices: u64,
     pub faces: u64,
-    /// Corners of all faces.
+    /// Number of corners of all faces.
     corners: u64,
-    /// Texture coordinates and normals.
+    /// Number of texture coordinates and normals.
     others: u64,
     /// All vertices have a colour.
     pub colors: bool,
     /// All corners of all faces have a normal.
     normals: bool,
-    /// Some face stands before what it refers to.
+    /// A face comes before something that it refers to.
     ahead: bool,
 }
 
 impl Survey {
     pub fn of(source: &Source, text: &str) -> Result<Self> {
         let mut survey = Self { colors: true, normals: true, ..Self::default() };
-        // Positions, texture coordinates and normals so far, and the largest index used of each with its line.
+        // The number of positions, texture coordinates and normals so far, and the largest index
+        // used of each with its line.
         let mut counts = [0i64; 3];
         let mut largest = [(0i64, 0usize); 3];
-        // The first line that refers to what stands behind it, and one that counts back from where it stands.
+        // The first line that refers to a later statement, and a line with a negative index, which
+        // counts back from its own place.
         let mut ahead = None;
         let mut back = None;
         for (line, number) in text.lines().zip(1usize..) {
@@ -68,7 +71,7 @@ impl Survey {
                             let shown: String = word.chars().take(40).collect();
                             return Err(source
                                 .error(place(), format!("“{shown}” is not a number"))
-                                .hint("numbers have points, no decimal commas"));
+                                .hint("write numbers with a decimal point, not a comma"));
                         }
                     }
                     survey.colors &= values >= 6;
@@ -83,8 +86,9 @@ impl Survey {
                         let mut has_normal = false;
                         for (kind, part) in word.split('/').enumerate() {
                             if kind > 2 || (part.is_empty() && kind == 0) {
-                                return Err(source
-                                    .error(place(), format!("“{word}” is no corner of a face")));
+                                return Err(
+                                    source.error(place(), format!("“{word}” is not a face corner"))
+                                );
                             }
                             if part.is_empty() {
                                 continue;
@@ -93,8 +97,7 @@ impl Survey {
                             let index: i64 = part
                                 .parse::<i32>()
                                 .map_err(|_| {
-                                    source
-                                        .error(place(), format!("“{word}” is no corner of a face"))
+                                    source.error(place(), format!("“{word}” is not a face corner"))
                                 })?
                                 .into();
                             if index == 0 || -index > counts[kind] {
@@ -126,12 +129,13 @@ impl Survey {
         }
         if let (Some((line, index, kind)), Some(back)) = (ahead, back) {
             let message = format!(
-                "a face refers to {} {index}, which stands behind it, while that of line {back} counts back from where it stands",
+                "a face refers to {} {index}, which comes after it, but a face in line {back} uses \
+                 negative indices; one file cannot have both",
                 WHAT[kind]
             );
             return Err(source
                 .error(format!("line {line}"), message)
-                .hint("put the faces behind all that they refer to"));
+                .hint("move the faces after everything that they refer to"));
         }
         survey.ahead = ahead.is_some();
         survey.vertices = counts[0] as u64;
@@ -147,9 +151,9 @@ impl Survey {
         Ok(survey)
     }
 
-    /// The file's lines for tobj.
+    /// Returns the file's lines for tobj.
     pub fn feed<'a>(&self, text: &'a str) -> Feed<'a> {
-        // tobj ends a part of the mesh at each `usemtl`, with what it has read so far.
+        // tobj ends a part of the mesh at each `usemtl`, with the statements it has read so far.
         let (rest, again) = (text, self.ahead.then_some(text));
         let kinds = if self.ahead { Kinds::Values } else { Kinds::All };
         Feed {
@@ -164,7 +168,7 @@ impl Survey {
     }
 }
 
-/// The place of the first texture coordinates that are not finite in 32 bits.
+/// Returns the place of the first texture coordinates that are not finite in 32 bits.
 pub(super) fn place_of_wide_uv(text: &str) -> String {
     let is_wide = |word: &str| word.parse::<f64>().is_ok_and(|value| !(value as f32).is_finite());
     let has_wide = |line: &str| {
@@ -184,7 +188,8 @@ fn wrong(index: i64, kind: usize, count: i64) -> String {
     )
 }
 
-/// What a feed serves: positions, texture coordinates and normals, or what refers to them.
+/// The statements that a feed passes on: values (positions, texture coordinates and normals),
+/// statements that refer to them, or all.
 #[derive(PartialEq)]
 enum Kinds {
     All,
@@ -192,11 +197,11 @@ enum Kinds {
     References,
 }
 
-/// Serves the statements that matter, one at a time, and counts lines. Where faces stand before what they refer to, all of that
-/// comes first.
+/// Passes the relevant statements to tobj, one at a time, and counts lines. If faces come before
+/// what they refer to, it passes all values first.
 pub(super) struct Feed<'a> {
     rest: &'a str,
-    /// The text where it is served twice.
+    /// The text, if it is passed twice.
     again: Option<&'a str>,
     kinds: Kinds,
     line: usize,
@@ -206,13 +211,13 @@ pub(super) struct Feed<'a> {
 }
 
 impl<'a> Feed<'a> {
-    /// The line that was served last, from 1.
+    /// Returns the number of the last line passed on, from 1.
     pub fn line(&self) -> usize {
         self.line
     }
 
-    /// The part of a line that tobj is given: without values that not all vertices have. Groups (`g`, `o`) are left
-    /// out because tobj would split vertices between them.
+    /// Returns the part of a line that tobj gets: without values that not all vertices have. Groups
+    /// (`g`, `o`) are left out because tobj would split vertices between them.
     fn useful(&self, line: &'a str) -> &'a str {
         let keep = |words: usize| first_words(line, words + 1);
         let word = line.split_whitespace().next();
@@ -231,7 +236,7 @@ impl<'a> Feed<'a> {
     }
 }
 
-/// The start of a line, up to the end of its `count`-th word.
+/// Returns the start of a line, up to the end of its `count`-th word.
 fn first_words(line: &str, count: usize) -> &str {
     let mut inside = false;
     let mut seen = 0;
@@ -275,7 +280,7 @@ impl BufRead for Feed<'_> {
         self.current = self.current.get(amount..).unwrap_or(&[]);
     }
 
-    // The served lines have lost their line ends, so each is one whole line here.
+    // The lines passed on have no line ends, so each is one whole line here.
     #[expect(clippy::disallowed_methods, reason = "the text is a copy of the file's")]
     fn read_line(&mut self, out: &mut String) -> std::io::Result<usize> {
         let line = std::str::from_utf8(self.fill_buf()?).unwrap_or("");

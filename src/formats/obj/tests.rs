@@ -38,7 +38,8 @@ fn concave_polygons_cover_themselves_only() {
     let l =
         ([[2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0], [0.0, 0.0]].as_slice(), 3.0);
     let dart = ([[0.0, 0.0], [2.0, 1.0], [0.0, 2.0], [0.5, 1.0]].as_slice(), 1.5);
-    // With a normal, vertices are split; with a triangle beside it (of no area), a model has faces of many kinds.
+    // With a normal, vertices are split. With an extra triangle (of zero area), a model has faces
+    // with different numbers of corners.
     for ((outline, area), normal, beside, far) in [
         (l, "", "", 0.0),
         (l, "//1", "", 0.0),
@@ -113,7 +114,7 @@ fn normals_split_vertices_and_partial_ones_are_left_out() {
     assert_eq!((mesh.positions.len(), mesh.normals.len()), (4, 0));
 }
 
-/// tobj ends a part of the mesh at each material, with the normals that it has read so far.
+/// tobj ends a part of the mesh at each material, with the normals it has read so far.
 #[test]
 fn faces_may_stand_before_what_they_refer_to() {
     let faces = ["f 1//1 2//1 3//1\n", "usemtl other\nf 1//2 3//2 4//2\n"];
@@ -124,15 +125,18 @@ fn faces_may_stand_before_what_they_refer_to() {
     assert_eq!((ahead.triangles, ahead.normals.len()), (behind.triangles, 6));
     let error =
         load(format!("{}{positions}vn 0 0 1\nf -4 -3 -1\n", faces[0])).unwrap_err().to_string();
-    assert!(error.contains("line 1: a face refers to vertex 1, which stands behind it"), "{error}");
+    assert!(error.contains("line 1: a face refers to vertex 1, which comes after it"), "{error}");
 }
 
 #[test]
 fn materials_and_pictures() {
     let folder = Folder::new();
     folder.write("t.png", png(2, 1, &[[255, 0, 0, 255], [0, 255, 0, 255]]));
-    folder
-        .write("a b.mtl", "newmtl red\nKd 1 0 0\nd 0.5\n\nnewmtl tex\n\tKd 1 1 1\n\tmap_Kd -s 1 1 1 -clamp on t.png\n");
+    folder.write(
+        "a b.mtl",
+        "newmtl red\nKd 1 0 0\nd 0.5\n\nnewmtl tex\n\tKd 1 1 1\n\tmap_Kd -s 1 1 \
+                           1 -clamp on t.png\n",
+    );
     let obj = "mtllib a b.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n\
         usemtl red\nf 1 2 3\nusemtl tex\nf 1/1 3/3 4/2\nusemtl unknown\nf 1 2 4\n";
     let mesh = load_mesh(&folder.write("a.obj", obj), &Limits::default()).expect("loads");
@@ -154,7 +158,7 @@ fn materials_and_pictures() {
     ));
 }
 
-/// `d` alone is of the format; `Tr` has two meanings.
+/// Only `d` is part of the format; `Tr` has two meanings.
 #[test]
 fn opacities_of_materials() {
     let folder = Folder::new();
@@ -227,7 +231,7 @@ fn broken_statements_are_errors_with_their_line() {
         (SQUARE.replace("3 4", "3 9223372036854775807"), "line 5"),
         (SQUARE.replace("3 4", "3 4/1"), "texture coordinate 1"),
         (SQUARE.replace("3 4", "3 4//1"), "normal 1"),
-        (SQUARE.replace("3 4", "3 4/a"), "no corner"),
+        (SQUARE.replace("3 4", "3 4/a"), "not a face corner"),
         (SQUARE.replace("3 4", "3 4/1/1/1"), "line 5"),
         (String::new(), "no vertices"),
         ("{}".into(), "no vertices"),
@@ -249,7 +253,8 @@ fn a_cut_file_never_panics() {
 #[test]
 fn large_coordinates_keep_their_precision() {
     let mesh = load(
-        "v 4500000.125 5600000.25 1\nv 4500001.125 5600000.25 1\nv 4500000.125 5600001.5 1\nf 1 2 3\n",
+        "v 4500000.125 5600000.25 1\nv 4500001.125 5600000.25 1\nv 4500000.125 5600001.5 1\nf 1 2 \
+         3\n",
     );
     let mesh = mesh.expect("loads");
     assert_eq!(
@@ -258,7 +263,8 @@ fn large_coordinates_keep_their_precision() {
     );
 }
 
-/// Coordinates in a picture that are none, or that 32 bits do not hold; elsewhere nobody asks for them.
+/// Texture coordinates that are not numbers, or do not fit in 32 bits, matter only if there is a
+/// picture.
 #[test]
 fn texture_coordinates_are_finite() {
     let folder = Folder::new();
@@ -266,7 +272,8 @@ fn texture_coordinates_are_finite() {
     folder.write("m.mtl", "newmtl a\nmap_Kd t.png\nnewmtl b\n");
     let obj = |uv: &str, material: &str| {
         let text = format!(
-            "mtllib m.mtl\nusemtl {material}\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt {uv}\nvt 1 1\nf 1/1 2/2 3/3\n"
+            "mtllib m.mtl\nusemtl {material}\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt {uv}\nvt 1 1\n\
+             f 1/1 2/2 3/3\n"
         );
         load_mesh(&folder.write("a.obj", text), &Limits::default())
     };

@@ -1,4 +1,4 @@
-//! The header of a PCD file: lines of text, of which `DATA` is the last.
+//! The header of a PCD file: lines of text. The last one is `DATA`.
 
 use crate::{
     Result,
@@ -6,20 +6,20 @@ use crate::{
 };
 use glam::DVec3;
 
-/// What the header says.
+/// The contents of the header.
 pub struct Header {
     pub fields: Vec<Field>,
     pub points: u64,
-    /// Rows of points, 1 where they are in no order.
+    /// Rows of points; 1 if the points are unordered.
     pub height: u64,
     pub viewpoint: Option<DVec3>,
     pub data: Data,
-    /// Where the header ends, in bytes and lines.
+    /// Where the header ends, in bytes and in lines.
     pub end: usize,
     pub lines: usize,
 }
 
-/// How the points are written.
+/// How the points are stored.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Data {
     Text,
@@ -31,9 +31,9 @@ pub enum Data {
 pub struct Field {
     pub name: String,
     pub kind: NumberKind,
-    /// Bytes of one number.
+    /// Bytes per number.
     pub size: usize,
-    /// Numbers of one point.
+    /// Numbers per point.
     pub count: usize,
     /// Where it begins in a point, in bytes and in words of text.
     pub offset: usize,
@@ -41,13 +41,13 @@ pub struct Field {
 }
 
 impl Field {
-    /// Bytes that it takes of a point.
+    /// Returns its bytes per point.
     pub fn bytes(&self) -> usize {
         self.size * self.count
     }
 }
 
-/// A type of numbers.
+/// A number type.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NumberKind {
     Signed,
@@ -60,7 +60,7 @@ impl NumberKind {
         self == Self::Float
     }
 
-    /// The number in these bytes, lowest first: 1, 2, 4 or 8 of them.
+    /// Returns the number in these bytes, lowest first. There may be 1, 2, 4 or 8 bytes.
     pub fn number(self, bytes: &[u8]) -> f64 {
         let mut wide = [0; 8];
         wide[..bytes.len()].copy_from_slice(bytes);
@@ -76,10 +76,10 @@ impl NumberKind {
     }
 }
 
-/// The fields and numbers of a point that a header may claim.
+/// Maximum number of fields, and of numbers per point, that a header may claim.
 const MOST_FIELDS: usize = 1 << 16;
 
-/// No header of a real file comes near this many bytes.
+/// Headers of real files are far shorter than this, in bytes.
 const LONGEST: usize = 1 << 20;
 
 pub fn read(source: &Source) -> Result<Header> {
@@ -106,7 +106,7 @@ pub fn read(source: &Source) -> Result<Header> {
         let Some(name) = parts.next().filter(|name| !name.starts_with('#')) else { continue };
         let Some(entry) = ENTRIES.iter().position(|entry| *entry == name) else {
             let shown: String = name.chars().take(40).collect();
-            return Err(source.error(place(), format!("“{shown}” is no entry of a PCD header")));
+            return Err(source.error(place(), format!("“{shown}” is not an entry of a PCD header")));
         };
         words[entry] = parts.map(str::to_owned).collect();
         if entry == DATA {
@@ -156,7 +156,7 @@ fn finish(
         ["ascii"] => Data::Text,
         ["binary"] => Data::Binary,
         ["binary_compressed"] => Data::Packed,
-        _ => return Err(wrong(DATA, "is none of ascii, binary and binary_compressed")),
+        _ => return Err(wrong(DATA, "is not ascii, binary or binary_compressed")),
     };
     let (width, height) = (number(WIDTH)?, number(HEIGHT)?);
     let product = width.map(|width| width.saturating_mul(height.unwrap_or(1)));
@@ -164,7 +164,7 @@ fn finish(
         (Some(points), Some(product)) if points != product => {
             return Err(source.error(
                 "header",
-                format!("claims {points} points, but {product} in rows and columns"),
+                format!("“POINTS” claims {points} points, but “WIDTH” × “HEIGHT” is {product}"),
             ));
         }
         (points, product) => points.or(product).ok_or_else(|| wrong(POINTS, "is missing"))?,
@@ -182,7 +182,7 @@ fn finish(
             "F" => NumberKind::Float,
             "U" => NumberKind::Unsigned,
             "I" => NumberKind::Signed,
-            _ => return Err(wrong(TYPE, "has a type that is none of F, U and I")),
+            _ => return Err(wrong(TYPE, "has a type other than F, U and I")),
         };
         let size = match (words[SIZE][index].as_str(), kind) {
             ("4", _) => 4,
@@ -195,7 +195,7 @@ fn finish(
         let fits =
             |count: &usize| word.checked_add(*count).is_some_and(|words| words <= MOST_FIELDS);
         let count = count.filter(|count| fits(count) && index < MOST_FIELDS);
-        let count = count.ok_or_else(|| wrong(COUNT, "has what is no count of numbers"))?;
+        let count = count.ok_or_else(|| wrong(COUNT, "has an invalid count"))?;
         if count > 0 {
             fields.push(Field { name: name.clone(), kind, size, count, offset, word });
         }

@@ -1,6 +1,7 @@
-//! Unpacking of LZF, the byte code of Lehmann's liblzf: runs of bytes, and copies of what came before.
+//! Unpacks LZF, the byte code of Lehmann's liblzf: literal bytes, and copies of earlier output.
 
-/// Unpacks to `size` bytes exactly. What is wrong is told with the place in `packed`. Memory grows with what is unpacked.
+/// Unpacks to exactly `size` bytes. Errors come with their offset in `packed`. Memory grows with
+/// the unpacked bytes.
 pub fn unpack(packed: &[u8], size: usize) -> Result<Vec<u8>, (usize, String)> {
     let mut out = Vec::new();
     let mut at = 0;
@@ -20,14 +21,15 @@ pub fn unpack(packed: &[u8], size: usize) -> Result<Vec<u8>, (usize, String)> {
             out.extend_from_slice(run);
             at += length;
         } else {
-            // Three bits of length, of which 7 says that a byte more follows, and 13 of distance.
+            // Three bits of length, where 7 means that one more byte of length follows, and 13 bits
+            // of distance.
             let length = 2 + if control >> 5 == 7 { 7 + next()? } else { control >> 5 };
             let distance = ((control & 31) << 8) + next()? + 1;
             let from = out
                 .len()
                 .checked_sub(distance)
-                .ok_or((start, "refer to before their start".to_owned()))?;
-            // A copy may reach into what it writes.
+                .ok_or((start, "refer to bytes before their start".to_owned()))?;
+            // A copy may overlap its own output.
             (from..from + length).for_each(|index| out.push(out[index]));
         }
         at += 1;
@@ -52,7 +54,7 @@ mod tests {
     fn runs_and_copies() {
         assert_eq!(unpack(&[], 0).unwrap(), b"");
         assert_eq!(unpack(&[2, b'a', b'b', b'c'], 3).unwrap(), b"abc");
-        // A copy of 3 from 3 before; one of 9 + 4 from 1 before.
+        // A copy of 3 bytes from 3 bytes back; one of 9 + 4 bytes from 1 byte back.
         assert_eq!(unpack(&[2, b'a', b'b', b'c', 1 << 5, 2], 6).unwrap(), b"abcabc");
         assert_eq!(unpack(&[0, b'a', 7 << 5, 4, 0], 14).unwrap(), [b'a'; 14]);
     }

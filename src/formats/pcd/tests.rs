@@ -4,10 +4,12 @@ use crate::{
     input::{Limits, testing::*},
 };
 
-const HEADER: &str = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z _ rgb normal_x normal_y normal_z\n\
-    SIZE 4 4 8 1 4 4 4 4\nTYPE F F F U U F F F\nCOUNT 1 1 1 3 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 1 2 9 1 0 0 0\nPOINTS 2\n";
+const HEADER: &str = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z _ rgb \
+                      normal_x normal_y normal_z\nSIZE 4 4 8 1 4 4 4 4\nTYPE F F F U U F F F\n\
+                      COUNT 1 1 1 3 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 1 2 9 1 0 0 0\nPOINTS 2\n\
+                      ";
 
-/// The two points by fields.
+/// The two points, field by field.
 fn columns() -> [Vec<Vec<u8>>; 8] {
     let floats = |values: [f32; 2]| values.map(|v| v.to_le_bytes().to_vec()).to_vec();
     [
@@ -32,7 +34,7 @@ fn binary() -> Vec<u8> {
     [format!("{HEADER}DATA binary\n").into_bytes(), rows.collect()].concat()
 }
 
-/// All in runs of bytes, as a packer may do.
+/// Everything as literal bytes, as a packer may write it.
 fn packed() -> Vec<u8> {
     let bytes: Vec<u8> = columns().into_iter().flatten().flatten().collect();
     let runs: Vec<u8> =
@@ -62,7 +64,8 @@ fn all_three_encodings_say_the_same() {
 
 #[test]
 fn what_is_missing_and_what_is_unusual() {
-    let plain = "FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\nWIDTH 2\nHEIGHT 2\nVIEWPOINT 0 0 0 1 0 0 0\nDATA ascii\n";
+    let plain = "FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\nWIDTH 2\nHEIGHT 2\nVIEWPOINT 0 0 0 \
+                 1 0 0 0\nDATA ascii\n";
     let color = f32::from_bits(0x00ff_8001);
     let mesh =
         load(format!("{plain}nan nan nan 0\n1 2 3 {color:e}\n4 5 6 0\nnan 1 2 0\n")).unwrap();
@@ -76,27 +79,27 @@ fn what_is_missing_and_what_is_unusual() {
 #[test]
 fn cuts_and_lies_are_errors() {
     let folder = Folder::new();
-    // A text may end without its last line break, and within its last number.
+    // A text may end without its last line break, or within its last number.
     every_cut(&folder, "a.pcd", &text()[..text().len() - 1], read);
     every_cut(&folder, "a.pcd", &binary(), read);
     every_cut(&folder, "a.pcd", &packed(), read);
     let header = |from: &str, to: &str| String::from_utf8(text()).unwrap().replace(from, to);
     for (content, word) in [
-        (header("POINTS 2", "POINTS 3"), "claims 3 points, but 2 in rows and columns"),
+        (header("POINTS 2", "POINTS 3"), "claims 3 points, but “WIDTH” × “HEIGHT” is 2"),
         (
             header("WIDTH 2\nHEIGHT 1\nVIEWPOINT 1 2 9 1 0 0 0\nPOINTS 2", "POINTS 3"),
-            "holds 2 points where the header claims 3",
+            "has 2 points, but the header claims 3",
         ),
         (header("FIELDS x", "FIELDS w"), "no fields “x”"),
         (header("SIZE 4", "SIZE 3"), "“SIZE 3 4 8 1 4 4 4 4” has a size"),
         (header("SIZE 4 4", "SIZE 4"), "does not fit the 8 fields"),
-        (header("TYPE F F", "TYPE F G"), "none of F, U and I"),
-        (header("COUNT 1 1 1 3", "COUNT 1 1 1 99999999999"), "no count of numbers"),
+        (header("TYPE F F", "TYPE F G"), "other than F, U and I"),
+        (header("COUNT 1 1 1 3", "COUNT 1 1 1 99999999999"), "an invalid count"),
         (
             header("COUNT 1 1 1 3", "COUNT 1 1 1 4"),
             "line 12: has 10 numbers where the fields need 11",
         ),
-        (header("DATA ascii", "DATA zipped"), "none of ascii"),
+        (header("DATA ascii", "DATA zipped"), "is not ascii"),
         (header("VERSION", "VERSIONS"), "line 2: “VERSIONS” is no entry"),
         (header("4.0 5", "4.0 five"), "line 14: “five” is not a number"),
         (header("1 2 3 7", "inf 2 3 7").replace("4.0", "nan"), "no points"),

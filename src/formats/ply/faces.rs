@@ -1,4 +1,4 @@
-//! The triangles of an element “face” or “tristrips”, and the texture coordinates that faces have for their corners.
+//! The triangles of an element “face” or “tristrips”, and the texture coordinates of their corners.
 
 use super::{
     CHUNK,
@@ -16,33 +16,33 @@ use ply_rs::ply::{PropertyType, ScalarType};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// Stands for −1, which separates strips.
+/// Represents −1, which separates strips.
 const MARK: u32 = u32::MAX;
 
-/// Bytes that a corner takes while a polygon of more corners than few is cut.
+/// Bytes per corner while a polygon is cut; polygons with up to `FEW` corners are not counted.
 const OF_CORNER: u64 = 128;
 const FEW: usize = 1024;
 
-/// What the faces of a file are.
+/// The faces of a file.
 #[derive(Default)]
 pub(super) struct Faces {
     pub triangles: Vec<[u32; 3]>,
-    /// Texture coordinates of the triangles' corners, as the file has them; none where it has none.
+    /// Texture coordinates of the triangles' corners, as in the file; empty if the file has none.
     uvs: Vec<[Vec2; 3]>,
-    /// Which picture each triangle with such coordinates shows.
+    /// The picture of each triangle that has texture coordinates.
     pictures: Vec<u32>,
 }
 
-/// The columns of a face that mean something here.
+/// The columns of a face that are read.
 struct Columns {
     indices: usize,
-    /// A list with u and v of each corner, and the number of the picture, as MeshLab writes them.
+    /// A list with u and v of each corner, and the index of the picture, as MeshLab writes them.
     uvs: Option<usize>,
     picture: Option<usize>,
 }
 
-/// Reads an element's faces; `positions` are those of the vertices, `pictures` how many pictures corners may have coordinates
-/// in.
+/// Reads an element's faces. `positions` are those of the vertices; `pictures` is the number of
+/// pictures that corners may have coordinates in.
 pub(super) fn read(
     source: &Source,
     element: &Element,
@@ -60,7 +60,7 @@ pub(super) fn read(
             format!("the element “{}” has no list “vertex_indices”", element.name),
         ));
     };
-    // Once as they are found, once in their place.
+    // Once as they are read, once in their final list.
     if let Rows::Fixed { .. } = rows {
         source.room::<[[u32; 3]; 2]>("the triangles", element.count)?;
     }
@@ -104,7 +104,7 @@ fn read_rows(
     let mut uvs = Growing::new(source, "the texture coordinates");
     let mut shown = Growing::new(source, "the pictures of the triangles");
     let (mut corners, mut own_uvs, mut picture) = (Vec::<u32>::new(), Vec::<f64>::new(), 0.0);
-    // The corners of a face by their places in its list.
+    // The corners of a face, by their index in its list.
     let mut order = Vec::new();
     for row in range {
         let mut stray = None;
@@ -137,7 +137,7 @@ fn read_rows(
         if corners.len() > FEW {
             source.spend("the size of a polygon in bytes", OF_CORNER * corners.len() as u64)?;
         }
-        // Faces without coordinates stand among those that have some.
+        // Faces without coordinates may occur among faces that have them.
         let has_uvs = columns.uvs.is_some() && !own_uvs.is_empty();
         if has_uvs && own_uvs.len() != 2 * corners.len() {
             let (found, corners) = (own_uvs.len(), corners.len());
@@ -180,8 +180,8 @@ fn read_rows(
     })
 }
 
-/// The common case: binary rows of one list of three 32-bit indices. `None` where it is another, or an index is wrong
-/// (the general way then finds the row).
+/// The common case: binary rows with one list of three 32-bit indices. Returns `None` in other
+/// cases and if an index is out of range; the general path then finds the row.
 fn read_triangles(
     element: &Element,
     rows: &Rows,
@@ -232,20 +232,20 @@ fn strips(list: &[u32], triangles: &mut Growing<[u32; 3]>) -> Result<()> {
 }
 
 impl Faces {
-    /// Adds those of another element.
+    /// Adds the faces of another element.
     pub fn append(&mut self, mut other: Self) {
         self.triangles.append(&mut other.triangles);
         self.uvs.append(&mut other.uvs);
         self.pictures.append(&mut other.pictures);
     }
 
-    /// Whether all triangles have texture coordinates of their corners.
+    /// Returns whether all triangles have texture coordinates at their corners.
     pub fn have_uvs(&self) -> bool {
         !self.uvs.is_empty() && self.uvs.len() == self.triangles.len()
     }
 
-    /// Gives the triangles to a mesh of vertices. Where corners of one vertex have several texture coordinates, it becomes
-    /// several vertices.
+    /// Moves the triangles into a mesh of vertices. A vertex whose corners have different texture
+    /// coordinates becomes several vertices.
     pub fn give(mut self, source: &Source, mesh: &mut Mesh) -> Result<()> {
         if self.have_uvs() {
             let mut own: Vec<Option<Vec2>> = Vec::new();
@@ -262,18 +262,18 @@ impl Faces {
                     let count = own.len() as u32;
                     let other = *others.entry((*index, bits)).or_insert(count);
                     if other == count {
-                        source.spend("the vertices of seams in bytes", 128)?;
+                        source.spend("the size of the vertices at seams in bytes", 128)?;
                         own.push(Some(uv));
                         copy(mesh, *index as usize);
                         source.check_points(
-                            "the number of vertices with those of seams",
+                            "the number of vertices including those at seams",
                             own.len() as u64,
                         )?;
                     }
                     *index = other;
                 }
             }
-            // PLY counts v from the bottom of the picture.
+            // In PLY, v = 0 is the bottom of the picture.
             mesh.uvs = own
                 .iter()
                 .map(|uv| uv.unwrap_or_default())
@@ -286,7 +286,7 @@ impl Faces {
     }
 }
 
-/// Adds a vertex once more.
+/// Adds a copy of a vertex.
 fn copy(mesh: &mut Mesh, vertex: usize) {
     mesh.positions.push(mesh.positions[vertex]);
     if let Some(&normal) = mesh.normals.get(vertex) {

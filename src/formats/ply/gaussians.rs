@@ -1,6 +1,6 @@
-//! Writing splats as the PLY of 3D Gaussian scenes (Kerbl et al. 2023), which many viewers open: binary, little-endian, one
-//! vertex each with place, normal, colour as the constant spherical harmonic, opacity, logarithms of the standard
-//! deviations, and a quaternion.
+//! Writes splats as the PLY of 3D Gaussian scenes (Kerbl et al. 2023), which many viewers open. The
+//! file is binary and little-endian. Each vertex has position, normal, colour as the constant
+//! spherical harmonic, opacity, logarithms of the standard deviations, and a quaternion.
 
 use super::header::Element;
 use crate::{
@@ -20,11 +20,12 @@ const PROPERTIES: [&str; 17] = [
     "scale_2", "rot_0", "rot_1", "rot_2", "rot_3",
 ];
 
-/// Writes splats as 3D Gaussians, in world coordinates of 32 bits; beyond that, their shading and the extent of their
-/// footprints are lost.
+/// Writes splats as 3D Gaussians, in 32-bit world coordinates. Apart from that precision, their
+/// shading and the extent of their footprints are lost.
 ///
 /// # Errors
-/// [`Error::Argument`] for scalar splats, which have no colours; [`Error::Output`] where the file cannot be written.
+/// [`Error::Argument`] for scalar splats, which have no colours; [`Error::Output`] if the file
+/// cannot be written.
 pub fn write_gaussians(set: &SplatSet, path: &Path) -> Result<()> {
     if set.payload != Payload::Radiance {
         return Err(Error::Argument(
@@ -43,27 +44,29 @@ pub fn write_gaussians(set: &SplatSet, path: &Path) -> Result<()> {
     })
 }
 
-/// Whether a vertex has what trainers of 3D Gaussian scenes write.
+/// Returns whether a vertex has the properties that trainers of 3D Gaussian scenes write.
 pub(super) fn are_gaussians(element: &Element) -> bool {
     ["f_dc_0", "opacity", "scale_0", "rot_0"].iter().all(|name| element.column(&[name]).is_some())
 }
 
-/// Warns of a file of 3D Gaussians: what a reader of points makes of them does not look like the scene.
+/// Warns that a file contains 3D Gaussians: read as points, they do not look like the scene.
 pub(in super::super) fn warn(source: &Source) {
     tracing::warn!(
-        "{}: holds trained 3D Gaussians, whose shapes and colours are not read yet; their centres are drawn as points",
+        "{}: contains trained 3D Gaussians, whose shapes and colours are not read yet; their \
+         centres are drawn as points",
         source.path.display()
     );
 }
 
-/// The numbers of one splat, in the order of [`PROPERTIES`].
+/// Returns the numbers of one splat, in the order of [`PROPERTIES`].
 fn gaussian(splat: &Splat, origin: DVec3) -> [f64; PROPERTIES.len()] {
     let center = origin + DVec3::from(splat.center.map(f64::from));
     let normal = decode_normal(splat.normal).unwrap_or_default().as_dvec3();
     let color =
         [0, 8, 16].map(|shift| (f64::from(splat.color >> shift & 255) / 255.0 - 0.5) / HARMONIC);
     let depth = f64::from(splat.strength) * f64::from(splat.color >> 24) / 255.0;
-    // The logit of 1 − e^−depth is the logarithm of e^depth − 1; where this is none, all but 0 or 1.
+    // The logit of 1 − e^−depth is the logarithm of e^depth − 1. If that is not finite, the clamp
+    // makes the opacity almost 0 or 1.
     let opacity = depth.exp_m1().ln().clamp(-16.0, 16.0);
     let [b00, b10, b11, b20, b21, b22] = splat.factor.map(f64::from);
     let b = DMat3::from_cols(

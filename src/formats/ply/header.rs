@@ -1,8 +1,9 @@
 //! The PLY header: elements, their columns and where the payload begins.
 //!
-//! The grammar and the types are ply-rs's. It refuses some headers that real files have (Latin-1 in a comment, a
-//! property named `scalar.x`) and merges properties of one name, so it is given a cleaned copy with the same lines
-//! but plain, unique names, and the names are put back afterwards.
+//! ply-rs parses the grammar and the types. It refuses some headers of real files (Latin-1 in a
+//! comment, a property named `scalar.x`) and merges properties with the same name. So it gets a
+//! cleaned copy with the same lines but plain, unique names. The original names are restored
+//! afterwards.
 
 use crate::{
     Result,
@@ -13,14 +14,14 @@ use ply_rs::{
     ply::{DefaultElement, Encoding, PropertyType, ScalarType},
 };
 
-/// No header of a real file comes near this many bytes or columns.
+/// Headers of real files have far fewer bytes and columns than this.
 const LONGEST: usize = 1 << 20;
 const MOST_COLUMNS: usize = 4096;
 
 pub(super) struct Header {
     pub encoding: Encoding,
     pub elements: Vec<Element>,
-    /// The pictures that lines `comment TextureFile` name.
+    /// The pictures that `comment TextureFile` lines name.
     pub textures: Vec<String>,
     /// Offset of the first byte after the header.
     pub payload: usize,
@@ -38,12 +39,12 @@ pub(super) struct Column {
 }
 
 impl Element {
-    /// Bytes of a row, where no column is a list.
+    /// Returns the bytes per row; `None` if a column is a list.
     pub fn stride(&self) -> Option<usize> {
         self.columns.iter().map(|column| column.width()).sum()
     }
 
-    /// Bytes that a binary row has at least: lists may be empty.
+    /// Returns the minimum bytes of a binary row: lists may be empty.
     pub fn least_bytes(&self) -> usize {
         let least = |column: &Column| match &column.kind {
             PropertyType::Scalar(kind) | PropertyType::List(kind, _) => width(kind),
@@ -57,7 +58,7 @@ impl Element {
 }
 
 impl Column {
-    /// Bytes of a scalar; `None` for a list.
+    /// Returns the bytes of a scalar; `None` for a list.
     pub fn width(&self) -> Option<usize> {
         match &self.kind {
             PropertyType::Scalar(scalar) => Some(width(scalar)),
@@ -66,7 +67,7 @@ impl Column {
     }
 }
 
-/// Bytes of one scalar.
+/// Returns the bytes of one scalar.
 pub(super) fn width(scalar: &ScalarType) -> usize {
     match scalar {
         ScalarType::Char | ScalarType::UChar => 1,
@@ -91,13 +92,13 @@ pub(super) fn read(source: &Source) -> Result<Header> {
         let Some(end) = window.iter().position(|b| matches!(b, b'\n' | b'\r')) else {
             if window.len() < rest.len() {
                 let message = format!(
-                    "the header is longer than {LONGEST} bytes, with no line “end_header” in them"
+                    "the header is longer than {LONGEST} bytes and has no “end_header” line"
                 );
                 return Err(source.error(place(), message));
             }
             return Err(source.error(
                 place(),
-                "the header has no “end_header” line; the file is cut or is no PLY",
+                "the header has no “end_header” line; the file is cut off or is not PLY",
             ));
         };
         let line = copy::lossy(&rest[..end]);
@@ -115,7 +116,7 @@ pub(super) fn read(source: &Source) -> Result<Header> {
             ["element", name, count] => {
                 if count.parse::<usize>().is_err() {
                     let shown: String = count.chars().take(40).collect();
-                    return Err(source.error(place(), format!("“{shown}” is no count of rows")));
+                    return Err(source.error(place(), format!("“{shown}” is not a row count")));
                 }
                 clean.push_str(&format!("element e{} {count}\n", names.len()));
                 names.push(((*name).to_owned(), Vec::new()));
@@ -125,7 +126,7 @@ pub(super) fn read(source: &Source) -> Result<Header> {
                 let Some((_, properties)) = names.last_mut() else {
                     return Err(source.error(
                         place(),
-                        format!("the property “{name}” stands before any element"),
+                        format!("the property “{name}” comes before any element"),
                     ));
                 };
                 clean.push_str(&format!("property {} p{}\n", kind.join(" "), properties.len()));

@@ -1,4 +1,5 @@
-//! Binary PLY files in pieces: vertices of a fixed stride, and faces of three corners each.
+//! Reads binary PLY files in pieces: vertices with a fixed stride, and faces with three corners
+//! each.
 
 use super::{
     super::stream::Found,
@@ -14,10 +15,10 @@ use glam::{DVec3, Vec3};
 use ply_rs::ply::{Encoding, PropertyType, ScalarType};
 use std::ops::Range;
 
-/// Rows of a piece.
+/// Rows per piece.
 const ROWS: usize = 1 << 16;
 
-/// Where everything is in a file.
+/// Where the vertices and faces are in a file.
 pub struct Pieces {
     vertices: Vertices,
     faces: Option<Faces>,
@@ -28,7 +29,7 @@ pub struct Pieces {
     pub are_gaussians: bool,
 }
 
-/// Rows that are all of one length.
+/// Rows of equal length.
 struct Rows {
     at: usize,
     count: usize,
@@ -45,15 +46,15 @@ struct Vertices {
 
 struct Faces {
     rows: Rows,
-    /// Where the number of corners is in a row.
+    /// Offset of the number of corners in a row, and its type.
     length: (usize, ScalarType),
-    /// Where the first of the three indices is.
+    /// Offset of the first of the three indices.
     indices: usize,
 }
 
 impl Pieces {
-    /// Finds the rows by the header and by some faces. None for text, polygons and strips, textures, and what the reader
-    /// refuses.
+    /// Locates the rows by the header and a sample of the faces. Returns `None` for text, polygons,
+    /// strips and textures, and for files that the reader refuses.
     pub fn find(source: &Source) -> Result<Option<Self>> {
         let header = header::read(source)?;
         let big = match header.encoding {
@@ -119,17 +120,18 @@ impl Pieces {
         Ok(Some(Self { vertices, faces, has_normals, has_colors, has_uvs, are_gaussians }))
     }
 
-    /// Whether all colours have to be known before any of them is.
+    /// Returns whether the scale of the colours depends on all of them.
     pub fn asks_for_colors(&self) -> bool {
         self.has_colors && self.vertices.color_kind.iter().flatten().any(ColorKind::is_wide)
     }
 
-    /// The values of a vertex's channels of colour; 0 for one that there is not.
+    /// Returns the values of a vertex's colour channels; 0 for a missing channel.
     pub fn channels(&self, source: &Source, row: usize) -> [f64; 4] {
         std::array::from_fn(|channel| self.value(source, row, COLOR + channel))
     }
 
-    /// Tells the largest values of all channels, without which there are no colours.
+    /// Sets the scale of the colours from the largest values of all channels. Without it there are
+    /// no colours.
     pub fn settle_colors(&mut self, largest: [f64; 4]) {
         self.vertices.color_scale = color_scale(&self.vertices.color_kind, largest);
     }
@@ -142,12 +144,12 @@ impl Pieces {
         self.faces.as_ref().map_or(0, |faces| faces.rows.count)
     }
 
-    /// How many pieces there are of the points, and of the triangles.
+    /// Returns the number of pieces of points, and of triangles.
     pub fn pieces(&self) -> [usize; 2] {
         [self.points(), self.triangles()].map(|count| count.div_ceil(ROWS))
     }
 
-    /// The rows of a piece of the points.
+    /// Returns the rows of a piece of points.
     pub fn rows(&self, piece: usize) -> Range<usize> {
         piece * ROWS..((piece + 1) * ROWS).min(self.points())
     }
@@ -162,14 +164,14 @@ impl Pieces {
         DVec3::from_array([0, 1, 2].map(|axis| self.value(source, row, POSITION + axis)))
     }
 
-    /// The error of a vertex whose position is not finite.
+    /// Returns the error for a vertex whose position is not finite.
     pub fn not_finite(&self, source: &Source, row: usize) -> Error {
         let byte = self.vertices.rows.at + row * self.vertices.rows.stride;
         let place = format!("element “vertex”, row {row}, byte {byte}");
         positions::not_finite(source, place, self.position(source, row))
     }
 
-    /// A vertex as the reader has it.
+    /// Returns a vertex, converted as by the reader of whole files.
     pub fn vertex(&self, source: &Source, row: usize) -> Found {
         let value = |role: usize| self.value(source, row, role);
         let mut found = Found {
@@ -189,7 +191,7 @@ impl Pieces {
         found
     }
 
-    /// The triangles of a piece, and the number of the first one.
+    /// Returns the triangles of a piece, and the index of the first one.
     ///
     /// # Errors
     /// [`Error::Input`] for a polygon, and for an index without a vertex.
@@ -206,7 +208,7 @@ impl Pieces {
             let corners = number(&bytes[faces.length.0..], &faces.length.1, big);
             if corners != 3.0 {
                 return wrong(format!(
-                    "has {corners} corners; in pieces only triangles can be read"
+                    "has {corners} corners; only triangles can be read in pieces"
                 ));
             }
             let corners = [0, 4, 8].map(|corner| {
@@ -224,7 +226,7 @@ impl Pieces {
 }
 
 impl Faces {
-    /// Faces whose only list is one of indices of 32 bits.
+    /// Locates faces whose only list contains 32-bit indices.
     fn find(element: &Element, rows: Rows) -> Option<Self> {
         let column = element.column(&["vertex_indices", "vertex_index"])?;
         let PropertyType::List(_, ScalarType::Int | ScalarType::UInt) =
@@ -236,7 +238,8 @@ impl Faces {
         Some(Self { rows, length: (offset, kind.clone()), indices: offset + width(kind) })
     }
 
-    /// Whether faces all over the rows have three corners: behind one that has not, no row is where it is looked for.
+    /// Returns whether sampled faces across the whole file have three corners. After a face with
+    /// another number, no row is at its expected offset.
     fn are_triangles(&self, source: &Source) -> bool {
         const LOOKS: usize = 1 << 10;
         let Rows { at, count, stride, big } = self.rows;

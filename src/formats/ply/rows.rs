@@ -1,7 +1,8 @@
-//! The rows of one element, in text or binary, behind one way of asking for their values.
+//! The rows of one element, in text or binary, with one way to read their values.
 //!
-//! ply-rs's own payload readers are not used: they hang on elements without properties, refuse `nan` and blank lines
-//! in text, and build a map per row, many times slower than the plain strides read here.
+//! ply-rs's own payload readers are not used. They hang on elements without properties, refuse
+//! `nan` and blank lines in text, and build a map per row. That is many times slower than the plain
+//! strides read here.
 
 use super::header::{Element, width};
 use crate::{
@@ -11,7 +12,7 @@ use crate::{
 use ply_rs::ply::{Encoding, PropertyType, ScalarType};
 use rayon::prelude::*;
 
-/// A number as the file's type holds it. `bytes` has at least the width of the type.
+/// Returns a number of the file's type. `bytes` has at least the width of the type.
 pub(super) fn number(bytes: &[u8], kind: &ScalarType, big: bool) -> f64 {
     macro_rules! take {
         ($t:ty) => {{
@@ -32,25 +33,26 @@ pub(super) fn number(bytes: &[u8], kind: &ScalarType, big: bool) -> f64 {
     }
 }
 
-/// The rows of an element, found in the file but not yet decoded.
+/// The rows of an element, located in the file but not yet decoded.
 pub(super) enum Rows<'a> {
     /// Every row has the same number of bytes.
     Fixed { data: &'a [u8], stride: usize, big: bool },
-    /// Rows with lists: where each begins.
+    /// Rows with lists, and the offset of each row.
     Loose { data: &'a [u8], starts: Vec<usize>, big: bool },
-    /// One line a row.
+    /// One line per row.
     Text { lines: Vec<&'a [u8]> },
 }
 
-/// Rows that are found between two looks at the clock.
+/// Rows that are located between two checks of the time limit.
 const ROWS: usize = 1 << 16;
 
-/// One value list of a row.
+/// The values of one list in a row.
 pub(super) type List = [f64];
 
 impl<'a> Rows<'a> {
-    /// Finds the rows of the element at `at` and moves `at` behind them. What is allocated is bounded by the bytes
-    /// present: a row of text is a line, a row with a list has a length of at least a byte.
+    /// Locates the rows of the element at `at` and advances `at` past them. The bytes present bound
+    /// what is allocated: a text row is a line, and a row with a list has a length of at least one
+    /// byte.
     pub fn find(
         source: &'a Source,
         element: &Element,
@@ -86,7 +88,7 @@ impl<'a> Rows<'a> {
             }
         }
         let most = element.count.min(rest.len() / element.least_bytes());
-        source.room::<usize>("the places of the rows", most)?;
+        source.room::<usize>("the row offsets", most)?;
         let mut starts = Vec::with_capacity(most);
         let mut next = 0;
         for row in 0..element.count {
@@ -110,9 +112,9 @@ impl<'a> Rows<'a> {
 
     fn find_lines(source: &'a Source, element: &Element, at: &mut usize) -> Result<Self> {
         let bytes = source.bytes();
-        // The last line may end with the file.
+        // The last line may end with the file instead of a line end.
         let most = element.count.min((bytes.len() - *at) / (2 * element.columns.len()) + 1);
-        source.room::<&[u8]>("the places of the lines", most)?;
+        source.room::<&[u8]>("the list of lines", most)?;
         let mut lines = Vec::with_capacity(most);
         let mut longest = 0;
         while lines.len() < element.count {
@@ -129,9 +131,9 @@ impl<'a> Rows<'a> {
             if !line.is_empty() {
                 longest = longest.max(line.len());
                 lines.push(line);
-                // A list of a line may be as long as it, and be read by every thread.
+                // A list may be as long as its line, and every thread may read one.
                 if lines.len() == lines.capacity() && lines.len() < element.count {
-                    source.room::<&[u8]>("the places of the lines", lines.len())?;
+                    source.room::<&[u8]>("the list of lines", lines.len())?;
                 }
             }
         }
@@ -139,7 +141,8 @@ impl<'a> Rows<'a> {
         Ok(Rows::Text { lines })
     }
 
-    /// Calls `visit` for every value of a row in column order: its column, and a number or a list.
+    /// Calls `visit` for every value of a row in column order, with its column and a number or a
+    /// list.
     pub fn visit(
         &self,
         source: &Source,
@@ -182,7 +185,8 @@ impl<'a> Rows<'a> {
                         }
                         PropertyType::List(..) => {
                             let length = next(index, true)?;
-                            // A line cannot hold more values than bytes, so a longer list ends in the error above.
+                            // A line cannot contain more values than bytes, so a longer list ends
+                            // in the error above.
                             if !(length >= 0.0 && length.fract() == 0.0) {
                                 return Err(source.error(
                                     text_place(source, element, row, lines[row]),
@@ -213,7 +217,7 @@ impl<'a> Rows<'a> {
         Ok(())
     }
 
-    /// Where a row stands, for an error.
+    /// Returns the place of a row, for an error.
     pub fn place(&self, source: &Source, element: &Element, row: usize) -> String {
         let start = source.bytes().as_ptr() as usize;
         let byte = match self {
@@ -244,7 +248,7 @@ enum Problem {
     Length(f64),
 }
 
-/// The offset behind a value that begins at `at`.
+/// Returns the offset after a value that begins at `at`.
 fn end_of(data: &[u8], at: usize, kind: &PropertyType, big: bool) -> Result<usize, Problem> {
     let inside = |end: usize| if end <= data.len() { Ok(end) } else { Err(Problem::Cut) };
     match kind {
@@ -263,8 +267,8 @@ fn end_of(data: &[u8], at: usize, kind: &PropertyType, big: bool) -> Result<usiz
     }
 }
 
-/// Visits a binary row. Its bytes were present when rows were counted: where a file changes under the reader and they are not
-/// any more, the row ends, and the reader tells of the change.
+/// Visits a binary row. Its bytes were present when the rows were counted. If the file has shrunk
+/// since, the row ends early, and the reader reports the change.
 fn walk(
     row: &[u8],
     element: &Element,
@@ -305,13 +309,13 @@ fn walk(
     }
 }
 
-/// Bytes of a row whose only list holds three values.
+/// Returns the bytes per row if its only list has three values.
 pub(super) fn triangle_stride(element: &Element) -> Option<usize> {
     let lists = element.columns.iter().filter(|column| column.width().is_none()).count();
     (lists == 1).then(|| place_in_row(element, element.columns.len()))
 }
 
-/// Where a column begins in rows of one length, in which a list holds three values.
+/// Returns the offset of a column in rows of equal length, whose lists have three values.
 pub(super) fn place_in_row(element: &Element, column: usize) -> usize {
     let bytes = |kind: &PropertyType| match kind {
         PropertyType::Scalar(kind) => width(kind),
@@ -320,7 +324,7 @@ pub(super) fn place_in_row(element: &Element, column: usize) -> usize {
     element.columns[..column].iter().map(|before| bytes(&before.kind)).sum()
 }
 
-/// Offset in the row, and type of the length, of an element's first list.
+/// Returns the offset of an element's first list in the row, and the type of its length.
 pub(super) fn list_place(element: &Element) -> (usize, &ScalarType) {
     let mut offset = 0;
     for column in &element.columns {

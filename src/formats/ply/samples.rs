@@ -13,7 +13,7 @@ use glam::DVec3;
 const RADIUS: &str = "radius";
 const COVARIANCE: [&str; 6] = ["cov_xx", "cov_xy", "cov_xz", "cov_yy", "cov_yz", "cov_zz"];
 
-/// Whether a PLY file's header tells of faces.
+/// Returns whether a PLY file's header declares faces.
 ///
 /// # Errors
 /// [`Error::Input`](crate::Error::Input) for a malformed header.
@@ -25,13 +25,14 @@ pub fn has_faces(source: &Source) -> Result<bool> {
         .any(|element| matches!(element.name.as_str(), "face" | "tristrips") && element.count > 0))
 }
 
-/// Reads the vertices as scattered samples: the property that `scalar` names, else the only one that is no position, normal,
-/// colour, texture coordinate or part of a kernel. Kernels: a property `radius`, or `cov_xx`, `cov_xy`, `cov_xz`, `cov_yy`,
-/// `cov_yz` and `cov_zz`.
+/// Reads the vertices as scattered samples. The value is the property that `scalar` names. Without
+/// `scalar`, it is the only property that is not a position, normal, colour, texture coordinate or
+/// part of a kernel. Kernels come from a property `radius`, or from `cov_xx`, `cov_xy`, `cov_xz`,
+/// `cov_yy`, `cov_yz` and `cov_zz`.
 ///
 /// # Errors
-/// As [`read`](super::read); [`Error::Input`](crate::Error::Input) also where the scalar cannot be told, with the names of
-/// those that there are, and for values that are not finite.
+/// As [`read`](super::read). Also [`Error::Input`](crate::Error::Input) if the scalar is ambiguous,
+/// with the available names, and for values that are not finite.
 pub fn read_samples(source: &Source, scalar: Option<&str>) -> Result<Points> {
     let header = header::read(source)?;
     let mut at = header.payload;
@@ -60,7 +61,8 @@ fn of_vertices(
         *at = column(names)
             .ok_or_else(|| source.error(place, format!("has no scalar property “{}”", names[0])))?;
     }
-    // Of a whole group: a lone “t” or “v” is no texture coordinate.
+    // A name belongs to a group only if the group is complete: a lone “t” or “v” is not a texture
+    // coordinate.
     let groups = [POSITION..NORMAL, NORMAL..COLOR, COLOR..UV, UV..ROLES.len()];
     let known = |name: &str| {
         let of_group = groups.iter().cloned().any(|group| {
@@ -74,7 +76,7 @@ fn of_vertices(
         .iter()
         .filter(|column| column.width().is_some())
         .map(|column| column.name.as_str());
-    // Those that mean something else can be asked for too.
+    // Properties with another meaning can also be requested by name.
     let names: Vec<&str> = scalars.filter(|name| scalar == Some(*name) || !known(name)).collect();
     let value = element.column(&[names[choose(source, place, scalar, &names)?]]);
     let radius = column(&[RADIUS]);
@@ -158,7 +160,7 @@ mod tests {
             assert_eq!(load(&slanted, None).unwrap().covariances, [[1.0, 0.0, 0.5, 4.0, 0.0, 6.0]]);
             let short = file(format, "x y z p", &[&[1., 2., 3., 4.]]);
             for end in 0..short.len() {
-                // A text that ends within its last number reads as the shorter one.
+                // A text that ends within its last number is read with the shorter number.
                 let cut = read_with(&folder.write("a.ply", &short[..end]), |source| {
                     read_samples(source, None)
                 });

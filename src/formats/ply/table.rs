@@ -1,4 +1,4 @@
-//! The values of some columns of an element.
+//! The values of selected columns of an element.
 
 use super::{
     CHUNK,
@@ -9,21 +9,23 @@ use crate::{Result, input::Source};
 use ply_rs::ply::{PropertyType, ScalarType};
 use rayon::prelude::*;
 
-/// Some scalar columns of an element, by their places in the list that was asked for.
+/// Selected scalar columns of an element, by their index in the list of requested columns.
 pub(super) enum Table<'a> {
-    /// Rows of one stride: values are decoded when they are asked for, from their offset in the row.
+    /// Rows of equal length: values are decoded on request, from their offset in the row.
     Binary {
         data: &'a [u8],
         stride: usize,
         big: bool,
         fields: Vec<Option<(usize, &'a ScalarType)>>,
     },
-    /// Text and rows with lists, decoded once: the values of all rows, and the place of each column in a row.
+    /// Text and rows with lists, decoded once: the values of all rows, and the index of each column
+    /// in a row.
     Decoded { values: Vec<f64>, used: usize, slots: Vec<Option<usize>> },
 }
 
 impl<'a> Table<'a> {
-    /// `columns` are indices of the element's columns, one at least; none for one that it lacks.
+    /// Reads the columns with these indices, at least one; `None` for a column that the element
+    /// lacks.
     pub fn read(
         source: &Source,
         element: &'a Element,
@@ -64,7 +66,7 @@ impl<'a> Table<'a> {
         Ok(Self::Decoded { values, used, slots })
     }
 
-    /// A value of a row; 0 for a column that is none.
+    /// Returns a value of a row; 0 for a missing column.
     pub fn value(&self, row: usize, column: usize) -> f64 {
         match self {
             Self::Binary { data, stride, big, fields } => fields[column]

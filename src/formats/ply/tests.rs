@@ -45,11 +45,12 @@ fn put(out: &mut Vec<u8>, kind: &str, value: f64, big: bool) {
     }
 }
 
-/// A square of one quad (or two triangles) with everything around it that a reader may meet.
+/// A square of one quad (or two triangles) with every extra that a reader may meet.
 fn square(format: &str, real: &str, count: &str, index: &str, quad: bool, extras: bool) -> Vec<u8> {
     let mut head = format!("ply\r\nformat {format} 1.0\r\ncomment a test\r\n");
     if extras {
-        head += "obj_info x 1\r\nelement first 2\r\nproperty list uchar float weights\r\nproperty int n\r\n";
+        head += "obj_info x 1\r\nelement first 2\r\nproperty list uchar float weights\r\nproperty \
+                 int n\r\n";
     }
     head += "element vertex 4\r\n";
     if extras {
@@ -130,7 +131,7 @@ fn a_cut_file_is_an_error_wherever_it_is_cut() {
     for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
         for (quad, extras) in [(false, false), (true, true)] {
             let whole = square(format, "float", "uchar", "int", quad, extras);
-            // Text may lose its line end, and the last number is of one digit.
+            // Text may lose its line end, and the last number has one digit.
             let least = if format == "ascii" { whole.trim_ascii_end().len() } else { whole.len() };
             for length in 0..least {
                 assert!(
@@ -146,20 +147,22 @@ fn a_cut_file_is_an_error_wherever_it_is_cut() {
 
 #[test]
 fn text_as_real_files_have_it() {
-    let file = b"ply\nformat ascii 1.0\ncomment caf\xe9\nelement vertex 3\nproperty float x\nproperty float y\n\
-        property float z\nproperty float confidence\nelement empty 40000000000\nelement face 1\n\
-        property list uchar int vertex_index\nend_header\n\n0 0 0 nan\n\n1 0 0 -inf\n \t\n0 1 0 1e3\n\n3 0 1 2";
+    let file = b"ply\nformat ascii 1.0\ncomment caf\xe9\nelement vertex 3\nproperty float x\n\
+                 property float y\nproperty float z\nproperty float confidence\nelement empty \
+                 40000000000\nelement face 1\nproperty list uchar int vertex_index\nend_header\n\n\
+                 0 0 0 nan\n\n1 0 0 -inf\n \t\n0 1 0 1e3\n\n3 0 1 2";
     let mesh = load(file).expect("loads");
     assert_eq!((mesh.positions.len(), mesh.triangles.len()), (3, 1));
 }
 
 #[test]
 fn normals_colors_and_uvs() {
-    let file = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
-        property float nx\nproperty float ny\nproperty float nz\nproperty float diffuse_red\n\
-        property float diffuse_green\nproperty float diffuse_blue\nproperty float alpha\n\
-        property float s\nproperty float t\nend_header\n\
-        0 0 0 0 0 2 1 0.5 0 0.2 0.25 0.25\n1 0 0 nan 0 0 2 -1 nan 1 0 0\n0 1 0 0 0 0 0 0 0 0 1 1\n";
+    let file = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+                property float z\nproperty float nx\nproperty float ny\nproperty float nz\n\
+                property float diffuse_red\nproperty float diffuse_green\nproperty float \
+                diffuse_blue\nproperty float alpha\nproperty float s\nproperty float t\n\
+                end_header\n0 0 0 0 0 2 1 0.5 0 0.2 0.25 0.25\n1 0 0 nan 0 0 2 -1 nan 1 0 0\n0 1 0 \
+                0 0 0 0 0 0 0 1 1\n";
     let mesh = load(file).expect("loads");
     assert_eq!(mesh.normals, [Vec3::Z, Vec3::ZERO, Vec3::ZERO]);
     assert_eq!(mesh.colors, [[255, 128, 0, 51], [255, 0, 0, 255], [0, 0, 0, 0]]);
@@ -173,11 +176,11 @@ fn normals_colors_and_uvs() {
     );
 }
 
-/// A binary file of columns behind or before the position, and its rows.
+/// A binary file with columns after or before the position, and its rows.
 fn cloud(before: &str, behind: &str, rows: &[&[(&str, f64)]]) -> Vec<u8> {
     let mut file = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\n{before}property float x\nproperty float y\n\
-         property float z\n{behind}end_header\n",
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\n{before}property float x\n\
+         property float y\nproperty float z\n{behind}end_header\n",
         rows.len()
     )
     .into_bytes();
@@ -185,7 +188,7 @@ fn cloud(before: &str, behind: &str, rows: &[&[(&str, f64)]]) -> Vec<u8> {
     file
 }
 
-/// Points at one place, which becomes the origin.
+/// Points at a single position, which becomes the origin.
 #[test]
 fn columns_around_a_list_of_three_are_read() {
     let list = [("uchar", 3.0), ("float", 7.0), ("float", 8.0), ("float", 9.0)];
@@ -220,7 +223,8 @@ fn colors_in_pieces(bytes: &[u8]) -> Vec<[u8; 4]> {
     colors
 }
 
-/// Colours of wider types than bytes are what the largest of all tells, as a whole and in pieces.
+/// The largest value decides the scale of colours in types wider than bytes, read whole and in
+/// pieces.
 #[test]
 fn colors_of_wider_types_may_be_bytes() {
     for (kind, values, expected) in [
@@ -255,11 +259,11 @@ fn texture_coordinates_of_corners() {
     dot([0, 255, 0, 255]).save(folder.path().join("b.png")).expect("a picture");
     let file = |faces: &str| {
         let text = format!(
-            "ply\nformat ascii 1.0\ncomment TextureFile a.png\ncomment TextureFile b.png\nelement vertex 4\n\
-             property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n\
-             property uchar blue\nelement face {}\nproperty list uchar int vertex_indices\n\
-             property list uchar float texcoord\nproperty int texnumber\nend_header\n0 0 0 1 0 0\n1 0 0 2 0 0\n\
-             1 1 0 3 0 0\n0 1 0 4 0 0\n{faces}",
+            "ply\nformat ascii 1.0\ncomment TextureFile a.png\ncomment TextureFile b.png\nelement \
+             vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n\
+             property uchar green\nproperty uchar blue\nelement face {}\nproperty list uchar int \
+             vertex_indices\nproperty list uchar float texcoord\nproperty int texnumber\n\
+             end_header\n0 0 0 1 0 0\n1 0 0 2 0 0\n1 1 0 3 0 0\n0 1 0 4 0 0\n{faces}",
             faces.lines().count()
         );
         let path = folder.write("a.ply", text);
@@ -287,12 +291,12 @@ fn texture_coordinates_of_corners() {
     }
 }
 
-/// What a concave polygon leaves out stays free.
+/// The triangles of a concave polygon stay inside it.
 #[test]
 fn concave_polygons() {
-    let file = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\nelement vertex 6\n\
-        property float x\nproperty float y\nproperty float z\nend_header\n6 0 1 2 3 4 5\n\
-        2 0 0\n2 1 0\n1 1 0\n1 2 0\n0 2 0\n0 0 0\n";
+    let file = "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_indices\n\
+                element vertex 6\nproperty float x\nproperty float y\nproperty float z\n\
+                end_header\n6 0 1 2 3 4 5\n2 0 0\n2 1 0\n1 1 0\n1 2 0\n0 2 0\n0 0 0\n";
     let mesh = load(file).expect("loads");
     let area = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|index| mesh.positions[index as usize]);
@@ -303,7 +307,7 @@ fn concave_polygons() {
     assert_eq!(mesh.triangles.iter().map(area).sum::<f32>(), 3.0);
 }
 
-/// Polygons are read as a whole, wherever they stand.
+/// Files with polygons are read as a whole, wherever the polygons are.
 #[test]
 fn polygons_are_not_read_in_pieces() {
     let limits = Limits::default();
@@ -317,8 +321,8 @@ fn polygons_are_not_read_in_pieces() {
 
 #[test]
 fn large_coordinates_keep_their_precision() {
-    let mut file = b"ply\nformat binary_little_endian 1.0\nelement vertex 2\nproperty double x\nproperty double y\n\
-        property double z\nend_header\n"
+    let mut file = b"ply\nformat binary_little_endian 1.0\nelement vertex 2\nproperty double x\n\
+                     property double y\nproperty double z\nend_header\n"
         .to_vec();
     let points = [[4_500_000.125, 5_600_000.25, 100.0], [4_500_001.375, 5_600_002.5, 101.0]];
     points.iter().flatten().for_each(|&v| put(&mut file, "double", v, false));
@@ -331,9 +335,9 @@ fn large_coordinates_keep_their_precision() {
 
 #[test]
 fn strips_become_triangles() {
-    let file = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n\
-        element tristrips 1\nproperty list int int vertex_indices\nend_header\n\
-        0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 2 0\n8 0 1 2 3 -1 2 3 4\n";
+    let file = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n\
+                property float z\nelement tristrips 1\nproperty list int int vertex_indices\n\
+                end_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 2 0\n8 0 1 2 3 -1 2 3 4\n";
     assert_eq!(load(file).expect("loads").triangles, [[0, 1, 2], [2, 1, 3], [2, 3, 4]]);
 }
 
@@ -345,8 +349,9 @@ fn message(bytes: impl AsRef<[u8]>) -> String {
 fn counts_that_lie_and_broken_numbers() {
     let file = |format: &str, count: &str, body: &str| {
         format!(
-            "ply\nformat {format} 1.0\nelement vertex {count}\nproperty float x\nproperty float y\nproperty float z\n\
-            element face 1\nproperty list uchar int vertex_indices\nend_header\n{body}"
+            "ply\nformat {format} 1.0\nelement vertex {count}\nproperty float x\nproperty float y\n\
+             property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+             {body}"
         )
     };
     let body = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";

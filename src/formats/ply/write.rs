@@ -1,13 +1,14 @@
-//! Writing PLY: binary, little-endian, positions as floats.
+//! Writes PLY: binary, little-endian, positions as 32-bit floats.
 
 use crate::{Error, Result, disk, surface::Mesh};
 use std::{io::Write, path::Path};
 
-/// Writes positions, normals, colours and triangles. Positions are written with the mesh's origin added, in 32 bits; texture
-/// coordinates and materials are not written.
+/// Writes positions, normals, colours and triangles. Positions include the mesh's origin and are
+/// rounded to 32 bits. Texture coordinates and materials are not written.
 ///
 /// # Errors
-/// [`Error::Output`] where the file cannot be written; [`Error::Argument`] for attributes that do not fit the positions.
+/// [`Error::Output`] if the file cannot be written; [`Error::Argument`] for attributes whose number
+/// does not match the positions.
 pub fn write(mesh: &Mesh, path: &Path) -> Result<()> {
     let count = mesh.positions.len();
     for (name, length) in [("normals", mesh.normals.len()), ("colors", mesh.colors.len())] {

@@ -1,4 +1,4 @@
-//! From the points of a file to a mesh without triangles.
+//! Builds a mesh without triangles from the points of a file.
 
 use crate::{
     Result,
@@ -13,19 +13,19 @@ use std::ops::Range;
 #[derive(Debug, Default)]
 pub(crate) struct Cloud {
     pub positions: Vec<DVec3>,
-    /// Of any length; zero where unusable.
+    /// Normals of any length; zero if unusable.
     pub normals: Vec<Vec3>,
     pub colors: Vec<[u8; 4]>,
-    /// Where scanners stood, in world coordinates, and the points that they saw.
+    /// The positions of scanners, in world coordinates, and the points that each has seen.
     pub sensors: Vec<(DVec3, Range<usize>)>,
     pub z_is_up: bool,
 }
 
 impl Cloud {
-    /// Chooses the origin. `place` names a point in an error.
+    /// Chooses the origin and makes the mesh. `place` names a point in an error.
     pub fn into_mesh(self, source: &Source, place: impl Fn(usize) -> String) -> Result<Mesh> {
         if self.positions.is_empty() {
-            return Err(source.error("file", "holds no points"));
+            return Err(source.error("file", "contains no points"));
         }
         source.room::<Vec3>("the normals", self.normals.len())?;
         let (origin, positions) =
@@ -46,7 +46,8 @@ impl Cloud {
     }
 }
 
-/// Intensities as greys: the darkest hundredth is black, the brightest white. Empty where they say nothing.
+/// Converts intensities to greys. The first percentile becomes black, the last white. Empty if all
+/// intensities are the same or none is finite.
 pub(crate) fn greys(intensities: &[f32]) -> Vec<[u8; 4]> {
     let mut sorted: Vec<f32> =
         intensities.par_iter().copied().filter(|value| value.is_finite()).collect();
@@ -62,14 +63,14 @@ pub(crate) fn greys(intensities: &[f32]) -> Vec<[u8; 4]> {
     intensities.par_iter().map(|&value| grey(value, low, high)).collect()
 }
 
-/// The grey of an intensity where black is at `low` and white at `high`.
+/// Returns the grey of an intensity: black at `low`, white at `high`.
 pub(crate) fn grey(value: f32, low: f32, high: f32) -> [u8; 4] {
     let grey = ((value - low) / (high - low) * 255.0).round() as u8;
     [grey, grey, grey, 255]
 }
 
-/// Colours of 16 bits as bytes. Some writers store bytes in the 16 bits: then none is larger than 255. Empty where all are
-/// black, as files without colours have them.
+/// Converts 16-bit colours to bytes. Some writers store bytes in the 16 bits; then no value exceeds
+/// 255. Empty if all are black, as in files without colours.
 pub(crate) fn colors_of_16_bits(colors: &[[u16; 3]]) -> Vec<[u8; 4]> {
     let largest =
         colors.par_iter().map(|color| color.iter().copied().max().unwrap_or(0)).max().unwrap_or(0);
@@ -79,7 +80,7 @@ pub(crate) fn colors_of_16_bits(colors: &[[u16; 3]]) -> Vec<[u8; 4]> {
     colors.par_iter().map(|&color| color_of_16_bits(color, largest)).collect()
 }
 
-/// One such colour, where the largest number of all is known.
+/// Converts one 16-bit colour, given the largest value of all colours.
 pub(crate) fn color_of_16_bits(color: [u16; 3], largest: u16) -> [u8; 4] {
     let byte = |value: u16| {
         if largest > 255 { ((u32::from(value) * 255 + 32767) / 65535) as u8 } else { value as u8 }

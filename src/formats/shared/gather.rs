@@ -1,4 +1,4 @@
-//! From the rows of a file to scattered samples.
+//! Builds scattered samples from the rows of a file.
 
 use crate::{
     Error, Result,
@@ -8,7 +8,7 @@ use crate::{
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// What rows say besides their positions. All but the values may be empty.
+/// The columns of the rows besides their positions. All but the values may be empty.
 #[derive(Debug, Default)]
 pub(crate) struct Columns {
     pub values: Vec<f64>,
@@ -17,11 +17,11 @@ pub(crate) struct Columns {
 }
 
 impl Columns {
-    /// Bytes that a row takes where it has all columns.
+    /// Bytes per row with all columns.
     pub const ROW: u64 = 8 + 4 + 24;
 }
 
-/// Puts samples together, `count` of them. `place` names a row in an error.
+/// Builds `count` samples. `place` names a row in an error.
 pub(crate) fn gather(
     source: &Source,
     count: usize,
@@ -30,11 +30,11 @@ pub(crate) fn gather(
     columns: Columns,
 ) -> Result<Points> {
     if count == 0 {
-        return Err(source.error("file", "holds no samples"));
+        return Err(source.error("file", "contains no samples"));
     }
     let wrong = |&value: &f64| !(value as f32).is_finite();
     if let Some(row) = columns.values.par_iter().position_first(wrong) {
-        let message = format!("the value {} is no finite number of 32 bits", columns.values[row]);
+        let message = format!("the value {} is not finite in 32 bits", columns.values[row]);
         return Err(source
             .error(place(row), message)
             .hint("remove the sample, or write the file without it"));
@@ -53,7 +53,8 @@ pub(crate) fn gather(
     Ok(points)
 }
 
-/// The error of a file whose scalar cannot be told: `names` are those that there are.
+/// Returns the error for a file in which the scalar is missing or ambiguous; `names` are those
+/// available.
 pub(crate) fn which_scalar(
     source: &Source,
     place: &str,
@@ -73,7 +74,7 @@ pub(crate) fn which_scalar(
     }
 }
 
-/// Which of `names` is asked for, or the only one.
+/// Returns the index of the requested name, or of the only one.
 pub(crate) fn choose(
     source: &Source,
     place: &str,

@@ -1,4 +1,5 @@
-//! What several formats share: point clouds, columns of samples, polygons, textures, sample types.
+//! Code that several formats share: point clouds, columns of samples, polygons, textures, sample
+//! types.
 
 pub(super) mod cloud;
 pub(super) mod gather;

@@ -1,23 +1,27 @@
-//! Polygons cut into triangles.
+//! Cuts polygons into triangles.
 //!
-//! A polygon is looked at along the axis nearest to its normal, which is the sum of its fan's normals (Newell's;
-//! Sutherland, Sproull and Schumacker, 1974). It is a fan from its first corner where that covers it, as it does all
-//! convex polygons; else ears are cut off (Meisters, 1975). Corners on straight sides stay, for other faces may end there.
-//! Corners on slits that lead to holes are met twice, and are no hindrance.
+//! A polygon is projected along the axis nearest to its normal, which is the sum of its fan's
+//! normals (Newell's; Sutherland, Sproull and Schumacker, 1974). If a fan from the first corner
+//! covers the polygon, the fan is the result; this holds for all convex polygons. Otherwise ears
+//! are cut off (Meisters, 1975). Corners on straight sides are kept, because other faces may end
+//! there. A slit that leads to a hole visits its corners twice, which does no harm.
 
 use crate::Result;
 use glam::{DVec2, DVec3};
 use std::{collections::VecDeque, iter::successors};
 
-/// Squared sine of the angle up to which a triangle of a fan that is turned over is one of rounding.
+/// Squared sine of an angle. Triangles of a fan that are flipped by less than this angle count as
+/// rounding errors.
 const ROUNDING: f64 = 1e-12;
 
-/// Steps that one polygon may take, about a second; what is left of it then is a fan. Polygons that cross themselves
-/// come to that with some thousand corners, others with more than a hundred thousand, if at all.
+/// Maximum number of steps for one polygon, about a second. What is left after them becomes a fan.
+/// Polygons that cross themselves reach this with a few thousand corners, others with more than a
+/// hundred thousand, if ever.
 const STEPS: usize = 1 << 27;
 
-/// Gives the triangles of a polygon, wound as it is: two fewer than it has corners, or fewer where it has repeated
-/// corners. A polygon without area, or with a position that is not finite, is a fan.
+/// Passes the triangles of a polygon to `add`, with the polygon's winding. There are two fewer than
+/// corners, or fewer if corners repeat. A polygon without area, or with a position that is not
+/// finite, becomes a fan.
 ///
 /// # Errors
 /// Those of `add`.
@@ -36,8 +40,9 @@ pub(crate) fn triangles(
     fan(corners, add)
 }
 
-/// The polygon in a plane, turning to the left: its coordinates but that along the axis nearest to its normal, from
-/// the first corner. They are not turned into its plane, so rounding bends nothing that is straight along an axis.
+/// Projects the polygon to a plane, where it winds counter-clockwise: drops the coordinate along
+/// the axis nearest to its normal, relative to the first corner. Coordinates are not rotated into
+/// the polygon's plane, so rounding bends no side that is straight along an axis.
 fn projection(corners: &[u32], position: impl Fn(u32) -> DVec3) -> Option<impl Fn(u32) -> DVec2> {
     let first = position(*corners.first()?);
     let spoke = move |corner| position(corner) - first;
@@ -54,7 +59,8 @@ fn projection(corners: &[u32], position: impl Fn(u32) -> DVec3) -> Option<impl F
     })
 }
 
-/// Whether no triangle of the fan is turned over. Their areas add up to the polygon's, so they then cover nothing else.
+/// Returns whether no triangle of the fan is flipped. The triangles' signed areas add up to the
+/// polygon's, so without flips they cover nothing else.
 fn fan_covers(corners: &[u32], flat: impl Fn(u32) -> DVec2) -> bool {
     corners[1..].windows(2).all(|side| {
         let [a, b] = [flat(side[0]), flat(side[1])];
@@ -68,8 +74,9 @@ fn fan<T: Copy>(corners: &[T], add: impl FnMut([T; 3]) -> Result<()>) -> Result<
     rest.windows(2).map(|side| [first, side[0], side[1]]).try_for_each(add)
 }
 
-/// What keeps a corner from being cut off: a concave corner in the triangle or on its border; one in it; nothing. A
-/// polygon that touches itself may need the second, one that crosses itself the third.
+/// What prevents cutting off a corner: a concave corner in the triangle or on its border; only one
+/// inside it; nothing. A polygon that touches itself may need the second, one that crosses itself
+/// the third.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Ban {
     Touching,
@@ -77,11 +84,12 @@ enum Ban {
     Nothing,
 }
 
-/// Cuts off ears, of a polygon that turns to the left.
+/// Cuts off the ears of a polygon that winds counter-clockwise.
 fn clip(points: Vec<DVec2>, mut add: impl FnMut([usize; 3]) -> Result<()>) -> Result<()> {
     let mut left = points.len();
     let mut queue: VecDeque<usize> = (0..left).collect();
-    // A corner whose neighbour went is looked at again, but after all others: slivers from one corner come of it else.
+    // A corner whose neighbour was removed is checked again, but after all others. Otherwise one
+    // corner would produce many slivers.
     let mut waiting = vec![1u32; left];
     let mut ring = Ring::new(points);
     let mut ban = Ban::Touching;
@@ -122,19 +130,20 @@ fn clip(points: Vec<DVec2>, mut add: impl FnMut([usize; 3]) -> Result<()>) -> Re
     fan(&ring.corners().collect::<Vec<_>>(), add)
 }
 
-/// What is left of a polygon.
+/// The remaining part of a polygon.
 struct Ring {
     points: Vec<DVec2>,
-    /// The corners before and after each; of one that is gone, itself.
+    /// The corners before and after each corner; a removed corner refers to itself.
     before: Vec<usize>,
     after: Vec<usize>,
-    /// A corner that is left.
+    /// A remaining corner.
     start: usize,
-    /// Whether a corner is left and does not turn to the left. Where any corner is in a triangle, so is a concave one.
+    /// Whether a corner remains and does not turn left. If a triangle contains any corner, it also
+    /// contains a concave one.
     concave: Vec<bool>,
-    /// The concave corners, by the square that they are in, with some that are concave no more.
+    /// The concave corners by grid square. Some are no longer concave.
     squares: Vec<Vec<usize>>,
-    /// Squares in a row, their lower corner and how many there are per unit.
+    /// Squares per row, the lower corner of the grid, and squares per unit of length.
     side: usize,
     low: DVec2,
     scale: DVec2,
@@ -176,13 +185,14 @@ impl Ring {
         [self.before[at], at, self.after[at]].map(|at| self.points[at])
     }
 
-    /// Twice the area that goes with a corner; positive for a turn to the left.
+    /// Returns twice the area that is lost with a corner; positive for a left turn.
     fn turn(&self, at: usize) -> f64 {
         let [a, b, c] = self.triangle(at);
         (b - a).perp_dot(c - b)
     }
 
-    /// Whether the corner repeats a neighbour or is the end of a line there and back.
+    /// Returns whether the corner repeats a neighbour or is the end of a line that returns on
+    /// itself.
     fn is_needless(&self, at: usize) -> bool {
         let [a, b, c] = self.triangle(at);
         self.turn(at) == 0.0 && (b - a).dot(c - b) <= 0.0
@@ -193,7 +203,7 @@ impl Ring {
             && (ban == Ban::Nothing || !self.is_entered(self.triangle(at), ban == Ban::Touching))
     }
 
-    /// Whether a concave corner is in a triangle, or on its border where `touching` counts.
+    /// Returns whether a concave corner is in a triangle, or on its border if `touching` is set.
     fn is_entered(&mut self, triangle: [DVec2; 3], touching: bool) -> bool {
         let [a, b, c] = triangle;
         let enters = |p: DVec2| {
@@ -238,7 +248,7 @@ impl Ring {
         self.look(after);
     }
 
-    /// Finds whether a corner is concave.
+    /// Updates whether a corner is concave.
     fn look(&mut self, at: usize) {
         let concave = self.turn(at) <= 0.0;
         if concave && !self.concave[at] {
@@ -277,7 +287,8 @@ mod tests {
         (2..count).map(|at| [0, at - 1, at]).collect()
     }
 
-    /// The polygon's area as a vector; those of its triangles have to point the same way and to have its length in sum.
+    /// Compares areas as vectors: those of the triangles must point the same way as the polygon's,
+    /// and their lengths must add up to its length.
     fn check_areas(corners: &[u32], points: &[DVec3], cuts: &[[u32; 3]]) {
         let at = |corner: u32| points[corner as usize];
         let area = |[a, b, c]: [u32; 3]| (at(b) - at(a)).cross(at(c) - at(a));
@@ -296,8 +307,8 @@ mod tests {
         );
     }
 
-    /// Cuts a polygon as it is, the other way round, from each of its first corners, and in other planes; checks the areas,
-    /// and that all corners are met.
+    /// Cuts a polygon as it is, reversed, from each of its first corners, and in other planes.
+    /// Checks the areas, and that every corner is used.
     fn check(outline: &[(f64, f64)]) {
         for turn in [DVec3::Z, DVec3::new(1.0, 2.0, -3.0), DVec3::new(-1.0, 0.2, 0.1), DVec3::NEG_Y]
         {
@@ -315,7 +326,7 @@ mod tests {
                     (0..points.len() as u32)
                         .all(|corner| cuts.iter().flatten().any(|&met| met == corner))
                 );
-                // Coordinates of this size are rounded to a billionth, and areas with them.
+                // Coordinates of this size are rounded to about 1e-9, and so are areas.
                 let near: Vec<DVec3> = points.iter().map(|&p| p - points[0]).collect();
                 check_areas(&(0..points.len() as u32).collect::<Vec<_>>(), &near, &cuts);
             }
@@ -341,7 +352,8 @@ mod tests {
                 assert_eq!(cut(&points), fan_of(count));
             }
         }
-        // With corners on a side; not quite in a plane; from the one corner that sees the whole of a concave one.
+        // With corners on a side; not quite planar; concave, from the one corner that sees the
+        // whole polygon.
         let square = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.0, 2.0), (0.0, 2.0)];
         assert_eq!(cut(&flat(&square)), fan_of(6));
         let saddle = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.5), DVec3::Y];
@@ -398,7 +410,8 @@ mod tests {
             (9.0, 9.0),
         ]);
         for corners in [
-            // A square with a square hole, and one with a notch: twice the same corner, thrice, a line in, a line out.
+            // A square with a square hole, and one with a notch: with the same corner twice, with
+            // it three times, with a line inwards, with a line outwards.
             vec![0, 1, 2, 3, 0, 4, 5, 6, 7, 4],
             vec![0, 1, 7, 2, 2, 3],
             vec![0, 0, 0, 1, 7, 7, 2, 3, 3, 0],
@@ -436,7 +449,7 @@ mod tests {
                 && cut(&[DVec3::X]).is_empty()
                 && cut(&[DVec3::X, DVec3::Y]).is_empty()
         );
-        // A bow tie, and corners that are strewn about.
+        // A bow tie, and random corners.
         cut(&flat(&[(0.0, 0.0), (2.0, 2.0), (2.0, 0.0), (0.0, 1.0)]));
         for count in [5, 20, 300] {
             let mut state = count as u64;
@@ -449,7 +462,7 @@ mod tests {
             let strewn: Vec<DVec3> =
                 (0..count).map(|_| DVec3::new(random(), random(), random())).collect();
             cut(&strewn);
-            // On a coarse grid, with many corners in one place and on one line.
+            // On a coarse grid, with many corners in the same place and on the same line.
             cut(&strewn.iter().map(|point| (point * 4.0).floor()).collect::<Vec<_>>());
         }
     }
@@ -462,7 +475,7 @@ mod tests {
             (0..teeth).flat_map(|tooth| [(f64::from(tooth), 0.0), (f64::from(tooth) + 0.5, 500.0)]),
         );
         comb.reverse();
-        // A ragged shore.
+        // A ragged coastline.
         let shore: Vec<(f64, f64)> = (0..10_000)
             .map(|at| {
                 let angle = f64::from(at) / 10_000.0 * std::f64::consts::TAU;

@@ -1,4 +1,4 @@
-//! Sample types as volume files have them, and how their bytes and texts become [`Samples`].
+//! Sample types of volume files, and how their bytes and texts become [`Samples`].
 
 use crate::volume::Samples;
 use rayon::prelude::*;
@@ -19,7 +19,7 @@ pub enum SampleType {
     F64,
 }
 
-/// The order of the bytes of a number.
+/// The byte order of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Endian {
     #[default]
@@ -28,7 +28,7 @@ pub enum Endian {
 }
 
 impl SampleType {
-    /// The type of a name such as `u8`, `i16` or `f32`.
+    /// Returns the type with a name such as `u8`, `i16` or `f32`.
     pub fn from_name(name: &str) -> Option<Self> {
         Some(match name {
             "u8" => Self::U8,
@@ -45,7 +45,7 @@ impl SampleType {
         })
     }
 
-    /// The name that [`from_name`](Self::from_name) reads.
+    /// Returns the name that [`from_name`](Self::from_name) accepts.
     pub fn name(self) -> &'static str {
         match self {
             Self::U8 => "u8",
@@ -61,7 +61,7 @@ impl SampleType {
         }
     }
 
-    /// Bytes that one sample takes.
+    /// Returns the bytes per sample.
     pub fn bytes(self) -> usize {
         match self {
             Self::U8 | Self::I8 => 1,
@@ -71,12 +71,13 @@ impl SampleType {
         }
     }
 
-    /// Bytes that a block of samples takes; none where that is more than 64 bits count.
+    /// Returns the bytes of a block of samples; `None` if they exceed 64 bits.
     pub fn bytes_of(self, dims: [usize; 3]) -> Option<u64> {
         dims.iter().try_fold(self.bytes() as u64, |product, &n| product.checked_mul(n as u64))
     }
 
-    /// Bytes that `size` bytes of samples take when they are [decoded](Self::decode), at most.
+    /// Returns the maximum bytes that `size` bytes of samples take once they are
+    /// [decoded](Self::decode).
     pub fn decoded_bytes(self, size: usize) -> u64 {
         let size = size as u64;
         match self {
@@ -86,11 +87,12 @@ impl SampleType {
         }
     }
 
-    /// Samples from their bytes; bytes after the last whole sample are left out.
+    /// Decodes samples from their bytes; bytes after the last whole sample are ignored.
     ///
-    /// Types that [`Samples`] has no place for become the nearest one: 8-bit signed integers become 16-bit ones; unsigned
-    /// 32-bit and all 64-bit integers become 32-bit ones where every value fits, else 32-bit floats (rounded to 24
-    /// bits); 64-bit floats become 32-bit ones.
+    /// Types that [`Samples`] does not have become the nearest one. Signed 8-bit integers become
+    /// 16-bit integers. Unsigned 32-bit and all 64-bit integers become signed 32-bit integers if
+    /// every value fits, else 32-bit floats (rounded to 24 bits). 64-bit floats become 32-bit
+    /// floats.
     pub fn decode(self, bytes: Cow<'_, [u8]>, endian: Endian) -> Samples {
         match self {
             Self::U8 => Samples::U8(bytes.into_owned()),
@@ -106,8 +108,8 @@ impl SampleType {
         }
     }
 
-    /// Numbers from their bytes as doubles: exact but for 64-bit integers beyond 2⁵³. Bytes after the last whole number are
-    /// left out.
+    /// Decodes numbers from their bytes as doubles: exact, except for 64-bit integers beyond 2⁵³.
+    /// Bytes after the last whole number are ignored.
     pub fn doubles(self, bytes: &[u8], endian: Endian) -> Vec<f64> {
         match self {
             Self::U8 => bytes.iter().map(|&v| f64::from(v)).collect(),
@@ -123,11 +125,11 @@ impl SampleType {
         }
     }
 
-    /// The little-endian bytes of at most `count` numbers written as text between white space and commas. Memory grows
-    /// with the numbers that are there.
+    /// Parses `count` numbers of a text, separated by white space and commas, into their
+    /// little-endian bytes. Memory grows with the numbers that are present.
     ///
     /// # Errors
-    /// In words: a word that is no number of this type, or another number of them than `count`.
+    /// A message if a word is not a number of this type, or if the number of words is not `count`.
     pub fn parse(self, text: &str, count: usize) -> Result<Vec<u8>, String> {
         match self {
             Self::U8 => parse(text, count, u8::to_le_bytes),
@@ -144,7 +146,8 @@ impl SampleType {
     }
 }
 
-/// Numbers of `N` bytes each, read by `read` and turned into what the samples hold.
+/// Decodes numbers of `N` bytes each: `read` decodes them, `turn` converts them to the samples'
+/// type.
 fn convert<const N: usize, T, U: Send>(
     bytes: &[u8],
     endian: Endian,
@@ -162,7 +165,7 @@ fn convert<const N: usize, T, U: Send>(
     }
 }
 
-/// Wide integers: 32 bits where all of them fit, floats otherwise.
+/// Decodes wide integers: to 32-bit integers if all fit, to floats otherwise.
 fn integers<const N: usize, T: TryInto<i32>>(
     bytes: &[u8],
     endian: Endian,
@@ -198,7 +201,7 @@ fn parse<const N: usize, T: std::str::FromStr>(
         }
         let number = word.parse().map_err(|_| {
             let shown: String = word.chars().take(40).collect();
-            format!("number {i} is “{shown}”, which is no {}", std::any::type_name::<T>())
+            format!("number {i} is “{shown}”, which is not a valid {}", std::any::type_name::<T>())
         })?;
         bytes.extend_from_slice(&write(number));
     }
@@ -266,7 +269,7 @@ mod tests {
     #[test]
     fn wrong_texts_are_told() {
         assert!(SampleType::U8.parse("1 256", 2).unwrap_err().contains("number 1 is “256”"));
-        assert!(SampleType::I16.parse("1.5", 1).unwrap_err().contains("no i16"));
+        assert!(SampleType::I16.parse("1.5", 1).unwrap_err().contains("not a valid i16"));
         assert!(SampleType::U8.parse("1 2 3", 2).unwrap_err().contains("more than the 2"));
         assert!(SampleType::U8.parse("1 2", 1 << 50).unwrap_err().contains("2 numbers"));
     }

@@ -1,4 +1,4 @@
-//! Pictures that a mesh refers to, decoded under the limits.
+//! Pictures that a mesh refers to, decoded within the limits.
 
 use crate::{
     Result,
@@ -8,9 +8,11 @@ use crate::{
 };
 use std::{io::Cursor, path::PathBuf, sync::Arc};
 
-/// Texels that a byte can stand for at most: deflate makes 1032 bytes of one, and a byte may hold 8 grey texels.
+/// Maximum number of texels per byte: deflate packs at most 1032 bytes into one, and a byte may
+/// contain 8 grey texels.
 const MOST_TEXELS: u64 = 8 * 1032;
-/// Bytes that a texel takes on the way: 16 bits a channel as the decoder gives it, 8 as a picture and as a texture.
+/// Bytes per texel during decoding: 16 bits per channel from the decoder, 8 bits per channel in the
+/// picture and in the texture.
 const TEXEL: u64 = 8 + 4 + 4;
 
 /// Decodes a PNG or JPEG picture. `place` names what refers to it.
@@ -42,7 +44,7 @@ fn decode_here(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture
     }
     source.spend("the size of a picture in bytes", texels * TEXEL)?;
     let mut limits = image::Limits::default();
-    // Room for 16 bits a channel and the decoder's own copy.
+    // Enough for 16 bits per channel and the decoder's own copy.
     limits.max_alloc = Some((texels * 16).saturating_add(1 << 20));
     image::ImageDecoder::set_limits(&mut decoder, limits).map_err(broken)?;
     let picture = image::DynamicImage::from_decoder(decoder).map_err(broken)?.into_rgba8();
@@ -53,7 +55,8 @@ fn decode_here(source: &Source, place: &str, bytes: &[u8]) -> Result<Arc<Texture
     Ok(Arc::new(Texture { width, height, texels }))
 }
 
-/// Reads the picture that a file refers to. `None`, with a warning, where there is no such file.
+/// Reads the picture that a file refers to. Returns `None`, with a warning, if the file does not
+/// exist.
 pub(crate) fn read_reference(
     source: &Source,
     place: &str,
@@ -64,7 +67,8 @@ pub(crate) fn read_reference(
     file.unless_changed(decode(&file, place, file.bytes())).map(Some)
 }
 
-/// The path of a file that may be missing: `None`, with a warning, where a proper reference leads to no file.
+/// Returns the path of a file that may be missing: `None`, with a warning, if a valid reference
+/// names a file that does not exist.
 pub(crate) fn find(source: &Source, place: &str, reference: &str) -> Result<Option<PathBuf>> {
     let reference = reference.replace('\\', "/");
     match source.neighbour(place, &reference) {

@@ -8,7 +8,7 @@ use std::io::Write;
 
 const VALUES: [i16; 12] = [0, 1, -2, 300, -4000, 5, 6, 7, 8, 9, 10, 32767];
 
-/// How a file of the test is written.
+/// How a test file is written.
 #[derive(Debug, Clone, Copy)]
 struct Style {
     format: &'static str,
@@ -37,7 +37,7 @@ impl Style {
         }
     }
 
-    /// The counts and the data of an array, in blocks of 10 bytes where they are packed.
+    /// The counts and the data of an array, in blocks of 10 bytes if it is compressed.
     fn array(&self, bytes: &[u8]) -> (Vec<u8>, Vec<u8>) {
         if !self.packed {
             return (self.count(bytes.len()), bytes.to_vec());
@@ -57,7 +57,7 @@ impl Style {
 
     fn base64(&self, bytes: &[u8]) -> String {
         let (head, data) = self.array(bytes);
-        // Counts of packed data are encoded apart.
+        // Counts of compressed data are encoded separately.
         if self.packed {
             STANDARD.encode(head) + &STANDARD.encode(data)
         } else {
@@ -65,7 +65,7 @@ impl Style {
         }
     }
 
-    /// Bytes of a section that two arrays are appended in, and the second one's offset.
+    /// The bytes of a section with two appended arrays, and the offset of the second one.
     fn append(&self, arrays: [&[u8]; 2]) -> (Vec<u8>, usize) {
         let [first, second] = arrays.map(|bytes| match self.appended {
             "raw" => [self.array(bytes).0, self.array(bytes).1].concat(),
@@ -89,11 +89,13 @@ impl Style {
         let compressor = if self.packed { " compressor=\"vtkZLibDataCompressor\"" } else { "" };
         let counts = if self.wide { "UInt64" } else { "UInt32" };
         format!(
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" byte_order=\"{order}\" header_type=\"{counts}\"{compressor}>"
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" byte_order=\"{order}\" \
+             header_type=\"{counts}\"{compressor}>"
         )
     }
 
-    /// A file of 3 × 2 × 2 points from index (1, 0, 0) on, with the values under the name “wanted”.
+    /// A file of 3 × 2 × 2 points, beginning at index (1, 0, 0), with the values in the array
+    /// “wanted”.
     fn file(&self) -> Vec<u8> {
         let bytes = self.bytes(&VALUES);
         let (section, offset) = self.append([&[1, 2, 3, 4], &bytes]);
@@ -102,16 +104,17 @@ impl Style {
             "binary" => format!("\n   {}\n  ", self.base64(&bytes)),
             _ => String::new(),
         };
-        let statistics = "<InformationKey name=\"RANGE\" location=\"here\"><Value index=\"0\">77</Value></InformationKey>";
+        let statistics = "<InformationKey name=\"RANGE\" location=\"here\"><Value \
+                          index=\"0\">77</Value></InformationKey>";
         let format = self.format;
         let mut file = format!(
             "{}<ImageData WholeExtent=\"1 3 0 1 0 1\" Origin=\"10 20 30\" Spacing=\"0.5 1 2\" \
-             Direction=\"0 -1 0 1 0 0 0 0 1\"><Piece Extent=\"1 3 0 1 0 1\"><CellData Scalars=\"cell\">\
-             <DataArray type=\"UInt8\" Name=\"cell\" format=\"appended\" offset=\"0\"/></CellData>\
-             <PointData Scalars=\"wanted\">\
-             <DataArray type=\"Float32\" Name=\"other\" format=\"ascii\">1 2</DataArray>\
-             <DataArray type=\"Int16\" Name=\"wanted\" format=\"{format}\" offset=\"{offset}\">{text}{statistics}</DataArray>\
-             </PointData></Piece></ImageData>",
+             Direction=\"0 -1 0 1 0 0 0 0 1\"><Piece Extent=\"1 3 0 1 0 1\"><CellData \
+             Scalars=\"cell\"><DataArray type=\"UInt8\" Name=\"cell\" format=\"appended\" \
+             offset=\"0\"/></CellData><PointData Scalars=\"wanted\"><DataArray type=\"Float32\" \
+             Name=\"other\" format=\"ascii\">1 2</DataArray><DataArray type=\"Int16\" \
+             Name=\"wanted\" format=\"{format}\" \
+             offset=\"{offset}\">{text}{statistics}</DataArray></PointData></Piece></ImageData>",
             self.head(),
         )
         .into_bytes();
@@ -165,7 +168,7 @@ fn every_cut_is_an_error() {
     }
 }
 
-/// Cut or changed data inside files that end as they should.
+/// Truncated or changed data inside files whose end is intact.
 #[test]
 fn no_damage_panics_or_passes_for_long() {
     let folder = Folder::new();
@@ -177,7 +180,8 @@ fn no_damage_panics_or_passes_for_long() {
             for value in [0, b'<', file[at] ^ 1] {
                 let mut damaged = file.clone();
                 damaged[at] = value;
-                // Whether it can still be read depends on the place; it must end with a volume or an error.
+                // Whether it can still be read depends on the place of the change. The result must
+                // be a volume or an error.
                 if let Ok(volume) = read_with(&folder.write("volume.vti", &damaged), read) {
                     assert_eq!(volume.len(), volume.lattice.len());
                 }
@@ -190,8 +194,11 @@ fn no_damage_panics_or_passes_for_long() {
 
 /// A file with one ascii piece, written by hand.
 fn ascii(head: &str, image: &str, points: &str) -> Vec<u8> {
-    format!("<VTKFile {head}><ImageData {image}><Piece Extent=\"0 1 0 0 0 1\">{points}</Piece></ImageData></VTKFile>")
-        .into_bytes()
+    format!(
+        "<VTKFile {head}><ImageData {image}><Piece Extent=\"0 1 0 0 0 \
+             1\">{points}</Piece></ImageData></VTKFile>"
+    )
+    .into_bytes()
 }
 
 #[test]
@@ -236,7 +243,7 @@ fn types_and_the_choice_of_the_array() {
         ),
         (
             format!("<PointData>{}</PointData>", scalar.replace("ascii", "appended' offset='0")),
-            "nothing is",
+            "no appended data",
         ),
         (
             format!(
@@ -245,7 +252,7 @@ fn types_and_the_choice_of_the_array() {
             ),
             "not finite",
         ),
-        (format!("<PointData>{scalar}</CellData>"), "is no XML"),
+        (format!("<PointData>{scalar}</CellData>"), "is not valid XML"),
     ] {
         let message = load(&points).unwrap_err().to_string();
         assert!(message.contains(word), "{message}");
@@ -269,8 +276,8 @@ fn wrong_heads_are_told() {
         (head, "", "WholeExtent"),
         (head, "WholeExtent='0 1 0 0 0'", "6 numbers"),
         (head, "WholeExtent='0 1 0 0 0 2'", "4 points"),
-        (head, "WholeExtent='0 0 0 0 0 1'", "out of the whole"),
-        (head, "WholeExtent='0 1 0 -1 0 1'", "no points"),
+        (head, "WholeExtent='0 0 0 0 0 1'", "beyond the whole"),
+        (head, "WholeExtent='0 1 0 -1 0 1'", "not a valid range"),
         (head, "WholeExtent='0 1 0 0 0 1' Spacing='1 0 1'", "spacing"),
         (head, "WholeExtent='0 1 0 0 0 1' Spacing='1 nan 1'", "finite"),
         (head, "WholeExtent='0 1 0 0 0 1' Direction='1 1 0 0 0 0 0 0 1'", "plane"),
@@ -318,7 +325,7 @@ fn lying_counts_allocate_nothing() {
         (error("0 4294967294 0 0 0 0", false, &narrow(&[u32::MAX, 1, 0])), "sizes of its blocks"),
         (
             error("0 4294967294 0 0 0 0", false, &narrow(&[1, u32::MAX, 0, 4, 0])),
-            "packed ones cannot hold",
+            "compressed bytes can hold",
         ),
         (error("0 7 0 0 0 0", true, &wide(&[1, 8, 0, u64::MAX])), "block 0 claims"),
         (error("0 7 0 0 0 0", true, &wide(&[1, 0, 8, 9])), "last of 8"),
@@ -327,7 +334,7 @@ fn lying_counts_allocate_nothing() {
     ] {
         assert!(message.contains(word), "{message}");
     }
-    // A block that holds more than it says.
+    // A block that contains more than it claims.
     let style = Style { packed: true, wide: true, ..PLAIN };
     let (head, data) = style.array(&[5; 10]);
     let long = [wide(&[1, 8, 0]), head[24..].to_vec(), data].concat();
@@ -342,13 +349,14 @@ fn pieces_are_put_together() {
             .iter()
             .map(|(extent, values)| {
                 format!(
-                    "<Piece Extent='{extent}'><PointData Scalars='s'>\
-                     <DataArray type='Int32' Name='s' format='ascii'>{values}</DataArray></PointData></Piece>"
+                    "<Piece Extent='{extent}'><PointData Scalars='s'><DataArray type='Int32' \
+                     Name='s' format='ascii'>{values}</DataArray></PointData></Piece>"
                 )
             })
             .collect();
         let file = format!(
-            "<VTKFile type='ImageData'><ImageData WholeExtent='0 2 -1 0 5 6'>{pieces}</ImageData></VTKFile>"
+            "<VTKFile type='ImageData'><ImageData WholeExtent='0 2 -1 0 5 \
+             6'>{pieces}</ImageData></VTKFile>"
         );
         read_with(&folder.write("volume.vti", file.as_bytes()), read)
     };
@@ -358,5 +366,5 @@ fn pieces_are_put_together() {
     assert_eq!(volume.samples, Samples::I32((0..12).collect()));
     assert_eq!(volume.lattice.origin, DVec3::new(0.0, -1.0, 5.0));
     assert!(load(&[left]).unwrap_err().to_string().contains("8 points"));
-    assert!(load(&[left, left]).unwrap_err().to_string().contains("no piece holds point 2"));
+    assert!(load(&[left, left]).unwrap_err().to_string().contains("no piece contains point 2"));
 }

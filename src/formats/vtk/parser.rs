@@ -1,4 +1,4 @@
-//! The lines and the arrays of legacy VTK files.
+//! Parses the lines and arrays of legacy VTK files.
 
 use super::super::{Endian, SampleType, vtk_xml::Part};
 use crate::{
@@ -6,13 +6,14 @@ use crate::{
     input::{Source, copy},
 };
 
-/// Bytes that an array of a field takes beside its name and its numbers.
+/// Bytes per field array besides its name and its numbers.
 const FIELD: u64 = 256;
 
-/// No line of a real file comes near this many bytes. Arrays are no lines.
+/// Maximum length of a line in bytes. Lines of real files are far shorter; arrays do not count as
+/// lines.
 const LONGEST: usize = 1 << 20;
 
-/// A place in a file.
+/// A position in a file.
 pub(super) struct Parser<'a> {
     source: &'a Source<'a>,
     at: usize,
@@ -20,7 +21,7 @@ pub(super) struct Parser<'a> {
 }
 
 impl<'a> Parser<'a> {
-    /// Reads the header; also gives the kind of the data set.
+    /// Reads the header. Also returns the kind of the data set.
     pub fn open(source: &'a Source) -> Result<(Self, String)> {
         let mut parser = Self { source, at: 0, binary: false };
         let cut = |parser: &Self| source.error(parser.place(), "the file ends inside its header");
@@ -61,7 +62,7 @@ impl<'a> Parser<'a> {
                     }
                     return Ok((parser, kind));
                 }
-                // Data of the whole may stand before.
+                // Data of the whole file may come first.
                 [keyword, _, count] if keyword.eq_ignore_ascii_case("FIELD") => {
                     for _ in 0..parser.count(&place, count)? {
                         parser.field()?;
@@ -71,9 +72,7 @@ impl<'a> Parser<'a> {
                     parser.skip_to_blank()?
                 }
                 _ => {
-                    return Err(
-                        source.error(place, "is not the line “DATASET …” that was expected")
-                    );
+                    return Err(source.error(place, "the line “DATASET …” was expected here"));
                 }
             }
         }
@@ -88,7 +87,7 @@ impl<'a> Parser<'a> {
         &source.bytes()[self.at..]
     }
 
-    /// The next line as it stands; none at the end of the file.
+    /// Returns the next line unchanged; `None` at the end of the file.
     fn raw_line(&mut self) -> Result<Option<&'a [u8]>> {
         let rest = self.rest();
         let window = &rest[..rest.len().min(LONGEST)];
@@ -102,20 +101,20 @@ impl<'a> Parser<'a> {
         Ok(Some(line.trim_ascii()))
     }
 
-    /// The next line that is not empty, and its place.
+    /// Returns the next line that is not empty, and its place.
     pub fn line(&mut self) -> Result<Option<(String, String)>> {
         loop {
             let place = self.place();
             let Some(line) = self.raw_line()? else { return Ok(None) };
             let text = copy::text(line).map_err(|_| self.source.error(&place, "is not text"))?;
-            // The copy is asked: what is mapped may have become blank since the line was found.
+            // Check the copy: the mapped line may have become blank since it was found.
             if text.split_ascii_whitespace().next().is_some() {
                 return Ok(Some((place, text)));
             }
         }
     }
 
-    /// Passes over the line that must come next, by its first word.
+    /// Skips the next line, which must begin with this word.
     pub fn expect(&mut self, word: &str) -> Result<()> {
         match self.line()? {
             Some((_, line)) if line.split_ascii_whitespace().next() == Some(word) => Ok(()),
@@ -125,30 +124,31 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Passes over lines up to an empty one.
+    /// Skips lines up to an empty one.
     pub fn skip_to_blank(&mut self) -> Result<()> {
         while self.raw_line()?.is_some_and(|line| !line.is_empty()) {}
         Ok(())
     }
 
-    /// A count from a keyword's line, within the limits of points.
+    /// Returns a count from a keyword's line, checked against the limit of points.
     pub fn count(&self, place: &str, word: &str) -> Result<usize> {
-        let count =
-            word.parse().map_err(|_| self.source.error(place, format!("“{word}” is no count")))?;
+        let count = word
+            .parse()
+            .map_err(|_| self.source.error(place, format!("“{word}” is not a count")))?;
         self.source.check_points("a count of points or cells", count)
     }
 
-    /// Three numbers of a keyword's line.
+    /// Returns three numbers of a keyword's line.
     pub fn three<T: std::str::FromStr>(&self, place: &str, words: &[&str]) -> Result<[T; 3]> {
         let numbers: Option<Vec<T>> = words.iter().map(|word| word.parse().ok()).collect();
         let wrong = |_| self.source.error(place, "needs three numbers");
         numbers.unwrap_or_default().try_into().map_err(wrong)
     }
 
-    /// The array that begins here.
+    /// Reads the array that begins here.
     pub fn array(&mut self, place: &str, count: usize, kind: &str) -> Result<Part<'a>> {
         let wrong = |message: String| -> Error { self.source.error(place, message) };
-        // Of the machines that write these files, long is 8 bytes wide; indices are written as int.
+        // On the machines that write these files, long has 8 bytes. Indices are written as int.
         let kind = match kind.to_ascii_lowercase().as_str() {
             "unsigned_char" | "vtktypeuint8" => SampleType::U8,
             "char" | "signed_char" | "vtktypeint8" => SampleType::I8,
@@ -180,7 +180,7 @@ impl<'a> Parser<'a> {
             })?;
             self.source.room::<u8>("the text", length)?;
             let text = copy::text(&rest[..length])
-                .map_err(|_| wrong("is followed by what is not text".into()))?;
+                .map_err(|_| wrong("is followed by bytes that are not text".into()))?;
             self.source.spend("the size of the numbers in bytes", (count * kind.bytes()) as u64)?;
             (kind.parse(&text, count).map_err(wrong)?.into(), Endian::Little, length)
         };
@@ -188,8 +188,9 @@ impl<'a> Parser<'a> {
         Ok(Part { kind, endian, bytes })
     }
 
-    /// The corners of `count` cells, and where each cell's end. Before version 5.1, `size` numbers: of each cell how many
-    /// corners it has, and these. From then on, `count` offsets, the first of them 0, and `size` corners.
+    /// Returns the corners of `count` cells, and where each cell's corners end. Before version 5.1,
+    /// the file has `size` numbers: for each cell the number of its corners, then the corners. From
+    /// 5.1 on, it has `count` offsets, beginning with 0, and `size` corners.
     pub fn cells(
         &mut self,
         place: &str,
@@ -206,7 +207,7 @@ impl<'a> Parser<'a> {
                 .as_ref()
                 .and_then(|(place, line)| Some((place, line.strip_prefix("CONNECTIVITY")?.trim())));
             let (place, kind) =
-                next.ok_or_else(|| self.source.error(place, "offsets without their CONNECTIVITY"))?;
+                next.ok_or_else(|| self.source.error(place, "has OFFSETS without CONNECTIVITY"))?;
             let corners = self.array(place, size, kind)?.doubles(self.source)?;
             if ends.first().is_some_and(|&first| first != 0.0) {
                 return Err(self
@@ -222,7 +223,7 @@ impl<'a> Parser<'a> {
         let (mut corners, mut ends) = (Vec::new(), Vec::new());
         let mut rest = &numbers[..];
         for cell in 0..count {
-            // Casts saturate: a negative number of corners is 0.
+            // Casts saturate: a negative number of corners becomes 0.
             let found = rest.split_first().and_then(|(&n, rest)| rest.split_at_checked(n as usize));
             let Some((own, after)) = found else {
                 return Err(self
@@ -236,7 +237,7 @@ impl<'a> Parser<'a> {
         Ok((corners, ends))
     }
 
-    /// An array of a field: its name, components and numbers.
+    /// Reads an array of a field: its name, components and numbers.
     pub fn field(&mut self) -> Result<(String, usize, Part<'a>)> {
         let Some((mut place, mut line)) = self.line()? else {
             return Err(self.source.error(self.place(), "the file ends inside a FIELD"));
@@ -257,14 +258,15 @@ impl<'a> Parser<'a> {
         Ok((unescaped(name), components, part))
     }
 
-    /// Passes over colours, which are bytes in binary and fractions in text.
+    /// Skips colours, which are bytes in binary files and fractions in text files.
     pub fn skip_colors(&mut self, place: &str, count: usize, components: usize) -> Result<()> {
         let kind = if self.binary { "unsigned_char" } else { "float" };
         self.array(place, count.saturating_mul(components), kind).map(drop)
     }
 }
 
-/// Bytes up to the end of the `count`-th word, or how many words there are.
+/// Returns the bytes up to the end of the `count`-th word. If there are fewer words, the error is
+/// their number.
 fn length_of_words(bytes: &[u8], count: usize) -> Result<usize, usize> {
     let (mut found, mut at) = (0, 0);
     while found < count {
@@ -275,7 +277,7 @@ fn length_of_words(bytes: &[u8], count: usize) -> Result<usize, usize> {
     Ok(at)
 }
 
-/// A name as it was before characters were written as % and two hexadecimal digits.
+/// Decodes a name in which characters are written as % and two hexadecimal digits.
 pub(super) fn unescaped(name: &str) -> String {
     let mut bytes = Vec::new();
     let mut rest = name.as_bytes();

@@ -4,7 +4,8 @@ use super::*;
 use crate::{input::testing::*, volume::Samples};
 use glam::Vec3;
 
-/// A file of text, or binary with the numbers of every line that begins with one turned into bytes of its type.
+/// A file in text or binary. Each entry of the body is a line, the type of the numbers after it,
+/// and the numbers.
 fn file(binary: bool, body: &[(&str, &str, &str)]) -> Vec<u8> {
     let encoding = if binary { "BINARY" } else { "ASCII" };
     let mut file =
@@ -43,7 +44,8 @@ fn samples(content: &[u8], scalar: Option<&str>) -> Result<Points> {
 
 const IMAGE: &[(&str, &str, &str)] = &[
     (
-        "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 1\nORIGIN 10 20 30\nSPACING 0.5 1 2\nPOINT_DATA 6",
+        "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 2 1\nORIGIN 10 20 30\nSPACING 0.5 1 2\nPOINT_DATA \
+         6",
         "",
         "",
     ),
@@ -58,7 +60,8 @@ fn structured_points() {
         let found = volume(&whole).unwrap();
         assert_eq!(found.samples, Samples::U8(vec![0, 1, 2, 30, 4, 255]));
         assert_eq!(found.bounds(), [DVec3::new(10.0, 20.0, 30.0), DVec3::new(11.0, 21.0, 30.0)]);
-        // Without the line's end behind the last number the file is whole, and a text without its last digits is a shorter one.
+        // Without the line end after the last number, the file is still whole. A text without its
+        // last digits has a shorter number.
         for end in 0..whole.len() - if binary { 1 } else { 3 } {
             assert!(volume(&whole[..end]).is_err(), "cut at {end}");
         }
@@ -133,9 +136,10 @@ fn unstructured_grids_of_both_versions() {
                     .to_string()
                     .contains("no scalar “none”")
             );
-            assert!(volume(&content).unwrap_err().to_string().contains("no volume"));
+            assert!(volume(&content).unwrap_err().to_string().contains("not a volume"));
             for end in 0..content.len() {
-                // Whole parts may be missing at the end; nothing panics, and what is read is sound.
+                // Whole parts may be missing at the end. Nothing panics, and data that are read are
+                // valid.
                 if let Ok(points) = samples(&content[..end], None) {
                     points.validate().unwrap();
                 }
@@ -180,10 +184,10 @@ fn what_is_wrong_is_told() {
         ("DIMENSIONS 3 2 1", "DIMENSIONS 3 2 2", "claims 6 points, but the data set has 12"),
         ("SPACING 0.5", "SPACING 0", "spacing"),
         ("unsigned_char", "bit", "type bit"),
-        ("SCALARS", "SCALES", "“SCALES” is not known"),
+        ("SCALARS", "SCALES", "“SCALES” is not a known keyword"),
         ("30 4", "300 4", "300"),
         ("4 255", "4", "5 numbers where 6"),
-        ("POINT_DATA 6", "POINT_DATA six", "“six” is no count"),
+        ("POINT_DATA 6", "POINT_DATA six", "“six” is not a count"),
         ("POINT_DATA 6", "", "before POINT_DATA"),
     ] {
         let message = image(from, to).to_string();
@@ -203,6 +207,6 @@ fn what_is_wrong_is_told() {
         .to_string()
     };
     assert!(cells("4 0 1 2").contains("more corners than are listed"));
-    assert!(cells("3 0 1 8").contains("corner 8"));
+    assert!(cells("3 0 1 8").contains("point 8"));
     assert!(cells("3 0 1 2").contains("has no scalar"));
 }

@@ -1,22 +1,25 @@
-//! What is done where a mapped file is not there any more: the handler of SIGBUS, and the mappings that it answers for.
+//! Handles reads of a mapped file whose pages are gone: the SIGBUS handler, and the mappings that
+//! it covers.
 //!
-//! The handler may interrupt anything, so it takes no lock and no memory: it reads a list of atomics that only ever grows, maps
-//! zeros over the rest of the mapping that was hit, and marks it. mmap is not on the list of what POSIX lets handlers call; on
-//! Linux and macOS it is a plain call of the system. A fault elsewhere goes to the handler that was there before, among them
-//! that of Rust's runtime for stacks that overflow.
+//! The handler may interrupt anything, so it takes no lock and allocates nothing. It reads a list
+//! of atomics that only ever grows, maps zeros over the rest of the mapping that was hit, and marks
+//! it. POSIX does not list mmap among the functions that a handler may call; on Linux and macOS it
+//! is a plain system call. Faults at other addresses go to the previous handler. For example,
+//! Rust's runtime has one for stack overflows.
 //!
-//! A program that sets its own handler of SIGBUS after the first file was opened has to pass on what is not its own.
+//! A program that sets its own SIGBUS handler after the first file was opened must pass on the
+//! faults that are not its own.
 
 use std::sync::{
     Once, OnceLock,
     atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst},
 };
 
-/// Answers for one mapping as long as it lives.
+/// Covers one mapping for as long as it lives.
 pub struct Guard(&'static Slot);
 
 impl Guard {
-    /// For bytes that are mapped, whole pages from the first one.
+    /// Covers mapped bytes, which are whole pages starting at the first byte.
     pub fn new(mapped: &[u8]) -> Self {
         install();
         let mut slot = &FIRST;
@@ -28,7 +31,7 @@ impl Guard {
         Self(slot)
     }
 
-    /// Whether a part of the mapping was not there when it was read.
+    /// Returns whether a part of the mapping was missing when it was read.
     pub fn is_hit(&self) -> bool {
         self.0.is_hit.load(SeqCst)
     }
@@ -41,10 +44,10 @@ impl Drop for Guard {
     }
 }
 
-/// A place for one mapping. Places are never given back, but used again.
+/// A slot for one mapping. Slots are never freed, but reused.
 struct Slot {
     is_taken: AtomicBool,
-    /// Odd while the two after it are being changed.
+    /// Odd while `start` and `length` are being changed.
     version: AtomicUsize,
     start: AtomicUsize,
     length: AtomicUsize,
@@ -73,7 +76,8 @@ impl Slot {
         self.version.fetch_add(1, SeqCst);
     }
 
-    /// The end of the mapping, if an address is in it. One that is just being set is another: what is read is not dropped.
+    /// Returns the end of the mapping if it contains the address. A slot that is just being changed
+    /// belongs to another mapping: the one being read is not dropped meanwhile.
     fn end_around(&self, address: usize) -> Option<usize> {
         let version = self.version.load(SeqCst);
         let [start, length] = [&self.start, &self.length].map(|number| number.load(SeqCst));
@@ -88,25 +92,26 @@ impl Default for Slot {
     }
 }
 
-/// The handler that was there before.
+/// The previous handler.
 static PREVIOUS: OnceLock<libc::sigaction> = OnceLock::new();
 
-/// Bytes of a page.
+/// Bytes per page.
 static PAGE: AtomicUsize = AtomicUsize::new(0);
 
-#[expect(unsafe_code, reason = "setting a handler of a signal")]
+#[expect(unsafe_code, reason = "installing a signal handler")]
 fn install() {
     static ONCE: Once = Once::new();
-    // SAFETY: the structures are those that the calls ask for, all zeros being a value of each; what the handler does is safe
-    // at any time, as told above. It runs on the stack that threads keep for handlers: where their own has overflowed, the
-    // runtime's handler, which comes after it, has to get that far.
+    // SAFETY: the calls get structures of the types they expect, and all zeros is a valid value of
+    // each. The handler is safe to run at any time, as the module's documentation explains. It runs
+    // on the stack that threads reserve for handlers. If a thread's own stack has overflowed, the
+    // runtime's handler, which runs after ours, must still be reached.
     ONCE.call_once(|| unsafe {
         PAGE.store(usize::try_from(libc::sysconf(libc::_SC_PAGESIZE)).unwrap_or(4096), SeqCst);
         let mut previous: libc::sigaction = std::mem::zeroed();
         if libc::sigaction(libc::SIGBUS, std::ptr::null(), &raw mut previous) != 0 {
             return;
         }
-        // Before ours, which asks for it, is there.
+        // Set before our handler is installed, which reads it.
         let _ = PREVIOUS.set(previous);
         let mut own: libc::sigaction = std::mem::zeroed();
         own.sa_sigaction = on_fault as *const () as usize;
@@ -116,22 +121,23 @@ fn install() {
     });
 }
 
-#[expect(unsafe_code, reason = "a handler of a signal")]
+#[expect(unsafe_code, reason = "a signal handler")]
 extern "C" fn on_fault(
     signal: libc::c_int,
     info: *mut libc::siginfo_t,
     context: *mut libc::c_void,
 ) {
-    // SAFETY: the system calls this with a pointer to what it knows of the signal. A positive code tells that the signal is a
-    // fault and has an address.
+    // SAFETY: the system passes a pointer to its description of the signal. A positive code means
+    // that the signal is a fault and has an address.
     let address = unsafe { ((*info).si_code > 0).then(|| (*info).si_addr() as usize) };
     if !address.is_some_and(replace) {
         pass_on(signal, info, context);
     }
 }
 
-/// Puts zeros in the place of a mapping from an address on; tells whether there is one of ours.
-#[expect(unsafe_code, reason = "mapping zeros over what is not there")]
+/// Maps zeros over a mapping from an address on. Returns whether the address belongs to one of our
+/// mappings and the zeros could be mapped.
+#[expect(unsafe_code, reason = "mapping zeros over missing pages")]
 fn replace(address: usize) -> bool {
     let mut slot = Some(&FIRST);
     while let Some(at) = slot {
@@ -139,8 +145,9 @@ fn replace(address: usize) -> bool {
             at.is_hit.store(true, SeqCst);
             let start = address & !(PAGE.load(SeqCst) - 1);
             let flags = libc::MAP_PRIVATE | libc::MAP_ANON | libc::MAP_FIXED;
-            // SAFETY: the pages belong to a mapping that is ours, is being read, so is not dropped, and is read only; its last page
-            // is its own to the end. Readers see the same bytes or zeros.
+            // SAFETY: the pages belong to one of our mappings. It is being read, so it is not
+            // dropped, and it is read only. No other mapping shares its last page. Readers see the
+            // same bytes or zeros.
             let mapped = unsafe {
                 libc::mmap(start as *mut libc::c_void, end - start, libc::PROT_READ, flags, -1, 0)
             };
@@ -151,13 +158,14 @@ fn replace(address: usize) -> bool {
     false
 }
 
-/// Has the handler that was there before answer.
-#[expect(unsafe_code, reason = "calling a handler of a signal")]
+/// Passes the signal on to the previous handler.
+#[expect(unsafe_code, reason = "calling the previous signal handler")]
 fn pass_on(signal: libc::c_int, info: *mut libc::siginfo_t, context: *mut libc::c_void) {
     type Plain = extern "C" fn(libc::c_int);
     type Informed = extern "C" fn(libc::c_int, *mut libc::siginfo_t, *mut libc::c_void);
-    // SAFETY: what the system gave as a handler is one, of the form that its flags tell. The default action is set where there
-    // was none: what faulted is tried again and ends the process; a signal that somebody sent is sent again.
+    // SAFETY: the system returned this address as a handler, of the kind that its flags say. If
+    // there was no handler, the default action is restored: a faulting instruction is retried and
+    // ends the process. A signal that another process sent is raised again.
     unsafe {
         match PREVIOUS.get() {
             Some(previous) if ![libc::SIG_DFL, libc::SIG_IGN].contains(&previous.sa_sigaction) => {

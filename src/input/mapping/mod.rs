@@ -1,18 +1,22 @@
-//! Files mapped to memory, which others may shorten or write to meanwhile.
+//! Files mapped to memory, which other programs may shorten or overwrite meanwhile.
 //!
-//! A mapping is read like memory, at any place and by any thread, which is what the readers of large files live on. Its price:
-//! where a file is shortened, or its disk fails, reading the mapping raises a signal (SIGBUS) that ends the process. Here the
-//! signal is answered instead (`fault`): the rest of the mapping becomes zeros and is marked. Whoever is done with reading asks
-//! [`Mapping::change`], and drops what was made of zeros, or of bytes old and new.
+//! A mapping is read like memory, at any offset and by any thread. The readers of large files rely
+//! on that. The price: if the file is shortened or its disk fails, reading the mapping raises a
+//! signal (SIGBUS) that ends the process. The handler in `fault` answers this signal instead: it
+//! replaces the rest of the mapping with zeros and marks it. When a caller has finished reading, it
+//! asks [`Mapping::change`] and discards results that were made from zeros, or from a mix of old
+//! and new bytes.
 //!
-//! The bytes behind `&[u8]` may thus change, which Rust's rules do not foresee. What is relied on: the readers take every
-//! byte for untrusted when they use it, so that other bytes lead to other results, or to an error, and those are dropped.
+//! So the bytes behind `&[u8]` may change, which Rust's rules do not foresee. The code relies on
+//! this: readers treat every byte as untrusted whenever they use it. Changed bytes therefore lead
+//! to other results or to an error, and those results are discarded.
 
 #[cfg(any(target_os = "linux", target_os = "macos"))]
 mod fault;
 #[cfg(not(any(target_os = "linux", target_os = "macos")))]
 mod fault {
-    //! Windows does not let mapped files be shortened. Elsewhere the signal keeps its usual effect.
+    //! Windows does not allow mapped files to be shortened. On other systems the signal keeps its
+    //! default effect.
 
     pub struct Guard;
 
@@ -34,10 +38,11 @@ use std::{fs::File, io, ops::Deref};
 
 /// The bytes of a file.
 pub(crate) struct Mapping {
-    /// None of an empty file. The guard goes before what it guards.
+    /// `None` for an empty file. The guard comes first, so that it is dropped before the mapping it
+    /// guards.
     bytes: Option<(fault::Guard, Mmap)>,
     file: File,
-    /// Of the file when it was opened.
+    /// The file's stamp when it was opened.
     opened: Stamp,
 }
 
@@ -51,23 +56,24 @@ impl Mapping {
         Ok(Self { bytes, file, opened })
     }
 
-    /// What has become of the file since it was opened, in words; `None` where nothing has.
+    /// Describes in words how the file has changed since it was opened; `None` if it has not.
     pub fn change(&self) -> Option<String> {
         if self.bytes.as_ref().is_some_and(|(guard, _)| guard.is_hit()) {
-            return Some("a part of it is not there any more, or its disk failed".into());
+            return Some("a part of it is gone, or its disk failed".into());
         }
-        // A file that cannot be asked any more may still have given what was in it.
+        // If the file can no longer be queried, what was read from it may still be right.
         self.opened.change(&Stamp::of(&self.file).ok()?)
     }
 
-    /// Gives the pages that were read back to the system: those who go through a file larger than memory do so now and
-    /// then. They are read again where they are asked for again.
+    /// Returns the pages read so far to the system. Readers of files larger than memory call this
+    /// regularly. Pages that are needed again are read again.
     pub fn release(&self) {
         #[cfg(unix)]
-        #[expect(unsafe_code, reason = "advice that may drop what was written to a mapping")]
+        #[expect(unsafe_code, reason = "advice that would drop changes written to a mapping")]
         if let Some((_, map)) = &self.bytes {
-            // SAFETY: the mapping is of a file and read only, or of zeros where `fault` put them: what is dropped reads again as
-            // it was. Where the advice is not taken, nothing is lost.
+            // SAFETY: the mapping is read only, backed by a file or by the zeros that `fault` put
+            // there. Pages that are dropped read the same again. If the system ignores the advice,
+            // nothing is lost.
             unsafe { map.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) }.ok();
         }
     }
@@ -75,7 +81,8 @@ impl Mapping {
 
 #[expect(unsafe_code, reason = "mapping a file, which others may change")]
 fn map(file: &File) -> io::Result<(fault::Guard, Mmap)> {
-    // SAFETY: the mapping is read only. That others may change the file, and what comes of it, is told above.
+    // SAFETY: the mapping is read only. The module's documentation explains what happens if another
+    // program changes the file.
     let map = unsafe { Mmap::map(file) }?;
     Ok((fault::Guard::new(&map), map))
 }
@@ -115,11 +122,12 @@ mod tests {
         assert_eq!((hit[99_999], hit[4999], hit[5001], hit[70_000]), (0, 7, 0, 0));
         hit.release();
         assert_eq!((hit[99_999], hit[4999]), (0, 7));
-        assert!(hit.change().unwrap().contains("not there any more"));
-        // Others have not been read, and are told by their length alone.
+        assert!(hit.change().unwrap().contains("a part of it is gone"));
+        // The other mappings have not been read yet; only the length shows the change.
         assert_eq!((other.change(), other[99_999]), (None, 7));
         assert!(away.change().unwrap().contains("5000 bytes"));
-        // Each mapping answers for itself, by many threads at once, and guards are used again.
+        // Each mapping handles its own faults, also with many threads at once, and slots are
+        // reused.
         drop(hit);
         for _ in 0..100 {
             let path = folder.write("c", [7; 100_000]);
@@ -133,7 +141,7 @@ mod tests {
                     });
                 }
             });
-            assert!(mapping.change().unwrap().contains("not there any more"));
+            assert!(mapping.change().unwrap().contains("a part of it is gone"));
         }
         assert_eq!((other.change(), other[50_000]), (None, 7));
     }
@@ -150,7 +158,7 @@ mod tests {
         std::thread::sleep(std::time::Duration::from_millis(20));
         File::options().write(true).open(&path).unwrap().write_all(&[8]).unwrap();
         assert!(written.change().unwrap().contains("written to"));
-        // A new file of the same name is another one.
+        // A new file of the same name is a different file.
         let replaced = mapping(&path);
         folder.write("a", [9; 10]);
         assert!(replaced.change().is_none() && replaced.len() == 5001);

@@ -1,4 +1,4 @@
-//! By what a file is seen to have changed.
+//! The stamp of a file that shows whether it has changed: its length and modification time.
 
 use std::{
     fs::File,
@@ -6,7 +6,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-/// The length of a file, and when it was written to last; not every file system knows.
+/// The length of a file in bytes, and its modification time if the file system reports one.
 pub struct Stamp {
     pub length: u64,
     written: Option<SystemTime>,
@@ -18,18 +18,19 @@ impl Stamp {
         Ok(Self { length: found.len(), written: found.modified().ok() })
     }
 
-    /// In words, what is not as it was.
+    /// Describes in words what has changed, or returns `None`.
     pub fn change(&self, now: &Self) -> Option<String> {
         if now.length != self.length {
-            return Some(format!("it has {} bytes where it had {}", now.length, self.length));
+            return Some(format!("it has {} bytes now and had {} before", now.length, self.length));
         }
         let [before, after] = [self.written?, now.written?];
         (!is_same(before, after)).then(|| "it was written to".into())
     }
 }
 
-/// Whether two times may be one. File systems keep them to a second or to parts of it, and some give a time as it came until
-/// they read it again: then one of the two is the other, rounded.
+/// Returns whether two times may be the same. File systems store times in seconds or fractions of a
+/// second. Some report the exact time until they read it back from disk. Then one of the two is the
+/// other, rounded.
 fn is_same(a: SystemTime, b: SystemTime) -> bool {
     const STEPS: [u128; 5] = [1_000_000_000, 1_000_000, 1_000, 100, 1];
     let [a, b] = [a, b].map(|time| {
