@@ -38,10 +38,12 @@ pub enum Item {
 /// The items of a picture. All are drawn together by the same sheets.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
+    /// The items, in any order.
     pub items: Vec<Item>,
 }
 
 impl Scene {
+    /// Creates a scene without items.
     pub fn new() -> Self {
         Self::default()
     }
@@ -574,8 +576,10 @@ pub enum Mode {
 /// The order in which single splats are composited; the picture is the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Order {
+    /// The nearest splat first.
     #[default]
     FrontToBack,
+    /// The farthest splat first.
     BackToFront,
 }
 
@@ -607,6 +611,7 @@ pub enum Optics {
 /// A part of space that a scene is cut to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clip {
+    /// The shape that bounds the part.
     pub shape: ClipShape,
     /// Keeps what is inside the shape; else what is outside.
     pub inside: bool,
@@ -617,9 +622,12 @@ pub struct Clip {
 pub enum ClipShape {
     /// The points x with normal·x ≤ offset are inside.
     HalfSpace {
+        /// The direction out of the half-space, in world coordinates; it need not have unit length.
         normal: DVec3,
+        /// The distance of its face from the world's origin, times the length of `normal`.
         offset: f64,
     },
+    /// A box along the world's axes.
     Box(Bounds),
 }
 
@@ -651,11 +659,15 @@ pub enum Evaluate {
 pub struct Settings {
     /// Width and height in pixels.
     pub size: [u32; 2],
+    /// How splats are gathered into layers.
     pub mode: Mode,
+    /// When a field's values become colour and opacity.
     pub classification: Classification,
+    /// How the values along a ray become one colour.
     pub optics: Optics,
     /// All of them cut, at most [`Settings::MAX_CLIPS`].
     pub clips: Vec<Clip>,
+    /// How the gradients of fields are found, for light and for `gradient` of transfer functions.
     pub gradient: Gradient,
     /// How a sheet of a lattice's field is filled.
     pub evaluate: Evaluate,

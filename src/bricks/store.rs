@@ -26,6 +26,7 @@ use std::{
 pub struct Header {
     /// The lattice of level 0, which is Cartesian.
     pub lattice: Lattice,
+    /// The type of the samples of level 0.
     pub scalar: Scalar,
     /// The smallest and the largest value of level 0. Coarser levels lie within.
     pub range: [f64; 2],

@@ -71,6 +71,7 @@ struct Outline {
 }
 
 impl Renderer {
+    /// Creates a renderer on this GPU with the default [`Budget`].
     pub fn new(gpu: &Gpu) -> Self {
         Self::with_budget(gpu, Budget::default())
     }

@@ -15,6 +15,7 @@ pub struct Node {
     /// Bounding sphere of the footprints of all leaves below. A child's sphere lies inside its
     /// parent's.
     pub center: [f32; 3],
+    /// The radius of that sphere, in world units.
     pub radius: f32,
     /// The apparent width of the splat: the full width at half maximum of its footprint along its
     /// longest axis (2.355 σ), and never less than a child's. A cut projects this width from the
@@ -30,10 +31,12 @@ pub struct Node {
 }
 
 impl Node {
+    /// Returns whether the node has no children.
     pub fn is_leaf(&self) -> bool {
         self.children == 0
     }
 
+    /// Returns the centre of the bounding sphere, relative to the tree's origin.
     pub fn center(&self) -> Vec3 {
         Vec3::from(self.center)
     }
@@ -43,6 +46,7 @@ impl Node {
 /// their parents.
 #[derive(Debug, Clone, Default)]
 pub struct Block {
+    /// The nodes; node 0 is the root.
     pub nodes: Vec<Node>,
     /// The leaf of block 0 that this block's root replaces; `None` for block 0 itself.
     pub portal: Option<u32>,
@@ -65,6 +69,7 @@ pub struct Tree {
     pub bounds: Bounds,
     /// Points in the source: vertices or samples.
     pub source_points: u64,
+    /// The blocks. If there are several, block 0 joins the others.
     pub blocks: Vec<Block>,
 }
 

@@ -23,6 +23,7 @@ pub struct FrameStats {
     pub lambda: f64,
     /// Bricks that the view needed, and those of them that were read for it.
     pub bricks: u64,
+    /// Bricks that were read for this view.
     pub read_bricks: u64,
     /// GPU memory of the slots that bricks lie in.
     pub brick_bytes: u64,

@@ -23,8 +23,11 @@ use rayon::prelude::*;
 /// as `positions`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Points {
+    /// World position that the positions are relative to.
     pub origin: DVec3,
+    /// The positions of the samples, relative to `origin`.
     pub positions: Vec<Vec3>,
+    /// The value of each sample.
     pub values: Vec<f32>,
     /// The reach of each sample, in world units: two standard deviations of its kernel, or as many
     /// as [`SampleOptions::deviations`] sets.
@@ -40,6 +43,7 @@ impl Points {
         self.positions.len()
     }
 
+    /// Returns whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }

@@ -30,6 +30,7 @@ pub struct Lattice {
     /// units. Body-centred: the edges of the cubic cell, which is two layers high along the third
     /// axis. Rectilinear: one unit of the coordinates along each axis.
     pub axes: DMat3,
+    /// How the samples are arranged in the cells.
     pub arrangement: Arrangement,
 }
 
@@ -56,6 +57,7 @@ impl Lattice {
         self.dims.iter().fold(1, |all, &n| all.saturating_mul(n))
     }
 
+    /// Returns whether the lattice has no samples.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

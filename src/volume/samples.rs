@@ -11,10 +11,15 @@ use std::{borrow::Cow, sync::Arc};
 /// Samples in the type of their file, first axis fastest.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Samples {
+    /// 8 bits, unsigned.
     U8(Vec<u8>),
+    /// 16 bits, unsigned.
     U16(Vec<u16>),
+    /// 16 bits, signed.
     I16(Vec<i16>),
+    /// 32 bits, signed.
     I32(Vec<i32>),
+    /// 32 bits, floating point.
     F32(Vec<f32>),
 }
 
@@ -41,6 +46,7 @@ impl Samples {
         each_type!(self, values => values.len())
     }
 
+    /// Returns whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -130,8 +136,11 @@ impl Samples {
 /// the largest.
 #[derive(Debug, Clone)]
 pub struct Volume {
+    /// The places of the samples.
     pub lattice: Lattice,
+    /// The samples, in the lattice's memory order.
     pub samples: Samples,
+    /// The smallest and the largest sample.
     pub range: [f64; 2],
     /// If set, kernels carry these values instead of the samples, so that their sum passes through
     /// the samples ([`Volume::sharpened`]).
@@ -209,6 +218,7 @@ impl Volume {
         self.samples.len()
     }
 
+    /// Returns whether the volume has no samples.
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
     }

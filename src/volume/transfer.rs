@@ -40,6 +40,7 @@ pub struct TransferFunction {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Isosurface {
+    /// The value of the field on the surface.
     pub value: f64,
     /// Red, green, blue, 0 … 1.
     pub color: [f64; 3],
@@ -65,9 +66,13 @@ impl Default for TransferFunction {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shade {
+    /// Light that reaches every surface, whatever its direction.
     pub ambient: f64,
+    /// Light that depends on the angle between the surface's normal and the light.
     pub diffuse: f64,
+    /// The highlight's brightness.
     pub specular: f64,
+    /// How small the highlight is. Larger powers make smaller highlights.
     pub power: f64,
 }
 

@@ -33,12 +33,16 @@ pub const NO_PAGE: u32 = u32::MAX;
 /// relative to the tree's origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CutSphere {
+    /// The centre of the node's bounding sphere.
     pub center: [f32; 3],
+    /// The radius of that sphere.
     pub radius: f32,
+    /// The apparent width of the node's splat ([`Node::size`]).
     pub size: f32,
 }
 
 impl CutSphere {
+    /// Returns the bounds of a node.
     pub fn of(node: &Node) -> Self {
         Self { center: node.center, radius: node.radius, size: node.size }
     }
@@ -221,6 +225,7 @@ impl Hierarchy {
         }
     }
 
+    /// Returns the properties of the whole hierarchy.
     pub fn header(&self) -> &Header {
         &self.header
     }
