@@ -149,7 +149,7 @@ impl<'a> DataSet<'a> {
             match (keyword.as_str(), &words[1..]) {
                 ("DIMENSIONS", sizes) => data.dims = parser.three(&place, sizes)?,
                 ("ORIGIN", numbers) => {
-                    data.origin = DVec3::from_array(parser.three(&place, numbers)?)
+                    data.origin = DVec3::from_array(parser.three(&place, numbers)?);
                 }
                 ("SPACING" | "ASPECT_RATIO", numbers) => {
                     data.spacing = DVec3::from_array(parser.three(&place, numbers)?);
@@ -183,7 +183,7 @@ impl<'a> DataSet<'a> {
                     data.cells.add(&corners, &ends, 0).map_err(wrong)?;
                 }
                 ("CELL_TYPES", [count]) => {
-                    drop(parser.array(&place, parser.count(&place, count)?, "int")?)
+                    drop(parser.array(&place, parser.count(&place, count)?, "int")?);
                 }
                 ("POINT_DATA", [count]) => {
                     data.points.count = parser.count(&place, count)?;
@@ -195,7 +195,7 @@ impl<'a> DataSet<'a> {
                 }
                 ("METADATA", _) => parser.skip_to_blank()?,
                 ("LOOKUP_TABLE", [_, count]) => {
-                    parser.skip_colors(&place, parser.count(&place, count)?, 4)?
+                    parser.skip_colors(&place, parser.count(&place, count)?, 4)?;
                 }
                 ("FIELD", [_, arrays]) => {
                     for _ in 0..parser.count(&place, arrays)? {

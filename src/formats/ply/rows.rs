@@ -18,7 +18,7 @@ pub(super) fn number(bytes: &[u8], kind: &ScalarType, big: bool) -> f64 {
         ($t:ty) => {{
             let mut raw = [0; size_of::<$t>()];
             raw.copy_from_slice(&bytes[..size_of::<$t>()]);
-            if big { <$t>::from_be_bytes(raw) as f64 } else { <$t>::from_le_bytes(raw) as f64 }
+            f64::from(if big { <$t>::from_be_bytes(raw) } else { <$t>::from_le_bytes(raw) })
         }};
     }
     match kind {
@@ -158,7 +158,7 @@ impl<'a> Rows<'a> {
                 walk(row, element, *big, wanted, &mut list, &mut visit);
             }
             Rows::Loose { data, starts, big } => {
-                walk(&data[starts[row]..], element, *big, wanted, &mut list, &mut visit)
+                walk(&data[starts[row]..], element, *big, wanted, &mut list, &mut visit);
             }
             Rows::Text { lines } => {
                 let mut words =

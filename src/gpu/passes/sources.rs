@@ -51,7 +51,7 @@ impl Sources<Stage> {
         match &chunk.origin {
             // The number of drawn nodes is known on the GPU alone.
             Origin::Nodes { slots, .. } => {
-                self.dispatch_indirect(gpu, encoder, chunk, buffers, &slots.arguments)
+                self.dispatch_indirect(gpu, encoder, chunk, buffers, &slots.arguments);
             }
             _ => {
                 let (stage, groups) = self.bound(gpu, chunk, buffers);

@@ -290,7 +290,7 @@ fn lies_are_told_though_checksums_fit() {
     let future = forged(&bytes, |bytes| bytes[8] = 9);
     match try_all(future) {
         Err(crate::Error::Input { message, .. }) => {
-            assert!(message.contains("version 9"), "{message}")
+            assert!(message.contains("version 9"), "{message}");
         }
         other => panic!("{other:?}"),
     }
