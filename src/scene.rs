@@ -36,6 +36,26 @@ pub enum Item {
 }
 
 /// The items of a picture. All are drawn together by the same sheets.
+///
+/// A volume and a mesh in one picture:
+///
+/// ```
+/// use splatkit::{
+///     math::Kernel,
+///     scene::Scene,
+///     surface::{Mesh, SurfelOptions},
+///     volume::{TransferFunction, phantoms::Phantom},
+/// };
+///
+/// let volume = Phantom::Ball.sample_bytes([16; 3])?;
+/// let transfer = TransferFunction::automatic(&volume);
+/// let scene = Scene::new()
+///     .with_volume(volume, Kernel::default(), transfer)
+///     .with_splats(Mesh::sphere(2).surfels(&SurfelOptions::default())?);
+/// assert_eq!(scene.items.len(), 2);
+/// assert!(scene.bounds().diagonal() > 3.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
     /// The items, in any order.
@@ -370,7 +390,7 @@ impl Scene {
                 }
                 Item::Volume(..) | Item::Bricks(..) => {}
                 Item::Radiance(_) | Item::Hierarchy(_) | Item::Scalar(..) => {
-                    pixels = Some(settings.sheet_pixels)
+                    pixels = Some(settings.sheet_pixels);
                 }
             }
         }

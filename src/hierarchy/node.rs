@@ -55,6 +55,26 @@ pub struct Block {
 /// A hierarchy of splats in memory. A large one consists of several blocks, each built on its own.
 /// Block 0 joins the others, and its leaves are portals to them. If there is only one block, it has
 /// ordinary leaves.
+///
+/// A small picture takes few of the splats:
+///
+/// ```
+/// use glam::DVec3;
+/// use splatkit::{
+///     hierarchy::{BuildOptions, Detail, Tree, validate},
+///     math::Camera,
+///     surface::{Mesh, SurfelOptions},
+/// };
+///
+/// let ball = Mesh::sphere(4).surfels(&SurfelOptions::default())?;
+/// let tree = Tree::build(&ball, &BuildOptions::default(), &|_, _| ())?;
+/// assert!(validate(&tree).is_empty());
+/// // From afar, few splats stand for the whole.
+/// let camera = Camera::framing(&tree.bounds, DVec3::NEG_Z, DVec3::Y, 1.0);
+/// let cut = tree.cut(&camera.view([64, 64])?, Detail::Pixels(8.0), None)?;
+/// assert!(cut.splats.len() < ball.splats.len() / 4);
+/// # Ok::<(), splatkit::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Tree {
     /// World position of the origin of all positions.

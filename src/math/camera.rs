@@ -77,6 +77,23 @@ pub enum Projection {
 }
 
 /// Where the picture is taken from, in world units.
+///
+/// The usual camera looks at the whole of a scene, and is turned around it:
+///
+/// ```
+/// use glam::DVec3;
+/// use splatkit::math::{Bounds, Camera};
+///
+/// let bounds = Bounds { min: DVec3::splat(-1.0), max: DVec3::ONE };
+/// // Looks along −z at the whole box, with +y upwards.
+/// let mut camera = Camera::framing(&bounds, DVec3::NEG_Z, DVec3::Y, 640.0 / 480.0);
+/// camera.azimuth(30.0);
+/// let view = camera.view([640, 480])?;
+/// // In view space x is right, y down and z forward.
+/// let center = view.to_view(bounds.center());
+/// assert!(center.x.abs() < 1e-9 && center.y.abs() < 1e-9 && center.z > 1.0);
+/// # Ok::<(), splatkit::Error>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
     /// The position of the eye.

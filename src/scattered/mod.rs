@@ -21,6 +21,22 @@ use rayon::prelude::*;
 /// Points with one value each, in the file's own unit, relative to `origin`, so that doubles far
 /// from zero keep their precision in 32 bits. `radii` and `covariances` are either empty or as long
 /// as `positions`.
+///
+/// Samples are drawn as splats that carry values:
+///
+/// ```
+/// use glam::Vec3;
+/// use splatkit::scattered::{Points, SampleOptions};
+///
+/// let grid = (0..64).map(|i| Vec3::new((i % 4) as f32, (i / 4 % 4) as f32, (i / 16) as f32));
+/// let positions: Vec<Vec3> = grid.collect();
+/// let values = positions.iter().map(|position| position.z).collect();
+/// let points = Points { positions, values, ..Points::default() };
+/// assert_eq!(points.range(), [0.0, 3.0]);
+/// let splats = points.to_splats(&SampleOptions::default())?;
+/// assert_eq!(splats.splats.len(), 64);
+/// # Ok::<(), splatkit::Error>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Points {
     /// World position that the positions are relative to.

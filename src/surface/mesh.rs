@@ -7,6 +7,23 @@ use std::{ops::Range, sync::Arc};
 ///
 /// Positions are in the file's own unit, relative to `origin`, so that geo-referenced doubles keep
 /// their precision in 32 bits. Optional attributes are either empty or as long as `positions`.
+///
+/// A mesh is drawn as surfels, elliptic discs that overlap without holes:
+///
+/// ```
+/// use glam::Vec3;
+/// use splatkit::surface::{Mesh, SurfelOptions};
+///
+/// let square = Mesh {
+///     positions: vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y],
+///     triangles: vec![[0, 1, 2], [0, 2, 3]],
+///     ..Mesh::default()
+/// };
+/// let surfels = square.surfels(&SurfelOptions::default())?;
+/// assert!(surfels.splats.len() >= 4);
+/// assert!(!square.is_solid() && Mesh::sphere(2).is_solid());
+/// # Ok::<(), splatkit::Error>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Mesh {
     /// World position that the vertices are relative to.

@@ -134,6 +134,21 @@ impl Samples {
 
 /// A volume: a lattice and one scalar per sample. Values are finite; `range` holds the smallest and
 /// the largest.
+///
+/// A volume of 2 × 3 × 4 bytes, whose slices are 2.5 units apart:
+///
+/// ```
+/// use glam::DVec3;
+/// use splatkit::volume::{Lattice, Samples, Volume};
+///
+/// let lattice = Lattice::with_spacing([2, 3, 4], DVec3::new(1.0, 1.0, 2.5));
+/// let volume = Volume::new(lattice, Samples::U8((0..24).collect()))?;
+/// assert_eq!(volume.range, [0.0, 23.0]);
+/// // The first axis is the fastest in memory.
+/// assert_eq!(volume.value(1 + 2 * 2 + 3 * 6), 23.0);
+/// assert_eq!(volume.bounds(), [DVec3::ZERO, DVec3::new(1.0, 2.0, 7.5)]);
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Volume {
     /// The places of the samples.

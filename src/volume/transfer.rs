@@ -19,6 +19,21 @@ use std::path::Path;
 /// 1.0, "shade": {"ambient": 0.2, "diffuse": 0.7, "specular": 0.3, "power": 10}}`. Without `unit`
 /// it is 1; without `shade` the volume is not lit. Optional: `"gradient": [[magnitude, factor], …]`
 /// and `"isosurfaces": [{"value": 80, "color": [1, 1, 1], "opacity": 1}, …]`.
+///
+/// Values below 200 are invisible here:
+///
+/// ```
+/// use splatkit::volume::TransferFunction;
+///
+/// let bone = TransferFunction::from_json(
+///     r#"{"color": [[0, 0.8, 0.5, 0.4], [1000, 1, 1, 0.9]],
+///         "opacity": [[200, 0], [700, 0.5]], "unit": 2.0}"#,
+/// )?;
+/// assert_eq!(bone.opacity(450.0), 0.25);
+/// assert_eq!(bone.opacity(3000.0), 0.5);
+/// assert!(!bone.visible([-1000.0, 200.0]));
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransferFunction {
     /// Value, and red, green, blue in 0 … 1. Values ascend.

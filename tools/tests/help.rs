@@ -36,7 +36,7 @@ fn every_shell_gets_a_script_with_tasks_and_flags() {
 fn bash_completes_a_flag() {
     let folder = Folder::new("bash");
     folder.put("script", folder.run("completions bash").ok().stdout);
-    let commands = "source script; COMP_WORDS=(splatkit render --gpu-m); COMP_CWORD=2; \
+    let commands = "source ./script; COMP_WORDS=(splatkit render --gpu-m); COMP_CWORD=2; \
         _splatkit splatkit --gpu-m render; echo \"${COMPREPLY[@]}\"";
     let bash = std::process::Command::new("bash")
         .args(["--norc", "-c", commands])

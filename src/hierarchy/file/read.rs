@@ -73,6 +73,25 @@ impl Page {
 }
 
 /// A hierarchy opened from a file, from bytes, or from a tree in memory.
+///
+/// The same as a file on disk, in memory:
+///
+/// ```
+/// use splatkit::{
+///     hierarchy::{BuildOptions, Hierarchy, Tree, file},
+///     input::Limits,
+///     surface::{Mesh, SurfelOptions},
+/// };
+///
+/// let ball = Mesh::sphere(3).surfels(&SurfelOptions::default())?;
+/// let tree = Tree::build(&ball, &BuildOptions::default(), &|_, _| ())?;
+/// let bytes = file::to_bytes(&tree, &file::WriteOptions::default())?;
+/// let name = "ball.splk".as_ref();
+/// let hierarchy = Hierarchy::from_bytes(bytes, name, &Limits::default())?;
+/// assert_eq!(hierarchy.header().leaves, ball.splats.len() as u64);
+/// assert_eq!(hierarchy.leaves()?.splats.len(), ball.splats.len());
+/// # Ok::<(), splatkit::Error>(())
+/// ```
 pub struct Hierarchy {
     path: PathBuf,
     store: Store,
@@ -166,7 +185,7 @@ impl Hierarchy {
                 (1.., Some(portal))
                     if top.nodes.get(portal as usize).is_some_and(Node::is_leaf) =>
                 {
-                    portals.push(portal)
+                    portals.push(portal);
                 }
                 (_, portal) => return Err(refuse(format!("its portal is {portal:?}"))),
             }
