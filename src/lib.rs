@@ -62,9 +62,9 @@
 //!
 //! # Errors
 //!
-//! Every fallible function returns [`Error`]; its message names the file, the place in it, what was
-//! found and what was expected. A few constructors that know no file return a message, to which the
-//! caller adds the place. A damaged or hostile file is an error, never a panic.
+//! Functions that may fail return [`Error`]. Its message names the file, the place in it, what was
+//! found and what was expected. A few functions know no file or place; they return a message as a
+//! string. A damaged or hostile file is an error, never a panic.
 
 pub mod bricks;
 pub mod compare;

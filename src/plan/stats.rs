@@ -27,7 +27,8 @@ pub struct FrameStats {
     pub read_bricks: u64,
     /// GPU memory of the slots that bricks lie in.
     pub brick_bytes: u64,
-    /// Milliseconds of each step, in order; only from [`Renderer::profile`].
+    /// Milliseconds of each step, in order; only from
+    /// [`Renderer::profile`](crate::Renderer::profile).
     pub steps: Vec<(&'static str, f64)>,
 }
 
