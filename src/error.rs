@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
+/// Matched by its variants; the words of a message may change.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A file that does not follow its format.
     #[error("{}: {place}: {message}", file.display())]
@@ -27,6 +29,10 @@ pub enum Error {
     #[error("{0}")]
     Argument(String),
 
+    /// A transfer function that cannot be used, or that does not fit the values of its item.
+    #[error("{0}")]
+    Transfer(String),
+
     /// Work on an input took longer than its [`Deadline`](crate::Deadline) allows.
     #[error("{what} takes longer than the limit of {limit} s")]
     Timeout { what: String, limit: u64 },
@@ -44,9 +50,26 @@ pub enum Error {
     #[error("no usable GPU: {0}")]
     NoAdapter(String),
 
-    /// The device ran out of memory or rejected an operation. It can still be used.
+    /// The driver reported an error, ran out of memory or did not answer in time. Unless the error
+    /// repeats, the device can still be used.
     #[error("GPU: {0}")]
-    Gpu(String),
+    Driver(String),
+
+    /// One sheet of a picture has more entries, pairs of a splat and a tile, than a depth pass may
+    /// have ([`Budget::entries`](crate::gpu::Budget::entries)).
+    #[error(
+        "GPU: the scene needs more entries in one sheet of the picture than the budget of {budget}; \
+         raise the budget"
+    )]
+    EntriesExhausted { budget: u32 },
+
+    /// The scene needs more memory, in bytes, than it may take on this adapter
+    /// ([`Gpu::with_memory`](crate::gpu::Gpu::with_memory)).
+    #[error(
+        "GPU: the scene takes {} MiB of memory or more on {adapter}, of which {} MiB may be taken",
+        needed.div_ceil(1 << 20), limit.div_ceil(1 << 20)
+    )]
+    MemoryBound { adapter: String, needed: u64, limit: u64 },
 
     /// The device is lost, with all its resources
     /// ([`Gpu::reopened`](crate::gpu::Gpu::reopened)).

@@ -67,7 +67,7 @@ impl Renderer {
     /// Prepares a scene on a device.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a scene that [`Scene::validate`] refuses; [`Error::Gpu`] for one that does not fit the device.
+    /// [`Error::Argument`] for a scene that [`Scene::validate`] refuses; [`Error::Driver`] for one that does not fit the device.
     pub fn new(device: &Device, scene: &Scene) -> Result<Self> {
         Ok(Self {
             scene: scene.clone(),

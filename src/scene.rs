@@ -533,7 +533,7 @@ impl Item {
     /// # Errors
     /// [`Error::Argument`] for numbers that are none, or beyond what 32 bits hold.
     pub fn validate(&self) -> Result<()> {
-        numbers::check_item(self).map_err(Error::Argument)
+        numbers::check_item(self)
     }
 
     /// The box around the item, footprints included.

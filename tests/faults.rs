@@ -240,7 +240,7 @@ fn a_small_device_draws_the_same_or_says_why_not() {
                     "2^{shift} bytes per buffer: the picture differs by {found}"
                 );
             }
-            Err(Error::Gpu(message)) => {
+            Err(Error::Driver(message)) => {
                 assert!(message.contains("buffer"), "2^{shift} bytes per buffer: {message}");
                 errors += 1;
             }
@@ -261,7 +261,7 @@ fn what_did_not_fit_leaves_the_device_usable() {
     // One row of this picture is larger than the largest buffer.
     let huge = Settings::new([1 << 23, 2]);
     let error = renderer.render(&mut prepared, &camera, &huge).unwrap_err();
-    assert!(matches!(error, Error::Gpu(_) | Error::Argument(_)), "{error}");
+    assert!(matches!(error, Error::Driver(_) | Error::Argument(_)), "{error}");
     let again = renderer.render(&mut prepared, &camera, &settings).expect("draws again").0;
     assert!(same(&first, &again));
 }
@@ -513,7 +513,7 @@ fn memory_is_kept_to() {
                     "coarser"
                 }
                 Ok(_) => panic!("2^{shift} bytes: a different picture"),
-                Err((when, Error::Gpu(message))) => {
+                Err((when, Error::Driver(message))) => {
                     assert!(message.ends_with(" MiB may be taken"), "2^{shift} bytes: {message}");
                     when
                 }

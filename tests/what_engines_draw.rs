@@ -62,9 +62,9 @@ impl Row {
 }
 
 fn bytes_on(lattice: Lattice) -> Result<Volume> {
-    let volume = Phantom::Ball.sample_on(lattice).map_err(Error::Argument)?;
+    let volume = Phantom::Ball.sample_on(lattice)?;
     let bytes = (0..volume.len()).map(|i| (255.0 * volume.value(i)).round() as u8).collect();
-    Volume::new(volume.lattice, Samples::U8(bytes)).map_err(Error::Argument)
+    Volume::new(volume.lattice, Samples::U8(bytes))
 }
 
 /// A lattice in the cube from −1 to 1, with `layers` samples along z.
@@ -128,7 +128,7 @@ fn sharp(lattice: Lattice, kernel: Result<Kernel>) -> Result<Scene> {
 fn of_type(samples: fn(&Volume) -> Samples) -> Result<Scene> {
     let volume = bytes_on(cartesian(SIDE))?;
     let samples = samples(&volume);
-    let volume = Volume::new(volume.lattice, samples).map_err(Error::Argument)?;
+    let volume = Volume::new(volume.lattice, samples)?;
     Ok(Scene::new().with_volume(volume, Kernel::default(), transfer()))
 }
 

@@ -39,7 +39,7 @@ impl Header {
     /// Checks that a volume with this header can be cut into bricks, in memory or in a file. The
     /// error is a message.
     pub(super) fn validate(&self) -> Result<(), String> {
-        self.lattice.validate()?;
+        self.lattice.check()?;
         level::refusal(&self.lattice)?;
         let [low, high] = self.range;
         if !(low <= high && (high - low).is_finite()) {
@@ -284,7 +284,7 @@ impl Bricks {
             },
         )?;
         let samples = Samples::from_bytes(scalar, &bytes);
-        let mut volume = Volume::new(self.lattice(level), samples)
+        let mut volume = Volume::checked(self.lattice(level), samples)
             .map_err(|message| damaged(&self.path, "samples", message))?;
         volume.range = self.header.range;
         Ok(volume)

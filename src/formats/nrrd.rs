@@ -59,7 +59,7 @@ pub fn read(source: &Source) -> Result<Volume> {
     source.spend("the size of the samples in bytes", kind.decoded_bytes(size))?;
     let Some(field) = header.data_file() else {
         let (bytes, endian) = header.bytes(source, rest, kind, size)?;
-        return Volume::new(lattice, kind.decode(bytes, endian))
+        return Volume::checked(lattice, kind.decode(bytes, endian))
             .map_err(|message| source.error("samples", message));
     };
     let names = files::names(source, field, rest, dims)?;
@@ -68,7 +68,7 @@ pub fn read(source: &Source) -> Result<Volume> {
         let path = source.neighbour("data file", name)?;
         let data = source.open_beside(&path)?;
         let volume = header.bytes(&data, data.bytes(), kind, size).and_then(|(bytes, endian)| {
-            Volume::new(lattice, kind.decode(bytes, endian))
+            Volume::checked(lattice, kind.decode(bytes, endian))
                 .map_err(|message| data.error("samples", message))
         });
         return data.unless_changed(volume);
@@ -84,7 +84,7 @@ pub fn read(source: &Source) -> Result<Volume> {
         order = endian;
         data.intact()?;
     }
-    Volume::new(lattice, kind.decode(all.into(), order))
+    Volume::checked(lattice, kind.decode(all.into(), order))
         .map_err(|message| source.error("samples", message))
 }
 
@@ -318,7 +318,7 @@ impl<'a> Header<'a> {
                 ));
             }
         };
-        lattice.validate().map_err(|message| self.source.error("header", message))?;
+        lattice.check().map_err(|message| self.source.error("header", message))?;
         Ok(lattice)
     }
 

@@ -82,7 +82,7 @@ pub fn read_volume(source: &Source) -> Result<Volume> {
         vtr::volume(data.places, samples)
     } else {
         let dims = data.dims.map(|count| count as usize);
-        Volume::new(
+        Volume::checked(
             Lattice::cartesian(dims, data.origin, DMat3::from_diagonal(data.spacing)),
             samples,
         )

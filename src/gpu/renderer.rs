@@ -110,7 +110,7 @@ impl Renderer {
     /// Draws a picture and reads it back. Pictures larger than a binding holds are drawn in strips, one below the other.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a camera or settings that make no picture of this scene, or a scene prepared on another device; [`Error::Gpu`] where the device's memory
+    /// [`Error::Argument`] for a camera or settings that make no picture of this scene, or a scene prepared on another device; [`Error::Driver`] where the device's memory
     /// runs out or a driver's limits are met: a smaller picture may do; [`Error::DeviceLost`]: see [`Gpu::reopened`]; those of
     /// reading, for scenes that are read as they are drawn.
     pub fn render(
@@ -490,7 +490,7 @@ impl Renderer {
 
 fn did_nothing(gpu: &Gpu) -> Error {
     // The caller puts in place of this what the device complains of.
-    Error::Gpu(format!("{} did nothing of what it was asked to", gpu.info.name))
+    Error::Driver(format!("{} did nothing of what it was asked to", gpu.info.name))
 }
 
 /// Scatters: submits `passes` depth passes at a time, behind the steps that open the frame, until all is drawn.
@@ -517,17 +517,13 @@ fn draw_passes<'a>(
             return Err(did_nothing(gpu));
         }
         if state.overflow != 0 {
-            return Err(Error::Gpu(format!(
-                "the scene needs more room in one sheet of the picture than the budget of {} entries gives; \
-                 raise the budget",
-                budget.entries
-            )));
+            return Err(Error::EntriesExhausted { budget: budget.entries });
         }
         if is_done {
             return Ok(state);
         }
         if start.elapsed() >= gpu.patience {
-            return Err(Error::Gpu(format!(
+            return Err(Error::Driver(format!(
                 "{} did not finish the picture within {} s",
                 gpu.info.name,
                 gpu.patience.as_secs_f64()

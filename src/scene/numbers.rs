@@ -16,24 +16,29 @@ use rayon::prelude::*;
 const VALUES: f64 = 1048576.0;
 
 /// An error of the item of this number.
-pub(super) fn of_item(number: usize) -> impl Fn(String) -> Error {
-    move |message| Error::Argument(format!("item {number} of the scene: {message}"))
+pub(super) fn of_item(number: usize) -> impl Fn(Error) -> Error {
+    let placed = move |message: String| format!("item {number} of the scene: {message}");
+    move |error| match error {
+        Error::Argument(message) => Error::Argument(placed(message)),
+        Error::Transfer(message) => Error::Transfer(placed(message)),
+        other => other,
+    }
 }
 
 /// Checks the transfer function of an item that has one.
-pub(super) fn check_transfer(item: &Item) -> Result<(), String> {
+pub(super) fn check_transfer(item: &Item) -> Result<()> {
     match item {
         Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => {
             transfer
                 .validate_numbers()
-                .map_err(|message| format!("the transfer function: {message}"))
+                .map_err(|message| Error::Transfer(format!("the transfer function: {message}")))
         }
         Item::Radiance(_) | Item::Hierarchy(_) => Ok(()),
     }
 }
 
 /// Checks the transfer function of an item that has one, also against the range of its values.
-pub(super) fn check_field(item: &Item) -> Result<(), String> {
+pub(super) fn check_field(item: &Item) -> Result<()> {
     check_transfer(item)?;
     let (transfer, [low, high]) = match item {
         Item::Scalar(set, transfer) => (transfer, set.value_range()),
@@ -44,22 +49,22 @@ pub(super) fn check_field(item: &Item) -> Result<(), String> {
     // One value far off, such as that of a broken sensor, would leave all others one colour.
     let [first, last] = transfer.span();
     if last > first && last - first < (high - low) / VALUES {
-        return Err(format!(
+        return Err(Error::Transfer(format!(
             "the transfer function changes from {first} to {last}, too close together for values from {low} to {high}: \
              remove values that are far off, or choose another function"
-        ));
+        )));
     }
     Ok(())
 }
 
 /// Checks the numbers of an item.
-pub(super) fn check_item(item: &Item) -> Result<(), String> {
+pub(super) fn check_item(item: &Item) -> Result<()> {
     if let Item::Volume(_, kernel, _) | Item::Bricks(_, kernel, _) = item {
-        kernel.validate().map_err(|error| error.to_string())?;
+        kernel.validate()?;
     }
     match item {
-        Item::Radiance(set) | Item::Scalar(set, _) => check_set(set)?,
-        Item::Volume(volume, ..) => volume.validate()?,
+        Item::Radiance(set) | Item::Scalar(set, _) => check_set(set).map_err(Error::Argument)?,
+        Item::Volume(volume, ..) => volume.validate().map_err(Error::Argument)?,
         Item::Hierarchy(_) | Item::Bricks(..) => {}
     }
     check_field(item)?;
@@ -69,7 +74,9 @@ pub(super) fn check_item(item: &Item) -> Result<(), String> {
     let is_none =
         matches!(item, Item::Radiance(set) | Item::Scalar(set, _) if set.splats.is_empty());
     if !is_none && ![min, max, max - min].iter().all(|v| v.to_array().into_iter().all(holds)) {
-        return Err(format!("it reaches from {min} to {max}, beyond what 32-bit numbers hold"));
+        return Err(Error::Argument(format!(
+            "it reaches from {min} to {max}, beyond what 32-bit numbers hold"
+        )));
     }
     Ok(())
 }

@@ -149,9 +149,7 @@ impl SceneFlags {
                 items.into_iter().find_map(|(path, item)| Some((path, item.validate().err()?)));
             match (found, self.show.transfer_text()) {
                 (None, _) => error.into(),
-                (Some((path, Error::Argument(what))), Some(flags))
-                    if what.starts_with("the transfer function") =>
-                {
+                (Some((path, Error::Transfer(what))), Some(flags)) => {
                     if let Some(file) = self.show.own_transfer() {
                         let message = format!("{what}; the values are those of {}", path.display());
                         return Error::input(file, "content", message).into();

@@ -35,7 +35,7 @@ pub fn write_bytes(
     path: &Path,
     mut slice: impl FnMut(usize) -> Vec<u8>,
 ) -> Result<()> {
-    lattice.validate().map_err(Error::Argument)?;
+    lattice.validate()?;
     let [nx, ny, nz] = lattice.dims;
     let mut wrong = None;
     let written = disk::write_with(path, |out| {

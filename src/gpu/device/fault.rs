@@ -80,7 +80,7 @@ impl Gpu {
         let complaints = scopes.into_iter().rev().map(|scope| pollster::block_on(scope.pop()));
         let complaint = complaints.reduce(Option::or).flatten().map(|complaint| {
             let (name, reason) = (&self.info.name, complaint.to_string());
-            Error::Gpu(match complaint {
+            Error::Driver(match complaint {
                 wgpu::Error::OutOfMemory { .. } => {
                     format!("the memory of {name} ran out: {reason}")
                 }
@@ -93,7 +93,7 @@ impl Gpu {
     /// Waits until the device has done all that was submitted.
     ///
     /// # Errors
-    /// [`Error::DeviceLost`] where it is lost; [`Error::Gpu`] where it does not answer in time ([`Self::with_patience`]), which
+    /// [`Error::DeviceLost`] where it is lost; [`Error::Driver`] where it does not answer in time ([`Self::with_patience`]), which
     /// loses it, or reported an error since the last time.
     pub fn wait(&self) -> Result<()> {
         if self.condition.lost.get().is_some() {
@@ -109,7 +109,7 @@ impl Gpu {
                 // Letting go of a device waits for it. This one may never be done, so its memory stays where it is.
                 std::mem::forget(self.clone());
                 // The device opened anew would take as long again: this is not told as a loss that can be mended.
-                return Err(Error::Gpu(format!(
+                return Err(Error::Driver(format!(
                     "{} did not answer within {seconds} s",
                     self.info.name
                 )));
@@ -127,7 +127,7 @@ impl Gpu {
         }
         match self.condition.stray.lock().unwrap_or_else(PoisonError::into_inner).take() {
             None => Ok(()),
-            Some(stray) => Err(Error::Gpu(stray)),
+            Some(stray) => Err(Error::Driver(stray)),
         }
     }
 
@@ -157,7 +157,7 @@ impl Gpu {
                 )));
             }
         }
-        let view = staging.get_mapped_range(..).map_err(|e| Error::Gpu(e.to_string()))?;
+        let view = staging.get_mapped_range(..).map_err(|e| Error::Driver(e.to_string()))?;
         Ok(view.to_vec())
     }
 }

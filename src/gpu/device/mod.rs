@@ -184,11 +184,11 @@ impl Gpu {
         if bytes <= self.memory {
             return Ok(());
         }
-        let [wanted, most] = [bytes, self.memory].map(|bytes| bytes.div_ceil(1 << 20));
-        Err(Error::Gpu(format!(
-            "the scene takes {wanted} MiB of memory or more on {}, of which {most} MiB may be taken",
-            self.info.name
-        )))
+        Err(Error::MemoryBound {
+            adapter: self.info.name.clone(),
+            needed: bytes,
+            limit: self.memory,
+        })
     }
 
     fn open(adapter: &wgpu::Adapter) -> Result<Self> {
