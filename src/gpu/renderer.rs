@@ -72,6 +72,7 @@ struct Outline {
 }
 
 impl Renderer {
+    /// Returns a renderer whose depth passes have the default capacity.
     pub fn new(gpu: &Gpu) -> Self {
         Self::with_budget(gpu, Budget::default())
     }
@@ -501,7 +502,7 @@ impl Renderer {
 
 fn did_nothing(gpu: &Gpu) -> Error {
     // If the device reported an error, the caller returns that error instead.
-    Error::Gpu(format!("{} did nothing of what it was asked to", gpu.info.name))
+    Error::Gpu(format!("{} did not do the work that was submitted", gpu.info.name))
 }
 
 /// Scatters: submits `passes` depth passes at a time, after the steps that open the frame, until
@@ -530,8 +531,8 @@ fn draw_passes<'a>(
         }
         if state.overflow != 0 {
             return Err(Error::Gpu(format!(
-                "the scene needs more room in one sheet of the picture than the budget of {} entries gives; \
-                 raise the budget",
+                "one sheet of the picture needs more than the budget of {} entries; raise the \
+                 budget",
                 budget.entries
             )));
         }

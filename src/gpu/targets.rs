@@ -153,10 +153,7 @@ impl Pool {
 }
 
 /// Creates everything that a frame needs, or takes it from the pool.
-#[allow(
-    clippy::too_many_arguments,
-    reason = "each is a different thing that the renderer holds apart"
-)]
+#[allow(clippy::too_many_arguments, reason = "each is a separate part of the renderer")]
 pub fn targets(
     gpu: &Gpu,
     pool: &mut Pool,
@@ -181,8 +178,9 @@ pub fn targets(
     let most_runs = most_runs(gpu);
     if prepared.runs > most_runs {
         return Err(Error::Argument(format!(
-            "the scene has more than {} splats and samples that may show, more than one picture takes on {}; \
-             convert it, and draw it by a coarser --cut, or let a transfer function show less",
+            "the scene has more than {} splats and visible samples, too many for one picture on \
+             {}; convert it and draw it with a coarser --cut, or use a transfer function that \
+             shows less",
             u64::from(most_runs) * u64::from(RUN),
             gpu.info.name
         )));
@@ -196,7 +194,8 @@ pub fn targets(
     let groups = |shift: u32| groups(sheets.count(), shift);
     if groups(MOST_GROUP_SHIFT) * u64::from(tile_count) > u64::from(MOST_BINS) {
         return Err(Error::Argument(format!(
-            "a picture of {width}x{height} with {} sheets is too large; draw it smaller or with thicker sheets",
+            "a picture of {width}x{height} with {} sheets is too large; draw it smaller or with \
+             thicker sheets",
             sheets.count()
         )));
     }

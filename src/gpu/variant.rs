@@ -49,7 +49,8 @@ pub fn variant(
         clips: 0,
         holes: 0,
         central: false,
-        // A software adapter runs eight invocations at once: eight columns of eight pixels fill a tile.
+        // A software adapter runs eight invocations at once: eight columns of eight pixels fill a
+        // tile.
         rows: if gpu.is_software() { 8 } else { 1 },
         most_entries: budget.tile_entries.unwrap_or(if gpu.is_software() {
             SOFTWARE_ENTRIES
@@ -137,7 +138,8 @@ const GATHERED_ROWS: u32 = 1;
 /// tests/engine_equals_reference.rs bounds the error of the picture.
 const ISOTROPIC_DISTANCE: f64 = 50.0;
 
-/// Whether the kernels of a lattice are round, and so far away that their sections are the same for all pixels.
+/// Whether the kernels of a lattice are round, and so far away that their sections are the same for
+/// all pixels.
 fn are_flat(lattice: &Lattice, kernel: &Kernel, view: &View, item: &Item) -> bool {
     let near = view.distances(&item.bounds())[0];
     // The sections of a kernel shift by ρ²σ²/2|c| between its centre and radius ρσ.

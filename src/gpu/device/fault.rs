@@ -120,7 +120,7 @@ impl Gpu {
                 )));
             }
             Ok(Err(error)) => self.condition.lose(error.to_string()),
-            Err(_) => self.condition.lose("it was gone when it was waited for"),
+            Err(_) => self.condition.lose("it disappeared during a wait"),
         }
         self.sound()
     }
@@ -158,7 +158,7 @@ impl Gpu {
             Ok(Ok(())) => {}
             _ => {
                 return Err(Error::DeviceLost(format!(
-                    "{} did not give back what was drawn",
+                    "{} did not return the requested data",
                     self.info.name
                 )));
             }

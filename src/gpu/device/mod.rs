@@ -57,8 +57,9 @@ impl std::str::FromStr for AdapterChoice {
 }
 
 /// What the user can do if no adapter is found.
-const NO_ADAPTER_HELP: &str = "install a Vulkan driver; without a GPU, the CPU engine draws the same pictures, and Mesa's \
-    software driver serves too (Debian and Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1)";
+const NO_ADAPTER_HELP: &str = "install a Vulkan driver; without a GPU, use the CPU engine, which \
+    draws the same pictures, or Mesa's software driver (Debian and Ubuntu: apt-get install \
+    mesa-vulkan-drivers libvulkan1)";
 
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
@@ -135,7 +136,7 @@ impl Gpu {
             AdapterChoice::Software => {
                 let found =
                     adapters.iter().position(|a| a.get_info().device_type == wgpu::DeviceType::Cpu);
-                (found, format!("in software; {NO_ADAPTER_HELP}"))
+                (found, format!("that runs in software; {NO_ADAPTER_HELP}"))
             }
         };
         let Some(index) = wanted.0 else {
@@ -159,7 +160,7 @@ impl Gpu {
     pub fn reopened(&self) -> Result<Self> {
         let Some(choice) = &self.choice else {
             return Err(Error::Argument(
-                "the device is the host's; it has to be opened there".into(),
+                "the device belongs to the host application, which must reopen it".into(),
             ));
         };
         Ok(Self { patience: self.patience, memory: self.memory, ..Self::headless(choice)? })
@@ -194,7 +195,8 @@ impl Gpu {
         }
         let [wanted, most] = [bytes, self.memory].map(|bytes| bytes.div_ceil(1 << 20));
         Err(Error::Gpu(format!(
-            "the scene takes {wanted} MiB of memory or more on {}, of which {most} MiB may be taken",
+            "the scene needs at least {wanted} MiB of memory on {}, of which {most} MiB may be \
+             taken",
             self.info.name
         )))
     }

@@ -46,6 +46,7 @@ pub struct Variant {
     pub isosurfaces: u32,
     /// Convex parts that the clips keep.
     pub clips: u32,
+    /// Boxes that the clips cut out.
     pub holes: u32,
     /// Opaque parts may hide the splats behind them.
     pub occlusion: bool,

@@ -60,6 +60,7 @@ pub struct Slab {
     pub slots: wgpu::Buffer,
     /// The selected samples, block by block.
     pub selected: wgpu::Buffer,
+    /// The number of selected samples.
     pub count: u32,
 }
 
@@ -123,6 +124,7 @@ pub struct Shelf {
     slot_of: HashMap<Key, usize>,
     /// Samples, ranges and first slot of each chunk.
     chunks: Vec<(wgpu::Buffer, wgpu::Buffer, usize)>,
+    /// The added chunks that the caller has not taken yet.
     grown: Vec<Slots>,
     update: u64,
 }

@@ -21,6 +21,7 @@ use std::sync::Arc;
 /// Candidates of a batch, which one invocation handles (`RUN` in frame.wgsl).
 pub const RUN: u32 = 16;
 
+/// Candidates of a workgroup of 64 invocations.
 pub const WORKGROUP_CANDIDATES: u32 = 64 * RUN;
 
 /// The source of a chunk's candidates.

@@ -56,7 +56,8 @@ struct LevelledSet {
     set: Option<Arc<SplatSet>>,
 }
 
-/// A scene whose splats and samples lie on the GPU. Cameras, settings and transfer functions may change between frames.
+/// A scene whose splats and samples lie on the GPU. Cameras, settings and transfer functions may
+/// change between frames.
 #[derive(Debug)]
 pub struct PreparedScene {
     pub(crate) scene: Scene,
@@ -136,7 +137,8 @@ impl PreparedScene {
         }
         let name = &gpu.info.name;
         Err(Error::Argument(format!(
-            "the scene was prepared on another device than the renderer's ({name}); prepare it by this renderer"
+            "the scene was prepared on another device than the renderer's ({name}); prepare it \
+             with this renderer"
         )))
     }
 
@@ -394,7 +396,12 @@ impl PreparedScene {
         if own.set.as_ref().is_some_and(|shown| Arc::ptr_eq(shown, &set)) {
             return Ok(());
         }
-        let is_old = |chunk: &Chunk| matches!(&chunk.origin, Origin::Splats { item, .. } if *item == own.item);
+        let is_old = |chunk: &Chunk| {
+            matches!(
+                &chunk.origin,
+                Origin::Splats { item, .. } if *item == own.item
+            )
+        };
         self.bytes -=
             self.chunks.iter().filter(|chunk| is_old(chunk)).map(Chunk::bytes).sum::<u64>();
         self.chunks.retain(|chunk| !is_old(chunk));
@@ -425,8 +432,8 @@ impl PreparedScene {
         let slices = held.saturating_sub(2 * NEIGHBOURS as u64).min(own) as usize;
         if slices == 0 {
             return Err(Error::Argument(format!(
-                "a slice of the volume holds {slice} samples, of which {} are too many for {}; convert the volume to bricks \
-                 (.splv), which are drawn whatever its size",
+                "a slice of the volume has {slice} samples, and {} slices are too large for {}; \
+                 convert the volume to bricks (.splv), which can be drawn at any size",
                 2 * NEIGHBOURS + 1,
                 gpu.info.name
             )));
@@ -564,7 +571,8 @@ fn places(gpu: &Gpu, lattice: &Lattice) -> Result<wgpu::Buffer> {
         let count: usize = lattice.dims.iter().sum();
         if count > MOST_PLACES {
             return Err(Error::Argument(format!(
-                "the rectilinear volume has {count} coordinates along its axes, more than {MOST_PLACES}"
+                "the rectilinear volume has {count} coordinates along its axes; the GPU engine \
+                 allows {MOST_PLACES}"
             )));
         }
         let each = (0..3).flat_map(|axis| (0..lattice.dims[axis]).map(move |at| (axis, at)));
