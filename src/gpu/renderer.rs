@@ -135,6 +135,9 @@ impl Renderer {
     }
 
     /// Draws a picture and leaves it on the GPU. A frame's time then excludes reading it back.
+    ///
+    /// # Errors
+    /// Those of [`Self::render`].
     pub fn draw(
         &mut self,
         prepared: &mut PreparedScene,
@@ -146,6 +149,9 @@ impl Renderer {
 
     /// Like [`Self::draw`], but the statistics contain the time of each step: by the GPU's clock,
     /// or, without a clock, by waiting for each step.
+    ///
+    /// # Errors
+    /// Those of [`Self::render`].
     pub fn profile(
         &mut self,
         prepared: &mut PreparedScene,

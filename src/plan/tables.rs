@@ -63,8 +63,8 @@ pub struct Tables {
 }
 
 impl Tables {
-    /// Makes the tables of a transfer function and the range of the samples. Only kernels without a
-    /// closed form get tables.
+    /// Makes the tables of a transfer function for samples in `range`, and those of the kernel if
+    /// it has no closed form.
     pub fn new(transfer: &TransferFunction, range: [f64; 2], kernel: Option<&Kernel>) -> Self {
         let Window { ends: [low, high], entries: count } = window(transfer, range);
         let last = (count - 1) as f64;

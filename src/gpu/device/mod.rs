@@ -81,8 +81,8 @@ fn rank(info: &wgpu::AdapterInfo) -> u8 {
 
 fn usable_adapters() -> Vec<wgpu::Adapter> {
     let mut adapters = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::all()));
-    // Without compute shaders, or without storage buffers in them, an adapter cannot run the
-    // engine.
+    // An adapter without compute shaders, or with fewer than eight storage buffers in them, cannot
+    // run the engine.
     adapters.retain(|a| {
         let flags = a.get_downlevel_capabilities().flags;
         flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
@@ -227,8 +227,8 @@ impl Gpu {
 
     /// Uses a device that the host application owns. It must keep WebGPU's default limits. Call
     /// this once per device: resources created through this `Gpu` or its clones can't be used with
-    /// another. Errors caused by the engine are returned by the engine; the host's own error scopes
-    /// and callbacks still see the host's errors only.
+    /// another `Gpu`. Errors caused by the engine are returned by the engine; the host's own error
+    /// scopes and callbacks still see the host's errors only.
     pub fn from_wgpu(device: wgpu::Device, queue: wgpu::Queue, info: wgpu::AdapterInfo) -> Self {
         let on_processor = info.device_type == wgpu::DeviceType::Cpu;
         let memory = memory::most().filter(|_| on_processor).unwrap_or(u64::MAX);
