@@ -63,7 +63,7 @@ const NO_ADAPTER_HELP: &str = "install a Vulkan driver; without a GPU, use the C
 
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
-    // wgpu's debug layers stay off, also in debug builds, unless the environment turns them on.
+    // wgpu turns its debug layers on in debug builds; environment variables override that.
     descriptor.flags = wgpu::InstanceFlags::from_env_or_default();
     wgpu::Instance::new(descriptor)
 }
