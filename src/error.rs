@@ -58,15 +58,15 @@ pub enum Error {
     /// One sheet of a picture has more entries, pairs of a splat and a tile, than a depth pass may
     /// have ([`Budget::entries`](crate::gpu::Budget::entries)).
     #[error(
-        "GPU: the scene needs more entries in one sheet of the picture than the budget of {budget}; \
-         raise the budget"
+        "GPU: one sheet of the picture needs more than the budget of {budget} entries; raise the \
+         budget"
     )]
     EntriesExhausted { budget: u32 },
 
     /// The scene needs more memory, in bytes, than it may take on this adapter
     /// ([`Gpu::with_memory`](crate::gpu::Gpu::with_memory)).
     #[error(
-        "GPU: the scene takes {} MiB of memory or more on {adapter}, of which {} MiB may be taken",
+        "GPU: the scene needs at least {} MiB of memory on {adapter}, of which {} MiB may be taken",
         needed.div_ceil(1 << 20), limit.div_ceil(1 << 20)
     )]
     MemoryBound { adapter: String, needed: u64, limit: u64 },

@@ -513,8 +513,8 @@ fn memory_is_kept_to() {
                     "coarser"
                 }
                 Ok(_) => panic!("2^{shift} bytes: a different picture"),
-                Err((when, Error::Driver(message))) => {
-                    assert!(message.ends_with(" MiB may be taken"), "2^{shift} bytes: {message}");
+                Err((when, Error::MemoryBound { limit, .. })) => {
+                    assert_eq!(limit, 1 << shift, "2^{shift} bytes");
                     when
                 }
                 Err((_, other)) => panic!("2^{shift} bytes: {other}"),
