@@ -17,6 +17,7 @@ mod memory;
 mod regions;
 mod solid;
 mod survey;
+mod triangles;
 
 use super::{Preset, build::Builder, file::WriteOptions, sphere::Sphere};
 use crate::{

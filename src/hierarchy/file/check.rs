@@ -2,9 +2,9 @@
 
 use super::{
     directory::{NO_PORTAL, PageEntry},
-    pages::{Around, in_order, pages},
+    pages::{Around, in_order, pages, parents},
     read::{Hierarchy, hash_start},
-    write::{arounds, parents},
+    write::arounds,
 };
 use crate::{
     Error,

@@ -311,15 +311,6 @@ pub(super) fn arounds(nodes: &[Node], runs: &[Run]) -> Vec<Around> {
     runs.par_iter().map(around).collect()
 }
 
-/// Returns the parent of each node of a block; `None` for the root.
-pub(super) fn parents(nodes: &[Node]) -> Vec<Option<u32>> {
-    let mut parents = vec![None];
-    for (index, node) in nodes.iter().enumerate() {
-        parents.extend(std::iter::repeat_n(Some(index as u32), node.children as usize));
-    }
-    parents
-}
-
 /// Writes a whole hierarchy to a temporary file beside `path`, which is renamed once it is
 /// complete.
 ///
