@@ -208,10 +208,16 @@ fn by_magic<'a>(
     bytes: &[u8],
     may: impl Fn(&Format) -> bool,
 ) -> Option<&'a Format> {
-    let mut allowed = table.iter().filter(|format| may(format));
-    let has_prefix = |format: &&Format| matches!(format.magic, Magic::Prefix(prefix) if bytes.starts_with(prefix));
-    let follows_rule = |format: &&Format| matches!(format.magic, Magic::Rule(rule) if rule(bytes));
-    allowed.clone().find(has_prefix).or_else(|| allowed.find(follows_rule))
+    let allowed = || table.iter().filter(|format| may(format));
+    let has_prefix = |format: &&Format| match format.magic {
+        Magic::Prefix(prefix) => bytes.starts_with(prefix),
+        _ => false,
+    };
+    let follows_rule = |format: &&Format| match format.magic {
+        Magic::Rule(rule) => rule(bytes),
+        _ => false,
+    };
+    allowed().find(has_prefix).or_else(|| allowed().find(follows_rule))
 }
 
 /// Returns the format of a file, among those that `may` be read: by its extension, else by its
@@ -250,5 +256,139 @@ pub(super) fn listed(mut words: Vec<String>, and: &str) -> String {
         (None, _) => String::new(),
         (Some(last), rest) if rest.is_empty() => last,
         (Some(last), rest) => format!("{rest} {and} {last}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        Error,
+        formats::{
+            FORMATS,
+            load::{mesh_of, samples_of, volume_of},
+        },
+        input::Limits,
+    };
+    use std::collections::HashSet;
+
+    /// The reader of a format that only this test knows: a word, then the coordinates of points.
+    fn read_toy(source: &Source) -> Result<Mesh> {
+        let text = source.small_text("a toy", 1 << 10)?;
+        let numbers: Vec<f32> = text.split(' ').skip(1).filter_map(|w| w.parse().ok()).collect();
+        let positions = numbers.as_chunks().0.iter().map(|&point| point.into()).collect();
+        Ok(Mesh { positions, ..Mesh::default() })
+    }
+
+    const TOY: Format = Format {
+        name: "toy",
+        extensions: &["toy"],
+        holds: &[Holding { content: Content::PointCloud, when: "" }],
+        feature: "toy",
+        magic: Magic::Prefix(b"toys"),
+        kind: Which::Always(Kind::Mesh),
+        mesh: Some(read_toy),
+        ..Format::ROW
+    };
+
+    fn with<T>(name: &str, bytes: &[u8], read: impl Fn(&Source) -> T) -> T {
+        let limits = Limits::default();
+        read(&Source::from_bytes(Path::new(name), bytes, &limits).expect("a source"))
+    }
+
+    #[test]
+    fn a_new_format_is_one_row() {
+        let table = [FORMATS, &[TOY]].concat();
+        for (name, bytes) in
+            [("a.toy", "1 2 3 4 5 6"), ("a.TOY", "toys 2 3 4"), ("a", "toys 2 3 4")]
+        {
+            let kind = |table: &[Format]| {
+                with(name, bytes.as_bytes(), |source| Kind::find(table, source, false)).unwrap()
+            };
+            assert_eq!((kind(&table), kind(FORMATS)), (Some(Kind::Mesh), None), "{name}");
+            let mesh = with(name, bytes.as_bytes(), |source| mesh_of(&table, source)).unwrap();
+            assert_eq!(mesh.positions[0].to_array(), [2.0, 3.0, 4.0], "{name}");
+            assert!(with(name, bytes.as_bytes(), |source| mesh_of(FORMATS, source)).is_err());
+        }
+        // Messages name it, where it can be read.
+        let hint = |error: Error| match error {
+            Error::Input { hint: Some(hint), .. } => hint,
+            error => panic!("no hint: {error}"),
+        };
+        let none = |source: &Source| hint(mesh_of(&table, source).unwrap_err());
+        assert!(with("a.none", b"none", none).ends_with(".csv, .txt and .toy"));
+        let none = |source: &Source| hint(samples_of(&table, source, None).unwrap_err());
+        assert!(with("a.none", b"none", none).ends_with(".csv, .txt and .xyzv"));
+    }
+
+    #[test]
+    fn rows_say_what_their_readers_read() {
+        let mut names = HashSet::new();
+        for format in FORMATS {
+            let name = format.name;
+            assert!(names.insert(name) && !format.feature.is_empty(), "{name}");
+            for extension in format.extensions {
+                assert!(names.insert(extension), "{extension} is the extension of two formats");
+                assert_eq!(extension.to_ascii_lowercase(), *extension);
+            }
+            assert!(format.written.is_none_or(|own| format.extensions.contains(&own)), "{name}");
+            let holds = |kind| format.holds.iter().any(|holding| holding.content.kind() == kind);
+            assert_eq!(format.mesh.is_some(), holds(Kind::Mesh), "{name}");
+            assert_eq!(format.volume.is_some(), holds(Kind::Volume), "{name}");
+            assert_eq!(format.samples.is_some(), holds(Kind::Samples), "{name}");
+            let is_opened = matches!(format.pieces, InPieces::Opened);
+            assert_eq!(is_opened, holds(Kind::Hierarchy) || holds(Kind::Bricks), "{name}");
+            match format.kind {
+                Which::Always(kind) => assert!(holds(kind), "{name}"),
+                Which::Rule(_) => assert!(format.holds.len() > 1, "{name}"),
+            }
+        }
+    }
+
+    #[test]
+    fn first_bytes_show_the_format() {
+        for (bytes, name) in [
+            ("SPLK", "splatkit hierarchy"),
+            ("SPLV", "splatkit bricks"),
+            ("\n ply\n", "PLY"),
+            ("glTF", "glTF"),
+            (" {\"asset\": 1}", "glTF"),
+            ("solid of one", "STL"),
+            ("LASF", "LAS"),
+            ("ASTM-E57", "E57"),
+            ("# .PCD v0.7", "PCD"),
+            ("# vtk DataFile Version 3.0", "VTK"),
+            ("<?xml?><VTKFile type='ImageData'>", "VTI"),
+            ("<VTKFile type='RectilinearGrid'>", "VTR"),
+            ("<VTKFile type='UnstructuredGrid'>", "VTU, VTP"),
+            ("<VTKFile type='PolyData'>", "VTU, VTP"),
+            ("NRRD0004", "NRRD"),
+            // A comment of a header is no sign of another format.
+            ("NRRD0004\n# from <VTKFile type='PolyData'>", "NRRD"),
+        ] {
+            let found = by_magic(FORMATS, bytes.as_bytes(), |_| true);
+            assert_eq!(found.map(|format| format.name), Some(name), "{bytes}");
+        }
+        let found = by_magic(FORMATS, b"\x93NUMPY\x01\0", |_| true);
+        assert_eq!(found.map(|format| format.name), Some("NPY"));
+        for bytes in ["", "hello", "solid", "<?xml?><svg>", "RectilinearGrid"] {
+            assert!(by_magic(FORMATS, bytes.as_bytes(), |_| true).is_none(), "{bytes}");
+        }
+        // Beyond the first 1024 bytes, words are no sign.
+        let late = [&[b' '; 1020][..], b"<VTKFile type='ImageData'>"].concat();
+        assert!(by_magic(FORMATS, &late, |_| true).is_none());
+    }
+
+    #[test]
+    fn what_no_reader_reads_is_told() {
+        let told = |error: Error| error.to_string();
+        let message = with("a.vti", b"", |source| told(mesh_of(FORMATS, source).unwrap_err()));
+        assert!(message.contains("“.vti” is not a mesh format that can be read"), "{message}");
+        let message =
+            with("a.OBJ", b"", |source| told(samples_of(FORMATS, source, None).unwrap_err()));
+        assert!(message.contains("“.obj” is not a format of scattered samples"), "{message}");
+        let message =
+            with("a.raw", b"", |source| told(volume_of(FORMATS, source, None).unwrap_err()));
+        assert!(message.contains("(VTR, VTI, VTK or NRRD)"), "{message}");
     }
 }
