@@ -132,7 +132,8 @@ impl Bricks {
     /// [`Error::Input`] for other files, other versions, damaged headers and directories, and files
     /// that are truncated or have data after their end. [`Error::Limit`] and [`Error::File`] as for
     /// every input.
-    pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
+    pub fn open(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
+        let path = path.as_ref();
         Self::new(path, Bytes::Mapped(Source::map(path, limits)?), limits)
     }
 
@@ -140,8 +141,8 @@ impl Bricks {
     ///
     /// # Errors
     /// [`Error::Input`] as for [`open`](Self::open).
-    pub fn from_bytes(bytes: Vec<u8>, name: &Path) -> Result<Self> {
-        Self::new(name, Bytes::Held(bytes), &Limits::default())
+    pub fn from_bytes(bytes: Vec<u8>, name: impl AsRef<Path>) -> Result<Self> {
+        Self::new(name.as_ref(), Bytes::Held(bytes), &Limits::default())
     }
 
     fn new(path: &Path, bytes: Bytes, limits: &Limits) -> Result<Self> {

@@ -14,6 +14,7 @@ mod describe;
 mod engine;
 mod failure;
 mod figures;
+mod formats;
 mod generate;
 mod gpus;
 mod info;
@@ -98,6 +99,8 @@ enum Task {
     Figures(figures::Figures),
     /// List the adapters that can draw, and their limits.
     Gpus(gpus::Gpus),
+    /// List the formats of files: what they hold, and whether they are read in pieces and written.
+    Formats(formats::Formats),
 }
 
 fn main() -> ExitCode {
@@ -123,6 +126,7 @@ fn main() -> ExitCode {
         Task::Generate(task) => task.run(&progress),
         Task::Figures(task) => task.run(&progress),
         Task::Gpus(task) => task.run(),
+        Task::Formats(task) => task.run(),
     };
     progress.clear();
     match result {

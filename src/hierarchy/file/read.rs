@@ -101,7 +101,8 @@ impl Hierarchy {
     /// # Errors
     /// [`Error::Input`] for other kinds of files, other versions, damaged headers and directories,
     /// and incomplete files; [`Error::Limit`] and [`Error::File`] as for every input.
-    pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
+    pub fn open(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
+        let path = path.as_ref();
         let map = Source::map(path, limits)?;
         Self::new(path, Store::Mapped(map), limits, false)
     }
@@ -111,7 +112,8 @@ impl Hierarchy {
     ///
     /// # Errors
     /// Those of [`open`](Self::open), if the header or the directory is not complete.
-    pub fn open_prefix(path: &Path, limits: &Limits) -> Result<Self> {
+    pub fn open_prefix(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
+        let path = path.as_ref();
         let map = Source::map(path, limits)?;
         Self::new(path, Store::Mapped(map), limits, true)
     }
@@ -120,8 +122,8 @@ impl Hierarchy {
     ///
     /// # Errors
     /// Those of [`open`](Self::open).
-    pub fn from_bytes(bytes: Vec<u8>, name: &Path, limits: &Limits) -> Result<Self> {
-        Self::new(name, Store::Bytes(bytes), limits, false)
+    pub fn from_bytes(bytes: Vec<u8>, name: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
+        Self::new(name.as_ref(), Store::Bytes(bytes), limits, false)
     }
 
     fn new(path: &Path, store: Store, limits: &Limits, may_be_cut: bool) -> Result<Self> {

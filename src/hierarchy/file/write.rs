@@ -77,7 +77,8 @@ impl Writer {
     /// # Errors
     /// [`Error::Output`] if nothing can be written beside `path`; [`Error::Argument`] if the extent
     /// is not a positive number, or above [`MAX_EXTENT`](crate::splat::SplatSet::MAX_EXTENT).
-    pub fn new(path: &Path, extent: f32, options: &WriteOptions) -> Result<Self> {
+    pub fn new(path: impl AsRef<Path>, extent: f32, options: &WriteOptions) -> Result<Self> {
+        let path = path.as_ref();
         Self::begin(Some(path.to_owned()), extent, options, || Spill::beside(path))
     }
 
@@ -316,7 +317,8 @@ pub(super) fn arounds(nodes: &[Node], runs: &[Run]) -> Vec<Around> {
 ///
 /// # Errors
 /// Those of [`Writer`]; also [`Error::Argument`] if a block of a joined tree has no portal.
-pub fn write(tree: &Tree, path: &Path, options: &WriteOptions) -> Result<()> {
+pub fn write(tree: &Tree, path: impl AsRef<Path>, options: &WriteOptions) -> Result<()> {
+    let path = path.as_ref();
     all(tree, Writer::new(path, tree.extent, options)?, || Target::at(path)).map(|_| ())
 }
 
