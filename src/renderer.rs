@@ -39,6 +39,27 @@ impl Device {
 
 /// Draws one scene on one device. The camera, the settings and the transfer function may change
 /// from picture to picture.
+///
+/// The CPU engine draws everywhere; [`Device::automatic`] takes a GPU if there is one:
+///
+/// ```
+/// use glam::DVec3;
+/// use splatkit::{
+///     Device, Renderer,
+///     math::Camera,
+///     scene::{Scene, Settings},
+///     surface::{Mesh, SurfelOptions},
+/// };
+///
+/// let ball = Mesh::sphere(3).surfels(&SurfelOptions::default())?;
+/// let scene = Scene::new().with_splats(ball);
+/// let mut renderer = Renderer::new(&Device::Cpu, &scene)?;
+/// let camera = Camera::framing(&scene.bounds(), DVec3::NEG_Z, DVec3::Y, 1.0);
+/// let (picture, stats) = renderer.render(&camera, &Settings::new([32, 32]))?;
+/// // Red, green, blue and opacity of the pixel in the middle.
+/// assert!(picture.color[16 * 32 + 16][3] > 0.99 && stats.splats > 0);
+/// # Ok::<(), splatkit::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Renderer {
     scene: Scene,

@@ -37,12 +37,34 @@ pub enum Item {
 }
 
 /// The items of a picture. All are drawn together, in the same sheets.
+///
+/// A volume and a mesh in one picture:
+///
+/// ```
+/// use splatkit::{
+///     math::Kernel,
+///     scene::Scene,
+///     surface::{Mesh, SurfelOptions},
+///     volume::{TransferFunction, phantoms::Phantom},
+/// };
+///
+/// let volume = Phantom::Ball.sample_bytes([16; 3])?;
+/// let transfer = TransferFunction::automatic(&volume);
+/// let scene = Scene::new()
+///     .with_volume(volume, Kernel::default(), transfer)
+///     .with_splats(Mesh::sphere(2).surfels(&SurfelOptions::default())?);
+/// assert_eq!(scene.items.len(), 2);
+/// assert!(scene.bounds().diagonal() > 3.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
+    /// The items, in any order.
     pub items: Vec<Item>,
 }
 
 impl Scene {
+    /// Creates a scene without items.
     pub fn new() -> Self {
         Self::default()
     }
@@ -399,7 +421,7 @@ impl Scene {
                 }
                 Item::Volume(..) | Item::Bricks(..) => {}
                 Item::Radiance(_) | Item::Hierarchy(_) | Item::Scalar(..) => {
-                    pixels = Some(settings.sheet_pixels)
+                    pixels = Some(settings.sheet_pixels);
                 }
             }
         }
@@ -614,8 +636,10 @@ pub enum Mode {
 /// The order in which single splats are composited. Both orders give the same picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Order {
+    /// The nearest splat first.
     #[default]
     FrontToBack,
+    /// The farthest splat first.
     BackToFront,
 }
 
@@ -648,6 +672,7 @@ pub enum Optics {
 /// A shape that cuts the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clip {
+    /// The shape that bounds the part.
     pub shape: ClipShape,
     /// Whether to keep what is inside the shape (`true`) or outside it (`false`).
     pub inside: bool,
@@ -658,9 +683,12 @@ pub struct Clip {
 pub enum ClipShape {
     /// The points x with normal·x ≤ offset are inside.
     HalfSpace {
+        /// The direction out of the half-space, in world coordinates; it need not have unit length.
         normal: DVec3,
+        /// The distance of its face from the world's origin, times the length of `normal`.
         offset: f64,
     },
+    /// A box along the world's axes.
     Box(Bounds),
 }
 
@@ -694,11 +722,15 @@ pub enum Evaluate {
 pub struct Settings {
     /// Width and height in pixels.
     pub size: [u32; 2],
+    /// How splats are gathered into layers.
     pub mode: Mode,
+    /// When a field's values become colour and opacity.
     pub classification: Classification,
+    /// How the values along a ray become one colour.
     pub optics: Optics,
     /// Clips that cut the scene, at most [`Settings::MAX_CLIPS`].
     pub clips: Vec<Clip>,
+    /// How the gradients of fields are found, for light and for `gradient` of transfer functions.
     pub gradient: Gradient,
     /// How the field of a lattice is evaluated in a sheet.
     pub evaluate: Evaluate,

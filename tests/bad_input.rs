@@ -87,7 +87,7 @@ fn every_cut_of_every_format_is_told() {
                     assert!(
                         may_load || name == "a.png" && at + 16 >= bytes.len(),
                         "{context}: loads as {told}"
-                    )
+                    );
                 }
             }
         }

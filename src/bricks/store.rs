@@ -26,6 +26,7 @@ use std::{
 pub struct Header {
     /// The lattice of level 0, which is Cartesian.
     pub lattice: Lattice,
+    /// The type of the samples of level 0.
     pub scalar: Scalar,
     /// The smallest and the largest value of level 0. Coarser levels lie within.
     pub range: [f64; 2],
@@ -52,6 +53,21 @@ impl Header {
 }
 
 /// A volume in levels and bricks. Any number of threads may read from it.
+///
+/// A volume of 48³ samples has two levels:
+///
+/// ```
+/// use splatkit::{bricks::Bricks, volume::phantoms::Phantom};
+/// use std::sync::Arc;
+///
+/// let volume = Phantom::Ball.sample_bytes([48; 3])?;
+/// let bricks = Bricks::from_volume(Arc::new(volume))?;
+/// let dims: Vec<_> = bricks.levels().iter().map(|level| level.dims).collect();
+/// assert_eq!(dims, [[48; 3], [24; 3]]);
+/// // The first of the 2 × 2 × 2 bricks of the finest level, one byte for each of its 32³ samples.
+/// assert_eq!(bricks.read(0, 0)?.samples.len(), 32 * 32 * 32);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Bricks {
     path: PathBuf,
     header: Header,

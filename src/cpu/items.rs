@@ -116,7 +116,7 @@ impl Prepared {
                 let source = Source::of_splats(view, drawn, false);
                 let own = |splat: &Splat| record(plan, &source, &widened(plan, &source, splat));
                 Ok(batches(&drawn.splats, spare, |batch, records| {
-                    records.extend(batch.iter().filter_map(own))
+                    records.extend(batch.iter().filter_map(own));
                 }))
             }
             Self::Hierarchy(pages) => {
@@ -133,7 +133,7 @@ impl Prepared {
                 let lattice = LatticeSource::new(plan, volume, kernel);
                 let own = |index: &u32| lattice.record(plan, *index as usize);
                 Ok(batches(list, spare, |batch, records| {
-                    records.extend(batch.iter().filter_map(own))
+                    records.extend(batch.iter().filter_map(own));
                 }))
             }
             Self::Bricks(cache) => {

@@ -7,6 +7,7 @@ use std::{fmt, path::Path};
 /// A file format: a row of [`FORMATS`](super::FORMATS).
 #[derive(Debug, Clone, Copy)]
 pub struct Format {
+    /// The name by which users know it.
     pub name: &'static str,
     /// In lower case, without the dot. Empty if any file may be in this format.
     pub extensions: &'static [&'static str],
@@ -30,17 +31,24 @@ pub struct Format {
 /// What a file may hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Content {
+    /// Triangles.
     Mesh,
+    /// Points without triangles, which become surfels.
     PointCloud,
+    /// Samples on a lattice.
     Volume,
+    /// Samples at any positions.
     Samples,
+    /// A hierarchy of splats.
     Hierarchy,
+    /// A volume in bricks.
     Bricks,
 }
 
 /// What files of a format hold, and when.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Holding {
+    /// The kind of data.
     pub content: Content,
     /// Which of the files hold it (“without faces”); empty for all of them.
     pub when: &'static str,

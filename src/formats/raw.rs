@@ -15,9 +15,11 @@ use std::borrow::Cow;
 pub struct RawLayout {
     /// Samples along each axis. The first axis varies fastest in the file.
     pub dims: [usize; 3],
+    /// The type of one sample.
     pub sample_type: SampleType,
     /// World units between samples along each axis.
     pub spacing: DVec3,
+    /// The byte order of samples of more than one byte.
     pub endian: Endian,
     /// Bytes before the first sample, of the uncompressed file if it is compressed.
     pub header: u64,

@@ -18,7 +18,9 @@ use std::path::Path;
 /// The counts in a file's header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Counts {
+    /// The number of points, or of vertices of a mesh.
     pub points: u64,
+    /// The number of triangles; 0 for a point cloud.
     pub triangles: u64,
 }
 

@@ -72,7 +72,7 @@ struct Outline {
 }
 
 impl Renderer {
-    /// Returns a renderer whose depth passes have the default capacity.
+    /// Creates a renderer on this GPU with the default [`Budget`].
     pub fn new(gpu: &Gpu) -> Self {
         Self::with_budget(gpu, Budget::default())
     }

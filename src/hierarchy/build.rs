@@ -22,17 +22,23 @@ use std::{
 /// Trades the time of building against the quality of the tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Preset {
+    /// Compares each splat with the fewest neighbours before it is paired.
     Fastest,
+    /// Compares with few neighbours.
     Fast,
+    /// Compares with some more neighbours; the default.
     #[default]
     Balanced,
+    /// Compares with many neighbours.
     Slow,
+    /// Compares with the most neighbours; the best tree, and the slowest to build.
     Best,
 }
 
 /// Options for building a tree.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BuildOptions {
+    /// How much time to spend on the tree's quality.
     pub preset: Preset,
     /// See [`Tree::closed`].
     pub closed: bool,

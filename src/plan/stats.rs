@@ -26,7 +26,7 @@ pub struct FrameStats {
     pub lambda: f64,
     /// Bricks that the view needed.
     pub bricks: u64,
-    /// The number of these that were read for the view.
+    /// Bricks that were read for this view.
     pub read_bricks: u64,
     /// GPU memory of the slots that hold bricks, in bytes.
     pub brick_bytes: u64,

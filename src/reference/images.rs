@@ -59,7 +59,7 @@ impl Frame<'_> {
                     }
                     Load::Radiance(_) => {}
                     Load::Sample(sample) => {
-                        sheet.mean.add(sample, kernel.center, &crossing, ray, part)
+                        sheet.mean.add(sample, kernel.center, &crossing, ray, part);
                     }
                 }
             }

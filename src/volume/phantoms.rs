@@ -258,7 +258,7 @@ mod tests {
         let volume = Phantom::Ball.sample_on(lattice).unwrap();
         // The first sample of the middle layer is displaced by half an edge: to the ball's centre.
         assert_eq!((volume.value(4), volume.len()), (1.0, 12));
-        assert_eq!(volume.value(0), Phantom::Ball.value(DVec3::splat(-0.5)) as f32 as f64);
+        assert_eq!(volume.value(0), f64::from(Phantom::Ball.value(DVec3::splat(-0.5)) as f32));
         assert!(
             Phantom::Ball
                 .sample_on(Lattice::body_centred([0, 1, 1], DVec3::ZERO, DMat3::IDENTITY))

@@ -11,10 +11,15 @@ use std::{borrow::Cow, sync::Arc};
 /// Samples in the type of their file, first axis fastest.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Samples {
+    /// 8 bits, unsigned.
     U8(Vec<u8>),
+    /// 16 bits, unsigned.
     U16(Vec<u16>),
+    /// 16 bits, signed.
     I16(Vec<i16>),
+    /// 32 bits, signed.
     I32(Vec<i32>),
+    /// 32 bits, floating point.
     F32(Vec<f32>),
 }
 
@@ -41,6 +46,7 @@ impl Samples {
         each_type!(self, values => values.len())
     }
 
+    /// Returns whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -128,10 +134,28 @@ impl Samples {
 
 /// A volume: a lattice and one scalar per sample. Values are finite; `range` holds the smallest and
 /// the largest.
+///
+/// A volume of 2 × 3 × 4 bytes, whose slices are 2.5 units apart:
+///
+/// ```
+/// use glam::DVec3;
+/// use splatkit::volume::{Lattice, Samples, Volume};
+///
+/// let lattice = Lattice::with_spacing([2, 3, 4], DVec3::new(1.0, 1.0, 2.5));
+/// let volume = Volume::new(lattice, Samples::U8((0..24).collect()))?;
+/// assert_eq!(volume.range, [0.0, 23.0]);
+/// // The first axis is the fastest in memory.
+/// assert_eq!(volume.value(1 + 2 * 2 + 3 * 6), 23.0);
+/// assert_eq!(volume.bounds(), [DVec3::ZERO, DVec3::new(1.0, 2.0, 7.5)]);
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Volume {
+    /// The places of the samples.
     pub lattice: Lattice,
+    /// The samples, in the lattice's memory order.
     pub samples: Samples,
+    /// The smallest and the largest sample.
     pub range: [f64; 2],
     /// If set, kernels carry these values instead of the samples, so that their sum passes through
     /// the samples ([`Volume::sharpened`]).
@@ -214,6 +238,7 @@ impl Volume {
         self.samples.len()
     }
 
+    /// Returns whether the volume has no samples.
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
     }

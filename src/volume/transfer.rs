@@ -19,6 +19,21 @@ use std::path::Path;
 /// 1.0, "shade": {"ambient": 0.2, "diffuse": 0.7, "specular": 0.3, "power": 10}}`. Without `unit`
 /// it is 1; without `shade` the volume is not lit. Optional: `"gradient": [[magnitude, factor], …]`
 /// and `"isosurfaces": [{"value": 80, "color": [1, 1, 1], "opacity": 1}, …]`.
+///
+/// Values below 200 are invisible here:
+///
+/// ```
+/// use splatkit::volume::TransferFunction;
+///
+/// let bone = TransferFunction::from_json(
+///     r#"{"color": [[0, 0.8, 0.5, 0.4], [1000, 1, 1, 0.9]],
+///         "opacity": [[200, 0], [700, 0.5]], "unit": 2.0}"#,
+/// )?;
+/// assert_eq!(bone.opacity(450.0), 0.25);
+/// assert_eq!(bone.opacity(3000.0), 0.5);
+/// assert!(!bone.visible([-1000.0, 200.0]));
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransferFunction {
     /// Value, and red, green, blue in 0 … 1. Values ascend.
@@ -40,6 +55,7 @@ pub struct TransferFunction {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Isosurface {
+    /// The value of the field on the surface.
     pub value: f64,
     /// Red, green, blue, 0 … 1.
     pub color: [f64; 3],
@@ -65,9 +81,13 @@ impl Default for TransferFunction {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shade {
+    /// Light that reaches every surface, whatever its direction.
     pub ambient: f64,
+    /// Light that depends on the angle between the surface's normal and the light.
     pub diffuse: f64,
+    /// The highlight's brightness.
     pub specular: f64,
+    /// How small the highlight is. Larger powers make smaller highlights.
     pub power: f64,
 }
 

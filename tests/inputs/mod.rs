@@ -230,7 +230,7 @@ fn las_points() -> Vec<[u8; 20]> {
     let point = |i: i32| {
         let mut point = [0; 20];
         (0..3).for_each(|axis| {
-            point[4 * axis..][..4].copy_from_slice(&(i * (axis as i32 + 1)).to_le_bytes())
+            point[4 * axis..][..4].copy_from_slice(&(i * (axis as i32 + 1)).to_le_bytes());
         });
         point[14] = 0b1001;
         point

@@ -384,10 +384,10 @@ pub fn any(bytes: &[u8]) {
     for kind in [kind(false), kind(true)] {
         match kind {
             Some(Kind::Mesh) => {
-                read("input", bytes, formats::read_mesh).iter().for_each(sound_mesh)
+                read("input", bytes, formats::read_mesh).iter().for_each(sound_mesh);
             }
             Some(Kind::Volume) => {
-                volume("input", bytes, |source| formats::read_volume(source, None))
+                volume("input", bytes, |source| formats::read_volume(source, None));
             }
             Some(Kind::Samples) => samples("input", bytes, formats::read_samples),
             Some(Kind::Hierarchy) => splk(bytes),

@@ -122,7 +122,7 @@ impl Generate {
                 disk::write_with(&self.output, |out| rectilinear(phantom, self.dims, out))?;
             }
             (What::Phantom(phantom), ..) if self.sample_type == Type::U8 => {
-                self.bytes(phantom, progress)?
+                self.bytes(phantom, progress)?;
             }
             (What::Phantom(phantom), ..) => {
                 let [x, ..] = self.dims;

@@ -8,6 +8,7 @@ mod camera;
 mod check;
 mod clip;
 mod compare;
+mod completions;
 mod convert;
 mod demo;
 mod describe;
@@ -22,6 +23,7 @@ mod interrupt;
 mod kernel;
 mod limits;
 mod load;
+mod man;
 mod method;
 mod output;
 mod parse;
@@ -38,7 +40,7 @@ mod terminal;
 mod threads;
 mod timing;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use failure::Failure;
 use progress::Progress;
 use std::{
@@ -101,6 +103,10 @@ enum Task {
     Gpus(gpus::Gpus),
     /// List the formats of files: what they hold, and whether they are read in pieces and written.
     Formats(formats::Formats),
+    /// Print a script that completes tasks and flags in a shell.
+    Completions(completions::Completions),
+    /// Write these help texts as manual pages.
+    Man(man::Pages),
 }
 
 fn main() -> ExitCode {
@@ -127,6 +133,8 @@ fn main() -> ExitCode {
         Task::Figures(task) => task.run(&progress),
         Task::Gpus(task) => task.run(),
         Task::Formats(task) => task.run(),
+        Task::Completions(task) => task.run(Command::command()),
+        Task::Man(task) => task.run(Command::command()),
     };
     progress.clear();
     match result {

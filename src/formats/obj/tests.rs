@@ -211,7 +211,7 @@ fn missing_files_are_warnings_and_traversal_is_refused() {
         match loaded {
             Ok(_) => assert!(reason.is_empty(), "{mtl}"),
             Err(error) => {
-                assert!(!reason.is_empty() && error.to_string().contains(reason), "{mtl}: {error}")
+                assert!(!reason.is_empty() && error.to_string().contains(reason), "{mtl}: {error}");
             }
         }
     }

@@ -18,7 +18,7 @@ pub(super) fn number(bytes: &[u8], kind: &ScalarType, big: bool) -> f64 {
         ($t:ty) => {{
             let mut raw = [0; size_of::<$t>()];
             raw.copy_from_slice(&bytes[..size_of::<$t>()]);
-            if big { <$t>::from_be_bytes(raw) as f64 } else { <$t>::from_le_bytes(raw) as f64 }
+            f64::from(if big { <$t>::from_be_bytes(raw) } else { <$t>::from_le_bytes(raw) })
         }};
     }
     match kind {

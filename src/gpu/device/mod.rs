@@ -18,8 +18,11 @@ const PATIENCE: Duration = Duration::from_secs(600);
 /// A wgpu device and queue, with the adapter's description.
 #[derive(Debug, Clone)]
 pub struct Gpu {
+    /// The wgpu device that draws.
     pub device: wgpu::Device,
+    /// The queue of the device.
     pub queue: wgpu::Queue,
+    /// The adapter's name, type, backend and driver.
     pub info: Arc<wgpu::AdapterInfo>,
     pub(crate) condition: Arc<Condition>,
     pub(crate) patience: Duration,

@@ -51,7 +51,7 @@ impl Sources<Stage> {
         match &chunk.origin {
             // Only the GPU knows the number of drawn nodes.
             Origin::Nodes { slots, .. } => {
-                self.dispatch_indirect(gpu, encoder, chunk, buffers, &slots.arguments)
+                self.dispatch_indirect(gpu, encoder, chunk, buffers, &slots.arguments);
             }
             _ => {
                 let (stage, groups) = self.bound(gpu, chunk, buffers);

@@ -123,7 +123,7 @@ impl PreparedScene {
                 }
                 Item::Volume(..) => {}
                 Item::Bricks(bricks, kernel, _) => {
-                    prepared.shelf = Some(Shelf::new(bricks, kernel))
+                    prepared.shelf = Some(Shelf::new(bricks, kernel));
                 }
             }
         }

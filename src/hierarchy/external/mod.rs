@@ -57,19 +57,24 @@ pub struct ExternalOptions {
     /// The approximate memory to use, in bytes. Regions are made as small as this requires, down to
     /// a thousand points. A few hundred million bytes are used in any case.
     pub memory: u64,
+    /// How much time to spend on the quality of each block's tree.
     pub preset: Preset,
     /// Splats in a block.
     pub block_splats: usize,
+    /// How points and triangles become splats.
     pub surfels: SurfelOptions,
 }
 
 /// The result of a conversion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Converted {
+    /// Points in the source: vertices or samples.
     pub points: u64,
+    /// Splats at the finest level.
     pub splats: u64,
     /// See [`Tree::closed`](super::Tree::closed).
     pub closed: bool,
+    /// The number of regions that the input was split into.
     pub regions: usize,
 }
 

@@ -33,12 +33,16 @@ pub const NO_PAGE: u32 = u32::MAX;
 /// relative to the tree's origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CutSphere {
+    /// The centre of the node's bounding sphere.
     pub center: [f32; 3],
+    /// The radius of that sphere.
     pub radius: f32,
+    /// The apparent width of the node's splat ([`Node::size`]).
     pub size: f32,
 }
 
 impl CutSphere {
+    /// Returns the bounds of a node.
     pub fn of(node: &Node) -> Self {
         Self { center: node.center, radius: node.radius, size: node.size }
     }
@@ -69,6 +73,25 @@ impl Page {
 }
 
 /// A hierarchy opened from a file, from bytes, or from a tree in memory.
+///
+/// The same as a file on disk, in memory:
+///
+/// ```
+/// use splatkit::{
+///     hierarchy::{BuildOptions, Hierarchy, Tree, file},
+///     input::Limits,
+///     surface::{Mesh, SurfelOptions},
+/// };
+///
+/// let ball = Mesh::sphere(3).surfels(&SurfelOptions::default())?;
+/// let tree = Tree::build(&ball, &BuildOptions::default(), &|_, _| ())?;
+/// let bytes = file::to_bytes(&tree, &file::WriteOptions::default())?;
+/// let name = "ball.splk".as_ref();
+/// let hierarchy = Hierarchy::from_bytes(bytes, name, &Limits::default())?;
+/// assert_eq!(hierarchy.header().leaves, ball.splats.len() as u64);
+/// assert_eq!(hierarchy.leaves()?.splats.len(), ball.splats.len());
+/// # Ok::<(), splatkit::Error>(())
+/// ```
 pub struct Hierarchy {
     path: PathBuf,
     store: Store,
@@ -191,6 +214,7 @@ impl Hierarchy {
         }
     }
 
+    /// Returns the properties of the whole hierarchy.
     pub fn header(&self) -> &Header {
         &self.header
     }

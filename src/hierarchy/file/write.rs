@@ -44,7 +44,9 @@ pub struct Whole {
     pub origin: DVec3,
     /// The box around all footprints, in world coordinates.
     pub bounds: Bounds,
+    /// Whether the source is solid ([`Tree::closed`]).
     pub closed: bool,
+    /// Points in the source: vertices or samples.
     pub source_points: u64,
 }
 
