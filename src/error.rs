@@ -9,6 +9,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 /// Why a function of this library failed. The message is for people; the variant says what a
 /// program can do about it.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A file that does not follow its format.
     #[error("{}: {place}: {message}", file.display())]
@@ -62,6 +63,10 @@ pub enum Error {
     #[error("{0}")]
     Argument(String),
 
+    /// A transfer function that cannot be used, or that does not fit the values of its item.
+    #[error("{0}")]
+    Transfer(String),
+
     /// Work on an input took longer than its [`Deadline`](crate::Deadline) allows.
     #[error("{what} takes longer than the limit of {limit} s")]
     Timeout {
@@ -89,9 +94,36 @@ pub enum Error {
     #[error("no usable GPU: {0}")]
     NoAdapter(String),
 
-    /// The device ran out of memory or rejected an operation. It can still be used.
+    /// The driver reported an error, ran out of memory or did not answer in time. Unless the error
+    /// repeats, the device can still be used.
     #[error("GPU: {0}")]
-    Gpu(String),
+    Driver(String),
+
+    /// One sheet of a picture has more entries, pairs of a splat and a tile, than a depth pass may
+    /// have ([`Budget::entries`](crate::gpu::Budget::entries)).
+    #[error(
+        "GPU: one sheet of the picture needs more than the budget of {budget} entries; raise the \
+         budget"
+    )]
+    EntriesExhausted {
+        /// The entries that a depth pass may have.
+        budget: u32,
+    },
+
+    /// The scene needs more memory, in bytes, than it may take on this adapter
+    /// ([`Gpu::with_memory`](crate::gpu::Gpu::with_memory)).
+    #[error(
+        "GPU: the scene needs at least {} MiB of memory on {adapter}, of which {} MiB may be taken",
+        needed.div_ceil(1 << 20), limit.div_ceil(1 << 20)
+    )]
+    MemoryBound {
+        /// The name of the adapter.
+        adapter: String,
+        /// The bytes that the scene needs at least.
+        needed: u64,
+        /// The bytes that it may take.
+        limit: u64,
+    },
 
     /// The device is lost, with all its resources
     /// ([`Gpu::reopened`](crate::gpu::Gpu::reopened)).

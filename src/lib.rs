@@ -1,8 +1,14 @@
 //! splatkit draws volumes and surfaces as elliptic splats, on a GPU or on the processor.
 //!
-//! The way of the data: a file → [`input`] (opened, guarded) → [`formats`] (what it says) → [`volume`] / [`scattered`] / [`surface`] (what it means) → splats
-//! ([`splat`]) in a [`Scene`](scene::Scene) → a [`Renderer`], which draws with the [`gpu`] on wgpu (one pass, one Rust file, one
-//! shader) or with that for processors ([`cpu`]) → a [`Picture`](picture::Picture).
+//! Data flows through these modules:
+//!
+//! - [`input`] opens a file and guards against damaged ones; [`formats`] decodes it.
+//! - [`volume`], [`scattered`] and [`surface`] interpret its content. Meshes, points and scattered
+//!   samples become splats ([`splat`]).
+//! - A [`Scene`](scene::Scene) holds splats, hierarchies and volumes, and the transfer functions
+//!   that show them.
+//! - A [`Renderer`] draws the scene into a [`Picture`](picture::Picture), with the GPU engine
+//!   ([`gpu`], on wgpu: each pass is one Rust file and one shader) or the CPU engine ([`cpu`]).
 //!
 //! # An example
 //!

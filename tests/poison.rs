@@ -283,7 +283,7 @@ fn volumes_that_are_not_finite_are_named() {
         let mut values = vec![0.5f32; 125];
         values[POISONED] = poison;
         let error = Volume::new(lattice(), Samples::F32(values.clone())).unwrap_err();
-        assert!(error.contains("sample 17"), "{error}");
+        assert!(error.to_string().contains("sample 17"), "{error}");
         let poisoned = Volume { samples: Samples::F32(values), ..volume() };
         assert_refused(&with_volume(poisoned), &camera(), &settings(), &["item 0", "sample 17"]);
         let poison = f64::from(poison);

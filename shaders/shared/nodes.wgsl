@@ -12,7 +12,7 @@
 // A bit for each page of the hierarchy: whether it is in memory.
 @group(0) @binding(5) var<storage, read> resident: array<u32>;
 
-// Mirrors engine/nodes.rs.
+// Mirrors src/gpu/scene/nodes.rs.
 struct Node {
     center: vec3<f32>,
     radius: f32,

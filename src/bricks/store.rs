@@ -40,7 +40,7 @@ impl Header {
     /// Checks that a volume with this header can be cut into bricks, in memory or in a file. The
     /// error is a message.
     pub(super) fn validate(&self) -> Result<(), String> {
-        self.lattice.validate()?;
+        self.lattice.check()?;
         level::refusal(&self.lattice)?;
         let [low, high] = self.range;
         if !(low <= high && (high - low).is_finite()) {
@@ -148,7 +148,8 @@ impl Bricks {
     /// [`Error::Input`] for other files, other versions, damaged headers and directories, and files
     /// that are truncated or have data after their end. [`Error::Limit`] and [`Error::File`] as for
     /// every input.
-    pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
+    pub fn open(path: impl AsRef<Path>, limits: &Limits) -> Result<Self> {
+        let path = path.as_ref();
         Self::new(path, Bytes::Mapped(Source::map(path, limits)?), limits)
     }
 
@@ -156,8 +157,8 @@ impl Bricks {
     ///
     /// # Errors
     /// [`Error::Input`] as for [`open`](Self::open).
-    pub fn from_bytes(bytes: Vec<u8>, name: &Path) -> Result<Self> {
-        Self::new(name, Bytes::Held(bytes), &Limits::default())
+    pub fn from_bytes(bytes: Vec<u8>, name: impl AsRef<Path>) -> Result<Self> {
+        Self::new(name.as_ref(), Bytes::Held(bytes), &Limits::default())
     }
 
     fn new(path: &Path, bytes: Bytes, limits: &Limits) -> Result<Self> {
@@ -300,7 +301,7 @@ impl Bricks {
             },
         )?;
         let samples = Samples::from_bytes(scalar, &bytes);
-        let mut volume = Volume::new(self.lattice(level), samples)
+        let mut volume = Volume::checked(self.lattice(level), samples)
             .map_err(|message| damaged(&self.path, "samples", message))?;
         volume.range = self.header.range;
         Ok(volume)

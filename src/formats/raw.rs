@@ -2,7 +2,7 @@
 
 use super::{Endian, SampleType, volume_stream::Plain};
 use crate::{
-    Error, Result,
+    Result,
     input::Source,
     volume::{Lattice, Volume},
 };
@@ -61,7 +61,7 @@ pub fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
         Cow::Owned(bytes) => drop(bytes.drain(..header)),
     }
     let samples = layout.sample_type.decode(unpacked, layout.endian);
-    Volume::new(lattice, samples).map_err(|message| source.error("samples", message))
+    Volume::checked(lattice, samples).map_err(|message| source.error("samples", message))
 }
 
 /// Returns where the samples are in a file that contains exactly the header and the samples; `None`
@@ -85,7 +85,7 @@ pub(super) fn plain(source: &Source, layout: &RawLayout) -> Result<Option<Plain>
 /// Returns the lattice of a layout, and the number of bytes of header and samples.
 fn whole(source: &Source, layout: &RawLayout) -> Result<(Lattice, usize)> {
     let lattice = Lattice::with_spacing(layout.dims, layout.spacing);
-    lattice.validate().map_err(Error::Argument)?;
+    lattice.validate()?;
     let samples =
         layout.sample_type.bytes_of(layout.dims).and_then(|bytes| bytes.checked_add(layout.header));
     let wanted = source
@@ -138,7 +138,7 @@ fn guess(size: u64, layout: &RawLayout) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{input::testing::*, volume::Samples};
+    use crate::{Error, input::testing::*, volume::Samples};
     use flate2::{Compression, write::GzEncoder};
     use std::io::Write;
 

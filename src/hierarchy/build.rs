@@ -118,7 +118,7 @@ impl Tree {
 /// file.
 pub fn build_file(
     set: &SplatSet,
-    path: &Path,
+    path: impl AsRef<Path>,
     build: &BuildOptions,
     write: &WriteOptions,
     watch: Watch<'_>,
@@ -127,8 +127,13 @@ pub fn build_file(
     check_splats(set)?;
     memory::room(WORK, order_bytes(set) + at_work(build.block_splats))?;
     let parts = partition::blocks(&set.splats, build.block_splats.max(64));
-    let mut builder =
-        Builder::new(path, set.extent, enclosing(&set.splats, set.extent), build.preset, write)?;
+    let mut builder = Builder::new(
+        path.as_ref(),
+        set.extent,
+        enclosing(&set.splats, set.extent),
+        build.preset,
+        write,
+    )?;
     let mut built = 0;
     for parts in parts.chunks(2 * rayon::current_num_threads()) {
         let block = |part: &Vec<u32>| {

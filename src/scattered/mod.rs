@@ -64,10 +64,19 @@ impl Points {
         self.positions.is_empty()
     }
 
-    /// Checks that the points are usable. The message names the first one that is wrong. Causes are
-    /// lists of different lengths, no points or more than 2³², numbers that are not finite, radii
-    /// not above 0, and covariances that are not positive definite.
-    pub fn validate(&self) -> Result<(), String> {
+    /// Checks that the points are usable.
+    ///
+    /// # Errors
+    /// [`Error::Argument`](crate::Error::Argument), which names the first point that is wrong.
+    /// Causes are lists of different lengths, no points or more than 2³², numbers that are not
+    /// finite, radii not above 0, and covariances that are not positive definite.
+    pub fn validate(&self) -> crate::Result<()> {
+        self.check().map_err(crate::Error::Argument)
+    }
+
+    /// Like [`validate`](Self::validate). The error is a message, to which the caller adds the
+    /// place.
+    pub(crate) fn check(&self) -> Result<(), String> {
         let count = self.len();
         if count == 0 {
             return Err("there are no samples".into());

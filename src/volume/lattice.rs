@@ -1,5 +1,6 @@
 //! Where the samples of a volume lie.
 
+use crate::Error;
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
@@ -237,9 +238,18 @@ impl Lattice {
         })
     }
 
-    /// Checks that samples can lie on this lattice. The message names the cause: no samples, more
-    /// than memory could index, or steps that are not finite or do not span space.
-    pub fn validate(&self) -> Result<(), String> {
+    /// Checks that samples can lie on this lattice.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for no samples, more than memory could index, or steps that are not
+    /// finite or do not span space.
+    pub fn validate(&self) -> crate::Result<()> {
+        self.check().map_err(Error::Argument)
+    }
+
+    /// Like [`validate`](Self::validate). The error is a message, to which the caller adds the
+    /// place.
+    pub(crate) fn check(&self) -> Result<(), String> {
         let [nx, ny, nz] = self.dims;
         if self.dims.contains(&0) {
             return Err(format!("a volume of {nx} × {ny} × {nz} samples holds none"));
@@ -334,7 +344,7 @@ mod tests {
             (Lattice::with_spacing([2, 2, 2], DVec3::new(1.0, 0.0, 1.0)), "spacing"),
             (Lattice { axes: flat, ..good }, "plane"),
         ] {
-            assert!(bad.validate().unwrap_err().contains(word), "{bad:?}");
+            assert!(bad.check().unwrap_err().contains(word), "{bad:?}");
         }
     }
 }

@@ -188,11 +188,16 @@ impl Volume {
     /// Puts samples on a lattice and measures their range (in parallel).
     ///
     /// # Errors
-    /// A message to which the caller adds the place. The causes are an invalid lattice
-    /// ([`Lattice::validate`]), a number of samples that does not match the lattice, and NaN or
-    /// infinite samples (the message gives their number and the first).
-    pub fn new(lattice: Lattice, samples: Samples) -> Result<Self, String> {
-        lattice.validate()?;
+    /// [`Error::Argument`](crate::Error::Argument) for an invalid lattice ([`Lattice::validate`]),
+    /// a number of samples that does not match the lattice, and NaN or infinite samples (the
+    /// message gives their number and the first).
+    pub fn new(lattice: Lattice, samples: Samples) -> crate::Result<Self> {
+        Self::checked(lattice, samples).map_err(crate::Error::Argument)
+    }
+
+    /// Like [`new`](Self::new). The error is a message, to which the caller adds the place.
+    pub(crate) fn checked(lattice: Lattice, samples: Samples) -> Result<Self, String> {
+        lattice.check()?;
         if samples.len() != lattice.len() {
             let [nx, ny, nz] = lattice.dims;
             return Err(format!(
@@ -208,7 +213,7 @@ impl Volume {
     /// in every function that takes a volume, because the volume may have been built by hand. The
     /// error is a message.
     pub(crate) fn validate(&self) -> Result<(), String> {
-        self.lattice.validate()?;
+        self.lattice.check()?;
         if self.samples.len() != self.lattice.len() {
             return Err(format!(
                 "{} samples do not fill a lattice of {}",
@@ -359,7 +364,7 @@ mod tests {
     use glam::DVec3;
 
     fn volume(dims: [usize; 3], samples: Samples) -> Result<Volume, String> {
-        Volume::new(Lattice::with_spacing(dims, DVec3::ONE), samples)
+        Volume::checked(Lattice::with_spacing(dims, DVec3::ONE), samples)
     }
 
     #[test]

@@ -135,8 +135,15 @@ impl TransferFunction {
     /// Reads the JSON form.
     ///
     /// # Errors
-    /// A message: invalid JSON (with line and column), or what [`validate`](Self::validate) finds.
-    pub fn from_json(text: &str) -> Result<Self, String> {
+    /// [`Error::Transfer`] for invalid JSON (with line and column), and those of
+    /// [`validate`](Self::validate).
+    pub fn from_json(text: &str) -> Result<Self> {
+        Self::parse(text).map_err(Error::Transfer)
+    }
+
+    /// Like [`from_json`](Self::from_json). The error is a message, to which the caller adds the
+    /// place.
+    fn parse(text: &str) -> Result<Self, String> {
         let document: Document = serde_json::from_str(text).map_err(|e| e.to_string())?;
         let transfer = Self {
             color: document.color.iter().map(|&[value, r, g, b]| (value, [r, g, b])).collect(),
@@ -150,7 +157,7 @@ impl TransferFunction {
                 .collect(),
             isosurfaces: document.isosurfaces,
         };
-        transfer.validate()?;
+        transfer.check()?;
         Ok(transfer)
     }
 
@@ -178,7 +185,7 @@ impl TransferFunction {
     /// a transfer function.
     pub fn read(path: &Path, limits: &Limits) -> Result<Self> {
         let text = Source::open(path, limits)?.small_text("a transfer function", MOST_BYTES)?;
-        Self::from_json(&text).map_err(|message| {
+        Self::parse(&text).map_err(|message| {
             Error::input(path, "transfer function", message).hint(
                 "the form is {\"color\": [[value, r, g, b], …], \
                      \"opacity\": [[value, opacity], …]}, all but values in 0 … 1",
@@ -192,8 +199,14 @@ impl TransferFunction {
     /// shade are finite and not negative.
     ///
     /// # Errors
-    /// A message that names the first point that is wrong.
-    pub fn validate(&self) -> Result<(), String> {
+    /// [`Error::Transfer`], which names the first point that is wrong.
+    pub fn validate(&self) -> Result<()> {
+        self.check().map_err(Error::Transfer)
+    }
+
+    /// Like [`validate`](Self::validate). The error is a message, to which the caller adds the
+    /// place.
+    fn check(&self) -> Result<(), String> {
         self.validate_numbers()?;
         if self.opacity.iter().all(|p| p.1 == 0.0) && self.isosurfaces.is_empty() {
             return Err(
@@ -519,11 +532,11 @@ mod tests {
                 "shade",
             ),
         ] {
-            assert!(message.contains(word), "{message}");
+            assert!(message.to_string().contains(word), "{message}");
         }
         let mut t = TransferFunction::from_json(EXAMPLE).unwrap();
         t.opacity[2].0 = f64::NAN;
-        assert!(t.validate().unwrap_err().contains("opacity point 2 is NaN"));
+        assert!(t.validate().unwrap_err().to_string().contains("opacity point 2 is NaN"));
         t.color.clear();
         assert_eq!(t.color(1.0), [0.0; 3]);
     }

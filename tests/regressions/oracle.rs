@@ -507,7 +507,9 @@ pub fn transfer(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     let transfer = match TransferFunction::from_json(text) {
         Ok(transfer) => transfer,
-        Err(message) => return assert!(!message.is_empty(), "an error without a message"),
+        Err(message) => {
+            return assert!(!message.to_string().is_empty(), "an error without a message");
+        }
     };
     let again =
         TransferFunction::from_json(&transfer.to_json()).expect("what was written can be read");

@@ -118,7 +118,7 @@ impl Demo {
         let mut mesh = Mesh::knot(1200, 72);
         // Scaled so that the knot winds through the specimen.
         mesh.positions.iter_mut().for_each(|p| *p *= KNOT_SCALE);
-        let specimen = Phantom::Specimen.sample([128; 3]).map_err(Error::Argument)?;
+        let specimen = Phantom::Specimen.sample([128; 3])?;
         formats::ply::write(&mesh, &self.folder.join(MESH))?;
         progress.stage("Building a hierarchy");
         let build = BuildOptions {

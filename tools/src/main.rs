@@ -15,6 +15,7 @@ mod describe;
 mod engine;
 mod failure;
 mod figures;
+mod formats;
 mod generate;
 mod gpus;
 mod info;
@@ -100,6 +101,8 @@ enum Task {
     Figures(figures::Figures),
     /// List the adapters that can draw, and their limits.
     Gpus(gpus::Gpus),
+    /// List the formats of files: what they hold, and whether they are read in pieces and written.
+    Formats(formats::Formats),
     /// Print a script that completes tasks and flags in a shell.
     Completions(completions::Completions),
     /// Write these help texts as manual pages.
@@ -129,6 +132,7 @@ fn main() -> ExitCode {
         Task::Generate(task) => task.run(&progress),
         Task::Figures(task) => task.run(&progress),
         Task::Gpus(task) => task.run(),
+        Task::Formats(task) => task.run(),
         Task::Completions(task) => task.run(Command::command()),
         Task::Man(task) => task.run(Command::command()),
     };

@@ -17,9 +17,9 @@ use std::{
 /// # Errors
 /// [`Error::Argument`] for a volume that was built by hand and contradicts itself;
 /// [`Error::Output`] if the file cannot be written.
-pub fn write(volume: &Volume, path: &Path) -> Result<()> {
+pub fn write(volume: &Volume, path: impl AsRef<Path>) -> Result<()> {
     volume.validate().map_err(Error::Argument)?;
-    disk::write_with(path, |out| write_to(volume, out))
+    disk::write_with(path.as_ref(), |out| write_to(volume, out))
 }
 
 /// Writes a volume of bytes slice by slice, uncompressed, so that it can also be read slice by
@@ -32,13 +32,13 @@ pub fn write(volume: &Volume, path: &Path) -> Result<()> {
 /// both cases no file is left behind.
 pub fn write_bytes(
     lattice: &Lattice,
-    path: &Path,
+    path: impl AsRef<Path>,
     mut slice: impl FnMut(usize) -> Vec<u8>,
 ) -> Result<()> {
-    lattice.validate().map_err(Error::Argument)?;
+    lattice.validate()?;
     let [nx, ny, nz] = lattice.dims;
     let mut wrong = None;
-    let written = disk::write_with(path, |out| {
+    let written = disk::write_with(path.as_ref(), |out| {
         write_header(lattice, Scalar::U8, "raw", out)?;
         for k in 0..nz {
             let samples = slice(k);

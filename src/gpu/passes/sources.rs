@@ -1,6 +1,6 @@
-//! Passes that read candidates come in four kinds, one per source of candidates: explicit splats
-//! (shaders/sources/splats.wgsl), hierarchies (shaders/sources/nodes.wgsl), lattices (shaders/sources/lattice.wgsl) and volumes in
-//! bricks (shaders/sources/bricks.wgsl).
+//! The sources of candidates. A pass that reads candidates has a stage for each of the four kinds:
+//! explicit splats (shaders/sources/splats.wgsl), hierarchies (shaders/sources/nodes.wgsl),
+//! lattices (shaders/sources/lattice.wgsl) and volumes in bricks (shaders/sources/bricks.wgsl).
 
 use crate::gpu::{
     device::Gpu,
@@ -11,7 +11,7 @@ use crate::gpu::{
     scene::chunk::{Chunk, Origin, WORKGROUP_CANDIDATES},
 };
 
-/// One thing per kind of source.
+/// One value per kind of source.
 #[derive(Debug)]
 pub struct Sources<T> {
     splats: T,
@@ -20,7 +20,7 @@ pub struct Sources<T> {
     bricks: T,
 }
 
-/// Makes all kinds of a stage from the source's shader and the bindings of its group.
+/// Makes a stage for each kind of source, from the source's shader and the bindings of its group.
 pub fn per_source(make: impl Fn(&str, &[Binding]) -> Stage) -> Sources<Stage> {
     use Binding::{Read, Uniform};
     let lattice = [shaders::VALUE, shaders::SAMPLE, shaders::SOURCE_LATTICE].concat();
@@ -49,7 +49,7 @@ impl Sources<Stage> {
         buffers: &[wgpu::BufferBinding<'_>],
     ) {
         match &chunk.origin {
-            // The number of drawn nodes is known on the GPU alone.
+            // Only the GPU knows the number of drawn nodes.
             Origin::Nodes { slots, .. } => {
                 self.dispatch_indirect(gpu, encoder, chunk, buffers, &slots.arguments);
             }
@@ -61,7 +61,7 @@ impl Sources<Stage> {
         }
     }
 
-    /// The same over as many workgroups as a buffer says.
+    /// The same, with the number of workgroups in a buffer.
     pub fn dispatch_indirect(
         &self,
         gpu: &Gpu,

@@ -17,6 +17,7 @@ mod memory;
 mod regions;
 mod solid;
 mod survey;
+mod triangles;
 
 use super::{Preset, build::Builder, file::WriteOptions, sphere::Sphere};
 use crate::{
@@ -106,12 +107,13 @@ const FEWEST_POINTS: u64 = 1 << 10;
 pub fn convert(
     files: &[PathBuf],
     limits: &Limits,
-    path: &Path,
+    path: impl AsRef<Path>,
     options: &ExternalOptions,
     write: &WriteOptions,
     watch: StageWatch<'_>,
 ) -> Result<Converted> {
     let _span = tracing::info_span!("convert").entered();
+    let path = path.as_ref();
     let most = (options.memory / OF_POINT).clamp(FEWEST_POINTS, MOST_POINTS);
     let mut inputs = Vec::new();
     for file in files {

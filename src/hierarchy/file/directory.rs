@@ -4,8 +4,7 @@
 use super::{
     HASH, PAGE_NODES,
     header::Stored,
-    pages::{Around, Run},
-    write::parents,
+    pages::{Around, Run, parents},
 };
 use crate::container::{Cursor, Put};
 use crate::hierarchy::Node;

@@ -71,7 +71,7 @@ fn lossless_keeps_every_bit() {
 fn pages_tell_their_parents(hierarchy: &Hierarchy) {
     let tree = hierarchy.read_tree().unwrap();
     let parents: Vec<Vec<Option<u32>>> =
-        tree.blocks.iter().map(|block| write::parents(&block.nodes)).collect();
+        tree.blocks.iter().map(|block| pages::parents(&block.nodes)).collect();
     for (number, entry) in hierarchy.pages().iter().enumerate() {
         let page = hierarchy.read_page(number as u32).unwrap();
         assert_eq!(page.nodes.len(), entry.nodes as usize);
@@ -342,7 +342,7 @@ fn bounds_hold_exactly_for_what_is_read() {
                         pages::reach(node.center().as_dvec3(), child) <= f64::from(node.radius)
                     );
                     assert!(child.size <= node.size);
-                    let cone = libm::cos(page::joint_angle(node, child));
+                    let cone = libm::cos(cones::joint_angle(node, child));
                     assert!(node.cone == -1.0 || f64::from(node.cone) <= cone);
                 }
             }
