@@ -3,7 +3,8 @@
 //! [`load_mesh`], [`load_volume`] and [`load_samples`] look at the name and the first bytes, and
 //! return a mesh (or point cloud), a volume or scattered samples; [`Kind`] says which of them a
 //! file needs. [`read_mesh`], [`read_volume`] and [`read_samples`] do the same with bytes in memory
-//! ([`Source::from_bytes`]). All of them read through a [`Source`], within its [`Limits`].
+//! ([`Source::from_bytes`]). All of them read through a [`Source`], within its
+//! [`Limits`](crate::input::Limits).
 
 #![deny(clippy::disallowed_methods)]
 

@@ -28,8 +28,9 @@ pub struct RawLayout {
 /// Reads a raw file, which may be compressed by gzip. Sample (0, 0, 0) is at the world's origin.
 ///
 /// # Errors
-/// [`Error::Input`] if the file's size is not exactly that of header and samples, with a guess at
-/// the layout it fits; [`Error::Limit`] for a layout over the limits.
+/// [`Error::Input`](crate::Error::Input) if the file's size is not exactly that of header and
+/// samples, with a guess at the layout it fits; [`Error::Limit`](crate::Error::Limit) for a layout
+/// over the limits.
 pub fn read(source: &Source, layout: &RawLayout) -> Result<Volume> {
     let (lattice, wanted) = whole(source, layout)?;
     let bytes = source.bytes();
