@@ -238,7 +238,7 @@ impl Builder<'_> {
         Ok(start..total)
     }
 
-    /// Adds the normals of a primitive's vertices, if it has some.
+    /// Adds the normals of a primitive's vertices, if there are any.
     fn add_normals(&mut self, part: &Part) -> Result<()> {
         let Some(accessor) = attribute(part.primitive, Semantic::Normals) else { return Ok(()) };
         let normals: Vec<[f32; 3]> = self.buffers.floats(accessor, part.place, false)?;
@@ -256,7 +256,7 @@ impl Builder<'_> {
         Ok(())
     }
 
-    /// Adds the colours of a primitive's vertices, if it has some.
+    /// Adds the colours of a primitive's vertices, if there are any.
     fn add_colors(&mut self, part: &Part, base: &Base) -> Result<()> {
         let Some(accessor) = attribute(part.primitive, Semantic::Colors(0)) else { return Ok(()) };
         let colors = self.buffers.colors(accessor, part.place)?;
