@@ -259,14 +259,12 @@ fn places_beyond_what_32_bits_count_are_found() {
             .expect("room");
     }
     let layout = RawLayout { header, ..RAW };
-    let read = |name: &str, limits: &Limits| match load_volume(
-        &folder.0.join(name),
-        limits,
-        Some(&layout),
-    ) {
-        Ok(volume) => format!("{:?} {}", volume.range, volume.value(63)),
-        Err(error) => error.to_string().replace(&format!("{}/", folder.0.display()), ""),
-    };
+    let read =
+        |name: &str, limits: &Limits| match load_volume(folder.0.join(name), limits, Some(&layout))
+        {
+            Ok(volume) => format!("{:?} {}", volume.range, volume.value(63)),
+            Err(error) => error.to_string().replace(&format!("{}/", folder.0.display()), ""),
+        };
     assert_eq!(read("far.raw", &Limits::default()), "[0.0, 63.0] 63");
     assert_eq!(
         read("far_cut.raw", &Limits::default()),

@@ -23,10 +23,12 @@ pub struct Format {
     pub(super) kind: Which,
     pub(super) mesh: Option<fn(&Source) -> Result<Mesh>>,
     pub(super) volume: Option<VolumeReader>,
-    /// The second argument names the values to read if a file has several.
-    pub(super) samples: Option<fn(&Source, Option<&str>) -> Result<Points>>,
+    pub(super) samples: Option<SamplesReader>,
     pub(super) pieces: InPieces,
 }
+
+/// Reads scattered samples. The second argument names the values to read if a file has several.
+pub(super) type SamplesReader = fn(&Source, Option<&str>) -> Result<Points>;
 
 /// What a file may hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -82,9 +82,9 @@ pub(super) fn volume_of(
         (Some(VolumeReader::Plain(read)), _) => read(source),
         (Some(VolumeReader::Described(read)), Some(layout)) => read(source, layout),
         _ => {
-            let names = table.iter().filter_map(|format| {
-                matches!(format.volume, Some(VolumeReader::Plain(_))).then(|| format.name.into())
-            });
+            let describes_itself =
+                |format: &&Format| matches!(format.volume, Some(VolumeReader::Plain(_)));
+            let names = table.iter().filter(describes_itself).map(|format| format.name.into());
             let names = listed(names.collect(), "or");
             Err(source
                 .error("file", format!("is not a volume that can be read ({names})"))

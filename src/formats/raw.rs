@@ -255,7 +255,7 @@ mod tests {
         let layout = layout([nrrd.len(), 1, 1], SampleType::U8);
         let load = |name: &str, raw| {
             crate::formats::load_volume(
-                &folder.write(name, nrrd),
+                folder.write(name, nrrd),
                 &crate::input::Limits::default(),
                 raw,
             )

@@ -310,7 +310,7 @@ mod tests {
             Tree::build(&set, &options, &|_, _| ()).map(drop),
             build_file(
                 &set,
-                &Folder::new().path().join("a.splk"),
+                Folder::new().path().join("a.splk"),
                 &options,
                 &WriteOptions::default(),
                 &|_, _| (),

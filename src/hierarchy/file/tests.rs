@@ -144,7 +144,7 @@ fn a_file_is_written_whole_and_is_sound() {
             );
         }
     }
-    drop(Writer::new(&folder.path().join("other.splk"), 3.0, &options(false)).unwrap());
+    drop(Writer::new(folder.path().join("other.splk"), 3.0, &options(false)).unwrap());
     assert_eq!(
         std::fs::read_dir(folder.path()).unwrap().count(),
         1,
