@@ -11,7 +11,7 @@ use splatkit::{
 };
 
 fn volume(folder: &Folder, name: &str) -> Volume {
-    formats::load_volume(&folder.path(name), &Limits::default(), None).unwrap()
+    formats::load_volume(folder.path(name), &Limits::default(), None).unwrap()
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn a_hierarchy_of_a_hierarchy_keeps_what_is_told_of_it() {
     folder.put("a.ply", PLY);
     folder.run("convert a.ply -o a.splk --up x --unit mm --lossless").ok();
     folder.run("convert a.splk -o b.splk --radius-scale 2 --lossless").ok();
-    let open = |name: &str| Hierarchy::open(&folder.path(name), &Limits::default()).unwrap();
+    let open = |name: &str| Hierarchy::open(folder.path(name), &Limits::default()).unwrap();
     let (a, b) = (open("a.splk"), open("b.splk"));
     assert_eq!((b.header().up, b.header().unit.as_str()), (a.header().up, "mm"));
     let widths = |hierarchy: &Hierarchy| {
