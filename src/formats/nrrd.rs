@@ -828,7 +828,7 @@ mod tests {
         );
         assert!(sizes("99999999999999999999 1 1").to_string().contains("sizes"));
         assert!(sizes("2147483648 4 1").to_string().contains("unpacks to 1048576 bytes"));
-        assert!(sizes("2 2 2").to_string().contains("more bytes"));
+        assert!(sizes("2 2 2").to_string().contains("too many bytes"));
         assert!(sizes("0 2 2").to_string().contains("holds none"));
         assert!(sizes("2 2").to_string().contains("3 numbers"));
         for (fields, data, word) in [

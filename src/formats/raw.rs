@@ -231,7 +231,7 @@ mod tests {
         let path = folder.write("bomb.raw.gz", gzip(&vec![0; 1 << 20]));
         let small =
             |layout: RawLayout| read_with(&path, |source| read(source, &layout)).unwrap_err();
-        assert!(small(layout([2, 2, 2], SampleType::U8)).to_string().contains("more bytes"));
+        assert!(small(layout([2, 2, 2], SampleType::U8)).to_string().contains("too many bytes"));
         assert!(matches!(small(layout([1 << 40, 1, 1], SampleType::U8)), Error::Limit { .. }));
         assert!(matches!(
             small(layout([1 << 31, 1 << 31, 1], SampleType::F64)),

@@ -100,7 +100,7 @@ fn cuts_and_lies_are_errors() {
             "line 12: has 10 numbers where the fields need 11",
         ),
         (header("DATA ascii", "DATA zipped"), "is not ascii"),
-        (header("VERSION", "VERSIONS"), "line 2: “VERSIONS” is no entry"),
+        (header("VERSION", "VERSIONS"), "line 2: “VERSIONS” is not an entry"),
         (header("4.0 5", "4.0 five"), "line 14: “five” is not a number"),
         (header("1 2 3 7", "inf 2 3 7").replace("4.0", "nan"), "no points"),
     ] {
