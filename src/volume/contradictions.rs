@@ -33,7 +33,9 @@ fn scene(volume: Volume, kernel: Kernel) -> Scene {
 #[track_caller]
 fn refused<T: Debug>(name: &str, word: &str, result: Result<T>) {
     match result {
-        Err(Error::Argument(message)) => assert!(message.contains(word), "{name}: {message}"),
+        Err(Error::Argument(message) | Error::Transfer(message)) => {
+            assert!(message.contains(word), "{name}: {message}")
+        }
         other => panic!("{name}: {other:?}"),
     }
 }

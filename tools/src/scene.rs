@@ -243,7 +243,7 @@ fn overview(bricks: &Bricks) -> usize {
 /// Adds the file's name to errors that lack it.
 pub fn in_file(path: &Path, error: Error) -> Error {
     match error {
-        Error::Argument(what) => Error::input(path, "content", what),
+        Error::Argument(what) | Error::Transfer(what) => Error::input(path, "content", what),
         other => other.in_file(path),
     }
 }
