@@ -91,8 +91,8 @@ impl Renderer {
     /// Prepares a scene on a device.
     ///
     /// # Errors
-    /// [`Error::Argument`] if [`Scene::validate`] or the engine refuses the scene; [`Error::Driver`]
-    /// if it does not fit the device.
+    /// [`Error::Argument`] if [`Scene::validate`] or the engine refuses the scene;
+    /// [`Error::Driver`] if it does not fit the device.
     pub fn new(device: &Device, scene: &Scene) -> Result<Self> {
         Ok(Self {
             scene: scene.clone(),

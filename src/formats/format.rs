@@ -1,6 +1,6 @@
 //! What a row of the table of formats says, and how the row of a file is found.
 
-use super::{Kind, RawLayout, stream::Form, volume_stream::Plain};
+use super::{Kind, RawLayout, form::Form, shared::plain::Plain};
 use crate::{Result, input::Source, scattered::Points, surface::Mesh, volume::Volume};
 use std::{fmt, path::Path};
 

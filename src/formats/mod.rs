@@ -10,6 +10,7 @@
 
 pub mod csv;
 pub mod e57;
+mod form;
 mod format;
 pub mod gltf;
 mod kind;

@@ -4,7 +4,7 @@
 mod files;
 mod write;
 
-use super::{Endian, SampleType, volume_stream::Plain};
+use super::{Endian, SampleType, shared::plain::Plain};
 use crate::{
     Error, Result,
     input::{Source, copy},

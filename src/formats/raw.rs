@@ -1,6 +1,6 @@
 //! Raw volumes: samples without a header, or after a header to skip. The caller gives the layout.
 
-use super::{Endian, SampleType, volume_stream::Plain};
+use super::{Endian, SampleType, shared::plain::Plain};
 use crate::{
     Result,
     input::Source,

@@ -3,8 +3,10 @@
 
 use super::{
     FORMATS,
+    form::Form,
     format::{InPieces, by_extension},
-    las, ply,
+    ply,
+    shared::found::Found,
 };
 use crate::{
     Result,
@@ -22,14 +24,6 @@ pub struct Counts {
     pub points: u64,
     /// The number of triangles; 0 for a point cloud.
     pub triangles: u64,
-}
-
-/// A point in the file's own coordinates.
-pub(super) struct Found {
-    pub row: usize,
-    pub position: DVec3,
-    pub normal: Vec3,
-    pub color: [u8; 4],
 }
 
 /// A point relative to the stream's origin.
@@ -58,12 +52,6 @@ pub struct Stream<'a> {
     points: u64,
     origin: DVec3,
     bounds: [Vec3; 2],
-}
-
-/// What the pieces of a file are, by format.
-pub(super) enum Form {
-    Ply(ply::Pieces),
-    Las(las::Pieces),
 }
 
 impl<'a> Stream<'a> {

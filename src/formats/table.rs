@@ -5,10 +5,9 @@
 
 use super::{
     Kind, csv, e57,
+    form::Form,
     format::{Content, Format, Holding, InPieces, Magic, VolumeReader, Which},
-    gltf, las, npy, nrrd, obj, pcd, ply, raw, stl,
-    stream::Form,
-    vti, vtk, vtr, vtu, xyz,
+    gltf, las, npy, nrrd, obj, pcd, ply, raw, stl, vti, vtk, vtr, vtu, xyz,
 };
 
 /// Every format, in the order of messages: surfaces, volumes, scattered samples.

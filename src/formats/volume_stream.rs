@@ -1,29 +1,16 @@
 //! Reads a volume slice by slice, for callers that cannot hold all of it.
 
 use super::{
-    Endian, FORMATS, RawLayout, SampleType,
+    FORMATS, RawLayout, SampleType,
     format::{InPieces, find_volume},
+    shared::plain::Plain,
 };
 use crate::{
     Error, Result,
     input::{Limits, Mapping, Source, intact},
     volume::{Lattice, Samples, Scalar},
 };
-use std::{
-    ops::Range,
-    path::{Path, PathBuf},
-};
-
-/// Location and layout of the samples in a file: contiguous and not compressed.
-pub(super) struct Plain {
-    /// The file that contains the samples.
-    pub path: PathBuf,
-    /// The byte offset of the first sample.
-    pub start: usize,
-    pub sample_type: SampleType,
-    pub endian: Endian,
-    pub lattice: Lattice,
-}
+use std::{ops::Range, path::Path};
 
 /// A volume whose samples are stored uncompressed: a raw file, or an NRRD file with raw encoding.
 /// It yields the same data as [`load_volume`](super::load_volume). It regularly returns the pages

@@ -115,8 +115,8 @@ impl Renderer {
     ///
     /// # Errors
     /// [`Error::Argument`] if the camera or the settings do not suit this scene, or if the scene
-    /// was prepared on another device. [`Error::Driver`] if the device's memory runs out or a limit of
-    /// the driver is reached; a smaller picture may succeed. [`Error::DeviceLost`]: see
+    /// was prepared on another device. [`Error::Driver`] if the device's memory runs out or a limit
+    /// of the driver is reached; a smaller picture may succeed. [`Error::DeviceLost`]: see
     /// [`Gpu::reopened`]. Scenes that are read while they are drawn also return the errors of
     /// reading.
     pub fn render(

@@ -100,8 +100,8 @@ pub struct Camera {
     pub position: DVec3,
     /// The point that the camera looks at. It is in the middle of the picture.
     pub focal_point: DVec3,
-    /// The direction that points up in the picture. It need not be perpendicular to the view, nor of
-    /// unit length.
+    /// The direction that points up in the picture. It need not be perpendicular to the view, nor
+    /// of unit length.
     pub view_up: DVec3,
     /// How far the view reaches sideways.
     pub projection: Projection,

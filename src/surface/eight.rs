@@ -2,7 +2,7 @@
 //! triangles, without given normals. All sums and products are those of [`fan`](super::fan), in the
 //! same order. A vertex gets the same surfel either way, to the last bit.
 
-use super::fan::{
+use super::fan_rules::{
     ALIKE, CENTROID, CORNER, LEAST_RATIO_SQUARED, LEAST_SQUARE, MIDDLE, SAG, SPREAD, STEEP,
     THICKNESS, mixed,
 };

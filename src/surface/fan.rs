@@ -5,6 +5,10 @@ use super::{
     adjacency::Connected,
     disc::{Ellipse, Moments},
     eight::{Common, Fans, Found, MOST_CORNERS},
+    fan_rules::{
+        ALIKE, CENTROID, CORNER, LEAST_RATIO_SQUARED, LEAST_SQUARE, MIDDLE, SAG, SPREAD, STEEP,
+        THICKNESS, mixed,
+    },
     paint::{NEUTRAL, corner_color, pack},
     refine::Origin,
     smooth::Groups,
@@ -19,34 +23,6 @@ use glam::{DVec3, Vec2, Vec3};
 /// A surfel stands for triangles whose normals differ from the first one's by at most this angle
 /// (degrees).
 const FLAT: f32 = 30.0;
-/// A surfel is perpendicular to its shading normal if that is at most this far from its triangles'
-/// mean normal (cosine of 20°).
-pub(super) const ALIKE: f32 = 0.94;
-/// A triangle is steep if its normal's dot product with the surfel's is less than this.
-pub(super) const STEEP: f32 = 0.95;
-/// Covariance of a surfel, as a multiple of that of the triangles around its vertex. On a mesh of
-/// equilateral triangles of side 1 the standard deviation is 0.35. The surfels' sum is then nowhere
-/// below 0.767 times the strength of one.
-pub(super) const SPREAD: f32 = 0.35 * 0.35 * 24.0 / 5.0;
-/// Largest squared distances, in standard deviations, of a surfel from three kinds of points. These
-/// are the midpoints of the edges at its vertex, the centroids of the triangles, and the vertex
-/// itself. Two surfels at the midpoint of an edge, and three at a centroid, then have 0.31 and 0.29
-/// of the strength of one. Narrower surfels leave holes, wider ones reach over silhouettes.
-pub(super) const MIDDLE: f32 = 3.8;
-pub(super) const CENTROID: f32 = 4.7;
-pub(super) const CORNER: f32 = 5.0;
-/// The thickness of a surfel, as a multiple of its smaller standard deviation.
-pub(super) const THICKNESS: f32 = 0.12;
-/// The square of twice an area, in units, below which products of moments underflow in 32 bits:
-/// edges of less than a millionth.
-pub(super) const LEAST_SQUARE: f32 = 1e-26;
-/// A triangle is a line at the precision of 32 bits if its height is less than the root of this,
-/// times its longest edge.
-pub(super) const LEAST_RATIO_SQUARED: f32 = 1e-12;
-/// Height of a surfel above its vertex, as a fraction of the mean height of the triangles around
-/// the vertex.
-pub(super) const SAG: f32 = 0.4;
-
 /// Vertices whose triangles are read together. They may lie anywhere in memory, and reading them
 /// one by one would wait for each.
 const TOGETHER: usize = 64;
@@ -454,14 +430,6 @@ impl Sums {
         let least = part * (self.area / 3.0).powf(1.5);
         i8::from(volume > least) - i8::from(volume < -least)
     }
-}
-
-/// Mixes the bits of a number, so that exclusive-or sums of different numbers do not cancel by
-/// chance.
-#[inline]
-pub(super) fn mixed(place: u32) -> u64 {
-    let product = (u64::from(place) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    product ^ (product >> 29)
 }
 
 /// Returns the angle of a sine ≥ 0 and a cosine of any common length, within 1e-5 (Abramowitz &

@@ -6,6 +6,7 @@ mod disc;
 mod eight;
 mod ellipse;
 mod fan;
+mod fan_rules;
 mod mesh;
 mod orient;
 mod paint;

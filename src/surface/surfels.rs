@@ -12,7 +12,8 @@ use super::{
     Mesh,
     adjacency::{Connected, is_split},
     cloud,
-    fan::{LEAST_RATIO_SQUARED, LEAST_SQUARE, Made, Maker, Sums},
+    fan::{Made, Maker, Sums},
+    fan_rules::{LEAST_RATIO_SQUARED, LEAST_SQUARE},
     refine::{Origin, budget, count_of_refined, is_fine, refine},
     survey::has_area,
 };

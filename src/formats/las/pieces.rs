@@ -1,9 +1,9 @@
 //! Reads LAS and LAZ files in pieces.
 
 use super::{
-    super::{
-        shared::cloud::{color_of_16_bits, grey},
-        stream::Found,
+    super::shared::{
+        cloud::{color_of_16_bits, grey},
+        found::Found,
     },
     Header, Point, packed, plain_bytes,
 };

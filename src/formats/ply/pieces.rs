@@ -2,7 +2,7 @@
 //! each.
 
 use super::{
-    super::stream::Found,
+    super::shared::found::Found,
     COLOR, ColorKind, NORMAL, POSITION, ROLES, UV, color, color_kind, color_scale, gaussians,
     header::{self, Element, Header, width},
     rows::{cut, list_place, number, triangle_stride},

@@ -2,7 +2,9 @@
 //! types.
 
 pub(super) mod cloud;
+pub(super) mod found;
 pub(super) mod gather;
+pub(super) mod plain;
 pub(super) mod polygon;
 pub(super) mod sample_type;
 pub(super) mod texture;
