@@ -7,9 +7,7 @@ use crate::{
     hierarchy::Hierarchy,
     math::{Bounds, Kernel},
     splat::SplatSet,
-    volume::{
-        Lattice, TransferFunction, Volume,
-    },
+    volume::{Lattice, TransferFunction, Volume},
 };
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
@@ -37,6 +35,55 @@ impl Item {
     /// [`Error::Argument`] for numbers that are not finite, or do not fit 32 bits.
     pub fn validate(&self) -> Result<()> {
         numbers::check_item(self)
+    }
+
+    /// Returns the transfer function that shows the item's field; `None` for splats that carry
+    /// their own colour.
+    pub fn transfer(&self) -> Option<&TransferFunction> {
+        match self {
+            Self::Scalar(_, transfer)
+            | Self::Volume(_, _, transfer)
+            | Self::Bricks(_, _, transfer) => Some(transfer),
+            Self::Radiance(_) | Self::Hierarchy(_) => None,
+        }
+    }
+
+    /// Like [`transfer`](Self::transfer), to be changed.
+    pub(super) fn transfer_mut(&mut self) -> Option<&mut TransferFunction> {
+        match self {
+            Self::Scalar(_, transfer)
+            | Self::Volume(_, _, transfer)
+            | Self::Bricks(_, _, transfer) => Some(transfer),
+            Self::Radiance(_) | Self::Hierarchy(_) => None,
+        }
+    }
+
+    /// Returns the kernel of the samples of a lattice; `None` for splats.
+    pub fn kernel(&self) -> Option<&Kernel> {
+        match self {
+            Self::Volume(_, kernel, _) | Self::Bricks(_, kernel, _) => Some(kernel),
+            Self::Radiance(_) | Self::Hierarchy(_) | Self::Scalar(..) => None,
+        }
+    }
+
+    /// Returns the lattice of the samples, at the finest level of bricks; `None` for splats.
+    pub fn lattice(&self) -> Option<&Lattice> {
+        match self {
+            Self::Volume(volume, ..) => Some(&volume.lattice),
+            Self::Bricks(bricks, ..) => Some(&bricks.header().lattice),
+            Self::Radiance(_) | Self::Hierarchy(_) | Self::Scalar(..) => None,
+        }
+    }
+
+    /// Returns the smallest and largest value of the item's field; `None` for splats that carry
+    /// their own colour. Scattered samples are searched for it.
+    pub fn value_range(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Scalar(set, _) => Some(set.value_range()),
+            Self::Volume(volume, ..) => Some(volume.range),
+            Self::Bricks(bricks, ..) => Some(bricks.header().range),
+            Self::Radiance(_) | Self::Hierarchy(_) => None,
+        }
     }
 
     /// Returns the box around the item, footprints included.

@@ -19,9 +19,7 @@ use crate::{
     hierarchy::Hierarchy,
     math::{Bounds, Kernel, Tensor},
     splat::SplatSet,
-    volume::{
-        TransferFunction, Volume,
-    },
+    volume::{TransferFunction, Volume},
 };
 use std::sync::Arc;
 
@@ -114,9 +112,7 @@ impl Scene {
     pub(crate) fn shown_by(&self, transfer: &TransferFunction) -> Result<Self> {
         let mut scene = self.clone();
         for (number, item) in scene.items.iter_mut().enumerate() {
-            if let Item::Scalar(_, shown) | Item::Volume(_, _, shown) | Item::Bricks(_, _, shown) =
-                item
-            {
+            if let Some(shown) = item.transfer_mut() {
                 shown.clone_from(transfer);
             }
             numbers::check_field(item).map_err(numbers::of_item(number))?;
@@ -127,10 +123,7 @@ impl Scene {
     /// Returns the scene's kernel if it is a tensor product: the function along each axis of the
     /// lattice. The GPU engine does not draw tensor products.
     pub fn tensor(&self) -> Option<Tensor> {
-        self.items.iter().find_map(|item| match item {
-            Item::Volume(_, kernel, _) | Item::Bricks(_, kernel, _) => kernel.as_tensor(),
-            Item::Radiance(_) | Item::Hierarchy(_) | Item::Scalar(..) => None,
-        })
+        self.items.iter().find_map(|item| item.kernel()?.as_tensor())
     }
 
     /// Returns the box around everything that can be seen, footprints included.
@@ -141,22 +134,18 @@ impl Scene {
     /// Whether the scene contains explicit splats (surfaces or scattered samples). These are
     /// widened by [`FOOTPRINT_BLUR`] and have edges.
     pub fn has_splats(&self) -> bool {
-        self.items.iter().any(|item| !matches!(item, Item::Volume(..) | Item::Bricks(..)))
+        self.items.iter().any(|item| item.lattice().is_none())
     }
 
     /// Whether any part can become opaque enough to hide what lies behind it. Surfaces can. A field
     /// can if it has isosurfaces, or if a line through its box can absorb nearly all light.
     pub(crate) fn can_hide(&self) -> bool {
         const OPTICAL_DEPTH: f64 = 7.0;
-        self.items.iter().any(|item| match item {
-            Item::Radiance(_) | Item::Hierarchy(_) => true,
-            Item::Scalar(_, transfer)
-            | Item::Volume(_, _, transfer)
-            | Item::Bricks(_, _, transfer) => {
-                let Bounds { min, max } = item.bounds();
-                !transfer.isosurfaces.is_empty()
-                    || transfer.most_extinction() * (max - min).length() > OPTICAL_DEPTH
-            }
+        self.items.iter().any(|item| {
+            let Some(transfer) = item.transfer() else { return true };
+            let Bounds { min, max } = item.bounds();
+            !transfer.isosurfaces.is_empty()
+                || transfer.most_extinction() * (max - min).length() > OPTICAL_DEPTH
         })
     }
 }

@@ -3,9 +3,7 @@
 use crate::{
     hierarchy::Detail,
     math::{Bounds, View},
-    volume::{
-        Shade, TransferFunction,
-    },
+    volume::{Shade, TransferFunction},
 };
 use glam::DVec3;
 

@@ -5,9 +5,7 @@ use crate::{
     bricks::Choice,
     math::{Bounds, Sheets, Tensor, View},
     splat::{FOOTPRINT_BLUR, STEP_BACK},
-    volume::{
-        Arrangement, Lattice,
-    },
+    volume::{Arrangement, Lattice},
 };
 use glam::{DMat3, DVec3};
 

@@ -5,9 +5,7 @@ use crate::{
     Error, Result,
     math::{Bounds, Profile, Tensor},
     splat::{Payload, SplatSet},
-    volume::{
-        Arrangement, Lattice,
-    },
+    volume::{Arrangement, Lattice},
 };
 
 impl Scene {
