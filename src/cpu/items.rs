@@ -375,12 +375,7 @@ fn sample(plan: &Plan, samples: &Samples, index: usize) -> f32 {
 
 /// Returns the transfer function of a scene's field, or `None` without a field.
 pub fn transfer_of(scene: &Scene) -> Option<&TransferFunction> {
-    scene.items.iter().find_map(|item| match item {
-        Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => {
-            Some(transfer)
-        }
-        Item::Radiance(_) | Item::Hierarchy(_) => None,
-    })
+    scene.items.iter().find_map(Item::transfer)
 }
 
 /// Returns an error if there are more records than record numbers.

@@ -415,10 +415,7 @@ impl CpuRenderer {
         let looks =
             if steps <= 1.0 { 0 } else { ((steps / gather::MOST_APART).ceil() as usize).max(2) };
         let parts = gathering::parts(&self.scene, &outline.sheets, outline.choice.as_ref());
-        let deviation = self.scene.items.iter().find_map(|item| match item {
-            Item::Volume(_, kernel, _) | Item::Bricks(_, kernel, _) => deviation(kernel),
-            _ => None,
-        });
+        let deviation = self.scene.items.iter().find_map(|item| deviation(item.kernel()?));
         let ends = deviation.map(|deviation| (1.0 / deviation) as f32);
         let is_blended = self.blend.is_some();
         Some(Gather { levels, parts, ends, looks, is_blended, visible, zero: zero as f32 })

@@ -18,7 +18,7 @@ use crate::{
     },
     math::{Sheets, View},
     plan::{tables::Tables, uniforms::Frame},
-    scene::{Item, Settings},
+    scene::Settings,
 };
 use wgpu::BufferUsages as Usage;
 
@@ -277,14 +277,11 @@ fn tables_of(
     sheets: &Sheets,
     frame: &mut Frame,
 ) -> Vec<[f32; 4]> {
-    let field = prepared.scene.items.iter().find_map(|item| match item {
-        Item::Radiance(_) | Item::Hierarchy(_) => None,
-        Item::Scalar(set, transfer) => Some((transfer, set.value_range(), None)),
-        Item::Volume(volume, kernel, transfer) => Some((transfer, volume.range, Some(kernel))),
-        Item::Bricks(bricks, kernel, transfer) => {
-            Some((transfer, bricks.header().range, Some(kernel)))
-        }
-    });
+    let field = prepared
+        .scene
+        .items
+        .iter()
+        .find_map(|item| Some((item.transfer()?, item.value_range()?, item.kernel())));
     let Some((transfer, range, kernel)) = field else { return vec![[0.0; 4]; 2] };
     let tables = Tables::new(transfer, range, kernel);
     frame.set_tables(&tables, transfer, view, sheets);

@@ -84,12 +84,9 @@ pub fn variant(
                 !transfer.gradient.is_empty() && settings.optics != Optics::Maximum;
             variant.isosurfaces = if is_lit { transfer.isosurfaces.len() as u32 } else { 0 };
         }
-        variant.beyond = match item {
-            Item::Volume(volume, ..) => tables::leaves_out(transfer, volume.range),
-            Item::Bricks(bricks, ..) => tables::leaves_out(transfer, bricks.header().range),
-            // Finding the range of scattered samples would take longer.
-            _ => true,
-        };
+        // Finding the range of scattered samples would take longer.
+        let range = item.lattice().and_then(|_| item.value_range());
+        variant.beyond = range.is_none_or(|range| tables::leaves_out(transfer, range));
         if let Item::Volume(volume, kernel, _) = item {
             variant.lattice = true;
             variant.body_centred = volume.lattice.arrangement == Arrangement::BodyCentred;

@@ -19,8 +19,7 @@ pub fn obstacle(
     parts: usize,
     unsuited: impl Fn(&Volume, &Kernel) -> Option<&'static str>,
 ) -> Option<&'static str> {
-    let fields =
-        scene.items.iter().filter(|item| !matches!(item, Item::Radiance(_) | Item::Hierarchy(_)));
+    let fields = scene.items.iter().filter(|item| item.transfer().is_some());
     let unsuited = match fields.collect::<Vec<_>>()[..] {
         [Item::Volume(volume, kernel, _)] => unsuited(volume, kernel),
         [Item::Bricks(_, kernel, _)] => unsuited_kernel(kernel),
@@ -30,11 +29,8 @@ pub fn obstacle(
         return unsuited;
     }
     let is_rectilinear = |item: &Item| {
-        matches!(
-            item,
-            Item::Volume(volume, ..)
-                if matches!(volume.lattice.arrangement, Arrangement::Rectilinear(_))
-        )
+        let arrangement = item.lattice().map(|lattice| &lattice.arrangement);
+        matches!(arrangement, Some(Arrangement::Rectilinear(_)))
     };
     if parts > 1 && scene.items.iter().any(is_rectilinear) {
         return Some("sheets thicker than two samples of a rectilinear lattice");

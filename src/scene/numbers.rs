@@ -6,9 +6,9 @@ use super::{Item, Settings};
 use crate::{
     Error, Result,
     hierarchy::Detail,
-    math::Bounds,
+    math::{Bounds, Kernel},
     splat::{Payload, Splat, SplatSet},
-    volume::Shade,
+    volume::{Shade, TransferFunction},
 };
 use rayon::prelude::*;
 
@@ -28,25 +28,16 @@ pub(super) fn of_item(number: usize) -> impl Fn(Error) -> Error {
 
 /// Checks the transfer function of an item, if it has one.
 pub(super) fn check_transfer(item: &Item) -> Result<()> {
-    match item {
-        Item::Scalar(_, transfer) | Item::Volume(_, _, transfer) | Item::Bricks(_, _, transfer) => {
-            transfer
-                .validate_numbers()
-                .map_err(|message| Error::Transfer(format!("the transfer function: {message}")))
-        }
-        Item::Radiance(_) | Item::Hierarchy(_) => Ok(()),
-    }
+    let checked = item.transfer().map_or(Ok(()), TransferFunction::validate_numbers);
+    checked.map_err(|message| Error::Transfer(format!("the transfer function: {message}")))
 }
 
 /// Checks the transfer function of an item, if it has one, also against the range of the item's
 /// values.
 pub(super) fn check_field(item: &Item) -> Result<()> {
     check_transfer(item)?;
-    let (transfer, [low, high]) = match item {
-        Item::Scalar(set, transfer) => (transfer, set.value_range()),
-        Item::Volume(volume, _, transfer) => (transfer, volume.range),
-        Item::Bricks(bricks, _, transfer) => (transfer, bricks.header().range),
-        Item::Radiance(_) | Item::Hierarchy(_) => return Ok(()),
+    let (Some(transfer), Some([low, high])) = (item.transfer(), item.value_range()) else {
+        return Ok(());
     };
     // A single outlier, such as from a broken sensor, would give all other values one colour.
     let [first, last] = transfer.span();
@@ -61,9 +52,7 @@ pub(super) fn check_field(item: &Item) -> Result<()> {
 
 /// Checks the numbers of an item.
 pub(super) fn check_item(item: &Item) -> Result<()> {
-    if let Item::Volume(_, kernel, _) | Item::Bricks(_, kernel, _) = item {
-        kernel.validate()?;
-    }
+    item.kernel().map_or(Ok(()), Kernel::validate)?;
     match item {
         Item::Radiance(set) | Item::Scalar(set, _) => check_set(set).map_err(Error::Argument)?,
         Item::Volume(volume, ..) => volume.validate().map_err(Error::Argument)?,

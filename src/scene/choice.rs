@@ -1,0 +1,58 @@
+//! Which bricks of the scene's volume a picture needs.
+
+use super::{Item, Scene, Settings};
+use crate::{
+    bricks::{self, Choice},
+    hierarchy::Detail,
+    math::{Bounds, View},
+    volume::reach::{EVERYTHING, first_visible},
+};
+
+/// Width of a sample's footprint at half its height, in sample spacings. The exact width is 1.8 for
+/// a B-spline and 1.65 for the usual Gaussian.
+const SAMPLE_WIDTH: f64 = 2.0;
+
+impl Scene {
+    /// Returns the bricks of the scene's volume that a view shows, within the settings' memory.
+    /// Returns `None` if the scene has no volume in bricks. A detail in splats also limits the
+    /// bricks to that number of samples. There are at most `most` bricks. `bounds` are the scene's.
+    pub(crate) fn choice(
+        &self,
+        view: &View,
+        settings: &Settings,
+        detail: Detail,
+        most: usize,
+        bounds: &Bounds,
+    ) -> Option<Choice> {
+        let own = |item: &Item| match item {
+            Item::Bricks(bricks, kernel, transfer) => {
+                let room = settings.page_memory / bricks::slot_bytes(bricks);
+                let (pixels, room) = match detail {
+                    Detail::Pixels(pixels) => (pixels, room),
+                    Detail::Splats(splats) => {
+                        (Detail::PIXELS, room.min(splats / bricks::SIDE.pow(3) as u64))
+                    }
+                    Detail::Milliseconds(_) => (Detail::PIXELS, room),
+                };
+                let most = usize::try_from(room).unwrap_or(usize::MAX).min(most).max(1);
+                let choose = |shown: &[u16; 256]| {
+                    bricks::choice(bricks, view, kernel.extent, pixels / SAMPLE_WIDTH, shown, most)
+                };
+                // If kernels reach further than the ranges of blocks cover, the ranges cannot
+                // exclude bricks.
+                if kernel.extent > bricks::REACH as f64 {
+                    return Some(choose(&EVERYTHING));
+                }
+                let choice = choose(&first_visible(transfer, bricks.header().range));
+                let sheets = self.sheets_of(view, settings, Some(&choice), bounds);
+                Some(if self.mixes_afar(settings, &sheets, Some(&choice)) {
+                    choose(&EVERYTHING)
+                } else {
+                    choice
+                })
+            }
+            _ => None,
+        };
+        self.items.iter().find_map(own)
+    }
+}

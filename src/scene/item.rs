@@ -1,0 +1,109 @@
+//! The items of a scene.
+
+use super::numbers;
+use crate::{
+    Result,
+    bricks::Bricks,
+    hierarchy::Hierarchy,
+    math::{Bounds, Kernel},
+    splat::SplatSet,
+    volume::{Lattice, TransferFunction, Volume},
+};
+use glam::{DMat3, DVec3};
+use std::sync::Arc;
+
+/// An item of a scene.
+#[derive(Debug, Clone)]
+pub enum Item {
+    /// Surfels or 3D Gaussians: splats that carry their own colour and optical depth.
+    Radiance(Arc<SplatSet>),
+    /// A hierarchy of these splats. A picture shows a cut of it ([`Settings::detail`]).
+    Hierarchy(Arc<Hierarchy>),
+    /// Scattered samples: splats that carry a value, shown by a transfer function.
+    Scalar(Arc<SplatSet>, TransferFunction),
+    /// Samples on a lattice, each the centre of one kernel, shown by a transfer function.
+    Volume(Arc<Volume>, Kernel, TransferFunction),
+    /// A volume that may be larger than memory. A picture shows the bricks that it needs
+    /// ([`Settings::detail`], [`Settings::page_memory`]).
+    Bricks(Arc<Bricks>, Kernel, TransferFunction),
+}
+
+impl Item {
+    /// Checks that the item can be drawn by itself, as [`Scene::validate`] does for all items.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for numbers that are not finite, or do not fit 32 bits.
+    pub fn validate(&self) -> Result<()> {
+        numbers::check_item(self)
+    }
+
+    /// Returns the transfer function that shows the item's field; `None` for splats that carry
+    /// their own colour.
+    pub fn transfer(&self) -> Option<&TransferFunction> {
+        match self {
+            Self::Scalar(_, transfer)
+            | Self::Volume(_, _, transfer)
+            | Self::Bricks(_, _, transfer) => Some(transfer),
+            Self::Radiance(_) | Self::Hierarchy(_) => None,
+        }
+    }
+
+    /// Like [`transfer`](Self::transfer), to be changed.
+    pub(super) fn transfer_mut(&mut self) -> Option<&mut TransferFunction> {
+        match self {
+            Self::Scalar(_, transfer)
+            | Self::Volume(_, _, transfer)
+            | Self::Bricks(_, _, transfer) => Some(transfer),
+            Self::Radiance(_) | Self::Hierarchy(_) => None,
+        }
+    }
+
+    /// Returns the kernel of the samples of a lattice; `None` for splats.
+    pub fn kernel(&self) -> Option<&Kernel> {
+        match self {
+            Self::Volume(_, kernel, _) | Self::Bricks(_, kernel, _) => Some(kernel),
+            Self::Radiance(_) | Self::Hierarchy(_) | Self::Scalar(..) => None,
+        }
+    }
+
+    /// Returns the lattice of the samples, at the finest level of bricks; `None` for splats.
+    pub fn lattice(&self) -> Option<&Lattice> {
+        match self {
+            Self::Volume(volume, ..) => Some(&volume.lattice),
+            Self::Bricks(bricks, ..) => Some(&bricks.header().lattice),
+            Self::Radiance(_) | Self::Hierarchy(_) | Self::Scalar(..) => None,
+        }
+    }
+
+    /// Returns the smallest and largest value of the item's field; `None` for splats that carry
+    /// their own colour. Scattered samples are searched for it.
+    pub fn value_range(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Scalar(set, _) => Some(set.value_range()),
+            Self::Volume(volume, ..) => Some(volume.range),
+            Self::Bricks(bricks, ..) => Some(bricks.header().range),
+            Self::Radiance(_) | Self::Hierarchy(_) => None,
+        }
+    }
+
+    /// Returns the box around the item, footprints included.
+    pub fn bounds(&self) -> Bounds {
+        match self {
+            Self::Radiance(set) | Self::Scalar(set, _) => set.bounds(),
+            Self::Hierarchy(hierarchy) => hierarchy.bounds(),
+            Self::Volume(volume, kernel, _) => reached(&volume.lattice, kernel),
+            // Kernels of coarser levels reach further, but nothing is drawn outside the field's
+            // box.
+            Self::Bricks(bricks, kernel, _) => reached(&bricks.header().lattice, kernel),
+        }
+    }
+}
+
+/// Returns the box that the kernels of a lattice reach.
+fn reached(lattice: &Lattice, kernel: &Kernel) -> Bounds {
+    let axes = lattice.axes * DMat3::from_diagonal(lattice.largest_unit());
+    let reach = kernel.extent
+        * DVec3::new(axes.row(0).length(), axes.row(1).length(), axes.row(2).length());
+    let [low, high] = lattice.bounds();
+    Bounds { min: low - reach, max: high + reach }
+}

@@ -1,0 +1,151 @@
+//! The scene (splats, hierarchies and volumes) and the settings of a picture.
+
+mod choice;
+mod item;
+mod numbers;
+mod settings;
+mod sheets;
+mod validate;
+
+pub use item::Item;
+pub use settings::{
+    Classification, Clip, ClipShape, Evaluate, Gradient, Mode, Optics, Order, Settings,
+};
+pub(crate) use sheets::MOST_GATHERED;
+
+use crate::{
+    Result,
+    bricks::Bricks,
+    hierarchy::Hierarchy,
+    math::{Bounds, Kernel, Tensor},
+    splat::SplatSet,
+    volume::{TransferFunction, Volume},
+};
+use std::sync::Arc;
+
+/// The items of a picture. All are drawn together, in the same sheets.
+///
+/// A volume and a mesh in one picture:
+///
+/// ```
+/// use splatkit::{
+///     math::Kernel,
+///     scene::Scene,
+///     surface::{Mesh, SurfelOptions},
+///     volume::{TransferFunction, phantoms::Phantom},
+/// };
+///
+/// let volume = Phantom::Ball.sample_bytes([16; 3])?;
+/// let transfer = TransferFunction::automatic(&volume);
+/// let scene = Scene::new()
+///     .with_volume(volume, Kernel::default(), transfer)
+///     .with_splats(Mesh::sphere(2).surfels(&SurfelOptions::default())?);
+/// assert_eq!(scene.items.len(), 2);
+/// assert!(scene.bounds().diagonal() > 3.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct Scene {
+    /// The items, in any order.
+    pub items: Vec<Item>,
+}
+
+impl Scene {
+    /// Creates a scene without items.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds splats that carry their own colour and optical depth.
+    #[must_use]
+    pub fn with_splats(mut self, set: impl Into<Arc<SplatSet>>) -> Self {
+        self.items.push(Item::Radiance(set.into()));
+        self
+    }
+
+    /// Adds a hierarchy of splats.
+    #[must_use]
+    pub fn with_hierarchy(mut self, hierarchy: impl Into<Arc<Hierarchy>>) -> Self {
+        self.items.push(Item::Hierarchy(hierarchy.into()));
+        self
+    }
+
+    /// Adds scattered samples.
+    #[must_use]
+    pub fn with_samples(
+        mut self,
+        set: impl Into<Arc<SplatSet>>,
+        transfer: TransferFunction,
+    ) -> Self {
+        self.items.push(Item::Scalar(set.into(), transfer));
+        self
+    }
+
+    /// Adds a volume.
+    #[must_use]
+    pub fn with_volume(
+        mut self,
+        volume: impl Into<Arc<Volume>>,
+        kernel: Kernel,
+        transfer: TransferFunction,
+    ) -> Self {
+        self.items.push(Item::Volume(volume.into(), kernel, transfer));
+        self
+    }
+
+    /// Adds a volume in bricks.
+    #[must_use]
+    pub fn with_bricks(
+        mut self,
+        bricks: impl Into<Arc<Bricks>>,
+        kernel: Kernel,
+        transfer: TransferFunction,
+    ) -> Self {
+        self.items.push(Item::Bricks(bricks.into(), kernel, transfer));
+        self
+    }
+
+    /// Returns the same scene with another transfer function for its volume or sample set.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if [`validate`](Self::validate) would refuse the function.
+    pub(crate) fn shown_by(&self, transfer: &TransferFunction) -> Result<Self> {
+        let mut scene = self.clone();
+        for (number, item) in scene.items.iter_mut().enumerate() {
+            if let Some(shown) = item.transfer_mut() {
+                shown.clone_from(transfer);
+            }
+            numbers::check_field(item).map_err(numbers::of_item(number))?;
+        }
+        Ok(scene)
+    }
+
+    /// Returns the scene's kernel if it is a tensor product: the function along each axis of the
+    /// lattice. The GPU engine does not draw tensor products.
+    pub fn tensor(&self) -> Option<Tensor> {
+        self.items.iter().find_map(|item| item.kernel()?.as_tensor())
+    }
+
+    /// Returns the box around everything that can be seen, footprints included.
+    pub fn bounds(&self) -> Bounds {
+        self.items.iter().fold(Bounds::EMPTY, |all, item| all.union(item.bounds()))
+    }
+
+    /// Whether the scene contains explicit splats (surfaces or scattered samples). These are
+    /// widened by [`FOOTPRINT_BLUR`] and have edges.
+    pub fn has_splats(&self) -> bool {
+        self.items.iter().any(|item| item.lattice().is_none())
+    }
+
+    /// Whether any part can become opaque enough to hide what lies behind it. Surfaces can. A field
+    /// can if it has isosurfaces, or if a line through its box can absorb nearly all light.
+    pub(crate) fn can_hide(&self) -> bool {
+        const OPTICAL_DEPTH: f64 = 7.0;
+        self.items.iter().any(|item| {
+            let Some(transfer) = item.transfer() else { return true };
+            let Bounds { min, max } = item.bounds();
+            !transfer.isosurfaces.is_empty()
+                || transfer.most_extinction() * (max - min).length() > OPTICAL_DEPTH
+        })
+    }
+}

@@ -1,0 +1,205 @@
+//! The settings of a picture: its size and the methods that draw it.
+
+use crate::{
+    hierarchy::Detail,
+    math::{Bounds, View},
+    volume::{Shade, TransferFunction},
+};
+use glam::DVec3;
+
+/// The layers that are composited.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Mode {
+    /// Image-aligned sheets (Mueller & Crawfis 1998): sheets parallel to the picture cut every
+    /// kernel into sections.
+    #[default]
+    Sheets,
+    /// Axis-aligned sheets (Westover 1990): slices of the data across the data's axis nearest to
+    /// the view direction. Each kernel is added whole to the slice that contains its centre.
+    /// Samples are classified before they are added.
+    AxisSheets,
+    /// Single splats (Westover 1989): each is composited whole, in the order of the distances of
+    /// their centres. Samples are classified first.
+    Splats(Order),
+}
+
+/// The order in which single splats are composited. Both orders give the same picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Order {
+    /// The nearest splat first.
+    #[default]
+    FrontToBack,
+    /// The farthest splat first.
+    BackToFront,
+}
+
+/// When the values of a field are mapped to colour and opacity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Classification {
+    /// Everywhere along the ray inside a sheet. The values at its two faces and its mean define a
+    /// parabola, over which the transfer function is integrated. Thin shells keep their look in
+    /// thick sheets.
+    #[default]
+    PreIntegrated,
+    /// Once per sheet, for its mean (Mueller, Möller & Crawfis 1999).
+    Post,
+    /// Once per sample, before interpolation (Westover 1990). Blurs edges; for comparison.
+    Pre,
+}
+
+/// How a ray through a field becomes the colour of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Optics {
+    /// Emission and absorption (Max 1995).
+    #[default]
+    EmissionAbsorption,
+    /// The colour and opacity of the largest value on the ray.
+    Maximum,
+    /// The light that the field absorbs, in white: opacity only, without colour and lighting.
+    XRay,
+}
+
+/// A shape that cuts the scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clip {
+    /// The shape that bounds the part.
+    pub shape: ClipShape,
+    /// Whether to keep what is inside the shape (`true`) or outside it (`false`).
+    pub inside: bool,
+}
+
+/// The shape of a [`Clip`], in world coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ClipShape {
+    /// The points x with normal·x ≤ offset are inside.
+    HalfSpace {
+        /// The direction out of the half-space, in world coordinates; it need not have unit length.
+        normal: DVec3,
+        /// The distance of its face from the world's origin, times the length of `normal`.
+        offset: f64,
+    },
+    /// A box along the world's axes.
+    Box(Bounds),
+}
+
+/// How the gradient across the picture is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Gradient {
+    /// From the derivative of the kernels.
+    #[default]
+    Analytic,
+    /// From differences of neighbouring pixels of a sheet (Mueller, Möller & Crawfis 1999, and the
+    /// GPU sheet buffers after it).
+    Central,
+}
+
+/// How the field of a lattice is evaluated in a sheet. The pictures agree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Evaluate {
+    /// Gathers a volume if possible, and scatters everything else.
+    #[default]
+    Auto,
+    /// Each pixel adds up the kernels that reach its ray, which is the faster way. The scene must
+    /// have exactly one volume, and may have surfaces too. On the GPU engine, the volume needs a
+    /// Cartesian lattice and a Gaussian kernel. Other scenes are an error.
+    Gather,
+    /// Each splat is added to the pixels that it covers.
+    Scatter,
+}
+
+/// The settings of a picture.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// How splats are gathered into layers.
+    pub mode: Mode,
+    /// When a field's values become colour and opacity.
+    pub classification: Classification,
+    /// How the values along a ray become one colour.
+    pub optics: Optics,
+    /// Clips that cut the scene, at most [`Settings::MAX_CLIPS`].
+    pub clips: Vec<Clip>,
+    /// How the gradients of fields are found, for light and for `gradient` of transfer functions.
+    pub gradient: Gradient,
+    /// How the field of a lattice is evaluated in a sheet.
+    pub evaluate: Evaluate,
+    /// Lighting of volumes, instead of the transfer function's own. `Some(None)` turns it off.
+    pub volume_shade: Option<Option<Shade>>,
+    /// Lighting of splats with normals. `None` draws their colours unlit.
+    pub surface_shade: Option<Shade>,
+    /// Maximum thickness of a sheet in world units. `None` derives it from the scene.
+    pub sheet_thickness: Option<f64>,
+    /// Maximum thickness of a sheet in pixels, if the scene contains explicit splats.
+    pub sheet_pixels: f64,
+    /// Whether splats behind opaque parts are left out. The picture differs only where less than
+    /// 0.0005 of the light passes. Turn it off to compare the cost of a frame.
+    pub occlusion: bool,
+    /// Level of detail of hierarchies and volumes in bricks. A sample of a volume counts as two
+    /// sample spacings wide.
+    pub detail: Detail,
+    /// Whether nodes of hierarchies that face away from the eye are left out. This saves time where
+    /// the front hides them, and loses parts of the picture where it does not. `None` leaves them
+    /// out if the source was solid, is seen from outside its bounds, and is not clipped.
+    pub cull_backfaces: Option<bool>,
+    /// GPU memory, in bytes, for the pages of each hierarchy and for the bricks of a volume. The
+    /// lists that frames make from bricks take more.
+    pub page_memory: u64,
+    /// Nearest distance that perspective views show, in world units; at least a millionth of the
+    /// scene's size. `None` is a thousandth of that size.
+    pub near: Option<f64>,
+}
+
+impl Settings {
+    /// Maximum number of clips in a picture.
+    pub const MAX_CLIPS: usize = 8;
+    /// Maximum number of pixels in a picture. Each takes 20 bytes of memory.
+    pub const MAX_PIXELS: u64 = 1 << 29;
+
+    /// Returns the defaults for a picture of `size` pixels (width, height).
+    pub fn new(size: [u32; 2]) -> Self {
+        Self {
+            size,
+            mode: Mode::default(),
+            classification: Classification::default(),
+            optics: Optics::default(),
+            clips: Vec::new(),
+            gradient: Gradient::default(),
+            evaluate: Evaluate::default(),
+            volume_shade: None,
+            surface_shade: Some(Shade { ambient: 0.2, diffuse: 0.75, specular: 0.15, power: 24.0 }),
+            sheet_thickness: None,
+            sheet_pixels: 8.0,
+            occlusion: true,
+            detail: Detail::default(),
+            cull_backfaces: None,
+            page_memory: 1 << 30,
+            near: None,
+        }
+    }
+
+    /// Whether samples are classified before they are added: on request, or because whole splats
+    /// are composited.
+    pub fn classifies_samples(&self) -> bool {
+        self.mode != Mode::Sheets || self.classification == Classification::Pre
+    }
+
+    /// Whether nearer parts may hide farther ones. They do not if all values on a ray count alike,
+    /// nor if the farthest comes first.
+    pub fn hides(&self) -> bool {
+        self.optics != Optics::Maximum && self.mode != Mode::Splats(Order::BackToFront)
+    }
+
+    /// Whether nodes that face away are left out of a hierarchy with these bounds. `closed` says
+    /// whether the hierarchy bounds a solid.
+    pub(crate) fn culls(&self, closed: bool, bounds: &Bounds, view: &View) -> bool {
+        let is_outside =
+            || !view.perspective || view.distances(bounds)[0] > self.near.unwrap_or(0.0);
+        self.cull_backfaces.unwrap_or_else(|| closed && self.clips.is_empty() && is_outside())
+    }
+
+    /// Returns the lighting of a volume that `transfer` shows.
+    pub fn shade_of(&self, transfer: &TransferFunction) -> Option<Shade> {
+        self.volume_shade.unwrap_or(transfer.shade)
+    }
+}

@@ -1,0 +1,192 @@
+//! The sheets of a picture: how thick they are, and along which axis they lie.
+
+use super::{Item, Mode, Scene, Settings};
+use crate::{
+    bricks::Choice,
+    math::{Bounds, Sheets, Tensor, View},
+    splat::{FOOTPRINT_BLUR, STEP_BACK},
+    volume::{Arrangement, Lattice},
+};
+use glam::{DMat3, DVec3};
+
+/// Maximum thickness of sheets in which a lattice is gathered, in smallest sample spacings. In
+/// thicker sheets a parabola misses details of the field.
+pub(crate) const MOST_GATHERED: f64 = 2.2;
+
+impl Scene {
+    /// Returns how far a splat of the scene can reach from its centre, in the standard deviations
+    /// that widening adds. Returns 0 if there are no explicit splats.
+    fn widest_reach(&self) -> f64 {
+        let reaches = self.items.iter().map(|item| match item {
+            Item::Radiance(set) => f64::from(set.extent) + STEP_BACK,
+            Item::Scalar(set, _) => f64::from(set.extent),
+            Item::Hierarchy(hierarchy) => f64::from(hierarchy.header().extent) + STEP_BACK,
+            Item::Volume(..) | Item::Bricks(..) => 0.0,
+        });
+        reaches.fold(0.0, f64::max)
+    }
+
+    /// Returns the sheets of a picture of this scene. Unless [`Settings::sheet_thickness`] is set,
+    /// their thickness follows from the items:
+    ///
+    /// - Volumes: 4/3 of the sample spacing, and at most 2/3 of the kernel's extent. A kernel of
+    ///   extent 2 meets at most four sheets. Sheets are half as thick if the field passes through
+    ///   the samples, and half a spacing thick if the kernel is linear.
+    /// - Surfaces: a few pixels.
+    /// - Both: the finer of the two.
+    /// - Volumes in bricks: as for volumes, with the spacing of the drawn levels. Between two
+    ///   levels it is interpolated.
+    pub fn sheets(&self, view: &View, settings: &Settings) -> Sheets {
+        let bounds = self.bounds();
+        let choice = self.choice(view, settings, settings.detail, usize::MAX, &bounds);
+        self.sheets_of(view, settings, choice.as_ref(), &bounds)
+    }
+
+    /// Returns the sheets for a known choice of bricks and the scene's known bounds.
+    pub(crate) fn sheets_of(
+        &self,
+        view: &View,
+        settings: &Settings,
+        choice: Option<&Choice>,
+        bounds: &Bounds,
+    ) -> Sheets {
+        if settings.mode == Mode::AxisSheets {
+            return self.axis_sheets(view, settings, bounds);
+        }
+        let [mut near, mut far] = view.distances(bounds);
+        // Widened footprints, which may have stepped back, reach beyond the bounds. Without this
+        // margin, a flat surface seen from the front would lie in sheets far thinner than itself.
+        let reach = FOOTPRINT_BLUR * self.widest_reach() / view.scale;
+        if view.perspective {
+            (near, far) = (near * (1.0 - reach), far * (1.0 + reach));
+            // Geometric sheets cannot start at 0, and 32 bits do not distinguish smaller distances.
+            let size = bounds.diagonal();
+            near = near.max(settings.near.unwrap_or(1e-3 * size).max(1e-6 * size));
+        } else {
+            (near, far) = (near - reach, far + reach);
+        }
+        let mut thickness = settings.sheet_thickness;
+        let mut pixels = None;
+        for item in &self.items {
+            match item {
+                Item::Volume(volume, kernel, _) if settings.sheet_thickness.is_none() => {
+                    // A field can bend within a few samples, whatever the kernel's extent; a sharp
+                    // field within fewer.
+                    let most: f64 = match kernel.as_tensor() {
+                        // The field has a kink at every plane of samples.
+                        Some(Tensor::Linear) => 0.5,
+                        Some(Tensor::CatmullRom) => 2.0 / 3.0,
+                        _ if volume.coefficients.is_some() => 2.0 / 3.0,
+                        _ => 4.0 / 3.0,
+                    };
+                    let step =
+                        most.min(2.0 / 3.0 * kernel.extent) * volume.lattice.kernel_spacing();
+                    // If the lattice's steps differ much in length, sheets stay thin enough to be
+                    // gathered.
+                    let step = step.min(MOST_GATHERED * volume.lattice.least_kernel_spacing());
+                    thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
+                }
+                Item::Bricks(bricks, kernel, _) if settings.sheet_thickness.is_none() => {
+                    // The thickness follows λ continuously, as the weights of the levels do.
+                    let level = choice.map_or(0.0, |choice| choice.lambda);
+                    let spacing = level.exp2() * bricks.header().lattice.kernel_spacing();
+                    let step = (4.0f64 / 3.0).min(2.0 / 3.0 * kernel.extent) * spacing;
+                    thickness = Some(thickness.map_or(step, |t: f64| t.min(step)));
+                }
+                Item::Volume(..) | Item::Bricks(..) => {}
+                Item::Radiance(_) | Item::Hierarchy(_) | Item::Scalar(..) => {
+                    pixels = Some(settings.sheet_pixels);
+                }
+            }
+        }
+        Sheets::new(view, [near, far], thickness, pixels)
+    }
+}
+
+impl Scene {
+    /// Whether sheets are thicker than kernels reach. If so, no sample may be left out: a sheet
+    /// then mixes visible samples with samples whose whole neighbourhood is invisible, and these
+    /// change its mean. Sheets of the default thickness exceed the reach only along the shortest
+    /// steps of uneven lattices, where that cannot be seen. So the typical step is compared for
+    /// them.
+    pub(crate) fn mixes_afar(
+        &self,
+        settings: &Settings,
+        sheets: &Sheets,
+        choice: Option<&Choice>,
+    ) -> bool {
+        let step = |lattice: &Lattice| match settings.sheet_thickness {
+            Some(_) => lattice.least_kernel_spacing(),
+            None => lattice.kernel_spacing(),
+        };
+        let reach = |item: &Item| match item {
+            Item::Volume(volume, kernel, _) => Some(kernel.extent * step(&volume.lattice)),
+            Item::Bricks(bricks, kernel, _) => {
+                let coarser = choice.map_or(0.0, |choice| choice.lambda).exp2();
+                Some(kernel.extent * step(&bricks.header().lattice) * coarser)
+            }
+            _ => None,
+        };
+        !settings.classifies_samples()
+            && self.items.iter().filter_map(reach).any(|reach| reach < sheets.step)
+    }
+}
+
+impl Scene {
+    /// Returns axis-aligned sheets, one for each slice of the data, with the slice in the middle.
+    /// Without a lattice, they are as thick as the sheets of a picture would be in the middle of
+    /// the scene. Distances are measured along the sheets' normal.
+    fn axis_sheets(&self, view: &View, settings: &Settings, bounds: &Bounds) -> Sheets {
+        let normal = self.sheet_normal(view);
+        let keys = bounds.corners().map(|corner| normal.dot(view.to_view(corner)));
+        let [mut near, mut far] =
+            keys.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &key| {
+                [low.min(key), high.max(key)]
+            });
+        if view.perspective {
+            // Distances are measured from the eye, on both of its sides.
+            (near, far) = (near.max(-far).max(0.0), far.max(-near));
+        }
+        let slices = self.lattice().map(|lattice| {
+            let along = |step: DVec3| normal.dot(view.rotation * (lattice.axes * step)).abs();
+            // The step along the axis that does not lie in the sheets.
+            let distance =
+                [DVec3::X, DVec3::Y, DVec3::Z].map(along).into_iter().fold(0.0, f64::max);
+            let share = match &lattice.arrangement {
+                Arrangement::Cartesian => 1.0,
+                Arrangement::BodyCentred => 0.5,
+                Arrangement::Rectilinear(_) => (lattice.spacing() / lattice.edges()).max_element(),
+            };
+            (normal.dot(view.to_view(lattice.position(lattice.step_range()[0]))), distance * share)
+        });
+        let (start, thickness) = slices.unwrap_or_else(|| {
+            let middle =
+                if view.perspective { view.to_view(bounds.center()).length() } else { 1.0 };
+            (near, settings.sheet_thickness.unwrap_or(settings.sheet_pixels * middle / view.scale))
+        });
+        let thickness = thickness.max((far - near) / Sheets::MAX as f64);
+        let first = ((near - start) / thickness - 0.5).floor();
+        Sheets::new(view, [start + (first + 0.5) * thickness, far], Some(thickness), None)
+    }
+
+    /// Returns the lattice of the scene's volume.
+    fn lattice(&self) -> Option<&Lattice> {
+        self.items.iter().find_map(|item| match item {
+            Item::Volume(volume, ..) => Some(&volume.lattice),
+            Item::Bricks(bricks, ..) => Some(&bricks.header().lattice),
+            _ => None,
+        })
+    }
+
+    /// Returns the normal of axis-aligned sheets in view space, pointing away from the eye. The
+    /// sheets are parallel to two axes of the data, or of the world without a lattice: those whose
+    /// plane faces the view most.
+    pub(crate) fn sheet_normal(&self, view: &View) -> DVec3 {
+        let axes = self.lattice().map_or(DMat3::IDENTITY, |lattice| lattice.axes);
+        let normals = (view.rotation * axes).inverse().transpose();
+        let normals = [normals.x_axis, normals.y_axis, normals.z_axis].map(DVec3::normalize);
+        let first = if normals[1].z.abs() > normals[0].z.abs() { 1 } else { 0 };
+        let nearest = if normals[2].z.abs() > normals[first].z.abs() { 2 } else { first };
+        normals[nearest] * normals[nearest].z.signum()
+    }
+}
