@@ -536,7 +536,7 @@ fn optical_depths_beyond_what_can_be_drawn_are_refused() {
     let error = built(&set).expect_err("too deep").to_string();
     assert!(
         error.contains("splat 7 at")
-            && error.contains("optical depths from 0 to 1e10 can be merged"),
+            && error.contains("optical depths from 0 to 1e10, can be merged"),
         "{error}"
     );
 }

@@ -147,7 +147,7 @@ impl Samples {
 /// // The first axis is the fastest in memory.
 /// assert_eq!(volume.value(1 + 2 * 2 + 3 * 6), 23.0);
 /// assert_eq!(volume.bounds(), [DVec3::ZERO, DVec3::new(1.0, 2.0, 7.5)]);
-/// # Ok::<(), String>(())
+/// # Ok::<(), splatkit::Error>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct Volume {

@@ -32,7 +32,7 @@ use std::path::Path;
 /// assert_eq!(bone.opacity(450.0), 0.25);
 /// assert_eq!(bone.opacity(3000.0), 0.5);
 /// assert!(!bone.visible([-1000.0, 200.0]));
-/// # Ok::<(), String>(())
+/// # Ok::<(), splatkit::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransferFunction {

@@ -86,8 +86,7 @@ impl Page {
 /// let ball = Mesh::sphere(3).surfels(&SurfelOptions::default())?;
 /// let tree = Tree::build(&ball, &BuildOptions::default(), &|_, _| ())?;
 /// let bytes = file::to_bytes(&tree, &file::WriteOptions::default())?;
-/// let name = "ball.splk".as_ref();
-/// let hierarchy = Hierarchy::from_bytes(bytes, name, &Limits::default())?;
+/// let hierarchy = Hierarchy::from_bytes(bytes, "ball.splk", &Limits::default())?;
 /// assert_eq!(hierarchy.header().leaves, ball.splats.len() as u64);
 /// assert_eq!(hierarchy.leaves()?.splats.len(), ball.splats.len());
 /// # Ok::<(), splatkit::Error>(())
