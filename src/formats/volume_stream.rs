@@ -123,6 +123,7 @@ impl VolumeStream {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::formats::Endian;
     use crate::{formats::load_volume, input::testing::Folder};
     use glam::DVec3;
 
