@@ -34,7 +34,7 @@ fn scene(volume: Volume, kernel: Kernel) -> Scene {
 fn refused<T: Debug>(name: &str, word: &str, result: Result<T>) {
     match result {
         Err(Error::Argument(message) | Error::Transfer(message)) => {
-            assert!(message.contains(word), "{name}: {message}")
+            assert!(message.contains(word), "{name}: {message}");
         }
         other => panic!("{name}: {other:?}"),
     }
