@@ -17,22 +17,26 @@ use std::sync::Arc;
 pub enum Item {
     /// Surfels or 3D Gaussians: splats that carry their own colour and optical depth.
     Radiance(Arc<SplatSet>),
-    /// A hierarchy of these splats. A picture shows a cut of it ([`Settings::detail`]).
+    /// A hierarchy of these splats. A picture shows a cut of it
+    /// ([`Settings::detail`](super::Settings::detail)).
     Hierarchy(Arc<Hierarchy>),
     /// Scattered samples: splats that carry a value, shown by a transfer function.
     Scalar(Arc<SplatSet>, TransferFunction),
     /// Samples on a lattice, each the centre of one kernel, shown by a transfer function.
     Volume(Arc<Volume>, Kernel, TransferFunction),
     /// A volume that may be larger than memory. A picture shows the bricks that it needs
-    /// ([`Settings::detail`], [`Settings::page_memory`]).
+    /// ([`Settings::detail`](super::Settings::detail),
+    /// [`Settings::page_memory`](super::Settings::page_memory)).
     Bricks(Arc<Bricks>, Kernel, TransferFunction),
 }
 
 impl Item {
-    /// Checks that the item can be drawn by itself, as [`Scene::validate`] does for all items.
+    /// Checks that the item can be drawn by itself, as [`Scene::validate`](super::Scene::validate)
+    /// does for all items.
     ///
     /// # Errors
-    /// [`Error::Argument`] for numbers that are not finite, or do not fit 32 bits.
+    /// [`Error::Argument`](crate::Error::Argument) for numbers that are not finite, or do not fit
+    /// 32 bits.
     pub fn validate(&self) -> Result<()> {
         numbers::check_item(self)
     }

@@ -132,7 +132,7 @@ impl Scene {
     }
 
     /// Whether the scene contains explicit splats (surfaces or scattered samples). These are
-    /// widened by [`FOOTPRINT_BLUR`] and have edges.
+    /// widened by [`FOOTPRINT_BLUR`](crate::splat::FOOTPRINT_BLUR) and have edges.
     pub fn has_splats(&self) -> bool {
         self.items.iter().any(|item| item.lattice().is_none())
     }
