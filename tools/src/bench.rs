@@ -12,14 +12,11 @@ use crate::{
     scene::{Loaded, SceneFlags},
     suite::{SuiteFlags, effort::EffortFlags},
     sweep::SweepFlags,
-    timing::{self, Times},
+    timing::{self, STEP, Times},
 };
 use clap::Args;
 use splatkit::{Error, FrameStats, Renderer, math::Camera, scene::Settings};
 use std::time::Instant;
-
-/// Degrees between frames, as in VTK's benchmark of the same view.
-pub const STEP: f64 = 5.0;
 
 /// Number of frames measured for one scene.
 const FRAMES: u32 = 10;

@@ -1,11 +1,10 @@
 //! `splatkit check`.
 
 use crate::{
-    failure::Failure,
+    failure::{Failure, in_file},
     load::{Input, LoadFlags},
     output,
     progress::Progress,
-    scene::in_file,
     terminal::safe,
 };
 use clap::Args;

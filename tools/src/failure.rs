@@ -187,6 +187,14 @@ fn room(error: &io::Error) -> Option<&'static str> {
     }
 }
 
+/// Adds the file's name to errors that lack it.
+pub fn in_file(path: &Path, error: Error) -> Error {
+    match error {
+        Error::Argument(what) | Error::Transfer(what) => Error::input(path, "content", what),
+        other => other.in_file(path),
+    }
+}
+
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         Self::Library(error)

@@ -1,6 +1,9 @@
 //! The flags of the kernel that reconstructs the field from the samples of a lattice.
 
-use crate::{failure::Failure, parse, scene::in_file};
+use crate::{
+    failure::{Failure, in_file},
+    parse,
+};
 use clap::Args;
 use splatkit::{
     input::{Limits, Source},

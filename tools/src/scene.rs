@@ -2,7 +2,7 @@
 
 use crate::{
     camera::Subject,
-    failure::Failure,
+    failure::{Failure, in_file},
     load::{Input, LoadFlags},
     progress::Progress,
     show::{Show, ShowFlags},
@@ -238,12 +238,4 @@ fn overview(bricks: &Bricks) -> usize {
     const QUICK: usize = 1 << 24;
     let is_quick = |level: &Level| level.dims.iter().product::<usize>() <= QUICK;
     bricks.levels().iter().position(is_quick).unwrap_or(bricks.levels().len() - 1)
-}
-
-/// Adds the file's name to errors that lack it.
-pub fn in_file(path: &Path, error: Error) -> Error {
-    match error {
-        Error::Argument(what) | Error::Transfer(what) => Error::input(path, "content", what),
-        other => other.in_file(path),
-    }
 }

@@ -1,5 +1,8 @@
 //! Frame times.
 
+/// Degrees between frames, as in VTK's benchmark of the same view.
+pub const STEP: f64 = 5.0;
+
 /// Statistics of frame times, in milliseconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Times {

@@ -1,7 +1,12 @@
 //! Volumes in levels of bricks.
 
 use super::{Convert, memory, source::Source};
-use crate::{failure::Failure, output, progress::Progress, render::milliseconds, scene::in_file};
+use crate::{
+    failure::{Failure, in_file},
+    output,
+    progress::Progress,
+    render::milliseconds,
+};
 use serde_json::json;
 use splatkit::{
     Error,

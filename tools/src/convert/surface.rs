@@ -2,8 +2,11 @@
 
 use super::{Convert, memory};
 use crate::{
-    failure::Failure, load::Input, output, parse, progress::Progress, render::milliseconds,
-    scene::in_file,
+    failure::{Failure, in_file},
+    load::Input,
+    output, parse,
+    progress::Progress,
+    render::milliseconds,
 };
 use clap::{Args, ValueEnum};
 use serde_json::json;

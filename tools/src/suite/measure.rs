@@ -4,7 +4,11 @@ use super::{
     case::{Case, Plan, Seed, Series},
     memory,
 };
-use crate::{bench::STEP, progress::Progress, render::milliseconds, timing::Times};
+use crate::{
+    progress::Progress,
+    render::milliseconds,
+    timing::{STEP, Times},
+};
 use splatkit::{
     Device, Error, FrameStats, Renderer, Result,
     picture::Picture,
@@ -102,9 +106,13 @@ fn outcome(plan: Plan, device: &Device, counts: Counts, progress: &Progress) -> 
 
 fn measure(case: Case, device: &Device, counts: Counts) -> Result<Measured> {
     memory::reset_peak();
-    let scattered = frames(&case, &case.settings, device, counts)?;
-    require_content(&scattered.stats)?;
+    // A new renderer: one that has drawn before keeps the largest buffers that it has needed.
+    let mut renderer = Renderer::new(device, &case.scene)?;
+    let stats = renderer.draw(&case.camera(0.0), &case.settings)?;
+    require_content(&stats)?;
+    let (times, steps) = timed(&mut renderer, &case, &case.settings, counts)?;
     let cpu_peak = memory::peak();
+    drop(renderer);
     let gathered = gathered(&case, device, counts)?;
     let same_bytes =
         if counts.runs > 1 { Some(same_bytes(&case, device, counts.runs)?) } else { None };
@@ -114,29 +122,22 @@ fn measure(case: Case, device: &Device, counts: Counts) -> Result<Measured> {
         effective: case.effective,
         seed: case.seed,
         series: case.series,
-        times: scattered.times,
-        stats: scattered.stats,
+        times,
+        stats,
         cpu_peak,
-        steps: scattered.steps,
+        steps,
         gathered,
         same_bytes,
     })
 }
 
-/// Frames of one case with one set of settings.
-struct Frames {
-    times: Times,
-    /// Of the first view.
-    stats: FrameStats,
-    /// Milliseconds of each step of the first view.
-    steps: Vec<(&'static str, f64)>,
-}
-
-/// Draws and times the case's frames with `settings`. Uses a renderer of its own: a renderer keeps
-/// the largest buffers that it has ever needed.
-fn frames(case: &Case, settings: &Settings, device: &Device, counts: Counts) -> Result<Frames> {
-    let mut renderer = Renderer::new(device, &case.scene)?;
-    let stats = renderer.draw(&case.camera(0.0), settings)?;
+/// Times the case's frames, and the steps of its first view in milliseconds.
+fn timed(
+    renderer: &mut Renderer,
+    case: &Case,
+    settings: &Settings,
+    counts: Counts,
+) -> Result<(Times, Vec<(&'static str, f64)>)> {
     let mut times = Vec::new();
     for frame in 1..=counts.frames {
         let camera = case.camera(STEP * f64::from(frame));
@@ -144,20 +145,22 @@ fn frames(case: &Case, settings: &Settings, device: &Device, counts: Counts) -> 
         renderer.draw(&camera, settings)?;
         times.push(milliseconds(start));
     }
-    let steps = renderer.profile(&case.camera(0.0), settings)?.steps;
-    Ok(Frames { times: Times::of(times), stats, steps })
+    Ok((Times::of(times), renderer.profile(&case.camera(0.0), settings)?.steps))
 }
 
-/// Measures the case once more as the engine draws it by itself. Returns `None` if it does not
-/// gather there.
+/// Measures the case as the engine draws it by default. Returns `None` if the scene has no lattice
+/// or the engine does not gather it.
 fn gathered(case: &Case, device: &Device, counts: Counts) -> Result<Option<Gathered>> {
-    let settings = Settings { evaluate: Evaluate::Auto, ..case.settings.clone() };
-    let mut renderer = Renderer::new(device, &case.scene)?;
-    if renderer.draw(&case.camera(0.0), &settings)?.gathered == 0 {
+    if case.scene.items.iter().all(|item| item.lattice().is_none()) {
         return Ok(None);
     }
-    drop(renderer);
-    let Frames { times, steps, stats } = frames(case, &settings, device, counts)?;
+    let settings = Settings { evaluate: Evaluate::Auto, ..case.settings.clone() };
+    let mut renderer = Renderer::new(device, &case.scene)?;
+    let stats = renderer.draw(&case.camera(0.0), &settings)?;
+    if stats.gathered == 0 {
+        return Ok(None);
+    }
+    let (times, steps) = timed(&mut renderer, case, &settings, counts)?;
     Ok(Some(Gathered { times, steps, bytes: stats.gpu_bytes }))
 }
 
