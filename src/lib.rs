@@ -4,6 +4,10 @@
 //! ([`splat`]) in a [`Scene`](scene::Scene) → a [`Renderer`], which draws with the [`gpu`] on wgpu (one pass, one Rust file, one
 //! shader) or with that for processors ([`cpu`]) → a [`Picture`](picture::Picture).
 
+// The scenes of the integration tests, which unit tests share, call the crate by its name.
+#[cfg(test)]
+extern crate self as splatkit;
+
 pub mod bricks;
 pub mod compare;
 pub mod container;

@@ -16,7 +16,7 @@
 @group(1) @binding(4) var<storage, read_write> arguments: array<u32, 3>;
 
 // A sphere around the parents of a batch's nodes, and the largest of the parents' sizes. The size
-// is negative if a node is a root. Mirrors engine/nodes.rs.
+// is negative if a node is a root. Mirrors src/gpu/scene/nodes.rs.
 struct Bounds {
     center: vec3<f32>,
     radius: f32,

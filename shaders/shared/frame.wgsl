@@ -1,5 +1,5 @@
 // The data of the picture for every pass: the view, the sheets, the light. Mirrors
-// engine/uniforms.rs.
+// src/plan/uniforms.rs.
 
 struct Frame {
     // Size of the picture in pixels, and in tiles.
@@ -101,7 +101,7 @@ struct Pass {
     unused: vec2<u32>,
 }
 
-// The placement of one item in the view. Mirrors engine/uniforms.rs.
+// The placement of one item in the view. Mirrors src/plan/uniforms.rs.
 struct Source {
     // Columns of the matrix to view space, from the item's local frame (explicit splats) or from
     // lattice steps.
@@ -146,7 +146,7 @@ fn record_words(flags: u32) -> u32 {
 const OPAQUE: f32 = 0.0005;
 
 // Returns the columns and rows of a dispatch. A row has at most MOST_WORKGROUPS workgroups
-// (engine/stage.rs); more go into further rows.
+// (src/gpu/pipeline/stage.rs); more go into further rows.
 fn rows_of(workgroups: u32) -> vec2<u32> {
     let columns = min(workgroups, MOST_WORKGROUPS);
     return vec2(columns, (workgroups + columns - 1u) / max(columns, 1u));

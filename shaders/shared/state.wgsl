@@ -1,5 +1,5 @@
 // The progress of a frame: the words of the buffer `state`, which the CPU reads after a series of
-// passes. Mirrors engine/uniforms.rs.
+// passes. Mirrors src/gpu/pipeline/state.rs.
 
 // The needs of the whole frame, including hidden parts: entries, record words, splats.
 const ENTRIES: u32 = 0u;

@@ -1,5 +1,5 @@
 // Functions of one value, as tables: the transfer function and its integral, the gradient factor,
-// the kernel's sections. Mirrors engine/tables.rs, which defines their places in `tables`.
+// the kernel's sections. Mirrors src/plan/tables.rs, which defines their places in `tables`.
 
 // Colour and extinction per value; their integrals (extinction times colour, extinction) from the
 // first value on, in entries; the factor on the extinction by gradient magnitude; the kernel and

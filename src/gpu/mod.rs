@@ -23,6 +23,8 @@
 //! docs/engine.md tells the mathematics.
 
 pub(crate) mod budget;
+#[cfg(test)]
+mod checks;
 pub(crate) mod device;
 mod frame;
 mod passes;

@@ -3,8 +3,9 @@
 use crate::gpu::{
     device::Gpu,
     pipeline::{
+        recipe::{Binding, Recipe},
         shaders,
-        stage::{Binding, Stage},
+        stage::Stage,
         variant::Variant,
     },
     targets::Targets,
@@ -16,6 +17,10 @@ pub struct March(Stage);
 
 impl March {
     pub fn new(gpu: &Gpu, variant: &Variant) -> Self {
+        Self(Stage::new(gpu, &Self::recipe(variant)))
+    }
+
+    pub fn recipe(variant: &Variant) -> Recipe {
         use Binding::{Read, Uniform, Write};
         let constants = variant.constants();
         let mut sources = vec![
@@ -40,13 +45,7 @@ impl March {
             sources.push(shaders::FIELD_SUMS);
         }
         let texture: &[&[Binding]] = if variant.gather { &[&[Binding::Texture]] } else { &[] };
-        Self(Stage::new(
-            gpu,
-            "march",
-            &sources,
-            "march",
-            &[&[bindings.as_slice()], texture].concat(),
-        ))
+        Recipe::new("march", &sources, "march", &[&[bindings.as_slice()], texture].concat())
     }
 
     /// `arguments`: where in the pass's the dispatch stands.
