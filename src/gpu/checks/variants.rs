@@ -6,7 +6,7 @@ use crate::{
     gpu::{
         budget::Budget,
         pipeline::variant::Variant,
-        scene::field::{FOUR, gathered_volume},
+        scene::field::{FOUR, gathered_volume, kind_of},
         variant::{Request, variant},
     },
     hierarchy::Detail,
@@ -14,7 +14,10 @@ use crate::{
     scene::{Classification, Gradient, Item, Mode, Optics, Order, Scene, Settings},
     volume::{Shade, Volume},
 };
-use std::{collections::HashSet, sync::Arc};
+use std::{
+    collections::HashSet,
+    sync::{Arc, LazyLock},
+};
 
 /// The scenes of the integration tests.
 fn cases() -> Vec<Case> {
@@ -72,7 +75,7 @@ fn cases() -> Vec<Case> {
         methods::sharp(),
         methods::sharp_body_centred(),
     ];
-    all.extend([0.25, 1.5, 3.0].map(bricks));
+    all.extend([0.25, 9.0, 20.0].map(bricks));
     all
 }
 
@@ -135,7 +138,8 @@ fn cameras(case: &Case) -> [Case; 3] {
 }
 
 /// Adds the variants of a case in some settings: on a GPU and in software, gathered and scattered.
-fn add(case: &Case, settings: &Settings, found: &mut Found) {
+/// `is_usual` says whether the settings are the case's own.
+fn add(case: &Case, settings: &Settings, is_usual: bool, found: &mut Found) {
     if case.scene.validate_settings(settings).is_err() {
         return;
     }
@@ -144,8 +148,10 @@ fn add(case: &Case, settings: &Settings, found: &mut Found) {
     let choice = case.scene.choice(&view, settings, settings.detail, usize::MAX, &bounds);
     let sheets = case.scene.sheets_of(&view, settings, choice.as_ref(), &bounds);
     let mut kinds = vec![None];
-    if gathered_volume(&case.scene, settings, &sheets).is_ok() {
-        kinds.extend((0..=FOUR).map(Some));
+    if let Ok(volume) = gathered_volume(&case.scene, settings, &sheets) {
+        // Settings do not change how samples are read, so one of them is enough for all types.
+        let own = kind_of(volume.samples.scalar());
+        kinds.extend(if is_usual { 0..=FOUR } else { own..=own }.map(Some));
     }
     let stopping = Budget { tile_entries: Some(500), ..Budget::default() };
     for gathered in kinds {
@@ -176,23 +182,23 @@ impl Found {
     }
 }
 
-/// Returns the variants of all cases, in the settings around their own, each with a scene's name.
-pub fn all() -> Vec<(&'static str, Variant)> {
+/// The variants of all cases, in the settings around their own, each with a scene's name.
+pub static ALL: LazyLock<Vec<(&str, Variant)>> = LazyLock::new(|| {
     let mut found = Found::default();
     for case in cases() {
         for case in cameras(&case) {
-            for settings in neighbours(&case) {
-                add(&case, &settings, &mut found);
+            for (number, settings) in neighbours(&case).iter().enumerate() {
+                add(&case, settings, number == 0, &mut found);
             }
         }
     }
     found.list
-}
+});
 
 /// Returns the variants of one scene with splats and a volume, gathered and scattered.
 pub fn usual() -> Vec<Variant> {
     let case = scenes::surface_in_a_volume();
     let mut found = Found::default();
-    add(&case, &case.settings, &mut found);
+    add(&case, &case.settings, true, &mut found);
     found.list.into_iter().map(|(_, variant)| variant).collect()
 }
